@@ -91,6 +91,10 @@ class Result(TableView):
         if not has_findings and not hasattr(cls, "findings"):
             cls.findings = ()  # type: ignore[assignment, method-assign]  # a property by default
 
+    def settings_tables(self) -> tuple[Table, ...]:
+        """Tables of what was set otherwise, beside the summary; by default none."""
+        return ()
+
     def _computed(self) -> dict[str, object]:
         """Values computed from the fields, by key; one that has a field's name replaces it."""
         return {}

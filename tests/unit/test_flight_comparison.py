@@ -15,6 +15,7 @@ from flightid.conventions import Light
 from flightid.dynamics.conditions.ratios import difference_of
 from flightid.errors import DataError
 from flightid.plot.flight import compared_steps
+from flightid.review.comparison import TRACKING, compare_loops
 from flightid.review.next_step import flown_step
 from flightid.review.promised import promised_loops
 from flightid.uncertainty.estimate import Estimate
@@ -57,6 +58,57 @@ def test_a_flight_with_more_gain_is_told_from_one_with_the_same(logs: dict[str, 
     assert "roll rate, rise time" in more.significant
     assert (more["roll rate, rise time"].difference.interval95 or (0.0, 0.0))[1] < 0.0
     assert len(compared_steps(more).data) > 4
+
+
+def test_a_slower_loop_is_amber_and_its_way_back_is_not(logs: dict[str, Path]) -> None:
+    slower = fid.compare_flights(logs["after"], logs["before"])
+    found = next(f for f in slower.findings if f.message.startswith("roll rate"))
+    assert found.light is Light.AMBER
+    assert "worse: " in found.action
+    assert "rise time" in found.action
+    quick = replace(slower.before[0], moved=3.0 * (slower.before[0].moved or 0.0))
+    again = compare_loops((quick,), (slower.before[0],), ("a", "b"), promised=False)
+    assert [f.light for f in again.findings] == [Light.UNKNOWN]
+    assert_close(
+        again[f"{quick.name}, {TRACKING}"].after.value or 0.0,
+        3.0 * (again[f"{quick.name}, {TRACKING}"].before.value or 0.0),
+        rtol=1e-9, why="the same error of a third of the set-point",
+    )  # fmt: skip
+
+
+def test_gains_filters_and_other_vehicles_are_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    old = ordinary(tmp_path / "old.bin")
+    new = ordinary(tmp_path / "new.bin", autopilot=Autopilot().with_parameters(
+        {"ATC_RAT_YAW_P": 0.5, "INS_GYRO_FILTER": 30.0}
+    ))  # fmt: skip
+    page = tmp_path / "page.html"
+    assert run(["compare", str(old), str(new), "--html", str(page)]) == 0
+    said = capsys.readouterr().out
+    for text in ("Gains that differ", "ATC_RAT_YAW_P", "Filters that differ", "two poles at 30 Hz"):
+        assert text in said
+        assert text in page.read_text()
+    review = fid.review_flight(old)
+    battery = None if review.identity.battery is None else replace(review.identity.battery, cells=6)
+    other = replace(
+        review, name="b", firmware="V5", identity=replace(review.identity, battery=battery)
+    )
+    found = fid.compare_flights(review, other)
+    assert (found.findings[0].code, found.findings[0].light) == ("not-alike", Light.AMBER)
+    assert found.summary().title.endswith("of different firmware")
+
+
+def test_what_is_read_over_another_time_is_said(logs: dict[str, Path]) -> None:
+    long = fid.review_flight(logs["before"])
+    cut = tuple(
+        replace(each, time_s=each.time_s[:-9], step=each.step[:-9], draws=each.draws[:, :-9])
+        for each in long.loops
+        if each.is_told
+    )
+    notes = fid.compare_flights(long, replace(long, loops=cut)).summary().notes
+    assert any("flightid flight reads each over its own" in note for note in notes)
+    assert not any("over its own" in n for n in fid.compare_flights(long, long).summary().notes)
 
 
 def test_parts_of_one_log_are_compared(

@@ -39,11 +39,12 @@ def command(
     """What changed from A to B, and what is more than chance.
 
     Two logs, or parts of logs (flight.BIN@20:80, s on its clock): steps, bandwidths and tracking of
-    the loops, and gains that differ. Models, then a log: what they promise of the gains that it
-    flew beside what it shows; where `flightid tune --write` left its files beside either, the next
-    step to fly or the file that takes this one back. Models alone: parameters and modes with their
-    ratios, the first as base. A model is a .toml file, the folder of a study, the JSON of a fit, or
-    a library name. To see which predicts better: `flightid verify MODEL RECORDS --against MODEL`.
+    the loops, gains and filters that differ, and whether vehicle, firmware or battery do. Models,
+    then a log: what they promise of the gains that it flew beside what it shows; where `flightid
+    tune --write` left its files beside either, the next step to fly or the file that takes this one
+    back. Models alone: parameters and modes with their ratios, the first as base. A model is a
+    .toml file, the folder of a study, the JSON of a fit, or a library name. To see which predicts
+    better: `flightid verify MODEL RECORDS --against MODEL`.
     """
     from flightid import compare_conditions
     from flightid.uncertainty.quantiles import showing
@@ -62,6 +63,9 @@ def command(
         raise click.UsageError("two logs are compared at a time")
     with showing(level):
         made = _flights(*files) if len(flights) == 2 else _promise(files[:-1], files[-1])
+        if not as_json:
+            for table in made.settings_tables():
+                click.echo(f"{table}\n")
         show(made, "Comparison", as_json=as_json, html=html, level=level)
 
 

@@ -67,13 +67,14 @@ def write_page(result: Result, title: str, path: Path, *beside: Result) -> Path:
     from flightid.errors import DataError, OptionError
     from flightid.files import write_atomically
     from flightid.report.blocks import result_blocks
-    from flightid.report.content import Block, Document, Section
+    from flightid.report.content import Block, Document, Section, TableBlock
     from flightid.report.figures import figure_block
     from flightid.report.html import to_html
 
     sections = []
     for one in (result, *beside):
         blocks: list[Block] = [*result_blocks(one)]
+        blocks += [TableBlock(each) for each in one.settings_tables()]
         try:
             blocks.append(figure_block(one.plot(), one.summary().title))
         except (OptionError, DataError) as reason:

@@ -6,7 +6,8 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from flightid.logs import Log, read_log
-from flightid.review.comparison import FlightComparison, compare_loops, gains_between
+from flightid.review.apart import filters_between, gains_between, unlike_between
+from flightid.review.comparison import FlightComparison, compare_loops
 from flightid.review.flight import review_flight
 from flightid.review.promised import promised_loops
 from flightid.review.result import FlightReview
@@ -45,8 +46,15 @@ def compare_flights(before: Flown, after: Flown) -> FlightComparison:
     names = first.name, second.name
     if names[0] == names[1]:
         names = f"{names[0]}, before", f"{names[1]}, after"
-    gains = gains_between(first, second)
-    return compare_loops(first.loops, second.loops, names, gains=gains, promised=False)
+    return compare_loops(
+        first.loops,
+        second.loops,
+        names,
+        gains=gains_between(first, second),
+        filters=filters_between(first, second),
+        unlike=unlike_between(first, second),
+        promised=False,
+    )
 
 
 def compare_with_promise(sources: Iterable[object], after: Log | str | Path) -> FlightComparison:
@@ -76,7 +84,7 @@ def compare_with_promise(sources: Iterable[object], after: Log | str | Path) -> 
     log = after if isinstance(after, Log) else read_log(after)
     names = "the models", log.path.name
     promise = promised_loops(sources, log)
-    return compare_loops(promise, review_flight(log).loops, names, gains={}, promised=True)
+    return compare_loops(promise, review_flight(log).loops, names, promised=True)
 
 
 def _review(flown: Flown) -> FlightReview:

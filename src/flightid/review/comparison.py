@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +16,6 @@ from flightid.errors import DataError
 from flightid.findings import Finding
 from flightid.result import Result
 from flightid.review.loop_response import LoopResponse
-from flightid.review.result import FlightReview
 from flightid.review.step_features import step_features
 from flightid.review.tables import cell
 from flightid.table import Cell, Column, Table
@@ -22,11 +23,21 @@ from flightid.uncertainty.estimate import Reading
 from flightid.uncertainty.quantiles import interval_words, shown
 
 SHOWN = ("delay to half", "rise time", "overshoot", "level")
-BY_FREQUENCY = "bandwidth at -3 dB"
+BY_FREQUENCY, TRACKING = "bandwidth at -3 dB", "tracking error of set-point"
+WORSE = {
+    "delay to half": 1.0,
+    "rise time": 1.0,
+    "overshoot": 1.0,
+    BY_FREQUENCY: -1.0,
+    TRACKING: 1.0,
+}
+"""Which way a number of a loop gets worse."""
+STEPS = "Steps of both are read over the time that both show"
 MATERIAL_SHARE, MATERIAL_OVERSHOOT = 0.1, 5.0
 """A tenth of what was promised, or five points of overshoot: what no pilot feels is no miss. A
 model's simplification alone moves numbers by a few percent, which its covariance does not hold."""
 IN_MILLISECONDS = 1e3
+NONE: Mapping[str, tuple[Any, Any]] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -65,6 +76,14 @@ class LoopChange:
             return apart >= MATERIAL_OVERSHOOT
         return apart >= MATERIAL_SHARE * abs(old)
 
+    @property
+    def is_worse(self) -> bool:
+        """Whether a pilot would feel it, and would rather not: slower, or less true."""
+        if self.name == "level":
+            old, new = (abs((each.value or 0.0) - 1.0) for each in (self.before, self.after))
+            return self.is_material and new > old
+        return self.is_material and WORSE[self.name] * (self.difference.value or 0.0) > 0.0
+
     def to_dict(self) -> dict[str, object]:
         """Plain values."""
         pairs = {key: getattr(self, key).to_dict() for key in ("before", "after", "difference")}
@@ -85,6 +104,10 @@ class FlightComparison(Result, schema="flightid.flight_comparison/1"):
     before, after : tuple of LoopResponse
     gains : mapping of str to tuple of float
         Parameters that differ: before and after.
+    filters : mapping of str to tuple of str
+        Filters whose settings differ: before and after.
+    unlike : mapping of str to tuple of str
+        What else differs that loops depend on: vehicle, firmware, frame, battery.
     significant : tuple of str
         ``"loop, name"`` of what changed beyond chance.
     findings : tuple of Finding
@@ -101,6 +124,8 @@ class FlightComparison(Result, schema="flightid.flight_comparison/1"):
     before: tuple[LoopResponse, ...]
     after: tuple[LoopResponse, ...]
     gains: Mapping[str, tuple[float, float]]
+    filters: Mapping[str, tuple[str, str]]
+    unlike: Mapping[str, tuple[str, str]]
     significant: tuple[str, ...]
     findings: tuple[Finding, ...]
 
@@ -150,10 +175,29 @@ class FlightComparison(Result, schema="flightid.flight_comparison/1"):
         notes = (
             f"In brackets: {interval_words(chosen)} intervals. Changed: beyond chance, one false "
             "“yes” in 20 such tables.",
+            *self._windows(),
             *map(str, self.findings),
         )
         title = f"{self.names[0]} and {self.names[1]}"
+        if self.unlike:
+            title = f"{title}, of different {', '.join(self.unlike)}"
         return Table(title, columns, tuple(rows), notes)
+
+    def _windows(self) -> Iterator[str]:
+        """That steps are read otherwise than each flight's own, and what tracking depends on."""
+        later = {loop.name: loop for loop in self.after}
+        told = dict.fromkeys(each.loop for each in self.changes)
+        pairs = [(loop, later[loop.name]) for loop in self.before if loop.name in told]
+        ends = {a.name: [each.time_s[-1] for each in (a, b)] for a, b in pairs}
+        cut = [f"{n}: {min(e):.2g} s" for n, e in ends.items() if max(e) > 1.001 * min(e)]
+        if cut:
+            alone = "" if self.promised else "; flightid flight reads each over its own"
+            yield f"{STEPS} ({'; '.join(cut)}){alone}."
+        if any(each.name == TRACKING for each in self.changes):
+            yield (
+                "Tracking error: rms of the error over that of the set-point; it depends on how "
+                "fast the sticks moved too."
+            )
 
     def gains_table(self) -> Table:
         """Parameters that differ."""
@@ -166,9 +210,18 @@ class FlightComparison(Result, schema="flightid.flight_comparison/1"):
         )
         return Table("Gains that differ", columns, rows)
 
+    def filters_table(self) -> Table:
+        """Filters whose settings differ."""
+        rows = tuple((name, *settings) for name, settings in self.filters.items())
+        columns = Column("filter"), Column(self.names[0]), Column(self.names[1])
+        return Table("Filters that differ", columns, rows)
+
+    def settings_tables(self) -> tuple[Table, ...]:
+        """What was set otherwise: gains, filters; those that have rows."""
+        return tuple(t for t in (self.gains_table(), self.filters_table()) if t.rows)
+
     def _tables(self) -> tuple[Table, ...]:
-        gains = self.gains_table()
-        return (gains, self.summary()) if gains.rows else (self.summary(),)
+        return (*self.settings_tables(), self.summary())
 
     def __repr__(self) -> str:
         """Names and number of changes on one line."""
@@ -183,7 +236,9 @@ def compare_loops(
     after: tuple[LoopResponse, ...],
     names: tuple[str, str],
     *,
-    gains: Mapping[str, tuple[float, float]],
+    gains: Mapping[str, tuple[float, float]] = NONE,
+    filters: Mapping[str, tuple[str, str]] = NONE,
+    unlike: Mapping[str, tuple[str, str]] = NONE,
     promised: bool,
 ) -> FlightComparison:
     """Put the loops of two flights, or of a promise and a flight, side by side."""
@@ -207,8 +262,10 @@ def compare_loops(
     chances = {f"{c.loop}, {c.name}": c.chance for c in changes if c.chance is not None}
     significant = holm(chances)
     kept = tuple(name for name in chances if name in significant)
-    findings = tuple(_judged(changes, kept, promised=promised))
-    return FlightComparison(names, promised, changes, before, after, gains, kept, findings)
+    findings = (*_unlike(unlike), *_judged(changes, kept, promised=promised))
+    return FlightComparison(
+        names, promised, changes, before, after, gains, filters, unlike, kept, findings
+    )
 
 
 def _pairs(before: LoopResponse, after: LoopResponse) -> Iterator[tuple[Reading, Reading]]:
@@ -226,8 +283,8 @@ def _readings(loop: LoopResponse, end_s: float) -> dict[str, Reading]:
     steps = np.vstack([loop.step, loop.draws])[:, kept]
     found = {r.name: r for r in step_features(steps, loop.time_s[kept]) if r.name in SHOWN}
     found |= {r.name: r for r in loop.readings if r.name == BY_FREQUENCY}
-    if loop.tracking is not None:
-        found[loop.tracking.name] = loop.tracking
+    if loop.tracking is not None and loop.tracking.value is not None and loop.moved:
+        found[TRACKING] = loop.tracking.scaled(100.0 / loop.moved, name=TRACKING, unit="%")
     return found
 
 
@@ -242,6 +299,15 @@ def _shown_unit(unit: str) -> tuple[float, str]:
     return (IN_MILLISECONDS, "ms") if unit == "s" else (1.0, "" if unit == "1" else unit)
 
 
+def _unlike(unlike: Mapping[str, tuple[str, str]]) -> Iterator[Finding]:
+    if unlike:
+        said = "; ".join(f"{what} {old} → {new}" for what, (old, new) in unlike.items())
+        yield Finding(
+            "not-alike", Light.AMBER, f"more than gains may differ between the two logs: {said}",
+            "compare flights of one vehicle in one state, or hold these for causes as well",
+        )  # fmt: skip
+
+
 def _judged(
     changes: tuple[LoopChange, ...], significant: tuple[str, ...], *, promised: bool
 ) -> Iterator[Finding]:
@@ -250,17 +316,14 @@ def _judged(
         if f"{each.loop}, {each.name}" in significant and (each.is_material or not promised):
             by_loop.setdefault(each.loop, []).append(each)
     for loop, found in by_loop.items():
-        worse = any(
-            c.name == "overshoot" and c.is_material and (c.difference.value or 0.0) > 0.0
-            for c in found
-        )
         said = "; ".join(each.words for each in found)
-        yield Finding(
-            "promise-missed" if promised else "loop-changed",
-            Light.AMBER if promised or worse else Light.GREEN,
-            f"{loop}, {'promised → flown' if promised else 'before → after'}: {said}",
-            "look at the steps before you fly more" if promised or worse else "",
-        )
+        if promised:
+            yield Finding(
+                "promise-missed", Light.AMBER, f"{loop}, promised → flown: {said}",
+                "look at the steps before you fly more",
+            )  # fmt: skip
+        else:
+            yield _changed(f"{loop}, before → after: {said}", found)
     if not by_loop:
         said = f"{len(changes)} numbers of {len({c.loop for c in changes})} loops"
         yield Finding(
@@ -269,10 +332,13 @@ def _judged(
         )  # fmt: skip
 
 
-def gains_between(before: FlightReview, after: FlightReview) -> dict[str, tuple[float, float]]:
-    """Flown gains that differ between two flights."""
-    old, new = (
-        {name: v for values in each.identity.gains.values() for name, v in values.items()}
-        for each in (before, after)
-    )
-    return {name: (old[name], new[name]) for name in old if name in new and old[name] != new[name]}
+def _changed(said: str, found: list[LoopChange]) -> Finding:
+    """Amber where something got worse; not judged where the tracking error alone did."""
+    worse = [each.name for each in found if each.is_worse]
+    if not worse:
+        return Finding("loop-changed", Light.GREEN, said)
+    if worse == [TRACKING]:
+        action = "compare flights whose sticks moved alike: quicker sticks are tracked worse"
+        return Finding("loop-changed", Light.UNKNOWN, said, action)
+    action = f"worse: {', '.join(worse)}; look at the steps and at what was set otherwise, and go "
+    return Finding("loop-changed", Light.AMBER, said, action + "back unless you wanted it")
