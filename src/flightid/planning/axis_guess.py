@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
+from numpy.typing import NDArray
 
 from flightid.control.autopilots.axis_loop import AxisLoop
 from flightid.errors import DataError, FlightidError
@@ -16,6 +18,8 @@ from flightid.planning.still_rate import still_rate
 from flightid.record import Record
 from flightid.responses import estimate_response
 
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 CHANNELS = {
     "roll": ("tau_phi", "p", "phi_ref"),
     "pitch": ("tau_theta", "q", "theta_ref"),
@@ -25,10 +29,13 @@ CHANNELS = {
 LOWEST_RAD_S, HIGHEST_RAD_S, N_OMEGA = 2.0, 60.0, 24
 SAMPLES_IN_CYCLE = 5.0
 SHORTEST_S = 5.0
-LEAST_COHERENCE, FEWEST_POINTS = 0.6, 6
-"""A frequency counts as measured from this coherence; so many make an axis measured."""
-BACKWARDS = 0.35
-"""Least distance of the broken loop from -1 at which a response is the vehicle's."""
+LARGEST_ERROR, LEAST_ERROR, FEWEST_POINTS = 0.2, 0.04, 6
+"""A frequency counts as measured up to this random error; so many make an axis measured; none
+weighs more than one of the least error, for shapes are not exact."""
+FARTHEST_CROSSOVER = 1.5
+"""What was flown must reach loop gains so near to one, from either side."""
+LARGEST_MISS, WIDEST_SHAPE = 0.3, 8.0
+"""Root mean square of the fit's logarithm, and of a time over a typical one."""
 PHASE_MARGIN_RAD = {
     "roll": math.radians(60.0),
     "pitch": math.radians(60.0),
@@ -82,8 +89,8 @@ def guess_axis(
 
     Reference
     ---------
-    Ljung, *System Identification*, 2nd ed., section 13.4 (direct approach): the response of command
-    to rate by a model of the noise, which a closed loop without excitation asks for.
+    Ljung, *System Identification*, 2nd ed., section 13.5 (joint input-output approach): the
+    direct one shows the controller backwards where gusts and noise move the command.
     """
     usual = _typical(loop, kind)
     base = replace(usual, enters=enters)
@@ -109,44 +116,86 @@ def _pieces(log: Log, axis: str, spans: tuple[Span, ...]) -> list[Record]:
     same = [each for each in streams if each.label.split(".")[0] == message]
     signals = [first, (same or streams)[0]]
     reference = find(log, angle)
-    if reference is not None and reference.rate_hz > 0.9 * min(each.rate_hz for each in signals):
-        signals.append(reference)
+    if reference is not None and reference.time_s.size > 1:
+        # As an instrument lines between samples will do: they have nothing of the gusts.
+        at = first.time_s[
+            (first.time_s >= reference.time_s[0]) & (first.time_s <= reference.time_s[-1])
+        ]
+        lines = np.interp(at, reference.time_s, reference.values)
+        signals.append(replace(reference, time_s=at, values=lines))
     made = records(signals, {command}, spans)
     return [record for record in made if record.duration_s >= SHORTEST_S]
 
 
 def _measured(axis: str, pieces: list[Record], base: FlownAxis, loop: AxisLoop) -> FlownAxis:
-    """The axis as it flew, by a model of the noise; typical in shape where the flight is silent.
+    """Gain and lags of the axis as it flew, by way of the set-point, which gusts do not move.
 
     Raises
     ------
     FlightidError
         The flight does not tell them.
     """
-    command, rate, _ = CHANNELS[axis]
+    command, rate, angle = CHANNELS[axis]
     if not pieces:
         raise DataError("no span in the air holds command and rate", found=f"{command}, {rate}")
+    if angle not in pieces[0]:
+        raise DataError("no set-point of attitude is logged", found=f"no {angle}")
     rate_hz = min(record.sample_rate_hz for record in pieces)
     highest = min(HIGHEST_RAD_S, 2.0 * np.pi * rate_hz / SAMPLES_IN_CYCLE)
     if highest < 4.0 * LOWEST_RAD_S:
         raise DataError("the log is too slow for a rate loop", found=f"{rate_hz:.3g} Hz")
     response = estimate_response(
-        pieces, inputs=command, outputs=rate, band_rad_s=(LOWEST_RAD_S, highest),
-        n_omega=N_OMEGA, estimator="prewhitened",
+        pieces, inputs=command, outputs=rate, excitations=angle,
+        band_rad_s=(LOWEST_RAD_S, highest), n_omega=N_OMEGA, estimator="instrument",
     )  # fmt: skip
-    flown = response.response[0, 0]
-    around = flown * loop.feedback(response.omega_rad_s, gyro="filtered", with_hold=False)
-    # Gusts that the loop answers show the controller backwards: around the loop that is -1.
-    coherent = (response.coherence[0, 0] >= LEAST_COHERENCE) & (abs(1.0 + around) > BACKWARDS)
-    if np.count_nonzero(coherent) < FEWEST_POINTS:
-        share = float(np.mean(coherent))
+    error = response.random_error[0, 0]
+    sure = error <= LARGEST_ERROR
+    if np.count_nonzero(sure) < FEWEST_POINTS:
         raise DataError(
-            "the flight moves the axis too little", found=f"coherence in {share:.0%} of the band"
+            "the set-point moves the axis too little",
+            found=f"errors below {LARGEST_ERROR:.0%} in {np.mean(sure):.0%} of the band",
         )
-    omega = response.omega_rad_s[coherent]
-    ratio = np.log(flown[coherent] / base.response(omega))
-    turned = np.real(ratio) + 1j * np.unwrap(np.imag(ratio))
-    return replace(base, told_omega_rad_s=tuple(omega), told_ratio=tuple(turned))
+    omega, flown = response.omega_rad_s[sure], response.response[0, 0][sure]
+    shape = _fitted(base, omega, flown, error[sure])
+    opened = shape.response(omega) * loop.feedback(omega, gyro="filtered", with_hold=False)
+    if not np.min(np.abs(opened)) < FARTHEST_CROSSOVER or not (
+        np.max(np.abs(opened)) > 1.0 / FARTHEST_CROSSOVER
+    ):
+        found = f"loop gains of {np.min(np.abs(opened)):.2g} to {np.max(np.abs(opened)):.2g}"
+        raise DataError("the set-point moves the axis far from its crossover alone", found=found)
+    return shape
+
+
+def _fitted(base: FlownAxis, omega: Array, flown: Complex, error: Array) -> FlownAxis:
+    """Gain, time constant, motor lag and delay by least squares of the logarithm.
+
+    Raises
+    ------
+    DataError
+        No such shape goes through what was flown.
+    """
+    weight = 1.0 / np.maximum(error, LEAST_ERROR)
+    weight /= np.sqrt(np.mean(weight**2))
+    names = ("gain", "time_constant_s", "motor_lag_s", "delay_s")
+    scale = float(np.median(np.abs(flown / base.response(omega))))
+    start = [scale * base.gain, base.time_constant_s, base.motor_lag_s, base.delay_s]
+
+    def shape(logs: Array) -> FlownAxis:
+        return replace(base, **dict(zip(names, np.exp(logs).tolist(), strict=True)))
+
+    def miss(logs: Array) -> Array:
+        ratio = flown / shape(logs).response(omega)
+        return np.concatenate([weight * np.log(np.abs(ratio)), weight * np.angle(ratio)])
+
+    around = np.log(start)
+    room = np.log([100.0, WIDEST_SHAPE, WIDEST_SHAPE, WIDEST_SHAPE])
+    found = scipy.optimize.least_squares(miss, around, bounds=(around - room, around + room))
+    left = float(np.sqrt(np.mean(found.fun**2)))
+    if left > LARGEST_MISS:
+        raise DataError(
+            "no gain, lag and delay go through what was flown", found=f"{left:.0%} away from it"
+        )
+    return shape(found.x)
 
 
 def _typical(loop: AxisLoop, kind: str) -> FlownAxis:

@@ -30,9 +30,6 @@ class FlownAxis(RateAxis):
         Where the sweep is added.
     still_omega_rad_s, still_density : ndarray, shape (n,)
         One-sided density of the rate without a sweep, (rad/s)²/Hz; empty: `noise_rad_s` alone.
-    told_omega_rad_s, told_ratio : ndarray, shape (n,)
-        Logarithm of what a flight showed over what gain and lags say, its ends held; empty where no
-        flight showed anything.
 
     Example
     -------
@@ -47,25 +44,11 @@ class FlownAxis(RateAxis):
     enters: Entry = "mixer"
     still_omega_rad_s: tuple[float, ...] = ()
     still_density: tuple[float, ...] = ()
-    told_omega_rad_s: tuple[float, ...] = ()
-    told_ratio: tuple[complex, ...] = ()
 
     @property
     def control_unit(self) -> str | None:
         """Unit of the input where it is not that of what is injected."""
         return None if self.loop is None or self.enters == "mixer" else self.loop.output_unit
-
-    def response(self, omega_rad_s: Array) -> NDArray[np.complex128]:
-        """Rate over command without feedback, as a flight showed it where it did."""
-        plain = super().response(omega_rad_s)
-        if not self.told_omega_rad_s:
-            return plain
-        at = np.log(np.maximum(omega_rad_s, AT_REST_RAD_S))
-        told = np.log(self.told_omega_rad_s)
-        size = np.interp(at, told, np.real(self.told_ratio))
-        # Beyond what was shown only the size is known: phase goes on as gain and lags have it.
-        turn = np.interp(at, told, np.imag(self.told_ratio))
-        return np.asarray(plain * np.exp(size + 1j * turn))
 
     def entry(self, omega_rad_s: Array) -> NDArray[np.complex128]:
         """From what is injected to the controller's output."""
