@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
@@ -17,9 +18,12 @@ from flightid.control.tuning.pid_design import PidDesign
 from flightid.control.tuning.responses import ResponseBand
 from flightid.conventions import Light
 from flightid.errors import DataError
+from flightid.logs.dataflash.writer import DataflashWriter
 from flightid.plot.gains import has_both, measured_and_predicted
 from flightid.plot.glance import flight_glance
 from flightid.review.deconvolution import LoopSamples, closed_loop
+from flightid.review.verdicts import judge_flight
+from flightid.uncertainty.estimate import Estimate
 from tests.closeness import assert_close
 from tests.ordinary_log import write_ordinary_log
 from tests.strangers.ordinary_flights import Axis, step
@@ -158,3 +162,46 @@ def test_measured_loops_stand_beside_what_models_have(review: fid.FlightReview) 
     assert_close(model.y, 0.5 * rises[::2], rtol=1e-12, why="with the gains that flew")
     measured = next(each for each in drawn if each.name == "measured" and each.line.width)
     assert_close(measured.y[:5], told[0].step[:5], rtol=1e-12, why="as the review has it")
+
+
+@pytest.mark.parametrize(
+    ("over", "error", "light"),
+    [(10.0, 5.0, Light.GREEN), (50.0, 5.0, Light.AMBER), (40.0, 25.0, Light.UNKNOWN)],
+)
+def test_large_overshoot_is_amber_and_wide_intervals_are_not_green(
+    review: fid.FlightReview, over: float, error: float, light: Light
+) -> None:
+    loop = review["roll rate"]
+    told = Estimate("overshoot", over, "%", error)
+    readings = tuple(told if r.name == told.name else r for r in loop.readings)
+    found = judge_flight(replace(review, loops=(replace(loop, readings=readings),)))
+    step = next(f for f in found if f.code == "step-roll-rate")
+    assert step.light is light
+    assert bool(step.action) is (light is not Light.GREEN)
+
+
+def test_a_yaw_moment_is_mended_before_the_limits_that_it_leads_to(
+    review: fid.FlightReview,
+) -> None:
+    low = replace(review, motors=(replace(review.motors[0], at_lower=0.3),))
+    assert any("MOT_SPIN_MIN" in finding.action for finding in judge_flight(low))
+    trim = Estimate("counter-clockwise less clockwise motors", 1.09, "1", 0.05)
+    found = judge_flight(replace(low, yaw_trim=trim))
+    assert not any("MOT_SPIN_MIN" in finding.action for finding in found)
+    said = [finding.code for finding in found]
+    assert said.index("yaw-trimmed") < said.index("motor-at-lower")
+
+
+def test_outputs_without_parameters_are_said_to_be_there(tmp_path: Path) -> None:
+    writer = DataflashWriter()
+    stamps = np.arange(10_000_000, 20_000_000, 100_000)
+    writer.message(int(stamps[0]), "ArduCopter V4.6.0 (test)")
+    writer.add("RCOU", stamps, {"C1": 1500.0, "C2": 1500.0})
+    writer.write(tmp_path / "bare.bin")
+    review = fid.review_flight(tmp_path / "bare.bin")
+    told = next(f for f in review.findings if f.code == "flight-unknown")
+    assert "outputs are logged (RCOU)" in told.message
+    assert "PARM" in told.action
+    assert ("in the air", "not known") in review.flight().rows
+    assert review.to_dict()["airborne_s"] is None
+    assert "airborne not known" in fid.inspect_log(tmp_path / "bare.bin").in_short()

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from flightid import Record, run_study
+from flightid import Record, inspect_log, run_study
 from flightid.cli.program import run
+from flightid.conventions import Light
 from flightid.errors import DataError, OptionError, StudyError, UnknownNameError
+from flightid.findings import Finding
 from flightid.study.proposal import Proposal, propose_study
 from flightid.study.proposal.columns import columns_of
+from tests.ordinary_log import write_ordinary_log
 
 RIG_WITH_GAINS = """
 [study]
@@ -111,6 +115,19 @@ def test_data_without_a_model_give_no_study(tmp_path: Path) -> None:
     with pytest.raises(StudyError, match="carry no model"):
         Proposal((), ()).write(tmp_path / "study.toml")
     assert "No model can be identified" in Proposal((), ()).refusal()
+
+
+def test_a_fall_comes_first_then_the_commands_that_go_on(tmp_path: Path) -> None:
+    write_ordinary_log(tmp_path / "day.bin", duration_s=20.0)
+    looked = inspect_log(tmp_path / "day.bin")
+    fall = Finding("tipped-over", Light.AMBER, "it falls", "look for its cause")
+    missed = (Finding("no-model", Light.RED, "roll: no model, no sweep", "fly a sweep"),)
+    said = Proposal((), (), missed, replace(looked, findings=(*looked.findings, fall))).refusal()
+    todo = said.partition("What to do, the first first\n")[2].splitlines()
+    assert [line.split(":")[0] for line in todo[:4]] == [
+        "- look for its cause", "- flightid plan day.bin", "- flightid flight day.bin",
+        "- fly a sweep",
+    ]  # fmt: skip
 
 
 def test_records_without_times_take_a_sample_time_into_the_study(tmp_path: Path) -> None:

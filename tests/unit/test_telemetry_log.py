@@ -46,6 +46,15 @@ def _open(folder: Path, content: bytes) -> fid.Log:
     return fid.read_log(path)
 
 
+def test_telemetry_is_called_so_with_modes_by_name(tmp_path: Path) -> None:
+    log = _open(tmp_path, _telemetry())
+    review = fid.review_flight(log)
+    assert [span.mode for span in review.identity.modes] == ["LOITER"]
+    assert ("vehicle", "telemetry of a copter") in review.flight().rows
+    assert "card" in next(f.action for f in review.findings if f.code == "no-set-points")
+    assert not any("faster" in finding.action for finding in review.findings)
+
+
 @pytest.mark.parametrize("how", [{}, {"old": True}, {"signed": True}])
 def test_frames_come_back(tmp_path: Path, how: dict[str, bool]) -> None:
     log = _open(tmp_path, _telemetry(**how))

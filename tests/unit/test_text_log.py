@@ -7,6 +7,7 @@ import pytest
 
 import flightid as fid
 from flightid.errors import LogFormatError
+from flightid.logs import is_log
 from tests.ordinary_log import write_ordinary_log
 
 DFReader = pytest.importorskip("pymavlink.DFReader")
@@ -76,6 +77,20 @@ def test_text_with_commas_and_modes_by_name(tmp_path: Path) -> None:
     table = log.table("POS")
     assert table["Lat"][0] == -35.3632621
     assert table["Alt"][0] == -3.25
+
+
+@pytest.mark.parametrize("before", [[], ["Mission Planner 1.3", "", "# of a friend"]])
+def test_logs_without_a_definition_of_definitions_in_front(
+    tmp_path: Path, flown: tuple[Path, list[str]], before: list[str]
+) -> None:
+    rest = [line for line in flown[1] if not line.startswith("FMT, 128")]
+    assert len(rest) < len(flown[1])
+    log = _open(tmp_path, [*before, *rest])
+    assert len(log.table("RATE")) == len(fid.read_log(flown[0]).table("RATE"))
+    assert log.parameters == fid.read_log(flown[0]).parameters
+    assert is_log(log.path)
+    with pytest.raises(LogFormatError):
+        _open(tmp_path, ["FMT, 300, 89, RATE, Qf, TimeUS,R", "RATE, 1, 2"], "no.log")
 
 
 def test_nothing_but_definitions_is_no_log(tmp_path: Path) -> None:

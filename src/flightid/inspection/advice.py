@@ -22,6 +22,10 @@ COPTER_LOG_BITS = {
 PLANE_LOG_BITS = {7: "IMU", 13: "servo outputs", 20: "attitude and PID terms at the loop rate"}
 """The same of ArduPlane, which numbers them otherwise (ArduPlane/defines.h)."""
 LOG_BITS = {"copter": COPTER_LOG_BITS, "plane": PLANE_LOG_BITS}
+LOGGING = {
+    "betaflight": "set blackbox_sample_rate 1/2 or faster, and log set-point, gyro and PID terms",
+    "mavlink": "hand in the log that the autopilot wrote to its own card: telemetry is too slow",
+}
 SDLOG_PROFILE = 25
 """PX4: default set 1, system identification 8, high rate 16 (logged_topics.cpp)."""
 SWEEP_START_HZ, SWEEP_STOP_HZ, SWEEP_RECORD_S = 0.2, 20.0, 130
@@ -37,8 +41,8 @@ def logging(log: Log) -> str:
     """Settings that make the autopilot log fast enough."""
     if log.kind == "px4":
         return _px4_logging(log)
-    if log.kind == "betaflight":
-        return "set blackbox_sample_rate 1/2 or faster, and log set-point, gyro and PID terms"
+    if log.kind in LOGGING:
+        return LOGGING[log.kind]
     wanted_bits = LOG_BITS.get(log.vehicle or "")
     present = log.parameters.get("LOG_BITMASK")
     if wanted_bits is None:

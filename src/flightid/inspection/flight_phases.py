@@ -44,6 +44,8 @@ class FlightPhases:
         What the spans rest on.
     is_known : bool
         Whether the log holds anything that tells flight from ground.
+    action : str
+        What to log where it does not.
     """
 
     airborne: tuple[Span, ...]
@@ -51,11 +53,17 @@ class FlightPhases:
     tipped_s: float | None
     evidence: str
     is_known: bool = True
+    action: str = ""
 
     @property
     def airborne_s(self) -> float:
         """Time in the air, s."""
         return sum(stop - start for start, stop in self.airborne)
+
+    @property
+    def airborne_words(self) -> str:
+        """Time in the air with its unit, or that it is not known."""
+        return f"{self.airborne_s:.1f} s" if self.is_known else "not known"
 
 
 def flight_phases(log: Log, actuators: Actuators | None) -> FlightPhases:
@@ -71,8 +79,7 @@ def flight_phases(log: Log, actuators: Actuators | None) -> FlightPhases:
     carrying = find(log, "airspeed" if plane else "thrust") or _mean_motor(log, actuators)
     flying = _landing_detector(log)
     if carrying is None and flying is None:
-        reason = "no throttle, motor output, speed or landing detector is logged"
-        return FlightPhases((), ran, None, reason, is_known=False)
+        return _untold(log, ran)
     spans, evidence, limit = [(-np.inf, np.inf)], [], 0.0
     if carrying is not None:
         limit = AIRBORNE_SPEED.value if plane else _carrying_throttle(carrying.values)
@@ -90,6 +97,21 @@ def flight_phases(log: Log, actuators: Actuators | None) -> FlightPhases:
         evidence.append("attitude")
     kept = tuple(span for span in spans if span[1] - span[0] >= SHORTEST_SEGMENT.value)
     return FlightPhases(kept, ran, tipped, ", ".join(evidence))
+
+
+def _untold(log: Log, ran: bool | None) -> FlightPhases:
+    """That flight is not told from ground, why, and what to log for it."""
+    reason = "no throttle, motor output, speed or landing detector is logged"
+    action = "log the throttle or the motors' outputs as well"
+    if log.kind == "ardupilot":
+        action = "log the throttle (CTUN) or the outputs (RCOU) with the parameters (PARM)"
+    if "RCOU" in log:
+        reason = (
+            "outputs are logged (RCOU), but no SERVOn_FUNCTION says which of them are motors, and "
+            "neither throttle, speed nor landing detector is logged"
+        )
+        action = "keep the beginning of the log, where the parameters are (PARM), or log CTUN"
+    return FlightPhases((), ran, None, reason, is_known=False, action=action)
 
 
 def _mean_motor(log: Log, actuators: Actuators | None) -> Signal | None:

@@ -147,7 +147,7 @@ class Inspection(Result, schema="flightid.inspection/1"):
         """The flight in a line, what each axis supports, what moved it, what was at a limit."""
         head = (
             f"{self.name}: {self.firmware or self.kind}, {self.duration_s:.1f} s, "
-            f"{self.phases.airborne_s:.1f} s of them airborne"
+            f"airborne {self.phases.airborne_words}"
         )
         tables = (self._axes(), self._excitations(), self._saturations(), self._skews())
         return "\n\n".join([head, *(each.to_text() for each in tables if each.rows)])
@@ -269,5 +269,5 @@ class Inspection(Result, schema="flightid.inspection/1"):
         """Log, duration, time in the air and verdict on one line."""
         return (
             f"Inspection({self.name!r}, {self.duration_s:.4g} s, "
-            f"{self.phases.airborne_s:.4g} s airborne, {self.verdict})"
+            f"{self.phases.airborne_words} airborne, {self.verdict})"
         )

@@ -92,7 +92,7 @@ def _on_the_ground(log: Log, found: Inspection) -> Finding:
             "flight-unknown",
             Light.UNKNOWN,
             f"whether it flew cannot be told: {found.phases.evidence}",
-            advice.logging(log),
+            found.phases.action,
         )
     return Finding(
         "not-airborne",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -18,17 +19,26 @@ from flightid.record.formats.sniff import file_format
 
 ULOG_MAGIC = b"ULog\x01\x12\x35"
 DATAFLASH_HEADER = b"\xa3\x95"
-TEXT_LOG = b"FMT, 128, 89, FMT"
+TEXT_LOG = re.compile(
+    rb"^FMT, *(\d+), *(\d+), *\w{1,4}, *[a-zA-Z]{1,16}, *\w[\w, ]*\r?$", re.MULTILINE
+)
 TEXT_WITHIN = 4096
-"""Bytes in which a text log defines its own definitions; ground stations write lines before."""
+"""Bytes in which a text log begins to define its messages; ground stations write lines before."""
 SNIFFED = 65536
 """Bytes searched for a first DataFlash header: a log whose beginning is damaged is still a log."""
+
+
+def _is_printed(head: bytes) -> bool:
+    """Whether a line defines a message: type and length of one byte each, name, format, labels."""
+    found = TEXT_LOG.finditer(head[:TEXT_WITHIN])
+    return any(max(int(line[1]), int(line[2])) < 256 for line in found)
+
 
 # Content test, name of the format, opener.
 _FORMATS: tuple[tuple[Callable[[bytes], bool], str, Callable[[Path], LogSource]], ...] = (
     (lambda head: head.startswith(ULOG_MAGIC), "PX4 ULog", UlogSource),
     (lambda head: PRODUCT in head, "Betaflight or INAV blackbox", open_blackbox),
-    (lambda head: TEXT_LOG in head[:TEXT_WITHIN], "ArduPilot text log", open_printed),
+    (_is_printed, "ArduPilot text log", open_printed),
     (_native.is_telemetry_log, "MAVLink telemetry", open_telemetry),
 )
 # In other files these two bytes may stand by chance: asked last, and not where rig records are.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -117,7 +118,7 @@ def _frame(log: Log) -> str:
 
 
 def _modes(log: Log) -> tuple[ModeSpan, ...]:
-    told = [(e.time_s, e.text.split(" ")[0]) for e in log.events if e.kind == "mode"]
+    told = [(e.time_s, re.split(r" \(|, ", e.text)[0]) for e in log.events if e.kind == "mode"]
     begun = [(time_s, mode) for time_s, mode in told if time_s is not None]
     ends = [*(time_s for time_s, _ in begun[1:]), log_span(log)[1]]
     spans: list[ModeSpan] = []

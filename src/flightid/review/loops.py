@@ -198,7 +198,7 @@ def _step(begun: LoopResponse, samples: LoopSamples, tick_s: float, advised: str
     except FlightidError as error:
         clauses = (error.problem, error.found, error.needed and f"needed {error.needed}")
         reason = ", ".join(str(clause) for clause in clauses if clause)
-        return replace(begun, reason=reason, action=_fly(begun))
+        return replace(begun, reason=reason, action=what_to_fly(begun))
     window_s = WINDOW_S[begun.loop]
     while True:
         steps, time_s = _steps(draws, window_s, tick_s)
@@ -243,10 +243,10 @@ def _refusal(
     if (begun.moved or 0.0) > LIVELY[begun.loop].value:
         reason = f"gusts, limits or the other axes move it more than the set-point does{why}"
         return replace(begun, reason=reason, action="see motors at limits; fly in calm air")
-    return replace(begun, reason=f"not enough motion{why}", action=_fly(begun))
+    return replace(begun, reason=f"not enough motion{why}", action=what_to_fly(begun))
 
 
-def _fly(begun: LoopResponse) -> str:
+def what_to_fly(begun: LoopResponse) -> str:
     """What to fly so that this loop shows a step."""
     size = "30 to 60 deg/s" if begun.loop == "rate" else "10 to 20 deg"
     stick = {"roll": "roll stick", "pitch": "pitch stick", "yaw": "yaw stick"}[begun.axis]

@@ -21,6 +21,9 @@ from flightid.review.vibration import Vibration
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Estimate
 
+KINDS = {"mavlink": "telemetry of a"}
+"""What a reader calls a kind of log."""
+
 
 @dataclass(frozen=True, repr=False)
 class FlightReview(
@@ -111,11 +114,11 @@ class FlightReview(
     def flight(self) -> Table:
         """Vehicle, firmware, frame, time in the air, battery."""
         rows: list[tuple[Cell, ...]] = [
-            ("vehicle", " ".join(filter(None, (self.kind, self.vehicle)))),
+            ("vehicle", " ".join(filter(None, (KINDS.get(self.kind, self.kind), self.vehicle)))),
             ("firmware", self.firmware or None),
             ("frame", self.identity.frame or None),
             ("logged", f"{self.duration_s:.1f} s"),
-            ("in the air", f"{self.phases.airborne_s:.1f} s"),
+            ("in the air", self.phases.airborne_words),
             *tables.battery(self.identity.battery),
         ]
         told = tuple(row for row in rows if row[1] is not None)
@@ -147,19 +150,20 @@ class FlightReview(
         return self.tables()
 
     def _computed(self) -> dict[str, object]:
-        return {"verdict": self.verdict, "airborne_s": self.phases.airborne_s}
+        known = self.phases.is_known
+        return {"verdict": self.verdict, "airborne_s": self.phases.airborne_s if known else None}
 
     @property
     def in_short(self) -> str:
         """Firmware, time in the air, and how many loops the flight tells, in words."""
         told = sum(loop.is_told for loop in self.loops)
         loops = f"steps of {told} of {len(self.loops)} loops" if self.loops else "no loops logged"
-        return f"{self.firmware or self.kind}, {self.phases.airborne_s:.1f} s in the air, {loops}"
+        return f"{self.firmware or self.kind}, in the air {self.phases.airborne_words}, {loops}"
 
     def __repr__(self) -> str:
         """Log, time in the air, loops told and verdict on one line."""
         told = sum(loop.is_told for loop in self.loops)
         return (
-            f"FlightReview({self.name!r}, {self.phases.airborne_s:.4g} s airborne, "
+            f"FlightReview({self.name!r}, {self.phases.airborne_words} airborne, "
             f"{told} of {len(self.loops)} loops told, {self.verdict})"
         )

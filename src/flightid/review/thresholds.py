@@ -20,6 +20,9 @@ SAMPLES_IN_RISE = Threshold(
 WIDEST_LEVEL = Threshold(
     0.5, "1", "half of the step either way: such a step tells nothing about gains"
 )
+OVERSHOOT = Threshold(
+    31, "%", "a pair of poles damped by 0.35, the least of level 1: MIL-F-8785C, 3.2.2.1.2"
+)
 VIBE_GOOD = Threshold(
     30, "m/s^2", "ArduPilot, Measuring Vibration: below 30 m/s/s is normally acceptable"
 )

@@ -6,17 +6,21 @@ from collections.abc import Iterator
 
 from flightid.conventions import Light
 from flightid.findings import Finding
+from flightid.inspection.advice import LOGGING
 from flightid.review.filter_findings import filter_findings
+from flightid.review.loop_response import LoopResponse
+from flightid.review.loops import what_to_fly
 from flightid.review.motors import MotorUse
 from flightid.review.result import FlightReview
 from flightid.review.tables import cell
-from flightid.review.thresholds import SATURATED, UNBALANCED
+from flightid.review.thresholds import OVERSHOOT, SATURATED, UNBALANCED
 from flightid.review.vibration import Vibration
 
 FAST_GYRO = {
     "ardupilot": "set INS_LOG_BAT_MASK 1 for raw batches of the first gyroscope",
     "px4": "set SDLOG_PROFILE 25, with system identification and high rate",
     "betaflight": "set blackbox_sample_rate 1/1, and log the unfiltered gyroscope",
+    "mavlink": LOGGING["mavlink"],
 }
 
 
@@ -57,7 +61,7 @@ def _noise(review: FlightReview) -> Iterator[Finding]:
 def _flown(review: FlightReview) -> Iterator[Finding]:
     phases = review.phases
     if not phases.is_known:
-        yield Finding("flight-unknown", Light.UNKNOWN, phases.evidence)
+        yield Finding("flight-unknown", Light.UNKNOWN, phases.evidence, phases.action)
     elif not phases.airborne:
         yield Finding(
             "no-flight",
@@ -81,8 +85,7 @@ def _loops(review: FlightReview) -> Iterator[Finding]:
         half, over = cell(loop["delay to half"], 1e3), cell(loop["overshoot"])
         yield Finding(
             f"step-{loop.axis}-{loop.loop}",
-            Light.GREEN,
-            f"{loop.name}: half way after {half} ms, overshoots by {over} %",
+            *_overshoot(loop, f"{loop.name}: half way after {half} ms, overshoots by {over} %"),
         )
     if not review.phases.airborne:
         return
@@ -96,8 +99,30 @@ def _loops(review: FlightReview) -> Iterator[Finding]:
             )
     if not review.loops:
         yield Finding(
-            "no-set-points", Light.AMBER, "the log holds no set-point with what was measured"
+            "no-set-points",
+            Light.AMBER,
+            "the log holds no set-point with what was measured",
+            LOGGING.get(review.kind, ""),
         )
+
+
+CALMER = {
+    "rate": "lower I of this loop, then P; raise D, or take filters with less delay",
+    "attitude": "mend the rate loop first, then lower P of the angle, or feed less of the "
+    "set-point's rate forward",
+}
+
+
+def _overshoot(loop: LoopResponse, said: str) -> tuple[Light, str, str]:
+    """Light, message and action: amber where it may be beyond the limit, unknown where all may."""
+    over, limit = loop["overshoot"], OVERSHOOT.value
+    low, high = over.interval95 or (over.value or 0.0, over.value or 0.0)
+    if over.value is None or (low < limit and high - low > limit):
+        return Light.UNKNOWN, f"{said}: too uncertain to judge", what_to_fly(loop)
+    if high <= limit:
+        return Light.GREEN, said, ""
+    said = f"{said}; beyond {limit:g} % damping is poor"
+    return Light.AMBER, said, CALMER[loop.loop]
 
 
 def _motors(review: FlightReview) -> Iterator[Finding]:
@@ -112,8 +137,9 @@ def _motors(review: FlightReview) -> Iterator[Finding]:
             Light.AMBER,
             f"the motors that turn {way} work {size} % of the mean harder than the others: they "
             "hold a steady yaw moment",
-            "look for twisted motor mounts or arms, then for a worn motor or propeller",
+            "look for tilted motors and twisted arms or frame, then for a worn motor or propeller",
         )
+    straight = "straighten motors and frame first: the steady yaw moment takes the room"
     for motor in review.motors:
         for share, limit, action in (
             (motor.at_upper, "upper", "less weight, larger propellers, or gentler flying"),
@@ -129,7 +155,7 @@ def _motors(review: FlightReview) -> Iterator[Finding]:
                     Light.AMBER,
                     f"{motor.name} is at its {limit} limit for {100 * share:.0f} % of the time in "
                     "the air: loops are not what they were tuned to be there",
-                    action,
+                    straight if twisted else action,
                 )
         if not twisted:
             yield from _balance(motor)

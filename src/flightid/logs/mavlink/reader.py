@@ -18,6 +18,7 @@ from flightid import _native
 from flightid.conventions import Light
 from flightid.errors import LogFormatError
 from flightid.findings import Finding
+from flightid.logs.dataflash.events import mode_text
 from flightid.logs.mavlink.messages import TelemetryMessage, telemetry_messages
 from flightid.logs.source import Event, ParameterChange
 from flightid.logs.table_source import Array, MessageRows, TableSource
@@ -25,7 +26,8 @@ from flightid.reading import bounded_bytes
 
 LARGEST = 1 << 30
 """Bytes of a file that are read."""
-AUTOPILOTS = {3: "ArduPilot", 12: "PX4"}
+ARDUPILOT = 3
+AUTOPILOTS = {ARDUPILOT: "ArduPilot", 12: "PX4"}
 VEHICLES = {1: "plane", 2: "copter", 3: "copter", 4: "copter", 10: "rover", 13: "copter",
             14: "copter", 15: "copter", 29: "copter"}  # fmt: skip
 """MAV_TYPE of vehicles whose channels are known."""
@@ -67,7 +69,7 @@ def open_telemetry(path: Path) -> TableSource:
     parameters, changes = _parameters(heard, stamps)
     return TableSource(
         "mavlink",
-        VEHICLES.get(int(beats["type"][0])),
+        _vehicle(beats),
         f"{AUTOPILOTS.get(int(beats['autopilot'][0]), 'autopilot')}, by telemetry",
         tables,
         parameters,
@@ -75,6 +77,10 @@ def open_telemetry(path: Path) -> TableSource:
         sorted(_events(heard, stamps), key=lambda event: event.time_s or 0.0),
         findings=tuple(_findings(lost, len(data))),
     )
+
+
+def _vehicle(beats: Table) -> str | None:
+    return VEHICLES.get(int(beats["type"][0]))
 
 
 def _autopilot(frames: list[Any], beat: TelemetryMessage) -> tuple[int, int]:
@@ -157,7 +163,9 @@ def _events(heard: dict[str, tuple[Array, Table]], stamps: dict[str, Array]) -> 
         yield Event(float(beat_s[at]), "arming", "armed" if armed[at] else "disarmed")
     modes = beats["custom_mode"].astype(np.int64)
     for at in np.flatnonzero(np.diff(modes, prepend=modes[:1] - 1)):
-        yield Event(float(beat_s[at]), "mode", f"mode {modes[at]}")
+        # Only ArduPilot's numbers count flight modes from zero; PX4 packs two numbers into one.
+        vehicle = _vehicle(beats) if int(beats["autopilot"][0]) == ARDUPILOT else None
+        yield Event(float(beat_s[at]), "mode", mode_text(vehicle, int(modes[at]), None))
     if "STATUSTEXT" in heard:
         for time_s, row in zip(stamps["STATUSTEXT"], heard["STATUSTEXT"][1], strict=True):
             text = bytes(row["text"]).split(b"\0")[0].decode("utf-8", "replace")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from textwrap import wrap
@@ -57,10 +58,19 @@ class Proposal:
         actions = [finding.action for finding in self.findings if finding.action]
         if self.inspection is not None:
             said += ["", self.inspection.in_short()]
-            actions += [each.action for each in self.inspection.findings if each.action]
+            noted = self.inspection.findings
+            fallen = [each.action for each in noted if each.code == "tipped-over"]
+            actions = [*fallen, *self._next(), *actions, *(f.action for f in noted if f.action)]
         said += ["", "What to do, the first first"]
         said += [line for each in dict.fromkeys(actions) for line in _wrapped(f"- {each}")]
         return "\n".join(said)
+
+    def _next(self) -> Iterator[str]:
+        """Commands that go on from a log of a flight without a model."""
+        if self.inspection is not None and self.inspection.phases.airborne:
+            log = self.inspection.name
+            yield f"flightid plan {log}: the sweep to fly for a model, as this vehicle's parameters"
+            yield f"flightid flight {log}: what this flight tells without one: steps, motors, noise"
 
     def write(self, path: str | Path) -> Path:
         """Write the study file; one that was changed by hand is never replaced.
