@@ -119,7 +119,7 @@ OWN = {
     "review": ("two flights beside each other", "after before"),
     "planning": (
         "a sweep and what the vehicle may do meanwhile",
-        "amplitude attitude_rad control n_records rate_rad_s",
+        "amplitude attitude_rad control loop_rate_hz n_records rate_rad_s write_no_go",
     ),
     "plot": (
         "the result that is drawn, by its own noun, and guides in it",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,12 @@ import pytest
 import flightid as fid
 from flightid.cli.program import run
 from flightid.control.autopilots import read_parameters
+from flightid.conventions import Light
 from flightid.errors import OptionError, UnknownNameError
+from flightid.findings import Finding
+from flightid.inspection.advice import set_bits
+from flightid.inspection.flight_phases import FlightPhases
+from flightid.planning.flight_findings import flight_findings
 from flightid.planning.result import AxisSweep
 from flightid.planning.still_rate import still_rate
 from flightid.report.flight_card import card_html
@@ -193,3 +199,48 @@ def test_command_writes_card_and_settings(
     assert "name a LOG" in capsys.readouterr().err
     assert run(["plan", str(log), "--autopilot", "px4"]) == 2
     assert "belongs to --vehicle" in capsys.readouterr().err
+
+
+def test_masks_are_whole_and_bits_are_never_summed(plan: fid.SweepPlan) -> None:
+    mask = next(c.value for c in plan.sweeps[0].changes if c.name == "LOG_BITMASK")
+    assert mask > 1e5
+    assert f"LOG_BITMASK {mask:.0f}" in card_html(plan)
+    assert set_bits({0: "a", 18: "b"}) == (
+        "set bits 0 (a), 18 (b) of LOG_BITMASK, and leave its other bits as they are"
+    )
+    assert "add " not in fid.plan_flight(vehicle="quadplane").logging
+
+
+def test_no_go_leaves_no_settings(plan: fid.SweepPlan, tmp_path: Path) -> None:
+    fell = replace(plan, findings=(Finding("tipped-over", Light.RED, "it falls over"),))
+    with pytest.raises(OptionError, match="no-go"):
+        fell.write(tmp_path / "none")
+    assert not (tmp_path / "none").exists()
+    assert "SID_AXIS 1" not in card_html(fell)
+    assert len(fell.write(tmp_path / "forced", write_no_go=True)) == 6
+
+
+def test_a_fall_an_unknown_rate_and_a_trim_are_said(
+    log: Path, plan: fid.SweepPlan, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened = fid.read_log(log)
+    phases = FlightPhases(((12.0, 60.0),), True, 61.0, "attitude")
+    found = flight_findings(opened, phases, plan.sweeps, 400.0)
+    lights = {each.code: each.light for each in found}
+    assert lights == {"tipped-over": Light.RED, "loop-rate-typical": Light.AMBER}
+    monkeypatch.setattr("flightid.planning.flight_findings.LARGEST_TRIM", 0.0)
+    (said,) = flight_findings(opened, replace(phases, tipped_s=None), plan.sweeps[2:], 0.0)
+    assert said.code == "trim-let-go"
+    assert "ATC_RAT_YAW_I at 0" in said.message
+
+
+def test_a_log_without_the_rate_of_the_controller_is_planned(
+    log: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened = fid.read_log(log)
+    silent = {n: v for n, v in opened.parameters.items() if n != "SCHED_LOOP_RATE"}
+    monkeypatch.setattr(opened, "parameters", silent)
+    codes = {each.code for each in fid.plan_flight(opened, axes=("roll",)).findings}
+    told = fid.plan_flight(opened, axes=("roll",), loop_rate_hz=400.0).findings
+    assert "loop-rate-typical" in codes
+    assert "loop-rate-typical" not in {each.code for each in told}

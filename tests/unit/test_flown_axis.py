@@ -103,3 +103,14 @@ def test_no_shape_no_measurement() -> None:
     )  # fmt: skip
     with pytest.raises(DataError, match="no gain, lag and delay"):
         _measured("yaw", [turned], _typical(loop, "multirotor"), loop)
+
+
+def test_commands_at_their_limit_measure_nothing() -> None:
+    loop, record = yaw_loop(), flown(1.0)
+    stuck = np.where(np.arange(record.n_samples) % 20 == 0, 1.0, record["tau_psi"])
+    limited = fid.Record.from_arrays(
+        record.time_s, inputs={"tau_psi": stuck},
+        outputs={"r": record["r"], "psi_ref": record["psi_ref"]},
+    )  # fmt: skip
+    with pytest.raises(DataError, match="at its limit"):
+        _measured("yaw", [limited], _typical(loop, "multirotor"), loop)

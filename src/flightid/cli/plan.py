@@ -32,11 +32,13 @@ def _fields() -> dict[str, type[Options]]:
     help="Folder of card and settings; default: <log>-plan beside the log.",
 )
 @click.option("--overwrite", is_flag=True, help="Replace files of settings that exist.")
+@click.option("--write-no-go", is_flag=True, help="Write settings in spite of a no-go.")
 @json_option
 def command(
     log: Path | None,
     output: Path | None,
     overwrite: bool,
+    write_no_go: bool,
     as_json: bool,
     **options: Any,  # noqa: ANN401 — read from the fields
 ) -> None:
@@ -45,7 +47,8 @@ def command(
     LOG is any flight: its loops stay on while the sweep is flown, so they decide, with the axis as
     this flight showed it, which amplitude gives which rates, attitudes and coherence. Writes
     card.html, one page to print and take to the field, and the settings of each axis with the file
-    that takes them back. The exit code is 1 for no-go.
+    that takes them back. The exit code is 1 for no-go,
+    which leaves no settings.
     """
     from flightid import plan_flight
     from flightid.files import write_atomically
@@ -66,7 +69,11 @@ def command(
     place = output or (
         Path(f"{asked['vehicle']}-plan") if log is None else log.parent / f"{log.stem}-plan"
     )
-    for path in plan.write(place, overwrite=overwrite):
-        note(f"Wrote {path}")
+    if plan.is_go or write_no_go:
+        for path in plan.write(place, overwrite=overwrite, write_no_go=write_no_go):
+            note(f"Wrote {path}")
+    else:
+        place.mkdir(parents=True, exist_ok=True)
+        note("No settings written: no-go (--write-no-go writes them)")
     note(f"Wrote {write_atomically(place / 'card.html', card_html(plan))}: print it")
     leave_by_verdict(plan.findings)

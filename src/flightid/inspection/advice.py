@@ -48,14 +48,19 @@ def logging(log: Log) -> str:
     if wanted_bits is None:
         return "log attitude, rates, outputs and PID terms at the loop rate (LOG_BITMASK)"
     if present is None or not 0 <= present < 2**31:
-        bits = " + ".join(str(2**bit) for bit in wanted_bits)
-        return f"add {bits} to LOG_BITMASK ({', '.join(wanted_bits.values())})"
+        return set_bits(wanted_bits)
     wanted = int(present) | sum(2**bit for bit in wanted_bits)
     missing = [str(bit) for bit in wanted_bits if not int(present) >> bit & 1]
     if not missing:
         return "LOG_BITMASK holds all that is needed: check for a card that is too slow"
     which = f"bit {missing[0]} is" if len(missing) == 1 else f"bits {', '.join(missing)} are"
     return f"set LOG_BITMASK {wanted} (now {int(present)}; {which} missing)"
+
+
+def set_bits(wanted: dict[int, str]) -> str:
+    """Bits of LOG_BITMASK by number: a sum would clear others where one is set already."""
+    named = ", ".join(f"{bit} ({what})" for bit, what in wanted.items())
+    return f"set bits {named} of LOG_BITMASK, and leave its other bits as they are"
 
 
 def _px4_logging(log: Log) -> str:

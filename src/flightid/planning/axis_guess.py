@@ -32,6 +32,8 @@ SHORTEST_S = 5.0
 LARGEST_ERROR, LEAST_ERROR, FEWEST_POINTS = 0.2, 0.04, 6
 """A frequency counts as measured up to this random error; so many make an axis measured; none
 weighs more than one of the least error, for shapes are not exact."""
+FULL, MOST_AT_LIMIT = 0.995, 0.02
+"""A command at its limit, and the share of the time that a linear loop may spend there."""
 FARTHEST_CROSSOVER = 1.5
 """What was flown must reach loop gains so near to one, from either side."""
 LARGEST_MISS, WIDEST_SHAPE = 0.3, 8.0
@@ -138,6 +140,9 @@ def _measured(axis: str, pieces: list[Record], base: FlownAxis, loop: AxisLoop) 
     command, rate, angle = CHANNELS[axis]
     if not pieces:
         raise DataError("no span in the air holds command and rate", found=f"{command}, {rate}")
+    limited = np.mean(np.abs(np.concatenate([piece[command] for piece in pieces])) >= FULL)
+    if loop.output_unit == "1" and limited > MOST_AT_LIMIT:
+        raise DataError("the command was at its limit", found=f"{limited:.0%} of the time")
     if angle not in pieces[0]:
         raise DataError("no set-point of attitude is logged", found=f"no {angle}")
     rate_hz = min(record.sample_rate_hz for record in pieces)

@@ -47,3 +47,9 @@ class PlanOptions(Options):
     attitude_rad: float = option(
         math.radians(15.0), unit="rad", above=0.0, doc="Limit: largest attitude change."
     )
+    loop_rate_hz: float | None = option(
+        None,
+        unit="Hz",
+        above=0.0,
+        doc="Rate of the controller, where the log does not tell it; default then: 400 Hz, amber.",
+    )

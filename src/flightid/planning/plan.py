@@ -16,17 +16,19 @@ from flightid.errors import OptionError
 from flightid.excitation import Limits, Plan, plan
 from flightid.findings import Finding
 from flightid.inspection.actuators import find_actuators
-from flightid.inspection.advice import LOG_BITS
+from flightid.inspection.advice import LOG_BITS, set_bits
 from flightid.inspection.advice import logging as logging_of
 from flightid.inspection.flight_phases import flight_phases
 from flightid.logs import Log, read_log
 from flightid.planning.axis_guess import guess_axis
+from flightid.planning.flight_findings import flight_findings
 from flightid.planning.flight_time import flight_time
 from flightid.planning.flown_axis import FlownAxis
 from flightid.planning.options import PlanOptions
 from flightid.planning.procedures import PROCEDURES, Procedure, procedure_of
 from flightid.planning.result import AxisSweep, SweepPlan
 from flightid.planning.settings import SID_AXES, log_family, settings_of
+from flightid.review.loops import loop_rate_hz as logged_loop_rate_hz
 
 USUAL_LOOP_HZ = 400.0
 SAMPLES_IN_CYCLE = 25.0
@@ -41,6 +43,7 @@ ENOUGH_COHERENCE, SMALLEST_SHARE = 0.95, 0.5
 what the limits allow, for the day may be windier than that of the log."""
 WAIT_S = {"mode": 31.0, "stick": 20.0, "autotune": 15.0, "chirp": 10.0}
 """Rest before and behind a run, s."""
+UNSURE = "what the axis does is not known yet: the log of a third of the amplitude tells"
 QUADPLANE = {"Q_A_RAT_": "ATC_RAT_", "Q_A_ANG_": "ATC_ANG_", "Q_A_ACCEL_": "ATC_ACCEL_"}
 
 
@@ -57,6 +60,7 @@ def plan_flight(
     control: float = 0.25,
     rate_rad_s: float = math.radians(60.0),
     attitude_rad: float = math.radians(15.0),
+    loop_rate_hz: float | None = None,
 ) -> SweepPlan:
     """Say what to fly so that the next log can be identified: amplitude, band, length, battery.
 
@@ -86,6 +90,8 @@ def plan_flight(
         Sweeps of each axis.
     control, rate_rad_s, attitude_rad : float
         What the vehicle may do about its trim.
+    loop_rate_hz : float, optional
+        Rate of the controller, Hz, where the log does not tell it; default: 400 Hz, amber.
 
     Raises
     ------
@@ -115,10 +121,14 @@ def plan_flight(
     """
     asked = PlanOptions(
         vehicle, autopilot, axes, band_rad_s, amplitude, duration_s, n_records, control,
-        rate_rad_s, attitude_rad,
+        rate_rad_s, attitude_rad, loop_rate_hz,
     )  # fmt: skip
     opened = log if isinstance(log, Log) or log is None else read_log(log)
     procedure = procedure_of(vehicle, autopilot) if opened is None else _of_log(opened)
+    rate_hz = asked.loop_rate_hz
+    assumed = opened is not None and rate_hz is None and not logged_loop_rate_hz(opened)
+    if assumed:
+        rate_hz = USUAL_LOOP_HZ
     current = {} if opened is None else dict(opened.parameters)
     phases = None if opened is None else flight_phases(opened, find_actuators(opened))
     spans = () if phases is None else phases.airborne
@@ -133,13 +143,14 @@ def plan_flight(
             )
         guess, made = None, None
         if procedure.how in ("mode", "stick"):
-            loop = _loop(procedure, axis, opened)
+            loop = _loop(procedure, axis, opened, rate_hz)
             enters = procedure.entry(axis)
             guess = guess_axis(axis, loop, procedure.kind, enters, opened, spans)
             made = _sweep(procedure, axis, guess.vehicle, asked)
         excitation = None if made is None else made.excitation
         changes = settings_of(procedure, axis, excitation, current, chosen, asked)
         sweeps.append(AxisSweep(axis, guess, made, changes))
+    flown = flight_findings(opened, phases, sweeps, USUAL_LOOP_HZ if assumed else 0.0)
     lengths = [each.plan.excitation.duration_s if each.plan else 30.0 for each in sweeps]
     runs = [length + WAIT_S[procedure.how] for length in lengths]
     return SweepPlan(
@@ -150,7 +161,7 @@ def plan_flight(
         n_records=asked.n_records,
         flight_time=flight_time(runs, asked.n_records, opened, phases),
         logging=_logging(procedure, opened),
-        findings=_findings(procedure, tuple(sweeps), opened),
+        findings=_findings(procedure, tuple(sweeps), opened, flown),
     )
 
 
@@ -161,19 +172,21 @@ def _of_log(log: Log) -> Procedure:
     return PROCEDURES[autopilot_of(log)]
 
 
-def _loop(procedure: Procedure, axis: str, log: Log | None) -> AxisLoop:
+def _loop(
+    procedure: Procedure, axis: str, log: Log | None, rate_hz: float | None = None
+) -> AxisLoop:
     """Controllers that stay on, as they are while the sweep is flown."""
     if log is None:
-        loop = axis_loop(procedure.loops, axis, loop_rate_hz=USUAL_LOOP_HZ)
+        loop = axis_loop(procedure.loops, axis, loop_rate_hz=rate_hz or USUAL_LOOP_HZ)
     elif procedure.name == "quadplane":
         # Its hover controllers are ArduCopter's, under other names.
         named = dict(log.parameters)
         for theirs, ours in QUADPLANE.items():
             found = {n: v for n, v in log.parameters.items() if n.startswith(theirs)}
             named |= {n.replace(theirs, ours, 1): v for n, v in found.items()}
-        loop = axis_loop(procedure.loops, axis, named)
+        loop = axis_loop(procedure.loops, axis, named, loop_rate_hz=rate_hz)
     else:
-        loop = axis_loop_of(log, axis)
+        loop = axis_loop_of(log, axis, loop_rate_hz=rate_hz)
     if procedure.how == "mode" and procedure.kind == "multirotor":
         return loop.with_gains({loop.names["i"]: 0.0})
     return loop
@@ -249,22 +262,25 @@ def _logging(procedure: Procedure, log: Log | None) -> str:
         return logging_of(log)
     if procedure.name.startswith("px4"):
         return "SDLOG_PROFILE 25 is in the file"
-    bits = LOG_BITS[log_family(procedure)]
-    return (
-        f"add {sum(2**bit for bit in bits)} to LOG_BITMASK ({', '.join(bits.values())}); the file "
-        "leaves it alone: only a log tells what is set now"
-    )
+    said = set_bits(LOG_BITS[log_family(procedure)])
+    return f"{said}; the file has no LOG_BITMASK: only a log tells what is set now"
 
 
 def _findings(
-    procedure: Procedure, sweeps: tuple[AxisSweep, ...], log: Log | None
+    procedure: Procedure,
+    sweeps: tuple[AxisSweep, ...],
+    log: Log | None,
+    flown: list[Finding],
 ) -> tuple[Finding, ...]:
-    found = _expected(sweeps)
+    found = flown + _expected(sweeps)
+    typical = {each.axis: bool(each.guess and not each.guess.measured) for each in sweeps}
     for each in sweeps:
         for told in () if each.plan is None else each.plan.findings:
             if told.light in (Light.AMBER, Light.RED) and told.code != "chirp-silent-end":
+                unsure = typical.get(each.axis) and told.code == "design-coherence"
                 said = told.message.removeprefix(f"{each.axis} ").removeprefix(f"{each.axis}: ")
-                found.append(replace(told, message=f"{each.axis}: {said}"))
+                action = UNSURE if unsure else told.action
+                found.append(replace(told, message=f"{each.axis}: {said}", action=action))
     if procedure.how in ("autotune", "chirp"):
         found.append(
             Finding(

@@ -13,6 +13,7 @@ from flightid.control.autopilots.parameter_files import (
     write_px4_parameters,
 )
 from flightid.conventions import Light
+from flightid.errors import OptionError
 from flightid.excitation import Plan
 from flightid.files import write_atomically
 from flightid.findings import Finding, worst
@@ -130,7 +131,7 @@ class SweepPlan(Result, schema="flightid.sweep_plan/1"):
         )
         rows: list[tuple[Cell, ...]] = []
         for each in self.sweeps:
-            file = self.file_of(each)
+            file = self.file_of(each) if self.is_go else "none: no-go"
             if each.plan is None:
                 rows.append((each.axis, *[None] * 4, self.n_records, file))
                 continue
@@ -212,7 +213,9 @@ class SweepPlan(Result, schema="flightid.sweep_plan/1"):
         )
         return Table(f"Settings for {axis}", columns, rows)
 
-    def write(self, path: str | Path, *, overwrite: bool = False) -> tuple[Path, ...]:
+    def write(
+        self, path: str | Path, *, overwrite: bool = False, write_no_go: bool = False
+    ) -> tuple[Path, ...]:
         """Write the settings of each axis, each with the file that takes them back.
 
         Parameters
@@ -221,14 +224,23 @@ class SweepPlan(Result, schema="flightid.sweep_plan/1"):
             Folder; is made where it is not there.
         overwrite : bool
             Replace files that exist.
+        write_no_go : bool
+            Write in spite of a no-go.
 
         Raises
         ------
         OptionError
-            A file is there already: it may be the only record of what the vehicle flew.
+            The plan is no-go, or a file is there already: it may be the only record of what the
+            vehicle flew.
         OSError
             The folder cannot be written.
         """
+        if not self.is_go and not write_no_go:
+            raise OptionError(
+                "a no-go plan leaves no settings that a vehicle could load",
+                found="; ".join(f.message for f in self.findings if f.light is Light.RED),
+                needed="a go, or write_no_go",
+            )
         place = Path(path)
         place.mkdir(parents=True, exist_ok=True)
         if self.procedure.how == "chirp":

@@ -32,9 +32,9 @@ def card_html(plan: SweepPlan) -> str:
     """
     names: dict[str, list[str]] = {}
     for sweep in plan.sweeps:
-        shown = {each.name: f"{each.value:.5g}" for each in sweep.changes[:SHOWN_SETTINGS]}
+        shown = {each.name: _number(each.value) for each in sweep.changes[:SHOWN_SETTINGS]}
         said = ", ".join(f"{name} {value}" for name, value in shown.items())
-        if said:
+        if said and plan.is_go:
             names.setdefault(said, []).append(sweep.axis)
     return (
         environment()
@@ -48,6 +48,11 @@ def card_html(plan: SweepPlan) -> str:
             version=VERSION,
         )
     )
+
+
+def _number(value: float) -> str:
+    """A setting as it is typed: bits of a mask are whole, however many digits they have."""
+    return f"{value:.0f}" if value.is_integer() else f"{value:.5g}"
 
 
 def _shown(table: Table) -> dict[str, object]:
