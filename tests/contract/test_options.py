@@ -79,6 +79,7 @@ OF_COMMANDS = {
     "value": "another parameter value",
     "version": "this version",
     "write": "file of the result, for other commands",
+    "write_no_go": "whether a no-go plan leaves settings",
 }
 FIELDS = {each.name for options in sections().values() for each in options_of(options)}
 # A verb -> the dataclass whose fields its arguments are, and fields that a caller gives otherwise.
