@@ -46,6 +46,7 @@ _BY_CHANCE = (lambda head: DATAFLASH_HEADER in head, "ArduPilot DataFlash", open
 # Contents that people do hand in, and what to do with them.
 _FOREIGN: tuple[tuple[bytes, str, str], ...] = (
     (b"\x1f\x8b", "gzip data", "unpack it first"),
+    (b"FMT,", "a text log without a whole definition", "hand in the .bin file it was made from"),
     (b"PK\x03\x04", "a zip archive", "unpack it first"),
     (
         b"\xfd",
