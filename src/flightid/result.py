@@ -114,7 +114,7 @@ class Result(TableView):
         told = _plain({**values, **self._computed()}, "", absent)
         return {"schema": self.schema, **told, **({ABSENT: absent} if absent else {})}
 
-    def plot(self, **options: object) -> Any:  # noqa: ANN401 — only plot knows Plotly's types
+    def plot(self, **options: object) -> Any:  # noqa: ANN401 — only plot knows its type
         """Draw it.
 
         Parameters

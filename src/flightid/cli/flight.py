@@ -39,7 +39,8 @@ def command(
     Steps, delays and bandwidths of the rate and attitude loops from ordinary flying, each with an
     interval; motors at their limits and out of balance; vibration; noise of the gyro and what it
     makes of the outputs; filters, the phase they cost, and better ones; battery, modes, gains.
-    What it cannot tell it says, with what to fly or log. Reads ArduPilot DataFlash and PX4 ULog.
+    What it cannot tell it says, with what to fly or log. Reads logs of ArduPilot, PX4, Betaflight
+    and INAV, and telemetry.
     """
     from flightid import review_flight
     from flightid.progress import progress

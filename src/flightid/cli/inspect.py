@@ -15,7 +15,8 @@ from flightid.cli.output import emit_values, json_option, leave_by_verdict
 def command(log: Path, as_json: bool) -> None:
     """Say what LOG holds, whether it can support identification, and what to do instead.
 
-    Reads ArduPilot DataFlash and PX4 ULog. Leaves with exit code 1 where a verdict is red.
+    Reads logs of ArduPilot, PX4, Betaflight and INAV, and telemetry. Leaves with exit code 1 where
+    a verdict is red.
     """
     from flightid.inspection import inspect_log
     from flightid.progress import progress

@@ -34,7 +34,7 @@ class Inspection(Result, schema="flightid.inspection/1"):
     Attributes
     ----------
     name, kind, firmware : str
-        File name, ``"ardupilot"`` or ``"px4"``, firmware as logged.
+        File name, who wrote it (as `Log.kind`), firmware as logged.
     vehicle : str or None
         Kind of vehicle.
     duration_s : float

@@ -38,7 +38,7 @@ class LogContents(Result, schema="flightid.log/1"):
 
     @property
     def kind(self) -> str:
-        """``"ardupilot"`` or ``"px4"``."""
+        """Who wrote it: ``"ardupilot"``, ``"px4"``, ``"betaflight"`` or ``"mavlink"``."""
         return self._source.kind
 
     @property

@@ -68,11 +68,10 @@ def read_log(path: str | Path) -> Log:
     The file is indexed once; columns are extracted when they are asked for. Damaged places are
     skipped and reported in `Log.skipped`.
 
-    A DataFlash file is mapped, not copied, and has to stay as it is while its `Log` is in use. If
-    it has become shorter, the next reading of a column raises `LogFormatError`; if another process
-    shortens it during a reading, the operating system ends this process (SIGBUS). Replacing the
-    file by renaming another over it is harmless. Copy a log that is still being written or
-    downloaded, and read the copy.
+    A binary DataFlash file is mapped where the system can, not copied, and has to stay as it is
+    while its `Log` is in use: where another process has shortened it, even during a reading, that
+    reading raises `LogFormatError`. Replacing the file by renaming another over it is harmless.
+    Copy a log that is still being written or downloaded, and read the copy.
 
     Parameters
     ----------

@@ -175,7 +175,7 @@ class LogSource(Protocol):
 
     @property
     def kind(self) -> str:
-        """``"ardupilot"`` or ``"px4"``."""
+        """Who wrote it: ``"ardupilot"``, ``"px4"``, ``"betaflight"`` or ``"mavlink"``."""
 
     @property
     def vehicle(self) -> str | None:

@@ -1,4 +1,4 @@
-"""Pictures: one file per noun, each with functions that take a result and return a Plotly figure.
+"""Pictures: one file per noun, each with functions that take a result and return a `PlotFigure`.
 
 Conventions. A function is named for the picture (`bode`, `time_histories`), takes the result first
 and options by keyword, computes nothing that a result could hold, and begins with

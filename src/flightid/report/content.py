@@ -87,7 +87,7 @@ class Figure:
     Attributes
     ----------
     spec : mapping
-        Plain values of a Plotly figure: ``data`` and ``layout``.
+        Plain values of a figure as plotly.js takes it: ``data`` and ``layout``.
     caption : str
         What to see in it; text output shows this alone.
     folded : bool
