@@ -12,7 +12,7 @@ from click.testing import CliRunner
 import flightid as fid
 from flightid.cli.identify import command
 from flightid.errors import UnknownNameError
-from flightid.plot.fit import estimates_of, fit_figure, parameter_intervals
+from flightid.plot.fit import fit_figure
 from tests.closeness import assert_close
 
 OMEGA = np.geomspace(1.0, 30.0, 60)
@@ -45,13 +45,6 @@ def test_figure_shows_data_and_model(fit: fid.Fit) -> None:
     assert_close(gain.y, 20 * np.log10(np.abs(each.model[inside])), rtol=1e-12, why="gain in dB")
     with pytest.raises(UnknownNameError, match="the fit has no such response"):
         fit_figure(fit, "q/u")
-
-
-def test_estimates_are_drawn_with_their_truth(fit: fid.Fit) -> None:
-    drawn = estimates_of(fit, {"Lp": -6.0})
-    assert [item.name for item in drawn] == ["Ltphi", "Lp", "tau"]
-    assert drawn[1].truth == -6.0
-    assert parameter_intervals(drawn).data
 
 
 def test_command_identifies_a_record(tmp_path: Path) -> None:

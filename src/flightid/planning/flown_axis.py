@@ -45,11 +45,6 @@ class FlownAxis(RateAxis):
     still_omega_rad_s: tuple[float, ...] = ()
     still_density: tuple[float, ...] = ()
 
-    @property
-    def control_unit(self) -> str | None:
-        """Unit of the input where it is not that of what is injected."""
-        return None if self.loop is None or self.enters == "mixer" else self.loop.output_unit
-
     def entry(self, omega_rad_s: Array) -> NDArray[np.complex128]:
         """From what is injected to the controller's output."""
         if self.loop is None or self.enters == "mixer":

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from flightid.errors import UnknownNameError
@@ -155,24 +155,3 @@ def _response_figure(each: FittedResponse) -> go.PlotFigure:
         Curve("model", measured.omega_rad_s[inside], each.model[inside], look.MODEL),
     ]
     return bode(curves, unit=measured.unit, band_rad_s=each.band_rad_s)
-
-
-def estimates_of(fit: Fit, truth: Mapping[str, float] | None = None) -> list[EstimateBar]:
-    """The fit's parameters that have an interval, for `parameter_intervals`.
-
-    Parameters
-    ----------
-    fit : Fit
-        Result of `flightid.identify`.
-    truth : mapping of str to float, optional
-        True values by name, where known.
-
-    Returns
-    -------
-    list of EstimateBar
-    """
-    return [
-        EstimateBar(p.name, p.value, *ends, (truth or {}).get(p.name))
-        for p in fit.parameters.values()
-        if (ends := p.interval(shown())) is not None and p.value != 0.0
-    ]

@@ -18,7 +18,6 @@ GOOD_PERCENT, POOR_PERCENT = 10.0, 40.0
 _SOME = 0.01
 """Share of a cost from which on what noise makes of it is worth a word."""
 _STILL = 1e-12
-_DEGREES = 180.0 / np.pi
 
 
 def judge_channels(prepared: RecordSet) -> list[Finding]:

@@ -23,7 +23,6 @@ from flightid.record.formats.matlab_bytes import inflated
 FORMATS = (".mat", ".json", ".npz")
 MAXIMUM_BYTES = 64 << 20
 _MATRICES = ("a", "b", "c", "d")
-_PARAMETERS = ("parameters", "parameter_values", "parameter_units")
 
 MATLAB_RECIPE = (
     "m = load('{name}'); k = 1 + (m.Ts > 0)*(m.Ts - 1);",
