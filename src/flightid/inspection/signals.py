@@ -11,19 +11,14 @@ from numpy.typing import NDArray
 from flightid.errors import DataError, MissingColumnError, UnitError, UnknownNameError
 from flightid.inspection.stamps import believable
 from flightid.logs import Log
-from flightid.logs.channels.channel_map import ChannelMap, channel_map, default_map
+from flightid.logs.channels.channel_map import DEFAULTS, ChannelMap, channel_map, default_map
 from flightid.logs.extraction import extract
 from flightid.record import Record
 from flightid.record.timebase import to_uniform
 
 Span = tuple[float, float]
-FALLBACK = {
-    "ardupilot": "arducopter",
-    "px4": "px4_multicopter",
-    "betaflight": "betaflight",
-    "mavlink": "mavlink",
-}
-"""Map for a log that does not tell its vehicle."""
+FALLBACK = {kind: name for (kind, _), name in reversed(DEFAULTS.items())}
+"""Map for a log that does not tell its vehicle: the first of its kind."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,6 +8,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from flightid.control.autopilots import AXES
 from flightid.control.autopilots.axis_loop import Gyro
 from flightid.control.autopilots.output_noise import GyroSpectrum
 from flightid.inspection.signals import Signal, Span, find, inside
@@ -18,7 +19,6 @@ from flightid.table import Column, Table
 from flightid.uncertainty.quantiles import shown, tails
 
 Array = NDArray[np.float64]
-AXES = ("roll", "pitch", "yaw")
 BINS = 8
 FEWEST_IN_BIN = 3
 LOWEST_HZ = 20.0

@@ -85,9 +85,10 @@ def _angle_alone(log: Log, axis: str) -> bool:
 
 def _promised(source: object, axes: list[str], loops: list[AxisLoop]) -> list[LoopResponse]:
     step_s = 1.0 / loops[0].loop_rate_hz
-    commands, rates = zip(*(CHANNELS[axis] for axis in axes), strict=True)
+    pairs = [CHANNELS[axis] for axis in axes]
+    commands, rates = zip(*pairs, strict=True)
     evidence = gather(
-        source, step_s, [f"{rate}/{command}" for command, rate in map(CHANNELS.get, axes)],  # type: ignore[misc]
+        source, step_s, [f"{rate}/{command}" for command, rate in pairs],
         draws=DRAWS, fresh=1, seed=0, band_rad_s=None, verification=None, nominal=True,
         accept_red=True, needs_band=False,
     )  # fmt: skip

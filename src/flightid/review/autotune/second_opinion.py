@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from flightid.control.autopilots import AxisLoop, axis_loop_of
 from flightid.control.margins.margins import Margins, margins
+from flightid.control.tuning.tune_pid import CHANNELS
 from flightid.conventions import Light
 from flightid.errors import FlightidError
 from flightid.identification import Fit
@@ -22,7 +23,6 @@ from flightid.models.transfer.model import TransferFunctionModel
 from flightid.record import Record
 
 Complex = NDArray[np.complex128]
-CHANNELS = {"roll": ("tau_phi", "p"), "pitch": ("tau_theta", "q"), "yaw": ("tau_psi", "r")}
 PID = {"roll": "PIDR", "pitch": "PIDP", "yaw": "PIDY"}
 PID_TERMS = ("P", "I", "D", "FF", "DFF")
 BUTTERWORTH = float(np.sqrt(0.5))
