@@ -62,6 +62,11 @@ class LoopChange:
     chance: float | None
 
     @property
+    def key(self) -> str:
+        """Loop and name: ``"roll rate, rise time"``."""
+        return f"{self.loop}, {self.name}"
+
+    @property
     def words(self) -> str:
         """Name and both numbers."""
         factor, unit = _shown_unit(self.before.unit)
@@ -143,7 +148,7 @@ class FlightComparison(Result, schema="flightid.flight_comparison/1"):
             Not both tell it.
         """
         for change in self.changes:
-            if f"{change.loop}, {change.name}" == name:
+            if change.key == name:
                 return change
         raise DataError("not both tell such a number", found=name)
 
@@ -164,8 +169,7 @@ class FlightComparison(Result, schema="flightid.flight_comparison/1"):
         rows: list[tuple[Cell, ...]] = []
         for each in self.changes:
             factor, unit = _shown_unit(each.before.unit)
-            changed = f"{each.loop}, {each.name}" in self.significant
-            apart = difference_of(each.after, each.before)
+            apart, changed = each.difference, each.key in self.significant
             rows.append(
                 (
                     *(each.loop, each.name, unit, cell(each.before, factor)),
@@ -259,7 +263,7 @@ def compare_loops(
             needed="the step of one loop in both",
             action="see flightid flight LOG of each for what to fly",
         )
-    chances = {f"{c.loop}, {c.name}": c.chance for c in changes if c.chance is not None}
+    chances = {c.key: c.chance for c in changes if c.chance is not None}
     significant = holm(chances)
     kept = tuple(name for name in chances if name in significant)
     findings = (*_unlike(unlike), *_judged(changes, kept, promised=promised))
@@ -313,7 +317,7 @@ def _judged(
 ) -> Iterator[Finding]:
     by_loop: dict[str, list[LoopChange]] = {}
     for each in changes:
-        if f"{each.loop}, {each.name}" in significant and (each.is_material or not promised):
+        if each.key in significant and (each.is_material or not promised):
             by_loop.setdefault(each.loop, []).append(each)
     for loop, found in by_loop.items():
         said = "; ".join(each.words for each in found)
