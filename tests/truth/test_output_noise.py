@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import flightid as fid
+from flightid.control.autopilots import GainChange
 from flightid.control.autopilots.output_noise import GyroSpectrum, output_noise
 from flightid.control.tuning.filter_choice import choose_filters
 from flightid.control.tuning.result import RefusedAxis
@@ -112,6 +113,9 @@ def test_quiet_gyros_get_faster_filters_and_noisy_ones_slower_within_ranges_and_
     assert hopeless.values["INS_GYRO_FILTER"] == 10.0
     fixed = choose_filters(loops, spectra, at, dict.fromkeys(axes, flown), step_limit=1.0)
     assert fixed.changes == (), "no step is allowed"
+    notch = GainChange("INS_HNTCH_ENABLE", 1.0)
+    added = replace(noisy, changes=(notch, *noisy.changes)).summary().notes[0]
+    assert added.startswith("INS_HNTCH_ENABLE 1; INS_GYRO_FILTER 20 → "), "the log has no notch"
 
 
 def test_gains_are_tuned_with_the_new_filter_around_a_plant_that_holds_the_old_one() -> None:

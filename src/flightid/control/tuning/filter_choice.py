@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 
@@ -144,10 +144,15 @@ class FilterChoice(
             )
             for a in self.axes
         ]
-        told = "; ".join(f"{c.name} {c.old:.4g} → {c.value:.4g}" for c in self.changes)
-        return Table(
-            "Filters", columns, tuple(rows), (told or "As flown: none is worth a change.",)
-        )
+        told = change_words(self.changes) or "As flown: none is worth a change."
+        return Table("Filters", columns, tuple(rows), (told,))
+
+
+def change_words(changes: Iterable[GainChange]) -> str:
+    """Old and new values of parameters; of one that the log does not hold the new alone."""
+    return "; ".join(
+        f"{c.name} {'' if c.old is None else f'{c.old:.4g} → '}{c.value:.4g}" for c in changes
+    )
 
 
 def choose_filters(

@@ -9,7 +9,13 @@ import numpy as np
 
 from flightid.control.autopilots import GainChange
 from flightid.control.autopilots.output_noise import GyroSpectrum, output_noise
-from flightid.control.tuning.filter_choice import WORTH_DEG, AxisFilters, FilterChoice, phase_deg
+from flightid.control.tuning.filter_choice import (
+    WORTH_DEG,
+    AxisFilters,
+    FilterChoice,
+    change_words,
+    phase_deg,
+)
 from flightid.control.tuning.pid_design import PidDesign
 from flightid.conventions import Light
 from flightid.findings import Finding
@@ -63,9 +69,8 @@ class TunedFilters:
             )
             for each in self.axes
         ]
-        told = [f"{c.name} {'' if c.old is None else f'{c.old:.4g} → '}{c.value:.4g}"
-                for c in self.changes]  # fmt: skip
-        said = "; ".join(told) or self.reason or "As flown: no other is worth a change."
+        said = change_words(self.changes) or self.reason
+        said = said or "As flown: no other is worth a change."
         notes = (said, "Noise: rms of the gyroscope's in the output from 20 Hz up, 1 is full.")
         return Table("Filters tuned with", columns, tuple(rows), notes if self.axes else (said,))
 
