@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import flightid as fid
-from flightid.control.autopilots import GainChange
+from flightid.control.autopilots import AxisLoop, GainChange
 from flightid.control.autopilots.output_noise import GyroSpectrum, output_noise
 from flightid.control.tuning.filter_choice import choose_filters
 from flightid.control.tuning.result import RefusedAxis
@@ -28,6 +28,17 @@ def _noise(seed: int, low_hz: float, high_hz: float) -> tuple[np.ndarray, GyroSp
     phases = np.random.default_rng(seed).uniform(0.0, 2 * np.pi, frequency.size)
     lines = np.concatenate([[0.0], np.sqrt(density * spacing / 2) * np.exp(1j * phases), [0.0]])
     return np.fft.irfft(lines, N) * N, GyroSpectrum(frequency, density, "raw")
+
+
+def _flown(
+    axes: tuple[str, ...], spectrum: GyroSpectrum
+) -> tuple[dict[str, AxisLoop], dict[str, GyroSpectrum], dict[str, float]]:
+    """Loops of these axes, the spectrum of each and its crossover."""
+    loops = {
+        axis: fid.axis_loop("arducopter", axis, loop_rate_hz=LOOP_HZ, gyro_rate_hz=GYRO_HZ)
+        for axis in axes
+    }
+    return loops, dict.fromkeys(axes, spectrum), dict.fromkeys(axes, 30.0)
 
 
 @pytest.mark.parametrize("autopilot", ["arducopter", "arduplane", "px4_multicopter"])
@@ -91,11 +102,7 @@ def test_a_plant_behind_the_flown_filter_sees_the_change_of_it_alone() -> None:
 def test_quiet_gyros_get_faster_filters_and_noisy_ones_slower_within_ranges_and_steps() -> None:
     _, spectrum = _noise(3, 30.0, 900.0)
     axes = ("roll", "pitch")
-    loops = {
-        axis: fid.axis_loop("arducopter", axis, loop_rate_hz=LOOP_HZ, gyro_rate_hz=GYRO_HZ)
-        for axis in axes
-    }
-    spectra, at = dict.fromkeys(axes, spectrum), dict.fromkeys(axes, 30.0)
+    loops, spectra, at = _flown(axes, spectrum)
     flown = output_noise(loops["roll"], spectrum).total
     quiet = choose_filters(loops, spectra, at, dict.fromkeys(axes, 50.0 * flown))
     assert quiet.values == {
@@ -146,11 +153,7 @@ def test_tuning_with_a_choice_judges_its_filters_and_leaves_the_flown_margins_al
 ) -> None:
     _, spectrum = _noise(5, 30.0, 900.0)
     axes = ("roll", "yaw")
-    loops = {
-        axis: fid.axis_loop("arducopter", axis, loop_rate_hz=LOOP_HZ, gyro_rate_hz=GYRO_HZ)
-        for axis in axes
-    }
-    spectra, at = dict.fromkeys(axes, spectrum), dict.fromkeys(axes, 30.0)
+    loops, spectra, at = _flown(axes, spectrum)
     flown_noise = output_noise(loops["roll"], spectrum).total
     choice = choose_filters(loops, spectra, at, dict.fromkeys(axes, 4.0 * flown_noise))
     assert choice.values["INS_GYRO_FILTER"] > 20.0
@@ -189,11 +192,7 @@ def test_tuning_with_a_choice_judges_its_filters_and_leaves_the_flown_margins_al
 def test_filters_that_all_axes_share_cost_no_phase_where_nothing_is_tuned(tmp_path: Path) -> None:
     _, spectrum = _noise(3, 30.0, 900.0)
     axes = ("roll", "pitch")
-    loops = {
-        axis: fid.axis_loop("arducopter", axis, loop_rate_hz=LOOP_HZ, gyro_rate_hz=GYRO_HZ)
-        for axis in axes
-    }
-    spectra, at = dict.fromkeys(axes, spectrum), dict.fromkeys(axes, 30.0)
+    loops, spectra, at = _flown(axes, spectrum)
     limits = dict.fromkeys(axes, 0.6 * output_noise(loops["roll"], spectrum).total)
     slower = choose_filters(loops, spectra, at, limits)
     kept = choose_filters(loops, spectra, at, limits, keep_phase=["pitch"])
