@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -164,6 +164,23 @@ class ParameterChange:
     name: str
     old: float
     new: float
+
+
+def changes_among(rows: Iterable[tuple[float | None, str, float]]) -> list[ParameterChange]:
+    """Values that differ from the one logged before: of rows of stamp, name and value.
+
+    Example
+    -------
+    >>> [each.new for each in changes_among([(0.0, "P", 0.1), (1.0, "P", 0.1), (2.0, "P", 0.2)])]
+    [0.2]
+    """
+    last: dict[str, float] = {}
+    changes = []
+    for time_s, name, value in rows:
+        if last.get(name, value) != value:
+            changes.append(ParameterChange(time_s, name, last[name], value))
+        last[name] = value
+    return changes
 
 
 class LogSource(Protocol):

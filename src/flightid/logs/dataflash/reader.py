@@ -23,7 +23,7 @@ from flightid.logs.dataflash.field_units import (
     UNITS,
     undeclared_units,
 )
-from flightid.logs.source import ByteRange, Event, Gap, MessageInfo, ParameterChange
+from flightid.logs.source import ByteRange, Event, Gap, MessageInfo, ParameterChange, changes_among
 from flightid.units import DIMENSIONLESS
 
 GAP_S = 0.2
@@ -245,13 +245,7 @@ class DataflashSource:
     @cached_property
     def parameter_changes(self) -> list[ParameterChange]:
         """Values that differ from the one logged before."""
-        last: dict[str, float] = {}
-        changes = []
-        for time_s, name, value in self._parameter_rows:
-            if last.get(name, value) != value:
-                changes.append(ParameterChange(time_s, name, last[name], value))
-            last[name] = value
-        return changes
+        return changes_among(self._parameter_rows)
 
     @cached_property
     def events(self) -> list[Event]:

@@ -6,7 +6,7 @@ when they arrived, brought onto that clock.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from flightid.errors import LogFormatError
 from flightid.findings import Finding
 from flightid.logs.dataflash.events import mode_text
 from flightid.logs.mavlink.messages import TelemetryMessage, telemetry_messages
-from flightid.logs.source import Event, ParameterChange
+from flightid.logs.source import Event, changes_among
 from flightid.logs.table_source import Array, MessageRows, TableSource
 from flightid.reading import bounded_bytes
 
@@ -63,24 +63,25 @@ def open_telemetry(path: Path) -> TableSource:
             heard[message.name] = (arrived_s, np.frombuffer(payloads, message.layout))
     ahead_s = _clock(heard)
     by_name = {message.name: message for message in known.values()}
-    stamps = {name: _stamps(arrived, rows, ahead_s) for name, (arrived, rows) in heard.items()}
-    tables = {name: _rows(by_name[name], rows, stamps[name]) for name, (_, rows) in heard.items()}
-    beats = heard["HEARTBEAT"][1]
-    parameters, changes = _parameters(heard, stamps)
+    tables = {
+        name: _rows(by_name[name], rows, _stamps(arrived, rows, ahead_s))
+        for name, (arrived, rows) in heard.items()
+    }
+    first = heard["HEARTBEAT"][1][0]
+    vehicle, autopilot = VEHICLES.get(int(first["type"])), int(first["autopilot"])
+    # Only ArduPilot's numbers count flight modes from zero; PX4 packs two numbers into one.
+    events = _events(tables, vehicle if autopilot == ARDUPILOT else None)
+    values = _parameter_values(tables)
     return TableSource(
         "mavlink",
-        _vehicle(beats),
-        f"{AUTOPILOTS.get(int(beats['autopilot'][0]), 'autopilot')}, by telemetry",
+        vehicle,
+        f"{AUTOPILOTS.get(autopilot, 'autopilot')}, by telemetry",
         tables,
-        parameters,
-        changes,
-        sorted(_events(heard, stamps), key=lambda event: event.time_s or 0.0),
+        {name: value for _, name, value in values},
+        changes_among(values),
+        sorted(events, key=lambda event: event.time_s or 0.0),
         findings=tuple(_findings(lost, len(data))),
     )
-
-
-def _vehicle(beats: Table) -> str | None:
-    return VEHICLES.get(int(beats["type"][0]))
 
 
 def _autopilot(frames: list[Any], beat: TelemetryMessage) -> tuple[int, int]:
@@ -140,37 +141,28 @@ def _column(rows: Table, name: str) -> Array:
     return np.asarray(values, np.float64)
 
 
-def _parameters(
-    heard: dict[str, tuple[Array, Table]], stamps: dict[str, Array]
-) -> tuple[dict[str, float], list[ParameterChange]]:
-    values: dict[str, float] = {}
-    changes: list[ParameterChange] = []
-    if "PARAM_VALUE" not in heard:
-        return values, changes
-    for time_s, row in zip(stamps["PARAM_VALUE"], heard["PARAM_VALUE"][1], strict=True):
-        name = bytes(row["param_id"]).split(b"\0")[0].decode("ascii", "replace")
-        value = float(row["param_value"])
-        if values.get(name, value) != value:
-            changes.append(ParameterChange(float(time_s), name, values[name], value))
-        values[name] = value
-    return values, changes
+def _parameter_values(tables: Mapping[str, MessageRows]) -> list[tuple[float | None, str, float]]:
+    if "PARAM_VALUE" not in tables:
+        return []
+    sent = tables["PARAM_VALUE"]
+    values = sent.read("param_value").tolist()
+    return list(zip(sent.time_s.tolist(), sent.words["param_id"], values, strict=True))
 
 
-def _events(heard: dict[str, tuple[Array, Table]], stamps: dict[str, Array]) -> Iterator[Event]:
-    beats, beat_s = heard["HEARTBEAT"][1], stamps["HEARTBEAT"]
-    armed = (beats["base_mode"] & ARMED) != 0
+def _events(tables: Mapping[str, MessageRows], vehicle: str | None) -> Iterator[Event]:
+    beats = tables["HEARTBEAT"]
+    armed = (beats.read("base_mode").astype(np.int64) & ARMED) != 0
     for at in np.flatnonzero(np.diff(armed, prepend=~armed[:1])):
-        yield Event(float(beat_s[at]), "arming", "armed" if armed[at] else "disarmed")
-    modes = beats["custom_mode"].astype(np.int64)
+        yield Event(float(beats.time_s[at]), "arming", "armed" if armed[at] else "disarmed")
+    modes = beats.read("custom_mode").astype(np.int64)
     for at in np.flatnonzero(np.diff(modes, prepend=modes[:1] - 1)):
-        # Only ArduPilot's numbers count flight modes from zero; PX4 packs two numbers into one.
-        vehicle = _vehicle(beats) if int(beats["autopilot"][0]) == ARDUPILOT else None
-        yield Event(float(beat_s[at]), "mode", mode_text(vehicle, int(modes[at]), None))
-    if "STATUSTEXT" in heard:
-        for time_s, row in zip(stamps["STATUSTEXT"], heard["STATUSTEXT"][1], strict=True):
-            text = bytes(row["text"]).split(b"\0")[0].decode("utf-8", "replace")
-            level = SEVERITIES[min(int(row["severity"]), len(SEVERITIES) - 1)]
-            yield Event(float(time_s), "text", f"{level}: {text}")
+        yield Event(float(beats.time_s[at]), "mode", mode_text(vehicle, int(modes[at]), None))
+    if "STATUSTEXT" in tables:
+        said = tables["STATUSTEXT"]
+        levels = said.read("severity").astype(np.int64)
+        for time_s, level, text in zip(said.time_s, levels, said.words["text"], strict=True):
+            name = SEVERITIES[min(int(level), len(SEVERITIES) - 1)]
+            yield Event(float(time_s), "text", f"{name}: {text}")
 
 
 def _findings(lost: int, size: int) -> Iterator[Finding]:
