@@ -48,6 +48,23 @@ class MessageInfo:
     first_s: float | None = None
     last_s: float | None = None
 
+    @classmethod
+    def of_stamps(
+        cls,
+        name: str,
+        count: int,
+        instances: tuple[int, ...],
+        fields: Mapping[str, str],
+        text_fields: tuple[str, ...],
+        time_s: NDArray[np.float64],
+    ) -> MessageInfo:
+        """Rate, first and last stamp by the stamps of one instance, shape (n,)."""
+        steps = np.diff(time_s)
+        middle = float(np.median(steps)) if steps.size else 0.0
+        rate_hz = 1.0 / middle if middle > 0 else None
+        ends = (float(time_s.min()), float(time_s.max())) if time_s.size else (None, None)
+        return cls(name, count, instances, fields, text_fields, rate_hz, *ends)
+
     def __repr__(self) -> str:
         """Rows, fields and rate on one line."""
         rate = "no rate" if self.rate_hz is None else f"{self.rate_hz:.4g} Hz"

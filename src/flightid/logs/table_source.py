@@ -39,17 +39,8 @@ class MessageRows:
 
     def info(self, name: str) -> MessageInfo:
         """What a listing says of the rows."""
-        steps = np.diff(self.time_s)
-        middle = float(np.median(steps)) if steps.size else 0.0
-        return MessageInfo(
-            name,
-            self.time_s.size,
-            (),
-            self.units,
-            tuple(self.words),
-            1.0 / middle if middle > 0 else None,
-            float(self.time_s.min()) if self.time_s.size else None,
-            float(self.time_s.max()) if self.time_s.size else None,
+        return MessageInfo.of_stamps(
+            name, self.time_s.size, (), self.units, tuple(self.words), self.time_s
         )
 
 

@@ -58,7 +58,7 @@ def open_blackbox(path: Path) -> TableSource:
     sizes = [stop - start for start, stop in flights]
     taken = int(np.argmax(sizes)) if sizes else 0
     native = _native.Blackbox(data, taken)
-    header = _header(native.headers())
+    header = dict(native.headers())
     tables = dict(_tables(native, header))
     lost = [ByteRange(*part) for part in native.skipped()]
     return TableSource(
@@ -72,10 +72,6 @@ def open_blackbox(path: Path) -> TableSource:
         gaps=_gaps(tables[LOOP].time_s) if LOOP in tables else (),
         findings=tuple(_findings(native, lost, len(data), taken, len(flights))),
     )
-
-
-def _header(lines: list[tuple[str, str]]) -> dict[str, str]:
-    return dict(lines)
 
 
 def _parameters(header: Mapping[str, str]) -> dict[str, float]:
@@ -125,7 +121,7 @@ def _scales(header: Mapping[str, str]) -> dict[str, float]:
     scales = dict.fromkeys(FINE, fine)
     for name in RATES:
         scales[name] *= _gyro_scale(header)
-    gravity = _number(header.get(GRAVITY))
+    gravity = _parameters(header).get(GRAVITY)
     if gravity:
         scales["accSmooth["] = 1.0 / gravity
     age = _VERSION.search(header.get("Firmware revision", ""))
@@ -147,13 +143,6 @@ def _gyro_scale(header: Mapping[str, str]) -> float:
         return 1.0
     # Baseflight counts in rad/µs.
     return float(np.degrees(scale * 1e6)) if scale < 1e-6 else float(scale)
-
-
-def _number(text: str | None) -> float | None:
-    try:
-        return float(text or "")
-    except ValueError:
-        return None
 
 
 def _events(native: _native.Blackbox) -> list[Event]:

@@ -239,17 +239,8 @@ class UlogSource:
         if stamps.size > 1 and np.ptp(stamps) == 0:
             # Some topics are published without ever setting their stamp.
             stamps = np.empty(0)
-        steps = np.diff(stamps)
-        middle = float(np.median(steps)) if steps.size else 0.0
-        return MessageInfo(
-            name,
-            sum(counts.values()),
-            tuple(sorted(counts)),
-            fields,
-            tuple(texts),
-            1.0 / middle if middle > 0 else None,
-            float(stamps.min()) if stamps.size else None,
-            float(stamps.max()) if stamps.size else None,
+        return MessageInfo.of_stamps(
+            name, sum(counts.values()), tuple(sorted(counts)), fields, tuple(texts), stamps
         )
 
     def _has(self, message: str, field: str) -> bool:
