@@ -39,6 +39,7 @@ FIELDS = (
     Field("amperageLatest", 1, (0, 0), (1, 6)),
     Field("rssi", 0, (0, 1), (1, 6)),
     *(Field(f"gyroADC[{i}]", 1, (0, 0), (3, 0)) for i in AXES),
+    *(Field(f"accSmooth[{i}]", 1, (0, 0), (3, 0)) for i in AXES),
     Field("motor[0]", 0, (11, 1), (3, 0)),
     *(Field(f"motor[{i}]", 0, (5, 0), (3, 0)) for i in range(1, 4)),
 )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import flightid as fid
-from flightid.errors import LogFormatError
+from flightid.errors import LogFormatError, MissingColumnError
 from flightid.logs.blackbox.reader import open_blackbox
 from tests.blackbox_builder import END, FIELDS, SETTINGS, blackbox, header
 
@@ -45,6 +45,7 @@ def test_every_value_comes_back(tmp_path: Path, seed: int) -> None:
     table = log.table("main")
     for name, values in columns.items():
         scale = 0.01 if name in ("vbatLatest", "amperageLatest") else 1.0
+        scale = 1.0 / 2048.0 if name.startswith("acc") else scale
         np.testing.assert_array_equal(table[name], values * scale, err_msg=name)
     np.testing.assert_array_equal(table.time_s, columns["time"] / 1e6)
     assert log.parameters["rollPID[1]"] == 80.0
@@ -94,6 +95,54 @@ def test_scales_of_the_header(tmp_path: Path) -> None:
     table = _open(tmp_path, blackbox(columns, fine)).table("main")
     np.testing.assert_allclose(table["gyroADC[0]"], columns["gyroADC[0]"] * 0.0625 / 10)
     np.testing.assert_allclose(table["setpoint[2]"], columns["setpoint[2]"] / 10)
+    fine["gyro_scale"] = f"0x{np.float32(1e-9).view(np.uint32):08x}"
+    table = _open(tmp_path, blackbox(columns, fine)).table("main")
+    milli = np.degrees(np.float32(1e-9) * 1e6) / 10
+    np.testing.assert_allclose(table["gyroADC[1]"], columns["gyroADC[1]"] * milli, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("revision", "volts", "amperes"),
+    [
+        ("Betaflight 4.0.0 (a) F7", 0.01, 0.01),
+        ("Betaflight 3.5.7 (a) F4", 0.1, 0.01),
+        ("Betaflight 3.1.0 (a) F3", 0.1, None),
+        ("Betaflight 3.0.1 (a) F3", None, None),
+        ("INAV 7.1.0 (a) F7", None, None),
+        ("", None, None),
+    ],
+)
+def test_battery_has_the_unit_of_its_version_or_is_left_out(
+    tmp_path: Path, revision: str, volts: float | None, amperes: float | None
+) -> None:
+    columns = _columns(n=64)
+    log = _open(tmp_path, blackbox(columns, {**SETTINGS, "Firmware revision": revision}))
+    table = log.table("main")
+    said = " ".join(f.message for f in log.findings if f.code == "unit-unknown")
+    for name, scale in (("vbatLatest", volts), ("amperageLatest", amperes)):
+        assert (name in said) is (scale is None)
+        assert (name in table.columns) is (scale is not None)
+        if scale is not None:
+            np.testing.assert_allclose(table[name], columns[name] * scale)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "fields"),
+    [
+        ("gyro_scale", "", "gyroADC[0], gyroADC[1], gyroADC[2]"),
+        ("gyro_scale", "0x7fc00000", "gyroADC[0], gyroADC[1], gyroADC[2]"),
+        ("acc_1G", "0", "accSmooth[0], accSmooth[1], accSmooth[2]"),
+    ],
+)
+def test_counts_of_unknown_size_are_left_out_and_said(
+    tmp_path: Path, name: str, value: str, fields: str
+) -> None:
+    log = _open(tmp_path, blackbox(_columns(n=64), {**SETTINGS, name: value}))
+    (said,) = log.findings
+    assert f"no {name}: {fields} are counts" in said.message
+    assert not set(fields.split(", ")) & set(log.table("main").columns)
+    with pytest.raises(MissingColumnError):
+        log.table("main")[fields.split(", ", maxsplit=1)[0]]
 
 
 @pytest.mark.parametrize(

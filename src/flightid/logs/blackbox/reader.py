@@ -38,8 +38,11 @@ HIGH_RESOLUTION = 10.0
 RATES = ("gyroADC[", "gyroUnfilt[")
 FINE = (*RATES, "setpoint[", "rcCommand[")
 """Fields that ``blackbox_high_resolution`` stores ten times as fine."""
+FORCES, VOLTAGE, CURRENT = "accSmooth[", "vbatLatest", "amperageLatest"
+BATTERY = {(4, 0): (0.01, 0.01), (3, 2): (0.1, 0.01), (3, 1): (0.1, None)}
+"""V and A of one count since a version of Betaflight, the newest first; before: raw readings."""
 
-_VERSION = re.compile(r"(?P<name>Betaflight|Cleanflight|INAV)\s+(?P<age>\d+\.\d+)", re.IGNORECASE)
+_VERSION = re.compile(r"Betaflight\s+(?P<major>\d+)\.(?P<minor>\d+)", re.IGNORECASE)
 
 
 def open_blackbox(path: Path) -> TableSource:
@@ -59,7 +62,8 @@ def open_blackbox(path: Path) -> TableSource:
     taken = int(np.argmax(sizes)) if sizes else 0
     native = _native.Blackbox(data, taken)
     header = dict(native.headers())
-    tables = dict(_tables(native, header))
+    scales, untold = _scales(header)
+    tables = dict(_tables(native, scales, untold))
     lost = [ByteRange(*part) for part in native.skipped()]
     return TableSource(
         "betaflight",
@@ -70,7 +74,10 @@ def open_blackbox(path: Path) -> TableSource:
         events=_events(native),
         skipped=lost,
         gaps=_gaps(tables[LOOP].time_s) if LOOP in tables else (),
-        findings=tuple(_findings(native, lost, len(data), taken, len(flights))),
+        findings=(
+            *_left_out(native, untold),
+            *_findings(native, lost, len(data), taken, len(flights)),
+        ),
     )
 
 
@@ -91,15 +98,18 @@ def _parameters(header: Mapping[str, str]) -> dict[str, float]:
 
 
 def _tables(
-    native: _native.Blackbox, header: Mapping[str, str]
+    native: _native.Blackbox, scales: Mapping[str, float], untold: Mapping[str, str]
 ) -> Iterator[tuple[str, MessageRows]]:
-    scales = _scales(header)
     for name, columns, count in native.tables():
         if not count:
             continue
         places = {column: place for place, column in reversed(list(enumerate(columns)))}
         read = partial(_scaled, native, name, places, scales)
-        units = {column: "µs" if column == "time" else "1" for column in columns}
+        units = {
+            column: "µs" if column == "time" else "1"
+            for column in columns
+            if not column.startswith(tuple(untold))
+        }
         yield name, MessageRows(units, read, native.stamps_us(name) / 1e6)
 
 
@@ -115,34 +125,56 @@ def _scaled(
     return values if scale == 1.0 else values * scale
 
 
-def _scales(header: Mapping[str, str]) -> dict[str, float]:
-    """Factor by the beginning of a field's name."""
+def _scales(header: Mapping[str, str]) -> tuple[dict[str, float], dict[str, str]]:
+    """Factor by the beginning of a field's name; of fields without one, what the header lacks."""
     fine = 1.0 / HIGH_RESOLUTION if header.get("blackbox_high_resolution") == "1" else 1.0
+    gyro, gravity = _gyro_scale(header), _parameters(header).get(GRAVITY, 0.0)
+    volts, amperes = _battery_scales(header.get("Firmware revision", ""))
+    told = {
+        **dict.fromkeys(RATES, ("gyro_scale", gyro and gyro * fine)),
+        FORCES: (GRAVITY, 1.0 / gravity if gravity > 0.0 else None),
+        VOLTAGE: ("version of Betaflight that logs volts", volts),
+        CURRENT: ("version of Betaflight that logs amperes", amperes),
+    }
     scales = dict.fromkeys(FINE, fine)
-    for name in RATES:
-        scales[name] *= _gyro_scale(header)
-    gravity = _parameters(header).get(GRAVITY)
-    if gravity:
-        scales["accSmooth["] = 1.0 / gravity
-    age = _VERSION.search(header.get("Firmware revision", ""))
-    if age is not None and age["name"].lower() == "betaflight":
-        major = int(age["age"].split(".")[0])
-        scales["vbatLatest"] = 0.01 if major >= 4 else 0.1
-        scales["amperageLatest"] = 0.01
-    return scales
+    scales |= {name: scale for name, (_, scale) in told.items() if scale is not None}
+    return scales, {name: lacks for name, (lacks, scale) in told.items() if scale is None}
 
 
-def _gyro_scale(header: Mapping[str, str]) -> float:
+def _battery_scales(revision: str) -> tuple[float | None, float | None]:
+    age = _VERSION.search(revision)
+    if age is None:
+        return None, None
+    version = (int(age["major"]), int(age["minor"]))
+    return next((each for since, each in BATTERY.items() if version >= since), (None, None))
+
+
+def _gyro_scale(header: Mapping[str, str]) -> float | None:
     """Degrees per second of one count: the bits of a float, in hexadecimal."""
     text = header.get("gyro_scale", header.get("gyro.scale", ""))
     try:
         scale = struct.unpack(">f", bytes.fromhex(text.removeprefix("0x").rjust(8, "0")))[0]
     except (ValueError, struct.error):
-        return 1.0
+        return None
     if not (np.isfinite(scale) and scale > 0.0):
-        return 1.0
+        return None
     # Baseflight counts in rad/µs.
     return float(np.degrees(scale * 1e6)) if scale < 1e-6 else float(scale)
+
+
+def _left_out(native: _native.Blackbox, untold: Mapping[str, str]) -> Iterator[Finding]:
+    columns = {column for _, names, _ in native.tables() for column in names}
+    for lacks in dict.fromkeys(untold.values()):
+        starts = tuple(start for start, why in untold.items() if why == lacks)
+        fields = sorted(column for column in columns if column.startswith(starts))
+        if fields:
+            yield Finding(
+                "unit-unknown",
+                Light.AMBER,
+                f"the header tells no {lacks}: {', '.join(fields)} are counts of unknown size, and "
+                "left out",
+                "update the firmware, or decode the file with its own viewer and hand in a CSV",
+            )
 
 
 def _events(native: _native.Blackbox) -> list[Event]:
