@@ -79,6 +79,46 @@ def test_damaged_frame_is_left_out_and_said(tmp_path: Path) -> None:
     assert {f.code for f in log.findings} == {"telemetry", "bytes-skipped"}
 
 
+def _run(n: int, started_s: float, first_ms: int, roll: float) -> bytes:
+    """A run of attitude, airspeed and outputs, whose clock began `started_s` after the first's."""
+    link, out = mavlink.MAVLink(None, srcSystem=1, srcComponent=1), []
+    for boot_ms in first_ms + 100 * np.arange(n):
+        messages = [
+            mavlink.MAVLink_heartbeat_message(2, 3, 0x80, 5, 4, 3),
+            mavlink.MAVLink_attitude_message(int(boot_ms), roll, 0.0, 0.2, 0.5, 0.0, 0.0),
+            mavlink.MAVLink_vfr_hud_message(roll, 1.0, 90, 40, 3.0, 0.0),
+            mavlink.MAVLink_servo_output_raw_message(int(1000 * boot_ms) % 2**32, 0, *[1500] * 8),
+        ]
+        stamp = START_US + round(1e6 * started_s) + 1000 * int(boot_ms)
+        out += [struct.pack(">Q", stamp) + each.pack(link) for each in messages]
+    return b"".join(out)
+
+
+@pytest.mark.parametrize("longest", [0, 1])
+def test_of_several_runs_of_the_autopilot_the_longest_is_read(tmp_path: Path, longest: int) -> None:
+    sizes = (300, 100) if longest == 0 else (100, 300)
+    runs = _run(sizes[0], 0.0, 50_000, 0.1), _run(sizes[1], 150.0, 1_000, 0.3)
+    log = _open(tmp_path, _telemetry(n=9) + b"".join(runs))
+    begun = (50.0, 1.0)[longest]
+    for name, field in (("ATTITUDE", "roll"), ("VFR_HUD", "airspeed")):
+        table = log.table(name)
+        assert len(table) == sizes[longest] + 9 * (longest == 0)
+        np.testing.assert_allclose(table[field][-90:], (0.1, 0.3)[longest], rtol=1e-6)
+        assert table.time_s[0] == pytest.approx(begun, abs=1e-3)
+        assert table.time_s[-1] == pytest.approx(begun + 0.1 * (sizes[longest] - 1), abs=1e-3)
+    assert "ATC_RAT_RLL_P" in log.parameters, "parameters stay"
+    said = next(f.message for f in log.findings if f.code == "autopilot-restarted")
+    assert "2 runs" in said
+
+
+def test_counters_of_microseconds_turn_over(tmp_path: Path) -> None:
+    log = _open(tmp_path, _run(300, 0.0, 2**32 // 1000 - 10_000, 0.1))
+    np.testing.assert_allclose(
+        log.table("SERVO_OUTPUT_RAW").time_s, log.table("ATTITUDE").time_s, atol=1e-3
+    )
+    assert {f.code for f in log.findings} == {"telemetry"}
+
+
 def test_no_autopilot_is_refused(tmp_path: Path) -> None:
     link = mavlink.MAVLink(None, srcSystem=255, srcComponent=190)
     beat = mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3).pack(link)

@@ -37,12 +37,14 @@ STAMPS = {"time_boot_ms": 1e3, "time_usec": 1e6}
 """Stamps of messages that tell when they were made, and their counts a second."""
 LATEST_BOOT_S = 1e8
 """Stamps beyond it, s, count from 1970, not from the start of the autopilot."""
+RESTART_S = 5.0
+"""Fall of the autopilot's clock that no order of arrival explains: it started anew."""
 SEVERITIES = ("emergency", "alert", "critical", "error", "warning", "notice", "info", "debug")
 Table = NDArray[np.void]
 
 
 def open_telemetry(path: Path) -> TableSource:
-    """Read a telemetry log: of the first autopilot that is heard in it.
+    """Read a telemetry log: of the first autopilot that is heard in it, its longest run.
 
     Raises
     ------
@@ -61,6 +63,8 @@ def open_telemetry(path: Path) -> TableSource:
         if (system, component) == sender:
             message = known[number]
             heard[message.name] = (arrived_s, np.frombuffer(payloads, message.layout))
+    starts = _starts(heard)
+    heard = _longest_run(heard, starts)
     ahead_s = _clock(heard)
     by_name = {message.name: message for message in known.values()}
     tables = {
@@ -80,7 +84,7 @@ def open_telemetry(path: Path) -> TableSource:
         {name: value for _, name, value in values},
         changes_among(values),
         sorted(events, key=lambda event: event.time_s or 0.0),
-        findings=tuple(_findings(lost, len(data))),
+        findings=tuple(_findings(lost, len(data), len(starts))),
     )
 
 
@@ -96,6 +100,38 @@ def _autopilot(frames: list[Any], beat: TelemetryMessage) -> tuple[int, int]:
         needed="a .tlog that a ground station recorded",
         action="hand in the log of the autopilot itself",
     )
+
+
+def _starts(heard: dict[str, tuple[Array, Table]]) -> list[float]:
+    """Arrivals with which the autopilot's clock begins: the log's, and one of each restart."""
+    boots = [
+        (arrived, rows["time_boot_ms"] / STAMPS["time_boot_ms"])
+        for arrived, rows in heard.values()
+        if "time_boot_ms" in (rows.dtype.names or ())
+    ]
+    if not boots:
+        return [-np.inf]
+    arrived_s, made_s = (np.concatenate(each) for each in zip(*boots, strict=True))
+    order = np.argsort(arrived_s, kind="stable")
+    fallen = np.flatnonzero(np.diff(made_s[order]) < -RESTART_S) + 1
+    return [-np.inf, *arrived_s[order][fallen].tolist()]
+
+
+def _longest_run(
+    heard: dict[str, tuple[Array, Table]], starts: list[float]
+) -> dict[str, tuple[Array, Table]]:
+    """What arrived in the run with most heartbeats; parameters stay from one run to the next."""
+    ends = [*starts[1:], np.inf]
+    beats = np.searchsorted(starts, heard["HEARTBEAT"][0], side="right") - 1
+    run = int(np.argmax(np.bincount(beats)))
+    kept = {}
+    for name, (arrived_s, rows) in heard.items():
+        inside = arrived_s < ends[run]
+        if name != "PARAM_VALUE":
+            inside &= arrived_s >= starts[run]
+        if np.any(inside):
+            kept[name] = (np.maximum(arrived_s[inside], starts[run]), rows[inside])
+    return kept
 
 
 def _clock(heard: dict[str, tuple[Array, Table]]) -> float:
@@ -117,8 +153,13 @@ def _made_s(rows: Table) -> Array | None:
 
 
 def _stamps(arrived_s: Array, rows: Table, ahead_s: float) -> Array:
-    made = _made_s(rows)
-    return arrived_s - ahead_s if made is None else made
+    """When rows were made, or arrived, on the autopilot's clock; counters of 32 bits turn over."""
+    made, here = _made_s(rows), arrived_s - ahead_s
+    if made is None:
+        return here
+    name = next(each for each in STAMPS if each in (rows.dtype.names or ()))
+    turn_s = 2.0 ** (8 * rows.dtype[name].itemsize) / STAMPS[name]
+    return np.asarray(made + turn_s * np.round((here - made) / turn_s))
 
 
 def _rows(message: TelemetryMessage, rows: Table, time_s: Array) -> MessageRows:
@@ -165,7 +206,7 @@ def _events(tables: Mapping[str, MessageRows], vehicle: str | None) -> Iterator[
             yield Event(float(time_s), "text", f"{name}: {text}")
 
 
-def _findings(lost: int, size: int) -> Iterator[Finding]:
+def _findings(lost: int, size: int, runs: int) -> Iterator[Finding]:
     yield Finding(
         "telemetry",
         Light.AMBER,
@@ -173,6 +214,13 @@ def _findings(lost: int, size: int) -> Iterator[Finding]:
         "motors",
         "hand in the log that the autopilot wrote to its own card",
     )
+    if runs > 1:
+        yield Finding(
+            "autopilot-restarted",
+            Light.AMBER,
+            f"the autopilot starts anew in this log, {runs} runs in all: the longest is read",
+            "save each run to its own file to read the others",
+        )
     if lost:
         yield Finding(
             "bytes-skipped",
