@@ -45,6 +45,11 @@ class FlownAxis(RateAxis):
     still_omega_rad_s: tuple[float, ...] = ()
     still_density: tuple[float, ...] = ()
 
+    @property
+    def full_command(self) -> float:
+        """A full command, in the unit of the controllers' outputs."""
+        return 1.0 if self.loop is None else self.loop.full_output
+
     def entry(self, omega_rad_s: Array) -> NDArray[np.complex128]:
         """From what is injected to the controller's output."""
         if self.loop is None or self.enters == "mixer":

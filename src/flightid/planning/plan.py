@@ -197,9 +197,10 @@ def _sweep(procedure: Procedure, axis: str, vehicle: FlownAxis, asked: PlanOptio
     band = asked.band_rad_s or _band(vehicle, by_stick)
     cycles_s = CYCLES * math.tau / band[0]
     length_s = asked.duration_s or float(np.clip(math.ceil(cycles_s), SHORTEST_S, LONGEST_S))
-    full = 45.0 if procedure.loops == "arduplane" else 1.0
     limits = Limits(
-        control=asked.control * full, rate_rad_s=asked.rate_rad_s, attitude_rad=asked.attitude_rad
+        control=asked.control * vehicle.full_command,
+        rate_rad_s=asked.rate_rad_s,
+        attitude_rad=asked.attitude_rad,
     )
 
     def made(size: float | None) -> Plan:

@@ -155,7 +155,7 @@ class SweepPlan(Result, schema="flightid.sweep_plan/1"):
         for each in self.sweeps:
             if each.plan is None or each.guess is None:
                 continue
-            told, size = each.plan.axes[0], 100.0 / self.full_command
+            told, size = each.plan.axes[0], 100.0 / each.guess.vehicle.full_command
             rows.append(
                 (
                     *(each.axis, size * told.peak_control, DEGREES * told.peak_rate_rad_s),
@@ -184,11 +184,6 @@ class SweepPlan(Result, schema="flightid.sweep_plan/1"):
     def title(self) -> str:
         """Whose plan."""
         return f"Flight plan of {self.name}, {self.procedure.title}"
-
-    @property
-    def full_command(self) -> float:
-        """A full command, in the unit of the controllers' outputs."""
-        return 45.0 if self.procedure.loops == "arduplane" else 1.0
 
     def _notes(self) -> Iterator[str]:
         yield f"{self.flight_time.words[0].upper()}{self.flight_time.words[1:]}."

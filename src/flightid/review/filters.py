@@ -27,8 +27,6 @@ from flightid.table import Cell, Column, Table
 
 USUAL_HZ = 5.0
 """Where multirotors of middle size cross over: taken where the flight tells no frequency."""
-FULL = {"1": 1.0, "deg": 45.0}
-"""Full command by the unit of the output."""
 
 
 @dataclass(frozen=True)
@@ -193,7 +191,7 @@ def filter_review(
             axis,
             loop.filter_stages(),
             output_noise(loop, spectra[axis]) if told else None,
-            FULL[loop.output_unit],
+            loop.full_output,
         )
         for axis, loop in flown.items()
     )

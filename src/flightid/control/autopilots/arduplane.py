@@ -43,6 +43,7 @@ class ArduPlaneLoop(ArduPilotLoop):
     eas2tas: float = 1.0
     autopilot: ClassVar[str] = "arduplane"
     output_unit: ClassVar[str] = "deg"
+    full_output: ClassVar[float] = FULL_SERVO_DEG
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -85,6 +85,8 @@ class AxisLoop(Result, schema="flightid.axis_loop/1"):
     plant_gyro: tuple[Section, ...] | None = field(default=None, kw_only=True)
     autopilot: ClassVar[str] = ""
     output_unit: ClassVar[str] = "1"
+    full_output: ClassVar[float] = 1.0
+    """Output of a full command, in its unit."""
     set_point_delay_loops: ClassVar[int] = 0
     """Loops between an angle error and the rate loop that acts on it."""
     inner: ClassVar[str] = "rate loop"
