@@ -160,6 +160,12 @@ def test_helicopters_keep_their_integrator() -> None:
     assert not any(each.name.endswith("_I") for each in made.sweeps[0].changes)
 
 
+def test_time_in_the_air_counts_the_sweep_that_the_settings_ask_of_an_autotune() -> None:
+    asked = fid.plan_flight(vehicle="plane", autopilot="px4", duration_s=60.0)
+    assert {c.name: c.value for c in asked.sweeps[0].changes}["FW_AT_SYSID_TIME"] == 60.0
+    assert asked.flight_time.run_s == (75.0,) * 3, "15 s of rest"
+
+
 def test_plans_refuse() -> None:
     with pytest.raises(UnknownNameError, match="no way to sweep this vehicle"):
         fid.plan_flight(vehicle="heli", autopilot="px4")

@@ -27,7 +27,7 @@ from flightid.planning.flown_axis import FlownAxis
 from flightid.planning.options import PlanOptions
 from flightid.planning.procedures import PROCEDURES, Procedure, procedure_of
 from flightid.planning.result import AxisSweep, SweepPlan
-from flightid.planning.settings import SID_AXES, log_family, settings_of
+from flightid.planning.settings import AUTOTUNE_S, SID_AXES, log_family, settings_of
 from flightid.review.loops import loop_rate_hz as logged_loop_rate_hz
 
 USUAL_LOOP_HZ = 400.0
@@ -151,7 +151,8 @@ def plan_flight(
         changes = settings_of(procedure, axis, excitation, current, chosen, asked)
         sweeps.append(AxisSweep(axis, guess, made, changes))
     flown = flight_findings(opened, phases, sweeps, USUAL_LOOP_HZ if assumed else 0.0)
-    lengths = [each.plan.excitation.duration_s if each.plan else 30.0 for each in sweeps]
+    unsized_s = (procedure.how == "autotune" and asked.duration_s) or AUTOTUNE_S
+    lengths = [each.plan.excitation.duration_s if each.plan else unsized_s for each in sweeps]
     runs = [length + WAIT_S[procedure.how] for length in lengths]
     return SweepPlan(
         name=vehicle if opened is None else opened.path.name,
