@@ -12,7 +12,6 @@ from flightid.responses.unbiased import unbiased
 from flightid.uncertainty.quantiles import LEVEL, half_width
 
 Real = NDArray[np.float64]
-NO_ERRORS = "the errors of the response are not known"
 RANDOM = "random errors alone: what windows blur is not known"
 TAKEN_OUT = "about the response with leakage and resolution taken out"
 

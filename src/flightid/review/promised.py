@@ -23,7 +23,6 @@ from flightid.review.step_features import frequency_features, step_features
 
 DRAWS = 40
 RESPONSES = {"rate": "rate step", "attitude": "angle step"}
-EMPTY = np.zeros(0)
 
 
 def promised_loops(sources: Iterable[object], log: Log) -> tuple[LoopResponse, ...]:

@@ -105,7 +105,7 @@ class JointResiduals:
 
 
 def flights_of(apart: Sequence[Array], blocks: Sequence[RecordBlock]) -> list[RecordParts]:
-    """Records with their halves, from what `_heard` gives of each."""
+    """Records with their halves, from what `noise_heard` gives of each."""
     return [_flight(each.sum(axis=0), block) for each, block in zip(apart, blocks, strict=True)]
 
 

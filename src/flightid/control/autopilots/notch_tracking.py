@@ -15,7 +15,6 @@ from flightid.logs import Log
 Array = NDArray[np.float64]
 STEADY = 1.3
 """Ratio of the 95th to the 5th percentile below which one centre stands for all of them."""
-DOUBLE = 2
 MOST_SOURCES = 12
 LEAST_HZ = 1.0
 RUNNING = 0.02

@@ -13,7 +13,6 @@ FORCES, MOMENTS = "XYZ", "LMN"
 SPEEDS = {"u": "u", "V": "u", "v": "v", "w": "w"}
 """Letter of the coefficient by speed."""
 RATES = ("p", "q", "r")
-ANGLES = ("alpha", "beta")
 FIXED_WING = "Klein and Morelli, Aircraft System Identification, 2006, sec. 3.7 and 5.1"
 ROTOR = "Johnson, Helicopter Theory (1980): by air density, rotor speed and radius"
 

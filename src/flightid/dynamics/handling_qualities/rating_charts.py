@@ -164,10 +164,3 @@ class RatingChart(Result, schema="flightid.rating_chart/1"):
         if self.confirmed:
             return ""
         return "Boundaries not confirmed: check them against your copy of the standard."
-
-
-def _finite(limits: Limits) -> dict[str, list[float | None]]:
-    return {
-        name: [value if np.isfinite(value) else None for value in ends]
-        for name, ends in limits.items()
-    }

@@ -32,7 +32,6 @@ NAMES: Mapping[str, str] = {
     "longitudinal stick": "Alon",
 }
 """Parameter of a library model by role."""
-MISSING = "the parameters give no such number"
 FLAPPING = {"roll": ("roll stiffness", "p"), "pitch": ("pitch stiffness", "q")}
 
 

@@ -21,7 +21,7 @@ STEPS = {0: "rate D up", 1: "rate D down", 2: "rate P up"}
 LATER_STEPS = {3: "rate FF up", 4: "angle P down", 5: "angle P up"}
 EARLIER_STEPS = {3: "angle P down", 4: "angle P up"}
 """Until 4.3 the angle's steps followed the rate's at once."""
-FAILED, REACHED_LIMIT, SUCCEEDED, SAVED = 34, 35, 33, 37
+SUCCEEDED, FAILED, SAVED = 33, 34, 37
 MOST_P, MOST_D = 2.0, 0.2
 """AUTOTUNE_RP_MAX and AUTOTUNE_RD_MAX of AC_AutoTune_Multi.cpp."""
 AT_END = 1.02
