@@ -8,7 +8,7 @@ import pytest
 import flightid as fid
 from flightid.errors import LogFormatError, MissingColumnError
 from flightid.logs.blackbox.reader import open_blackbox
-from tests.blackbox_builder import END, FIELDS, SETTINGS, blackbox, header
+from tests.blackbox_builder import END, FIELDS, SETTINGS, blackbox, header, unsigned
 
 
 def _columns(n: int = 400, seed: int = 0, size: float = 1.0) -> dict[str, np.ndarray]:
@@ -81,6 +81,33 @@ def test_longest_of_several_flights_is_read_and_said(tmp_path: Path) -> None:
     said = next(f.message for f in log.findings if f.code == "several-flights")
     assert "3 flights" in said
     assert "number 2" in said
+
+
+def test_modes_and_gaps_are_told(tmp_path: Path) -> None:
+    columns = _columns(n=64, size=0.5)
+    columns["time"][40:] += 30 * 500
+    content = blackbox(columns).removesuffix(END)
+    for flags in (0, 1 << 1, 1 << 2, 1 << 5):
+        content += b"E" + bytes([30]) + unsigned(flags) + unsigned(0)
+    log = _open(tmp_path, content + END)
+    assert [e.text for e in log.events if e.kind == "mode"] == ["ACRO", "ANGLE", "HORIZON", "ACRO"]
+    (gap,) = log.gaps
+    assert (gap.start_s, gap.stop_s) == (columns["time"][39] / 1e6, columns["time"][40] / 1e6)
+
+
+def test_axes_are_turned_into_those_of_an_aircraft(tmp_path: Path) -> None:
+    """Betaflight's body axes are x forward, y left and z up."""
+    columns = _columns(n=64, size=0.5)
+    columns["time"] = 10_000_000 + 500 * np.arange(64)
+    record = _open(tmp_path, blackbox(columns)).record()
+    for place, (rate, command) in enumerate(
+        (("p", "tau_phi"), ("q", "tau_theta"), ("r", "tau_psi"))
+    ):
+        sign = 1.0 if place == 0 else -1.0
+        exact = sign * np.radians(columns[f"gyroADC[{place}]"])
+        np.testing.assert_allclose(record[rate], exact, rtol=1e-12, atol=1e-12)
+        terms = sum(columns[f"axis{term}[{place}]"] for term in "PID")
+        np.testing.assert_allclose(record[command], sign * terms / 1e3, rtol=1e-12, atol=1e-12)
 
 
 def test_log_without_end_is_called_cut(tmp_path: Path) -> None:
