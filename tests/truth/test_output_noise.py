@@ -83,6 +83,26 @@ def test_noise_above_half_of_the_loop_s_rate_is_folded_below_it() -> None:
     assert_close(power, np.trapezoid(line.density * gain, frequency), rtol=0.01, why="none is lost")
 
 
+def test_motion_below_20_hz_is_no_noise() -> None:
+    frequency = np.linspace(1.0, 999.0, 4000)
+    moved = GyroSpectrum(frequency, np.where(frequency < 20.0, 1e3, 1e-5), "filtered")
+    loop = fid.axis_loop("arducopter", "roll", loop_rate_hz=LOOP_HZ, gyro_rate_hz=GYRO_HZ)
+    omega, density = moved.behind(loop)
+    below = density[omega < 2 * np.pi * 19.0]
+    assert_close(below, np.full(below.size, density[100]), rtol=0.5, why="the level just above it")
+    assert density[100] < 1e-4
+
+
+def test_a_filter_is_raised_only_as_far_as_the_spectrum_tells() -> None:
+    _, spectrum = _noise(3, 30.0, 900.0)
+    loop = fid.axis_loop("arducopter", "roll", loop_rate_hz=LOOP_HZ, gyro_rate_hz=GYRO_HZ)
+    for known_hz, highest in ((900.0, 40.0), (90.0, 30.0), (50.0, 20.0)):
+        kept = spectrum.frequency_hz <= known_hz
+        told = GyroSpectrum(spectrum.frequency_hz[kept], spectrum.density[kept], "raw")
+        choice = choose_filters({"roll": loop}, {"roll": told}, {"roll": 30.0}, {"roll": 1e3})
+        assert choice.values.get("INS_GYRO_FILTER", 20.0) == highest, "a third of what is known"
+
+
 def test_a_plant_behind_the_flown_filter_sees_the_change_of_it_alone() -> None:
     flown = fid.axis_loop("arducopter", "roll", loop_rate_hz=LOOP_HZ, gyro_rate_hz=GYRO_HZ)
     notch = fid.axis_loop(

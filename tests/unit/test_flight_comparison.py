@@ -15,7 +15,7 @@ from flightid.conventions import Light
 from flightid.dynamics.conditions.ratios import difference_of
 from flightid.errors import DataError
 from flightid.plot.flight import compared_steps
-from flightid.review.comparison import TRACKING, compare_loops
+from flightid.review.comparison import BY_FREQUENCY, TRACKING, _change, compare_loops
 from flightid.review.next_step import flown_step
 from flightid.review.promised import promised_loops
 from flightid.uncertainty.estimate import Estimate
@@ -99,6 +99,29 @@ def test_gains_filters_and_other_vehicles_are_said(
     assert found.summary().title.endswith("of different firmware")
 
 
+@pytest.mark.parametrize(
+    ("name", "old", "new", "material", "worse"),
+    [
+        ("rise time", 1.0, 1.08, False, False),
+        ("rise time", 1.0, 1.15, True, True),
+        ("rise time", 1.0, 0.85, True, False),
+        ("overshoot", 10.0, 14.0, False, False),
+        ("overshoot", 10.0, 17.0, True, True),
+        (BY_FREQUENCY, 10.0, 8.0, True, True),
+        (BY_FREQUENCY, 10.0, 12.0, True, False),
+        ("level", 1.0, 1.2, True, True),
+        ("level", 1.3, 1.1, True, False),
+        ("level", 1.1, 0.7, True, True),
+    ],
+)
+def test_a_tenth_or_five_points_of_overshoot_are_felt(
+    name: str, old: float, new: float, *, material: bool, worse: bool
+) -> None:
+    found = _change("roll rate", *(Estimate(name, value, "1", 1e-3) for value in (old, new)))
+    assert found.is_material is material
+    assert found.is_worse is worse
+
+
 def test_what_is_read_over_another_time_is_said(logs: dict[str, Path]) -> None:
     long = fid.review_flight(logs["before"])
     cut = tuple(
@@ -176,12 +199,19 @@ def test_the_step_that_flew_names_the_next_and_the_way_back(
     assert flown_step([log.parent], {"ATC_RAT_RLL_P": 0.5}) is None
 
 
-def test_angle_loops_are_promised_where_nothing_else_moves_them(tmp_path: Path) -> None:
+def test_angle_loops_are_promised_where_nothing_else_moves_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     log = write_ardupilot_log(
         fly(duration_s=3.0, turbulence=Turbulence(), seed=1), tmp_path / "still.bin"
     )
     model = fid.load_model("rate_motor_lag", axis="roll")
     told = promised_loops([model], fid.read_log(log))
     assert [loop.name for loop in told] == ["roll rate", "roll attitude"]
+    yaw = fid.load_model("rate_motor_lag", axis="yaw")
+    assert [loop.name for loop in promised_loops([yaw], fid.read_log(log))] == ["yaw rate"]
+    fed = fid.read_log(log)
+    monkeypatch.setattr(fed, "parameters", {**fed.parameters, "ATC_RATE_FF_ENAB": 1.0})
+    assert [loop.name for loop in promised_loops([model], fed)] == ["roll rate"]
     with pytest.raises(DataError, match="no model promises anything"):
         promised_loops([fid.load_model("r50_hover")], fid.read_log(log))

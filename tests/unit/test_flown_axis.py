@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 import flightid as fid
 from flightid.control.autopilots.axis_loop import AxisLoop
 from flightid.errors import DataError
-from flightid.planning.axis_guess import _measured, _typical
+from flightid.planning.axis_guess import _fitted, _measured, _typical
 from tests.closeness import assert_close
 
 STEP_S, GAIN, DAMPING, LAG_S, DELAY = 1.0 / 400.0, 18.0, 0.5, 0.04, 2
@@ -107,10 +107,32 @@ def test_no_shape_no_measurement() -> None:
 
 def test_commands_at_their_limit_measure_nothing() -> None:
     loop, record = yaw_loop(), flown(1.0)
-    stuck = np.where(np.arange(record.n_samples) % 20 == 0, 1.0, record["tau_psi"])
+    stuck = np.where(np.arange(record.n_samples) % 40 == 0, 1.0, record["tau_psi"])
     limited = fid.Record.from_arrays(
         record.time_s, inputs={"tau_psi": stuck},
         outputs={"r": record["r"], "psi_ref": record["psi_ref"]},
     )  # fmt: skip
     with pytest.raises(DataError, match="at its limit"):
         _measured("yaw", [limited], _typical(loop, "multirotor"), loop)
+
+
+@pytest.mark.parametrize(("miss", "measured"), [(0.25, True), (0.35, False)])
+def test_a_shape_misses_by_three_tenths_at_most(miss: float, *, measured: bool) -> None:
+    base, omega = _typical(yaw_loop(), "multirotor"), np.geomspace(2.0, 60.0, 24)
+    # Up and down from one frequency to the next, which no shape follows; phases are right.
+    wave = math.sqrt(2.0) * miss * np.where(np.arange(24) % 2 == 0, 1.0, -1.0)
+    flown, error = base.response(omega) * np.exp(wave), np.full(24, 0.1)
+    if measured:
+        assert_close(_fitted(base, omega, flown, error).gain, base.gain, rtol=0.1, why="the mean")
+    else:
+        with pytest.raises(DataError, match="35% away from it"):
+            _fitted(base, omega, flown, error)
+
+
+def test_an_axis_that_flew_far_below_its_crossover_is_not_measured() -> None:
+    """With a hundredth of the gains, no loop gain that was flown comes near to one."""
+    loop = yaw_loop()
+    faint = loop.with_gains({name: 0.01 * loop.gains[name] for name in (
+        "ATC_RAT_YAW_P", "ATC_RAT_YAW_I")})  # fmt: skip
+    with pytest.raises(DataError, match="far from its crossover"):
+        _measured("yaw", [flown(1.0)], _typical(loop, "multirotor"), faint)

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any, cast
+
 import pytest
 
 import flightid as fid
+from flightid.identification.hold_test import _steps_told_otherwise
 from tests.strangers.holds import TRUTH, flight, model
 
 
@@ -17,3 +21,14 @@ def test_lines_are_doubted_where_steps_fit_alike(shape: str, *, doubted: bool) -
     low, high = fit.parameters["tau"].interval95
     assert low < TRUTH["tau"] < high
     assert all("steps fit alike" in found.message for found in said)
+
+
+@pytest.mark.parametrize(("gain", "doubted"), [(-1.0, True), (-2.0, False)])
+def test_steps_fit_alike_within_one_and_a_half_of_likelihood(gain: float, *, doubted: bool) -> None:
+    rivals = SimpleNamespace(
+        logged=False, made_by=lambda by: False, records=[flight(2, "held", told="first")],
+        fit=SimpleNamespace(model=model()), assumed="first",
+    )  # fmt: skip
+    steps = SimpleNamespace(gain=gain, parameter="tau", moved=3.0)
+    found = _steps_told_otherwise(cast(Any, steps), cast(Any, rivals), "as the record says")
+    assert (found is not None) is doubted

@@ -10,7 +10,7 @@ from scipy.signal import lfilter
 
 import flightid as fid
 from flightid.uncertainty.residual_noise import autoregression, periodogram
-from flightid.uncertainty.slow_drift import Drift
+from flightid.uncertainty.slow_drift import Drift, _is_slow
 from tests.closeness import assert_close
 from tests.strangers import noises, output_error
 
@@ -21,6 +21,28 @@ def test_a_drifts_spectrum_is_that_of_its_autocovariance() -> None:
     drift = Drift(2.0, 0.05)
     found = np.fft.irfft(drift.spectrum(4096), 4096)[:40]
     assert_close(found, drift.autocovariance(40), why="poles fade over 4096", rtol=1e-9)
+
+
+def test_what_a_drift_leaves_unknown_is_by_the_slopes_of_its_level() -> None:
+    """Against Whittle's information by differences of the spectrum."""
+    fast, drift, length, n, step = np.full(2049, 1.0), Drift(0.3, 0.01), 4096, 2000, 1e-5
+
+    def level(fast_by: float, slow_by: float, corner_by: float) -> np.ndarray:
+        moved = Drift(0.3 * np.exp(slow_by), 0.01 * np.exp(corner_by))
+        return np.log(np.exp(fast_by) * fast + moved.spectrum(length))
+
+    slopes = np.array([(level(*ahead) - level(*-ahead)) / (2 * step) for ahead in step * np.eye(3)])
+    information = 0.5 * n * slopes @ slopes.T / fast.size
+    exact = np.einsum("ib,ij,jb->b", slopes, np.linalg.inv(information), slopes)
+    assert_close(drift.doubt(fast, n, length), exact, rtol=1e-5, why="central differences")
+
+
+@pytest.mark.parametrize(("excess", "slow"), [(7.0, True), (5.0, False)])
+def test_a_look_is_worth_one_and_a_half_deviations(excess: float, *, slow: bool) -> None:
+    # Four half cycles of n samples are eight bins of twice the length: a deviation is four.
+    ratio = np.ones(1001)
+    ratio[2] += excess
+    assert _is_slow(ratio, 1000, 2000) is slow
 
 
 @pytest.mark.parametrize("seed", range(4))
