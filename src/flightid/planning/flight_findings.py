@@ -54,7 +54,7 @@ def flight_findings(
                 Light.AMBER,
                 f"the log does not tell the rate of the controller: {assumed_hz:g} Hz stands for "
                 "it",
-                "say it: --loop-rate-hz",
+                "say it: loop_rate_hz=…",
             )
         )
     return [*found, *_trims(log, phases, sweeps)]
