@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from textwrap import fill
 
 from flightid.conventions import Light
 from flightid.findings import Finding, worst
@@ -15,10 +14,10 @@ from flightid.inspection.rates import StreamRate
 from flightid.inspection.saturation import Saturation
 from flightid.inspection.skew import StreamSkew
 from flightid.inspection.usable_band import AxisBand
+from flightid.inspection.verdict_lines import verdict_lines
 from flightid.result import Result
 from flightid.table import Column, Table
 
-WIDTH = 100
 WORDS = {
     Light.GREEN: "can support identification",
     Light.AMBER: "can support identification with reservations",
@@ -134,14 +133,8 @@ class Inspection(Result, schema="flightid.inspection/1"):
     def to_text(self) -> str:
         """Verdict, sentences and tables for a terminal."""
         head = f"{self.name}: {self.firmware or self.kind}, {self.duration_s:.1f} s"
-        said = [f"{head}\nThis log {WORDS[self.verdict]}."]
-        for finding, action in self._advised():
-            text = f"{finding.light}: {finding.message}"
-            said.append(fill(text, WIDTH, subsequent_indent="    "))
-            if action:
-                advice = f"  do: {action}"
-                said.append(fill(advice, WIDTH, initial_indent="  ", subsequent_indent="        "))
-        return "\n\n".join(["\n".join(said), *(t.to_text() for t in self.tables()[1:])])
+        said = f"{head}\nThis log {WORDS[self.verdict]}.\n{verdict_lines(self.findings)}"
+        return "\n\n".join([said, *(t.to_text() for t in self.tables()[1:])])
 
     def in_short(self) -> str:
         """The flight in a line, what each axis supports, what moved it, what was at a limit."""

@@ -9,6 +9,7 @@ from flightid.errors import UnknownNameError
 from flightid.findings import Finding, worst
 from flightid.inspection.flight_phases import FlightPhases
 from flightid.inspection.signals import Signal
+from flightid.inspection.verdict_lines import verdict_lines
 from flightid.result import Result
 from flightid.review import tables
 from flightid.review.filters import FilterReview
@@ -16,7 +17,6 @@ from flightid.review.gyro_noise import GyroNoise
 from flightid.review.identity import FlightIdentity
 from flightid.review.loop_response import LoopResponse
 from flightid.review.motors import MotorUse
-from flightid.review.verdict_lines import verdict_lines
 from flightid.review.vibration import Vibration
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Estimate

@@ -10,11 +10,11 @@ import numpy as np
 from flightid.control.margins.margins import Margins
 from flightid.conventions import Light
 from flightid.findings import Finding, worst
+from flightid.inspection.verdict_lines import verdict_lines
 from flightid.result import Result
 from flightid.review.autotune.run import AutotuneRun
 from flightid.review.autotune.second_opinion import SecondOpinion
 from flightid.review.tables import cell
-from flightid.review.verdict_lines import verdict_lines
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.quantiles import interval_words, showing, shown
 

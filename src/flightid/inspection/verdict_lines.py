@@ -6,7 +6,8 @@ from collections.abc import Iterable
 from textwrap import fill
 
 from flightid.findings import Finding
-from flightid.inspection.inspection import WIDTH
+
+WIDTH = 100
 
 
 def verdict_lines(findings: Iterable[Finding]) -> str:
