@@ -177,8 +177,8 @@ def test_plans_refuse() -> None:
 
 def test_what_the_stick_moves_is_no_gust() -> None:
     random = np.random.default_rng(0)
-    time_s = np.arange(12_000) / 100.0
-    stick = np.repeat(random.standard_normal(1200), 10)
+    time_s = np.arange(5000) / 100.0
+    stick = np.repeat(random.standard_normal(500), 10)
     gusts = 0.1 * random.standard_normal(time_s.size)
     record = fid.Record.from_arrays(
         time_s, inputs={"u": 0.0 * time_s}, outputs={"p": stick + gusts, "p_ref": stick}
@@ -186,8 +186,8 @@ def test_what_the_stick_moves_is_no_gust() -> None:
     found = still_rate([record])
     assert found is not None
     assert_close(
-        float(np.mean(found[1])), 2.0 * 0.1**2 / 100.0, rtol=0.1,
-        why="white: 2 σ² dt; 24 windows of 500 lines",
+        float(np.mean(found[1])), 2.0 * 0.1**2 / 100.0, rtol=0.06,
+        why="white: 2 σ² dt; nine windows of 500 lines, 2 %",
     )  # fmt: skip
 
 

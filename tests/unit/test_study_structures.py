@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
+import pytest
 from scipy import signal
 
 import flightid as fid
@@ -71,3 +74,15 @@ def test_an_edge_that_stays_is_amber_without_intervals(monkeypatch) -> None:
     assert fit.covariance is None
     assert fit.evidence.check(GUIDELINES).light is Light.AMBER
     assert fit.evidence.check(GUIDELINES).what == found.message
+
+
+@pytest.mark.parametrize(("gain", "doubted"), [(5.0, False), (7.0, True)])
+def test_a_neighbour_beyond_the_edge_is_clearly_better_by_six(gain: float, doubted) -> None:
+    inner, beyond = (fid.PolynomialModel.oe("u", "y", nb=nb, nf=2) for nb in (2, 3))
+    trials = [
+        SimpleNamespace(structure=each, criteria=SimpleNamespace(bic=bic), settled=True)
+        for each, bic in ((inner, 100.0), (beyond, 100.0 - gain))
+    ]
+    found = widened_scan._better(inner, {"nb": 3}, SimpleNamespace(trials=trials))
+    assert bool(found) is doubted
+    assert all("beyond the scan's last nb" in each.message for each in found)

@@ -12,6 +12,8 @@ from flightid.record import Record
 LONGEST_WINDOW_S = 10.0
 SHORTEST_WINDOW_S = 2.0
 FEWEST_WINDOWS = 4
+ALIKE = 1.0 + 2.0 / 36.0
+"""Hann windows that overlap by half hold so much fewer independent ones than their number."""
 LEAST_DENSITY = 1e-12
 """Keeps the logarithm of a made-up, silent flight finite, (rad/s)²/Hz."""
 
@@ -32,7 +34,8 @@ def still_rate(pieces: list[Record]) -> tuple[tuple[float, ...], tuple[float, ..
     Reference
     ---------
     Bendat & Piersol, *Random Data*, 4th ed., section 6.1: the residual spectrum (1 − γ²) G_yy,
-    with the n/(n − 1) that the fitted gain of n windows takes.
+    with the n/(n − 1) that the fitted gain of n windows takes; Welch (1967) for n of windows that
+    overlap.
     """
     usable = [record for record in pieces if record.duration_s >= 2.0 * SHORTEST_WINDOW_S]
     if not usable:
@@ -41,7 +44,7 @@ def still_rate(pieces: list[Record]) -> tuple[tuple[float, ...], tuple[float, ..
     window_s = min(LONGEST_WINDOW_S, *(record.duration_s / 2.0 for record in usable))
     size = max(8, round(window_s * rate_hz))
     weights = np.array([record.duration_s for record in usable])
-    averages = max(float(weights.sum()) / window_s, 2.0)
+    averages = float(np.sum(2.0 * weights / window_s - 1.0)) / ALIKE
     named = usable[0].outputs
     asked = named[1] if len(named) > 1 else None
     sums: list[np.ndarray] = []
@@ -56,7 +59,7 @@ def still_rate(pieces: list[Record]) -> tuple[tuple[float, ...], tuple[float, ..
         sums = [weight * part + (sums[k] if sums else 0.0) for k, part in enumerate(parts)]
     total = [each / weights.sum() for each in sums]
     left = total[0]
-    if asked is not None and averages >= FEWEST_WINDOWS:
+    if asked is not None and weights.sum() >= FEWEST_WINDOWS * window_s:
         explained = np.abs(total[2]) ** 2 / np.maximum(total[1], np.finfo(np.float64).tiny)
         left = np.maximum(total[0] - explained, 0.0) * averages / (averages - 1.0)
     keep = slice(1, None)
