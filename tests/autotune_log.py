@@ -120,10 +120,15 @@ def _log_twitch(writer: DataflashWriter, at_us: int, flown: Flown, stop: int, ax
 
 
 def write_px4(
-    path: Path, axis: Axis, tuned: tuple[float, float, float], *, states: tuple[int, ...] = (2, 11)
+    path: Path,
+    axis: Axis,
+    tuned: tuple[float, float, float],
+    *,
+    states: tuple[int, ...] = (2, 11),
+    seed: int = 5,
 ) -> None:
     """PX4's steps on roll for ten seconds; the last state follows them."""
-    random, rate_hz, n = np.random.default_rng(5), axis.loop_hz, int(10 * axis.loop_hz)
+    random, rate_hz, n = np.random.default_rng(seed), axis.loop_hz, int(10 * axis.loop_hz)
     every = int(rate_hz // 100)
     wanted, at, sign, count = np.zeros(n), 0, 1.0, 5
     while at < n:

@@ -12,6 +12,7 @@ from click.testing import CliRunner
 import flightid as fid
 from flightid.cli.autotune import command
 from flightid.control.margins.margins import Margins
+from flightid.conventions import Light
 from flightid.errors import DataError
 from flightid.logs.dataflash.writer import DataflashWriter
 from flightid.review.autotune.ardupilot import ardupilot_run
@@ -109,6 +110,19 @@ def test_margins_of_px4_s_gains_are_those_of_the_vehicle(tmp_path: Path) -> None
     assert roll.tuned is not None
     assert_close(roll.tuned.phase_margin.value, truth[1], atol=4.0, why="logged at a quarter rate")
     assert_close(roll.tuned.gain_margin.value, truth[2], atol=2.5, why="the same")
+
+
+def test_samples_slower_than_the_loop_give_no_intervals(tmp_path: Path) -> None:
+    """With this seed residuals are white, and a bar of 0.1 % stood 3.7 % beside the crossover."""
+    path = tmp_path / "autotune.ulg"
+    write_px4(path, PX4, (0.15, 1.5, 0.02), seed=4)
+    review = fid.review_autotune(path)
+    (roll,) = review.opinions
+    assert roll.tuned is not None
+    assert roll.tuned.crossover.interval95 is None
+    assert "logged at 100 Hz" in roll.doubt
+    assert any("logged at 100 Hz" in note for note in review.summary().notes)
+    assert not any(each.light is Light.GREEN for each in review.findings if "roll" in each.message)
 
 
 def test_why_px4_s_tune_failed_is_told(tmp_path: Path) -> None:

@@ -1,0 +1,77 @@
+"""Margins that a second opinion on an autotune gives: do their intervals hold those of the vehicle.
+
+Twitches and steps of `tests/autotune_log.py`, whose loops share nothing with flightid's. Counted,
+not asserted: margins hold always, for they are wide, and crossovers seven times in eight.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+import flightid as fid
+from flightid.control.margins.margins import Margins
+from flightid.errors import FlightidError
+from tests.autotune_log import true_margins, write_ardupilot, write_px4
+from tests.strangers.counting import Case, Reading, Trial
+from tests.strangers.ordinary_flights import Axis
+
+CALM = Axis(gust=0.0, noise=0.02, p=0.08, i=0.08, d=0.002)
+HEAVY = replace(CALM, effectiveness=60.0, motor_s=0.08, p=0.15, i=0.15, d=0.004)
+PX4 = Axis(form="px4", gust=0.0, noise=0.02, p=0.1, i=0.15, d=0.002, derivative_hz=30.0)
+
+
+def by_twitches(path: Path, seed: int, axis: Axis) -> Axis:
+    """ArduCopter's; the axis with the gains that came out."""
+    gains = write_ardupilot(path, axis, seed=seed)
+    return replace(axis, p=gains.p, i=gains.p, d=gains.d)
+
+
+def by_steps(path: Path, seed: int, axis: Axis) -> Axis:
+    """PX4's."""
+    write_px4(path, axis, (0.15, 1.5, 0.02), seed=seed)
+    return replace(axis, p=0.15, i=0.225, d=0.003)
+
+
+def fly(seed: int, *, axis: Axis, tuned: Callable[[Path, int, Axis], Axis], suffix: str) -> Trial:
+    """Crossover and margins of roll with the gains before and after."""
+    begun = time.perf_counter()
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / f"autotune{suffix}"
+        after = tuned(path, seed, axis)
+        try:
+            (roll,) = fid.review_autotune(path).opinions
+        except FlightidError as error:
+            return Trial(refusal=str(error), seconds=time.perf_counter() - begun)
+    seconds = time.perf_counter() - begun
+    if roll.flown is None or roll.tuned is None or roll.fit is None:
+        return Trial(refusal=roll.reason, seconds=seconds)
+    readings = (*_read("flown", roll.flown, axis), *_read("tuned", roll.tuned, after))
+    return Trial(readings, roll.fit.evidence.light.value, seconds)
+
+
+def _read(which: str, found: Margins, axis: Axis) -> list[Reading]:
+    told = (found.crossover, found.phase_margin, found.gain_margin)
+    names = ("crossover", "phase margin", "gain margin")
+    units = (2.0 * np.pi, 1.0, 1.0)
+    return [
+        Reading(f"{which} {name}", unit * exact, each.value, None, each.interval95)
+        for name, each, exact, unit in zip(names, told, true_margins(axis), units, strict=True)
+        if each.value is not None
+    ]
+
+
+LIGHTS = tuple(
+    Case(f"autotune, {name}", partial(fly, axis=axis, tuned=tuned, suffix=suffix))
+    for name, axis, tuned, suffix in (
+        ("ArduCopter's twitches", CALM, by_twitches, ".bin"),
+        ("ArduCopter's twitches, heavy vehicle", HEAVY, by_twitches, ".bin"),
+        ("PX4's steps", PX4, by_steps, ".ulg"),
+    )
+)
