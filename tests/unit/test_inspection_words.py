@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -25,7 +26,14 @@ from flightid.logs.source import Event, Gap
 
 
 def log(**fields: object) -> Any:
-    known = {"kind": "px4", "vehicle": "copter", "parameters": {}, "gaps": (), "findings": ()}
+    known: dict[str, object] = {
+        "kind": "px4",
+        "vehicle": "copter",
+        "parameters": {},
+        "gaps": (),
+        "findings": (),
+    }
+    known["path"] = Path("flown.bin")
     return SimpleNamespace(**{**known, **fields})
 
 
@@ -77,6 +85,8 @@ def test_bits_of_the_logging_mask_are_those_of_the_vehicle() -> None:
     assert advice.logging(plane) == "set LOG_BITMASK 1114111 (now 65535; bit 20 is missing)"
     without_sid = log(kind="ardupilot", parameters={"LOG_BITMASK": 65535.0})
     assert "SID_AXIS" not in advice.excitation(without_sid)
+    with_sid = log(kind="ardupilot", parameters={"SID_AXIS": 0.0})
+    assert "flightid plan flown.bin" in advice.excitation(with_sid)
 
 
 @pytest.mark.parametrize(

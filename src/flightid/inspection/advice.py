@@ -28,7 +28,6 @@ LOGGING = {
 }
 SDLOG_PROFILE = 25
 """PX4: default set 1, system identification 8, high rate 16 (logged_topics.cpp)."""
-SWEEP_START_HZ, SWEEP_STOP_HZ, SWEEP_RECORD_S = 0.2, 20.0, 130
 SID_MIXER = "SID_AXIS 10 (roll), 11 (pitch), 12 (yaw)"
 
 
@@ -81,26 +80,23 @@ def _px4_logging(log: Log) -> str:
 
 
 def excitation(log: Log) -> str:
-    """Manoeuvre that excites the axes."""
+    """Manoeuvre that excites the axes; its numbers come from the flight plan of that very log."""
     repeats = "two runs an axis, one of them with the opposite sign, the other axes quiet"
     piloted = "fly piloted frequency sweeps of 90 s an axis from 0.3 Hz up"
+    sized = f"{repeats}: flightid plan {log.path.name} writes amplitude, settings and a card"
     if log.kind == "px4":
         tunes = [name for name in ("MC_AT_START", "FW_AT_START") if name in log.parameters]
         autotune = f", or the autotune ({' or '.join(tunes)})" if tunes else ""
-        return f"{piloted}{autotune}; {repeats}"
+        return f"{piloted}{autotune}; {sized}"
     if log.kind == "betaflight":
         return (
             "fly the CHIRP mode of firmware 2025.12 or later (a build with USE_CHIRP), debug_mode "
-            f"CHIRP, or {piloted.removeprefix('fly ')}; {repeats}"
+            f"CHIRP, or {piloted.removeprefix('fly ')}; {sized}"
         )
     if log.vehicle == "copter" and "SID_AXIS" not in log.parameters and log.parameters:
-        return f"{piloted}; {repeats}"
+        return f"{piloted}; {sized}"
     if log.vehicle == "copter":
-        return (
-            f"fly system identification mode with {SID_MIXER}, SID_F_START_HZ "
-            f"{SWEEP_START_HZ:g}, SID_F_STOP_HZ {SWEEP_STOP_HZ:g}, SID_MAGNITUDE 0.1, "
-            f"SID_T_FADE_IN 5, SID_T_REC {SWEEP_RECORD_S}, SID_T_FADE_OUT 5; {repeats}"
-        )
+        return f"fly system identification mode with {SID_MIXER}; {sized}"
     return f"fly sweeps or 3-2-1-1 steps about each axis; {repeats}"
 
 
