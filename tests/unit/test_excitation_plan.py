@@ -34,6 +34,13 @@ def _findings(plan: Plan, code: str) -> list[str]:
     return [str(finding) for finding in plan.findings if finding.code == code]
 
 
+def test_a_lead_moves_the_slowest_pole_as_its_polynomial_says() -> None:
+    led = RateAxis(gain=8.0, time_constant_s=1.0, lead_s=0.2, rate_feedback=0.25)
+    slow = RateAxis(gain=8.0, time_constant_s=1.0, rate_feedback=0.25)
+    assert_close(led.slowest_s(), (1.0 + 2.0 * 0.2) / 3.0, rtol=1e-9, why="s + 1 + 2 (0.2 s + 1)")
+    assert_close(slow.slowest_s(), 1.0 / 3.0, rtol=1e-9, why="s + 1 + 2")
+
+
 def test_template_of_the_methodic_configurator_is_seen_through() -> None:
     chirp = excitation.ardupilot_chirp(**TEMPLATE)
     plan = excitation.assess(chirp, AXIS, n_records=1)

@@ -10,12 +10,13 @@ import pytest
 
 import flightid as fid
 from flightid.cli.program import run
-from flightid.control.autopilots import read_parameters
+from flightid.control.autopilots import axis_loop_of, read_parameters
 from flightid.conventions import Light
 from flightid.errors import OptionError, UnknownNameError
 from flightid.findings import Finding
 from flightid.inspection.advice import set_bits
-from flightid.inspection.flight_phases import FlightPhases
+from flightid.inspection.flight_phases import FlightPhases, flight_phases
+from flightid.planning.axis_guess import guess_axis
 from flightid.planning.flight_findings import flight_findings
 from flightid.planning.result import AxisSweep
 from flightid.planning.still_rate import still_rate
@@ -103,6 +104,24 @@ def test_the_simulated_vehicle_does_what_the_card_promises(plan: fid.SweepPlan, 
         float(response.coherence[0, 0].mean()), sweep.coherence or 0.0, rtol=0.1,
         why="mean over the band; asked is 0.3",
     )  # fmt: skip
+
+
+@pytest.mark.parametrize("axis", AXES)
+def test_a_plan_is_held_to_the_closed_loop_that_the_flight_shows(
+    plan: fid.SweepPlan, log: Path, axis: AxisName
+) -> None:
+    checks = {each.axis: each.guess.check for each in plan.sweeps if each.guess}
+    check = checks[axis]
+    assert check is not None
+    assert check.holds
+    assert check.miss < 0.1
+    assert check.finding(axis).light is Light.GREEN
+    wrong = axis_loop_of(fid.read_log(log), axis)
+    wrong = wrong.with_gains({wrong.names["p"]: 2.0 * wrong.values["p"]})
+    phases = flight_phases(fid.read_log(log), None)
+    told = guess_axis(axis, wrong, "multirotor", "mixer", fid.read_log(log), phases.airborne).check
+    assert told is not None
+    assert told.finding(axis).light is Light.AMBER
 
 
 def test_amplitudes_are_those_of_closed_loops(plan: fid.SweepPlan) -> None:

@@ -35,6 +35,8 @@ class RateAxis(Options):
         Pure delay, s.
     motor_lag_s : float
         Lag of motors or actuators, s; taken as known.
+    lead_s : float
+        Lead, s, as the reaction of speeding rotors gives yaw; taken as known.
     noise_rad_s : float
         Deviation of the white noise on the measured rate, rad/s.
     rate_feedback : float
@@ -54,6 +56,9 @@ class RateAxis(Options):
     motor_lag_s: float = option(
         0.0, unit="s", minimum=0.0, doc="Guess: lag of motors or actuators."
     )
+    lead_s: float = option(
+        0.0, unit="s", minimum=0.0, doc="Guess: lead, as speeding rotors give yaw."
+    )
     noise_rad_s: float = option(
         0.02, unit="rad/s", above=0.0, doc="Deviation of the noise on the measured rate."
     )
@@ -70,7 +75,7 @@ class RateAxis(Options):
         """Rate over input without feedback, (rad/s)/unit."""
         s = 1j * omega_rad_s
         lags = (self.time_constant_s * s + 1) * (self.motor_lag_s * s + 1)
-        return np.asarray(self.gain * np.exp(-self.delay_s * s) / lags)
+        return np.asarray(self.gain * (self.lead_s * s + 1) * np.exp(-self.delay_s * s) / lags)
 
     def noise_density(
         self, omega_rad_s: NDArray[np.float64], sample_time_s: float
@@ -169,13 +174,13 @@ class RateAxis(Options):
         lag = np.polymul([self.time_constant_s, 1.0], [self.motor_lag_s, 1.0])
         if self.rate_feedback == 0:
             return np.asarray(np.roots(lag), dtype=np.complex128)
-        loop_gain = self.gain * self.rate_feedback
+        over = self.gain * self.rate_feedback * np.polymul([self.lead_s, 1.0], over)
         if self.attitude_feedback_per_s == 0:
-            total = np.polyadd(np.polymul(lag, under), loop_gain * over)
+            total = np.polyadd(np.polymul(lag, under), over)
         else:
             command = np.array([1.0, self.attitude_feedback_per_s])
             total = np.polyadd(
                 np.polymul([1.0, 0.0], np.polymul(lag, under)),
-                loop_gain * np.polymul(command, over),
+                np.polymul(command, over),
             )
         return np.asarray(np.roots(total), dtype=np.complex128)

@@ -14,6 +14,7 @@ from flightid.errors import DataError, FlightidError
 from flightid.inspection.signals import Span, find, places, records
 from flightid.logs import Log
 from flightid.planning.flown_axis import Entry, FlownAxis
+from flightid.planning.loop_check import LoopCheck, check_loop
 from flightid.planning.still_rate import still_rate
 from flightid.record import Record
 from flightid.responses import estimate_response
@@ -26,6 +27,8 @@ CHANNELS = {
     "yaw": ("tau_psi", "r", "psi_ref"),
 }
 """Command, rate and attitude set-point of each axis."""
+WANTED = {"roll": "p_ref", "pitch": "q_ref", "yaw": "r_ref"}
+"""Rate that its rate loop is told to fly."""
 LOWEST_RAD_S, HIGHEST_RAD_S, N_OMEGA = 2.0, 60.0, 24
 SAMPLES_IN_CYCLE = 5.0
 SHORTEST_S = 5.0
@@ -38,6 +41,10 @@ FARTHEST_CROSSOVER = 1.5
 """What was flown must reach loop gains so near to one, from either side."""
 LARGEST_MISS, WIDEST_SHAPE = 0.3, 8.0
 """Root mean square of the fit's logarithm, and of a time over a typical one."""
+SHAPE = ("gain", "time_constant_s", "motor_lag_s", "delay_s")
+LED = (*SHAPE, "lead_s")
+LEAD_S, LEAST_GAIN = 0.1, 0.7
+"""Typical lead of yaw, s, and what it must leave of the miss."""
 PHASE_MARGIN_RAD = {
     "roll": math.radians(60.0),
     "pitch": math.radians(60.0),
@@ -64,11 +71,14 @@ class AxisGuess:
         Whether an ordinary flight told it; else it is typical of vehicles with these gains.
     reason : str
         Why it was not measured; empty where it was.
+    check : LoopCheck or None
+        Its closed loop beside the flight's; None where the flight does not tell it.
     """
 
     vehicle: FlownAxis
     measured: bool
     reason: str = ""
+    check: LoopCheck | None = None
 
 
 def guess_axis(
@@ -102,10 +112,13 @@ def guess_axis(
     still = still_rate(pieces)
     if still is not None:
         base = replace(base, still_omega_rad_s=still[0], still_density=still[1])
+    reason = ""
     try:
-        return AxisGuess(_measured(axis, pieces, base, loop), True)
+        base = _measured(axis, pieces, base, loop)
     except FlightidError as error:
-        return AxisGuess(base, False, f"{error.problem}: found {error.found}")
+        reason = f"{error.problem}: found {error.found}"
+    check = _checked(axis, pieces, base, loop)
+    return AxisGuess(base, not reason, reason, check)
 
 
 def _pieces(log: Log, axis: str, spans: tuple[Span, ...]) -> list[Record]:
@@ -117,16 +130,34 @@ def _pieces(log: Log, axis: str, spans: tuple[Span, ...]) -> list[Record]:
     message = first.label.split(".")[0]
     same = [each for each in streams if each.label.split(".")[0] == message]
     signals = [first, (same or streams)[0]]
-    reference = find(log, angle)
-    if reference is not None and reference.time_s.size > 1:
-        # As an instrument lines between samples will do: they have nothing of the gusts.
-        at = first.time_s[
-            (first.time_s >= reference.time_s[0]) & (first.time_s <= reference.time_s[-1])
-        ]
-        lines = np.interp(at, reference.time_s, reference.values)
-        signals.append(replace(reference, time_s=at, values=lines))
-    made = records(signals, {command}, spans)
+    wanted = WANTED[axis]
+    for name in (angle, wanted):
+        reference = find(log, name)
+        if reference is not None and reference.time_s.size > 1:
+            # As an instrument lines between samples will do: they have nothing of the gusts.
+            at = first.time_s[
+                (first.time_s >= reference.time_s[0]) & (first.time_s <= reference.time_s[-1])
+            ]
+            lines = np.interp(at, reference.time_s, reference.values)
+            signals.append(replace(reference, time_s=at, values=lines))
+    made = records(signals, {command, wanted}, spans)
     return [record for record in made if record.duration_s >= SHORTEST_S]
+
+
+def _checked(
+    axis: str, pieces: list[Record], vehicle: FlownAxis, loop: AxisLoop
+) -> LoopCheck | None:
+    if not pieces or WANTED[axis] not in pieces[0]:
+        return None
+    _, rate, angle = CHANNELS[axis]
+    return check_loop(pieces, (WANTED[axis], rate, angle), vehicle, loop, _grid(pieces))
+
+
+def _grid(pieces: list[Record]) -> Array:
+    """Frequencies that the slowest piece can tell, rad/s."""
+    rate_hz = min(record.sample_rate_hz for record in pieces)
+    highest = min(HIGHEST_RAD_S, 2.0 * np.pi * rate_hz / SAMPLES_IN_CYCLE)
+    return np.geomspace(LOWEST_RAD_S, max(highest, 2.0 * LOWEST_RAD_S), N_OMEGA)
 
 
 def _measured(axis: str, pieces: list[Record], base: FlownAxis, loop: AxisLoop) -> FlownAxis:
@@ -172,7 +203,10 @@ def _measured(axis: str, pieces: list[Record], base: FlownAxis, loop: AxisLoop) 
 
 
 def _fitted(base: FlownAxis, omega: Array, flown: Complex, error: Array) -> FlownAxis:
-    """Gain, time constant, motor lag and delay by least squares of the logarithm.
+    """Gain, time constant, motor lag and delay by least squares of the logarithm; a lead too.
+
+    A lead is there in the yaw of rotors, which push the frame as they speed up: taken where it
+    makes the miss a good deal smaller.
 
     Raises
     ------
@@ -181,9 +215,24 @@ def _fitted(base: FlownAxis, omega: Array, flown: Complex, error: Array) -> Flow
     """
     weight = 1.0 / np.maximum(error, LEAST_ERROR)
     weight /= np.sqrt(np.mean(weight**2))
-    names = ("gain", "time_constant_s", "motor_lag_s", "delay_s")
+    shape, left = _searched(base, SHAPE, omega, flown, weight)
+    if base.loop is not None and base.loop.axis == "yaw":
+        led, closer = _searched(replace(base, lead_s=LEAD_S), LED, omega, flown, weight)
+        if closer < LEAST_GAIN * left:
+            shape, left = led, closer
+    if left > LARGEST_MISS:
+        raise DataError(
+            "no gain, lag and delay go through what was flown", found=f"{left:.0%} away from it"
+        )
+    return shape
+
+
+def _searched(
+    base: FlownAxis, names: tuple[str, ...], omega: Array, flown: Complex, weight: Array
+) -> tuple[FlownAxis, float]:
+    """Best shape near typical times, and the root mean square of its logarithmic miss."""
     scale = float(np.median(np.abs(flown / base.response(omega))))
-    start = [scale * base.gain, base.time_constant_s, base.motor_lag_s, base.delay_s]
+    start = [getattr(base, name) * (scale if name == "gain" else 1.0) for name in names]
 
     def shape(logs: Array) -> FlownAxis:
         return replace(base, **dict(zip(names, np.exp(logs).tolist(), strict=True)))
@@ -193,14 +242,9 @@ def _fitted(base: FlownAxis, omega: Array, flown: Complex, error: Array) -> Flow
         return np.concatenate([weight * np.log(np.abs(ratio)), weight * np.angle(ratio)])
 
     around = np.log(start)
-    room = np.log([100.0, WIDEST_SHAPE, WIDEST_SHAPE, WIDEST_SHAPE])
+    room = np.log([100.0 if name == "gain" else WIDEST_SHAPE for name in names])
     found = scipy.optimize.least_squares(miss, around, bounds=(around - room, around + room))
-    left = float(np.sqrt(np.mean(found.fun**2)))
-    if left > LARGEST_MISS:
-        raise DataError(
-            "no gain, lag and delay go through what was flown", found=f"{left:.0%} away from it"
-        )
-    return shape(found.x)
+    return shape(found.x), float(np.sqrt(np.mean(found.fun**2)))
 
 
 def _typical(loop: AxisLoop, kind: str) -> FlownAxis:

@@ -146,7 +146,8 @@ def plan_flight(
             loop = _loop(procedure, axis, opened, rate_hz)
             enters = procedure.entry(axis)
             guess = guess_axis(axis, loop, procedure.kind, enters, opened, spans)
-            made = _sweep(procedure, axis, guess.vehicle, asked)
+            swept = replace(guess.vehicle, loop=_while_swept(procedure, loop))
+            made = _sweep(procedure, axis, swept, asked)
         excitation = None if made is None else made.excitation
         changes = settings_of(procedure, axis, excitation, current, chosen, asked)
         sweeps.append(AxisSweep(axis, guess, made, changes))
@@ -176,7 +177,7 @@ def _of_log(log: Log) -> Procedure:
 def _loop(
     procedure: Procedure, axis: str, log: Log | None, rate_hz: float | None = None
 ) -> AxisLoop:
-    """Controllers that stay on, as they are while the sweep is flown."""
+    """Controllers that stay on, as they fly."""
     if log is None:
         loop = axis_loop(procedure.loops, axis, loop_rate_hz=rate_hz or USUAL_LOOP_HZ)
     elif procedure.name == "quadplane":
@@ -188,6 +189,11 @@ def _loop(
         loop = axis_loop(procedure.loops, axis, named, loop_rate_hz=rate_hz)
     else:
         loop = axis_loop_of(log, axis, loop_rate_hz=rate_hz)
+    return loop
+
+
+def _while_swept(procedure: Procedure, loop: AxisLoop) -> AxisLoop:
+    """Without the integrator where the settings take it out for the sweep."""
     if procedure.how == "mode" and procedure.kind == "multirotor":
         return loop.with_gains({loop.names["i"]: 0.0})
     return loop
@@ -318,10 +324,16 @@ def _findings(
 def _expected(sweeps: tuple[AxisSweep, ...]) -> list[Finding]:
     """What each axis rests on; axes with one reason in one sentence."""
     by_reason: dict[str, list[str]] = {}
-    for each in sweeps:
-        if each.guess is not None:
-            by_reason.setdefault(each.guess.reason, []).append(each.axis)
     found = []
+    for each in sweeps:
+        guess = each.guess
+        if guess is None:
+            continue
+        told = None if guess.check is None else guess.check.finding(each.axis)
+        if told is not None:
+            found.append(told)
+        if told is None or told.light is Light.GREEN or not guess.measured:
+            by_reason.setdefault(guess.reason, []).append(each.axis)
     for reason, axes in by_reason.items():
         named = ", ".join(axes)
         if not reason:
