@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import chirp, cont2discrete, lfilter, max_len_seq, zpk2tf
 
+import flightid as fid
 from flightid.conventions import Light
 from flightid.errors import FlightidError
 from flightid.evidence import Evidence
@@ -31,7 +32,7 @@ from flightid.study.stage_runner import StageRunner
 from flightid.study.taking import take
 from flightid.study.task import load_task
 from tests.strangers import noises
-from tests.strangers.counting import Case, Trial
+from tests.strangers.counting import Case, Trial, fit_trial
 
 Array = NDArray[np.float64]
 Columns = dict[str, Array]
@@ -193,6 +194,22 @@ def flown(seed: int, *, columns: Callable[[np.random.Generator], Columns]) -> Tr
     return Trial((), str(light), time.perf_counter() - begun)
 
 
+def in_slow_noise(seed: int) -> Trial:
+    """Output error's coefficients of a rig of its own order, a multisine and AR(1) 0.98 noise."""
+    random = np.random.default_rng([seed, 1225])
+    rig = Rig(random)
+    u = injected(random, "multisine", 2000, rig.omega)
+    y = rig.answer(u)
+    y = y + 0.2 * y.std() * noises.ar1(random, y.size, 0.98)
+    n = rig.order
+    asked = fid.PolynomialModel.oe("u", "y", nb=n, nf=n, nk=rig.delay + 1)
+    truth = dict(zip(asked.names, [*rig.b[rig.delay + 1 :], *rig.a[1:]], strict=True))
+    time_s = np.arange(y.size) * STEP_S
+    record = fid.Record.from_arrays(time_s, inputs={"u": u}, outputs={"y": y}, hold="zero")
+    return fit_trial(lambda: fid.identify(asked, record, loop="open"), truth)
+
+
+CASES = (Case("output error of rigs, multisine, AR(1) 0.98", in_slow_noise),)
 SOUND = {kind: partial(sound, kind=kind) for kind in INPUTS}
 BARREN: dict[str, Callable[[np.random.Generator], Columns]] = {
     "loop, no injection": partial(loop, moved=0.0),

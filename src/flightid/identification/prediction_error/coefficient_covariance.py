@@ -17,6 +17,7 @@ from flightid.identification.prediction_error.coloured_errors import (
     output_error_covariance,
 )
 from flightid.identification.prediction_error.findings import ELSEWHERE, NOISE_AT_CIRCLE
+from flightid.identification.prediction_error.likelihoods import ALIKE
 from flightid.identification.prediction_error.part_blocks import errors_at, part_blocks
 from flightid.identification.prediction_error.roots import farthest
 from flightid.identification.residual_evidence import NOTHING, least_gain
@@ -38,15 +39,16 @@ NOISE_MODEL = "prediction errors are not white, so the noise model's coefficient
 
 SLOW = 0.05
 """Independent samples over samples below which noise seems to follow inputs: AR(0.95)."""
-ALIKE = 0.05
-"""Chance of twice the difference of two logarithms of likelihoods below which two minima differ."""
 FAR = 5.0
 """Bars between two minima beyond which neither's hold the other."""
 
 
 @dataclass(frozen=True, eq=False)
 class SearchResult:
-    """Coefficients with what the search left; `skip` first errors of each record do not count."""
+    """Coefficients with what the search left; `skip` first errors of each record do not count.
+
+    `behind` tells how far minima lie below the first in likelihood, where colour was taken out.
+    """
 
     theta: Array
     covariance: Array | None
@@ -61,6 +63,7 @@ class SearchResult:
     reason: str = UNDETERMINED
     noise_reason: str = ""
     correlations: tuple[FittedCorrelation, ...] = ()
+    behind: tuple[float, ...] = ()
 
 
 def shares_poles(structure: PolynomialStructure) -> bool:
@@ -147,18 +150,21 @@ def compared(
 def _fits_elsewhere(found: SearchResult) -> bool:
     """Whether another minimum, many bars away, fits as well within chance.
 
-    Likelihoods are compared by the ratio of the sums of squares; colour leaves fewer samples.
+    Likelihoods are those with the colour taken out, or follow from the sums of squares; colour
+    leaves fewer samples.
     """
-    if found.covariance is None:
-        return False
     best, *others = found.minima
+    if found.covariance is None or not best.objective > 0.0:
+        return False
     bars = np.sqrt(np.diag(found.covariance))
     samples = found.degrees / max(found.colour[1], 1.0) ** 2
+    behind = found.behind[1:] or [
+        samples * np.log(each.objective / best.objective) for each in others
+    ]
     return any(
-        samples * np.log(each.objective / best.objective) < scipy.special.chdtri(1, ALIKE)
+        gap < scipy.special.chdtri(1, ALIKE)
         and np.max(np.abs(np.array(list(each.values.values())) - found.theta) / bars) > FAR
-        for each in others
-        if best.objective > 0.0 and each.objective > best.objective
+        for each, gap in zip(others, behind, strict=True)
     )
 
 

@@ -6,19 +6,14 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flightid.conventions import Light
 from flightid.findings import Finding
-from flightid.identification.innovation_tests import ROUNDING
-from flightid.identification.output_error.innovation_gain import ORDER
-from flightid.identification.output_error.sensor_noise import sensor_errors
 from flightid.identification.prediction_error.coefficient_covariance import SearchResult
-from flightid.identification.prediction_error.part_blocks import errors_at
+from flightid.identification.prediction_error.likelihoods import coloured_cost
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.models.sampled.channels import SampledChannels
 
-Array = NDArray[np.float64]
 WEAK = 2.0
 """Differences of BIC below this are worth no more than a bare mention."""
 Ended = tuple[PolynomialStructure, SearchResult]
@@ -59,15 +54,7 @@ def preferred(ends: Sequence[Ended], data: SampledChannels) -> tuple[Ended, tupl
 
 
 def _bic(structure: PolynomialStructure, data: SampledChannels, found: SearchResult) -> float:
-    errors = errors_at(structure, data, found.memory, found.theta)
-    rows = [errors[None, span][:, found.skip :] for span in data.spans]
-    counted = sum(row.size for row in rows)
-    if min(row.size for row in rows) > 3 * ORDER:
-        left, lags = sensor_errors(rows)
-    else:
-        left, lags = np.concatenate(rows, axis=1), 0
-    rounding = ROUNDING**2 * float(np.mean(data.output**2))
-    n, d = left.size, structure.n_parameters + lags
+    cost, n = coloured_cost(structure, data, found.theta, found.memory, found.skip)
+    counted = sum(length - found.skip for length in data.lengths)
     before = counted - found.degrees - structure.n_parameters
-    power = max(float(np.mean(left**2)), rounding)
-    return n * math.log(power) + d * math.log(n) + 2 * before
+    return cost + structure.n_parameters * math.log(n) + 2 * before

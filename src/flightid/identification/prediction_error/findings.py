@@ -64,7 +64,9 @@ def _ending(minima: Sequence[LocalMinimum], reason: str) -> list[Finding]:
                 "raise maximum_iterations, lower the orders or give more starts",
             )
         )
-    others = [m for m in minima[1:] if m.objective > best.objective * (1 + SAME_MINIMUM)]
+    others = [
+        m for m in minima[1:] if abs(m.objective - best.objective) > SAME_MINIMUM * best.objective
+    ]
     if reason == ELSEWHERE:
         action = "lower the orders, fit a noise model (Box-Jenkins), or take longer records"
         found.append(Finding("local-minima", Light.AMBER, reason, action))
@@ -73,12 +75,22 @@ def _ending(minima: Sequence[LocalMinimum], reason: str) -> list[Finding]:
             Finding(
                 "local-minima",
                 Light.GREEN if best.count > 1 else Light.AMBER,
-                f"starts found {1 + len(others)} minima; the best, found {best.count} times, is "
-                f"{others[0].objective / best.objective:.4g} times below the next",
+                f"starts found {1 + len(others)} minima; the best, found {best.count} times, "
+                f"{_beside(best, min(others, key=lambda each: each.objective))}",
                 "" if best.count > 1 else "give more starts to see whether it is found again",
             )
         )
     return found
+
+
+def _beside(best: LocalMinimum, other: LocalMinimum) -> str:
+    ratio = other.objective / best.objective
+    if ratio >= 1.0:
+        return f"is {ratio:.4g} times below the next"
+    return (
+        f"is {1.0 / ratio:.4g} times above another, which chance explains; its errors are likelier "
+        "with their colour taken out"
+    )
 
 
 def _circle(model: PolynomialModel, reason: str) -> list[Finding]:

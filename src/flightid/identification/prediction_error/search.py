@@ -16,6 +16,7 @@ from flightid.identification.prediction_error.backcast import backcast
 from flightid.identification.prediction_error.coefficient_covariance import (
     SearchResult,
 )
+from flightid.identification.prediction_error.coloured_errors import has_noise_model
 from flightid.identification.prediction_error.denominators import preferred
 from flightid.identification.prediction_error.findings import (
     CONVERGED,
@@ -23,6 +24,7 @@ from flightid.identification.prediction_error.findings import (
 from flightid.identification.prediction_error.information_criteria import Criteria, criteria
 from flightid.identification.prediction_error.instrumental_variables import four_stage
 from flightid.identification.prediction_error.kernel_regression import kernel_estimate
+from flightid.identification.prediction_error.likelihoods import End, likeliest
 from flightid.identification.prediction_error.linear_regression import (
     inverse_square,
     regress_structure,
@@ -134,8 +136,7 @@ def _linear(
     ending: str,
     skip: int,
 ) -> SearchResult:
-    values = dict(zip(structure.names, theta.tolist(), strict=True))
-    minimum = LocalMinimum(0.0, 1, values, ending)
+    minimum = LocalMinimum(0.0, 1, _named(structure, theta), ending)
     return SearchResult(theta, covariance, degrees, (minimum,), 0, [], skip)
 
 
@@ -167,8 +168,11 @@ def _iterate(
             found="; ".join(sorted({end for end in outcomes if isinstance(end, str)})),
             action="lower the orders, or give more starts",
         )
-    ends.sort(key=lambda end: end[1])
-    theta, squares, flat, iterations, _ = ends[0]
+    minima = _grouped(ends)
+    behind: tuple[float, ...] = ()
+    if len(minima) > 1 and not has_noise_model(structure):
+        minima, behind = likeliest(structure, data, minima, memory, skip)
+    theta, squares, flat, iterations, _ = minima[0][0]
     unknown = len(data.lengths) * data.levels
     if structure.past == "estimate":
         of_inputs, of_noise = _native.polynomial_memory(structure.native)
@@ -180,9 +184,11 @@ def _iterate(
     covariance = None
     if _is_determined(factor):
         covariance = squares / degrees * inverse_square(factor)
-    return SearchResult(
-        theta, covariance, degrees, _minima(structure, ends), iterations, memory, skip
+    told = tuple(
+        LocalMinimum(each[0][1], len(each), _named(structure, each[0][0]), each[0][-1])
+        for each in minima
     )
+    return SearchResult(theta, covariance, degrees, told, iterations, memory, skip, behind=behind)
 
 
 def _is_determined(factor: Array) -> bool:
@@ -190,17 +196,19 @@ def _is_determined(factor: Array) -> bool:
     return bool(np.all(np.abs(np.diag(factor)) > 1e-11 * np.maximum(lengths, 1e-300)))
 
 
-def _minima(
-    structure: PolynomialStructure, ends: Sequence[tuple[Array, float, Array, int, str]]
-) -> tuple[LocalMinimum, ...]:
-    groups: list[LocalMinimum] = []
-    for theta, squares, _, _, ending in ends:
-        if groups and squares <= groups[-1].objective * (1 + SAME_MINIMUM):
-            groups[-1] = replace(groups[-1], count=groups[-1].count + 1)
+def _grouped(ends: Sequence[End]) -> list[list[End]]:
+    """Ends of each minimum, the smallest sum of squares first."""
+    groups: list[list[End]] = []
+    for end in sorted(ends, key=lambda each: each[1]):
+        if groups and end[1] <= groups[-1][0][1] * (1 + SAME_MINIMUM):
+            groups[-1].append(end)
         else:
-            values = dict(zip(structure.names, theta.tolist(), strict=True))
-            groups.append(LocalMinimum(squares, 1, values, ending))
-    return tuple(groups)
+            groups.append([end])
+    return groups
+
+
+def _named(structure: PolynomialStructure, theta: Array) -> dict[str, float]:
+    return dict(zip(structure.names, theta.tolist(), strict=True))
 
 
 def _backcast_rounds(structure: PolynomialStructure, data: SampledChannels) -> SearchResult:
@@ -214,7 +222,7 @@ def _backcast_rounds(structure: PolynomialStructure, data: SampledChannels) -> S
         about = about_levels(structure, data, found.memory, found.theta)
         after = _iterate(structure, data, found.theta[None], backcast(model, about))
         moved = np.abs(after.theta - found.theta)
-        found = replace(after, minima=(*after.minima[:1], *found.minima[1:]))
+        found = replace(after, minima=(*after.minima[:1], *found.minima[1:]), behind=found.behind)
         if found.covariance is None or np.all(
             moved <= SETTLED * np.sqrt(np.diag(found.covariance))
         ):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -120,7 +120,23 @@ def _plants(
         )
         b += above
         f.append(below)
-    return [_Plant(np.zeros(structure.na), b, f), _filtered(structure, data)]
+    found = [_Plant(np.zeros(structure.na), b, f), _filtered(structure, data)]
+    if not (structure.nc or structure.nd):
+        # Where noise is much stronger at some frequencies, others tell the plant.
+        found.append(_filtered(structure, _whitened(data, long_a)))
+    return found
+
+
+def _whitened(data: SampledChannels, long_a: Array) -> SampledChannels:
+    """Channels through what makes a long model's noise white, the start of each record cut off."""
+    first = long_a.size - 1
+    rows = [
+        scipy.signal.lfilter(long_a, [1.0], np.vstack([data.output, data.inputs])[:, span])
+        for span in data.spans
+    ]
+    kept = np.hstack([row[:, first:] for row in rows])
+    lengths = tuple(length - first for length in data.lengths)
+    return replace(data, output=kept[0], inputs=np.ascontiguousarray(kept[1:]), lengths=lengths)
 
 
 def _split(structure: PolynomialStructure, theta: Array) -> tuple[Array, list[Array]]:
