@@ -174,6 +174,28 @@ def test_every_autopilot_has_a_card(
     assert not any("rollback" in name for name in names)
 
 
+def test_chirps_are_as_asked(tmp_path: Path) -> None:
+    band = (2.0 * np.pi, 2.0 * np.pi * 60.0)
+    asked = fid.plan_flight(
+        vehicle="quad", autopilot="betaflight", axes=("roll", "yaw"), band_rad_s=band,
+        amplitude=np.radians(120.0), duration_s=40.0,
+    )  # fmt: skip
+    lines = asked.write(tmp_path)[0].read_text().splitlines()
+    assert "set chirp_amplitude_roll = 120" in lines
+    assert "set chirp_frequency_start_deci_hz = 10" in lines
+    assert "set chirp_frequency_end_deci_hz = 600" in lines
+    assert "set chirp_time_seconds = 40" in lines
+    assert not any("pitch =" in line and "chirp" in line for line in lines)
+    usual = fid.plan_flight(vehicle="quad", autopilot="betaflight")
+    assert_close(
+        asked.flight_time.total_s - usual.flight_time.total_s,
+        2 * (2 * 50 + 60) - 3 * (2 * 30 + 60),
+        rtol=1e-9, why="two axes of 40 s, or three of 20, twice with 10 s of rest and a take-off",
+    )  # fmt: skip
+    with pytest.raises(OptionError, match="leaves the autopilot's range"):
+        fid.plan_flight(vehicle="quad", autopilot="betaflight", amplitude=20.0)
+
+
 def test_helicopters_keep_their_integrator() -> None:
     made = fid.plan_flight(vehicle="heli", axes=("roll",))
     assert not any(each.name.endswith("_I") for each in made.sweeps[0].changes)

@@ -32,7 +32,7 @@ class PlanOptions(Options):
     amplitude: float | None = option(
         None,
         above=0.0,
-        doc="Of the sweep: share of full command, or rad of a set-point; default: by the limits.",
+        doc="Of the sweep: share of full command; rad or rad/s of a set-point; default: by limits.",
     )
     duration_s: float | None = option(
         None, unit="s", above=0.0, maximum=255.0, doc="Length of one sweep; default: by the band."

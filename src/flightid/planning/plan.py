@@ -27,7 +27,7 @@ from flightid.planning.flown_axis import FlownAxis
 from flightid.planning.options import PlanOptions
 from flightid.planning.procedures import PROCEDURES, Procedure, procedure_of
 from flightid.planning.result import AxisSweep, SweepPlan
-from flightid.planning.settings import AUTOTUNE_S, SID_AXES, log_family, settings_of
+from flightid.planning.settings import SID_AXES, log_family, settings_of, unsized_s
 from flightid.review.loops import loop_rate_hz as logged_loop_rate_hz
 
 USUAL_LOOP_HZ = 400.0
@@ -83,7 +83,7 @@ def plan_flight(
         Band to sweep; default: an eighth of the crossover to 2.5 times the frequency at which the
         broken rate loop turns by -180 deg, and what the loop's rate, or a pilot, can do.
     amplitude : float, optional
-        Share of full command (mixer) or rad (set-point); default: by limits and coherence.
+        Share of full command (mixer), rad or rad/s (set-point); default: by limits and coherence.
     duration_s : float, optional
         Length of one sweep, s; default: twenty cycles of the lowest frequency, 60 to 120 s.
     n_records : int
@@ -152,8 +152,10 @@ def plan_flight(
         changes = settings_of(procedure, axis, excitation, current, chosen, asked)
         sweeps.append(AxisSweep(axis, guess, made, changes))
     flown = flight_findings(opened, phases, sweeps, USUAL_LOOP_HZ if assumed else 0.0)
-    unsized_s = (procedure.how == "autotune" and asked.duration_s) or AUTOTUNE_S
-    lengths = [each.plan.excitation.duration_s if each.plan else unsized_s for each in sweeps]
+    lengths = [
+        each.plan.excitation.duration_s if each.plan else unsized_s(procedure, asked)
+        for each in sweeps
+    ]
     runs = [length + WAIT_S[procedure.how] for length in lengths]
     return SweepPlan(
         name=vehicle if opened is None else opened.path.name,

@@ -20,7 +20,7 @@ from flightid.findings import Finding, worst
 from flightid.planning.axis_guess import AxisGuess
 from flightid.planning.flight_time import FlightTime
 from flightid.planning.procedures import STOP, Procedure
-from flightid.planning.settings import BETAFLIGHT_CLI, INTEGERS
+from flightid.planning.settings import INTEGERS, betaflight_cli
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
 
@@ -239,7 +239,8 @@ class SweepPlan(Result, schema="flightid.sweep_plan/1"):
         place = Path(path)
         place.mkdir(parents=True, exist_ok=True)
         if self.procedure.how == "chirp":
-            return (write_atomically(place / "chirp.txt", BETAFLIGHT_CLI),)
+            wanted = [change for each in self.sweeps for change in each.changes]
+            return (write_atomically(place / "chirp.txt", betaflight_cli(wanted)),)
         by_file = {self.file_of(each): each for each in reversed(self.sweeps) if each.changes}
         written: list[Path] = []
         for name, each in reversed(by_file.items()):

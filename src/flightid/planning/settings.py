@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from flightid.control.autopilots.parameter_files import GainChange
 from flightid.errors import OptionError
@@ -34,6 +34,12 @@ RANGES = {
     "FW_AT_SYSID_F0": (0.1, 30.0),
     "FW_AT_SYSID_F1": (0.1, 30.0),
     "FW_AT_SYSID_TIME": (5.0, 120.0),
+    "chirp_amplitude_roll": (1.0, 500.0),
+    "chirp_amplitude_pitch": (1.0, 500.0),
+    "chirp_amplitude_yaw": (1.0, 500.0),
+    "chirp_frequency_start_deci_hz": (1.0, 1000.0),
+    "chirp_frequency_end_deci_hz": (2.0, 10000.0),
+    "chirp_time_seconds": (1.0, 200.0),
 }
 INTEGERS = ("SDLOG_PROFILE", "FW_AT_APPLY", "FW_AT_AXES", "FW_AT_SYSID_TYPE")
 """Parameters that PX4 keeps as integers."""
@@ -78,6 +84,8 @@ def settings_of(
     wanted: dict[str, tuple[float, str]] = {}
     if procedure.how == "mode" and excitation is not None:
         wanted |= _system_identification(procedure, axis, excitation, current, axes)
+    if procedure.how == "chirp":
+        wanted |= _chirp(axis, asked or PlanOptions())
     if procedure.how == "autotune":
         wanted |= _autotune_sweep(asked or PlanOptions())
     wanted |= _logging(procedure, current)
@@ -149,22 +157,45 @@ def log_family(procedure: Procedure) -> str:
     return "plane" if procedure.name in ("arduplane", "quadplane") else "copter"
 
 
-BETAFLIGHT_CLI = """# flightid: chirp on all axes; save `diff all` first, it is the way back
+BETAFLIGHT_CLI = """# flightid: chirp; save `diff all` first, it is the way back
 set debug_mode = CHIRP
 set blackbox_sample_rate = 1/2
 set blackbox_high_resolution = ON
 set blackbox_disable_debug = OFF
 set chirp_lag_freq_hz = 3
 set chirp_lead_freq_hz = 30
-set chirp_amplitude_roll = 230
-set chirp_amplitude_pitch = 230
-set chirp_amplitude_yaw = 180
-set chirp_frequency_start_deci_hz = 2
-set chirp_frequency_end_deci_hz = 2000
-set chirp_time_seconds = 20
+{chirp}
 set f_roll = 0
 set f_pitch = 0
 set f_yaw = 0
 save
 """
-"""Defaults of Betaflight's chirp for a 5-inch quadrotor; feed-forward off."""
+"""Feed-forward off; lag and lead are Betaflight's own."""
+CHIRP_BAND_RAD_S, CHIRP_S = (math.tau * 0.2, math.tau * 200.0), 20.0
+CHIRP_DEG_S = {"roll": 230.0, "pitch": 230.0, "yaw": 180.0}
+"""Betaflight's defaults for a 5-inch quadrotor."""
+
+
+def _chirp(axis: str, asked: PlanOptions) -> dict[str, tuple[float, str]]:
+    """Betaflight's sweep of the rate set-point."""
+    band = asked.band_rad_s or CHIRP_BAND_RAD_S
+    size = CHIRP_DEG_S[axis] if asked.amplitude is None else math.degrees(asked.amplitude)
+    return {
+        f"chirp_amplitude_{axis}": (round(size), "deg/s, before the lag"),
+        "chirp_frequency_start_deci_hz": (round(10.0 * band[0] / math.tau), "0.1 Hz"),
+        "chirp_frequency_end_deci_hz": (round(10.0 * band[1] / math.tau), "0.1 Hz"),
+        "chirp_time_seconds": (round(asked.duration_s or CHIRP_S), "s, an axis"),
+    }
+
+
+def betaflight_cli(changes: Iterable[GainChange]) -> str:
+    """Lines for Betaflight's CLI that make the chirp of all axes."""
+    wanted = {each.name: int(each.value) for each in changes}
+    return BETAFLIGHT_CLI.format(
+        chirp="\n".join(f"set {name} = {value}" for name, value in wanted.items())
+    )
+
+
+def unsized_s(procedure: Procedure, asked: PlanOptions) -> float:
+    """Length of a sweep that the autopilot makes by itself, s."""
+    return asked.duration_s or (CHIRP_S if procedure.how == "chirp" else AUTOTUNE_S)

@@ -15,6 +15,8 @@ from flightid.errors import FileFormatError, OptionError
 from flightid.files import as_path, write_atomically
 
 NAME = re.compile(r"[A-Z][A-Z0-9_]{0,15}")
+CLI_NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
+"""Betaflight's settings, by the line."""
 """Both autopilots keep names in 16 characters."""
 PX4_INTEGERS = ("IMU_GYRO_DNF_EN",)
 REAL32, INT32 = 9, 6
@@ -55,11 +57,11 @@ class GainChange:
     reason: str = ""
 
     def __post_init__(self) -> None:
-        if not NAME.fullmatch(self.name):
+        if not (NAME.fullmatch(self.name) or CLI_NAME.fullmatch(self.name)):
             raise OptionError(
                 "not a parameter's name",
                 found=self.name,
-                needed="up to 16 capitals, digits and underscores",
+                needed="up to 16 capitals, digits and underscores; Betaflight: small letters",
             )
         for value in (self.value, 0.0 if self.old is None else self.old):
             if not math.isfinite(value):
