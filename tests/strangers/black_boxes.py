@@ -112,7 +112,7 @@ def fly(
     loop: str | None = None,
     truth: Mapping[str, float] = MODE,
 ) -> Trial:
-    """Frequency, damping and gain of the mode, all options at their defaults."""
+    """Frequency, damping, gain and coefficients of a truth, all options at their defaults."""
     record = flight(np.random.default_rng(seed))
     found: list[fid.Fit] = []
 
@@ -123,9 +123,10 @@ def fly(
     trial = fit_trial(fit, {})
     if not found:
         return trial
+    known = _mode(found[0], truth["frequency"]) | dict(found[0].parameters)
     readings = tuple(
         Reading(name, truth[name], item.value, item.stderr, item.interval95)
-        for name, item in _mode(found[0], truth["frequency"]).items()
+        for name, item in known.items()
         if name in truth
     )
     return Trial(readings, trial.light, trial.seconds, trial.refusal)

@@ -57,7 +57,8 @@ def started(
     return recorded(u, LEVEL + y + error)
 
 
-RED: Noise = partial(noises.ar1, pole=0.9)
+NOISE_POLE = 0.9
+RED: Noise = partial(noises.ar1, pole=NOISE_POLE)
 BOXES: dict[str, tuple[object, Noise, bool]] = {
     "oe": (P.oe("u", "y", nb=1, nf=1), noises.white, False),
     "bj": (P.bj("u", "y", nb=1, nc=0, nd=1, nf=1), RED, False),
@@ -72,7 +73,7 @@ CASES = tuple(
             fly,
             flight=partial(started, moves=moves, noise=noise, in_equation=in_equation),
             structure=structure,
-            truth=TRUTH,
+            truth=TRUTH | ({"d1": -NOISE_POLE} if name == "bj" else {}),
         ),
     )
     for name, (structure, noise, in_equation) in BOXES.items()

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.uncertainty.parts import LEAST_INFORMATION, RecordParts
-from flightid.uncertainty.residual_noise import Autoregression
+from flightid.uncertainty.residual_noise import Autoregression, FittedDirections
 
 Array = NDArray[np.float64]
 
@@ -168,6 +168,20 @@ def noise_heard(models: Sequence[Autoregression], blocks: Sequence[RecordBlock])
         level[:, None, None]
         * np.array([noise.squared(part) for noise, part in zip(models, _halves(each), strict=True)])
         for each, level in zip(blocks, levels(blocks), strict=True)
+    ]
+
+
+def directions_taken(blocks: Sequence[RecordBlock]) -> list[FittedDirections]:
+    """Directions along which the fit takes noise out: of instruments, what they answer to."""
+    shared = [block.projected for block in blocks]
+    answering = [(b.basis, b.answering) for b in blocks if b.answering is not None]
+    if answering:
+        apart = [each - basis @ (basis.T @ each) for basis, each in answering]
+        ends = np.cumsum([len(each) for each in apart])[:-1]
+        shared = np.split(np.linalg.qr(np.vstack(apart))[0], ends)
+    return [
+        FittedDirections(*(part.reshape(*block.residual.shape, -1) for part in (block.basis, each)))
+        for block, each in zip(blocks, shared, strict=True)
     ]
 
 

@@ -23,6 +23,7 @@ from flightid.uncertainty.agreement import Agreement, AgreementTest, compare_par
 from flightid.uncertainty.blocks import (
     JointResiduals,
     RecordBlock,
+    directions_taken,
     flights_of,
     freedom_of,
     joined,
@@ -202,10 +203,7 @@ def residual_covariance(
     inner = _gain(slopes, whitened)
     half = root @ inner
     turned = half @ root.T
-    taken = []
-    for block in whitened:
-        parts = (block.basis, block.projected)
-        taken.append(FittedDirections(*(part.reshape(*block.residual.shape, -1) for part in parts)))
+    taken = directions_taken(whitened)
     walks = None if noise is None else _walks(taken[0], *noise)
     models = noise_models([block.residual for block in blocks], taken, walks)
     apart = noise_heard(models, whitened)

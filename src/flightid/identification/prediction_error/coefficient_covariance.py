@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 from flightid.identification.innovation_tests import ROUNDING, InnovationTests, innovation_tests
 from flightid.identification.local_minimum import LocalMinimum
 from flightid.identification.prediction_error.coloured_errors import (
+    answers,
     has_noise_model,
+    noise_bias,
     output_error_covariance,
 )
 from flightid.identification.prediction_error.findings import ELSEWHERE, NOISE_AT_CIRCLE
@@ -129,8 +131,8 @@ def compared(
         found = replace(
             found, covariance=agreed.covariance, freedom=freedom, agreement=agreed.agreement
         )
-        if not tests.is_white and not shares_poles(structure):
-            found = _by_colour(structure, data, found, agreed.covariance, blocks)
+        if not shares_poles(structure) and structure.method != "iv4":
+            found = _by_colour(structure, data, found, errors, None if tests.is_white else blocks)
     first = structure.na + sum(structure.nb)
     of_c = slice(first, first + structure.nc)
     noise = np.concatenate([[1.0], found.theta[of_c]])
@@ -198,38 +200,46 @@ def _by_colour(
     structure: PolynomialStructure,
     data: SampledChannels,
     found: SearchResult,
-    white: Array,
-    blocks: Sequence[RecordBlock],
+    errors: Array,
+    blocks: Sequence[RecordBlock] | None,
 ) -> SearchResult:
-    """The vehicle's coefficients by the colour of the errors, where noise has its own poles.
+    """The vehicle's coefficients by the colour of the noise, where it has its own poles.
 
-    In an open loop errors of the noise model do not reach the vehicle's, so the two stand apart.
+    What white errors would give for known C and D makes room for it; what a loop adds stays.
+    Errors that are not white come with their blocks, and are tested against the inputs.
 
     Reference: Ljung, *System Identification*, 2nd ed., theorem 8.4 and eq. 9.42.
     """
     places = np.array([name[0] in "bf" for name in structure.names])
-    known = residual_covariance(
-        [
-            RecordBlock.of(
-                block.projected.reshape(*block.residual.shape, -1)[:, :, places],
-                np.zeros((*block.residual.shape, 0)),
-                block.residual,
-            )
-            for block in blocks
-        ],
-        inputs=[data.inputs[:, span][:, found.skip :] for span in data.spans],
-    )
-    covariance = np.where(np.outer(~places, ~places), white, 0.0)
-    covariance[np.ix_(places, places)] = known.covariance
-    freedom = np.full(places.size, float(found.degrees))
+    if found.covariance is None or not places.any():
+        return found
+    known = output_error_covariance(structure, data, found.theta, errors, found.skip)
+    block = np.ix_(places, places)
+    apart = np.linalg.inv(np.linalg.inv(found.covariance)[block])
+    covariance, freedom = found.covariance.copy(), np.full(places.size, float(found.degrees))
+    covariance[block] += known.covariance - apart
     freedom[places] = known.freedom
+    of_noise = np.ix_(~places, ~places)
+    columns = answers(structure, data, found.theta, errors, found.skip)
+    bias = noise_bias(structure, found.theta, columns, covariance[of_noise])
+    covariance[of_noise] += np.outer(bias, bias)
+    found = replace(found, covariance=covariance, freedom=freedom, agreement=known.agreement)
+    if blocks is None:
+        return found
+    of_vehicle = [
+        RecordBlock.of(
+            each.projected.reshape(*each.residual.shape, -1)[:, :, places],
+            np.zeros((*each.residual.shape, 0)),
+            each.residual,
+        )
+        for each in blocks
+    ]
+    inputs = [data.inputs[:, span][:, found.skip :] for span in data.spans]
+    white = residual_covariance(of_vehicle, inputs=inputs)
     return replace(
         found,
-        covariance=covariance,
-        freedom=freedom,
-        colour=known.colour,
-        agreement=known.agreement,
-        correlations=known.correlations,
+        colour=white.colour,
+        correlations=white.correlations,
         noise_reason=NOISE_MODEL,
     )
 

@@ -17,9 +17,15 @@ from numpy.typing import NDArray
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.models.sampled.channels import SampledChannels
 from flightid.uncertainty.blocks import RecordBlock
-from flightid.uncertainty.coloured_residuals import ResidualCovariance, residual_covariance
+from flightid.uncertainty.coloured_residuals import (
+    ResidualCovariance,
+    residual_covariance,
+    triangle_of,
+)
 
 Array = NDArray[np.float64]
+STEP = 1e-4
+"""Of a coefficient of C or D, for differences of determinants."""
 INDEPENDENT = 1e-9
 """Share of the largest singular value below which a start's direction is another's."""
 
@@ -43,17 +49,21 @@ def output_error_covariance(
     errors: Array,
     skip: int,
 ) -> ResidualCovariance:
-    """Covariance of the coefficients of B and F by the colour of the errors.
+    """Covariance of the coefficients of B and F by the colour of what they leave of the output.
+
+    Where C and D model that noise, the fit weighs by their inverse: instruments. What it took of
+    the noise is given back, for a noise model that was fitted to the rest is too small where
+    inputs are slow: an AR(1) of 0.9 beside four steps in 600 samples ends at 0.885.
 
     Parameters
     ----------
     structure : PolynomialStructure
-        Without noise model.
+        Without A.
     data : SampledChannels
     theta : ndarray, shape (n_coefficients,)
-        Estimates, B of all inputs before F of all inputs.
+        Estimates, in the order of `structure.names`.
     errors : ndarray, shape (n_samples,)
-        Measured minus modelled, records after records.
+        One step ahead, records after records; without noise model measured minus modelled.
     skip : int
         First errors of each record that the fit left out.
 
@@ -63,24 +73,101 @@ def output_error_covariance(
 
     Reference
     ---------
-    Ljung, *System Identification*, 2nd ed., eqs. 9.41 and 9.42 (errors that are not white).
+    Ljung, *System Identification*, 2nd ed., eqs. 9.41 and 9.42 (errors that are not white);
+    Patterson & Thompson (1971), Biometrika 58(3), 545-554 (what a fit takes of its noise).
     """
-    size = float(np.sqrt(errors @ errors / errors.size)) or 1.0
+    own_of_noise = structure.nc + structure.nd
     blocks = []
-    for span in data.spans:
-        level = np.ones((errors[span].size, int(data.levels)))
+    for shared, own, rest in answers(structure, data, theta, errors, skip):
+        block = RecordBlock.of(shared[None], own[None], rest[None])
+        if own_of_noise:
+            white = _whitened(structure, theta, shared, own)
+            weighed = np.zeros_like(shared)
+            weighed[own_of_noise:] = white.projected
+            turned = scipy.signal.lfilter(*noise_filter(structure, theta), weighed[::-1], axis=0)
+            block = RecordBlock.of(turned[None, ::-1], own[None], rest[None])
+            block = replace(block, answering=shared)
+        blocks.append(block)
+    inputs = [data.inputs[:, span][:, skip:] for span in data.spans]
+    return residual_covariance(blocks, inputs=None if own_of_noise else inputs)
+
+
+def answers(
+    structure: PolynomialStructure, data: SampledChannels, theta: Array, errors: Array, skip: int
+) -> list[tuple[Array, Array, Array]]:
+    """How outputs answer to B and F and to a record's own numbers, and what is left of them.
+
+    By record; the noise is of unit variance.
+    """
+    above, below = noise_filter(structure, theta)[::-1]
+    of_vehicle = theta[[name[0] in "bf" for name in structure.names]]
+    left = [scipy.signal.lfilter(above, below, errors[span]) for span in data.spans]
+    size = float(np.sqrt(np.mean(np.concatenate(left) ** 2))) or 1.0
+    found = []
+    for span, rest in zip(data.spans, left, strict=True):
+        level = np.ones((rest.size, int(data.levels)))
         shared, own = _sensitivities(
-            structure, theta, data.inputs[:, span], data.output[span] - errors[span], level
+            structure, of_vehicle, data.inputs[:, span], data.output[span] - rest, level
         )
         if structure.past != "estimate" or skip:
             own = level
-        blocks.append(
-            RecordBlock.of(
-                shared[None, skip:] / size, own[None, skip:], errors[None, span][:, skip:] / size
-            )
-        )
-    inputs = [data.inputs[:, span][:, skip:] for span in data.spans]
-    return residual_covariance(blocks, inputs=inputs)
+        found.append((shared[skip:] / size, own[skip:], rest[skip:] / size))
+    return found
+
+
+def noise_bias(
+    structure: PolynomialStructure,
+    theta: Array,
+    columns: Sequence[tuple[Array, Array, Array]],
+    covariance: Array,
+) -> Array:
+    """How far C and D lie from those of the whole noise, for what the fit took of it.
+
+    Half the slope of ln det XᵀΩ⁻¹X, by which the restricted likelihood differs from the plain one.
+
+    Parameters
+    ----------
+    structure : PolynomialStructure
+    theta : ndarray, shape (n_coefficients,)
+    columns : sequence of tuple of ndarray
+        Of `answers`.
+    covariance : ndarray, shape (nc + nd, nc + nd)
+        Of C and D by the plain likelihood.
+
+    Reference
+    ---------
+    Patterson & Thompson (1971), Biometrika 58(3), 545-554.
+    """
+    places = np.flatnonzero([name[0] in "cd" for name in structure.names])
+    slopes = []
+    for place in places:
+        sizes = []
+        for step in (-STEP, STEP):
+            moved = theta.copy()
+            moved[place] += step
+            blocks = [_whitened(structure, moved, *each[:2]) for each in columns]
+            triangles = [triangle_of(blocks), *(block.triangle for block in blocks)]
+            sizes.append(sum(np.log(np.abs(np.diag(each))).sum() for each in triangles))
+        slopes.append((sizes[1] - sizes[0]) / (2.0 * STEP))
+    return np.asarray(covariance @ np.array(slopes))
+
+
+def _whitened(
+    structure: PolynomialStructure, theta: Array, shared: Array, own: Array
+) -> RecordBlock:
+    """Sensitivities through D/C, without the samples that its own past takes."""
+    first = structure.nc + structure.nd
+    shared, own = (
+        scipy.signal.lfilter(*noise_filter(structure, theta), part, axis=0)[first:]
+        for part in (shared, own)
+    )
+    return RecordBlock.of(shared[None], own[None], np.zeros((1, len(shared))))
+
+
+def noise_filter(structure: PolynomialStructure, theta: Array) -> tuple[Array, Array]:
+    """D over C, which makes the noise white, with their leading ones."""
+    parts = [[x for x, n in zip(theta, structure.names, strict=True) if n[0] == k] for k in "dc"]
+    return np.array([1.0, *parts[0]]), np.array([1.0, *parts[1]])
 
 
 def _sensitivities(
