@@ -42,9 +42,27 @@ def test_an_unknown_hold_is_never_silent(shape: str, light: str, code: str) -> N
     assert others["zero"]["parameter"] == "tau"
 
 
-@pytest.mark.parametrize("shape", ["steps", "straight", "smooth"])
+@pytest.mark.parametrize("shape", ["steps", "straight"])
 def test_a_hold_that_is_true_is_not_talked_about(shape: str) -> None:
     assert _fit(shape, told=True).evidence.check("input hold") is None
+
+
+def test_estimates_that_rest_on_a_word_say_so() -> None:
+    evidence = _fit("smooth", told=True).evidence
+    assert str(evidence.light) == "green"
+    said = next(line for line in evidence.lines if "the data cannot tell: were they steps" in line)
+    assert "Inputs are smooth between samples as the records say" in said
+    assert "tau would be 140 standard errors away" in said
+
+
+@pytest.mark.parametrize(
+    ("gain", "expected", "doubts"),
+    [(1.6, 0.1, True), (1.4, 1.5, False), (0.5, 8.0, True), (-0.1, 8.0, False)],
+)
+def test_a_word_is_doubted_the_sooner_the_more_data_could_tell(
+    gain: float, expected: float, doubts: bool
+) -> None:
+    assert OtherHold("zero", "tau", 9.0, gain, expected=expected).doubts is doubts
 
 
 @pytest.mark.parametrize(

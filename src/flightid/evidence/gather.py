@@ -52,6 +52,8 @@ STRAIGHT = frozenset({"", "regression", "instruments", "kernel", "subspace"})
 INSENSITIVE, CRAMER_RAO, CORRELATED = "insensitive", "cramer-rao", "correlated"
 OF_PARAMETERS = (INSENSITIVE, CRAMER_RAO, CORRELATED)
 """Codes of guides to parameters: they speak of model and band, and know nothing of the noise."""
+ON_A_WORD = "hold-told"
+"""A hold that estimates rest on and that the data neither bear out nor contradict."""
 OVERFIT = "overfit"
 """An order that may be one too high: intervals hold what it costs."""
 BELONGS = {
@@ -175,7 +177,9 @@ def _of_findings(name: str, findings: Sequence[Finding], termination: str) -> Ch
         # A guide that is missed by what is well known, or known to do no harm, all the same.
         missed = (each.message for each in findings if each.code in (*OF_PARAMETERS, OVERFIT))
         return Check(name, Light.GREEN, next(missed, met))
-    return Check(name, Light.GREEN, findings[0].message) if findings else None
+    word = next((each.message for each in findings if each.code == ON_A_WORD), "")
+    limit = word[:1].upper() + word[1:]
+    return Check(name, Light.GREEN, findings[0].message, limit=limit) if findings else None
 
 
 def _ended(findings: Sequence[Finding], termination: str) -> Check | None:

@@ -29,8 +29,9 @@ from flightid.identification.records.setup import OwnNumbers, RecordSet, prepare
 from flightid.models import GreyBoxModel
 from flightid.record import Record
 from flightid.record.hold import InputHold
+from flightid.responses import FrequencyResponse
 from flightid.uncertainty.blocks import RecordBlock
-from flightid.uncertainty.foretold import likelihood_gain
+from flightid.uncertainty.foretold import expected_gain, likelihood_gain
 
 Array = NDArray[np.float64]
 RIDGE = 1e-9
@@ -72,6 +73,40 @@ class HeldOutputs:
             )
             for output in range(len(self.left[0]))
         )
+
+    def apart_from(self, other: HeldOutputs) -> float:
+        """The gain that is expected where this hold is true."""
+        moved = [mine - theirs for mine, theirs in zip(self.left, other.left, strict=True)]
+        return sum(
+            expected_gain([each[output] for each in moved], [each[output] for each in self.left])
+            for output in range(len(self.left[0]))
+        )
+
+
+def records_behind(data: object, model: GreyBoxModel) -> list[Record]:
+    """A record, or those that a response of a model was estimated from, means removed."""
+    if isinstance(data, Record):
+        return [data]
+    if not isinstance(data, FrequencyResponse) or data.linear is None:
+        return []
+    linear = data.linear
+    if not set(model.inputs) <= set(linear.inputs):
+        return []
+    outputs = {name: linear.places[0][k] for k, name in enumerate(data.outputs)}
+    if not set(model.outputs) <= set(outputs):
+        return []
+    trim = getattr(model, "trim", {})
+    return [
+        Record.from_arrays(
+            np.arange(u.shape[1]) * linear.sample_time_s,
+            inputs={
+                name: u[linear.inputs.index(name)] + trim.get(name, 0.0) for name in model.inputs
+            },
+            outputs={name: y[outputs[name]] for name in model.outputs},
+            units={name: model.units[name] for name in (*model.inputs, *model.outputs)},
+        )
+        for u, y in zip(linear.input_records, linear.output_records, strict=True)
+    ]
 
 
 def held_outputs(

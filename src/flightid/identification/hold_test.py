@@ -7,6 +7,7 @@ hold the data prefer.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -15,17 +16,17 @@ import numpy as np
 
 from flightid.conventions import Light
 from flightid.errors import FlightidError
-from flightid.evidence.gather import CONVERGED
+from flightid.evidence.gather import CONVERGED, ON_A_WORD
 from flightid.findings import Finding
 from flightid.identification.fit import Fit
 from flightid.identification.frequency_domain.estimator_bias import Correction
 from flightid.identification.hold_likelihood import (
     HeldOutputs,
     held_outputs,
+    records_behind,
 )
 from flightid.identification.methods import Method, flat
 from flightid.identification.rival_fits import estimates_alone
-from flightid.models import GreyBoxModel
 from flightid.record import Record
 from flightid.record.chosen_hold import ASSUMED, DECLARED, RECORDED, ChosenHold
 from flightid.record.history import is_of_log
@@ -39,8 +40,9 @@ NEGLIGIBLE = 0.3
 """Standard errors by which an estimate may move: a 95 % interval then holds 94 in 100."""
 DECISIVE = 6.0
 """Difference of log-likelihoods, odds of 400 to 1, that counts as told by the data."""
-DOUBTFUL = 1.5
-"""The same for a hold that was told: chance alone gives it in less than 1 of 25 fits."""
+DOUBTFUL, CHANCE = 1.5, 1.73
+"""The same for a hold that was told, and standard deviations of a gain that chance alone exceeds
+in 1 of 24 fits: with 1.5 such a fit is doubted no oftener, however far the two lie apart."""
 STEPS = 25
 """Most steps of a fit under another hold: it starts half a sample from its end."""
 OF_A_LOG = (
@@ -67,6 +69,8 @@ class OtherHold:
         not end, or the method minimises none that can be compared.
     shift : tuple of float
         By how much each estimate moves, in the order of the fit's covariance.
+    expected : float
+        The gain that it would have on average were it true, and the other way round were it not.
     """
 
     hold: InputHold
@@ -74,6 +78,15 @@ class OtherHold:
     moved: float
     gain: float | None
     shift: tuple[float, ...] = ()
+    expected: float = 0.0
+
+    @property
+    def doubts(self) -> bool:
+        """Whether it speaks against a hold that was told, by the most powerful test at 4 %."""
+        least = DOUBTFUL
+        if self.expected > DOUBTFUL:
+            least = max(CHANCE * math.sqrt(2.0 * self.expected) - self.expected, 0.0)
+        return (self.gain or 0.0) > least
 
     @property
     def is_likely(self) -> bool:
@@ -170,7 +183,12 @@ class _Rivals:
         free = [parameter.name for parameter in self.fit.model.parameters.free]
         places = [free.index(name) for name in self.fit.names]
         return [
-            _moved_by(hold, self.fit, (there.values - here.values)[places], there.gain_over(here))
+            replace(
+                _moved_by(
+                    hold, self.fit, (there.values - here.values)[places], there.gain_over(here)
+                ),
+                expected=there.apart_from(here),
+            )
             for hold, there in zip(holds, others, strict=True)
         ]
 
@@ -180,32 +198,6 @@ class _Rivals:
         # A response keeps what its estimator adds: both holds meet the same points.
         data = _corrected(self.data, hold, self.fit)
         return self.method.run(self.fit.model, data, {**self.given, **fresh, "hold": hold})
-
-
-def records_behind(data: object, model: GreyBoxModel) -> list[Record]:
-    """A record, or those that a response of a model was estimated from, means removed."""
-    if isinstance(data, Record):
-        return [data]
-    if not isinstance(data, FrequencyResponse) or data.linear is None:
-        return []
-    linear = data.linear
-    if not set(model.inputs) <= set(linear.inputs):
-        return []
-    outputs = {name: linear.places[0][k] for k, name in enumerate(data.outputs)}
-    if not set(model.outputs) <= set(outputs):
-        return []
-    trim = getattr(model, "trim", {})
-    return [
-        Record.from_arrays(
-            np.arange(u.shape[1]) * linear.sample_time_s,
-            inputs={
-                name: u[linear.inputs.index(name)] + trim.get(name, 0.0) for name in model.inputs
-            },
-            outputs={name: y[outputs[name]] for name in model.outputs},
-            units={name: model.units[name] for name in (*model.inputs, *model.outputs)},
-        )
-        for u, y in zip(linear.input_records, linear.output_records, strict=True)
-    ]
 
 
 def _told(fit: Fit, held: ChosenHold, rivals: _Rivals) -> tuple[Fit, ChosenHold]:
@@ -218,21 +210,33 @@ def _told(fit: Fit, held: ChosenHold, rivals: _Rivals) -> tuple[Fit, ChosenHold]
         return fit, held
     whose = f"as {_TOLD[held.source]}"
     finding = None
-    if (known[0].gain or 0.0) > DOUBTFUL:
+    if known[0].doubts:
         if rival != "zero" and not rivals.logged:
             known += rivals.by_likelihood(["first"])
         finding = _contradicted(max(known, key=lambda each: each.gain or 0.0), held.hold, whose)
-    elif rival == "zero" and known[0].is_likely:
-        finding = _steps_told_otherwise(known[0], rivals, whose)
+    elif known[0].is_likely and not rivals.made_by("simulate"):
+        steps = _steps_told_otherwise(known[0], rivals, whose) if rival == "zero" else None
+        finding = steps or _on_a_word(known[0], held.hold, whose)
     fit = _noted(fit, known)
     if finding is None:
         return fit, held
-    return _widened(fit, known), replace(held, findings=(*held.findings, finding))
+    fit = fit if finding.light is Light.GREEN else _widened(fit, known)
+    return fit, replace(held, findings=(*held.findings, finding))
+
+
+def _on_a_word(other: OtherHold, taken: InputHold, whose: str) -> Finding:
+    """What rests on a hold that was told, and that the data neither bear out nor contradict."""
+    return Finding(
+        ON_A_WORD,
+        Light.GREEN,
+        f"inputs are {BETWEEN[taken]} between samples {whose}; the data cannot tell: were they "
+        f"{BETWEEN[other.hold]}, {other.parameter} would be {other.moved:.2g} standard errors away",
+    )
 
 
 def _steps_told_otherwise(steps: OtherHold, rivals: _Rivals, whose: str) -> Finding | None:
-    """Steps in samples that were told as anything else; none where a simulator made them."""
-    if rivals.logged or rivals.made_by("simulate"):
+    """Steps in samples that were told as anything else; none where a log shows what it sampled."""
+    if rivals.logged:
         return None
     for record in rivals.records:
         for name in rivals.fit.model.inputs:

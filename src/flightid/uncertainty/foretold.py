@@ -209,5 +209,40 @@ def likelihood_gain(
     return 0.5 * count * math.log(power[0] / power[1])
 
 
+def expected_gain(
+    moved: Sequence[Array],
+    left: Sequence[Array],
+    share: Callable[[Array], float] = independent_share,
+) -> float:
+    """What `likelihood_gain` is on average where the right model stands against a wrong one.
+
+    ½ n (power of their difference / power left by the right one), n as there. The gain scatters
+    about it by the square root of twice its size, and about less of it where the other is right.
+
+    Parameters
+    ----------
+    moved : sequence of ndarray, shape (n_samples,)
+        Difference of the two in one output, by record.
+    left : sequence of ndarray, shape (n_samples,)
+        Residuals of the right one.
+    share : callable
+        Of a residual's samples that count.
+
+    Reference
+    ---------
+    Cox, Proc. 4th Berkeley Symposium 1 (1961), 105-123.
+
+    Example
+    -------
+    >>> white = np.random.default_rng(0).standard_normal(2000)
+    >>> line = np.full(2000, 0.1)
+    >>> round(expected_gain([line], [white]), 1), round(likelihood_gain([white + line], [white]), 1)
+    (10.0, 4.4)
+    """
+    tiny = float(np.finfo(float).tiny)
+    away, rest = (sum(float(row @ row) for row in rows) for rows in (moved, left))
+    return 0.5 * sum(row.size * share(row) for row in left) * away / max(rest, tiny)
+
+
 def _within(share: float) -> float:
     return min(max(share, 0.0), 1.0)
