@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 
 from flightid import Noise
+from flightid.conditioning.options import FilterOptions, OutlierOptions
 from flightid.control.margins.options import (
     DiskMarginOptions,
     DisturbanceOptions,
@@ -38,13 +39,29 @@ from flightid.record.options import ChannelOptions, ReadOptions
 from flightid.responses.options import ResponseOptions
 from flightid.simulation.fly_options import FlyOptions
 from flightid.simulation.options import SimulationOptions
-from flightid.study.fit_settings import VerifySettings
+from flightid.study.conditioning import Conditioning, ConsistencyStep, SensorPositions
+from flightid.study.fit_settings import FitMethod, VerifySettings
+from flightid.study.flight import FlightPlan
+from flightid.study.model_settings import ModelSettings, ParameterOverride
 from flightid.study.proposal.options import ProposalOptions
+from flightid.study.published import MeanSquareErrors, PublishedFigures, Remark
+from flightid.study.qualities_settings import QualitiesSettings, QualityCase
 from flightid.study.record_files import RecordFile
+from flightid.study.reducing import ReduceSettings
 from flightid.study.response_settings import ResponseSettings
-from flightid.study.settings import LogChannels, Segment, StudyWords
+from flightid.study.settings import LogChannels, LogFile, Segment, StudyWords
+from flightid.study.structure_settings import StructureSettings
+from flightid.study.uses_settings import ExportSettings, LoopSettings, RotorSettings
 from flightid.validation.residuals.options import ResidualTestOptions
 from flightid.validation.verification.options import VerifyOptions
+from flightid.vehicles import (
+    Autopilot,
+    PilotDoublet,
+    QuadrotorParameters,
+    Sensors,
+    SidActivation,
+    Turbulence,
+)
 from flightid.vehicles.gain_flight import GainFlightOptions
 from flightid.vehicles.pilot_inputs import StickOptions
 
@@ -56,6 +73,40 @@ Every option of every method with its default and range, written from the code b
 dashes, options of the command line, where some have a short form too (`--band` for
 `--band-rad-s`); a value outside its range is refused with the range.
 """
+
+
+STUDY: dict[str, type[Options]] = {
+    "[study]": StudyWords,
+    "[log]": LogFile,
+    "[flight]": FlightPlan,
+    "[[flight.sweep]]": SidActivation,
+    "[[flight.doublet]]": PilotDoublet,
+    "[flight.vehicle]": QuadrotorParameters,
+    "[flight.autopilot]": Autopilot,
+    "[flight.sensors]": Sensors,
+    "[flight.turbulence]": Turbulence,
+    "[channels]": LogChannels,
+    "[[segment]]": Segment,
+    "[[record]]": RecordFile,
+    "[[conditioning]]": Conditioning,
+    "Positions of sensors in [[conditioning]]": SensorPositions,
+    "outliers of [[conditioning]]": OutlierOptions,
+    "consistency of [[conditioning]]": ConsistencyStep,
+    "filter of [[conditioning]]": FilterOptions,
+    "[response]": ResponseSettings,
+    "[fit]": FitMethod,
+    "[verify]": VerifySettings,
+    "[reduce], beside the limits": ReduceSettings,
+    "[[model]], with equations": ModelSettings,
+    "parameters of a [[model]]": ParameterOverride,
+    "qualities of a [[model]]": QualityCase,
+    "[[model]], structure": StructureSettings,
+    "[handling_qualities]": QualitiesSettings,
+    "[[export]], beside its format's": ExportSettings,
+    "[rotor]": RotorSettings,
+    "[[loop]]": LoopSettings,
+}
+"""Tables of a study that are no verb's alone."""
 
 
 def sections() -> dict[str, type[Options]]:
@@ -98,12 +149,10 @@ def sections() -> dict[str, type[Options]]:
         "Part of a log or record": PartOptions,
         "Channels": ChannelOptions,
         "Studies of a log or records (run, new, tune)": ProposalOptions,
-        "[study] of a study": StudyWords,
-        "[channels] of a study": LogChannels,
-        "[[segment]] of a study": Segment,
-        "[[record]] of a study": RecordFile,
-        "[response] of a study": ResponseSettings,
-        "[verify] of a study": VerifySettings,
+        **{f"{table} of a study": options for table, options in STUDY.items()},
+        "A file of published figures": PublishedFigures,
+        "[mean_square_error] of such a file": MeanSquareErrors,
+        "[[remark]] of such a file": Remark,
     }
 
 
@@ -124,6 +173,8 @@ def section(title: str, options: type[Options]) -> str:
 
 
 def _shown(default: object) -> str:
+    if isinstance(default, Options):
+        return "as below"
     return f"{default:.6g}" if isinstance(default, float) and default % 1 else repr(default)
 
 

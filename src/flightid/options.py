@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import typing
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from functools import cache
@@ -18,12 +18,16 @@ from typing import Any, TypeVar
 from flightid.errors import FlightidError, OptionError
 from flightid.option_forms import (
     BAND,
+    FIGURES,
     FLAG,
     NAMES,
     NOTHING,
     NUMBER,
     NUMBERS,
+    SPAN,
+    TRIPLE,
     WHOLE,
+    WHOLES,
     WORD,
     WORDS,
     Form,
@@ -32,6 +36,8 @@ from flightid.option_forms import (
 
 Made = TypeVar("Made", bound="Options")
 _KEY = "flightid"
+_WORDS = (NAMES, WORDS)
+_NUMBERS = (FIGURES, BAND, SPAN, TRIPLE, WHOLES, NUMBERS)
 OFF = "none"
 """How files and commands write None, for options that may be switched off."""
 
@@ -87,6 +93,11 @@ class Option:
                                           high) if part)  # fmt: skip
 
     @property
+    def part(self) -> Form | None:
+        """The form that is a dataclass of options of its own; None where there is none."""
+        return next((form for form in self.forms if form.part is not None), None)
+
+    @property
     def needed(self) -> str:
         """What a value may be, in words."""
         parts = []
@@ -95,7 +106,7 @@ class Option:
                 parts += [repr(word) for word in self.choices]
             elif form is NAMES and self.choices:
                 parts.append("a list of " + ", ".join(map(repr, self.choices)))
-            elif form in (WHOLE, NUMBER, NUMBERS, BAND):
+            elif form in (WHOLE, NUMBER, *_NUMBERS):
                 unit = f"[{self.unit}]" if self.unit else ""
                 words = (form.words, self.range_words, unit)
                 parts.append(" ".join(word for word in words if word))
@@ -104,32 +115,22 @@ class Option:
         return " or ".join(parts)
 
     def problem(self, value: object) -> str | None:
-        """What is wrong with a value, None where nothing is.
-
-        Parameters
-        ----------
-        value : object
-
-        Returns
-        -------
-        str or None
-            A clause that begins with the option's name.
-        """
+        """What is wrong with a value: a clause that begins with the name; None where nothing is."""
         forms = [form for form in self.forms if form.fits(value)]
         if not forms:
             return f"{self.name} has no meaning"
         form = forms[0]
-        if form is WORD and self.choices and value not in self.choices:
-            return f"{self.name} is not known"
-        if form in (NAMES, WORDS) and self.choices:
-            given = value.values() if isinstance(value, Mapping) else typing.cast("Any", value)
-            if not set(given) <= {*self.choices}:
-                return f"{self.name} holds a word that is not known"
-        if form in (WHOLE, NUMBER):
-            return self._outside(float(typing.cast(float, value)))
-        if form in (NUMBERS, BAND):
-            numbers = typing.cast(Sequence[float], value)
-            return next(filter(None, map(self._outside, numbers)), None)
+        inside = value.values() if isinstance(value, Mapping) else value
+        several: list[Any] = (
+            list(typing.cast("Any", inside)) if form in (*_WORDS, *_NUMBERS) else [value]
+        )
+        if form in (WORD, *_WORDS) and self.choices and not {*several} <= {*self.choices}:
+            holds = "is not known" if form is WORD else "holds a word that is not known"
+            return f"{self.name} {holds}"
+        if form is NAMES and len({*several}) < len(several):
+            return f"{self.name} holds a name twice"
+        if form in (WHOLE, NUMBER, *_NUMBERS):
+            return next(filter(None, map(self._outside, several)), None)
         return None
 
     def _outside(self, number: float) -> str | None:
@@ -242,14 +243,7 @@ def _plain(value: object) -> object:
 def options_of(options: type) -> tuple[Option, ...]:
     """Options of a dataclass, in the order of its fields.
 
-    Parameters
-    ----------
-    options : type
-        A dataclass; fields that were not made by `option` are left out.
-
-    Returns
-    -------
-    tuple of Option
+    Fields that were not made by `option` are left out.
     """
     return _options_of(typing.cast(Hashable, options))
 
@@ -295,11 +289,9 @@ def checked(options: type[Made], given: Mapping[str, object], subject: str = "th
     for name in given:
         if name not in known:
             raise OptionError(
-                f"{subject} has no such option",
-                found=name,
-                needed=", ".join(known) or "none",
-                action=_nearest(name, known),
-            )
+                f"{subject} has no such option", found=name,
+                needed=", ".join(known) or "none", action=_nearest(name, known),
+            )  # fmt: skip
     return options(**given)
 
 
@@ -333,25 +325,10 @@ def read_options(
         Of type `error`: a key that has no meaning, with the nearest that has; a key that is
         missing; a value outside its range, with key, found and range.
     """
-    known = {each.name: each for each in options_of(options)}
-    for key in table:
-        if key not in known:
-            raise error(
-                f"{where}: there is no key {key!r}",
-                needed="one of " + ", ".join(known) if known else "no key at all",
-                action=_nearest(key, known),
-            )
-    values = {}
-    for name, each in known.items():
-        if name not in table:
-            if each.default is dataclasses.MISSING:
-                raise error(f"{where}: {name} is missing", needed=each.needed)
-            continue
-        value = read_value(each, table[name])
-        problem = each.problem(value)
-        if problem is not None:
-            raise error(f"{where}: {problem}", found=repr(table[name]), needed=each.needed)
-        values[name] = value
+    values = option_values(options, table, where, error=error)
+    for each in options_of(options):
+        if each.default is dataclasses.MISSING and each.name not in values:
+            raise error(f"{where}: {each.name} is missing", needed=each.needed)
     try:
         return options(**values)
     except OptionError as said:
@@ -359,29 +336,55 @@ def read_options(
         raise error(problem, found=said.found, needed=said.needed, action=said.action) from said
 
 
-def read_value(wanted: Option, value: object) -> object:
-    """A value as its option takes it, from what TOML gives; as it is where it does not fit.
+def option_values(
+    options: type[Options],
+    table: Mapping[str, object],
+    where: str,
+    *,
+    error: type[FlightidError] = OptionError,
+) -> dict[str, Any]:
+    """What a table of a TOML file gives of a dataclass's options, each checked alone.
 
-    Parameters
-    ----------
-    wanted : Option
-    value : object
-
-    Returns
-    -------
-    object
+    Parameters and errors are those of `read_options`, but for options that are missing.
     """
+    known = {each.name: each for each in options_of(options)}
+    values = {}
+    for name, given in table.items():
+        if name not in known:
+            raise unknown_key(where, name, known, error)
+        value = read_value(known[name], given)
+        problem = known[name].problem(value)
+        if problem is not None:
+            raise error(f"{where}: {problem}", found=repr(given), needed=known[name].needed)
+        values[name] = value
+    return values
+
+
+def read_value(wanted: Option, value: object) -> object:
+    """A value as its option takes it, from what TOML gives; as it is where it does not fit."""
     # TOML has no word for None.
     may_be_off = NOTHING in wanted.forms and FLAG not in wanted.forms
     # 0 equals False, and is a number.
     is_off = value is False or (isinstance(value, str) and value == OFF)
     if may_be_off and is_off and OFF not in wanted.choices:
         return None
-    # One name alone may stand for a list of one.
+    # One name or number alone may stand for a list of one.
     if isinstance(value, str) and NAMES in wanted.forms and WORD not in wanted.forms:
         return (value,)
+    if NUMBERS in wanted.forms and NUMBER not in wanted.forms and NUMBER.fits(value):
+        return (float(typing.cast(float, value)),)
     form = next((form for form in wanted.forms if form.fits(value)), None)
     return value if form is None or form.read is None else form.read(value)
+
+
+def unknown_key(
+    where: str, name: str, known: Iterable[str], error: type[FlightidError]
+) -> FlightidError:
+    """Error for a key that has no meaning in a table; names the nearest one that has."""
+    names = list(dict.fromkeys(known))
+    needed = "one of " + ", ".join(names) if names else "no key at all"
+    problem = f"{where}: there is no key {name!r}"
+    return error(problem, needed=needed, action=_nearest(name, names))
 
 
 def _nearest(name: str, known: Iterable[str]) -> str | None:

@@ -10,11 +10,9 @@ from flightid.plot.modes import pole_map
 from flightid.report.content import Document, Figure, Lights, TableBlock
 from flightid.report.html import to_html
 from flightid.report.modes import modes_blocks, physics_blocks
-from flightid.study.fit_settings import FitSettings, VerifySettings
 from flightid.study.identified import ModelFits, ModelResults
 from flightid.study.model_section import model_section
 from flightid.study.model_settings import ModelSettings
-from flightid.study.response_settings import ResponseSettings
 from tests.closeness import assert_close
 
 
@@ -103,9 +101,7 @@ def test_studies_show_modes_of_state_space_fits(
         units=truth.units,
         random_error=np.full(exact.shape, 0.05),
     )
-    settings = ModelSettings(
-        name, name, None, (), (), None, ResponseSettings(), FitSettings(), VerifySettings()
-    )
+    settings = ModelSettings(name=name, template=name, identify=())
     fitted = ModelFits({"composite": fid.identify(truth, data)})
     item = ModelResults(settings, {"composite": data}, fitted=fitted)
     page = to_html(Document("study", "", (model_section(item, None),)))

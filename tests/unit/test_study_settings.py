@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from flightid.errors import StudyError
 from flightid.study.conditioning import read_conditioning
+from flightid.study.model_settings import ParameterOverride
 from flightid.study.reading import TableReader
 from flightid.study.settings import read_settings
 
@@ -60,7 +61,7 @@ def test_a_whole_study_is_read(tmp_path: Path) -> None:
     assert settings.sample_rate_hz == 100.0
     model = settings.models[0]
     assert (model.identify, model.verify) == (("sweep",), ("doublet",))
-    assert model.parameters == {"tau_s": {"value": 0.03, "free": False}}
+    assert model.parameters == {"tau_s": ParameterOverride(value=0.03, free=False)}
     assert settings.segment("doublet").span_s == (70.0, 80.0)
     assert settings.response.compare == ("composite",)
     assert settings.reduce is not None
@@ -76,7 +77,7 @@ def test_a_model_file_lies_beside_the_study(tmp_path: Path) -> None:
 
 def test_rivals_are_library_models_or_files_beside_the_study(tmp_path: Path) -> None:
     text = GOOD.replace("band_rad_s", 'rivals = ["rate_integrator", "own.toml"]\nband_rad_s')
-    rivals = read_settings(_write(tmp_path, text)).models[0].rivals
+    rivals = read_settings(_write(tmp_path, text)).models[0].beside
     assert rivals == {"rate_integrator": "rate_integrator", "own.toml": str(tmp_path / "own.toml")}
 
 
@@ -110,19 +111,23 @@ def test_rivals_are_library_models_or_files_beside_the_study(tmp_path: Path) -> 
         ('name = "doublet"', 'name = "sweep"', "two [[segment]]s have one name: found 'sweep'"),
         ('identify = "sweep"', 'identify = "sweeps"', "no such segment: found 'sweeps'"),
         ('verify = ["doublet"]', 'verify = ["sweep"]', "verified on data it has seen"),
-        ("band_rad_s = [0.5, 60]", "band_rad_s = [0, 60]", "needed positive frequencies"),
-        ("free = false", 'free = "no"', "[[model]] number 1, parameters, tau_s: free does not fit"),
+        ("band_rad_s = [0.5, 60]", "band_rad_s = [0, 60]", "above 0 [rad/s]"),
+        (
+            "free = false",
+            'free = "no"',
+            "[[model]] number 1, parameters, tau_s: free has no meaning",
+        ),
         ("value = 0.03", "val = 0.03", "Next: write 'value'"),
         ("value = 0.03", 'value = "x"', "needed a number"),
         ("[log]\n", "[flight]\nsimulate = 'quadrotor'\n[log]\n", "found [log] and [flight]"),
         ('[log]\npath = "flight.bin"', "", "found none"),
-        ('[log]\npath = "flight.bin"', "[flight]\nsimulate = 'ufo'", "one of 'quadrotor'"),
+        ('[log]\npath = "flight.bin"', "[flight]\nsimulate = 'ufo'", "needed 'quadrotor'"),
         ('[log]\npath = "flight.bin"', "[[log]]", "log does not fit: found [{}]; needed a table"),
         ("[fit]", "[fit", "the study file is no TOML"),
         ("cramer_rao_percent = 30", "cramer_rao_percent = 0", "needed a number above 0"),
         ("maximum_cramer_rao", "maximum_cramer_raw", "Next: write 'maximum_cramer_rao_percent'"),
         ("_percent = 30", '_percent = 30\nafter_rise = "hope"', "needed 'stop' or 'next'"),
-        ("[reduce]\nmaximum_cramer_rao_percent = 30", "", "there is no key 'keep'"),
+        ("[reduce]\nmaximum_cramer_rao_percent = 30", "", "keep has no meaning here"),
         ("seed = 7", "seed = 7\nwindow_s = []", "[fit]: there is no key 'window_s'"),
         ('compare = ["composite"]', "window_s = []", "window_s has no meaning: found []"),
     ],

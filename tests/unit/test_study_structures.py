@@ -34,7 +34,7 @@ def test_an_offset_of_the_means_asks_for_no_pole() -> None:
     whole = rig()
     flown, unseen = whole.segment(0.0, 29.99), whole.segment(29.99, 44.98)
     orders = {"nb": (2, 3), "nf": (2, 3), "nk": (1,)}
-    settings = StructureSettings("oe", ("u",), ("y",), (), (), orders)
+    settings = StructureSettings(structure="oe", inputs=("u",), outputs=("y",), **orders)
     fit, scan = fit_structure(settings, ("u",), [flown], [unseen])
     first = ranked(scan, "balanced")[0]
     assert (first.structure.nb, first.structure.nf) == ((2,), (2,))
@@ -54,7 +54,7 @@ def narrow_scan():
     """Orders of 1 and 2 and delays of 3 and 4 of three poles after five samples."""
     whole = third_order()
     orders = {"nb": (1, 2), "nf": (1, 2), "nk": (3, 4)}
-    settings = StructureSettings("oe", ("u",), ("y",), (), (), orders)
+    settings = StructureSettings(structure="oe", inputs=("u",), outputs=("y",), **orders)
     return fit_structure(settings, ("u",), [whole.segment(0.0, 39.9)], [whole.segment(39.9, 60.0)])
 
 

@@ -174,7 +174,7 @@ def test_a_controller_of_blocks_and_its_qualities_are_stages(
         ('path = "roll.c"', 'path = "../roll.c"', "a name without a folder"),
         ('model = "Roll, slow"\npath', 'model = "Roll"\npath', "there is no such model to use"),
         ("gains = { tau_phi = { p = 0.02 } }", "", "gains is missing"),
-        ("{ p = 0.02 }", '{ p = "much" }', "a number"),
+        ("{ p = 0.02 }", '{ p = "much" }', "tables of numbers by name"),
         ("[[loop]]", "[rotor]\nmodel = 'Recursion'\n[[loop]]", "rotor_speed_rad_s is missing"),
     ],
 )

@@ -166,12 +166,14 @@ def flags_of(name: str) -> list[str]:
 def _click_option(name: str, uses: list[tuple[str, Option]], *, everywhere: bool) -> click.Option:
     from flightid.option_forms import (
         BAND,
+        FIGURES,
         FLAG,
         NAMES,
         NUMBER,
         NUMBERS,
         TABLE,
         WHOLE,
+        WHOLES,
         WORD,
         WORDS,
     )  # fmt: skip
@@ -194,15 +196,15 @@ def _click_option(name: str, uses: list[tuple[str, Option]], *, everywhere: bool
     choices = list(dict.fromkeys(word for _, use in uses for word in use.choices))
     if BAND in forms:
         return made(nargs=2, type=float, help=help_text)
-    if {NAMES, TABLE, WORDS} & forms:
+    if {NAMES, FIGURES, TABLE, WORDS} & forms:
         extra = "repeat for several"
-        if {TABLE, WORDS} & forms:
+        if {FIGURES, TABLE, WORDS} & forms:
             extra = f"NAME={'TEXT' if WORDS in forms else 'NUMBER'}, repeated"
             extra = f"{', '.join(choices)} or {extra}" if WORD in forms else extra
         if FLAG in forms:
             extra += f"; '{ALL}' or '{NONE}'"
         return made(multiple=True, help=f"{help_text} ({extra})")
-    if NUMBERS in forms:
+    if {NUMBERS, WHOLES} & forms:
         return made(
             multiple=True,
             type=int if WHOLE in forms else float,
@@ -349,14 +351,15 @@ def _read(each: Option, value: Any) -> Any:  # noqa: ANN401 — whatever the opt
 
 def _several(each: Option, value: tuple[Any, ...]) -> Any:  # noqa: ANN401
     """Values of an option that may be repeated: all or none, by name, one word, or a list."""
-    from flightid.option_forms import FLAG, TABLE, WORD, WORDS
+    from flightid.option_forms import FIGURES, FLAG, TABLE, WORD, WORDS
 
     flag = flags_of(each.name)[-1]
     if FLAG in each.forms and value in ((ALL,), (NONE,)):
         return value == (ALL,)
     if WORDS in each.forms and (WORD not in each.forms or any("=" in v for v in value)):
         return pairs(flag, value)
-    if TABLE in each.forms and (WORD not in each.forms or any("=" in str(v) for v in value)):
+    named = {FIGURES, TABLE} & set(each.forms)
+    if named and (WORD not in each.forms or any("=" in str(v) for v in value)):
         return {name: _number(flag, text) for name, text in pairs(flag, value).items()}
     return value[0] if WORD in each.forms and len(value) == 1 else value
 

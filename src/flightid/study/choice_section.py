@@ -35,17 +35,17 @@ def choice_blocks(item: ModelResults) -> tuple[Block, ...]:
     shown = "Every structure tried: error in free run on the selection records"
     shown += "." if choice.is_of_several_kinds else ", and BIC of the fit."
     taken = next((t for t in choice.trials if _orders(t.structure) == _orders(fit.structure)), None)
-    words = f"Chosen by “{structure.choose}”"
+    words = f"Chosen by “{structure.rule}”"
     if taken is not None:
         words += f": {words_of(choice, taken)}"
-    if structure.choose == "balanced":
+    if structure.rule == "balanced":
         words += (
             ". Free runs do not see the noise model; so of all structures whose free-run error "
             "lies within 10 % of the smallest the one with the smallest AICc is taken, before "
             "those with fewer coefficients of B than of F: what such a structure forbids has no "
             "share in its intervals"
         )
-    if taken is not None and taken is not ranked(choice, structure.choose)[0]:
+    if taken is not None and taken is not ranked(choice, structure.rule)[0]:
         words += (
             ". Those before it have a pole and a zero that cancel within their errors, or their "
             "search ended at no minimum or at one of several that fit as well"

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from dataclasses import dataclass, field, make_dataclass, replace
+from itertools import product
+from typing import Any
 
 from flightid.conditioning import (
     accelerations_at_cg,
@@ -42,22 +43,28 @@ SENSORS: dict[str, tuple[Move, tuple[str, str, str]]] = {
 """Sensors by key: the verb that moves them to the centre of gravity, and its channels."""
 LENGTHS = ("m", "cm", "mm", "ft", "in")
 """Units that a position may be told in, behind the sensor's key: ``accelerometers_ft``."""
-Made = TypeVar("Made", bound=Options)
+
+
+SensorPositions: type[Options] = make_dataclass(
+    "SensorPositions",
+    [
+        (
+            f"{sensor}_{unit}",
+            tuple[float, float, float] | None,
+            option(None, unit=unit, doc=f"Position of {sensor} from the centre of gravity."),
+        )
+        for sensor in SENSORS
+        for unit in LENGTHS
+    ],
+    bases=(Options,),
+    frozen=True,
+)
+"""Where sensors sit, each told in one unit: keys of ``[[conditioning]]``."""
 
 
 @dataclass(frozen=True)
 class ConsistencyStep(Options):
-    """A check of data compatibility; see `flightid.conditioning.check_consistency`.
-
-    Attributes
-    ----------
-    channels : tuple of str
-        Attitudes, accelerations and velocities to look at, beside the rates.
-    estimate : tuple of str, or None
-        Instrument errors; None: the usual ones.
-    apply : bool
-        Whether records go on without the errors that were found.
-    """
+    """A check of data compatibility; see `flightid.conditioning.check_consistency`."""
 
     channels: tuple[str, ...] = option(
         ("phi", "theta"), doc="Attitudes, accelerations and velocities beside the rates."
@@ -69,47 +76,34 @@ class ConsistencyStep(Options):
 
 
 @dataclass(frozen=True)
-class Conditioning:
+class Conditioning(Options):
     """Steps that make records fit for estimation, carried out in the order of these attributes.
 
-    Attributes
-    ----------
-    records : tuple of str
-        Records or segments it is meant for; empty: all.
-    units : mapping of str to str
-        Unit that a channel is converted to.
-    flip : tuple of str
-        Channels whose sign is changed.
-    axes : str or None
-        Conversion of rates and accelerations.
-    skews_s : mapping of str to float
-        Lag of a channel that is taken out, s.
-    outliers : OutlierOptions or None
-    actuators : mapping of str to float
-        Bandwidth of the known actuator behind an input, rad/s.
-    positions : mapping of str to tuple of float
-        Position of sensors from the centre of gravity, m, by key of `SENSORS`.
-    consistency : ConsistencyStep or None
-        Check of rates against attitudes and velocities, and whether its errors are taken out.
-    filter : FilterOptions or None
-    resample_to_s : float or None
-        New sample time, s.
-    detrend : str or None
-        ``"mean"``, ``"linear"`` or ``"trim"``.
+    Sensors are moved (`positions`, in m, by key of `SENSORS`) after actuators are taken out.
     """
 
-    records: tuple[str, ...] = ()
-    units: Mapping[str, str] = field(default_factory=dict)
-    flip: tuple[str, ...] = ()
-    axes: str | None = None
-    skews_s: Mapping[str, float] = field(default_factory=dict)
-    outliers: OutlierOptions | None = None
-    actuators: Mapping[str, float] = field(default_factory=dict)
+    records: tuple[str, ...] = option((), doc="Records or segments it is meant for; default: all.")
+    units: Mapping[str, str] = option(
+        default_factory=dict, doc="Unit that a channel is converted to."
+    )
+    flip: tuple[str, ...] = option((), doc="Channels whose sign is changed.")
+    axes: str | None = option(
+        None, choices=map(str, AxisConversion), doc="Conversion of rates and accelerations."
+    )
+    skews_s: Mapping[str, float] = option(
+        default_factory=dict, unit="s", doc="Lag of a channel that is taken out."
+    )
+    outliers: OutlierOptions | None = option(None, doc="Outliers that are bridged.")
+    actuators: Mapping[str, float] = option(
+        default_factory=dict, unit="rad/s", doc="Bandwidth of the known actuator behind an input."
+    )
+    consistency: ConsistencyStep | None = option(
+        None, doc="Check of rates against attitudes and velocities."
+    )
+    filter: FilterOptions | None = option(None, doc="Filter of channels.")
+    resample_to_s: float | None = option(None, unit="s", above=0.0, doc="New sample time.")
+    detrend: str | None = option(None, choices=map(str, Trend), doc="What is taken off.")
     positions: Mapping[str, Position] = field(default_factory=dict)
-    consistency: ConsistencyStep | None = None
-    filter: FilterOptions | None = None
-    resample_to_s: float | None = None
-    detrend: str | None = None
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -131,24 +125,9 @@ def read_conditioning(reader: TableReader) -> Conditioning:
     StudyError
         A key is unknown or a value does not fit.
     """
-    made = Conditioning(
-        reader.names("records", ()),
-        _texts(reader, "units"),
-        reader.names("flip", ()),
-        reader.maybe(
-            lambda key: reader.choice(key, [str(each) for each in AxisConversion]), "axes"
-        ),
-        _numbers(reader, "skews_s"),
-        _options(reader, "outliers", OutlierOptions),
-        _numbers(reader, "actuators"),
-        _positions(reader),
-        _options(reader, "consistency", ConsistencyStep),
-        _options(reader, "filter", FilterOptions),
-        reader.maybe(reader.positive, "resample_to_s"),
-        reader.maybe(lambda key: reader.choice(key, [str(each) for each in Trend]), "detrend"),
-    )
-    reader.finish()
-    return made
+    made: Conditioning
+    made, positions = read_each((Conditioning, SensorPositions), reader)
+    return replace(made, positions=_in_metres(positions, reader))
 
 
 def require_records(steps: Sequence[Conditioning], names: Sequence[str]) -> None:
@@ -249,35 +228,16 @@ def _apply(record: Record, step: Conditioning, checks: list[KinematicConsistency
     return record if step.detrend is None else detrend(record, step.detrend)
 
 
-def _options(reader: TableReader, key: str, kind: type[Made]) -> Made | None:
-    """A table in the table as options; None where it is not there."""
-    if key not in reader:
-        return None
-    made: list[Made] = read_each((kind,), reader.table(key))
-    return made[0]
-
-
-def _texts(reader: TableReader, key: str) -> dict[str, str]:
-    inner = reader.table(key)
-    return {name: inner.text(name) for name in reader.values(key)}
-
-
-def _numbers(reader: TableReader, key: str) -> dict[str, float]:
-    inner = reader.table(key)
-    return {name: inner.number(name) for name in reader.values(key)}
-
-
-def _positions(reader: TableReader) -> dict[str, Position]:
-    """Positions in m, from whichever unit the key names."""
+def _in_metres(positions: Options, reader: TableReader) -> dict[str, Position]:
+    """Positions by sensor, from whichever unit the key names."""
     found: dict[str, Position] = {}
-    for sensor in SENSORS:
-        for unit in LENGTHS:
+    for sensor, unit in product(SENSORS, LENGTHS):
+        given = getattr(positions, f"{sensor}_{unit}")
+        if given is None:
+            continue
+        if sensor in found:
             key = f"{sensor}_{unit}"
-            given = reader.maybe(lambda name: reader.numbers(name, length=3), key)
-            if given is None:
-                continue
-            if sensor in found:
-                raise reader.error(key, "tells a position twice", found=given, needed="one unit")
-            x, y, z = convert(given, unit, "m").tolist()
-            found[sensor] = (x, y, z)
+            raise reader.error(key, "tells a position twice", found=given, needed="one unit")
+        x, y, z = convert(given, unit, "m").tolist()
+        found[sensor] = (x, y, z)
     return found

@@ -11,8 +11,8 @@ from flightid.identification.methods import METHODS, RECORDS
 from flightid.identification.prediction.request import FREE_RUN
 from flightid.models import StateSpaceModel
 from flightid.option_forms import WHOLE, Form
-from flightid.options import option, options_of, read_options
-from flightid.study.reading import TableReader, read_each
+from flightid.options import Options, option, options_of, read_options
+from flightid.study.reading import TableReader, read_own
 from flightid.validation.verification.options import VerifyOptions
 
 FREQUENCY_DOMAIN = "frequency_domain"
@@ -94,6 +94,15 @@ class VerifySettings(VerifyOptions):
         return self.without_equations if self.spectra is None else self.spectra
 
 
+@dataclass(frozen=True)
+class FitMethod(Options):
+    """What ``[fit]`` says beside the options of the method."""
+
+    method: str = option(
+        FREQUENCY_DOMAIN, choices=METHOD_NAMES, doc="Of identify; its options are keys beside it."
+    )
+
+
 def read_fit(reader: TableReader, usual: FitSettings | None = None) -> FitSettings:
     """Check a table ``[fit]``; what it does not say is as `usual`.
 
@@ -103,23 +112,11 @@ def read_fit(reader: TableReader, usual: FitSettings | None = None) -> FitSettin
         A key that the method does not have, or a value outside its range.
     """
     usual = usual or FitSettings()
-    method = reader.choice("method", METHOD_NAMES, usual.method)
+    method = read_own(FitMethod, reader).method if "method" in reader else usual.method
     kind = next(way.options for way in METHODS if way.name == method)
     known = [each.name for each in options_of(kind)]
-    given = reader.rest()
     kept = {key: value for key, value in usual.options.items() if key in known}
-    where = f"study file, {reader.where}"
-    read = read_options(kind, {**kept, **given}, where, error=StudyError)
+    given = reader.options(kind)
+    reader.finish()
+    read = read_options(kind, {**kept, **given}, reader.told, error=StudyError)
     return FitSettings(method, {name: getattr(read, name) for name in {**kept, **given}})
-
-
-def read_verify(reader: TableReader, usual: VerifySettings | None = None) -> VerifySettings:
-    """Check a table ``[verify]``; what it does not say is as `usual`.
-
-    Raises
-    ------
-    StudyError
-        A key is unknown or a value does not fit.
-    """
-    (made,) = read_each((VerifySettings,), reader, (usual,))
-    return cast("VerifySettings", made)

@@ -137,7 +137,7 @@ class ModelResults:
     def choice_findings(self) -> tuple[Finding, ...]:
         """Verdicts of the search on its first structure, where that one is taken."""
         structure = self.settings.structure
-        if self.choice is None or structure is None or structure.choose != "free_run":
+        if self.choice is None or structure is None or structure.rule != "free_run":
             return ()
         return self.choice.findings
 

@@ -90,8 +90,8 @@ def _first(item: ModelResults, truth: Truth | None) -> Iterator[Block]:
         yield TableBlock(minima_table(fit), folded=True)
     if item.settings.structure is None and fit.covariance is not None and len(fit.names) > 1:
         yield TableBlock(correlation_table(fit), folded=True)
-    if item.settings.published is not None:
-        yield from map(TableBlock, published_tables(item.settings.published, fit, item.on_unseen))
+    if item.settings.figures is not None:
+        yield from map(TableBlock, published_tables(item.settings.figures, fit, item.on_unseen))
     yield from evidence_blocks(fit.evidence)
     if len(item.fits) > 1:
         yield TableBlock(estimates_table(item, truth), folded=True)

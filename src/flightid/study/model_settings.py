@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
-from flightid.study.fit_settings import FitSettings, VerifySettings, read_fit, read_verify
+from flightid.option_forms import NOTHING, ONE, SPAN, part_of
+from flightid.options import Options, option
+from flightid.study.fit_settings import FitSettings, VerifySettings, read_fit
 from flightid.study.published import PublishedFigures, read_published
-from flightid.study.qualities_settings import read_cases
-from flightid.study.reading import TableReader
-from flightid.study.response_settings import ResponseSettings, read_response
+from flightid.study.qualities_settings import QualityCase
+from flightid.study.reading import TableReader, read_own, read_table
+from flightid.study.response_settings import ResponseSettings
 from flightid.study.structure_settings import NARX, SUBSPACE, StructureSettings, read_structure
 
 COHERENT, UNBROKEN = "coherent", "unbroken"
@@ -21,85 +22,89 @@ METHODS = {NARX: "orthogonal_least_squares", SUBSPACE: "subspace"}
 
 
 @dataclass(frozen=True)
-class ModelSettings:
+class ParameterOverride(Options):
+    """What a study says of one parameter of a model, over the model's own file."""
+
+    value: float | None = option(None, doc="Where it starts, or stays.")
+    minimum: float | None = option(None, doc="Lower bound.")
+    maximum: float | None = option(None, doc="Upper bound.")
+    free: bool | None = option(None, doc="Whether it is estimated.")
+
+
+@dataclass(frozen=True, kw_only=True)
+class AnyModel(Options):
+    """What a table ``[[model]]`` says, with equations or without."""
+
+    name: str = option(doc="Title in the report.")
+    identify: tuple[str, ...] = option(doc="Records of the fit.")
+    verify: tuple[str, ...] = option((), doc="Records kept for verification.")
+    band_rad_s: tuple[float, float] | None = option(
+        None, forms=(SPAN, NOTHING), unit="rad/s", above=0.0, doc="Band of its responses."
+    )
+    rivals: tuple[str, ...] = option(
+        (), doc="Models to verify beside it: of the library, of a file, or of this study."
+    )
+    condition: str | None = option(None, doc="Flight condition, where the study compares several.")
+    reference: str | None = option(
+        None, doc="Library name or file of a model whose parameters and modes stand beside."
+    )
+    published: str | None = option(None, doc="File of published figures that stand beside.")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModelSettings(AnyModel):
     """One model to identify.
 
     Attributes
     ----------
-    name : str
-        Title in the report.
-    template : str or None
-        Name of a library model, or path of a model file; None for a structure.
-    axis : str or None
-        Axis of a library model that is written for any.
-    identify, verify : tuple of str
-        Records for the fit, and records kept for verification.
-    joint : tuple of str
-        Records of a joint fit; those of `identify` then give the responses alone.
-    band_rad_s : tuple of float or None
-        Lowest and highest frequency of the fit, rad/s; None where records are fitted.
-    responses : tuple of str
-        Responses that are fitted, ``"output/input"``; ``("coherent",)``: those with coherence, over
-        all frequencies that have it; ``("unbroken",)``: over the widest band without a gap. Empty:
-        the model's own.
-    outputs : tuple of str
-        Outputs whose responses are fitted; empty: all.
-    response : ResponseSettings
-        How responses are estimated.
-    fit : FitSettings
-        How the model is fitted.
-    check : VerifySettings
-        How it is verified.
-    parameters : mapping
-        Overrides by parameter: value, minimum, maximum, free.
-    rivals : mapping of str to str
-        Models to verify side by side: library name, or path of a model file, by name.
-    keep, drop : tuple of str
-        Parameters that a reduction leaves in, or takes out first.
-    condition : str or None
-        Flight condition, where the study compares several.
-    values_from : mapping of str to tuple of str
-        Parameters that start at another model's estimates, by the name of that model.
-    qualities : mapping of str to str
-        Case of the standard of handling qualities, where it differs from the study's.
-    reduce : bool
-        Whether the reduction that the study asks for is meant for this model.
-    reference : str or None
-        Model whose parameters and modes stand beside the estimates: library name or model file.
-    published : PublishedFigures or None
-        What others found of its parameters, beside ours.
+    response, fit, check
+        How responses are estimated, and how the model is fitted and verified.
+    beside : mapping of str to str
+        Library name, or path of a model file, of each rival.
+    figures : PublishedFigures or None
+        Of the file `published`.
     structure : StructureSettings or None
         A structure without equations, whose order is looked for.
     """
 
-    name: str
-    template: str | None
-    axis: str | None
-    identify: tuple[str, ...]
-    verify: tuple[str, ...]
-    band_rad_s: tuple[float, float] | None
-    response: ResponseSettings
-    fit: FitSettings
-    check: VerifySettings
-    joint: tuple[str, ...] = ()
-    responses: tuple[str, ...] = ()
-    outputs: tuple[str, ...] = ()
-    parameters: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    rivals: Mapping[str, str] = field(default_factory=dict)
-    keep: tuple[str, ...] = ()
-    drop: tuple[str, ...] = ()
-    condition: str | None = None
-    reference: str | None = None
-    values_from: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    qualities: Mapping[str, str] = field(default_factory=dict)
-    reduce: bool = True
-    published: PublishedFigures | None = None
+    template: str | None = option(None, doc="Library name or file of a model; or a structure.")
+    axis: str | None = option(None, doc="Axis of a library model that is written for any.")
+    joint: tuple[str, ...] = option(
+        (), doc="Records of a joint fit; those of identify then give the responses alone."
+    )
+    responses: tuple[str, ...] = option(
+        (),
+        doc="Responses of the fit as output/input; or 'coherent': those with coherence, over all "
+        "such frequencies; or 'unbroken': over the widest band without a gap; default: its own.",
+    )
+    outputs: tuple[str, ...] = option((), doc="Outputs that are fitted; default: all.")
+    parameters: Mapping[str, ParameterOverride] = option(
+        default_factory=dict, doc="Overrides by parameter."
+    )
+    keep: tuple[str, ...] = option((), doc="Parameters that a reduction leaves in.")
+    drop: tuple[str, ...] = option((), doc="Parameters that a reduction takes out first.")
+    reduce: bool = option(True, doc="The reduction that the study asks for is meant for it.")
+    values_from: Mapping[str, tuple[str, ...]] = option(
+        default_factory=dict, doc="Parameters that start at another model's estimates, by model."
+    )
+    qualities: Options = option(
+        default_factory=QualityCase,
+        forms=(part_of(QualityCase, ONE),),
+        doc="Case of the standard, where it is not the study's.",
+    )
+    response: ResponseSettings = field(default_factory=ResponseSettings)
+    fit: FitSettings = field(default_factory=FitSettings)
+    check: VerifySettings = field(default_factory=VerifySettings)
+    beside: Mapping[str, str] = field(default_factory=dict)
+    figures: PublishedFigures | None = None
     structure: StructureSettings | None = None
 
     @property
     def segments(self) -> tuple[str, ...]:
         """Every record that the model uses."""
-        beside = (*self.structure.select, *self.structure.coherence) if self.structure else ()
+        beside = (
+            (*self.structure.select, *(self.structure.coherence or ())) if self.structure else ()
+        )
         return (*self.identify, *self.joint, *self.verify, *beside)
 
     @property
@@ -110,7 +115,7 @@ class ModelSettings:
     @property
     def flown(self) -> tuple[str, ...]:
         """Records of the frequency responses."""
-        return self.identify if self.structure is None else self.structure.coherence
+        return self.identify if self.structure is None else self.structure.coherence or ()
 
     @property
     def by_coherence(self) -> bool:
@@ -134,119 +139,75 @@ def read_model(
     StudyError
         A key is unknown or a value does not fit.
     """
-    response = read_response(reader.table("response"), response)
-    check = read_verify(reader.table("check"), check)
+    response = read_table(ResponseSettings, reader.table("response"), response)
+    check = read_table(VerifySettings, reader.table("check"), check)
     if "structure" in reader:
         return _without_equations(reader, folder, response=response, check=check)
-    template = reader.text("template")
     fit = read_fit(reader.table("fit"), fit)
-    joint = reader.names("joint", ())
-    if joint and fit.method != "joint":
-        raise reader.error(
-            "joint", "names records of a joint fit", found=fit.method, needed='method = "joint"'
-        )
-    if fit.method == "joint" and not joint:
-        raise reader.error(
-            "joint", "is missing", found="none", needed="records beside those of the responses"
-        )
-    made = ModelSettings(
-        reader.text("name"),
-        _placed(folder, template),
-        reader.maybe(reader.text, "axis"),
-        reader.names("identify"),
-        reader.names("verify", ()),
-        _band(reader, response if fit.on_responses else None),
-        response,
-        fit,
-        check,
-        joint,
-        reader.names("responses", ()),
-        reader.names("outputs", ()),
-        read_overrides(reader),
-        _rivals(reader, folder),
-        *((reader.names("keep", ()), reader.names("drop", ())) if reduced else ((), ())),
-        condition=reader.maybe(reader.text, "condition"),
-        **_beside(reader, folder),
-        values_from=_values_from(reader),
-        qualities=read_cases(reader.table("qualities")),
-        reduce=reader.flag("reduce", True) if reduced else False,
+    made = read_table(ModelSettings, reader)
+    if made.template is None:
+        raise reader.error("template", "is missing", found="none", needed="a model, or structure")
+    if bool(made.joint) != (fit.method == "joint"):
+        problem = "names records of a joint fit" if made.joint else "is missing"
+        needed = 'method = "joint"' if made.joint else "records beside those of the responses"
+        raise reader.error("joint", problem, found=fit.method, needed=needed)
+    for name in ("keep", "drop", "reduce"):
+        if name in reader and not reduced:
+            raise reader.error(name, "has no meaning here", found="no [reduce]", needed="[reduce]")
+    made = replace(
+        made,
+        template=placed(folder, made.template),
+        band_rad_s=_band(made, reader, response if fit.on_responses else None),
+        reduce=made.reduce and reduced,
+        response=response,
+        fit=fit,
+        check=check,
     )
-    reader.finish()
-    return made
+    return _beside(made, folder)
 
 
 def _without_equations(
     reader: TableReader, folder: Path, *, response: ResponseSettings, check: VerifySettings
 ) -> ModelSettings:
-    identify = reader.names("identify")
+    own = read_own(AnyModel, reader)
+    structure = read_structure(reader, own.identify)
+    reader.finish()
     # Only a response needs a band: without one no coherence is shown, and all inputs are kept.
-    responds = "coherence" in reader or "band_rad_s" in reader or response.band_rad_s is not None
-    structure = read_structure(reader, identify)
+    responds = "coherence" in reader or own.band_rad_s or response.band_rad_s
     made = ModelSettings(
-        reader.text("name"),
-        None,
-        None,
-        identify,
-        reader.names("verify", ()),
-        _band(reader, response) if responds else None,
-        response,
-        FitSettings(METHODS.get(structure.kind, "prediction_error")),
-        replace(check, without_equations=True),
-        rivals=_rivals(reader, folder),
-        condition=reader.maybe(reader.text, "condition"),
-        **_beside(reader, folder),
+        **vars(own),
+        reduce=False,
+        response=response,
+        fit=FitSettings(METHODS.get(structure.structure, "prediction_error")),
+        check=replace(check, without_equations=True),
         structure=structure,
     )
-    reader.finish()
-    return made
+    return _beside(
+        replace(made, band_rad_s=_band(made, reader, response) if responds else None), folder
+    )
 
 
-def _band(reader: TableReader, response: ResponseSettings | None) -> tuple[float, float] | None:
+def _band(
+    made: ModelSettings, reader: TableReader, response: ResponseSettings | None
+) -> tuple[float, float] | None:
     """Band of the model, else that of its responses, which need one."""
-    if response is None or response.band_rad_s is not None:
-        band = reader.maybe(reader.interval, "band_rad_s")
-        band = response.band_rad_s if band is None and response is not None else band
-    else:
-        band = reader.interval("band_rad_s")
-    if band is not None and not 0 < band[0] < band[1]:
-        raise reader.error("band_rad_s", "does not fit", found=band, needed="positive frequencies")
-    return band
+    if response is None or made.band_rad_s is not None:
+        return made.band_rad_s
+    if response.band_rad_s is None:
+        raise reader.error("band_rad_s", "is missing", found="none", needed="the responses' band")
+    return response.band_rad_s
 
 
-def _beside(reader: TableReader, folder: Path) -> dict[str, Any]:
-    """What stands beside the estimates: a model, and printed figures."""
-    reference = reader.maybe(reader.text, "reference")
-    published = reader.maybe(reader.text, "published")
-    return {
-        "reference": None if reference is None else _placed(folder, reference),
-        "published": None if published is None else read_published(folder / published),
-    }
+def _beside(made: ModelSettings, folder: Path) -> ModelSettings:
+    """With what stands beside the estimates as it lies in the folder of the study."""
+    return replace(
+        made,
+        beside={rival: placed(folder, rival) for rival in made.rivals},
+        reference=None if made.reference is None else placed(folder, made.reference),
+        figures=None if made.published is None else read_published(folder / made.published),
+    )
 
 
-def _rivals(reader: TableReader, folder: Path) -> dict[str, str]:
-    return {rival: _placed(folder, rival) for rival in reader.names("rivals", ())}
-
-
-def _values_from(reader: TableReader) -> dict[str, tuple[str, ...]]:
-    inner = reader.table("values_from")
-    return {name: inner.names(name) for name in reader.values("values_from")}
-
-
-def _placed(folder: Path, source: str) -> str:
-    """A library name as it is, a model file beside the study."""
+def placed(folder: Path, source: str) -> str:
+    """A name of what is shipped as it is, a TOML file beside the study."""
     return str(folder / source) if source.endswith(".toml") else source
-
-
-def read_overrides(reader: TableReader) -> dict[str, dict[str, Any]]:
-    """Values, bounds and freedom of parameters by name."""
-    overrides: dict[str, dict[str, Any]] = {}
-    parameters = reader.table("parameters")
-    for name in reader.values("parameters"):
-        entry = parameters.table(name)
-        given: dict[str, Any] = {
-            key: entry.maybe(entry.number, key) for key in ("value", "minimum", "maximum")
-        }
-        given["free"] = entry.maybe(entry.flag, "free")
-        entry.finish()
-        overrides[name] = {key: value for key, value in given.items() if value is not None}
-    return overrides

@@ -3,75 +3,78 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from flightid.errors import StudyError
 from flightid.identification import Fit, PolynomialDetails, SubspaceDetails
+from flightid.options import Options, option
 from flightid.reading import read_toml
-from flightid.study.reading import TableReader
+from flightid.study.reading import TableReader, read_table
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Estimate
 from flightid.validation import Verification
 
-SETS = ("training", "validation")
-"""What a mean square error is of."""
 SHOWN = 4
 """Records of a fit whose errors stand each for itself."""
 
 
 @dataclass(frozen=True)
-class PublishedFigures:
-    """Figures of a paper or report, by parameter.
+class Remark(Options):
+    """A table ``[[remark]]``."""
 
-    Attributes
-    ----------
-    source : str
-        Where they stand.
-    value : mapping of str to float
-        In the units of the model's parameters.
-    cramer_rao_percent, insensitivity_percent : mapping of str to float
-        Percent of the value.
-    average_cost : float or None
-        Of all responses.
-    loss : float or None
-        Of a model without equations.
-    singular_values : tuple of float
-        Of a subspace estimate, the largest first.
-    mean_square_error : mapping of str to mapping of str to float
-        Of ``"training"`` and ``"validation"``, by output, in its unit squared.
-    remarks : tuple of tuple of str
-        What is printed, and what speaks against it.
+    printed: str = option(doc="What is printed.")
+    but: str = option(doc="What speaks against it.")
+
+
+@dataclass(frozen=True)
+class MeanSquareErrors(Options):
+    """What mean square errors are of."""
+
+    training: Mapping[str, float] = option(default_factory=dict, doc="Of the fitted records.")
+    validation: Mapping[str, float] = option(default_factory=dict, doc="Of unseen records.")
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Outputs of which one was published."""
+        return tuple(dict.fromkeys((*self.training, *self.validation)))
+
+
+@dataclass(frozen=True)
+class PublishedFigures(Options):
+    """Figures of a paper or report, by parameter: what a file of them says.
 
     Example
     -------
-    >>> PublishedFigures("a paper", {"Lp": -4.0}, {"Lp": 3.1}, {}).cramer_rao_percent["Lp"]
+    >>> PublishedFigures("a paper", {"Lp": -4.0}, {"Lp": 3.1}).cramer_rao_percent["Lp"]
     3.1
     """
 
-    source: str
-    value: Mapping[str, float]
-    cramer_rao_percent: Mapping[str, float]
-    insensitivity_percent: Mapping[str, float]
-    average_cost: float | None = None
-    loss: float | None = None
-    singular_values: tuple[float, ...] = ()
-    mean_square_error: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    remarks: tuple[tuple[str, str], ...] = ()
+    source: str = option(doc="Where they stand.")
+    value: Mapping[str, float] = option(
+        default_factory=dict, doc="By parameter, in the unit of the model."
+    )
+    cramer_rao_percent: Mapping[str, float] = option(
+        default_factory=dict, unit="%", doc="Of the value, by parameter."
+    )
+    insensitivity_percent: Mapping[str, float] = option(
+        default_factory=dict, unit="%", doc="Of the value, by parameter."
+    )
+    average_cost: float | None = option(None, above=0.0, doc="Of all responses.")
+    loss: float | None = option(None, above=0.0, doc="Of a model without equations.")
+    singular_values: tuple[float, ...] | None = option(
+        None, doc="Of a subspace estimate, the largest first."
+    )
+    mean_square_error: MeanSquareErrors = option(
+        default_factory=MeanSquareErrors, doc="By output, in its unit squared."
+    )
+    remark: tuple[Remark, ...] = option((), doc="What is to be read with care.")
 
 
 def read_published(path: Path) -> PublishedFigures:
     """Figures from a TOML file.
-
-    Parameters
-    ----------
-    path : Path
-        Keys ``source``, ``average_cost``, ``loss`` and ``singular_values``; tables ``[value]``,
-        ``[cramer_rao_percent]`` and ``[insensitivity_percent]`` of numbers by parameter;
-        ``[mean_square_error.training]`` and ``.validation`` by output; ``[[remark]]`` with
-        ``printed`` and ``but``; each may be left out but the first.
 
     Raises
     ------
@@ -86,38 +89,7 @@ def read_published(path: Path) -> PublishedFigures:
             found=f"{path.name}: {error}",
             needed="a TOML file beside the study",
         ) from error
-    reader = TableReader(content, f"published figures {path.name}")
-    made = PublishedFigures(
-        reader.text("source"),
-        _numbers(reader, "value"),
-        _numbers(reader, "cramer_rao_percent"),
-        _numbers(reader, "insensitivity_percent"),
-        reader.maybe(reader.positive, "average_cost"),
-        reader.maybe(reader.positive, "loss"),
-        reader.numbers("singular_values", ()),
-        _errors(reader),
-        tuple(map(_remark, reader.tables("remark"))),
-    )
-    reader.finish()
-    return made
-
-
-def _numbers(reader: TableReader, kind: str) -> dict[str, float]:
-    inner = reader.table(kind)
-    return {name: inner.number(name) for name in reader.values(kind)}
-
-
-def _errors(reader: TableReader) -> dict[str, dict[str, float]]:
-    inner = reader.table("mean_square_error")
-    found = {kind: _numbers(inner, kind) for kind in SETS if kind in inner}
-    inner.finish()
-    return found
-
-
-def _remark(reader: TableReader) -> tuple[str, str]:
-    told = (reader.text("printed"), reader.text("but"))
-    reader.finish()
-    return told
+    return read_table(PublishedFigures, TableReader(content, f"published figures {path.name}"))
 
 
 def published_tables(
@@ -135,11 +107,12 @@ def published_tables(
     first = published_table(published, fit)
     # The source alone is no figure.
     made = [first] if first.rows or len(first.notes) > 1 else []
-    if published.mean_square_error:
+    if published.mean_square_error.outputs:
         made.append(error_table(published, fit, unseen))
-    if published.remarks:
+    if published.remark:
         columns = (Column("printed"), Column("but"))
-        made.append(Table("Published figures, read with care", columns, published.remarks))
+        rows = tuple((each.printed, each.but) for each in published.remark)
+        made.append(Table("Published figures, read with care", columns, rows))
     return tuple(made)
 
 
@@ -153,15 +126,13 @@ def error_table(published: PublishedFigures, fit: Fit, unseen: Mapping[str, Veri
         Its own are of all its records together.
     unseen : mapping of str to Verification
     """
-    outputs = dict.fromkeys(
-        name for figures in published.mean_square_error.values() for name in figures
-    )
+    theirs = published.mean_square_error
     ours = _training_errors(fit)
     rows: list[tuple[Cell, ...]] = []
-    for name in outputs:
+    for name in theirs.outputs:
         if name not in fit.model.outputs:
             continue
-        first, second = (published.mean_square_error.get(kind, {}).get(name) for kind in SETS)
+        first, second = theirs.training.get(name), theirs.validation.get(name)
         own = (errors.get(name) for errors in ours.values())
         free = (run.mse.get(name) for run in unseen.values())
         rows.append((name, fit.model.units.get(name, "1"), first, *own, second, *free))

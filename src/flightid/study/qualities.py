@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -78,8 +78,8 @@ def rate_models(
         keys[item.name] = each.key
         if item.fit is None or item.settings.structure is not None:
             continue
-        cases: Mapping[str, Any] = item.settings.qualities
-        asked = replace(settings, **cases)
+        cases = vars(item.settings.qualities).items()
+        asked = replace(settings, **{name: case for name, case in cases if case is not None})
         beside = {"fit": item.fit, "reference": item.reference, "response": item.response}
         for kind, source in beside.items():
             if kind in settings.sources and source is not None:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, make_dataclass, replace
 from pathlib import Path
-from typing import cast
 
 from flightid.dynamics.handling_qualities.options import CASES, QualitiesOptions
 from flightid.errors import OptionError, StudyError
-from flightid.options import option, options_of
-from flightid.study.reading import TableReader, read_each
+from flightid.options import Options, option, options_of
+from flightid.study.reading import TableReader, read_table
 
 SOURCES = ("fit", "reference", "response", "loop")
 
@@ -39,8 +38,7 @@ def read_qualities(reader: TableReader, folder: Path) -> QualitiesSettings:
         A key is unknown, or a value does not fit.
     """
     given = [each.name for each in options_of(QualitiesSettings) if each.name in reader]
-    (made,) = read_each((QualitiesSettings,), reader)
-    settings = cast("QualitiesSettings", made)
+    settings = read_table(QualitiesSettings, reader)
     _require_case(settings, given, reader.where)
     charts = settings.charts
     return replace(settings, charts=None if charts is None else str(folder / charts))
@@ -54,11 +52,14 @@ def _require_case(settings: QualitiesOptions, given: Collection[str], where: str
         raise StudyError(problem, found=said.found, needed=said.needed) from said
 
 
-def read_cases(reader: TableReader) -> dict[str, str]:
-    """Cases of the standards that one model differs in."""
-    names = [name for case in CASES.values() for name in case]
-    known = [each for each in options_of(QualitiesOptions) if each.name in names and each.choices]
-    made = {each.name: reader.choice(each.name, each.choices) for each in known
-            if each.name in reader}  # fmt: skip
-    reader.finish()
-    return made
+QualityCase: type[Options] = make_dataclass(
+    "QualityCase",
+    [
+        (each.name, str | None, option(None, choices=each.choices, doc=each.doc))
+        for each in options_of(QualitiesOptions)
+        if each.choices and any(each.name in names for names in CASES.values())
+    ],
+    bases=(Options,),
+    frozen=True,
+)
+"""Case of the standards that one model differs in: keys of ``qualities`` of a ``[[model]]``."""

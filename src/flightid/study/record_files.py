@@ -18,7 +18,7 @@ from flightid.record.options import TableOptions
 from flightid.record.store import RECORD_COLUMN
 from flightid.record.tables import sources_of
 from flightid.study.error_list import ErrorList
-from flightid.study.reading import TableReader, read_each
+from flightid.study.reading import TableReader, read_table
 
 UNKNOWN = InputShape()
 ALL = "*"
@@ -72,8 +72,7 @@ def read_record_file(reader: TableReader, folder: Path) -> RecordFile:
     StudyError
         A key is unknown or a value does not fit.
     """
-    made: RecordFile
-    (made,) = read_each((RecordFile,), reader)
+    made = read_table(RecordFile, reader)
     return replace(made, paths=_paths(reader, folder, made.path))
 
 

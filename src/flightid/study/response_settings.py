@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any
 
 from flightid.options import option
 from flightid.record.hold import LOOPS, Loop
 from flightid.responses.options import ESTIMATORS, ResponseOptions
-from flightid.study.reading import TableReader, read_each
 
 EXCITATION = "excitation"
 TEST = "test"
@@ -72,15 +71,3 @@ class ResponseSettings(ResponseOptions):
             **{name: getattr(self, name) for name in ("n_omega", "window_s", "overlap", "detrend")},
             "covariance": self.covariance,
         }
-
-
-def read_response(reader: TableReader, usual: ResponseSettings | None = None) -> ResponseSettings:
-    """Check a table ``[response]``; what it does not say is as `usual`.
-
-    Raises
-    ------
-    StudyError
-        A key is unknown or a value does not fit.
-    """
-    (made,) = read_each((ResponseSettings,), reader, (usual,))
-    return cast("ResponseSettings", made)

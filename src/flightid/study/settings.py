@@ -18,15 +18,15 @@ from flightid.options import Options, option
 from flightid.reading import read_toml
 from flightid.study.conditioning import Conditioning, read_conditioning, require_records
 from flightid.study.error_list import ErrorList
-from flightid.study.fit_settings import FitSettings, VerifySettings, read_fit, read_verify
-from flightid.study.flight import FlightPlan, read_flight, read_fly
-from flightid.study.model_settings import ModelSettings, read_model
+from flightid.study.fit_settings import FitSettings, VerifySettings, read_fit
+from flightid.study.flight import FlightPlan, read_flight
+from flightid.study.model_settings import ModelSettings, placed, read_model
 from flightid.study.qualities_settings import QualitiesSettings, read_qualities
-from flightid.study.reading import TOP, TableReader, read_each
+from flightid.study.reading import TOP, TableReader, read_table
 from flightid.study.record_files import RecordFile, ShapeOptions, read_record_file
 from flightid.study.reducing import ReduceSettings, read_reduce
 from flightid.study.references import require_conditions, require_references
-from flightid.study.response_settings import EXCITATION, ResponseSettings, read_response
+from flightid.study.response_settings import EXCITATION, ResponseSettings
 from flightid.study.tuning import TuneSettings, read_tune
 from flightid.study.uses_settings import UsesSettings, read_uses
 from flightid.uncertainty.quantiles import LEVEL
@@ -45,6 +45,13 @@ class StudyWords(Options):
     level: float = option(
         LEVEL, above=0.0, below=1.0, doc="Of every interval that the report shows."
     )
+
+
+@dataclass(frozen=True)
+class LogFile(Options):
+    """What ``[log]`` says."""
+
+    path: str = option(doc="The flight log, beside the study.")
 
 
 @dataclass(frozen=True)
@@ -188,15 +195,14 @@ def read_settings(path: Path) -> Settings:
     records = collected.read(_record_tables, [], root)
     files = collected.each(records, read_record_file, folder)
     conditioning = collected.each(tables("conditioning"), read_conditioning)
-    nothing = TableReader({}, TOP)
     table = partial(collected.read, _maybe, None, root)
     before = len(collected.errors)
-    response = table("response", read_response) or read_response(nothing)
-    fit = table("fit", read_fit) or read_fit(nothing)
-    check = table("verify", read_verify) or read_verify(nothing)
+    response = table("response", partial(read_table, ResponseSettings)) or ResponseSettings()
+    fit = table("fit", read_fit) or FitSettings()
+    check = table("verify", partial(read_table, VerifySettings)) or VerifySettings()
     reducing = table("reduce", read_reduce)
     tuning = table("tune", read_tune)
-    flown_again = table("fly", read_fly)
+    flown_again = table("fly", partial(read_table, GainFlightOptions))
     qualities = table("handling_qualities", read_qualities, folder)
     model = partial(read_model, response=response, fit=fit, check=check, reduced="reduce" in root)
     # What a model lacks hangs on the tables of all: without those, nothing can be said of it.
@@ -256,11 +262,12 @@ def _maybe(
     *inputs: Any,  # noqa: ANN401 - whatever the table's reader takes
 ) -> Value | None:
     """A table that may be absent."""
-    return root.maybe(lambda given: read(root.table(given), *inputs), key)
+    inner = root.table(key)
+    return read(inner, *inputs) if key in root else None
 
 
 def _words(root: TableReader) -> tuple[str, str, str, float]:
-    (made,) = read_each((StudyWords,), root.table("study"))
+    made = read_table(StudyWords, root.table("study"))
     return made.title, made.aircraft, made.notes, made.level
 
 
@@ -268,10 +275,9 @@ def _channels(
     root: TableReader, folder: Path
 ) -> tuple[str | None, str, float | None, float | None]:
     """Map of channels, what to do about gaps, their longest, and the rate."""
-    (made,) = read_each((LogChannels,), root.table("channels"))
-    is_file = made.map is not None and made.map.endswith(".toml")
+    made = read_table(LogChannels, root.table("channels"))
     return (
-        str(folder / made.map) if is_file else made.map,
+        None if made.map is None else placed(folder, made.map),
         made.gaps,
         made.max_gap_s,
         made.sample_rate_hz,
@@ -311,15 +317,12 @@ def _source(root: TableReader, folder: Path) -> tuple[Path | None, FlightPlan | 
             needed="one of [log], [flight] and [[record]]",
         )
     if "log" in root:
-        path = folder / log.text("path")
-        log.finish()
-        return path, None
+        return folder / read_table(LogFile, log).path, None
     return None, read_flight(flight, folder) if "flight" in root else None
 
 
 def _segment(reader: TableReader) -> Segment:
-    made: Segment
-    (made,) = read_each((Segment,), reader)
+    made = read_table(Segment, reader)
     if (made.span_s is None) == (made.sid_axis is None):
         raise reader.error(
             "span_s or sid_axis", "must be given, not both", found=made.name, needed="one of them"

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
+from flightid.errors import StudyError
 from flightid.models import NarxStructure, SubspaceStructure
-from flightid.models.polynomial.orders import ANY, EVERY_ORDER, USED
+from flightid.models.polynomial.orders import ANY, EVERY_ORDER, USED, OrderOptions
 from flightid.models.polynomial.structure import PolynomialStructure
-from flightid.option_forms import NOTHING
-from flightid.options import Options, options_of, read_value
-from flightid.study.reading import TableReader
+from flightid.options import Options, option, option_values
+from flightid.study.reading import TableReader, read_own
 
 NARX, SUBSPACE = "narx", "subspace"
 ORDERS: dict[str, tuple[str, ...]] = {
@@ -21,8 +21,8 @@ ORDERS: dict[str, tuple[str, ...]] = {
     ANY: tuple(EVERY_ORDER),
 }
 """Orders of each structure, of which several may be tried."""
-WORDS = {"output_lags": "spectrum"}
-"""What may stand for an order's numbers: they follow from the data."""
+SPECTRUM = "spectrum"
+"""What may stand for the lags of an output: they follow from the data."""
 CHOICES = ("balanced", "free_run", "simplest", "bic")
 
 
@@ -30,51 +30,77 @@ CHOOSE = {NARX: "free_run", ANY: "simplest"}
 """How a structure of a kind is chosen unless a study says it."""
 
 
-@dataclass(frozen=True)
-class StructureSettings:
-    """A structure whose model is found from records alone.
+@dataclass(frozen=True, kw_only=True)
+class StructureSettings(OrderOptions):
+    """A structure whose model is found from records alone: keys of a ``[[model]]``.
 
     Attributes
     ----------
-    kind : str
-        ``"arx"``, ``"armax"``, ``"oe"``, ``"bj"``, ``"narx"``, ``"subspace"``; ``"any"`` of them.
-    inputs : tuple of str
-        Those whose response has no coherence are left out.
-    outputs : tuple of str
-        One; of ``"subspace"`` one or more.
-    select : tuple of str
-        Records on which free runs rank several structures.
-    coherence : tuple of str
-        Records of the coherence test and of the spectra.
-    orders : mapping of str to tuple of int
-        Orders to try by name; for ``"narx"`` output_lags, none where the spectrum of the output
-        tells them, and input_lags.
-    widths : tuple of float
-        Widths of radial functions to try.
-    choose : str
-        How a structure is chosen: ``"free_run"`` smallest error on the selection records,
-        ``"simplest"`` fewest coefficients within 2 % of it, ``"bic"``, or ``"balanced"``: the
-        smallest AICc among those within 10 % of it, of OE and BJ first those with no fewer
-        coefficients of B than of F.
     options : mapping
         Further options of the structure.
     """
 
-    kind: str
-    inputs: tuple[str, ...]
-    outputs: tuple[str, ...]
-    select: tuple[str, ...]
-    coherence: tuple[str, ...]
-    orders: Mapping[str, tuple[int, ...]]
-    widths: tuple[float, ...] = ()
-    choose: str = CHOICES[0]
+    structure: str = option(choices=ORDERS, doc="Kind of model; any: all of them are tried.")
+    inputs: tuple[str, ...] = option(doc="Those whose response has no coherence are left out.")
+    outputs: tuple[str, ...] = option(doc="One; of 'subspace' one or more.")
+    select: tuple[str, ...] = option((), doc="Records on which free runs rank several structures.")
+    coherence: tuple[str, ...] | None = option(
+        None, doc="Records of the coherence test and of the spectra; default: those of the fit."
+    )
+    output_lags: int | tuple[int, ...] | str | None = option(
+        None, minimum=0, choices=(SPECTRUM,), doc="Lags of the output of NARX, or by its spectrum."
+    )
+    input_lags: int | tuple[int, ...] | None = option(
+        None, minimum=0, doc="Lags of each input of NARX."
+    )
+    width: float | tuple[float, ...] | None = option(
+        None, unit="deviations", doc="Widths of radial functions to try."
+    )
+    choose: str | None = option(
+        None,
+        choices=CHOICES,
+        doc="balanced: smallest AICc among free-run errors within 10 % of the smallest; free_run: "
+        "that one; simplest: fewest coefficients within 2 % of it; default: what fits the kind.",
+    )
     options: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def usual(self) -> Mapping[str, tuple[int, ...]]:
+        """Orders that need not be given."""
+        return EVERY_ORDER if self.structure == ANY else {"nk": (1,)}
+
+    @property
+    def orders(self) -> dict[str, tuple[int, ...]]:
+        """Orders to try by name; none where the spectrum of the output tells them."""
+        told = {name: getattr(self, name) for name in ORDERS[self.structure]}
+        return {
+            name: self.usual[name]
+            if given is None
+            else ()
+            if given == SPECTRUM
+            else _several(given)
+            for name, given in told.items()
+        }
+
+    @property
+    def widths(self) -> tuple[float, ...]:
+        """Widths of radial functions to try."""
+        return _several(NarxStructure.width if self.width is None else self.width)
+
+    @property
+    def rule(self) -> str:
+        """How a structure is chosen: one of `CHOICES`."""
+        return self.choose or CHOOSE.get(self.structure, CHOICES[0])
 
     @property
     def is_scanned(self) -> bool:
         """Whether several structures are tried."""
-        counts = [len(values) for values in self.orders.values()]
-        return self.kind == ANY or max([*counts, len(self.widths)], default=1) > 1
+        counts = [len(values) for values in (*self.orders.values(), self.widths)]
+        return self.structure == ANY or max(counts) > 1
+
+
+def _several(given: Any) -> tuple[Any, ...]:  # noqa: ANN401 - numbers, one or several
+    return tuple(given) if isinstance(given, list | tuple) else (given,)
 
 
 def read_structure(reader: TableReader, identify: tuple[str, ...]) -> StructureSettings:
@@ -91,23 +117,23 @@ def read_structure(reader: TableReader, identify: tuple[str, ...]) -> StructureS
     StudyError
         A value does not fit; several structures without records to choose on.
     """
-    kind = reader.choice("structure", ORDERS)
-    is_narx = kind == NARX
-    usual = EVERY_ORDER if kind == ANY else {"nk": (1,)}
-    made = StructureSettings(
-        kind,
-        reader.names("inputs"),
-        reader.names("outputs"),
-        reader.names("select", ()),
-        reader.names("coherence", identify),
-        {
-            name: reader.integers(name, usual.get(name), word=WORDS.get(name, ""))
-            for name in ORDERS[kind]
-        },
-        reader.numbers("width", (NarxStructure.width,)) if is_narx else (),
-        reader.choice("choose", CHOICES, CHOOSE.get(kind, CHOICES[0])),
-        _options(kind, reader),
-    )
+    made = read_own(StructureSettings, reader)
+    kind = made.structure
+    known = (*ORDERS[kind], *(("width",) if kind == NARX else ()))
+    for name in (*EVERY_ORDER, *ORDERS[NARX], "width"):
+        if name in reader and name not in known:
+            needed = ", ".join(known) or "no orders"
+            raise reader.error(name, "has no meaning here", found=kind, needed=needed)
+        told = getattr(made, name)
+        if isinstance(told, tuple) and len({*told}) < len(told):
+            raise reader.error(name, "is tried twice", found=told, needed="different numbers")
+        if name in ORDERS[kind] and name not in reader and name not in made.usual:
+            raise reader.error(name, "is missing", found="none", needed="a number, or several")
+    further = STRUCTURES.get(kind, PolynomialStructure)
+    given = {name: told for name, told in reader.options(further).items() if name not in known}
+    options = option_values(further, given, reader.told, error=StudyError)
+    flown = identify if made.coherence is None else made.coherence
+    made = replace(made, options=options, coherence=flown)
     if kind != SUBSPACE and len(made.outputs) != 1:
         raise reader.error("outputs", "does not fit", found=made.outputs, needed="one output")
     if made.is_scanned and not made.select:
@@ -117,11 +143,11 @@ def read_structure(reader: TableReader, identify: tuple[str, ...]) -> StructureS
             found="none",
             needed="records on which free runs rank them",
         )
-    if is_narx and made.choose != "free_run":
+    if kind == NARX and made.rule != "free_run":
         raise reader.error(
             "choose", "does not fit", found=made.choose, needed="'free_run' for NARX models"
         )
-    if kind == ANY and made.choose in ("balanced", "bic"):
+    if kind == ANY and made.rule in ("balanced", "bic"):
         raise reader.error(
             "choose",
             "does not fit: kinds share no information criterion",
@@ -131,32 +157,5 @@ def read_structure(reader: TableReader, identify: tuple[str, ...]) -> StructureS
     return made
 
 
-def _options(kind: str, reader: TableReader) -> dict[str, Any]:
-    """Options of the structure among the keys of the model: those of its fields."""
-    options = STRUCTURES.get(kind, PolynomialStructure)
-    given: dict[str, Any] = {}
-    for each in options_of(options):
-        if each.name in TAKEN[kind]:
-            continue
-        reader.know(each.name)
-        if each.name in reader:
-            # TOML has no word for None.
-            value = reader.peek(each.name)
-            value = None if value == "none" and NOTHING in each.forms else read_value(each, value)
-            problem = each.problem(value)
-            if problem is not None:
-                raise reader.error(
-                    each.name, problem.removeprefix(f"{each.name} "),
-                    found=reader.peek(each.name), needed=each.needed,
-                )  # fmt: skip
-            given[each.name] = value
-    return given
-
-
 STRUCTURES: dict[str, type[Options]] = {NARX: NarxStructure, SUBSPACE: SubspaceStructure}
 """What holds the options of a kind; the others are polynomials."""
-TAKEN: dict[str, tuple[str, ...]] = {
-    **dict.fromkeys(ORDERS, ()),
-    NARX: ("output_lags", "input_lags", "width"),
-}
-"""Options that are read as several to try."""

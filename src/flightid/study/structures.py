@@ -49,10 +49,10 @@ def fit_structure(
     tuple of Fit and (OrderScan, NarxSearch or None)
         The fit, and what was tried.
     """
-    if settings.kind == SUBSPACE:
+    if settings.structure == SUBSPACE:
         asked = InnovationsModel.subspace(inputs, settings.outputs, **settings.options)
         return identify(asked, list(flown)), None
-    if settings.kind == NARX:
+    if settings.structure == NARX:
         return _narx(settings, inputs, list(flown), list(unseen))
     return _polynomial(settings, inputs, list(flown), list(unseen))
 
@@ -65,7 +65,7 @@ def _polynomial(
         orders: dict[str, Any] = {name: values[0] for name, values in settings.orders.items()}
         asked = PolynomialModel.general(inputs, output, **orders, **settings.options)
         return identify(asked, flown), None
-    usual: dict[str, Any] = {"kind": settings.kind, "inputs": inputs, "outputs": output}
+    usual: dict[str, Any] = {"kind": settings.structure, "inputs": inputs, "outputs": output}
 
     def scanned(orders: Mapping[str, tuple[int, ...]]) -> OrderScan:
         tried: dict[str, Any] = {**usual, **orders, **settings.options}
@@ -73,11 +73,11 @@ def _polynomial(
 
     scan = scanned(settings.orders)
     findings: tuple[Finding, ...] = ()
-    if settings.kind != ANY:
+    if settings.structure != ANY:
         scan, findings = widened(
-            scan, settings.orders, lambda each: ranked(each, settings.choose)[0], scanned
+            scan, settings.orders, lambda each: ranked(each, settings.rule)[0], scanned
         )
-    return doubted(_cleanest(scan, settings.choose, flown), findings), scan
+    return doubted(_cleanest(scan, settings.rule, flown), findings), scan
 
 
 def _cleanest(scan: OrderScan, choose: str, flown: list[Record]) -> Fit:

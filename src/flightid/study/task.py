@@ -68,7 +68,7 @@ def load_task(settings: ModelSettings, others: tuple[str, ...] = ()) -> Task:
     """
     rivals = {
         name: load_model(source_of(path), axis=settings.axis)
-        for name, path in settings.rivals.items()
+        for name, path in settings.beside.items()
         if name not in others
     }
     structure = settings.structure
@@ -79,7 +79,8 @@ def load_task(settings: ModelSettings, others: tuple[str, ...] = ()) -> Task:
     model = load_structure(source_of(settings.template), axis=settings.axis)
     parameters = model.parameters
     for name, given in settings.parameters.items():
-        parameters = parameters.with_parameter(replace(parameters[name], **given))
+        told = {key: value for key, value in vars(given).items() if value is not None}
+        parameters = parameters.with_parameter(replace(parameters[name], **told))
     model = replace(model, parameters=parameters)
     outputs = settings.outputs or model.outputs
     if settings.outputs:

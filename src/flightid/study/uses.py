@@ -12,6 +12,7 @@ from flightid.control.closed_loop.close_loop import close_loop
 from flightid.control.closed_loop.result import ClosedLoop
 from flightid.dynamics.conditions.compare_conditions import compare_conditions
 from flightid.dynamics.conditions.result import ConditionComparison
+from flightid.dynamics.rotor.options import RotorOptions
 from flightid.dynamics.rotor.result import RotorPhysics
 from flightid.dynamics.rotor.rotor_physics import rotor_physics
 from flightid.errors import StudyError
@@ -20,6 +21,7 @@ from flightid.export.to_file import export
 from flightid.identification import Fit
 from flightid.models import GreyBoxModel, write_model
 from flightid.models.saved_files import MODELS
+from flightid.options import options_of
 from flightid.study.faults import Faults
 from flightid.study.identified import ModelResults
 from flightid.study.loop_blocks import made_block
@@ -116,7 +118,10 @@ def use_models(
 
 
 def _rotor(fits: Mapping[str, Fit], asked: RotorSettings) -> RotorPhysics:
-    return rotor_physics(_fit(fits, asked.model), **vars(asked.options))
+    return rotor_physics(
+        _fit(fits, asked.model),
+        **{each.name: getattr(asked, each.name) for each in options_of(RotorOptions)},
+    )
 
 
 def _closed(
@@ -128,7 +133,7 @@ def _closed(
 def _around(fit: Fit, loop: LoopSettings) -> ClosedLoop:
     return close_loop(
         fit,
-        loop.gains or list(map(made_block, loop.blocks)),
+        loop.gains or list(map(made_block, loop.block)),
         outside=loop.outside,
         draws=loop.draws,
         seed=loop.seed,

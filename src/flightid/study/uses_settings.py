@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,75 +13,54 @@ from flightid.dynamics.rotor.options import RotorOptions
 from flightid.errors import StudyError
 from flightid.export.options import FORMATS
 from flightid.export.to_file import format_of
-from flightid.options import Options
+from flightid.option_forms import NOTHING, SPAN
+from flightid.options import Options, option
 from flightid.study.loop_blocks import made_block
-from flightid.study.reading import TableReader, read_each
+from flightid.study.reading import TableReader, read_own, read_table
 
 
 @dataclass(frozen=True)
-class ExportSettings:
-    """One file of another tool; see `flightid.export`.
+class ExportSettings(Options):
+    """One file of another tool: a table ``[[export]]``; see `flightid.export`."""
 
-    Attributes
-    ----------
-    model : str
-        Name of the study's model.
-    file : str
-        Name of the file, in the folder ``export`` of the output; left out: the model's, as C.
-    format : str
-    options : Options
-        Of the format.
-    """
-
-    model: str
-    file: str
-    format: str = "c"
+    model: str = option(doc="Name of the study's model.")
+    path: str | None = option(
+        None, doc="File in the folder 'export' of the output; default: the model's name, as C."
+    )
+    format: str | None = option(None, choices=FORMATS, doc="Default: by the file's suffix.")
     options: Options = field(default_factory=Options)
 
+    @property
+    def file(self) -> str:
+        """Name of the file."""
+        return self.path or f"{re.sub(r'[^0-9A-Za-z]+', '_', self.model)}.c"
 
-@dataclass(frozen=True)
-class RotorSettings:
-    """Rotor physics of one model; see `flightid.rotor_physics`.
 
-    Attributes
-    ----------
-    model : str
-    options : RotorOptions
-    """
+@dataclass(frozen=True, kw_only=True)
+class RotorSettings(RotorOptions):
+    """Rotor physics of one model: the table ``[rotor]``; see `flightid.rotor_physics`."""
 
-    model: str
-    options: RotorOptions
+    model: str = option(doc="Name of the study's model.")
 
 
 @dataclass(frozen=True)
-class LoopSettings:
-    """Feedback closed around one model; see `flightid.close_loop`.
+class LoopSettings(Options):
+    """Feedback closed around one model: a table ``[[loop]]``; see `flightid.close_loop`."""
 
-    Attributes
-    ----------
-    name : str
-        Title in the report.
-    model : str
-    gains : mapping of str to mapping of str to float
-        Negative feedback by input and output; empty where the controller is made of blocks.
-    blocks : tuple of mapping
-        Blocks of the controller: ``kind``, a function of `flightid.loops`, and its arguments.
-    band_rad_s : tuple of float or None
-        Where margins are looked for.
-    outside : tuple of str
-        Set-points that the gains read.
-    draws, seed : int
-        Vehicles drawn from the fit's uncertainty.
-    """
-
-    name: str
-    model: str
-    gains: Mapping[str, Mapping[str, float]]
-    blocks: tuple[Mapping[str, Any], ...] = ()
-    band_rad_s: tuple[float, float] | None = None
-    outside: tuple[str, ...] = ()
-    draws: int = DRAWS
-    seed: int = 0
+    name: str = option(doc="Title in the report.")
+    model: str = option(doc="Name of the study's model.")
+    gains: Mapping[str, Mapping[str, float]] = option(
+        default_factory=dict, doc="Negative feedback by input and output; or blocks."
+    )
+    block: tuple[Mapping[str, Any], ...] = option(
+        (), doc="Blocks of the controller: kind, a function of flightid.loops, and its arguments."
+    )
+    band_rad_s: tuple[float, float] | None = option(
+        None, unit="rad/s", forms=(SPAN, NOTHING), above=0.0, doc="Where margins are looked for."
+    )
+    outside: tuple[str, ...] = option((), doc="Set-points that the gains read.")
+    draws: int = option(DRAWS, minimum=1, doc="Vehicles drawn from the fit's uncertainty.")
+    seed: int = option(0, minimum=0, doc="Seed of the draws.")
 
 
 @dataclass(frozen=True)
@@ -115,13 +94,14 @@ def read_uses(root: TableReader, models: Sequence[str]) -> UsesSettings:
     StudyError
         A key is unknown, a value does not fit, or there is no such model.
     """
+    rotor = root.table("rotor")
     made = UsesSettings(
         tuple(map(_export, root.tables("export"))),
-        root.maybe(lambda key: _rotor(root.table(key)), "rotor"),
+        read_table(RotorSettings, rotor) if "rotor" in root else None,
         tuple(map(_loop, root.tables("loop"))),
     )
-    rotor = () if made.rotor is None else (made.rotor,)
-    for each in (*made.exports, *rotor, *made.loops):
+    around = () if made.rotor is None else (made.rotor,)
+    for each in (*made.exports, *around, *made.loops):
         if each.model not in models:
             raise StudyError(
                 "study file: there is no such model to use",
@@ -138,44 +118,21 @@ def read_uses(root: TableReader, models: Sequence[str]) -> UsesSettings:
 
 
 def _export(reader: TableReader) -> ExportSettings:
-    model = reader.text("model")
-    file = reader.maybe(reader.text, "path") or f"{re.sub(r'[^0-9A-Za-z]+', '_', model)}.c"
+    made = read_own(ExportSettings, reader)
+    file = made.file
     if "/" in file or "\\" in file or file.startswith("."):
         raise reader.error("path", "does not fit", found=file, needed="a name without a folder")
-    format = format_of(Path(file), reader.maybe(reader.text, "format"))
-    (options,) = read_each([FORMATS[format]], reader)
-    return ExportSettings(model, file, format, options)
-
-
-def _rotor(reader: TableReader) -> RotorSettings:
-    model = reader.text("model")
-    (options,) = read_each((RotorOptions,), reader)
-    return RotorSettings(model, options)
+    format = format_of(Path(file), made.format)
+    return replace(made, format=format, options=read_table(FORMATS[format], reader))
 
 
 def _loop(reader: TableReader) -> LoopSettings:
-    gains = reader.table("gains")
-    by_input: dict[str, dict[str, float]] = {}
-    for name, row in reader.values("gains").items():
-        of_input = gains.table(name)
-        by_input[name] = {output: of_input.number(output) for output in dict(row)}
-    blocks = tuple(each.rest() for each in reader.tables("block"))
-    for each in blocks:
+    made = read_table(LoopSettings, reader)
+    for each in made.block:
         made_block(each)
-    if bool(by_input) == bool(blocks):
+    if bool(made.gains) == bool(made.block):
         needed = "gains by input and output, or [[loop.block]]s"
-        problem = "stands beside blocks" if blocks else "is missing"
-        found = "both" if blocks else "none"
+        problem = "stands beside blocks" if made.block else "is missing"
+        found = "both" if made.block else "none"
         raise reader.error("gains", problem, found=found, needed=needed)
-    made = LoopSettings(
-        reader.text("name"),
-        reader.text("model"),
-        by_input,
-        blocks,
-        reader.maybe(reader.interval, "band_rad_s"),
-        reader.names("outside", ()),
-        reader.integer("draws", DRAWS, minimum=1),
-        reader.integer("seed", 0),
-    )
-    reader.finish()
     return made

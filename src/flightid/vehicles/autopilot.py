@@ -6,9 +6,11 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
-from typing import Any, Literal
+from typing import Any
 
+from flightid.control.autopilots.parameter_table import AXES, Axis
 from flightid.errors import OptionError, UnknownNameError
+from flightid.options import Options, option
 from flightid.vehicles.quadrotor import Axes
 
 AXIS_LETTERS = ("RLL", "PIT", "YAW")
@@ -60,30 +62,12 @@ def _yaw() -> RateGains:
 
 
 @dataclass(frozen=True)
-class Autopilot:
+class Autopilot(Options):
     """The autopilot: loop rate, filters, gains and motor outputs, with ArduCopter's defaults.
 
-    Rate gains are reduced from ArduCopter's defaults to what a 450 mm frame on a heavy gimbal
-    takes. Body-frame rate feed-forward is off (ATC_RATE_FF_ENAB 0), as is advised for sweeps.
-
-    Attributes
-    ----------
-    loop_rate_hz : float
-        SCHED_LOOP_RATE, Hz.
-    gyro_filter_hz : float
-        INS_GYRO_FILTER, Hz (two poles); 0 is off.
-    rate : tuple of RateGains
-        Rate controllers of roll, pitch and yaw.
-    angle_p : tuple of float
-        ATC_ANG_xxx_P, 1/s.
-    acceleration_rad_s2 : tuple of float
-        ATC_ACCEL_x_MAX, rad/s².
-    thrust_expo, spin_min, spin_max : float
-        MOT_THST_EXPO, MOT_SPIN_MIN, MOT_SPIN_MAX.
-    pwm_min_us, pwm_max_us, pwm_step_us : float
-        Range and step of the motor output, µs; a step of 0 is continuous.
-    voltage_ratio : float
-        Battery voltage over its full value; the mixer compensates for it.
+    Rate gains (`rate`: of roll, pitch and yaw) are reduced from ArduCopter's defaults to what a
+    450 mm frame on a heavy gimbal takes. Body-frame rate feed-forward is off (ATC_RATE_FF_ENAB 0),
+    as is advised for sweeps.
 
     Raises
     ------
@@ -96,23 +80,30 @@ class Autopilot:
     80.0
     """
 
-    loop_rate_hz: float = 400.0
-    gyro_filter_hz: float = 80.0
+    loop_rate_hz: float = option(400.0, unit="Hz", above=0.0, doc="SCHED_LOOP_RATE.")
+    gyro_filter_hz: float = option(
+        80.0, unit="Hz", minimum=0.0, doc="INS_GYRO_FILTER, two poles; 0 is off."
+    )
     rate: tuple[RateGains, RateGains, RateGains] = field(
         default_factory=lambda: (RateGains(), RateGains(), _yaw())
     )
-    angle_p: Axes = (4.5, 4.5, 4.5)
-    acceleration_rad_s2: Axes = (19.2, 19.2, 4.7)
-    thrust_expo: float = 0.65
-    spin_min: float = 0.15
-    spin_max: float = 0.95
-    pwm_min_us: float = 1000.0
-    pwm_max_us: float = 2000.0
-    pwm_step_us: float = 1.0
-    voltage_ratio: float = 0.95
+    angle_p: Axes = option((4.5, 4.5, 4.5), unit="1/s", doc="ATC_ANG_xxx_P.")
+    acceleration_rad_s2: Axes = option((19.2, 19.2, 4.7), unit="rad/s^2", doc="ATC_ACCEL_x_MAX.")
+    thrust_expo: float = option(0.65, doc="MOT_THST_EXPO.")
+    spin_min: float = option(0.15, doc="MOT_SPIN_MIN.")
+    spin_max: float = option(0.95, doc="MOT_SPIN_MAX.")
+    pwm_min_us: float = option(1000.0, unit="us", doc="Least motor output.")
+    pwm_max_us: float = option(2000.0, unit="us", doc="Largest motor output.")
+    pwm_step_us: float = option(
+        1.0, unit="us", minimum=0.0, doc="Step of the motor output; 0 is continuous."
+    )
+    voltage_ratio: float = option(
+        0.95, doc="Battery voltage over its full value; the mixer compensates for it."
+    )
 
     def __post_init__(self) -> None:
-        if not (self.loop_rate_hz > 0 and 0 <= self.gyro_filter_hz < self.loop_rate_hz / 2):
+        super().__post_init__()
+        if self.gyro_filter_hz >= self.loop_rate_hz / 2:
             raise OptionError(
                 "the gyro filter does not fit the loop",
                 found=f"{self.gyro_filter_hz} Hz at {self.loop_rate_hz} Hz",
@@ -182,24 +173,8 @@ class Autopilot:
 
 
 @dataclass(frozen=True)
-class SidActivation:
+class SidActivation(Options):
     """One activation of ArduPilot's system-identification mode.
-
-    Attributes
-    ----------
-    axis : int
-        SID_AXIS: 1–3 input angles, 4–6 recover, 7–9 rates, 10–12 mixer, 13 thrust.
-    start_s : float
-        When the pilot switches to the mode, s; the chirp starts one second later.
-    magnitude : float
-        SID_MAGNITUDE: deg or deg/s up to axis 9, fraction of the full command above.
-    start_hz, stop_hz : float
-        SID_F_START_HZ and SID_F_STOP_HZ, Hz.
-    fade_in_s, record_s, fade_out_s : float
-        SID_T_FADE_IN, SID_T_REC and SID_T_FADE_OUT, s.
-    leave_after_s : float or None
-        Time after the start at which the pilot leaves the mode, s; None: it ends by itself, after
-        a silent tail as long as both fades and the dwell.
 
     Example
     -------
@@ -207,19 +182,27 @@ class SidActivation:
     181.0
     """
 
-    axis: int
-    start_s: float
-    magnitude: float = 0.15
-    start_hz: float = 0.05
-    stop_hz: float = 5.0
-    fade_in_s: float = 5.0
-    record_s: float = 130.0
-    fade_out_s: float = 5.0
-    leave_after_s: float | None = None
-
-    def __post_init__(self) -> None:
-        if not 1 <= self.axis <= 13:
-            raise OptionError("SID_AXIS cannot be flown", found=self.axis, needed="1 to 13")
+    axis: int = option(
+        minimum=1,
+        maximum=13,
+        doc="SID_AXIS: 1-3 angles, 4-6 recover, 7-9 rates, 10-12 mixer, 13 thrust.",
+    )
+    start_s: float = option(
+        unit="s", doc="When the pilot switches to it; the chirp starts a second later."
+    )
+    magnitude: float = option(
+        0.15, doc="SID_MAGNITUDE: deg or deg/s up to axis 9, fraction of the full command above."
+    )
+    start_hz: float = option(0.05, unit="Hz", above=0.0, doc="SID_F_START_HZ.")
+    stop_hz: float = option(5.0, unit="Hz", above=0.0, doc="SID_F_STOP_HZ.")
+    fade_in_s: float = option(5.0, unit="s", minimum=0.0, doc="SID_T_FADE_IN.")
+    record_s: float = option(130.0, unit="s", above=0.0, doc="SID_T_REC.")
+    fade_out_s: float = option(5.0, unit="s", minimum=0.0, doc="SID_T_FADE_OUT.")
+    leave_after_s: float | None = option(
+        None,
+        unit="s",
+        doc="When the pilot leaves the mode; default: it ends by itself, after a silent tail.",
+    )
 
     @property
     def duration_s(self) -> float:
@@ -252,19 +235,8 @@ class SidActivation:
 
 
 @dataclass(frozen=True)
-class PilotDoublet:
+class PilotDoublet(Options):
     """The pilot moves a stick one way, then the other, then back to the middle.
-
-    Attributes
-    ----------
-    axis : {"roll", "pitch", "yaw"}
-        Which stick.
-    start_s : float
-        Start, s.
-    amplitude : float
-        Roll or pitch angle, rad, or yaw rate, rad/s.
-    width_s : float
-        Length of each half, s.
 
     Example
     -------
@@ -272,10 +244,10 @@ class PilotDoublet:
     11.6
     """
 
-    axis: Literal["roll", "pitch", "yaw"]
-    start_s: float
-    amplitude: float
-    width_s: float = 0.8
+    axis: Axis = option(choices=AXES, doc="Which stick.")
+    start_s: float = option(unit="s", doc="Start.")
+    amplitude: float = option(doc="Roll or pitch angle, rad, or yaw rate, rad/s.")
+    width_s: float = option(0.8, unit="s", above=0.0, doc="Length of each half.")
 
     @property
     def end_s(self) -> float:

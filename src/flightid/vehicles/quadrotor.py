@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import asdict, dataclass
 from typing import Any
 
 from flightid.conventions import STANDARD_GRAVITY_M_S2
 from flightid.errors import OptionError
+from flightid.options import Options, option
 
 Axes = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
-class QuadrotorParameters:
+class QuadrotorParameters(Options):
     """Physical parameters of an X-frame quadrotor; the defaults are a 450 mm frame.
 
     Where the values come from: arm, frame, motor (57 g), propeller (13 g) and speed-controller
@@ -23,41 +23,6 @@ class QuadrotorParameters:
     propeller. Axial damping and in-plane drag are blade-element values at hover for that propeller
     (Leishman, Principles of Helicopter Aerodynamics, 2nd ed., sections 3.5 and 5.4: thrust against
     axial speed at constant rotor speed, with induced flow).
-
-    Attributes
-    ----------
-    mass_kg : float
-        Mass, kg.
-    inertia_kg_m2 : tuple of float
-        Moments of inertia about x, y, z, kg m².
-    arm_m : float
-        Centre to rotor axis, m.
-    rotor_height_m : float
-        Rotor plane above the c.g., m.
-    maximum_thrust_n : float
-        Thrust of one motor at full throttle and full battery, N.
-    thrust_expo : float
-        Curve of thrust T against drive x: T/T_max = (1 − e) x + e x².
-    torque_per_thrust_m : float
-        Drag torque of a rotor over its thrust, m.
-    thrust_per_speed_n_s2 : float
-        Thrust over rotor speed squared, N s².
-    rotor_inertia_kg_m2 : float
-        Moment of inertia of propeller and rotating part of the motor, kg m².
-    motor_lag_s : float
-        Time constant of thrust, s.
-    motor_delay_s : float
-        Pure delay from the autopilot's output to the motor, s.
-    axial_damping_n_s_m : float
-        Loss of thrust of one rotor per speed along its axis, N s/m.
-    in_plane_drag_n_s_m : float
-        Drag of one rotor per speed in its plane, N s/m.
-    on_rig : bool
-        True: held at the c.g. in a gimbal; False: free flight.
-    rig_inertia_kg_m2 : tuple of float
-        Inertia that the gimbal adds about x, y, z, kg m².
-    rig_friction_n_m_s : tuple of float
-        Viscous friction of the gimbal about x, y, z, N m s.
 
     Raises
     ------
@@ -70,33 +35,47 @@ class QuadrotorParameters:
     0.403
     """
 
-    mass_kg: float = 1.25
-    inertia_kg_m2: Axes = (0.0135, 0.0138, 0.0252)
-    arm_m: float = 0.225
-    rotor_height_m: float = 0.0
-    maximum_thrust_n: float = 7.6
-    thrust_expo: float = 0.65
-    torque_per_thrust_m: float = 0.016
-    thrust_per_speed_n_s2: float = 1.0e-5
-    rotor_inertia_kg_m2: float = 4.0e-5
-    motor_lag_s: float = 0.045
-    motor_delay_s: float = 0.006
-    axial_damping_n_s_m: float = 0.37
-    in_plane_drag_n_s_m: float = 0.05
-    on_rig: bool = True
-    rig_inertia_kg_m2: Axes = (0.0035, 0.0052, 0.0080)
-    rig_friction_n_m_s: Axes = (0.020, 0.026, 0.012)
+    mass_kg: float = option(1.25, unit="kg", above=0.0, doc="Mass.")
+    inertia_kg_m2: Axes = option(
+        (0.0135, 0.0138, 0.0252), unit="kg m^2", above=0.0, doc="Moments of inertia about x, y, z."
+    )
+    arm_m: float = option(0.225, unit="m", above=0.0, doc="Centre to rotor axis.")
+    rotor_height_m: float = option(0.0, unit="m", doc="Rotor plane above the c.g.")
+    maximum_thrust_n: float = option(
+        7.6, unit="N", above=0.0, doc="Thrust of one motor at full throttle and battery."
+    )
+    thrust_expo: float = option(
+        0.65, doc="Curve of thrust T against drive x: T/T_max = (1 - e) x + e x^2."
+    )
+    torque_per_thrust_m: float = option(
+        0.016, unit="m", doc="Drag torque of a rotor over its thrust."
+    )
+    thrust_per_speed_n_s2: float = option(
+        1.0e-5, unit="N s^2", above=0.0, doc="Thrust over rotor speed squared."
+    )
+    rotor_inertia_kg_m2: float = option(
+        4.0e-5, unit="kg m^2", doc="Of a propeller and the rotating part of its motor."
+    )
+    motor_lag_s: float = option(0.045, unit="s", above=0.0, doc="Time constant of thrust.")
+    motor_delay_s: float = option(
+        0.006, unit="s", doc="Pure delay from the autopilot to the motor."
+    )
+    axial_damping_n_s_m: float = option(
+        0.37, unit="N s/m", doc="Loss of a rotor's thrust per speed along its axis."
+    )
+    in_plane_drag_n_s_m: float = option(
+        0.05, unit="N s/m", doc="Drag of a rotor per speed in its plane."
+    )
+    on_rig: bool = option(True, doc="Held at the c.g. in a gimbal, or free.")
+    rig_inertia_kg_m2: Axes = option(
+        (0.0035, 0.0052, 0.0080), unit="kg m^2", doc="Inertia that the gimbal adds about x, y, z."
+    )
+    rig_friction_n_m_s: Axes = option(
+        (0.020, 0.026, 0.012), unit="N m s", doc="Viscous friction of the gimbal about x, y, z."
+    )
 
     def __post_init__(self) -> None:
-        positive = ("mass_kg", "arm_m", "maximum_thrust_n", "thrust_per_speed_n_s2", "motor_lag_s")
-        for name in positive:
-            value = getattr(self, name)
-            if not (value > 0 and math.isfinite(value)):
-                raise OptionError(f"{name} has no meaning", found=value, needed="positive")
-        if min(self.inertia_kg_m2) <= 0:
-            raise OptionError(
-                "inertia_kg_m2 has no meaning", found=self.inertia_kg_m2, needed="positive"
-            )
+        super().__post_init__()
         if self.hover_throttle >= 1:
             raise OptionError(
                 "the motors cannot lift the vehicle",
@@ -124,22 +103,11 @@ class QuadrotorParameters:
 
 
 @dataclass(frozen=True)
-class Sensors:
+class Sensors(Options):
     """Errors of the inertial sensors.
 
     Defaults: white noise of a consumer gyro on a vibrating frame sampled at 400 Hz (about ten
     times the data-sheet density 0.005 deg/s/√Hz of an MPU-6000).
-
-    Attributes
-    ----------
-    gyro_noise_rad_s : float
-        Standard deviation of one gyro sample, rad/s.
-    gyro_bias_rad_s : tuple of float
-        Bias after the autopilot's calibration, rad/s.
-    accelerometer_noise_m_s2 : float
-        Standard deviation of one accelerometer sample, m/s².
-    accelerometer_bias_m_s2 : tuple of float
-        Bias, m/s².
 
     Example
     -------
@@ -147,29 +115,26 @@ class Sensors:
     0.0
     """
 
-    gyro_noise_rad_s: float = 0.012
-    gyro_bias_rad_s: Axes = (0.002, -0.001, 0.0015)
-    accelerometer_noise_m_s2: float = 0.3
-    accelerometer_bias_m_s2: Axes = (0.05, -0.03, 0.1)
+    gyro_noise_rad_s: float = option(
+        0.012, unit="rad/s", doc="Standard deviation of a gyro's sample."
+    )
+    gyro_bias_rad_s: Axes = option(
+        (0.002, -0.001, 0.0015), unit="rad/s", doc="Bias after the autopilot's calibration."
+    )
+    accelerometer_noise_m_s2: float = option(
+        0.3, unit="m/s^2", doc="Standard deviation of a sample of acceleration."
+    )
+    accelerometer_bias_m_s2: Axes = option(
+        (0.05, -0.03, 0.1), unit="m/s^2", doc="Bias of the accelerometers."
+    )
 
 
 @dataclass(frozen=True)
-class Turbulence:
+class Turbulence(Options):
     """Gusts as Gauss–Markov velocity and rotation of the air (Dryden's longitudinal form).
 
-    The defaults are a hall, with the rotors' own stirred air; outdoors take ten times as much.
-
-    Attributes
-    ----------
-    velocity_m_s : float
-        Standard deviation of each velocity component, m/s.
-    velocity_time_s : float
-        Correlation time L/V of the velocity, s.
-    rate_rad_s : float
-        Standard deviation of the air's rotation about each body axis, rad/s; it acts through the
-        vehicle's own aerodynamic damping.
-    rate_time_s : float
-        Correlation time of the rotation, s.
+    The defaults are a hall, with the rotors' own stirred air; outdoors take ten times as much. The
+    air's rotation acts through the vehicle's own aerodynamic damping.
 
     Example
     -------
@@ -177,7 +142,11 @@ class Turbulence:
     0.0
     """
 
-    velocity_m_s: float = 0.1
-    velocity_time_s: float = 1.5
-    rate_rad_s: float = 0.03
-    rate_time_s: float = 0.3
+    velocity_m_s: float = option(
+        0.1, unit="m/s", doc="Standard deviation of each velocity component."
+    )
+    velocity_time_s: float = option(1.5, unit="s", doc="Correlation time L/V of the velocity.")
+    rate_rad_s: float = option(
+        0.03, unit="rad/s", doc="Standard deviation of the air's rotation about each body axis."
+    )
+    rate_time_s: float = option(0.3, unit="s", doc="Correlation time of the rotation.")
