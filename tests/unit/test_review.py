@@ -22,6 +22,7 @@ from flightid.logs.dataflash.writer import DataflashWriter
 from flightid.plot.gains import has_both, measured_and_predicted
 from flightid.plot.glance import flight_glance
 from flightid.review.deconvolution import LoopSamples, closed_loop
+from flightid.review.gyro_noise import GyroNoise
 from flightid.review.verdicts import judge_flight
 from flightid.uncertainty.estimate import Estimate
 from tests.closeness import assert_close
@@ -205,3 +206,14 @@ def test_outputs_without_parameters_are_said_to_be_there(tmp_path: Path) -> None
     assert ("in the air", "not known") in review.flight().rows
     assert review.to_dict()["airborne_s"] is None
     assert "airborne not known" in fid.inspect_log(tmp_path / "bare.bin").in_short()
+
+
+@pytest.mark.parametrize(("bins", "rows"), [(0, 1), (1, 1), (2, 2)])
+def test_noise_is_drawn_over_throttle_where_throttle_moved(bins: int, rows: int) -> None:
+    hertz = np.arange(1.0, 6.0)
+    noise = GyroNoise(
+        freedom=20.0, frequency_hz=hertz, spectrum=np.ones((3, 5)),
+        throttle=np.linspace(0.4, 0.5, bins), by_throttle=np.ones((bins, 5)),
+    )  # fmt: skip
+    drawn = noise.plot().to_dict()
+    assert sum(trace["type"] == "heatmap" for trace in drawn["data"]) == rows - 1

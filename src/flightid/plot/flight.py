@@ -153,7 +153,8 @@ def gyro_spectrum(noise: GyroNoise) -> go.PlotFigure:
     """
     if not noise.is_told:
         raise DataError("there is no spectrum to draw", found=noise.reason)
-    bins = noise.throttle.size
+    # One bin of throttle has no height: there is nothing to see across it.
+    bins = noise.throttle.size > 1
     made = look.figure(2 if bins else 1, shared_x=True, height_px=560 if bins else 340)
     edges = noise.band()
     for place, (axis, colour) in enumerate(COLOURS.items()):

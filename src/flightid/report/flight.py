@@ -39,7 +39,7 @@ def flight_blocks(
     if review.noise.is_told:
         blocks.append(
             figure_block(
-                review.noise.plot(), NOISE + BY_THROTTLE * bool(review.noise.throttle.size)
+                review.noise.plot(), NOISE + BY_THROTTLE * (review.noise.throttle.size > 1)
             )
         )
     blocks += [TableBlock(table, table.title in FOLDED) for table in review.tables()]
