@@ -132,16 +132,29 @@ def find_delays(data: SampledChannels, largest: int) -> list[InputDelay]:
 def _costs(
     data: _Signals, delays: Sequence[int], place: int, tried: Iterable[int]
 ) -> dict[int, float]:
-    """Least criterion of each delay of one input, each search begun by the poles of neighbours."""
+    """Least criterion of each delay of one input, each search begun by the poles of neighbours.
+
+    From below first, then from above; one pole ends alike from both sides.
+    """
     way = sorted(tried)
     skip = max(*delays, *way) + max(POLES)
-    costs = dict.fromkeys(way, np.inf)
-    poles = [np.ones(1)] * len(POLES)
-    for delay in (*way, *reversed(way)):
+
+    def searched(delay: int, order: int, start: Array) -> _Ended:
         asked = [*delays[:place], delay, *delays[place + 1 :]]
-        cost, poles = _cost(data, asked, skip, poles)
-        costs[delay] = min(costs[delay], cost)
-    return costs
+        return _output_error(data, asked, order, skip, start)
+
+    ends: dict[int, list[_Ended]] = {}
+    poles = [np.ones(1)] * len(POLES)
+    for delay in way:
+        ends[delay] = list(map(searched, [delay] * len(POLES), POLES, poles))
+        poles = [found for _, found in ends[delay]]
+    for i, order in enumerate(POLES[1:], 1):
+        start = ends[way[-1]][i][1]
+        for delay in reversed(way[:-1]):
+            again = searched(delay, order, start)
+            start = again[1]
+            ends[delay][i] = min(ends[delay][i], again, key=lambda each: each[0])
+    return {delay: min(cost for cost, _ in each) for delay, each in ends.items()}
 
 
 def delays_to_scan(
@@ -250,8 +263,9 @@ def _criterion(squares: float, n: int, numbers: int) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Signals:
-    output: Array
-    inputs: Array
+    """The output above the inputs, records end to end."""
+
+    rows: Array
     lengths: tuple[int, ...]
     levels: bool
 
@@ -260,14 +274,12 @@ class _Signals:
         ends = np.cumsum([0, *self.lengths])
         return [slice(first, last) for first, last in pairwise(ends.tolist())]
 
-    def filtered(self, top: Array, below: Array) -> _Signals:
-        """Every channel of every record through one filter."""
-        rows = np.vstack([self.output, self.inputs])
+    def filtered(self, top: Array, below: Array) -> Array:
+        """Output and inputs of every record through one filter."""
         with np.errstate(over="ignore", invalid="ignore"):
-            made = np.hstack(
-                [scipy.signal.lfilter(top, below, rows[:, span]) for span in self.spans]
+            return np.hstack(
+                [scipy.signal.lfilter(top, below, self.rows[:, span]) for span in self.spans]
             )
-        return _Signals(made[0], made[1:], self.lengths, self.levels)
 
 
 def _shortened(data: SampledChannels) -> _Signals:
@@ -281,50 +293,47 @@ def _shortened(data: SampledChannels) -> _Signals:
         if lengths[-1] < length:
             break
     n = sum(lengths)
-    return _Signals(data.output[:n], data.inputs[:, :n], tuple(lengths), data.levels)
+    return _Signals(np.vstack([data.output, data.inputs])[:, :n], tuple(lengths), data.levels)
 
 
 def _whitened(data: _Signals) -> _Signals:
     """Signals filtered so that what a long model leaves of the output is white, starts cut off."""
-    m, n = len(data.inputs), data.output.size
+    output, inputs = data.rows[0], data.rows[1:]
+    m, n = inputs.shape
     long = max(1, min(LONG, n // (8 * (m + 1)), min(data.lengths) // 4))
-    made = regress(
-        data.output, data.inputs, data.lengths, long, [long + 1] * m, [0] * m, levels=data.levels
-    )
+    made = regress(output, inputs, data.lengths, long, [long + 1] * m, [0] * m, levels=data.levels)
     # The longer an ARX model, the more its A is the inverse of the noise model alone.
     white = data.filtered(np.concatenate([[1.0], made.shortest[:long]]), np.ones(1))
     kept = np.concatenate([np.arange(span.start + long, span.stop) for span in data.spans])
     lengths = tuple(length - long for length in data.lengths)
-    return _Signals(white.output[kept], white.inputs[:, kept], lengths, data.levels)
+    # A pulse at the start of each record answers as whatever state it began in.
+    pulses = np.zeros(kept.size)
+    pulses[np.cumsum((0, *lengths[:-1]))] = 1.0
+    return _Signals(np.vstack([white[:, kept], pulses]), lengths, data.levels)
 
 
-def _cost(
-    data: _Signals, delays: Sequence[int], skip: int, starts: Sequence[Array]
-) -> tuple[float, list[Array]]:
-    """Smallest criterion of output-error structures with one denominator and these delays.
-
-    Also the denominators, from which the search at a neighbouring delay begins.
-    """
-    found = [
-        _output_error(data, delays, order, skip, start)
-        for order, start in zip(POLES, starts, strict=True)
-    ]
-    return min(cost for cost, _ in found), [below for _, below in found]
+_Ended = tuple[float, Array]
+"""Criterion and denominator of a search."""
 
 
 def _output_error(
     data: _Signals, delays: Sequence[int], order: int, skip: int, below: Array
-) -> tuple[float, Array]:
+) -> _Ended:
+    """Criterion of output error with one denominator of this order, and that denominator."""
     criterion = np.inf
     for _ in range(ROUNDS):
-        flat = data.filtered(np.ones(1), below)
-        if not np.all(np.isfinite(flat.output)):
+        rows = data.filtered(np.ones(1), below)
+        if not np.isfinite(rows).all():
             break
-        parts = [_rows(flat, span, delays, order, skip, below) for span in data.spans]
-        rows = np.concatenate(parts)
-        triangle = np.asarray(np.linalg.qr(rows, mode="r"))
+        parts = [
+            _triangle(rows[:, span], delays, order, skip, levels=data.levels) for span in data.spans
+        ]
+        triangle = parts[0]
+        if len(parts) > 1:
+            triangle = np.asarray(np.linalg.qr(np.concatenate(parts), mode="r"))
         before = criterion
-        criterion = _criterion(triangle[-1, -1] ** 2, len(rows), triangle.shape[1] - 1)
+        n = sum(data.lengths) - skip * len(parts)
+        criterion = _criterion(triangle[-1, -1] ** 2, n, len(triangle) - 1)
         if abs(criterion - before) < SETTLED:
             break
         found = np.linalg.lstsq(triangle[:-1, :-1], triangle[:-1, -1])[0]
@@ -332,28 +341,25 @@ def _output_error(
     return criterion, below
 
 
-def _rows(
-    data: _Signals, span: slice, delays: Sequence[int], order: int, skip: int, below: Array
-) -> Array:
-    """Regressors of one record and its output, without its level and whatever state it began in.
+def _triangle(rows: Array, delays: Sequence[int], order: int, skip: int, *, levels: bool) -> Array:
+    """Triangle of one record's regressors and output, whatever state it began in taken out.
 
-    Filtering from rest leaves 1/F of what was before: free responses of that denominator.
+    Filtering from rest leaves 1/F of what was before: free responses of that denominator, which
+    follow a pulse at the start. A level is a direction too.
     """
+    output, *inputs, pulse = rows
     lags = range(1, order + 1)
-    output, inputs = data.output[span], data.inputs[:, span]
-    columns = [-_later(output, lag) for lag in lags]
-    columns += [
-        _later(row, delay + lag - 1)
-        for row, delay in zip(inputs, delays, strict=True)
-        for lag in lags
+    shifted = [(pulse, lag - 1) for lag in lags]
+    shifted += [(output, lag) for lag in lags]
+    shifted += [
+        (row, delay + lag - 1) for row, delay in zip(inputs, delays, strict=True) for lag in lags
     ]
-    own = np.ones((output.size, order + int(data.levels)))
-    own[:, :order] = scipy.signal.lfilter([1.0], below, np.eye(output.size, order), axis=0)
+    own = order + int(levels)
+    columns = np.ones((own + len(shifted) - order + 1, output.size - skip))
+    places = [*range(order), *range(own, len(columns) - 1)]
+    for place, (row, lag) in zip(places, shifted, strict=True):
+        columns[place] = row[skip - lag : row.size - lag]
+    columns[-1] = output[skip:]
+    columns[own : own + order] *= -1.0
     # Directions that rounding leaves of responses that are over cost a sample each, no more.
-    basis = np.linalg.qr(own[skip:])[0]
-    rows = np.array([*columns, output]).T[skip:]
-    return np.asarray(rows - basis @ (basis.T @ rows))
-
-
-def _later(row: Array, lag: int) -> Array:
-    return np.concatenate([np.zeros(lag), row[: row.size - lag]])
+    return np.asarray(np.linalg.qr(columns.T, mode="r"))[own:, own:]

@@ -35,7 +35,7 @@ from flightid.identification.prediction_error.part_blocks import (
     about_levels,
     errors_at,
 )
-from flightid.identification.prediction_error.starts import polynomial_starts
+from flightid.identification.prediction_error.starts import polynomial_starts, whitened_start
 from flightid.models.polynomial.model import PolynomialModel
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.models.sampled.channels import SampledChannels
@@ -148,29 +148,20 @@ def _iterate(
 ) -> SearchResult:
     """Gauss-Newton with the damping of Levenberg and Marquardt from every start."""
     skip = structure.longest_lag if structure.is_regression and not memory else 0
-    outcomes = _native.polynomial_fit(
-        data.output,
-        data.inputs,
-        list(data.lengths),
-        structure.native,
-        starts,
-        BEFORE[structure.past],
-        memory,
-        data.levels,
-        skip,
-        structure.enforce_stability,
-        structure.maximum_iterations,
-    )
-    ends = [end for end in outcomes if not isinstance(end, str) and np.isfinite(end[1])]
-    if not ends:
+    outcomes = _outcomes(structure, data, starts, memory, skip)
+    minima = _grouped(outcomes)
+    has_noise = has_noise_model(structure)
+    if len(minima) != 1 and not has_noise and len(starts) < structure.starts:
+        outcomes += _outcomes(structure, data, whitened_start(structure, data), memory, skip)
+        minima = _grouped(outcomes)
+    if not minima:
         raise FitError(
             "the fit diverged from every start",
-            found="; ".join(sorted({end for end in outcomes if isinstance(end, str)})),
+            found="; ".join(sorted({each for each in outcomes if isinstance(each, str)})),
             action="lower the orders, or give more starts",
         )
-    minima = _grouped(ends)
     behind: tuple[float, ...] = ()
-    if len(minima) > 1 and not has_noise_model(structure):
+    if len(minima) > 1 and not has_noise:
         minima, behind = likeliest(structure, data, minima, memory, skip)
     theta, squares, flat, iterations, _ = minima[0][0]
     unknown = len(data.lengths) * data.levels
@@ -196,8 +187,32 @@ def _is_determined(factor: Array) -> bool:
     return bool(np.all(np.abs(np.diag(factor)) > 1e-11 * np.maximum(lengths, 1e-300)))
 
 
-def _grouped(ends: Sequence[End]) -> list[list[End]]:
+def _outcomes(
+    structure: PolynomialStructure,
+    data: SampledChannels,
+    starts: Array,
+    memory: list[list[float]],
+    skip: int,
+) -> list[End | str]:
+    """What each start came to: an end, or why there is none."""
+    return _native.polynomial_fit(
+        data.output,
+        data.inputs,
+        list(data.lengths),
+        structure.native,
+        starts,
+        BEFORE[structure.past],
+        memory,
+        data.levels,
+        skip,
+        structure.enforce_stability,
+        structure.maximum_iterations,
+    )
+
+
+def _grouped(outcomes: Sequence[End | str]) -> list[list[End]]:
     """Ends of each minimum, the smallest sum of squares first."""
+    ends = [end for end in outcomes if not isinstance(end, str) and np.isfinite(end[1])]
     groups: list[list[End]] = []
     for end in sorted(ends, key=lambda each: each[1]):
         if groups and end[1] <= groups[-1][0][1] * (1 + SAME_MINIMUM):

@@ -120,11 +120,17 @@ def _plants(
         )
         b += above
         f.append(below)
-    found = [_Plant(np.zeros(structure.na), b, f), _filtered(structure, data)]
-    if not (structure.nc or structure.nd):
-        # Where noise is much stronger at some frequencies, others tell the plant.
-        found.append(_filtered(structure, _whitened(data, long_a)))
-    return found
+    return [_Plant(np.zeros(structure.na), b, f), _filtered(structure, data)]
+
+
+def whitened_start(structure: PolynomialStructure, data: SampledChannels) -> Array:
+    """One more start of output error, shape (1, n_coefficients), from whitened data.
+
+    Where noise is much stronger at some frequencies, the others tell the plant.
+    """
+    _, long_a, _ = _long_model(structure, data)
+    plant = _filtered(structure, _whitened(data, long_a))
+    return np.nan_to_num(_flat(plant, np.zeros(0), np.zeros(0)))[None]
 
 
 def _whitened(data: SampledChannels, long_a: Array) -> SampledChannels:
