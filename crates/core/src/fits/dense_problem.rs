@@ -6,6 +6,9 @@ use crate::fits::least_squares::{Objective, Point, Problem};
 use crate::fits::normal_triangle::triangle_of;
 use crate::numerics::householder::dot;
 
+/// Entries that are looked at together.
+const CHUNK: usize = 256;
+
 /// A problem whose residuals and Jacobian are held whole.
 pub(crate) struct Dense<'a, P> {
     problem: &'a mut P,
@@ -73,11 +76,18 @@ impl<P: Problem> Dense<'_, P> {
         let (n, m) = (x.len(), self.residuals.len());
         self.jacobian.resize(m * n, 0.0);
         self.problem.jacobian(x, &mut self.jacobian)?;
-        if let Some(index) = self.jacobian.iter().position(|value| !value.is_finite()) {
+        if let Some(index) = first_not_finite(&self.jacobian) {
             return Err(CoreError::NotFinite { what: "the Jacobian", index });
         }
         let (triangle, projected) = (&mut point.triangle, &mut point.projected);
         triangle_of(&self.jacobian, &self.residuals, n, &mut self.work, triangle, projected);
         Ok(())
     }
+}
+
+/// Place of the first entry that is not finite; whole chunks are looked at without branches.
+fn first_not_finite(values: &[f64]) -> Option<usize> {
+    let bad = |chunk: &[f64]| chunk.iter().fold(false, |bad, value| bad | !value.is_finite());
+    let chunk = values.chunks(CHUNK).position(bad)?;
+    values.iter().skip(chunk * CHUNK).position(|v| !v.is_finite()).map(|k| chunk * CHUNK + k)
 }

@@ -4,6 +4,7 @@
 //! Reference: Golub & Van Loan, *Matrix Computations*, 4th ed., §5.3.2 (normal equations) and 4.2.3.
 
 use crate::numerics::householder::triangularise;
+use crate::numerics::widest::widest;
 
 /// Smallest diagonal of the triangle, of columns scaled to unit length, at which the squared
 /// condition of the normal equations leaves a step ten good digits.
@@ -70,7 +71,10 @@ fn by_normal_equations(
     work.clear();
     work.resize(n * n + n, 0.0);
     let (gram, right) = work.split_at_mut(n * n);
-    gather(jacobian, residuals, n, gram, right);
+    widest(
+        #[inline(always)]
+        || gather(jacobian, residuals, n, gram, right),
+    );
     let length: Vec<f64> = (0..n).map(|j| gram[j * n + j].sqrt()).collect();
     // Zero columns, overflow and underflow belong to the reflections.
     if !length.iter().all(|&l| (1e-100..1e100).contains(&l)) {
@@ -97,6 +101,7 @@ fn by_normal_equations(
 }
 
 /// Upper half of JᵀJ, row-major, and Jᵀr.
+#[inline(always)]
 fn gather(jacobian: &[f64], residuals: &[f64], n: usize, gram: &mut [f64], right: &mut [f64]) {
     let (blocks, values) = (jacobian.chunks_exact(ROWS * n), residuals.chunks_exact(ROWS));
     let (rest, left) = (blocks.remainder(), values.remainder());

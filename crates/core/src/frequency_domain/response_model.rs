@@ -16,13 +16,6 @@ pub trait ResponseModel {
     /// # Errors
     /// Where the model has no meaning at these values.
     fn prepare(&mut self, free: &[f64], with_gradient: bool) -> Result<(), CoreError>;
-    /// H(jω) of one response; the gradient of log H (n_free) is written where asked for.
-    fn response(
-        &self,
-        response: usize,
-        omega: f64,
-        gradient: Option<&mut [Complex64]>,
-    ) -> Complex64;
     /// H(jω) of one response at several frequencies; the gradients of log H (n_omega × n_free) are
     /// written where asked for.
     fn responses(
@@ -31,19 +24,16 @@ pub trait ResponseModel {
         omega: &[f64],
         values: &mut [Complex64],
         gradients: Option<&mut [Complex64]>,
-    ) {
-        match gradients {
-            Some(gradients) if self.n_free() > 0 => {
-                let rows = gradients.chunks_exact_mut(self.n_free());
-                for ((value, &each), row) in values.iter_mut().zip(omega).zip(rows) {
-                    *value = self.response(response, each, Some(row));
-                }
-            }
-            _ => {
-                for (value, &each) in values.iter_mut().zip(omega) {
-                    *value = self.response(response, each, None);
-                }
-            }
-        }
+    );
+    /// The same at one frequency.
+    fn response(
+        &self,
+        response: usize,
+        omega: f64,
+        gradient: Option<&mut [Complex64]>,
+    ) -> Complex64 {
+        let mut value = [Complex64::default()];
+        self.responses(response, &[omega], &mut value, gradient);
+        value[0]
     }
 }

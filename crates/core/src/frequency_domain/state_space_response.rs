@@ -13,6 +13,7 @@ use crate::frequency_domain::response_model::ResponseModel;
 use crate::numerics::complex_lanes::{LANES, Lanes};
 use crate::numerics::complex_lu::ComplexLu;
 use crate::numerics::sparse_lu::{Block, Factors, Plan};
+use crate::numerics::widest::widest;
 use crate::state_space::model_tape::{Linearisation, ModelTape, Sensitivity};
 
 /// A state-space model seen by a fit: some parameters vary, the others stay.
@@ -37,9 +38,9 @@ pub struct FreeStateSpace<'a> {
     /// Free parameters for which `states` hold, and whether the adjoints hold too.
     solved_at: Option<Vec<f64>>,
     has_adjoints: bool,
-    /// X and Λ at each frequency: frequency, input or output, state.
-    states: Vec<Complex64>,
-    adjoints: Vec<Complex64>,
+    /// X and Λ at the frequencies of each block: block, input or output, state.
+    states: Vec<Lanes>,
+    adjoints: Vec<Lanes>,
     right: Vec<Lanes>,
     solution: Vec<Lanes>,
 }
@@ -194,18 +195,15 @@ impl<'a> FreeStateSpace<'a> {
             let made = self.factor(block, old.next())?;
             self.blocks.push(made);
         }
-        self.states.resize(self.omega.len() * m * n, Complex64::default());
+        self.states.resize(self.blocks.len() * m * n, Lanes::ZERO);
         for block in 0..self.blocks.len() {
             for column in 0..m {
                 for state in 0..n {
                     self.right[state] = Lanes::real(self.forcing(state, self.inputs[column]));
                 }
                 self.back_solve(block, false);
-                let first = block * LANES;
-                for (lane, place) in (first..self.omega.len().min(first + LANES)).enumerate() {
-                    let out = &mut self.states[(place * m + column) * n..][..n];
-                    out.iter_mut().zip(&self.solution).for_each(|(to, v)| *to = v.get(lane));
-                }
+                let start = (block * m + column) * n;
+                self.states[start..start + n].copy_from_slice(&self.solution);
             }
         }
         Ok(())
@@ -213,7 +211,7 @@ impl<'a> FreeStateSpace<'a> {
 
     fn solve_adjoints(&mut self) {
         let (n, p) = (self.tape.n_states(), self.outputs.len());
-        self.adjoints.resize(self.omega.len() * p * n, Complex64::default());
+        self.adjoints.resize(self.blocks.len() * p * n, Lanes::ZERO);
         for block in 0..self.blocks.len() {
             let omega = self.frequencies(block);
             for row in 0..p {
@@ -222,11 +220,8 @@ impl<'a> FreeStateSpace<'a> {
                     self.right[state] = Lanes::along(value, rate, &omega);
                 }
                 self.back_solve(block, true);
-                let first = block * LANES;
-                for (lane, place) in (first..self.omega.len().min(first + LANES)).enumerate() {
-                    let out = &mut self.adjoints[(place * p + row) * n..][..n];
-                    out.iter_mut().zip(&self.solution).for_each(|(to, v)| *to = v.get(lane));
-                }
+                let start = (block * p + row) * n;
+                self.adjoints[start..start + n].copy_from_slice(&self.solution);
             }
         }
         self.has_adjoints = true;
@@ -238,6 +233,7 @@ impl<'a> FreeStateSpace<'a> {
     }
 
     /// Responses at up to eight frequencies that were solved in advance, and derivatives of log H.
+    #[inline(always)]
     fn eight(
         &self,
         pair: (usize, usize),
@@ -249,11 +245,17 @@ impl<'a> FreeStateSpace<'a> {
         let row = n + output;
         let at = |lane: usize| places[lane.min(places.len() - 1)];
         let omega: [f64; LANES] = std::array::from_fn(|lane| self.omega[at(lane)]);
-        let gather = |from: &[Complex64], count: usize, which: usize| -> Vec<Lanes> {
-            let mut found = vec![Lanes::ZERO; n];
-            for lane in 0..LANES {
-                let start = (at(lane) * count + which) * n;
-                found.iter_mut().zip(&from[start..start + n]).for_each(|(to, &v)| to.set(lane, v));
+        let is_block =
+            places[0].is_multiple_of(LANES) && (0..places.len()).all(|k| at(k) == places[0] + k);
+        let gather = |from: &[Lanes], count: usize, which: usize| -> Vec<Lanes> {
+            let start = |place: usize| (place / LANES * count + which) * n;
+            let mut found = from[start(places[0])..][..n].to_vec();
+            // What fills a block beyond its last frequency is nobody's.
+            for lane in (0..LANES).filter(|_| !is_block) {
+                let (place, held) = (at(lane), &from[start(at(lane))..][..n]);
+                for (to, v) in found.iter_mut().zip(held) {
+                    to.set(lane, v.get(place % LANES));
+                }
             }
             found
         };
@@ -283,6 +285,7 @@ impl<'a> FreeStateSpace<'a> {
     }
 
     /// Derivatives of log H: one term for each entry of the matrices that depends on a parameter.
+    #[inline(always)]
     fn add_entries(
         &self,
         (output, input): (usize, usize),
@@ -353,17 +356,6 @@ impl ResponseModel for FreeStateSpace<'_> {
         Ok(())
     }
 
-    fn response(
-        &self,
-        response: usize,
-        omega: f64,
-        gradient: Option<&mut [Complex64]>,
-    ) -> Complex64 {
-        let mut value = [Complex64::default()];
-        self.responses(response, &[omega], &mut value, gradient);
-        value[0]
-    }
-
     fn responses(
         &self,
         response: usize,
@@ -381,7 +373,10 @@ impl ResponseModel for FreeStateSpace<'_> {
                 return;
             };
             let wanted = gradients.is_some().then_some(slopes.as_mut_slice());
-            let found = self.eight(self.pairs[response], &places, wanted);
+            let found = widest(
+                #[inline(always)]
+                || self.eight(self.pairs[response], &places, wanted),
+            );
             for lane in 0..places.len() {
                 let place = chunk * LANES + lane;
                 values[place] = found.get(lane);

@@ -219,6 +219,26 @@ impl<'a> FreeTransfer<'a> {
         }
         value
     }
+
+    /// H(jω) of one response, and the gradient of its logarithm.
+    fn at(&self, response: usize, omega: f64, mut gradient: Option<&mut [Complex64]>) -> Complex64 {
+        let layout = &self.functions.layouts[response];
+        let s = Complex64::new(0.0, omega);
+        let (gain, delay) = (self.numbers[layout.gain], self.numbers[layout.delay]);
+        if let Some(gradient) = gradient.as_deref_mut() {
+            gradient.fill(Complex64::default());
+            self.add_slope(layout.gain, Complex64::new(1.0 / gain, 0.0), gradient);
+            self.add_slope(layout.delay, -s, gradient);
+        }
+        let mut value = gain * Complex64::cis(-omega * delay);
+        for range in &layout.numerator {
+            value *= self.factor(range, s, 1.0, gradient.as_deref_mut());
+        }
+        for range in &layout.denominator {
+            value /= self.factor(range, s, -1.0, gradient.as_deref_mut());
+        }
+        value
+    }
 }
 
 impl ResponseModel for FreeTransfer<'_> {
@@ -243,28 +263,17 @@ impl ResponseModel for FreeTransfer<'_> {
         }
     }
 
-    fn response(
+    fn responses(
         &self,
         response: usize,
-        omega: f64,
-        mut gradient: Option<&mut [Complex64]>,
-    ) -> Complex64 {
-        let layout = &self.functions.layouts[response];
-        let s = Complex64::new(0.0, omega);
-        let (gain, delay) = (self.numbers[layout.gain], self.numbers[layout.delay]);
-        if let Some(gradient) = gradient.as_deref_mut() {
-            gradient.fill(Complex64::default());
-            self.add_slope(layout.gain, Complex64::new(1.0 / gain, 0.0), gradient);
-            self.add_slope(layout.delay, -s, gradient);
+        omega: &[f64],
+        values: &mut [Complex64],
+        gradients: Option<&mut [Complex64]>,
+    ) {
+        let mut rows = gradients.map(|all| all.chunks_exact_mut(self.free.len().max(1)));
+        for (value, &each) in values.iter_mut().zip(omega) {
+            *value = self.at(response, each, rows.as_mut().and_then(Iterator::next));
         }
-        let mut value = gain * Complex64::cis(-omega * delay);
-        for range in &layout.numerator {
-            value *= self.factor(range, s, 1.0, gradient.as_deref_mut());
-        }
-        for range in &layout.denominator {
-            value /= self.factor(range, s, -1.0, gradient.as_deref_mut());
-        }
-        value
     }
 }
 

@@ -103,9 +103,9 @@ pub fn responses<'py>(
     omega: &[f64],
 ) -> PyResult<Bound<'py, PyArray2<Complex64>>> {
     let n = model.n_responses();
-    let mut result = Vec::with_capacity(n * omega.len());
-    for index in 0..n {
-        result.extend(omega.iter().map(|&each| model.response(index, each, None)));
+    let mut result = vec![Complex64::default(); n * omega.len()];
+    for (index, row) in result.chunks_exact_mut(omega.len().max(1)).enumerate() {
+        model.responses(index, omega, row, None);
     }
     result.into_pyarray(py).reshape([n, omega.len()])
 }
@@ -121,8 +121,9 @@ pub fn log_gradients<'py>(
 ) -> PyResult<Bound<'py, PyArray3<Complex64>>> {
     let (n, n_free) = (model.n_responses(), model.n_free());
     let mut result = vec![Complex64::default(); n * omega.len() * n_free];
-    for (place, row) in result.chunks_exact_mut(n_free.max(1)).enumerate() {
-        model.response(place / omega.len(), omega[place % omega.len()], Some(row));
+    let mut values = vec![Complex64::default(); omega.len()];
+    for (index, rows) in result.chunks_exact_mut((omega.len() * n_free).max(1)).enumerate() {
+        model.responses(index, omega, &mut values, Some(rows));
     }
     result.into_pyarray(py).reshape([n, omega.len(), n_free])
 }
