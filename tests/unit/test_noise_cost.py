@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
+import pytest
+from numpy.typing import NDArray
 
 import flightid as fid
 from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.identification.fit_findings import NoiseCost, judge_cost
+from flightid.identification.frequency_domain import search
+from flightid.identification.multistart import draw_starts
 
 
 def _found(average: float, noise: NoiseCost | None) -> Finding:
@@ -82,3 +88,31 @@ def test_costs_of_independent_errors_have_the_mean_that_is_foretold() -> None:
     weight = (1.58 * (1.0 - np.exp(-1.0))) ** 2
     expected = 20.0 * weight * ((20.0 / np.log(10.0) * 0.05) ** 2 + 0.01745 * np.rad2deg(0.05) ** 2)
     assert 0.85 * expected < np.mean(costs) < 1.05 * expected
+
+
+@pytest.mark.parametrize(("mode", "tried"), [(0.0, [1]), (0.5, [1, search.NEARBY])])
+def test_starts_around_a_fit_are_tried_where_noise_does_not_explain_its_cost(
+    mode: float, tried: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn: list[int] = []
+
+    def counted(free: Sequence[fid.Parameter], starts: int, seed: int) -> NDArray[np.float64]:
+        drawn.append(starts)
+        return draw_starts(free, starts, seed)
+
+    monkeypatch.setattr(search, "draw_starts", counted)
+    truth = fid.load_model("rate_first_order").with_values({"Lp": -5.0, "Ltphi": 150.0})
+    omega = np.geomspace(0.5, 20.0, 40)
+    errors = 0.05 * np.random.default_rng(1).standard_normal((2, 1, 1, 40))
+    missing = 1.0 + mode / (1.0 + 0.4j * omega / 8.0 - (omega / 8.0) ** 2)
+    data = fid.FrequencyResponse.from_values(
+        omega,
+        truth.frequency_response(omega) * missing * np.exp(errors[0] + 1j * errors[1]),
+        inputs=truth.inputs,
+        outputs=truth.outputs,
+        units=truth.units,
+        random_error=np.full((1, 1, 40), 0.05),
+    )
+    fit = fid.identify(truth, data, correct_bias=False)
+    assert fit.average_cost > search.LEAVES
+    assert drawn == tried

@@ -7,6 +7,10 @@ the cost are, the interval speaks of the scatter over repeated flights.
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,14 +21,65 @@ _DECIBEL = 20.0 / np.log(10.0)
 _DEGREE = 180.0 / np.pi
 
 
-def estimator_gain(jacobian: Array, sensitivity: Array, *, total: Array | None = None) -> Array:
+@dataclass(frozen=True)
+class PointSensitivity:
+    """Derivatives of residuals with respect to data, of which each residual answers to few.
+
+    Attributes
+    ----------
+    blocks : tuple of ndarray
+        Square ones; their rows follow one another in the order of the residuals.
+    columns : tuple of ndarray of int
+        Data of each block; together each of the data once.
+
+    Example
+    -------
+    >>> halves = PointSensitivity.of([2.0 * np.eye(1), 4.0 * np.eye(1)])
+    >>> np.ones((1, 2)) @ halves, halves.solved(np.ones((2, 1))).T
+    (array([[2., 4.]]), array([[0.5 , 0.25]]))
+    """
+
+    __array_ufunc__ = None  # NumPy leaves products with this to it
+    blocks: tuple[Array, ...]
+    columns: tuple[NDArray[np.intp], ...]
+
+    @classmethod
+    def of(cls, blocks: Sequence[Array]) -> PointSensitivity:
+        """Of blocks whose data follow one another as their residuals do."""
+        ends = np.cumsum([0, *map(len, blocks)])
+        columns = (np.arange(*span) for span in pairwise(ends))
+        return cls(tuple(blocks), tuple(columns))
+
+    def __rmatmul__(self, left: Array) -> Array:
+        found = np.empty(left.shape)
+        for rows, block, columns in self._parts():
+            found[:, columns] = left[:, rows] @ block
+        return found
+
+    def solved(self, right: Array) -> Array:
+        """Changes of the data that make given residuals, shape (n_data, n)."""
+        found = np.empty(right.shape)
+        for rows, block, columns in self._parts():
+            found[columns] = np.linalg.solve(block, right[rows])
+        return found
+
+    def _parts(self) -> Iterator[tuple[slice, Array, NDArray[np.intp]]]:
+        first = 0
+        for block, columns in zip(self.blocks, self.columns, strict=True):
+            yield slice(first, first + len(block)), block, columns
+            first += len(block)
+
+
+def estimator_gain(
+    jacobian: Array, sensitivity: Array | PointSensitivity, *, total: Array | None = None
+) -> Array:
     """How far the estimates move with the data, but for the sign.
 
     Parameters
     ----------
     jacobian : ndarray, shape (n_residuals, n_parameters)
         Derivatives J of the weighted residuals with respect to the parameters.
-    sensitivity : ndarray, shape (n_residuals, n_data)
+    sensitivity : ndarray, shape (n_residuals, n_data), or PointSensitivity
         Derivatives B of the weighted residuals with respect to the data.
     total : ndarray, shape (n_residuals, n_parameters), optional
         Derivatives T of the residuals where the data follow the parameters too, as a corrected

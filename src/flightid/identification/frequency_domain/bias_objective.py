@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from flightid.identification.frequency_domain.error_model import ErrorModel, whitening
 from flightid.identification.frequency_domain.estimator_bias import Correction
+from flightid.identification.frequency_domain.model_curves import slopes_of
 from flightid.identification.frequency_domain.selection import SelectedResponse
 from flightid.models import GreyBoxModel
 
@@ -68,15 +69,8 @@ class Objective:
 
     def model_slopes(self, x: Array) -> Curves:
         """Derivatives of the model's own responses, each shape (n_free, n)."""
-        model = self.at(x)
-        values, free = model.parameters.independent_values(), model.parameters.free_indices
-        found = []
-        for place, each in enumerate(self.selected):
-            omega = each.omega_rad_s
-            curve = np.asarray(model.native.response(values, omega)[place])
-            slope = model.native.log_gradient(values, free, omega)[place]
-            found.append((curve[:, None] * slope).T)
-        return found
+        grids = [each.omega_rad_s for each in self.selected]
+        return [slope.T for slope in slopes_of(self.at(x), grids)]
 
     def following(self) -> Array:
         """Derivatives of corrected points by the free parameters, at the model as it stands.

@@ -8,7 +8,6 @@ from functools import cached_property
 from itertools import groupby
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from flightid.errors import FitError
@@ -23,6 +22,7 @@ from flightid.responses.errors.random_error import (
     knows_between_outputs,
 )
 from flightid.uncertainty import decibel_phase_sensitivity, window_covariance
+from flightid.uncertainty.response_errors import PointSensitivity
 
 Array = NDArray[np.float64]
 
@@ -207,22 +207,18 @@ def coherence_sensitivity(
     selected: Sequence[SelectedResponse],
     fitted: Sequence[NDArray[np.complex128]],
     model: ErrorModel,
-) -> Array:
+) -> PointSensitivity:
     """Derivatives of the weighted dB and degree residuals with respect to all runs' points."""
-    blocks = []
+    blocks, columns, first = [], [], 0
     for run in model.runs:
         group = range(run.first, run.first + run.count)
         total = sum(len(selected[k].places) for k in group)
-        block, start = np.zeros((2 * total, 2 * total)), 0
         for k in group:
             each = selected[k]
-            size = len(each.places)
-            span = np.arange(start, start + size)
-            block[2 * start : 2 * (start + size), np.concatenate([span, span + total])] = (
-                decibel_phase_sensitivity(
-                    fitted[k], np.sqrt(each.weight_db), np.sqrt(each.weight_deg)
-                )
-            )
-            start += size
-        blocks.append(block)
-    return np.asarray(scipy.linalg.block_diag(*blocks))
+            weights = np.sqrt(each.weight_db), np.sqrt(each.weight_deg)
+            blocks.append(decibel_phase_sensitivity(fitted[k], *weights))
+            span = np.arange(first, first + len(each.places))
+            columns.append(np.concatenate([span, span + total]))
+            first += len(span)
+        first += total
+    return PointSensitivity(tuple(blocks), tuple(columns))

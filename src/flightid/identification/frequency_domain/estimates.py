@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from flightid.errors import FitError
 from flightid.identification.fit_findings import UNKNOWN
 from flightid.identification.frequency_domain.error_model import ErrorModel
+from flightid.identification.frequency_domain.model_curves import log_slopes_of
 from flightid.identification.frequency_domain.selection import SelectedResponse
 from flightid.identification.multistart import DenseEnd
 from flightid.models import GreyBoxModel, Parameter
@@ -24,6 +25,7 @@ from flightid.uncertainty import (
 from flightid.uncertainty.agreement import Agreement, AgreementTest
 from flightid.uncertainty.cramer_rao import inverse_hessian
 from flightid.uncertainty.estimate import Estimate
+from flightid.uncertainty.response_errors import PointSensitivity
 
 Array = NDArray[np.float64]
 Compare = Callable[[Array, NDArray[np.bool_]], AgreementTest]
@@ -74,7 +76,7 @@ def statistics(
     errors: ErrorModel,
     end: DenseEnd,
     *,
-    sensitivity: Array | None,
+    sensitivity: PointSensitivity | None,
     withheld: str = "",
     compare: Compare | None = None,
     bias: Array | None = None,
@@ -164,17 +166,10 @@ def require_identifiable(names: tuple[str, ...], jacobian: Array, action: str = 
 
 def coherence_jacobian(fitted: GreyBoxModel, selected: Sequence[SelectedResponse]) -> Array:
     """Derivatives of the weighted dB and degree residuals with respect to the free parameters."""
-    values = fitted.parameters.independent_values()
-    free = fitted.parameters.free_indices
+    slopes = log_slopes_of(fitted, [each.omega_rad_s for each in selected])
     rows = []
-    # One call gives all responses at its frequencies, which most of them share.
-    known: dict[bytes, NDArray[np.complex128]] = {}
-    for place, each in enumerate(selected):
-        omega = each.omega_rad_s
-        if omega.tobytes() not in known:
-            known[omega.tobytes()] = fitted.native.log_gradient(values, free, omega)
-        slope = known[omega.tobytes()][place]
-        both = np.empty((2 * len(slope), len(free)))
+    for each, slope in zip(selected, slopes, strict=True):
+        both = np.empty((2 * len(slope), slope.shape[1]))
         both[0::2] = _DECIBEL * np.sqrt(each.weight_db)[:, None] * slope.real
         both[1::2] = _DEGREE * np.sqrt(each.weight_deg)[:, None] * slope.imag
         rows.append(both)

@@ -39,8 +39,9 @@ from flightid.identification.frequency_domain.feedback_findings import (
     judge_feedback,
     why_bent,
 )
+from flightid.identification.frequency_domain.model_curves import curves_of
 from flightid.identification.frequency_domain.noise_cost import noise_costs
-from flightid.identification.frequency_domain.opened import opened, response_at
+from flightid.identification.frequency_domain.opened import opened
 from flightid.identification.frequency_domain.options import FrequencyDomainOptions
 from flightid.identification.frequency_domain.response_parts import PartComparison
 from flightid.identification.frequency_domain.search import minimise
@@ -54,6 +55,7 @@ from flightid.identification.multistart import DenseEnd, cluster, local_minima
 from flightid.identification.withheld_intervals import without_intervals
 from flightid.models import GreyBoxModel
 from flightid.responses import FrequencyResponse
+from flightid.uncertainty.response_errors import PointSensitivity
 from flightid.units import require_match
 from flightid.version import VERSION
 
@@ -110,7 +112,7 @@ def _fit_selected(
     sensitivity = _sensitivity(fitted, selected, errors, options, curves)
     if curves is not None and errors.known is not None and sensitivity is not None:
         # Residuals answer to points and to the model's estimates with opposite signs.
-        slopes = np.asarray(-np.linalg.lstsq(sensitivity, groups[0][0].jacobian)[0], np.float64)
+        slopes = -sensitivity.solved(groups[0][0].jacobian)
         if data.linear is not None and data.linear.weights.tells_parts:
             compare = PartComparison(without, fitted, selected, errors, slopes).compare
     found = statistics(
@@ -126,8 +128,8 @@ def _fit_selected(
     bent = judge_feedback(found.names, found.covariance, found.bias)
     setup += bent
     responses = compare_responses(fitted, selected)
-    curves = [response_at(fitted, each.omega_rad_s, k) for k, each in enumerate(selected)]
-    noise = noise_costs(selected, curves, by_noise)
+    points = [each.model[chosen.places] for each, chosen in zip(responses, selected, strict=True)]
+    noise = noise_costs(selected, points, by_noise)
     fit = _assemble(fitted, options, data, groups, responses, found, setup, noise)
     fit = replace(fit, provenance={**fit.provenance, "estimator_bias": correction})
     reason = why_misfit(fit.average_cost, noise) or why_bent(data, found.bias, bent)
@@ -189,11 +191,11 @@ def check_start(model: GreyBoxModel, selected: Sequence[SelectedResponse]) -> li
         The model has no response of a pair.
     """
     found: list[Finding] = []
-    for place, each in enumerate(selected):
-        try:
-            start = response_at(model, each.omega_rad_s, place)
-        except DataError:
-            continue  # no value at the start: the search will say so if no start has one
+    try:
+        starts = curves_of(model, [each.omega_rad_s for each in selected])
+    except DataError:
+        return []  # no value at the start: the search will say so if no start has one
+    for each, start in zip(selected, starts, strict=True):
         if not np.any(start):
             raise FitError(
                 f"the model has no response of {each.name}",
@@ -229,7 +231,7 @@ def _sensitivity(
     errors: ErrorModel,
     options: FrequencyDomainOptions,
     curves: Curves | None,
-) -> Array | None:
+) -> PointSensitivity | None:
     """Derivatives of the minimised residuals with respect to the measured points.
 
     `curves` are what the points are compared with; default: the model's responses.
@@ -237,11 +239,9 @@ def _sensitivity(
     if not errors.runs:
         return None
     if options.cost == "likelihood":
-        from scipy.linalg import block_diag  # noqa: PLC0415
-
-        return np.asarray(-block_diag(*(matrix for *_, matrix in whitening(errors))))
+        return PointSensitivity.of([-matrix for *_, matrix in whitening(errors)])
     if curves is None:
-        curves = [response_at(fitted, each.omega_rad_s, k) for k, each in enumerate(selected)]
+        curves = curves_of(fitted, [each.omega_rad_s for each in selected])
     return coherence_sensitivity(selected, curves, errors)
 
 
@@ -250,8 +250,8 @@ def compare_responses(
 ) -> tuple[FittedResponse, ...]:
     """Measured and fitted responses side by side, each with its cost J."""
     result = []
-    for place, each in enumerate(selected):
-        curve = response_at(fitted, each.measured.omega_rad_s, place)
+    curves = curves_of(fitted, [each.measured.omega_rad_s for each in selected])
+    for each, curve in zip(selected, curves, strict=True):
         ratio = curve[each.places] / each.response
         cost = float(
             np.sum(

@@ -49,21 +49,18 @@ def noise_costs(
     if not errors.runs:
         return {}
     sensitivity = coherence_sensitivity(selected, curves, errors)
+    blocks = zip(sensitivity.blocks, sensitivity.columns, strict=True)
     found, first = {}, 0
     for run, covariance in zip(errors.runs, errors.covariances, strict=True):
-        size = len(covariance)
-        span = slice(first, first + size)
         group = range(run.first, run.first + run.count)
-        turned = sensitivity[span, span] * _believed(covariance, [curves[k] for k in group])
-        spread = turned @ covariance @ turned.T
-        start = 0
-        for place in group:
-            rows = slice(start, start + 2 * len(selected[place].places))
-            start = rows.stop
-            part = spread[rows, rows]
+        believed = _believed(covariance, [curves[k] for k in group])
+        for place, (block, columns) in zip(group, blocks, strict=False):
+            own = columns - first
+            turned = block * believed[own]
+            part = turned @ covariance[np.ix_(own, own)] @ turned.T
             deviation = float(np.sqrt(2.0 * np.sum(part * part)))
             found[selected[place].name] = NoiseCost(float(np.trace(part)), deviation)
-        first = span.stop
+        first += len(covariance)
     return found
 
 

@@ -10,18 +10,13 @@ from numpy.typing import NDArray
 from flightid.conventions import Light
 from flightid.errors import FlightidError
 from flightid.findings import Finding
+from flightid.identification.frequency_domain.model_curves import curves_of
 from flightid.identification.frequency_domain.selection import SelectedResponse
 from flightid.models import GreyBoxModel
 
 Array = NDArray[np.float64]
 STEP = 1e-3
 """Trial value of a parameter at zero, of which its response is a straight line nearly."""
-
-
-def response_at(model: GreyBoxModel, omega: Array, place: int) -> NDArray[np.complex128]:
-    """One response of the model, by its place."""
-    values = model.parameters.independent_values()
-    return np.asarray(model.native.response(values, np.ascontiguousarray(omega))[place])
 
 
 def opened(
@@ -41,19 +36,18 @@ def opened(
     -------
     model, and list of Finding
     """
-    shut = [place for place, each in enumerate(selected) if not _has_response(model, each, place)]
+    shut = [place for place, curve in enumerate(_curves(model, selected)) if not np.any(curve)]
     zero = [p for p in model.parameters.free if p.value == 0.0] if shut else []
     moved: dict[str, float] = {}
     for parameter in zero:
         step = STEP if parameter.maximum > STEP else -STEP
         trial = model.with_values({parameter.name: step})
         above, below = 0.0, 0.0
-        for place in shut:
-            each = selected[place]
-            if _has_response(trial, each, place):
-                slope = response_at(trial, each.omega_rad_s, place) / step
-                above += float(np.sum((slope.conj() * each.response).real))
-                below += float(np.sum(np.abs(slope) ** 2))
+        curves = _curves(trial, selected)
+        for place in shut if curves else ():
+            slope = curves[place] / step
+            above += float(np.sum((slope.conj() * selected[place].response).real))
+            below += float(np.sum(np.abs(slope) ** 2))
         if above != 0.0 and below > 0.0:
             half = 0.5 * np.array([parameter.minimum, parameter.maximum])
             moved[parameter.name] = float(np.clip(above / below, *half))
@@ -65,8 +59,11 @@ def opened(
     return model.with_values(moved), [Finding("start-opened", Light.GREEN, text, action)]
 
 
-def _has_response(model: GreyBoxModel, each: SelectedResponse, place: int) -> bool:
+def _curves(
+    model: GreyBoxModel, selected: Sequence[SelectedResponse]
+) -> list[NDArray[np.complex128]]:
+    """Responses at the points; none where the model has no value at one of them."""
     try:
-        return bool(np.any(response_at(model, each.omega_rad_s, place)))
+        return curves_of(model, [each.omega_rad_s for each in selected])
     except FlightidError:
-        return True
+        return []

@@ -38,8 +38,9 @@ from flightid.identification.frequency_domain.fit import (
     compare_responses,
     select_by,
 )
+from flightid.identification.frequency_domain.model_curves import curves_of, slopes_of
 from flightid.identification.frequency_domain.noise_cost import noise_costs
-from flightid.identification.frequency_domain.opened import opened, response_at
+from flightid.identification.frequency_domain.opened import opened
 from flightid.identification.frequency_domain.options import FrequencyDomainOptions
 from flightid.identification.frequency_domain.selection import SelectedResponse
 from flightid.identification.joint.independence import judge_independence
@@ -109,12 +110,7 @@ class ChosenPoints:
         return np.concatenate([matrix @ part for matrix, part in parts])
 
     def _slopes(self, fitted: GreyBoxModel) -> Array:
-        values, free = fitted.parameters.independent_values(), fitted.parameters.free_indices
-        by_response = []
-        for place, each in enumerate(self.selected):
-            curve = response_at(fitted, each.omega_rad_s, place)
-            slope = fitted.native.log_gradient(values, free, each.omega_rad_s)[place]
-            by_response.append(curve[:, None] * slope)
+        by_response = slopes_of(fitted, [each.omega_rad_s for each in self.selected])
         rows = []
         for first, count, matrix in whitening(self.errors):
             run = np.concatenate(by_response[first : first + count])
@@ -151,7 +147,7 @@ def fit_jointly(model: GreyBoxModel, data: Sequence[object], options: JointOptio
     bent_by = why_bent(response, beside.bias, bent)
     noise = noise_costs(
         points.selected,
-        [response_at(fit.model, each.omega_rad_s, k) for k, each in enumerate(points.selected)],
+        curves_of(fit.model, [each.omega_rad_s for each in points.selected]),
         points.errors,
     )
     fit = _with_responses(fit, response, made.points, noise, made.outcome.provenance(options.hold))
