@@ -8,6 +8,7 @@ from typing import Any
 from flightid.errors import OptionError
 
 EXTRAS = {"pandas": "tables", "pyarrow": "parquet", "xarray": "tables"}
+EXTRAS |= dict.fromkeys(("lz4", "rosbags", "zstandard"), "ros")
 """Extra of the package that installs a library."""
 
 

@@ -88,12 +88,12 @@ def write_atomically(path: str | Path, content: bytes | str | Callable[[Path], o
 
 
 def sha256_of_file(path: str | Path) -> str:
-    """SHA-256 of a file's bytes, read in blocks.
+    """SHA-256 of a file's bytes, read in blocks; of a folder, of the digests of its files by name.
 
     Parameters
     ----------
     path : str or Path
-        File to read.
+        File or folder to read.
 
     Returns
     -------
@@ -112,8 +112,12 @@ def sha256_of_file(path: str | Path) -> str:
     ...     sha256_of_file(write_atomically(Path(folder) / "empty", b""))[:16]
     'e3b0c44298fc1c14'
     """
-    digest = hashlib.sha256()
-    with Path(path).open("rb") as stream:
+    digest, path = hashlib.sha256(), Path(path)
+    if path.is_dir():
+        for each in sorted(each for each in path.iterdir() if each.is_file()):
+            digest.update(sha256_of_file(each).encode())
+        return digest.hexdigest()
+    with path.open("rb") as stream:
         while block := stream.read(BLOCK_BYTES):
             digest.update(block)
     return digest.hexdigest()

@@ -19,6 +19,7 @@ from flightid.logs.channels.channel_map import channel_map
 from flightid.responses.store import read_response, write_response
 from flightid.study.output import SCHEMA, read_report
 from flightid.study.settings import read_settings
+from tests.bag_builder import Flight, write_bag1, write_db3, write_mcap
 
 TIME = np.arange(6) * 0.5
 RECORD = fid.Record.from_arrays(TIME, inputs={"u": TIME**2}, outputs={"p": -TIME}, name="flown")
@@ -68,12 +69,23 @@ def _records(folder: Path) -> list[Seed]:
         "plain.mat",
         "small.mat",
         "new.mat",
+        *_bags(folder),
     )
     made = [Seed(name, fid.read_records, (folder / name).read_bytes()) for name in names]
     return [
         *made,
         *(Seed(f"{key}.csv", fid.read_records, text, True) for key, text in SHEETS.items()),
     ]
+
+
+def _bags(folder: Path) -> tuple[str, ...]:
+    flown = Flight(n_rates=12)
+    write_mcap(folder / "chunked.mcap", flown)
+    write_mcap(folder / "plain.mcap", flown, chunked=False)
+    write_bag1(folder / "plain.bag", flown)
+    write_bag1(folder / "packed.bag", flown, packing="bz2")
+    (write_db3(folder / "bag", flown) / "bag_0.db3").rename(folder / "bag.db3")
+    return "chunked.mcap", "plain.mcap", "plain.bag", "packed.bag", "bag.db3"
 
 
 SHEETS = {

@@ -15,7 +15,24 @@ if TYPE_CHECKING:
     from flightid.options import Options
     from flightid.record import Record
 
-FILES = click.Path(exists=True, dir_okay=False, path_type=Path)
+
+class _DataPath(click.Path):
+    """A file, or the folder of a ROS 2 bag."""
+
+    def convert(
+        self,
+        value: Any,  # noqa: ANN401 - as click has it
+        param: click.Parameter | None,
+        ctx: click.Context | None,
+    ) -> Any:  # noqa: ANN401
+        """A path that is there; a folder has to hold files of a bag."""
+        path = Path(str(super().convert(value, param, ctx)))
+        if path.is_dir() and not any(path.glob("*.mcap")) and not any(path.glob("*.db3*")):
+            self.fail(f"{path} is a folder, and no ROS 2 bag: it holds no .mcap and no .db3")
+        return path
+
+
+FILES = _DataPath(exists=True, path_type=Path)
 
 
 def reading() -> dict[str, type[Options]]:

@@ -15,6 +15,7 @@ from flightid.logs.log import Log
 from flightid.logs.mavlink.reader import open_telemetry
 from flightid.logs.source import LogSource
 from flightid.logs.ulog.reader import UlogSource
+from flightid.record.formats.foreign import foreign
 from flightid.record.formats.sniff import file_format
 
 ULOG_MAGIC = b"ULog\x01\x12\x35"
@@ -43,19 +44,14 @@ _FORMATS: tuple[tuple[Callable[[bytes], bool], str, Callable[[Path], LogSource]]
 )
 # In other files these two bytes may stand by chance: asked last, and not where rig records are.
 _BY_CHANCE = (lambda head: DATAFLASH_HEADER in head, "ArduPilot DataFlash", open_dataflash)
-# Contents that people do hand in, and what to do with them.
-_FOREIGN: tuple[tuple[bytes, str, str], ...] = (
-    (b"\x1f\x8b", "gzip data", "unpack it first"),
+# Beginnings of logs that are not read, and what to do with them.
+_BROKEN: tuple[tuple[bytes, str, str], ...] = (
     (b"FMT,", "a text log without a whole definition", "hand in the .bin file it was made from"),
-    (b"PK\x03\x04", "a zip archive", "unpack it first"),
     (
         b"\xfd",
         "a MAVLink stream without stamps",
         "record it as .tlog, or hand in the vehicle's log",
     ),
-    (b"\x89MCAP0", "a ROS 2 bag (MCAP)", "export the topics to CSV: one column a field, with time"),
-    (b"#ROSBAG", "a ROS bag", "export the topics to CSV: one column a field, with time"),
-    (b"SQLite format 3", "a database, perhaps a ROS 2 bag", "export the topics to CSV, with time"),
 )
 
 
@@ -93,11 +89,12 @@ def read_log(path: str | Path) -> Log:
     400.0
     """
     path = Path(path)
-    with path.open("rb") as file:
-        head = file.read(SNIFFED)
-    for holds, _, open_source in (*_FORMATS, _BY_CHANCE):
+    head = _head(path)
+    for holds, _, open_source in _FORMATS:
         if holds(head):
             return Log(path, open_source(path))
+    if foreign(head) is None and _BY_CHANCE[0](head):
+        return Log(path, _BY_CHANCE[2](path))
     raise _not_a_log(path, head)
 
 
@@ -112,11 +109,15 @@ def is_log(path: str | Path) -> bool:
         The file cannot be read.
     """
     path = Path(path)
-    with path.open("rb") as file:
-        head = file.read(SNIFFED)
-    signs = (DATAFLASH_HEADER, *(magic for magic, _, _ in _FOREIGN))
-    if head.startswith(signs) or any(holds(head) for holds, _, _ in _FORMATS):
+    head = _head(path)
+    signs = (DATAFLASH_HEADER, *(magic for magic, _, _ in _BROKEN))
+    strange = foreign(head)
+    if strange is None and head.startswith(signs):
         return True
+    if any(holds(head) for holds, _, _ in _FORMATS):
+        return True
+    if strange is not None:
+        return False
     try:
         file_format(path)
     except FileFormatError:
@@ -124,12 +125,26 @@ def is_log(path: str | Path) -> bool:
     return False
 
 
+def _head(path: Path) -> bytes:
+    """First bytes of a file; none of a folder, which may be a bag of records."""
+    if path.is_dir():
+        return b""
+    with path.open("rb") as file:
+        return file.read(SNIFFED)
+
+
 def _not_a_log(path: Path, head: bytes) -> LogFormatError:
-    found, action = "an empty file", "copy the log from the vehicle again"
-    if head:
-        found, action = f"first bytes {head[:8].hex(' ')}", "hand in the autopilot's own log file"
-        for magic, what, advice in _FOREIGN:
-            if head.startswith(magic):
-                found, action = what, advice
+    found, action = f"first bytes {head[:8].hex(' ')}", "hand in the autopilot's own log file"
+    broken = [(what, advice) for magic, what, advice in _BROKEN if head.startswith(magic)]
+    if named := [*filter(None, [None if path.is_dir() else foreign(head)]), *broken]:
+        found, action = named[0]
+    else:
+        try:
+            kind = file_format(path)
+        except FileFormatError:
+            pass
+        else:
+            found = f"records ({kind})"
+            action = f"flightid inspect {path.name} lists its columns, flightid run identifies"
     formats = " or ".join(name for _, name, _ in (*_FORMATS, _BY_CHANCE))
     return LogFormatError(f"{path.name} is not a log", found=found, needed=formats, action=action)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,39 +15,32 @@ from flightid.errors import DataError, OptionError, UnknownNameError
 from flightid.files import sha256_of_file
 from flightid.reading import of_file
 from flightid.record.channel import DECLARED, Channel
-from flightid.record.checks import REMOVE_OUTLIERS, entry_steps
+from flightid.record.derived import sources_of, with_derived
 from flightid.record.formats import ColumnTable, file_format
 from flightid.record.formats.columns import is_unit
 from flightid.record.history import Step
 from flightid.record.hold import InputHold, InputShape, Loop
-from flightid.record.interpolation import Interpolation, is_coarser, usual_method
-from flightid.record.outlying import bridge_outliers
+from flightid.record.interpolation import Interpolation
 from flightid.record.record import Record
+from flightid.record.row_grids import ChannelColumn, RowGrid
 from flightid.record.rows import (
     column_unit,
     manoeuvres,
-    require_sensible_base,
     row_stamps,
     with_time_unit,
 )
 from flightid.record.selection import Names, pairs_of, refuse_columns, selected_records
 from flightid.record.stamps import mean_spacing_s
 from flightid.record.store import RECORD_COLUMN
-from flightid.record.tables import read_table, sources_of
-from flightid.record.timebase import to_uniform
-from flightid.record.validation import require_period, unknown_channel
+from flightid.record.tables import read_table
+from flightid.record.validation import require_period
 from flightid.record.witnesses import turning_columns
 from flightid.table import Cell
 from flightid.units import canonical
 from flightid.version import VERSION
 
-
-@dataclass(frozen=True)
-class _ChannelColumn:
-    """A channel of the record and the column it comes from."""
-
-    channel: Channel
-    column: str
+MOST_UNNAMED = 24
+"""Columns with clocks of their own that are taken where none is named."""
 
 
 def read_records(
@@ -73,7 +65,7 @@ def read_records(
     period_s: float | None = None,
     loop: Loop | None = None,
 ) -> list[Record]:
-    r"""Read records from CSV, Parquet, MATLAB .mat (level 5 to 7.3) or netCDF.
+    r"""Read records from CSV, Parquet, MATLAB .mat (level 5 to 7.3), netCDF or ROS bags.
 
     A file that `write_records` made comes back as it was; naming channels then selects and
     assigns roles. In any other file the time is the column `time_column`, or `sample_time_s` is
@@ -83,10 +75,15 @@ def read_records(
     headings such as ``p [rad/s]``, from a second row of units in CSV, or from the file's metadata;
     `units` declares them and must not contradict the file. Values are not converted.
 
+    Columns of a bag (ROS 1 ``.bag``, ROS 2 ``.mcap``, ``.db3`` or their folder) are the numbers of
+    its messages, ``/imu/angular_velocity.x``, each topic on its own stamps: those of the headers
+    where they rise, else those of the recorder. They always go to one grid, that of the slowest
+    input or output unless `resample_to_s` says another; the history tells both.
+
     Parameters
     ----------
     path : str or Path
-        The file.
+        The file, or the folder of a bag.
     inputs, outputs, excitations, others : names or mapping of str to str, optional
         Columns by role, or one name; a mapping gives new names, channel to column. With none of
         the four, every numeric column becomes a channel of role "other".
@@ -177,80 +174,67 @@ def read_records(
     if stored is not None:
         refuse_columns(source, column_names, derive)
         return [_declared(item, InputShape(hold, period_s, loop)) for item in stored]
-    table = read_table(source, kind, column_names, derive, units)
-    stamps = row_stamps(table, time_column, units, sample_time_s)
+    table = with_derived(read_table(source, kind, column_names), derive, units)
+    own, shared = table.clock, np.empty(0)
+    if own is None:
+        shared = row_stamps(table, time_column, units, sample_time_s)
+    elif sample_time_s is not None:
+        raise OptionError(
+            f"{source.name} has stamps", found=f"sample_time_s={sample_time_s}", needed="none"
+        )
     wanted = _wanted(
-        table, roles, units, time_column, record_column, stamps.size, sources_of(derive)
+        table, roles, units, time_column, record_column, shared.size, sources_of(derive)
     )
-    columns = {item.channel.name: table.column(item.column) for item in wanted}
+    rows = {
+        item.channel.name: (
+            shared if own is None else own(item.column).time_s,
+            table.column(item.column),
+        )
+        for item in wanted
+    }
     for item in wanted:
-        if columns[item.channel.name].size != stamps.size:
+        found, needed = (values.size for values in reversed(rows[item.channel.name]))
+        if found != needed:
             raise DataError(
                 f"column {item.column!r} is not as long as the time",
-                found=f"{columns[item.channel.name].size} samples",
-                needed=f"{stamps.size}",
+                found=f"{found} samples",
+                needed=f"{needed}",
             )
-    taken = {item.column: item.channel for item in wanted}
-    witnesses = turning_columns(table, taken, stamps.size)
-    base = _Base(resample_to_s, max_gap_s, interpolation, outliers, hold, time_column)
+    grid = RowGrid(
+        tuple(wanted), resample_to_s, max_gap_s, interpolation, outliers, hold, time_column,
+        has_clocks=own is not None,
+    )  # fmt: skip
     options: dict[str, Cell] = {
         "file": source.name,
         "sha256": sha256_of_file(source),
-        "time": time_column if sample_time_s is None else None,
+        "time": time_column if own is None and sample_time_s is None else None,
         "sample_time_s": sample_time_s,
         **({"column_names": ",".join(column_names)} if column_names else {}),
         **{f"derived {name}": formula for name, formula in derive.items()},
     }
+    parts: list[tuple[slice, str | None]] = [(slice(None), None)]
+    witnesses: list[tuple[Channel, NDArray[np.float64]]] = []
+    if own is not None:
+        options["stamps"] = "; ".join(dict.fromkeys(own(item.column).said for item in wanted))
+    else:
+        taken = {item.column: item.channel for item in wanted}
+        witnesses = turning_columns(table, taken, shared.size)
+        parts = manoeuvres(table, record_column, shared, split_gaps=resample_to_s is None)
     records: list[Record] = []
-    for part, label in manoeuvres(table, record_column, stamps, split_gaps=resample_to_s is None):
-        if sample_time_s is None:
+    for part, label in parts:
+        if own is None and sample_time_s is None:
             options["time_unit"] = units.get(time_column) or table.units.get(time_column)
-            options["row_spacing_s"] = mean_spacing_s(stamps[part])
+            options["row_spacing_s"] = mean_spacing_s(shared[part])
         history = (Step("read_records", dict(options), VERSION),)
-        rows = {name: values[part] for name, values in columns.items()}
-        beside = [(channel, stamps[part], values[part]) for channel, values in witnesses]
+        some = {name: (time_s[part], values[part]) for name, (time_s, values) in rows.items()}
+        beside = [(channel, shared[part], values[part]) for channel, values in witnesses]
         with of_file(source.name):
-            for grid, samples, more in _pieces(stamps[part], rows, wanted, base, beside):
+            for time_s, samples, more in grid.pieces(some, beside):
                 name = label or source.stem
-                records.append(_record(grid, samples, wanted, name, (*history, *more)))
+                records.append(_record(time_s, samples, wanted, name, (*history, *more)))
     records = _numbered(records)
-    kept = base.hold_after(mean_spacing_s(stamps), wanted)
+    kept = grid.hold_after(rows)
     return [_declared(item, InputShape(kept, period_s, loop)) for item in records]
-
-
-@dataclass(frozen=True)
-class _Base:
-    """What is done to the rows of a manoeuvre before they are a record."""
-
-    resample_to_s: float | None
-    max_gap_s: float | None
-    interpolation: Interpolation | str | Mapping[str, Interpolation | str] | None
-    outliers: Mapping[str, Any] | None
-    hold: InputHold | None
-    time_column: str
-
-    def methods(
-        self, wanted: Iterable[_ChannelColumn], source_s: float
-    ) -> dict[str, Interpolation | str]:
-        """Interpolation by channel: what was asked for, else what the inputs' hold calls for."""
-        assert self.resample_to_s is not None
-        given = self.interpolation
-        if isinstance(given, str):
-            return {item.channel.name: given for item in wanted}
-        found: dict[str, Interpolation | str] = {}
-        for item in wanted:
-            hold = self.hold if item.channel.role is Role.INPUT else None
-            found[item.channel.name] = usual_method(hold, source_s, self.resample_to_s)
-        return {**found, **(given or {})}
-
-    def hold_after(self, source_s: float, wanted: Iterable[_ChannelColumn]) -> InputHold | None:
-        """What is still true of the inputs: what was low-passed is smooth."""
-        if self.resample_to_s is None or not is_coarser(self.resample_to_s, source_s):
-            return self.hold
-        ways = self.methods(wanted, source_s)
-        driving = [ways[item.channel.name] for item in wanted if item.channel.role is Role.INPUT]
-        filtered = self.hold is not None and any(way != "previous" for way in driving)
-        return "band_limited" if filtered else self.hold
 
 
 def _numbered(records: Sequence[Record]) -> list[Record]:
@@ -290,6 +274,11 @@ def _note(table: ColumnTable, column: str, name: str, units: Mapping[str, str]) 
     return ", ".join(notes)
 
 
+def _moves(table: ColumnTable, key: str) -> bool:
+    values = table.raw(key)
+    return bool(values.size > 1 and np.all(np.isfinite(values)) and np.ptp(values) > 0.0)
+
+
 def _wanted(
     table: ColumnTable,
     roles: Mapping[Role, Names | None],
@@ -298,14 +287,22 @@ def _wanted(
     record: str | None,
     n_samples: int,
     sources: set[str],
-) -> list[_ChannelColumn]:
+) -> list[ChannelColumn]:
     pairs = [(role, *pair) for role, names in roles.items() for pair in pairs_of(names)]
     if not pairs:
         pairs = [
             (Role.OTHER, key, key)
             for key, length in table.lengths.items()
-            if key not in (time, record) and length == n_samples
+            if key not in (time, record)
+            and (length == n_samples if table.clock is None else _moves(table, key))
         ]
+        if table.clock is not None and len(pairs) > MOST_UNNAMED:
+            raise OptionError(
+                f"{table.path.name} holds {len(pairs)} columns that move, with clocks of their own",
+                found=", ".join(key for _, _, key in pairs[:8]) + ", …",
+                needed="the channels that are meant, by name",
+                action="name inputs and outputs; flightid inspect lists all columns",
+            )
     names = [name for _, name, _ in pairs]
     if repeated := {name for name in names if names.count(name) > 1}:
         raise OptionError(
@@ -319,7 +316,7 @@ def _wanted(
     for _, _, column in pairs:
         table.require(column)
     return [
-        _ChannelColumn(
+        ChannelColumn(
             Channel(
                 name,
                 column_unit(table, column, name, units, default="1"),
@@ -332,56 +329,10 @@ def _wanted(
     ]
 
 
-def _pieces(
-    stamps: NDArray[np.float64],
-    rows: dict[str, NDArray[np.float64]],
-    wanted: Sequence[_ChannelColumn],
-    base: _Base,
-    beside: Sequence[tuple[Channel, NDArray[np.float64], NDArray[np.float64]]],
-) -> list[tuple[NDArray[np.float64], Mapping[str, NDArray[np.float64]], tuple[Step, ...]]]:
-    """The rows of a manoeuvre without outliers, on the grid that was asked for."""
-    steps: tuple[Step, ...] = ()
-    if base.outliers is not None:
-        rows, step = _without_outliers(stamps, rows, wanted, base.outliers)
-        steps = (step,)
-    steps += entry_steps([(c.channel, stamps, rows[c.channel.name]) for c in wanted], beside)
-    if base.resample_to_s is None:
-        return [(stamps, rows, steps)]
-    require_sensible_base(stamps, base.resample_to_s, base.time_column)
-    made = to_uniform(
-        {key: (stamps, values) for key, values in rows.items()},
-        sample_time_s=base.resample_to_s,
-        gaps="split",
-        max_gap_s=base.max_gap_s,
-        interpolation=base.methods(wanted, mean_spacing_s(stamps)),
-    )
-    steps = (*steps, Step("conditioning.to_uniform", made.options, VERSION))
-    return [(span.time_s, span.samples, steps) for span in made.spans]
-
-
-def _without_outliers(
-    stamps: NDArray[np.float64],
-    rows: dict[str, NDArray[np.float64]],
-    wanted: Iterable[_ChannelColumn],
-    asked: Mapping[str, Any],
-) -> tuple[dict[str, NDArray[np.float64]], Step]:
-    limits = {"deviations": 6.0, "half_width": 3, **asked}
-    outputs = [item.channel.name for item in wanted if item.channel.role is Role.OUTPUT]
-    names = outputs if limits.pop("channels", None) is None else list(asked["channels"])
-    counts: dict[str, Cell] = {}
-    for name in names:
-        if name not in rows:
-            raise unknown_channel(name, rows)
-        samples, count = bridge_outliers(name, stamps, rows[name], **limits)
-        if count:
-            rows, counts = {**rows, name: samples}, {**counts, name: count}
-    return rows, Step(REMOVE_OUTLIERS, {**limits, **counts}, VERSION)
-
-
 def _record(
     time_s: NDArray[np.float64],
     samples: Mapping[str, NDArray[np.float64]],
-    wanted: Iterable[_ChannelColumn],
+    wanted: Iterable[ChannelColumn],
     name: str,
     history: tuple[Step, ...],
 ) -> Record:

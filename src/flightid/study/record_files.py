@@ -13,10 +13,10 @@ from flightid.errors import StudyError
 from flightid.option_forms import NOTHING, SPAN
 from flightid.options import Options, option
 from flightid.record import InputShape, Record, read_records
+from flightid.record.derived import sources_of
 from flightid.record.hold import HOLDS, LOOPS
 from flightid.record.options import TableOptions
 from flightid.record.store import RECORD_COLUMN
-from flightid.record.tables import sources_of
 from flightid.study.error_list import ErrorList
 from flightid.study.reading import TableReader, read_table
 
@@ -49,7 +49,7 @@ class RecordFile(ShapeOptions, TableOptions):
 
     name: str = option(doc="Name by which models refer to it.")
     path: tuple[str, ...] = option(
-        doc="CSV, Parquet, MATLAB or netCDF, by name or pattern; the name stands for all pieces."
+        doc="Table or ROS bag, by name or pattern; the name stands for all pieces."
     )
     manoeuvre: str | None = option(
         None, doc="Name of the manoeuvre where the file holds several; '*': all, as one group."
@@ -105,7 +105,7 @@ def require_files(files: Iterable[RecordFile]) -> None:
 
 
 def _require_file(name: str, path: Path) -> None:
-    if not path.is_file():
+    if not path.exists():
         raise StudyError(
             f"the file of record {name!r} is not there",
             found=str(path),

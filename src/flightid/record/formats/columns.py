@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,24 @@ from flightid.units import canonical
 
 VALUE_BYTES = 3 * 8
 """What a sample takes on its way into a record: as it was read, as a double, in the record."""
+SHOWN = 30
+"""Columns that an error names; of more the nearest."""
 HEADING = re.compile(r"^(?P<name>.*\S)\s*\[(?P<unit>[^\[\]]*)\]$")
+
+
+@dataclass(frozen=True, eq=False)
+class Clock:
+    """Stamps of columns that have their own.
+
+    Attributes
+    ----------
+    time_s : ndarray, shape (n,)
+    said : str
+        Where the stamps come from, in words.
+    """
+
+    time_s: NDArray[np.float64]
+    said: str
 
 
 @dataclass(frozen=True)
@@ -36,6 +54,9 @@ class ColumnTable:
         Units as the file spells them; columns left out state none.
     advice : str
         What the file holds that is no column, and how to make columns of it.
+    clock : callable or None
+        Takes a column name, returns its stamps, where not all columns have the same; None: the
+        time column holds them.
 
     Example
     -------
@@ -49,6 +70,7 @@ class ColumnTable:
     load: Callable[[str], NDArray[Any]]
     units: Mapping[str, str] = field(default_factory=dict)
     advice: str = ""
+    clock: Callable[[str], Clock] | None = None
 
     def named(self, headings: Sequence[str]) -> ColumnTable:
         """The same columns under other headings, in their order.
@@ -62,12 +84,14 @@ class ColumnTable:
         names, units = split_headings(headings)
         require_distinct(self.path, names)
         old = dict(zip(names, self.lengths, strict=True))
+        own = self.clock
         return ColumnTable(
             self.path,
             {name: self.lengths[key] for name, key in old.items()},
             lambda name: self.load(old[name]),
             {n: self.units[key] for n, key in old.items() if key in self.units} | units,
             self.advice,
+            None if own is None else lambda name: own(old[name]),
         )
 
     def require(self, name: str) -> None:
@@ -79,10 +103,13 @@ class ColumnTable:
             There is no such column; the message lists those there are.
         """
         if name not in self.lengths:
+            names = list(self.lengths)
+            near = get_close_matches(name, names, SHOWN, 0.0) if len(names) > SHOWN else names
+            more = f" and {len(names) - len(near)} others" if len(names) > len(near) else ""
             raise UnknownNameError(
                 f"{self.path.name} has no column of this name",
                 found=name,
-                needed="one of " + ", ".join(self.lengths),
+                needed=f"one of {', '.join(near)}{more}",
                 action=self.advice or None,
             )
 

@@ -7,8 +7,12 @@ from enum import StrEnum
 from pathlib import Path
 
 from flightid.errors import FileFormatError
+from flightid.record.formats.foreign import foreign
 
 TEXT_SUFFIXES = {".csv", ".txt", ".tsv", ".dat"}
+SNIFFED = 4096
+OTHERS = "read autopilot logs with read_log; export other data as CSV or Parquet"
+BAG_SIGNATURES = (b"\x89MCAP0\r\n", b"#ROSBAG V2.0\n", b"SQLite format 3\x00")
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
@@ -21,6 +25,7 @@ class FileFormat(StrEnum):
     MATLAB_HDF5 = "matlab-hdf5"
     NETCDF_CLASSIC = "netcdf-classic"
     NETCDF = "netcdf"
+    BAG = "ros-bag"
 
 
 def file_format(path: Path) -> FileFormat:
@@ -46,16 +51,22 @@ def file_format(path: Path) -> FileFormat:
     ...     file_format(write_atomically(Path(folder) / "a.csv", "time,p"))
     <FileFormat.CSV: 'csv'>
     """
+    if path.is_dir():
+        return FileFormat.BAG
     with path.open("rb") as stream:
-        head = stream.read(1024)
+        head = stream.read(SNIFFED)
     suffix = path.suffix.lower()
-    found = _by_content(head, suffix)
+    strange = foreign(head)
+    found = None if strange else _by_content(head, suffix)
     if found is None:
+        if strange is None and _is_text(head):
+            strange = "text", f"if it is a table, give it a name that ends in .csv, not {suffix!r}"
+        what, action = strange or (f"first bytes {head[:8]!r}", OTHERS)
         raise FileFormatError(
             f"{path.name} is of no format that holds records",
-            found=f"first bytes {head[:8]!r}" if head else "an empty file",
-            needed="CSV text, Parquet, MATLAB .mat or netCDF",
-            action="read autopilot logs with read_log; export other data as CSV or Parquet",
+            found=what,
+            needed="CSV text, Parquet, MATLAB .mat, netCDF or a ROS bag",
+            action=action,
         )
     return found
 
@@ -70,6 +81,7 @@ def _by_content(head: bytes, suffix: str) -> FileFormat | None:
     hdf5 = FileFormat.MATLAB_HDF5 if suffix == ".mat" else FileFormat.NETCDF
     # Level 5 MATLAB files begin with a text and end their header with a byte-order mark.
     signs = (
+        (head.startswith(BAG_SIGNATURES), FileFormat.BAG),
         (head[:4] == b"PAR1", FileFormat.PARQUET),
         (head[:4] in (b"CDF\x01", b"CDF\x02", b"CDF\x05"), FileFormat.NETCDF_CLASSIC),
         (head[:8] == HDF5_SIGNATURE, hdf5),

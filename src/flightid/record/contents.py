@@ -1,0 +1,63 @@
+"""What a file of records holds, column by column: for those who are to name channels."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from flightid.record.formats import ColumnTable, file_format
+from flightid.record.tables import read_table
+from flightid.table import Cell, Column, Table
+
+
+def table_contents(path: str | Path) -> Table:
+    r"""Columns of a file with unit, samples, rate, range, and the stamps of a bag's topics.
+
+    Parameters
+    ----------
+    path : str or Path
+        CSV, Parquet, MATLAB, netCDF, or a ROS bag.
+
+    Raises
+    ------
+    FileFormatError
+        The content is of no known format, damaged or too large.
+
+    Example
+    -------
+    >>> import tempfile
+    >>> from flightid.files import write_atomically
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = write_atomically(Path(folder) / "a.csv", "time,p [deg/s]\n0,1\n1,3\n")
+    ...     table_contents(path).rows
+    (('time', None, 2, None, 0.0, 1.0), ('p', 'deg/s', 2, None, 1.0, 3.0))
+    """
+    path = Path(path)
+    kind = file_format(path)
+    table = read_table(path, kind, ())
+    rows = tuple(_row(table, name) for name in table.lengths)
+    moving = tuple(row for row in rows if row[-2] is None or row[-2] != row[-1])
+    notes = [table.advice] if table.advice else []
+    if table.clock is not None:
+        notes += dict.fromkeys(table.clock(name).said for name in table.lengths)
+    if len(moving) < len(rows):
+        notes.append(f"Not listed: {len(rows) - len(moving)} columns that never move.")
+    notes.append(f"Next: flightid run {path.name} --inputs COLUMN --outputs COLUMN")
+    columns = (
+        *(Column("column"), Column("unit"), Column("samples"), Column("rate", "Hz")),
+        *(Column("least"), Column("most")),
+    )
+    return Table(f"{path.name}: {len(rows)} columns, {kind}", columns, moving, tuple(notes))
+
+
+def _row(table: ColumnTable, name: str) -> tuple[Cell, ...]:
+    values, rate_hz = table.raw(name), None
+    if table.clock is not None:
+        steps = np.diff(table.clock(name).time_s)
+        rate_hz = 1.0 / float(np.median(steps)) if steps.size and np.median(steps) > 0 else None
+    least = most = None
+    if values.dtype.kind in "fiub":
+        finite = values[np.isfinite(values)]
+        least, most = (float(finite.min()), float(finite.max())) if finite.size else (None, None)
+    return name, table.units.get(name), table.lengths[name], rate_hz, least, most

@@ -1,0 +1,79 @@
+"""Bags of ROS 1: records of a header of ``name=value`` fields, and data; chunks hold further ones.
+
+Reference: "Bags/Format/2.0", wiki.ros.org.
+"""
+
+from __future__ import annotations
+
+import io
+import struct
+from pathlib import Path
+from typing import BinaryIO
+
+from flightid.reading import require_memory
+from flightid.record.formats.ros.content import BagContent, Topic, inflated
+
+MAGIC = b"#ROSBAG V2.0\n"
+MESSAGE, CHUNK, CONNECTION = 2, 5, 7
+
+
+def gather(path: Path, content: BagContent) -> None:
+    """Add the messages of a file to the content of a bag.
+
+    Raises
+    ------
+    FileFormatError
+        A record is not one, or more than the memory budget.
+    """
+    with path.open("rb") as stream:
+        stream.seek(len(MAGIC))
+        _walk(stream, path, content, path.stat().st_size)
+
+
+def _walk(
+    stream: BinaryIO, path: Path, content: BagContent, end: int, *, is_chunk: bool = False
+) -> None:
+    while len(size := stream.read(4)) == 4:
+        header = _fields(_block(stream, size, end, path))
+        size = stream.read(4)
+        kind = header["op"][0]
+        if kind not in (MESSAGE, CHUNK, CONNECTION) or (kind == CHUNK and is_chunk):
+            stream.seek(int.from_bytes(size, "little"), 1)
+            continue
+        if len(size) < 4 or int.from_bytes(size, "little") > end - stream.tell():
+            break
+        data = _block(stream, size, end, path)
+        if kind == CHUNK:
+            unpacked = int.from_bytes(header["size"], "little")
+            inner = inflated(path.name, header["compression"].decode("ascii"), data, unpacked)
+            _walk(io.BytesIO(inner), path, content, len(inner), is_chunk=True)
+        elif kind == CONNECTION:
+            said = _fields(data)
+            said_type, definition, name = (
+                value.decode("utf-8", "replace")
+                for value in (said["type"], said["message_definition"], header["topic"])
+            )
+            topic = Topic(name, said_type, definition, "ros1")
+            content.topics.setdefault((path, header["conn"]), topic)
+        else:
+            seconds, rest = struct.unpack("<II", header["time"])
+            content.add((path, header["conn"]), seconds * 1_000_000_000 + rest, data)
+    else:
+        return
+    content.cut = path.name
+
+
+def _block(stream: BinaryIO, size: bytes, end: int, path: Path) -> bytes:
+    count = int.from_bytes(size, "little")
+    require_memory(path.name, count)
+    return stream.read(min(count, max(0, end - stream.tell())))
+
+
+def _fields(header: bytes) -> dict[str, bytes]:
+    found, at = {}, 0
+    while at < len(header):
+        (size,) = struct.unpack_from("<I", header, at)
+        name, _, value = header[at + 4 : at + 4 + size].partition(b"=")
+        found[name.decode("ascii", "replace")] = value
+        at += 4 + size
+    return found

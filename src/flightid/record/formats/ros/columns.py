@@ -1,0 +1,218 @@
+"""A bag as columns: fields of topics, each topic on its own stamps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.errors import FileFormatError, FlightidError, OptionError
+from flightid.reading import bounded_bytes, decoding
+from flightid.record.formats.columns import Clock, ColumnTable
+from flightid.record.formats.ros import bag1, mcap, storage
+from flightid.record.formats.ros.content import BagContent, Topic
+from flightid.record.formats.ros.decode import decoded, leading_columns
+from flightid.record.formats.ros.definitions import parsed, shipped
+from flightid.record.formats.ros.plan import Plan, plan_of
+
+CONTAINERS: tuple[tuple[bytes, Callable[[Path, BagContent], None]], ...] = (
+    (mcap.MAGIC, mcap.gather),
+    (bag1.MAGIC, bag1.gather),
+    (storage.MAGIC, storage.gather),
+)
+"""Readers by the first bytes of a file."""
+UNITS = {
+    "sensor_msgs/Imu.angular_velocity": "rad/s",
+    "sensor_msgs/Imu.linear_acceleration": "m/s^2",
+    "sensor_msgs/MagneticField.magnetic_field": "T",
+    "sensor_msgs/FluidPressure.fluid_pressure": "Pa",
+    "sensor_msgs/BatteryState.voltage": "V",
+    "sensor_msgs/BatteryState.current": "A",
+    "geometry_msgs/Twist.linear": "m/s",
+    "geometry_msgs/Twist.angular": "rad/s",
+    "geometry_msgs/Accel.linear": "m/s^2",
+    "geometry_msgs/Accel.angular": "rad/s^2",
+    "geometry_msgs/Wrench.force": "N",
+    "geometry_msgs/Wrench.torque": "N*m",
+    "geometry_msgs/Pose.position": "m",
+    "geometry_msgs/Transform.translation": "m",
+}
+"""Units that the definitions of standard messages state (REP 103)."""
+METADATA = "metadata.yaml"
+ENCODINGS = ("cdr", "ros1")
+NS = 1_000_000_000
+SAME_CLOCK_S = 0.5
+"""Distance of the stamps of a header from those of the recorder within which they are one clock."""
+
+
+def bag_files(path: Path) -> list[Path]:
+    """Files of a bag, in the order of their names and numbers.
+
+    Raises
+    ------
+    FileFormatError
+        A folder without any, or whose files are packed as a whole.
+    """
+    if not path.is_dir():
+        return [path]
+    files = sorted(
+        (each for each in path.iterdir() if each.suffix in (".mcap", ".db3") and each.is_file()),
+        key=lambda each: (len(each.name), each.name),
+    )
+    about = path / METADATA
+    packed = about.is_file() and b"compression_mode: MESSAGE" in bounded_bytes(about, 1 << 24)
+    if files and not packed:
+        return files
+    raise FileFormatError(
+        f"{path.name} is a folder and no bag that is read",
+        found="messages packed one by one" if packed else f"{len(list(path.iterdir()))} files",
+        needed=".mcap or .db3 files",
+        action="ros2 bag convert rewrites a bag unpacked; zstd -d unpacks .db3.zstd",
+    )
+
+
+def read_columns(path: Path) -> ColumnTable:
+    """Numeric fields of a bag's topics as columns such as ``/imu/angular_velocity.x``.
+
+    Stamps are those of the headers where messages have them and they rise, else those of the
+    recorder; zero is the first message. A header's clock that is not the recorder's is moved onto
+    it by the least difference.
+
+    Parameters
+    ----------
+    path : Path
+        File, or folder of a ROS 2 bag.
+
+    Raises
+    ------
+    FileFormatError
+        The bag is damaged, holds no numbers, or is more than the memory budget.
+    OptionError
+        What unpacks it, or knows its messages, is not installed (extra ``ros``).
+    """
+    content = BagContent(path.name)
+    for file in bag_files(path):
+        with file.open("rb") as stream:
+            head = stream.read(16)
+        gather = next((read for magic, read in CONTAINERS if head.startswith(magic)), None)
+        if gather is None:
+            raise FileFormatError(f"{file.name} is no bag", found=head[:8].hex(" ") or "nothing")
+        with decoding(file.name, "a whole bag", "copy it again, or `ros2 bag reindex`"):
+            gather(file, content)
+    return _table(path, content)
+
+
+def _table(path: Path, content: BagContent) -> ColumnTable:
+    topics: dict[str, Topic] = {}
+    for topic in content.topics.values():
+        known = topics.setdefault(topic.name, topic)
+        if known is not topic:
+            known.received_ns += topic.received_ns
+            known.payloads += topic.payloads
+            known.is_long = known.is_long or topic.is_long
+    stamps = [topic.received_ns[0] for topic in topics.values() if topic.received_ns]
+    of_column: dict[str, tuple[_NumberTopic, str]] = {}
+    left_out: dict[str, str] = {}
+    missing: OptionError | None = None
+    for topic in topics.values():
+        try:
+            numbers = _NumberTopic(path.name, topic, _plan(topic), min(stamps, default=0))
+            of_column |= numbers.columns
+        except FlightidError as fault:
+            missing = fault if isinstance(fault, OptionError) else missing
+            left_out[topic.name] = f"{fault.problem}, {fault.found}"
+    said = [f"{name} left out: {why}" for name, why in left_out.items()]
+    said += [f"{content.cut} ends within a message: it was cut"] if content.cut else []
+    if missing is not None and not of_column:
+        raise missing
+    if not of_column:
+        raise FileFormatError(
+            f"{path.name} holds no topic of numbers",
+            found="; ".join(said) or "no message",
+            needed="messages of numbers with their definitions",
+            action="record it as MCAP, or with ROS 2 Iron or later: such bags hold all definitions",
+        )
+    return ColumnTable(
+        path,
+        {name: topic.n_messages for name, (topic, _) in of_column.items()},
+        lambda name: of_column[name][0].column(of_column[name][1]),
+        {name: unit for name, (topic, key) in of_column.items() if (unit := topic.unit(key))},
+        "; ".join(said),
+        lambda name: of_column[name][0].clock,
+    )
+
+
+def _plan(topic: Topic) -> Plan:
+    """Plan of a topic's messages.
+
+    Raises
+    ------
+    FlightidError
+        They are no numbers that can be read.
+    """
+    if topic.is_long:
+        raise FileFormatError("its messages are too long for samples", found=topic.type)
+    if topic.encoding not in ENCODINGS:
+        raise FileFormatError("its encoding is not read", found=topic.encoding or "none")
+    if not topic.payloads:
+        raise FileFormatError("it has no message", found=topic.type)
+    known = parsed(topic.type, topic.definition) if topic.definition else shipped(topic.type)
+    if known is None:
+        raise FileFormatError("the bag does not define its messages", found=topic.type)
+    return plan_of(topic.type, known)
+
+
+class _NumberTopic:
+    """A topic whose numbers are columns, decoded when one is asked for."""
+
+    def __init__(self, bag: str, topic: Topic, plan: Plan, origin_ns: int) -> None:
+        self.bag, self.topic, self.plan, self.origin_ns = bag, topic, plan, origin_ns
+        self.n_messages = len(topic.payloads)
+        prefix = topic.name.rstrip("/")
+        self.columns = {
+            f"{prefix}/{key}": (self, key)
+            for key in leading_columns(topic, plan, bag)
+            if key in plan.origins or key.rpartition("[")[0] in plan.origins
+            if not key.startswith("header.") and key not in plan.stamp
+        }
+
+    def unit(self, key: str) -> str | None:
+        """Unit of a field by the message that it belongs to."""
+        origins = self.plan.origins
+        return UNITS.get(origins.get(key) or origins[key.rpartition("[")[0]])
+
+    @cached_property
+    def values(self) -> dict[str, NDArray[np.float64]]:
+        """Numbers by field."""
+        names, values = decoded(self.topic, self.plan, self.bag)
+        self.topic.payloads.clear()
+        return {name: values[:, index] for index, name in enumerate(names) if name}
+
+    def column(self, key: str) -> NDArray[np.float64]:
+        """Numbers of a field, shape (n_messages,)."""
+        return self.values[key]
+
+    @cached_property
+    def clock(self) -> Clock:
+        """Stamps of the messages, and which they are."""
+        whole, rest = divmod(self.origin_ns, NS)
+        since_ns = np.array(self.topic.received_ns, dtype=np.int64) - self.origin_ns
+        received = since_ns / NS
+        name = self.topic.name
+        if not self.plan.stamp:
+            return Clock(received, f"{name}: stamps of the recorder, there is no header")
+        if len(self.plan.stamp) == 1:
+            own = self.values[self.plan.stamp[0]] * 1e-6
+        else:
+            seconds, ns = (self.values[key] for key in self.plan.stamp)
+            own = (seconds - whole) + (ns - rest) / NS
+        if not np.all(np.diff(own) > 0):
+            return Clock(received, f"{name}: stamps of the recorder, those of the headers stand")
+        late = received - own
+        if abs(float(np.median(late))) <= SAME_CLOCK_S:
+            return Clock(own, f"{name}: stamps of the headers")
+        shift = float(np.min(late))
+        return Clock(own + shift, f"{name}: stamps of the headers, moved by {shift:.6g} s")

@@ -1,0 +1,139 @@
+"""What a bag holds, gathered message by message within the memory budget."""
+
+from __future__ import annotations
+
+import bz2
+import io
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import IO, cast
+
+from flightid.errors import FileFormatError
+from flightid.extras import extra_module
+from flightid.reading import require_memory
+
+LONGEST = 1 << 16
+"""Bytes of a message beyond which it is a picture or a cloud, not samples."""
+OVERHEAD = 150
+"""Bytes that the interpreter takes for a message beside its own."""
+PIECE = 1 << 20
+
+
+@dataclass(eq=False)
+class Topic:
+    """A topic with its messages, not decoded.
+
+    Attributes
+    ----------
+    name, type : str
+        Such as "/imu" and "sensor_msgs/Imu".
+    definition : str
+        Text of the message definition; empty where the bag holds none.
+    encoding : str
+        "cdr" or "ros1"; others are not decoded.
+    received_ns : list of int
+        Stamps of the recorder.
+    payloads : list of bytes
+    is_long : bool
+        Its messages are too long for samples and were left out.
+    """
+
+    name: str
+    type: str
+    definition: str
+    encoding: str
+    received_ns: list[int] = field(default_factory=list)
+    payloads: list[bytes] = field(default_factory=list)
+    is_long: bool = False
+
+
+@dataclass(eq=False)
+class BagContent:
+    """Topics by what their container calls them; `cut` says where a file ended too early."""
+
+    name: str
+    topics: dict[object, Topic] = field(default_factory=dict)
+    cut: str = ""
+    n_bytes: int = 0
+
+    def add(self, key: object, received_ns: int, payload: bytes) -> None:
+        """Keep a message of a topic.
+
+        Raises
+        ------
+        FileFormatError
+            The topic was not declared, or the messages are more than the memory budget.
+        """
+        topic = self.topics.get(key)
+        if topic is None:
+            raise FileFormatError(
+                f"{self.name} holds a message of no topic",
+                found=repr(key)[:40],
+                needed="a channel for each",
+            )
+        if topic.is_long:
+            return
+        if len(payload) > LONGEST:
+            self.n_bytes -= sum(map(len, topic.payloads)) + OVERHEAD * len(topic.payloads)
+            topic.is_long = True
+            topic.received_ns.clear()
+            topic.payloads.clear()
+            return
+        self.n_bytes += len(payload) + OVERHEAD
+        require_memory(self.name, self.n_bytes)
+        topic.received_ns.append(received_ns)
+        topic.payloads.append(payload)
+
+
+def inflated(name: str, kind: str, data: bytes, size: int) -> bytes:
+    """Content of a compressed chunk, of the size that it declares.
+
+    Parameters
+    ----------
+    name : str
+        Of the file.
+    kind : str
+        "" or "none", "bz2", "lz4", "zstd".
+    data : bytes
+    size : int
+        Bytes that it declares.
+
+    Raises
+    ------
+    FileFormatError
+        It is of another size, or more than the memory budget.
+    OptionError
+        The library that unpacks it is not installed.
+    """
+    require_memory(name, size)
+    if kind in ("", "none"):
+        stream: IO[bytes] = io.BytesIO(data)
+    elif kind == "bz2":
+        stream = cast(IO[bytes], bz2.BZ2File(io.BytesIO(data)))
+    elif kind == "lz4":
+        stream = extra_module("lz4.frame", "a bag packed with lz4").open(io.BytesIO(data))
+    elif kind == "zstd":
+        library = extra_module("zstandard", "a bag packed with zstd")
+        stream = library.ZstdDecompressor(max_window_size=1 << 27).stream_reader(data)
+    else:
+        raise FileFormatError(
+            f"{name} is packed in a way that is not read",
+            found=kind[:20],
+            needed="bz2, lz4 or zstd",
+        )
+    content = b"".join(_pieces(stream, size + 1))
+    if len(content) != size:
+        raise FileFormatError(
+            f"a chunk of {name} is not as long as it says",
+            found=f"{len(content)} bytes",
+            needed=f"{size}",
+            action="copy the bag again",
+        )
+    return content
+
+
+def _pieces(stream: IO[bytes], most: int) -> Iterator[bytes]:
+    """Content in pieces: memory grows with what is there, not with what is declared."""
+    while most > 0 and (piece := stream.read(min(PIECE, most))):
+        most -= len(piece)
+        yield piece

@@ -1,0 +1,134 @@
+"""Rows of a table on the grid of a record: without outliers, each channel from its own stamps."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.conventions import Role
+from flightid.record.channel import Channel
+from flightid.record.checks import REMOVE_OUTLIERS, entry_steps
+from flightid.record.history import Step
+from flightid.record.hold import InputHold
+from flightid.record.interpolation import Interpolation, is_coarser, usual_method
+from flightid.record.outlying import bridge_outliers
+from flightid.record.rows import require_sensible_base
+from flightid.record.stamps import mean_spacing_s
+from flightid.record.timebase import to_uniform
+from flightid.record.validation import unknown_channel
+from flightid.table import Cell
+from flightid.version import VERSION
+
+Array = NDArray[np.float64]
+Rows = Mapping[str, tuple[Array, Array]]
+"""Stamps, s, and samples by channel; those of a table share their stamps."""
+
+
+@dataclass(frozen=True)
+class ChannelColumn:
+    """A channel of the record and the column it comes from."""
+
+    channel: Channel
+    column: str
+
+
+@dataclass(frozen=True)
+class RowGrid:
+    """What is done to the rows of a manoeuvre before they are a record.
+
+    Attributes
+    ----------
+    wanted : tuple of ChannelColumn
+    resample_to_s, max_gap_s, interpolation, outliers, hold, time_column
+        As in `read_records`.
+    has_clocks : bool
+        Channels have stamps of their own: they always go to one grid, that of the slowest input or
+        output where none is stated.
+    """
+
+    wanted: tuple[ChannelColumn, ...]
+    resample_to_s: float | None
+    max_gap_s: float | None
+    interpolation: Interpolation | str | Mapping[str, Interpolation | str] | None
+    outliers: Mapping[str, Any] | None
+    hold: InputHold | None
+    time_column: str
+    has_clocks: bool = False
+
+    def step_s(self, rows: Rows) -> float | None:
+        """Spacing of the grid, s; None: the rows are the grid."""
+        if self.resample_to_s is not None or not self.has_clocks:
+            return self.resample_to_s
+        roles = {item.channel.name: item.channel.role for item in self.wanted}
+        decide = [name for name, role in roles.items() if role in (Role.INPUT, Role.OUTPUT)]
+        slowest = max(float(np.median(np.diff(rows[name][0]))) for name in decide or roles)
+        return float(f"{slowest:.9g}")
+
+    def methods(self, rows: Rows, step_s: float) -> dict[str, Interpolation | str]:
+        """Interpolation by channel: what was asked for, else what the inputs' hold calls for."""
+        given = self.interpolation
+        if isinstance(given, str):
+            return {item.channel.name: given for item in self.wanted}
+        found: dict[str, Interpolation | str] = {}
+        for item in self.wanted:
+            hold = self.hold if item.channel.role is Role.INPUT else None
+            source_s = mean_spacing_s(rows[item.channel.name][0])
+            found[item.channel.name] = usual_method(hold, source_s, step_s)
+        return {**found, **(given or {})}
+
+    def hold_after(self, rows: Rows) -> InputHold | None:
+        """What is still true of the inputs: what was low-passed is smooth."""
+        step_s = self.step_s(rows)
+        if step_s is None or self.hold is None:
+            return self.hold
+        ways = self.methods(rows, step_s)
+        driving = [i.channel.name for i in self.wanted if i.channel.role is Role.INPUT]
+        filtered = any(
+            is_coarser(step_s, mean_spacing_s(rows[name][0])) and ways[name] != "previous"
+            for name in driving
+        )
+        return "band_limited" if filtered else self.hold
+
+    def pieces(
+        self, rows: Rows, beside: Sequence[tuple[Channel, Array, Array]]
+    ) -> list[tuple[Array, Mapping[str, Array], tuple[Step, ...]]]:
+        """Stamps, samples and history of each piece between gaps."""
+        steps: tuple[Step, ...] = ()
+        if self.outliers is not None:
+            rows, step = self._without_outliers(rows, self.outliers)
+            steps = (step,)
+        entering = [(c.channel, *rows[c.channel.name]) for c in self.wanted]
+        steps += entry_steps(entering, beside)
+        step_s = self.step_s(rows)
+        if step_s is None:
+            stamps = next(iter(rows.values()))[0]
+            return [(stamps, {name: values for name, (_, values) in rows.items()}, steps)]
+        fastest = min((time_s for time_s, _ in rows.values()), key=mean_spacing_s)
+        require_sensible_base(fastest, step_s, self.time_column)
+        made = to_uniform(
+            rows,
+            sample_time_s=step_s,
+            gaps="split",
+            max_gap_s=self.max_gap_s,
+            interpolation=self.methods(rows, step_s),
+        )
+        steps = (*steps, Step("conditioning.to_uniform", made.options, VERSION))
+        return [(span.time_s, span.samples, steps) for span in made.spans]
+
+    def _without_outliers(self, rows: Rows, asked: Mapping[str, Any]) -> tuple[Rows, Step]:
+        limits = {"deviations": 6.0, "half_width": 3, **asked}
+        outputs = [item.channel.name for item in self.wanted if item.channel.role is Role.OUTPUT]
+        names = outputs if limits.pop("channels", None) is None else list(asked["channels"])
+        counts: dict[str, Cell] = {}
+        for name in names:
+            if name not in rows:
+                raise unknown_channel(name, rows)
+            time_s = rows[name][0]
+            samples, count = bridge_outliers(name, *rows[name], **limits)
+            if count:
+                rows, counts = {**rows, name: (time_s, samples)}, {**counts, name: count}
+        return rows, Step(REMOVE_OUTLIERS, {**limits, **counts}, VERSION)
