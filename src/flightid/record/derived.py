@@ -14,6 +14,7 @@ from flightid.dimensions import unit_of
 from flightid.errors import ModelError, OptionError
 from flightid.formula import RESERVED, formula_names
 from flightid.record.formats import ColumnTable
+from flightid.record.formats.columns import channel_name
 from flightid.record.rows import column_unit
 
 OPERAND = re.compile(
@@ -117,8 +118,7 @@ def _derived(table: ColumnTable, name: str, formula: str, units: Mapping[str, st
             action="columns with other signs in their names get new ones with column_names",
         ) from fault
     sources = [columns.get(each, each) for each in names]
-    for source in sources:
-        table.require(source)
+    sources = [table.require(source) for source in sources]
     own = table.clock
     if own is not None and len({id(own(source)) for source in sources}) > 1:
         raise OptionError(
@@ -159,10 +159,11 @@ class _FormulaColumn:
 
     def unit(self, subject: str, formula: str, units: Mapping[str, str]) -> str | None:
         """Unit of the formula; None where no column in it has any."""
-        if not any(each in self.table.units or each in units for each in self.sources.values()):
+        columns = self.sources.values()
+        if not any(each in self.table.units or channel_name(each) in units for each in columns):
             return None
         known = {
-            word: column_unit(self.table, each, each, units, "1")
+            word: column_unit(self.table, each, channel_name(each), units, "1")
             for word, each in self.sources.items()
         }
         try:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ from flightid.reading import of_file
 from flightid.record.channel import DECLARED, Channel
 from flightid.record.derived import sources_of, with_derived
 from flightid.record.formats import ColumnTable, file_format
-from flightid.record.formats.columns import is_unit
+from flightid.record.formats.columns import channel_name, is_unit
 from flightid.record.history import Step
 from flightid.record.hold import InputHold, InputShape, Loop
 from flightid.record.interpolation import Interpolation
@@ -39,6 +39,7 @@ from flightid.table import Cell
 from flightid.units import canonical
 from flightid.version import VERSION
 
+_Witness = tuple[Channel, NDArray[np.float64], NDArray[np.float64]]
 MOST_UNNAMED = 24
 """Columns with clocks of their own that are taken where none is named."""
 
@@ -78,7 +79,8 @@ def read_records(
     Columns of a bag (ROS 1 ``.bag``, ROS 2 ``.mcap``, ``.db3`` or their folder) are the numbers of
     its messages, ``/imu/angular_velocity.x``, each topic on its own stamps: those of the headers
     where they rise, else those of the recorder. They always go to one grid, that of the slowest
-    input or output unless `resample_to_s` says another; the history tells both.
+    input or output unless `resample_to_s` says another; the history tells both. A slash in a
+    column's name is a point in its channel's: ``imu.angular_velocity.x``.
 
     Parameters
     ----------
@@ -169,65 +171,46 @@ def read_records(
     roles: dict[Role, Names | None] = {
         role: (names,) if isinstance(names, str) else names for role, names in groups.items()
     }
-    units, derive = with_time_unit(units or {}, time_column, time_unit), derive or {}
+    units = {
+        key if key == time_column else channel_name(key): u for key, u in (units or {}).items()
+    }
+    units, derive = with_time_unit(units, time_column, time_unit), derive or {}
     stored = selected_records(source, kind, roles, units)
     if stored is not None:
         refuse_columns(source, column_names, derive)
         return [_declared(item, InputShape(hold, period_s, loop)) for item in stored]
     table = with_derived(read_table(source, kind, column_names), derive, units)
-    own, shared = table.clock, np.empty(0)
-    if own is None:
-        shared = row_stamps(table, time_column, units, sample_time_s)
-    elif sample_time_s is not None:
-        raise OptionError(
-            f"{source.name} has stamps", found=f"sample_time_s={sample_time_s}", needed="none"
-        )
+    shared = row_stamps(table, time_column, units, sample_time_s)
     wanted = _wanted(
-        table, roles, units, time_column, record_column, shared.size, sources_of(derive)
+        table,
+        roles,
+        units,
+        time_column,
+        record_column,
+        shared.size,
+        set(map(channel_name, sources_of(derive))),
     )
-    rows = {
-        item.channel.name: (
-            shared if own is None else own(item.column).time_s,
-            table.column(item.column),
-        )
-        for item in wanted
-    }
-    for item in wanted:
-        found, needed = (values.size for values in reversed(rows[item.channel.name]))
-        if found != needed:
-            raise DataError(
-                f"column {item.column!r} is not as long as the time",
-                found=f"{found} samples",
-                needed=f"{needed}",
-            )
+    rows = _rows(table, wanted, shared)
     grid = RowGrid(
         tuple(wanted), resample_to_s, max_gap_s, interpolation, outliers, hold, time_column,
-        has_clocks=own is not None,
+        has_clocks=table.clock is not None,
     )  # fmt: skip
     options: dict[str, Cell] = {
         "file": source.name,
         "sha256": sha256_of_file(source),
-        "time": time_column if own is None and sample_time_s is None else None,
+        "time": time_column if shared.size and sample_time_s is None else None,
         "sample_time_s": sample_time_s,
+        **_said_of_stamps(table, wanted),
         **({"column_names": ",".join(column_names)} if column_names else {}),
         **{f"derived {name}": formula for name, formula in derive.items()},
     }
-    parts: list[tuple[slice, str | None]] = [(slice(None), None)]
-    witnesses: list[tuple[Channel, NDArray[np.float64]]] = []
-    if own is not None:
-        options["stamps"] = "; ".join(dict.fromkeys(own(item.column).said for item in wanted))
-    else:
-        taken = {item.column: item.channel for item in wanted}
-        witnesses = turning_columns(table, taken, shared.size)
-        parts = manoeuvres(table, record_column, shared, split_gaps=resample_to_s is None)
     records: list[Record] = []
-    for part, label in parts:
-        if own is None and sample_time_s is None:
+    for part, label, beside in _parts(table, wanted, shared, record_column, grid):
+        if shared.size and sample_time_s is None:
             options["time_unit"] = units.get(time_column) or table.units.get(time_column)
             options["row_spacing_s"] = mean_spacing_s(shared[part])
         history = (Step("read_records", dict(options), VERSION),)
         some = {name: (time_s[part], values[part]) for name, (time_s, values) in rows.items()}
-        beside = [(channel, shared[part], values[part]) for channel, values in witnesses]
         with of_file(source.name):
             for time_s, samples, more in grid.pieces(some, beside):
                 name = label or source.stem
@@ -235,6 +218,48 @@ def read_records(
     records = _numbered(records)
     kept = grid.hold_after(rows)
     return [_declared(item, InputShape(kept, period_s, loop)) for item in records]
+
+
+def _rows(
+    table: ColumnTable, wanted: Iterable[ChannelColumn], shared: NDArray[np.float64]
+) -> dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    """Stamps and samples by channel."""
+    rows = {}
+    for item in wanted:
+        time_s = shared if table.clock is None else table.clock(item.column).time_s
+        values = table.column(item.column)
+        if values.size != time_s.size:
+            raise DataError(
+                f"column {item.column!r} is not as long as the time",
+                found=f"{values.size} samples",
+                needed=f"{time_s.size}",
+            )
+        rows[item.channel.name] = time_s, values
+    return rows
+
+
+def _said_of_stamps(table: ColumnTable, wanted: Iterable[ChannelColumn]) -> dict[str, Cell]:
+    """Where the stamps of columns that have their own come from."""
+    if table.clock is None:
+        return {}
+    return {"stamps": "; ".join(dict.fromkeys(table.clock(i.column).said for i in wanted))}
+
+
+def _parts(
+    table: ColumnTable,
+    wanted: Iterable[ChannelColumn],
+    shared: NDArray[np.float64],
+    record_column: str | None,
+    grid: RowGrid,
+) -> Iterator[tuple[slice, str | None, list[_Witness]]]:
+    """Rows of each manoeuvre, its name, and the columns that bear witness to its units."""
+    if table.clock is not None:
+        yield slice(None), None, []
+        return
+    witnesses = turning_columns(table, {i.column: i.channel for i in wanted}, shared.size)
+    split = grid.resample_to_s is None
+    for part, label in manoeuvres(table, record_column, shared, split_gaps=split):
+        yield part, label, [(channel, shared[part], values[part]) for channel, values in witnesses]
 
 
 def _numbered(records: Sequence[Record]) -> list[Record]:
@@ -291,7 +316,7 @@ def _wanted(
     pairs = [(role, *pair) for role, names in roles.items() for pair in pairs_of(names)]
     if not pairs:
         pairs = [
-            (Role.OTHER, key, key)
+            (Role.OTHER, channel_name(key), key)
             for key, length in table.lengths.items()
             if key not in (time, record)
             and (length == n_samples if table.clock is None else _moves(table, key))
@@ -313,8 +338,7 @@ def _wanted(
             raise UnknownNameError(
                 "a unit is declared for no channel", found=name, needed="one of " + ", ".join(names)
             )
-    for _, _, column in pairs:
-        table.require(column)
+    pairs = [(role, name, table.require(column)) for role, name, column in pairs]
     return [
         ChannelColumn(
             Channel(

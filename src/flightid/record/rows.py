@@ -23,6 +23,8 @@ def row_stamps(
 ) -> NDArray[np.float64]:
     """Time of each row, s, from the column of the stamps or from a stated sample time.
 
+    Columns with stamps of their own have none in common: it is empty.
+
     Raises
     ------
     OptionError
@@ -30,6 +32,14 @@ def row_stamps(
     UnitError
         A unit of the column that is none of time.
     """
+    if table.clock is not None:
+        if sample_time_s is not None:
+            raise OptionError(
+                f"the columns of {table.path.name} have stamps",
+                found=f"sample_time_s={sample_time_s}",
+                needed="no sample time; resample_to_s is that of the new grid",
+            )
+        return np.empty(0)
     if time_column in table.lengths:
         if sample_time_s is not None:
             raise OptionError(

@@ -9,6 +9,7 @@ from flightid.conventions import Role
 from flightid.errors import OptionError, UnitError
 from flightid.record.channel import Channel
 from flightid.record.formats import FileFormat, netcdf, parquet
+from flightid.record.formats.columns import channel_name
 from flightid.record.history import Step
 from flightid.record.record import Record
 from flightid.record.store import stored_records
@@ -40,7 +41,7 @@ def pairs_of(names: Names | None) -> list[tuple[str, str]]:
         return []
     if isinstance(names, Mapping):
         return list(names.items())
-    return [(name, name) for name in names]
+    return [(channel_name(name), name) for name in names]
 
 
 def refuse_columns(path: Path, names: Sequence[str], derive: Mapping[str, str]) -> None:

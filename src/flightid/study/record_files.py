@@ -14,6 +14,7 @@ from flightid.option_forms import NOTHING, SPAN
 from flightid.options import Options, option
 from flightid.record import InputShape, Record, read_records
 from flightid.record.derived import sources_of
+from flightid.record.formats.columns import channel_name
 from flightid.record.hold import HOLDS, LOOPS
 from flightid.record.options import TableOptions
 from flightid.record.store import RECORD_COLUMN
@@ -202,8 +203,8 @@ def _names(records: list[Record]) -> str:
 def _reading(file: RecordFile, roles: Mapping[str, Role]) -> dict[str, Any]:
     """How the file is read: one study may use it in several ways, of other channels each."""
     asked = {each.name: getattr(file, each.name) for each in fields(TableOptions)}
-    known = {*roles, file.time_column, *sources_of(file.derive)}
-    asked["units"] = {key: unit for key, unit in file.units.items() if key in known}
+    known = {*roles, file.time_column, *map(channel_name, sources_of(file.derive))}
+    asked["units"] = {key: unit for key, unit in file.units.items() if channel_name(key) in known}
     if isinstance(file.interpolation, Mapping):
         asked["interpolation"] = {k: way for k, way in file.interpolation.items() if k in roles}
     return asked

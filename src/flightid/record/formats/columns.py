@@ -24,7 +24,7 @@ HEADING = re.compile(r"^(?P<name>.*\S)\s*\[(?P<unit>[^\[\]]*)\]$")
 
 
 @dataclass(frozen=True, eq=False)
-class Clock:
+class ColumnStamps:
     """Stamps of columns that have their own.
 
     Attributes
@@ -70,7 +70,7 @@ class ColumnTable:
     load: Callable[[str], NDArray[Any]]
     units: Mapping[str, str] = field(default_factory=dict)
     advice: str = ""
-    clock: Callable[[str], Clock] | None = None
+    clock: Callable[[str], ColumnStamps] | None = None
 
     def named(self, headings: Sequence[str]) -> ColumnTable:
         """The same columns under other headings, in their order.
@@ -94,15 +94,18 @@ class ColumnTable:
             None if own is None else lambda name: own(old[name]),
         )
 
-    def require(self, name: str) -> None:
-        """Refuse a name that is no column.
+    def require(self, name: str) -> str:
+        """The column of a name, which may be that of its channel; see `channel_name`.
 
         Raises
         ------
         UnknownNameError
             There is no such column; the message lists those there are.
         """
+        found = name
         if name not in self.lengths:
+            found = next((each for each in self.lengths if channel_name(each) == name), "")
+        if not found:
             names = list(self.lengths)
             near = get_close_matches(name, names, SHOWN, 0.0) if len(names) > SHOWN else names
             more = f" and {len(names) - len(near)} others" if len(names) > len(near) else ""
@@ -112,11 +115,11 @@ class ColumnTable:
                 needed=f"one of {', '.join(near)}{more}",
                 action=self.advice or None,
             )
+        return found
 
     def raw(self, name: str) -> NDArray[Any]:
         """Values of a column as the file holds them."""
-        self.require(name)
-        return self.load(name)
+        return self.load(self.require(name))
 
     def column(self, name: str) -> NDArray[np.float64]:
         """Values of a column as numbers.
@@ -137,6 +140,17 @@ class ColumnTable:
                 action="leave the column out, or write it as numbers",
             )
         return np.asarray(values, dtype=np.float64)
+
+
+def channel_name(column: str) -> str:
+    """Name of the channel that a column becomes: a slash parts output and input of a response.
+
+    Example
+    -------
+    >>> channel_name("/imu/rate.x"), channel_name("p")
+    ('imu.rate.x', 'p')
+    """
+    return column.strip("/").replace("/", ".")
 
 
 def require_readable_size(path: Path, n_values: int) -> None:

@@ -39,6 +39,13 @@ _SIGNS: tuple[tuple[int, bytes, str, str], ...] = (
     (0, b"\x0a\x0d\x0d\x0a", "captured network packets", NO_DATA),
     (0, b"\x7fELF", "a program", NO_DATA),
     (0, b"MZ", "a program of Windows", NO_DATA),
+    (0, b"ULog", "a ULog file of another version, or a damaged one", "copy it again"),
+    (
+        0,
+        b"LOGH",
+        "a log of DJI",
+        "DJI's logs are closed: record with an open autopilot, or export CSV",
+    ),
     (0, b"QGC WPL", "a mission of way-points", NO_DATA),
 )
 # Names of members that a zip archive begins with, and what it then is.

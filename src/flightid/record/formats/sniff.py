@@ -63,9 +63,9 @@ def file_format(path: Path) -> FileFormat:
             strange = "text", f"if it is a table, give it a name that ends in .csv, not {suffix!r}"
         what, action = strange or (f"first bytes {head[:8]!r}", OTHERS)
         raise FileFormatError(
-            f"{path.name} is of no format that holds records",
+            f"{path.name} is of no format that holds records or a flight",
             found=what,
-            needed="CSV text, Parquet, MATLAB .mat, netCDF or a ROS bag",
+            needed="CSV text, Parquet, MATLAB .mat, netCDF, a ROS bag, or an autopilot's log",
             action=action,
         )
     return found

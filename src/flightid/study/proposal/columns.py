@@ -64,7 +64,7 @@ def columns_of(
                 "the records have no such column", found=name, needed=", ".join(shared)
             )
     drives, how_in = _told(first, shared, Role.INPUT, inputs, outputs)
-    answers, how_out = _told(first, shared, Role.OUTPUT, outputs, inputs)
+    answers, how_out = _told(first, shared, Role.OUTPUT, outputs, drives)
     for role, found in (("inputs", drives), ("outputs", answers)):
         if not found:
             columns = ", ".join(f"{name} [{first.unit(name) or '?'}]" for name in shared)

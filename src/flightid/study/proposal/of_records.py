@@ -19,6 +19,7 @@ from flightid.identification.advice.delays import delays_to_scan
 from flightid.models.polynomial.orders import USED
 from flightid.models.save import toml_value
 from flightid.record import Record, read_records
+from flightid.record.formats.columns import channel_name
 from flightid.record.options import ReadOptions
 from flightid.study.proposal.columns import Columns, columns_of
 from flightid.study.proposal.proposal import Proposal
@@ -102,6 +103,7 @@ def study_of_records(
         No column can be told for an input or output.
     """
     reading = reading or ReadOptions()
+    inputs, outputs = (tuple(map(channel_name, names)) for names in (inputs, outputs))
     # What is named alone is read, so that no other column's gaps part its manoeuvres.
     named = {"inputs": inputs, "outputs": outputs} if inputs and outputs else {}
     read = [part for path in paths for part in _parts(path, {**vars(reading), **named})]

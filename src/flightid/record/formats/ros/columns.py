@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from flightid.errors import FileFormatError, FlightidError, OptionError
 from flightid.reading import bounded_bytes, decoding
-from flightid.record.formats.columns import Clock, ColumnTable
+from flightid.record.formats.columns import ColumnStamps, ColumnTable
 from flightid.record.formats.ros import bag1, mcap, storage
 from flightid.record.formats.ros.content import BagContent, Topic
-from flightid.record.formats.ros.decode import decoded, leading_columns
 from flightid.record.formats.ros.definitions import parsed, shipped
-from flightid.record.formats.ros.plan import Plan, plan_of
+from flightid.record.formats.ros.layouts import FieldLayout, layout_of
+from flightid.record.formats.ros.payloads import decoded, leading_columns
 
 CONTAINERS: tuple[tuple[bytes, Callable[[Path, BagContent], None]], ...] = (
     (mcap.MAGIC, mcap.gather),
@@ -119,7 +119,7 @@ def _table(path: Path, content: BagContent) -> ColumnTable:
     missing: OptionError | None = None
     for topic in topics.values():
         try:
-            numbers = _NumberTopic(path.name, topic, _plan(topic), min(stamps, default=0))
+            numbers = _NumberTopic(path.name, topic, _layout(topic), min(stamps, default=0))
             of_column |= numbers.columns
         except FlightidError as fault:
             missing = fault if isinstance(fault, OptionError) else missing
@@ -145,8 +145,8 @@ def _table(path: Path, content: BagContent) -> ColumnTable:
     )
 
 
-def _plan(topic: Topic) -> Plan:
-    """Plan of a topic's messages.
+def _layout(topic: Topic) -> FieldLayout:
+    """FieldLayout of a topic's messages.
 
     Raises
     ------
@@ -162,32 +162,32 @@ def _plan(topic: Topic) -> Plan:
     known = parsed(topic.type, topic.definition) if topic.definition else shipped(topic.type)
     if known is None:
         raise FileFormatError("the bag does not define its messages", found=topic.type)
-    return plan_of(topic.type, known)
+    return layout_of(topic.type, known)
 
 
 class _NumberTopic:
     """A topic whose numbers are columns, decoded when one is asked for."""
 
-    def __init__(self, bag: str, topic: Topic, plan: Plan, origin_ns: int) -> None:
-        self.bag, self.topic, self.plan, self.origin_ns = bag, topic, plan, origin_ns
+    def __init__(self, bag: str, topic: Topic, layout: FieldLayout, origin_ns: int) -> None:
+        self.bag, self.topic, self.layout, self.origin_ns = bag, topic, layout, origin_ns
         self.n_messages = len(topic.payloads)
         prefix = topic.name.rstrip("/")
         self.columns = {
             f"{prefix}/{key}": (self, key)
-            for key in leading_columns(topic, plan, bag)
-            if key in plan.origins or key.rpartition("[")[0] in plan.origins
-            if not key.startswith("header.") and key not in plan.stamp
+            for key in leading_columns(topic, layout, bag)
+            if key in layout.origins or key.rpartition("[")[0] in layout.origins
+            if not key.startswith("header.") and key not in layout.stamp
         }
 
     def unit(self, key: str) -> str | None:
         """Unit of a field by the message that it belongs to."""
-        origins = self.plan.origins
+        origins = self.layout.origins
         return UNITS.get(origins.get(key) or origins[key.rpartition("[")[0]])
 
     @cached_property
     def values(self) -> dict[str, NDArray[np.float64]]:
         """Numbers by field."""
-        names, values = decoded(self.topic, self.plan, self.bag)
+        names, values = decoded(self.topic, self.layout, self.bag)
         self.topic.payloads.clear()
         return {name: values[:, index] for index, name in enumerate(names) if name}
 
@@ -196,23 +196,25 @@ class _NumberTopic:
         return self.values[key]
 
     @cached_property
-    def clock(self) -> Clock:
+    def clock(self) -> ColumnStamps:
         """Stamps of the messages, and which they are."""
         whole, rest = divmod(self.origin_ns, NS)
         since_ns = np.array(self.topic.received_ns, dtype=np.int64) - self.origin_ns
         received = since_ns / NS
         name = self.topic.name
-        if not self.plan.stamp:
-            return Clock(received, f"{name}: stamps of the recorder, there is no header")
-        if len(self.plan.stamp) == 1:
-            own = self.values[self.plan.stamp[0]] * 1e-6
+        if not self.layout.stamp:
+            return ColumnStamps(received, f"{name}: stamps of the recorder, there is no header")
+        if len(self.layout.stamp) == 1:
+            own = self.values[self.layout.stamp[0]] * 1e-6
         else:
-            seconds, ns = (self.values[key] for key in self.plan.stamp)
+            seconds, ns = (self.values[key] for key in self.layout.stamp)
             own = (seconds - whole) + (ns - rest) / NS
         if not np.all(np.diff(own) > 0):
-            return Clock(received, f"{name}: stamps of the recorder, those of the headers stand")
+            return ColumnStamps(
+                received, f"{name}: stamps of the recorder, those of the headers stand"
+            )
         late = received - own
         if abs(float(np.median(late))) <= SAME_CLOCK_S:
-            return Clock(own, f"{name}: stamps of the headers")
+            return ColumnStamps(own, f"{name}: stamps of the headers")
         shift = float(np.min(late))
-        return Clock(own + shift, f"{name}: stamps of the headers, moved by {shift:.6g} s")
+        return ColumnStamps(own + shift, f"{name}: stamps of the headers, moved by {shift:.6g} s")

@@ -1,4 +1,4 @@
-"""Payloads of a topic to numbers, by the plan of its type.
+"""Payloads of a topic to numbers, by the layout of its type.
 
 CDR aligns numbers to their size, counted from behind its four bytes of header (OMG DDSI-RTPS 2.5,
 section 10; DDS-XTypes 1.3, section 7.4.1); ROS 1 packs them without gaps, little-endian.
@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 from flightid.errors import FileFormatError
 from flightid.reading import decoding, require_memory
 from flightid.record.formats.ros.content import Topic
-from flightid.record.formats.ros.plan import MOST_ELEMENTS, Plan, Repeat, Run
+from flightid.record.formats.ros.layouts import MOST_ELEMENTS, FieldLayout, NumberRun, Repeat
 
 CDR_HEADER = 4
 PLAIN_CDR = {b"\x00\x00": ">", b"\x00\x01": "<"}
 
 
-def decoded(topic: Topic, plan: Plan, name: str) -> tuple[list[str], NDArray[np.float64]]:
+def decoded(topic: Topic, layout: FieldLayout, name: str) -> tuple[list[str], NDArray[np.float64]]:
     """Numbers of all messages of a topic.
 
     An array as long as a message says has as many columns as in the first message; where a later
@@ -32,7 +32,7 @@ def decoded(topic: Topic, plan: Plan, name: str) -> tuple[list[str], NDArray[np.
     ----------
     topic : Topic
         With at least one message.
-    plan : Plan
+    layout : FieldLayout
     name : str
         Of the bag, for errors.
 
@@ -49,17 +49,17 @@ def decoded(topic: Topic, plan: Plan, name: str) -> tuple[list[str], NDArray[np.
     """
     with decoding(f"{name}, topic {topic.name}", f"messages of type {topic.type}"):
         first = _Message(topic.payloads[0], topic.encoding)
-        first.walk(plan.steps)
+        first.walk(layout.steps)
         require_memory(name, 8.0 * len(first.columns) * len(topic.payloads))
         values = np.empty((len(topic.payloads), len(first.columns)))
         for row, payload in zip(values, topic.payloads, strict=True):
             message = _Message(payload, topic.encoding, first.sizes)
-            message.walk(plan.steps)
+            message.walk(layout.steps)
             row[:] = message.numbers
     return first.columns, values
 
 
-def leading_columns(topic: Topic, plan: Plan, name: str) -> list[str]:
+def leading_columns(topic: Topic, layout: FieldLayout, name: str) -> list[str]:
     """Columns of a topic, as its first message has them; "" where a number is none.
 
     Raises
@@ -69,7 +69,7 @@ def leading_columns(topic: Topic, plan: Plan, name: str) -> list[str]:
     """
     with decoding(f"{name}, topic {topic.name}", f"messages of type {topic.type}"):
         first = _Message(topic.payloads[0], topic.encoding)
-        first.walk(plan.steps)
+        first.walk(layout.steps)
     return first.columns
 
 
@@ -103,7 +103,7 @@ class _Message:
         self.columns: list[str] = []
         self.numbers: list[float] = []
 
-    def walk(self, steps: Sequence[Run | Repeat]) -> None:
+    def walk(self, steps: Sequence[NumberRun | Repeat]) -> None:
         """Take the numbers of some steps."""
         for step in steps:
             if isinstance(step, Repeat):

@@ -25,7 +25,7 @@ VECTORS = ("geometry_msgs/Vector3", "geometry_msgs/Point", "geometry_msgs/Point3
 
 
 @dataclass(frozen=True)
-class Run:
+class NumberRun:
     """Numbers that follow one another: letters of `struct`, and the column of each, "" for none."""
 
     letters: str
@@ -49,61 +49,61 @@ class Repeat:
     count: int | None = None
     letter: str = ""
     text_width: int = 0
-    steps: tuple[Run | Repeat, ...] = ()
+    steps: tuple[NumberRun | Repeat, ...] = ()
     column: str = ""
 
 
 @dataclass(eq=False)
-class Plan:
+class FieldLayout:
     """How messages of a type are walked.
 
     Attributes
     ----------
-    steps : tuple of Run or Repeat
+    steps : tuple of NumberRun or Repeat
     origins : dict of str to str
         Type and field by column, such as "sensor_msgs/Imu.angular_velocity".
     stamp : tuple of str
         Columns of the stamp: s and ns of a header, µs of PX4; empty where there is none.
     """
 
-    steps: tuple[Run | Repeat, ...]
+    steps: tuple[NumberRun | Repeat, ...]
     origins: dict[str, str]
     stamp: tuple[str, ...]
 
 
-def plan_of(type_name: str, known: Definitions) -> Plan:
-    """Plan of a message type.
+def layout_of(type_name: str, known: Definitions) -> FieldLayout:
+    """FieldLayout of a message type.
 
     Raises
     ------
     FileFormatError
         A type is not defined, contains itself, or is too wide.
     """
-    walk = _Walk(type_name, known)
+    walk = _LayoutDraft(type_name, known)
     walk.fields(type_name, "", "", 0)
     stamp = walk.stamp
     if type_name.startswith("px4_msgs/") and "timestamp" in walk.origins:
         stamp = ("timestamp",)
-    return Plan(walk.taken(), walk.origins, stamp)
+    return FieldLayout(walk.taken(), walk.origins, stamp)
 
 
 @dataclass(eq=False)
-class _Walk:
+class _LayoutDraft:
     """A walk through a definition, depth first."""
 
     subject: str
     known: Definitions
     origins: dict[str, str] = field(default_factory=dict)
     stamp: tuple[str, ...] = ()
-    steps: list[Run | Repeat] = field(default_factory=list)
+    steps: list[NumberRun | Repeat] = field(default_factory=list)
     letters: str = ""
     columns: list[str] = field(default_factory=list)
     n_values: int = 0
 
-    def taken(self) -> tuple[Run | Repeat, ...]:
+    def taken(self) -> tuple[NumberRun | Repeat, ...]:
         """Steps so far, the open run closed."""
         if self.letters:
-            self.steps.append(Run(self.letters, tuple(self.columns)))
+            self.steps.append(NumberRun(self.letters, tuple(self.columns)))
             self.letters, self.columns = "", []
         return tuple(self.steps)
 
@@ -141,7 +141,7 @@ class _Walk:
         count = None if each.count is None or each.count < 0 else each.count
         if each.type in TEXTS:
             return Repeat(count, text_width=TEXTS[each.type])
-        inner = _Walk(self.subject, self.known, n_values=self.n_values)
+        inner = _LayoutDraft(self.subject, self.known, n_values=self.n_values)
         inner.value(each.type, "", "", depth + 1)
         self.n_values = inner.n_values
         return Repeat(count, steps=_nameless(inner.taken()))
@@ -167,7 +167,7 @@ class _Walk:
             self.fields(kind, place, source, depth + 1)
 
     def refusal(self, found: str) -> FileFormatError:
-        """No plan can be made."""
+        """No layout can be made."""
         return FileFormatError(
             f"messages of type {self.subject[:60] or '?'} cannot be told apart into fields",
             found=found[:80],
@@ -175,10 +175,10 @@ class _Walk:
         )
 
 
-def _nameless(steps: Sequence[Run | Repeat]) -> tuple[Run | Repeat, ...]:
+def _nameless(steps: Sequence[NumberRun | Repeat]) -> tuple[NumberRun | Repeat, ...]:
     return tuple(
-        Run(step.letters, ("",) * len(step.letters))
-        if isinstance(step, Run)
+        NumberRun(step.letters, ("",) * len(step.letters))
+        if isinstance(step, NumberRun)
         else Repeat(step.count, step.letter, step.text_width, step.steps)
         for step in steps
     )
