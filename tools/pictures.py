@@ -33,9 +33,9 @@ OPTIONS = (
     "--disable-component-update",
     "--disable-sync",
 )
-PAGE_SIZE = (1180, 3400)
-# File name -> (first line, last line) of the page's picture, in px.
-SHOTS = {"report-result.png": (0, 1400), "report-model.png": (2050, 3390)}
+PAGE_SIZE = (1180, 3800)
+# File name -> (left, top, right, bottom) in the page's picture, px.
+SHOTS = {"report-result.png": (0, 0, 1180, 1190), "report-model.png": (262, 2250, 1180, 3540)}
 SCALE = 0.7
 WAIT_S = 10.0
 """For pictures to be unpacked and drawn."""
@@ -85,12 +85,11 @@ def photograph(page: Path, picture: Path, size: tuple[int, int] = PAGE_SIZE) -> 
         subprocess.run(command, check=True, capture_output=True, timeout=120)
 
 
-def keep(whole: Path, picture: Path, rows: tuple[int, int] | None = None) -> Path:
-    """Keep a picture in few colours, the rare ones among them; of a page only some rows, shrunk."""
+def keep(whole: Path, picture: Path, box: tuple[int, int, int, int] | None = None) -> Path:
+    """Keep a picture in few colours, the rare ones among them; of a page only a part, shrunk."""
     with Image.open(whole) as image:
-        first, last = rows or (0, image.height)
-        part = image.convert("RGB").crop((0, first, image.width, last))
-        if rows is not None:
+        part = image.convert("RGB").crop(box)
+        if box is not None:
             size = (round(part.width * SCALE), round(part.height * SCALE))
             part = part.resize(size, Image.Resampling.LANCZOS)
         part.quantize(128, Image.Quantize.MAXCOVERAGE).save(picture, optimize=True)
@@ -108,8 +107,8 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         whole = Path(folder) / "page.png"
         photograph(Path(sys.argv[1]), whole)
-        for name, rows in SHOTS.items():
-            picture = keep(whole, PICTURES / name, rows)
+        for name, box in SHOTS.items():
+            picture = keep(whole, PICTURES / name, box)
             print(f"{picture.relative_to(ROOT)}: {picture.stat().st_size / 1000:.0f} kB")
 
 
