@@ -306,6 +306,8 @@ def _left(known: Array, targets: Array) -> Array:
     """What least squares on the known columns leave of the targets."""
     size = np.maximum(np.sqrt(np.sum(known**2, axis=0)), np.finfo(float).tiny)
     columns = known / size
-    factor = scipy.linalg.cho_factor(columns.T @ columns + RIDGE * np.eye(columns.shape[1]))
+    products = columns.T @ columns
+    products.flat[:: columns.shape[1] + 1] += RIDGE
+    factor = scipy.linalg.cho_factor(products, overwrite_a=True)
     weights = scipy.linalg.cho_solve(factor, columns.T @ targets)
     return np.asarray(targets - columns @ weights)

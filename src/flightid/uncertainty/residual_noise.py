@@ -9,6 +9,8 @@ one, the recursion over the orders meets no reflection of one or more, and the m
 
 from __future__ import annotations
 
+import math
+import operator
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -245,24 +247,29 @@ def _weights(sample: Array, n: int) -> tuple[Array, bool]:
 
     And whether the sample is an autocovariance: a reflection of one or more says that it is none.
     """
-    trial = best = np.empty(0)
-    innovation = float(sample[0])
-    criterion = n * np.log(innovation) if innovation > 0 else -np.inf
-    for order in range(1, sample.size):
+    lags = sample.tolist()
+    # At these orders plain numbers are faster than arrays.
+    trial: list[float] = []
+    best = trial
+    innovation = lags[0]
+    criterion = n * math.log(innovation) if innovation > 0 else -math.inf
+    for order in range(1, len(lags)):
         # A residual that predicts itself to rounding has no further order.
-        if not innovation > 1e-12 * sample[0]:
+        if not innovation > 1e-12 * lags[0]:
             break
-        reflection = float(sample[order] - trial @ sample[order - 1 : 0 : -1]) / innovation
+        told = sum(map(operator.mul, trial, lags[order - 1 : 0 : -1]))
+        reflection = (lags[order] - told) / innovation
         if abs(reflection) >= 1.0:
-            return best, False
+            return np.array(best), False
         if abs(reflection) > TONE:
             break
-        trial = np.concatenate((trial - reflection * trial[::-1], [reflection]))
+        trial = [a - reflection * b for a, b in zip(trial, reversed(trial), strict=True)]
+        trial.append(reflection)
         innovation *= 1 - reflection**2
-        worth = n * np.log(max(innovation, 1e-300)) + order * np.log(n)
+        worth = n * math.log(max(innovation, 1e-300)) + order * math.log(n)
         if worth < criterion:
             criterion, best = worth, trial
-    return best, bool(sample[0] >= 0.0)
+    return np.array(best), lags[0] >= 0.0
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +21,18 @@ Section = tuple[float, float, float, float, float]
 
 
 def delay_operator(omega: Omega, rate_hz: float) -> Response:
-    """z⁻¹ on the unit circle: one sample's delay."""
-    return np.asarray(np.exp(-1j * omega / rate_hz))
+    """z⁻¹ on the unit circle: one sample's delay; a loop asks for it at the same ω many times."""
+    omega = np.asarray(omega, dtype=np.float64)
+    return _turns(omega.tobytes(), rate_hz).reshape(omega.shape)
+
+
+@lru_cache(maxsize=16)
+def _turns(omega: bytes, rate_hz: float) -> Response:
+    angle = np.frombuffer(omega) / rate_hz
+    turns = np.empty(angle.size, dtype=np.complex128)
+    turns.real, turns.imag = np.cos(angle), -np.sin(angle)
+    turns.flags.writeable = False
+    return turns
 
 
 def sections_response(sections: Iterable[Section], omega: Omega, rate_hz: float) -> Response:
@@ -56,8 +67,8 @@ def one_pole_response(cutoff_hz: float, omega: Omega, rate_hz: float) -> Respons
 def difference_response(omega: Omega, rate_hz: float) -> Response:
     """Backward difference over the sample time, 1/s."""
     # 1 − e^(−jx) = 2 j sin(x/2) e^(−jx/2): nothing cancels at low frequencies.
-    half = 0.5 * omega / rate_hz
-    return np.asarray(2j * rate_hz * np.sin(half) * np.exp(-1j * half))
+    half = delay_operator(omega, 2.0 * rate_hz)
+    return np.asarray(-2j * rate_hz * half.imag * half)
 
 
 def hold_response(omega: Omega, rate_hz: float) -> Response:

@@ -268,24 +268,43 @@ def _score(
     chosen: dict[str, float] = {}
     for axis, loop in base.items():
         before = phase_deg(flown[axis], crossovers[axis])
-        found: list[tuple[bool, float, float, float, dict[str, float]]] = []
+        found: list[tuple[float, float, AxisLoop, dict[str, float]]] = []
         for own in _grid(loop, _own(loop, shared), step_limit, spectra[axis]):
             tried = loop.with_gains({**values, **own})
-            noise = output_noise(tried, spectra[axis], flown=flown[axis]).total / limits[axis]
             gain = phase_deg(tried, crossovers[axis]) - before
             if axis in keep_phase and gain < -WORTH_DEG:
                 continue
             moved = any(value != flown[axis].gains[name] for name, value in own.items())
-            worth = gain - WORTH_DEG * moved if noise <= 1.0 else -noise
-            found.append((noise <= 1.0, worth, gain, noise, own))
+            found.append((gain - WORTH_DEG * moved, gain, tried, own))
         if not found:
             return (False, -np.inf), {}
-        _, _, gain, noise, own = max(found, key=lambda each: each[:2])
+        gain, noise, own = _first_within(found, spectra[axis], flown[axis], limits[axis])
         gained.append(gain)
         excess.append(noise)
         chosen |= own
     within = max(excess) <= 1.0
     return (within, float(np.mean(gained)) if within else -max(excess)), chosen
+
+
+def _first_within(
+    found: Sequence[tuple[float, float, AxisLoop, dict[str, float]]],
+    spectrum: GyroSpectrum,
+    flown: AxisLoop,
+    limit: float,
+) -> tuple[float, float, dict[str, float]]:
+    """Of tried cut-offs the worthiest within the limit of noise, else the least noisy.
+
+    The noise of those worth less is never asked for.
+    """
+    least: tuple[float, float, dict[str, float]] | None = None
+    for _, gain, tried, own in sorted(found, key=lambda each: -each[0]):
+        noise = output_noise(tried, spectrum, flown=flown).total / limit
+        if least is None or noise < least[1]:
+            least = gain, noise, own
+        if noise <= 1.0:
+            break
+    assert least is not None
+    return least
 
 
 def _told(
