@@ -9,7 +9,10 @@ JOBS   ?= auto
 FUZZ_RUNS ?= 1000000
 
 # Rewritten asserts are kept between runs, whatever the shell says of byte code.
-PYTEST = PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n $(JOBS) --dist worksteal
+PYTEST = PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest
+STARTED = -n $(JOBS) --dist worksteal
+# Forked processes share what one of them collected; where a fork is not safe, each is started.
+SPREAD := $(if $(filter Linux,$(shell uname -s)),-p tests.forks --forks $(JOBS),$(STARTED))
 
 .PHONY: demo test test-slow test-nightly docs fuzz fuzz-files kills same-wheel bench lint hooks format stubs develop wheel constraints clean help
 
@@ -55,13 +58,13 @@ stubs: develop  ## regenerate src/flightid/_native.pyi
 
 test: wheel lint  ## everything that must pass before a merge
 	cargo test --workspace --quiet
-	$(PYTEST) --doctest-modules tests --pyargs flightid
+	$(PYTEST) $(SPREAD) --doctest-modules tests --pyargs flightid
 
 test-nightly: wheel  ## every example whole and longer draws of properties, minutes; then what test-slow does
-	HYPOTHESIS_PROFILE=nightly $(PYTEST) -m "nightly or slow or hypothesis"
+	HYPOTHESIS_PROFILE=nightly $(PYTEST) $(STARTED) -m "nightly or slow or hypothesis"
 
 test-slow: wheel  ## Monte Carlo calibration of every printed interval, and the full studies
-	$(PYTEST) -m slow
+	$(PYTEST) $(STARTED) -m slow
 
 docs: wheel  ## build the documentation site into build/site, warnings as errors
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet

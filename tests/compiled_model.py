@@ -20,7 +20,7 @@ class CompiledModel:
 
     def __init__(self, source: Path, prefix: str, n_outputs: int) -> None:
         library = source.with_suffix(".so")
-        command = [c_compiler(), *WARNINGS, "-O1", "-fPIC", "-shared", "-o", library, source, "-lm"]
+        command = [c_compiler(), *WARNINGS, "-O0", "-fPIC", "-shared", "-o", library, source, "-lm"]
         subprocess.run(list(map(str, command)), check=True)
         self.library, self.prefix = ctypes.CDLL(str(library)), prefix
         self.memory = ctypes.create_string_buffer(1 << 20)

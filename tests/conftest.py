@@ -22,7 +22,7 @@ REPOSITORY = Path(__file__).parent.parent
 
 # The same examples in every run, and no clock; more of them at night (`make test-nightly`), and
 # `HYPOTHESIS_PROFILE=search` looks for new ones.
-settings.register_profile("steady", derandomize=True, deadline=None, max_examples=30)
+settings.register_profile("steady", derandomize=True, deadline=None, max_examples=15)
 settings.register_profile("nightly", derandomize=True, deadline=None)
 settings.register_profile("search", deadline=None, max_examples=2000)
 settings.load_profile(PROFILE)

@@ -17,9 +17,8 @@ PANICS = re.compile(r"\.unwrap\(\)|\.expect\(|panic!\(|unreachable!\(")
 
 def _open_ends(text: str) -> list[str]:
     return [
-        f"{number}: open end {match[0]!r}"
-        for number, line in enumerate(text.split("\n"), 1)
-        for match in OPEN_ENDS.finditer(line)
+        f"{1 + text.count(chr(10), 0, match.start())}: open end {match[0]!r}"
+        for match in OPEN_ENDS.finditer(text)
     ]
 
 
@@ -58,8 +57,9 @@ def _code_in_comments(text: str) -> list[str]:
 def test_python_sources() -> None:
     offenders = []
     for path in python_files():
-        found = _open_ends(path.read_text("utf-8"))
-        if SUSPECT.search(path.read_text("utf-8")):
+        text = path.read_text("utf-8")
+        found = _open_ends(text)
+        if SUSPECT.search(text):
             found += _python_habits(tree(path), may_print=stage(path) == "cli")
         if path.stem in FORBIDDEN_STEMS:
             found.append("a name that says nothing")

@@ -36,7 +36,3 @@ def test_inspect_loads_what_it_uses(tmp_path: Path) -> None:
     found = loaded("--quiet", "inspect", str(path))
     assert "flightid.inspection.usable_band" in found
     assert not found & HEAVY
-
-
-def test_a_loaded_module_is_seen() -> None:
-    assert "flightid.study" in loaded("run", "--help")

@@ -86,9 +86,11 @@ def test_the_matrix_has_every_system_and_python_that_we_promise() -> None:
 
 def test_windows_runs_the_steps_of_make_test() -> None:
     text = (ROOT / "Makefile").read_text(encoding="utf-8")
-    pytest_line = next(line for line in text.splitlines() if "$(PYTEST) --doctest" in line)
+    pytest_line = next(line for line in text.splitlines() if "$(PYTEST) $(SPREAD)" in line)
     (meaning,) = re.findall(r"^PYTEST = .*\$\(BIN\)/(.*)$", text, re.MULTILINE)
-    wanted = pytest_line.strip().replace("$(PYTEST)", meaning).replace("$(JOBS)", "auto")
+    (started,) = re.findall(r"^STARTED = (.*)$", text, re.MULTILINE)
+    wanted = pytest_line.strip().replace("$(PYTEST)", meaning).replace("$(SPREAD)", started)
+    wanted = wanted.replace("$(JOBS)", "auto")
     assert wanted in _commands(dict(JOBS)["test.windows"])
 
 

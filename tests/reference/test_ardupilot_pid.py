@@ -72,9 +72,9 @@ def test_agrees_with_a_plain_implementation(
 ) -> None:
     rng = np.random.default_rng(seed)
     gains = RateGains(0.12, i, 0.003, 0.05, 0.001, 0.1, pdmx, *flt)
-    target = np.cumsum(rng.standard_normal(200) * 0.05).astype(F)
-    measured = (0.7 * target + 0.01 * rng.standard_normal(200)).astype(F)
-    limited = rng.random(200) < 0.1
+    target = np.cumsum(rng.standard_normal(80) * 0.05).astype(F)
+    measured = (0.7 * target + 0.01 * rng.standard_normal(80)).astype(F)
+    limited = rng.random(80) < 0.1
     ours = _run(gains, target, measured, limited)
     theirs = _plain(gains, target, measured, limited)
     # The derivative divides differences by 2.5 ms, which magnifies the last bit.

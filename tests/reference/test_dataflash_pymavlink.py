@@ -16,6 +16,7 @@ from tests.closeness import assert_close
 LOGS = ("arducopter_457.BIN", "arducopter_470dev_ground.BIN")
 NIGHTLY = pytest.mark.nightly
 SEEDS = [0, pytest.param(1, marks=NIGHTLY), pytest.param(2, marks=NIGHTLY)]
+FIRST_BYTES = 800_000  # pymavlink takes a second for all of them
 FRACTIONS = [pytest.param(0.1, marks=NIGHTLY), 0.5, pytest.param(0.9, marks=NIGHTLY)]
 
 
@@ -38,10 +39,13 @@ def _our_counts(path: Path) -> Counter[str]:
 
 
 @pytest.mark.parametrize("name", [LOGS[0], pytest.param(LOGS[1], marks=NIGHTLY)])
-def test_every_count_number_and_text_equals_pymavlinks(shared_data: Path, name: str) -> None:
+def test_every_count_number_and_text_equals_pymavlinks(
+    shared_data: Path, tmp_path: Path, name: str
+) -> None:
     # pymavlink applies the scale of the storage (hundredths, 1e-7 deg) but not the multipliers of
     # the MULT table, so ours are divided out; both are then the same doubles to rounding.
-    path = shared_data / "logs" / name
+    path = tmp_path / name
+    path.write_bytes((shared_data / "logs" / name).read_bytes()[:FIRST_BYTES])
     log = fid.read_log(path)
     by_type: dict[str, list[object]] = {}
     for message in _peer(path):
@@ -65,7 +69,7 @@ def test_every_count_number_and_text_equals_pymavlinks(shared_data: Path, name: 
                 why=f"{message}.{field}: the same stored number, scaled in one rounding",
             )
             compared += expected.size
-    assert compared > 100_000
+    assert compared > 50_000
 
 
 def _multipliers(path: Path) -> dict[tuple[str, str], float]:
@@ -101,8 +105,8 @@ def test_counts_of_a_truncated_log_equal_pymavlinks(
 def test_a_zeroed_block_loses_what_pymavlink_loses(
     shared_data: Path, tmp_path: Path, seed: int, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    content = bytearray((shared_data / "logs" / LOGS[1]).read_bytes())
-    start = int(np.random.default_rng(seed).integers(200_000, 1_500_000))
+    content = bytearray((shared_data / "logs" / LOGS[1]).read_bytes()[:FIRST_BYTES])
+    start = int(np.random.default_rng(seed).integers(200_000, 700_000))
     content[start : start + 65_536] = bytes(65_536)
     path = tmp_path / "zeroed.bin"
     path.write_bytes(content)
@@ -120,8 +124,8 @@ def test_random_blocks_lose_no_more_than_pymavlink_loses(
     # Where random bytes look like a header pymavlink believes them and may swallow true messages;
     # flightid wants proof. So counts differ by a few messages around each of the three blocks.
     rng = np.random.default_rng(seed)
-    content = bytearray((shared_data / "logs" / LOGS[0]).read_bytes())
-    for start in rng.integers(200_000, 2_000_000, 3):
+    content = bytearray((shared_data / "logs" / LOGS[0]).read_bytes()[:FIRST_BYTES])
+    for start in rng.integers(200_000, 700_000, 3):
         content[start : start + 4096] = rng.bytes(4096)
     path = tmp_path / "random.bin"
     path.write_bytes(content)
@@ -130,7 +134,7 @@ def test_random_blocks_lose_no_more_than_pymavlink_loses(
     difference = ours.copy()
     difference.subtract(theirs)
     assert sum(abs(count) for count in difference.values()) <= 6
-    assert sum(ours.values()) >= 54_200
+    assert sum(ours.values()) >= 19_000
 
 
 def _values(code: str, n_rows: int, rng: np.random.Generator) -> object:

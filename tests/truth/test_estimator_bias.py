@@ -315,8 +315,8 @@ def _standard_scores(noise: float, seed: int) -> NDArray[np.float64]:
 
 @pytest.mark.parametrize("noise", [0.02, pytest.param(0.0002, marks=pytest.mark.nightly)])
 def test_one_sweep_lies_in_its_errors(noise: float) -> None:
-    scores = np.array([_standard_scores(noise, seed) for seed in range(4)])
-    assert np.all(np.abs(scores) < 3.8), scores
+    scores = np.array([_standard_scores(noise, seed) for seed in range(2)])
+    assert np.all(np.abs(scores) < 3.5), scores
 
 
 @pytest.mark.slow

@@ -110,7 +110,7 @@ def test_an_independent_pi_optimum() -> None:
     """Integrator with delay: the least square of the rate after a step, on 45° and a peak of 2."""
 
     def left(p: float, ratio: float) -> float:
-        omega = np.geomspace(1e-3, 3e3, 1500)
+        omega = np.geomspace(1e-3, 3e3, 1000)
         s = 1j * omega
         plant = GAIN * np.exp(-DELAY_S * s) / s
         loop = p * (1 + ratio / s) * plant
@@ -124,12 +124,12 @@ def test_an_independent_pi_optimum() -> None:
 
     table = [
         (left(p, ratio), p, ratio)
-        for p in np.linspace(0.11, 0.17, 25)
-        for ratio in np.linspace(1.5, 6.0, 25)
+        for p in np.linspace(0.11, 0.17, 16)
+        for ratio in np.linspace(1.5, 6.0, 16)
     ]
     best, p, ratio = min(table)
     found = _solve(_one(("P", "I"), noise_growth=None, band_factor=None))
-    assert_close(left(*found.gains * [1, 1 / found.gains[0]]), best, rtol=0.02, why="grid of 2 %")
+    assert_close(left(*found.gains * [1, 1 / found.gains[0]]), best, rtol=0.02, why="grid of 3 %")
     assert_close(found.gains[0], p, rtol=0.05, why="grid of the independent search")
     assert_close(found.gains[1] / found.gains[0], ratio, rtol=0.15, why="a flat optimum")
 

@@ -45,7 +45,7 @@ def test_a_regression_without_finite_numbers_is_a_typed_error():
 
 
 def test_pulse_responses_recover_the_model_and_its_delays():
-    record = flown(TWO_INPUTS, 0, n=3000, noise=0.1)
+    record = flown(TWO_INPUTS, 0, n=1200, noise=0.1)
     found = fid.impulse_response(record, n_lags=50)
     assert found.delays == {"u": 1, "v": 3}
     pulse = np.eye(1, 50)[0]
@@ -106,8 +106,8 @@ def test_advice_on_a_good_record():
 
 
 def test_advice_sees_poor_related_silent_and_fast_channels():
-    t = np.arange(1500)
-    noise = np.random.default_rng(3).standard_normal((3, 1500))
+    t = np.arange(1000)
+    noise = np.random.default_rng(3).standard_normal((3, 1000))
 
     def advise(inputs, y):
         return fid.advise(
@@ -131,12 +131,12 @@ def test_feedback_is_seen_and_its_absence_too():
     rng = np.random.default_rng(4)
     found = []
     for gain in (0.0, 0.6):
-        y, u = np.zeros(1500), np.zeros(1500)
-        e, r = rng.standard_normal((2, 1500))
-        for t in range(1, 1500):
+        y, u = np.zeros(600), np.zeros(600)
+        e, r = rng.standard_normal((2, 600))
+        for t in range(1, 600):
             y[t] = 0.7 * y[t - 1] + 0.5 * u[t - 1] + e[t]
             u[t] = r[t] - gain * y[t]
-        record = fid.Record.from_arrays(np.arange(1500) / 10, inputs={"u": u}, outputs={"y": y})
+        record = fid.Record.from_arrays(np.arange(600) / 10, inputs={"u": u}, outputs={"y": y})
         found.append("feedback" in _codes(fid.advise(record)))
     assert found == [False, True]
     assert "feedback" not in _codes(fid.advise(record, loop="open"))

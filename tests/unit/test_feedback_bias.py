@@ -28,7 +28,14 @@ def _loop(n: int, *, late: int = 1, direct: float = 0.0) -> tuple[np.ndarray, np
     return fresh + lfilter(back, [1.0], y), y
 
 
-@pytest.mark.parametrize(("late", "direct"), [(1, 0.0), (0, 0.0), (0, 0.8), (1, 0.8)])
+@pytest.mark.parametrize(
+    ("late", "direct"),
+    [
+        (1, 0.0),
+        (0, 0.8),
+        *(pytest.param(*each, marks=pytest.mark.nightly) for each in [(0, 0.0), (1, 0.8)]),
+    ],
+)
 def test_the_spectrum_of_fed_noise_is_that_of_the_loop(late: int, direct: float) -> None:
     u, y = _loop(60_000, late=late, direct=direct)
     omega = np.array([0.1, 0.5, 1.5])

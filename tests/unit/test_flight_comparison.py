@@ -77,9 +77,11 @@ def test_a_slower_loop_is_amber_and_its_way_back_is_not(logs: dict[str, Path]) -
 
 
 def test_gains_filters_and_other_vehicles_are_said(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    stepped: tuple[Path, fid.TransferFunctionModel],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    old = ordinary(tmp_path / "old.bin")
+    old, _ = stepped
     new = ordinary(tmp_path / "new.bin", autopilot=Autopilot().with_parameters(
         {"ATC_RAT_YAW_P": 0.5, "INS_GYRO_FILTER": 30.0}
     ))  # fmt: skip

@@ -165,7 +165,8 @@ def test_files_set_and_take_back(plan: fid.SweepPlan, log: Path, tmp_path: Path)
 def test_every_autopilot_has_a_card(
     tmp_path: Path, vehicle: str, autopilot: str, file: str | None, said: str
 ) -> None:
-    made = fid.plan_flight(vehicle=vehicle, autopilot=autopilot)
+    axis = file.split(".")[0] if file and autopilot == "ardupilot" else "roll"
+    made = fid.plan_flight(vehicle=vehicle, autopilot=autopilot, axes=(axis,))
     made.write(tmp_path)
     names = {path.name for path in tmp_path.iterdir()}
     assert file is None or file in names

@@ -54,15 +54,19 @@ def _flight(hold: str) -> fid.Record:
     )
 
 
-@pytest.mark.parametrize("hold", ["zero", "first"])
 @pytest.mark.parametrize(
-    ("method", "rtol"),
+    ("method", "rtol", "hold"),
     [
-        ("output_error", 1e-5),
-        ("filter_error", 1e-5),
-        ("fourier_output_error", 1e-5),
-        ("equation_error", 2e-3),
-        ("fourier_regression", 2e-3),
+        ("output_error", 1e-5, "zero"),
+        ("output_error", 1e-5, "first"),
+        ("filter_error", 1e-5, "zero"),
+        pytest.param("filter_error", 1e-5, "first", marks=pytest.mark.nightly),
+        pytest.param("fourier_output_error", 1e-5, "zero", marks=pytest.mark.nightly),
+        ("fourier_output_error", 1e-5, "first"),
+        ("equation_error", 2e-3, "zero"),
+        pytest.param("equation_error", 2e-3, "first", marks=pytest.mark.nightly),
+        pytest.param("fourier_regression", 2e-3, "zero", marks=pytest.mark.nightly),
+        ("fourier_regression", 2e-3, "first"),
     ],
 )
 def test_held_inputs_are_exact_in_every_method(method: str, rtol: float, hold: str) -> None:

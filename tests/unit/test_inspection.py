@@ -72,8 +72,8 @@ def test_result_is_plain_values_text_and_tables(good: Inspection) -> None:
 
 
 BAD_CASES = [
-    ("rate-too-low", Light.RED, SweepFlight(rate_hz=10.0)),
-    ("rate-limited", Light.AMBER, SweepFlight(rate_hz=50.0)),
+    ("rate-too-low", Light.RED, SweepFlight(rate_hz=10.0, sweep_s=30.0)),
+    ("rate-limited", Light.AMBER, SweepFlight(rate_hz=50.0, sweep_s=30.0)),
     ("too-short", Light.RED, SweepFlight(sweep_s=6.0)),
     ("nothing-excited", Light.RED, SweepFlight(amplitude=0.0, injected=False, sweep_s=20.0)),
     (

@@ -136,6 +136,7 @@ def test_every_case_is_found_once_and_every_number_is_finite_somewhere() -> None
         "attention": ("full", "divided"),
     }
     for key in keys:
+        told = set()
         for values in product(*ways.values()):
             conditions = dict(zip(ways, values, strict=True))
             if key == "pitch_bandwidth" and conditions["category"] != "A":
@@ -143,7 +144,9 @@ def test_every_case_is_found_once_and_every_number_is_finite_somewhere() -> None
             chart = rating_chart(key, **conditions)
             assert chart.source
             assert chart.regions
-            json.dumps(chart.to_dict(), allow_nan=False)
+            if chart.regions not in told:
+                json.dumps(chart.to_dict(), allow_nan=False)
+            told.add(chart.regions)
     assert "Boundaries not confirmed" in str(
         rating_chart("attitude_bandwidth", axis="yaw", task="other", speed="hover").summary()
     )

@@ -118,6 +118,7 @@ def test_provenance_names_every_file_by_its_hash(study: fid.Study) -> None:
         assert digest in text
 
 
+@pytest.mark.usefixtures("no_report")
 def test_a_second_run_on_the_written_log_finds_the_same(
     study: fid.Study, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
