@@ -118,9 +118,9 @@ def test_the_dryer_study_prints_published_values_beside_ours(tmp_path: Path) -> 
     study = fid.run_study(tmp_path / "study.toml")
     delay, oe, *_, subspace = study.identified
     assert delay.fit.structure.nk == (3,)
-    for name, value in oe.settings.published.value.items():
+    for name, value in oe.settings.figures.value.items():
         assert abs(oe.fit.parameters[name].value - value) < 0.05, name
-    assert len(subspace.settings.published.singular_values) == 6
+    assert len(subspace.settings.figures.singular_values) == 6
     report = (study.output / "report.txt").read_text("utf-8")
     assert (study.output / "controller.toml").exists() is (
         worst(study.tuning.findings) is not Light.RED
@@ -140,11 +140,11 @@ def test_the_dryer_record_gives_the_published_values(shared_data: Path, tmp_path
     study = fid.run_study(tmp_path / "study.toml")
     _, *published, subspace = study.identified
     for item in published:
-        figures, fit = item.settings.published, item.fit
+        figures, fit = item.settings.figures, item.fit
         for name, value in figures.value.items():
             assert abs(fit.parameters[name].value - value) < 6e-5, (item.name, name)
         assert_close(fit.details.criteria.loss, figures.loss, rtol=1e-4, why="printed digits")
-    wanted = subspace.settings.published.singular_values
+    wanted = subspace.settings.figures.singular_values
     found = subspace.fit.details.order.singular_values[: len(wanted)]
     assert_close(found, wanted, atol=6e-5, why="printed digits")
 
