@@ -12,6 +12,7 @@ pub mod group;
 pub mod interrupt;
 pub mod logs;
 pub mod models;
+pub mod row_major;
 pub mod simulation;
 #[cfg(unix)]
 pub mod taken_pages;

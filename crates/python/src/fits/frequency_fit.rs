@@ -8,31 +8,28 @@ use flightid_core::frequency_domain::frequency_fit::{
 };
 use flightid_core::frequency_domain::response_model::ResponseModel;
 use num_complex::Complex64;
-use numpy::{IntoPyArray, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{IntoPyArray, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 
 use crate::error::from_core;
 use crate::fits::least_squares::{Ending, ending};
 use crate::interrupt;
+use crate::row_major::{RowMajor1, RowMajor2};
 
 /// Frequencies, response, square roots of the weights of decibels and degrees.
-pub type Response<'py> = (
-    PyReadonlyArray1<'py, f64>,
-    PyReadonlyArray1<'py, Complex64>,
-    PyReadonlyArray1<'py, f64>,
-    PyReadonlyArray1<'py, f64>,
-);
+pub type Response<'py> =
+    (RowMajor1<'py, f64>, RowMajor1<'py, Complex64>, RowMajor1<'py, f64>, RowMajor1<'py, f64>);
 /// First response, number of responses and matrix of a whitening.
-pub type Run<'py> = (usize, usize, PyReadonlyArray2<'py, f64>);
+pub type Run<'py> = (usize, usize, RowMajor2<'py, f64>);
 
 /// Starts, bounds and limit of a search.
 pub struct Search<'py> {
     /// Rows are starts.
-    pub starts: PyReadonlyArray2<'py, f64>,
+    pub starts: RowMajor2<'py, f64>,
     /// Lower bounds.
-    pub lower: PyReadonlyArray1<'py, f64>,
+    pub lower: RowMajor1<'py, f64>,
     /// Upper bounds.
-    pub upper: PyReadonlyArray1<'py, f64>,
+    pub upper: RowMajor1<'py, f64>,
     /// Most steps of each start.
     pub maximum_iterations: usize,
 }
@@ -40,7 +37,7 @@ pub struct Search<'py> {
 /// Measured responses, copied out of NumPy.
 ///
 /// # Errors
-/// For arrays that are not contiguous.
+/// NumPy's own.
 pub fn measured(data: Vec<Response<'_>>) -> PyResult<Vec<Measured>> {
     data.into_iter()
         .map(|(omega, response, weight_db, weight_deg)| {
@@ -74,7 +71,7 @@ impl Beside {
     /// Copy.
     ///
     /// # Errors
-    /// For arrays that are not contiguous.
+    /// NumPy's own.
     pub fn new((data, runs): WhitenedResponses<'_>) -> PyResult<Self> {
         Ok(Self { data: measured(data)?, cost: Cost::Whitened(whitenings(runs)?) })
     }

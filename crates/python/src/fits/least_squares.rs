@@ -4,10 +4,11 @@
 use flightid_core::CoreError;
 use flightid_core::fits::least_squares::{Minimum, Options, Problem, Progress};
 use flightid_core::fits::levenberg_marquardt::minimise;
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 
 use crate::error::from_core;
+use crate::row_major::{RowMajor1, RowMajor2};
 
 /// x, cost, residuals, Jacobian, iterations, name of the termination.
 pub type Ending<'py> = (
@@ -82,7 +83,7 @@ impl Problem for Callback<'_, '_> {
         self.ready()?;
         let x = PyArray1::from_slice(self.py, x);
         let call = self.residuals.call1((x,)).and_then(|result| {
-            let result: PyReadonlyArray1<'_, f64> = result.extract()?;
+            let result: RowMajor1<'_, f64> = result.extract()?;
             Ok(result.to_vec()?)
         });
         self.copy(call, residuals)
@@ -92,7 +93,7 @@ impl Problem for Callback<'_, '_> {
         self.ready()?;
         let x = PyArray1::from_slice(self.py, x);
         let call = self.jacobian.call1((x,)).and_then(|result| {
-            let result: PyReadonlyArray2<'_, f64> = result.extract()?;
+            let result: RowMajor2<'_, f64> = result.extract()?;
             Ok(result.to_vec()?)
         });
         self.copy(call, jacobian)
@@ -110,9 +111,9 @@ fn least_squares<'py>(
     py: Python<'py>,
     residuals: &Bound<'py, PyAny>,
     jacobian: &Bound<'py, PyAny>,
-    start: PyReadonlyArray1<'_, f64>,
-    lower: PyReadonlyArray1<'_, f64>,
-    upper: PyReadonlyArray1<'_, f64>,
+    start: RowMajor1<'_, f64>,
+    lower: RowMajor1<'_, f64>,
+    upper: RowMajor1<'_, f64>,
     n_residuals: usize,
     maximum_iterations: usize,
     stop: Option<&Bound<'py, PyAny>>,

@@ -11,22 +11,21 @@ use flightid_core::output_error::model_on_records::{Trajectories, Wanted};
 use flightid_core::output_error::output_error_weights::Noise;
 use flightid_core::output_error::record_data::RecordData;
 use flightid_core::output_error::record_data::RecordInputs;
-use numpy::{
-    IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
-};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 
 use crate::error::from_core;
 use crate::interrupt;
+use crate::row_major::{RowMajor1, RowMajor2};
 
 /// Inputs and outputs (channels × samples) and sample time of one record.
-pub type Flown<'py> = (PyReadonlyArray2<'py, f64>, PyReadonlyArray2<'py, f64>, f64);
+pub type Flown<'py> = (RowMajor2<'py, f64>, RowMajor2<'py, f64>, f64);
 /// Initial state, input shifts, output biases of one record, which entries of each are free, and the
 /// bounds of those, none or one for each.
 pub type Own<'py> = (
-    PyReadonlyArray1<'py, f64>,
-    PyReadonlyArray1<'py, f64>,
-    PyReadonlyArray1<'py, f64>,
+    RowMajor1<'py, f64>,
+    RowMajor1<'py, f64>,
+    RowMajor1<'py, f64>,
     Vec<usize>,
     Vec<usize>,
     Vec<usize>,
@@ -34,7 +33,7 @@ pub type Own<'py> = (
 );
 /// Rows are starts; lower and upper bounds; most steps.
 pub type SearchArguments<'py> =
-    (PyReadonlyArray2<'py, f64>, PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, f64>, usize);
+    (RowMajor2<'py, f64>, RowMajor1<'py, f64>, RowMajor1<'py, f64>, usize);
 /// Full covariance, limit of the loss, share of Gaussian variance within it.
 pub type NoiseArguments = (bool, f64, f64);
 /// θ, objective, noise covariance, own numbers, which are determined, iterations, termination.
@@ -51,7 +50,7 @@ type Ending<'py> = (
 /// Inputs of the records, copied out of NumPy.
 ///
 /// # Errors
-/// For arrays that are not contiguous.
+/// NumPy's own.
 pub fn driven(records: &[Flown<'_>]) -> PyResult<Vec<RecordInputs>> {
     records
         .iter()
@@ -91,7 +90,7 @@ pub fn linear<F: LinearFamily>(
 /// Measurements and own numbers of the records.
 ///
 /// # Errors
-/// For arrays that are not contiguous.
+/// NumPy's own.
 pub fn record_data(records: &[Flown<'_>], own: Vec<Own<'_>>) -> PyResult<Vec<RecordData>> {
     records
         .iter()

@@ -7,9 +7,7 @@ use flightid_core::output_error::record_data::RecordData;
 use flightid_core::output_error::record_data::RecordInputs;
 use flightid_core::state_space::ode_model::OdeModel;
 use flightid_core::trajectories::shooting::Plan;
-use numpy::{
-    IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
-};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 
 use crate::error::from_core;
@@ -18,9 +16,10 @@ use crate::fits::output_error::{
     Flown, NoiseArguments, Own, SearchArguments, driven, fit, hold as named, record_data, run,
 };
 use crate::models::state_space::StateSpace;
+use crate::row_major::{RowMajor1, RowMajor2};
 
 /// Cuts, conditions at the ends, how many of them at the end, guesses of the nodes.
-type Segments<'py> = (Vec<usize>, PyReadonlyArray2<'py, f64>, usize, PyReadonlyArray2<'py, f64>);
+type Segments<'py> = (Vec<usize>, RowMajor2<'py, f64>, usize, RowMajor2<'py, f64>);
 
 /// __init__(self, model: StateSpace, substeps: Sequence[int], segments: Sequence[tuple[Sequence[int], NDArray[np.float64], int, NDArray[np.float64]]]) -> None
 ///
@@ -85,7 +84,7 @@ impl EquationRecords {
     fn fit_records<'py>(
         &self,
         py: Python<'py>,
-        values: PyReadonlyArray1<'py, f64>,
+        values: RowMajor1<'py, f64>,
         free: Vec<usize>,
         records: Vec<Flown<'py>>,
         own: Vec<Own<'py>>,
@@ -109,7 +108,7 @@ impl EquationRecords {
         &self,
         py: Python<'py>,
         place: usize,
-        values: PyReadonlyArray1<'py, f64>,
+        values: RowMajor1<'py, f64>,
         free: Vec<usize>,
         record: Flown<'py>,
         own: Own<'py>,
@@ -131,7 +130,7 @@ impl EquationRecords {
         &self,
         py: Python<'py>,
         place: usize,
-        values: PyReadonlyArray1<'py, f64>,
+        values: RowMajor1<'py, f64>,
         free: Vec<usize>,
         record: Flown<'py>,
         own: Own<'py>,

@@ -5,11 +5,12 @@ use std::collections::BTreeMap;
 use flightid_core::language::expression::Expression;
 use flightid_core::language::syntax::Node;
 use flightid_core::tape::expression_tape::{Registers, Tape as CoreTape};
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 
 use crate::error::from_core;
 use crate::models::lookup_table::{LookupTable, shared};
+use crate::row_major::RowMajor1;
 
 /// expression_names(text: str, tables: Sequence[str] = ...) -> list[str]
 ///
@@ -86,7 +87,7 @@ impl Tape {
     fn evaluate<'py>(
         &self,
         py: Python<'py>,
-        values: PyReadonlyArray1<'_, f64>,
+        values: RowMajor1<'_, f64>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let mut result = vec![0.0; self.tape.n_outputs()];
         self.tape
@@ -101,7 +102,7 @@ impl Tape {
     fn jacobian<'py>(
         &self,
         py: Python<'py>,
-        values: PyReadonlyArray1<'_, f64>,
+        values: RowMajor1<'_, f64>,
         directions: Vec<usize>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let values = values.as_slice()?;

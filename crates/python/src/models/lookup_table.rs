@@ -6,11 +6,12 @@ use flightid_core::CoreError;
 use flightid_core::language::lookup_table::{
     Interpolation, LookupTable as CoreTable, Outside, cubic_spline as spline,
 };
-use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
+use numpy::{IntoPyArray, PyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::error::from_core;
+use crate::row_major::RowMajor1;
 
 /// __init__(self, axes: Sequence[Sequence[float]], values: Sequence[float], interpolation: str, outside: str) -> None
 ///
@@ -57,8 +58,8 @@ impl LookupTable {
     fn evaluate<'py>(
         &self,
         py: Python<'py>,
-        first: PyReadonlyArray1<'_, f64>,
-        second: PyReadonlyArray1<'_, f64>,
+        first: RowMajor1<'_, f64>,
+        second: RowMajor1<'_, f64>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let (x, y) = (first.as_slice()?, second.as_slice()?);
         if x.len() != y.len() {
@@ -83,9 +84,9 @@ impl LookupTable {
 #[pyfunction]
 fn cubic_spline<'py>(
     py: Python<'py>,
-    points: PyReadonlyArray1<'_, f64>,
-    values: PyReadonlyArray1<'_, f64>,
-    at: PyReadonlyArray1<'_, f64>,
+    points: RowMajor1<'_, f64>,
+    values: RowMajor1<'_, f64>,
+    at: RowMajor1<'_, f64>,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
     let (points, values, at) = (points.as_slice()?, values.as_slice()?, at.as_slice()?);
     let made = py.detach(|| spline(points, values, at)).map_err(from_core)?;

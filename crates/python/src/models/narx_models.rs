@@ -2,13 +2,14 @@
 //! (Python side: models/narx/model.py, identification/narx/fit.py)
 
 use crate::error::from_core;
+use crate::row_major::{RowMajor1, RowMajor2};
 use flightid_core::CoreError;
 use flightid_core::black_box::candidates::Candidates;
 use flightid_core::black_box::local_regularisation::{Regularisation, select_regularised};
 use flightid_core::black_box::narx_prediction::{Lag, Monomial, Narx};
 use flightid_core::black_box::radial_basis::{Kernel, Radial};
 use flightid_core::black_box::stop_rule::Stop;
-use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{IntoPyArray, PyArray1};
 use pyo3::prelude::*;
 
 type Path<'py> = (
@@ -54,10 +55,10 @@ fn stop_rule(name: &str, goal: f64) -> Result<Stop, CoreError> {
 #[allow(clippy::too_many_arguments)]
 fn select_terms<'py>(
     py: Python<'py>,
-    target: PyReadonlyArray1<'py, f64>,
-    columns: PyReadonlyArray2<'py, f64>,
-    regressors: PyReadonlyArray2<'py, f64>,
-    centres: PyReadonlyArray2<'py, f64>,
+    target: RowMajor1<'py, f64>,
+    columns: RowMajor2<'py, f64>,
+    regressors: RowMajor2<'py, f64>,
+    centres: RowMajor2<'py, f64>,
     kernel: &str,
     beta: f64,
     keep: bool,
@@ -108,12 +109,12 @@ fn select_terms<'py>(
 #[allow(clippy::too_many_arguments)]
 fn run_narx<'py>(
     py: Python<'py>,
-    measured: PyReadonlyArray1<'py, f64>,
-    inputs: PyReadonlyArray2<'py, f64>,
+    measured: RowMajor1<'py, f64>,
+    inputs: RowMajor2<'py, f64>,
     lags: Vec<(usize, usize)>,
     monomials: Vec<(f64, Vec<(usize, i32)>)>,
-    centres: PyReadonlyArray2<'py, f64>,
-    radial_weights: PyReadonlyArray1<'py, f64>,
+    centres: RowMajor2<'py, f64>,
+    radial_weights: RowMajor1<'py, f64>,
     kernel: &str,
     beta: f64,
     bounds: (f64, f64),

@@ -3,13 +3,14 @@
 
 use crate::error::from_core;
 use crate::interrupt;
+use crate::row_major::{RowMajor1, RowMajor2};
 use flightid_core::CoreError;
 use flightid_core::black_box::order_scan::{Scan, scan};
 use flightid_core::black_box::polynomial_fit::{Before, PredictionError, fit_from, regress};
 use flightid_core::black_box::polynomial_orders::Orders;
 use flightid_core::black_box::polynomial_predictor::Samples;
 use flightid_core::fits::least_squares::{Minimum, Options};
-use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{IntoPyArray, PyArray1};
 use pyo3::prelude::*;
 
 /// Degrees of A, coefficients of each B, degrees of C, D and each F (or of one of all inputs), delays.
@@ -69,8 +70,8 @@ type Regression<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, us
 #[allow(clippy::too_many_arguments)]
 fn polynomial_regression<'py>(
     py: Python<'py>,
-    output: PyReadonlyArray1<'py, f64>,
-    inputs: PyReadonlyArray2<'py, f64>,
+    output: RowMajor1<'py, f64>,
+    inputs: RowMajor2<'py, f64>,
     lengths: Vec<usize>,
     orders: OrderTuple,
     skip: usize,
@@ -102,11 +103,11 @@ type End<'py> = (Bound<'py, PyArray1<f64>>, f64, Bound<'py, PyArray1<f64>>, usiz
 #[allow(clippy::too_many_arguments)]
 fn polynomial_fit<'py>(
     py: Python<'py>,
-    output: PyReadonlyArray1<'py, f64>,
-    inputs: PyReadonlyArray2<'py, f64>,
+    output: RowMajor1<'py, f64>,
+    inputs: RowMajor2<'py, f64>,
     lengths: Vec<usize>,
     orders: OrderTuple,
-    starts: PyReadonlyArray2<'py, f64>,
+    starts: RowMajor2<'py, f64>,
     before: &str,
     memory: Vec<Vec<f64>>,
     levels: bool,
@@ -154,11 +155,11 @@ fn end<'py>(py: Python<'py>, found: Result<Minimum, CoreError>) -> PyResult<Boun
 #[allow(clippy::too_many_arguments)]
 fn polynomial_errors<'py>(
     py: Python<'py>,
-    output: PyReadonlyArray1<'py, f64>,
-    inputs: PyReadonlyArray2<'py, f64>,
+    output: RowMajor1<'py, f64>,
+    inputs: RowMajor2<'py, f64>,
     lengths: Vec<usize>,
     orders: OrderTuple,
-    theta: PyReadonlyArray1<'py, f64>,
+    theta: RowMajor1<'py, f64>,
     before: &str,
     memory: Vec<Vec<f64>>,
     levels: bool,
@@ -189,8 +190,8 @@ type Scanned<'py> = (Bound<'py, PyArray1<f64>>, f64, usize, bool);
 #[allow(clippy::too_many_arguments)]
 fn scan_polynomials<'py>(
     py: Python<'py>,
-    output: PyReadonlyArray1<'py, f64>,
-    inputs: PyReadonlyArray2<'py, f64>,
+    output: RowMajor1<'py, f64>,
+    inputs: RowMajor2<'py, f64>,
     lengths: Vec<usize>,
     orders: Vec<OrderTuple>,
     long: usize,

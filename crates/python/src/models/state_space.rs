@@ -10,9 +10,7 @@ use flightid_core::output_error::state_space_family::StateSpaceFamily;
 use flightid_core::state_space::model_samples::sample;
 use flightid_core::state_space::model_tape::{ModelTape, ModelText};
 use num_complex::Complex64;
-use numpy::{
-    IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
-};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 
 use crate::error::from_core;
@@ -23,6 +21,7 @@ use crate::fits::output_error::{
     self, Flown, NoiseArguments, Own, SearchArguments, linear, record_data,
 };
 use crate::models::lookup_table::{LookupTable, shared};
+use crate::row_major::{RowMajor1, RowMajor2};
 
 /// __init__(self, states: Sequence[str], inputs: Sequence[str], equations: Sequence[tuple[str, str]], outputs: Sequence[str], delays: Sequence[str], names: Sequence[str], definitions: dict[str, str], pairs: Sequence[tuple[int, int]], point: Sequence[float], tables: dict[str, LookupTable] = ...) -> None
 ///
@@ -111,8 +110,8 @@ impl StateSpace {
     fn linearise<'py>(
         &self,
         py: Python<'py>,
-        values: PyReadonlyArray1<'_, f64>,
-        point: PyReadonlyArray1<'_, f64>,
+        values: RowMajor1<'_, f64>,
+        point: RowMajor1<'_, f64>,
     ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>)> {
         let found =
             self.tape.linearise(point.as_slice()?, values.as_slice()?).map_err(from_core)?;
@@ -127,8 +126,8 @@ impl StateSpace {
     fn sensitivities<'py>(
         &self,
         py: Python<'py>,
-        values: PyReadonlyArray1<'_, f64>,
-        point: PyReadonlyArray1<'_, f64>,
+        values: RowMajor1<'_, f64>,
+        point: RowMajor1<'_, f64>,
         free: Vec<usize>,
     ) -> PyResult<Bound<'py, PyArray3<f64>>> {
         let (height, width) = (self.tape.height(), self.tape.width());
@@ -151,8 +150,8 @@ impl StateSpace {
     fn curvatures<'py>(
         &self,
         py: Python<'py>,
-        values: PyReadonlyArray1<'_, f64>,
-        point: PyReadonlyArray1<'_, f64>,
+        values: RowMajor1<'_, f64>,
+        point: RowMajor1<'_, f64>,
         free: Vec<usize>,
     ) -> PyResult<(Bound<'py, PyArray2<i64>>, Bound<'py, PyArray1<f64>>)> {
         let found = self
@@ -177,8 +176,8 @@ impl StateSpace {
     fn sample<'py>(
         &self,
         py: Python<'py>,
-        values: PyReadonlyArray1<'_, f64>,
-        points: PyReadonlyArray2<'_, f64>,
+        values: RowMajor1<'_, f64>,
+        points: RowMajor2<'_, f64>,
         directions: Vec<usize>,
     ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray3<f64>>)> {
         let count = points.as_array().nrows();
@@ -198,8 +197,8 @@ impl StateSpace {
     fn response<'py>(
         &self,
         py: Python<'py>,
-        values: PyReadonlyArray1<'_, f64>,
-        omega_rad_s: PyReadonlyArray1<'_, f64>,
+        values: RowMajor1<'_, f64>,
+        omega_rad_s: RowMajor1<'_, f64>,
     ) -> PyResult<Bound<'py, PyArray2<Complex64>>> {
         let omega = omega_rad_s.as_slice()?;
         responses(py, &self.prepared(values.as_slice()?, &[], omega, false)?, omega)
@@ -211,9 +210,9 @@ impl StateSpace {
     fn log_gradient<'py>(
         &self,
         py: Python<'py>,
-        values: PyReadonlyArray1<'_, f64>,
+        values: RowMajor1<'_, f64>,
         free: Vec<usize>,
-        omega_rad_s: PyReadonlyArray1<'_, f64>,
+        omega_rad_s: RowMajor1<'_, f64>,
     ) -> PyResult<Bound<'py, PyArray3<Complex64>>> {
         let omega = omega_rad_s.as_slice()?;
         log_gradients(py, &self.prepared(values.as_slice()?, &free, omega, true)?, omega)
@@ -226,13 +225,13 @@ impl StateSpace {
     fn fit<'py>(
         &self,
         py: Python<'py>,
-        values: PyReadonlyArray1<'_, f64>,
+        values: RowMajor1<'_, f64>,
         free: Vec<usize>,
         data: Vec<Response<'_>>,
         whitening: Vec<Run<'_>>,
-        starts: PyReadonlyArray2<'py, f64>,
-        lower: PyReadonlyArray1<'py, f64>,
-        upper: PyReadonlyArray1<'py, f64>,
+        starts: RowMajor2<'py, f64>,
+        lower: RowMajor1<'py, f64>,
+        upper: RowMajor1<'py, f64>,
         maximum_iterations: usize,
     ) -> PyResult<Vec<Bound<'py, PyAny>>> {
         let data = measured(data)?;
@@ -257,7 +256,7 @@ impl StateSpace {
     fn fit_records<'py>(
         &self,
         py: Python<'py>,
-        values: PyReadonlyArray1<'_, f64>,
+        values: RowMajor1<'_, f64>,
         free: Vec<usize>,
         records: Vec<Flown<'_>>,
         own: Vec<Own<'_>>,
@@ -282,7 +281,7 @@ impl StateSpace {
     fn run_record<'py>(
         &self,
         py: Python<'py>,
-        values: PyReadonlyArray1<'_, f64>,
+        values: RowMajor1<'_, f64>,
         free: Vec<usize>,
         record: Flown<'_>,
         own: Own<'_>,

@@ -9,7 +9,7 @@ use flightid_core::frequency_domain::transfer::{
 };
 use flightid_core::output_error::transfer_family::TransferFamily;
 use num_complex::Complex64;
-use numpy::{PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{PyArray2, PyArray3};
 use pyo3::prelude::*;
 
 use crate::error::from_core;
@@ -19,6 +19,7 @@ use crate::fits::frequency_fit::{
 use crate::fits::output_error::{
     self, Flown, NoiseArguments, Own, SearchArguments, linear, record_data,
 };
+use crate::row_major::{RowMajor1, RowMajor2};
 
 type Text = (String, Vec<String>, Vec<String>, String);
 type Numbers = (f64, Vec<Vec<f64>>, Vec<Vec<f64>>, f64);
@@ -58,7 +59,7 @@ impl TransferFunctions {
     /// factored(self, values: NDArray[np.float64]) -> list[tuple[float, list[list[float]], list[list[float]], float]]
     ///
     /// Gain, numerator and denominator factors (ascending powers of s) and delay of each response.
-    fn factored(&self, values: PyReadonlyArray1<'_, f64>) -> PyResult<Vec<Numbers>> {
+    fn factored(&self, values: RowMajor1<'_, f64>) -> PyResult<Vec<Numbers>> {
         let found = self.functions.factored(values.as_slice()?).map_err(from_core)?;
         Ok(found.into_iter().map(|f| (f.gain, f.numerator, f.denominator, f.delay)).collect())
     }
@@ -69,8 +70,8 @@ impl TransferFunctions {
     fn response<'py>(
         &self,
         py: Python<'py>,
-        values: PyReadonlyArray1<'_, f64>,
-        omega_rad_s: PyReadonlyArray1<'_, f64>,
+        values: RowMajor1<'_, f64>,
+        omega_rad_s: RowMajor1<'_, f64>,
     ) -> PyResult<Bound<'py, PyArray2<Complex64>>> {
         let mut model =
             FreeTransfer::new(&self.functions, values.as_slice()?, &[]).map_err(from_core)?;
@@ -84,9 +85,9 @@ impl TransferFunctions {
     fn log_gradient<'py>(
         &self,
         py: Python<'py>,
-        values: PyReadonlyArray1<'_, f64>,
+        values: RowMajor1<'_, f64>,
         free: Vec<usize>,
-        omega_rad_s: PyReadonlyArray1<'_, f64>,
+        omega_rad_s: RowMajor1<'_, f64>,
     ) -> PyResult<Bound<'py, PyArray3<Complex64>>> {
         let values = values.as_slice()?;
         let mut model = FreeTransfer::new(&self.functions, values, &free).map_err(from_core)?;
@@ -104,13 +105,13 @@ impl TransferFunctions {
     fn fit<'py>(
         &self,
         py: Python<'py>,
-        values: PyReadonlyArray1<'_, f64>,
+        values: RowMajor1<'_, f64>,
         free: Vec<usize>,
         data: Vec<Response<'_>>,
         whitening: Vec<Run<'_>>,
-        starts: PyReadonlyArray2<'py, f64>,
-        lower: PyReadonlyArray1<'py, f64>,
-        upper: PyReadonlyArray1<'py, f64>,
+        starts: RowMajor2<'py, f64>,
+        lower: RowMajor1<'py, f64>,
+        upper: RowMajor1<'py, f64>,
         maximum_iterations: usize,
     ) -> PyResult<Vec<Bound<'py, PyAny>>> {
         let model =
@@ -132,7 +133,7 @@ impl TransferFunctions {
     fn fit_records<'py>(
         &self,
         py: Python<'py>,
-        values: PyReadonlyArray1<'_, f64>,
+        values: RowMajor1<'_, f64>,
         free: Vec<usize>,
         records: Vec<Flown<'_>>,
         own: Vec<Own<'_>>,
@@ -159,7 +160,7 @@ impl TransferFunctions {
     fn run_record<'py>(
         &self,
         py: Python<'py>,
-        values: PyReadonlyArray1<'_, f64>,
+        values: RowMajor1<'_, f64>,
         free: Vec<usize>,
         record: Flown<'_>,
         own: Own<'_>,

@@ -2,10 +2,11 @@
 //! identification/output_error/sensor_noise.py)
 
 use flightid_core::linear::drift_errors::{GainSearch, drift_errors as search};
-use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
+use numpy::{IntoPyArray, PyArray1};
 use pyo3::prelude::*;
 
 use crate::error::from_core;
+use crate::row_major::RowMajor1;
 
 /// drift_errors(samples: NDArray[np.float64], lengths: list[int], drift: tuple[float, float], skip: int, settings: tuple[int, float, list[float]]) -> NDArray[np.float64]
 ///
@@ -14,7 +15,7 @@ use crate::error::from_core;
 #[pyfunction]
 fn drift_errors<'py>(
     py: Python<'py>,
-    samples: PyReadonlyArray1<'_, f64>,
+    samples: RowMajor1<'_, f64>,
     lengths: Vec<usize>,
     drift: (f64, f64),
     skip: usize,

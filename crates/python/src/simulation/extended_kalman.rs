@@ -3,29 +3,23 @@
 
 use flightid_core::trajectories::extended_kalman::{Belief, Constants, filter, slopes};
 use flightid_core::trajectories::runge_kutta::Course;
-use numpy::{
-    IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
-    PyReadonlyArray3,
-};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 
 use crate::error::from_core;
 use crate::fits::output_error::hold as named;
 use crate::interrupt::run_beside;
 use crate::models::state_space::StateSpace;
+use crate::row_major::{RowMajor1, RowMajor2, RowMajor3};
 
 type Matrix<'py> = Bound<'py, PyArray2<f64>>;
 type Found<'py> = (
     (Matrix<'py>, Bound<'py, PyArray3<f64>>, Matrix<'py>),
     (Matrix<'py>, Bound<'py, PyArray1<f64>>),
 );
-type Start<'py> = (PyReadonlyArray1<'py, f64>, PyReadonlyArray2<'py, f64>, Vec<usize>, Vec<usize>);
-type Ahead<'py> = (
-    PyReadonlyArray2<'py, f64>,
-    PyReadonlyArray3<'py, f64>,
-    PyReadonlyArray2<'py, f64>,
-    PyReadonlyArray2<'py, f64>,
-);
+type Start<'py> = (RowMajor1<'py, f64>, RowMajor2<'py, f64>, Vec<usize>, Vec<usize>);
+type Ahead<'py> =
+    (RowMajor2<'py, f64>, RowMajor3<'py, f64>, RowMajor2<'py, f64>, RowMajor2<'py, f64>);
 
 /// extended_filter(model: StateSpace, values: NDArray[np.float64], inputs: NDArray[np.float64], measured: NDArray[np.float64], sampling: tuple[float, str, int], start: tuple[NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int]], noise: tuple[NDArray[np.float64], NDArray[np.float64]]) -> tuple[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]], tuple[NDArray[np.float64], NDArray[np.float64]]]
 ///
@@ -40,12 +34,12 @@ type Ahead<'py> = (
 fn extended_filter<'py>(
     py: Python<'py>,
     model: &StateSpace,
-    values: PyReadonlyArray1<'py, f64>,
-    inputs: PyReadonlyArray2<'py, f64>,
-    measured: PyReadonlyArray2<'py, f64>,
+    values: RowMajor1<'py, f64>,
+    inputs: RowMajor2<'py, f64>,
+    measured: RowMajor2<'py, f64>,
     sampling: (f64, String, usize),
     start: Start<'py>,
-    noise: (PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, f64>),
+    noise: (RowMajor1<'py, f64>, RowMajor1<'py, f64>),
 ) -> PyResult<Found<'py>> {
     let (sample_s, hold, substeps) = (sampling.0, named(&sampling.1)?, sampling.2);
     let n_samples = inputs.as_array().ncols();
@@ -75,12 +69,12 @@ fn extended_filter<'py>(
 fn extended_filter_slopes<'py>(
     py: Python<'py>,
     model: &StateSpace,
-    values: PyReadonlyArray1<'py, f64>,
-    inputs: PyReadonlyArray2<'py, f64>,
-    measured: PyReadonlyArray2<'py, f64>,
+    values: RowMajor1<'py, f64>,
+    inputs: RowMajor2<'py, f64>,
+    measured: RowMajor2<'py, f64>,
     sampling: (f64, String, usize),
     start: Start<'py>,
-    noise: (PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, f64>),
+    noise: (RowMajor1<'py, f64>, RowMajor1<'py, f64>),
     ahead: Ahead<'py>,
 ) -> PyResult<(Matrix<'py>, Matrix<'py>)> {
     let (sample_s, hold, substeps) = (sampling.0, named(&sampling.1)?, sampling.2);
@@ -115,9 +109,9 @@ fn extended_filter_slopes<'py>(
 }
 
 fn belief<'a>(
-    values: &'a PyReadonlyArray1<'_, f64>,
+    values: &'a RowMajor1<'_, f64>,
     start: &'a Start<'_>,
-    noise: &'a (PyReadonlyArray1<'_, f64>, PyReadonlyArray1<'_, f64>),
+    noise: &'a (RowMajor1<'_, f64>, RowMajor1<'_, f64>),
 ) -> PyResult<Belief<'a>> {
     Ok(Belief {
         parameters: values.as_slice()?,

@@ -2,10 +2,11 @@
 //! identification/filter_error/fit.py)
 
 use flightid_core::linear::linear_recursion::recurse;
-use numpy::{IntoPyArray, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3};
+use numpy::{IntoPyArray, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 
 use crate::error::from_core;
+use crate::row_major::{RowMajor2, RowMajor3};
 
 /// linear_recursion(transition: NDArray[np.float64], forcing: NDArray[np.float64], initial: NDArray[np.float64]) -> NDArray[np.float64]
 ///
@@ -14,9 +15,9 @@ use crate::error::from_core;
 #[pyfunction]
 fn linear_recursion<'py>(
     py: Python<'py>,
-    transition: PyReadonlyArray2<'_, f64>,
-    forcing: PyReadonlyArray3<'_, f64>,
-    initial: PyReadonlyArray2<'_, f64>,
+    transition: RowMajor2<'_, f64>,
+    forcing: RowMajor3<'_, f64>,
+    initial: RowMajor2<'_, f64>,
 ) -> PyResult<Bound<'py, PyArray3<f64>>> {
     let shape = forcing.as_array().dim();
     let (a, f, x0) = (transition.as_slice()?, forcing.as_slice()?, initial.as_slice()?);

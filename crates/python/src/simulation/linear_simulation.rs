@@ -2,6 +2,7 @@
 
 use crate::error::from_core;
 use crate::fits::output_error::hold as named;
+use crate::row_major::{RowMajor1, RowMajor2, RowMajor3};
 use flightid_core::linear::discretisation::discretise;
 use flightid_core::linear::discretisation::{Hold, StateSpace};
 use flightid_core::linear::linear_response::responses;
@@ -9,10 +10,7 @@ use flightid_core::linear::linear_simulation::Discrete;
 use flightid_core::numerics::matrix_exponential::exponential;
 use num_complex::Complex64;
 use numpy::ndarray::Array2;
-use numpy::{
-    IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
-    PyReadonlyArray3, PyUntypedArrayMethods,
-};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
 pub(crate) type States<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
@@ -35,13 +33,13 @@ pub(crate) fn matrix<'py>(
 #[allow(clippy::too_many_arguments)]
 fn simulate_linear<'py>(
     py: Python<'py>,
-    a: PyReadonlyArray2<'py, f64>,
-    b: PyReadonlyArray2<'py, f64>,
-    c: PyReadonlyArray2<'py, f64>,
-    d: PyReadonlyArray2<'py, f64>,
-    delays_s: PyReadonlyArray1<'py, f64>,
-    inputs: PyReadonlyArray2<'py, f64>,
-    initial_state: PyReadonlyArray1<'py, f64>,
+    a: RowMajor2<'py, f64>,
+    b: RowMajor2<'py, f64>,
+    c: RowMajor2<'py, f64>,
+    d: RowMajor2<'py, f64>,
+    delays_s: RowMajor1<'py, f64>,
+    inputs: RowMajor2<'py, f64>,
+    initial_state: RowMajor1<'py, f64>,
     sample_time_s: f64,
     first_order_hold: bool,
 ) -> PyResult<States<'py>> {
@@ -69,11 +67,11 @@ fn simulate_linear<'py>(
 #[pyfunction]
 fn linear_response<'py>(
     py: Python<'py>,
-    a: PyReadonlyArray2<'py, f64>,
-    b: PyReadonlyArray2<'py, f64>,
-    c: PyReadonlyArray2<'py, f64>,
-    d: PyReadonlyArray2<'py, f64>,
-    points: PyReadonlyArray1<'py, Complex64>,
+    a: RowMajor2<'py, f64>,
+    b: RowMajor2<'py, f64>,
+    c: RowMajor2<'py, f64>,
+    d: RowMajor2<'py, f64>,
+    points: RowMajor1<'py, Complex64>,
 ) -> PyResult<Bound<'py, PyArray3<Complex64>>> {
     let &[n_outputs, n_inputs] = d.shape() else { return Err(odd_shape()) };
     let n = a.shape()[0];
@@ -103,11 +101,11 @@ type Taps<'py> = Vec<(usize, isize, Bound<'py, PyArray1<f64>>, Bound<'py, PyArra
 #[allow(clippy::too_many_arguments)]
 fn discretise_linear<'py>(
     py: Python<'py>,
-    a: PyReadonlyArray2<'py, f64>,
-    b: PyReadonlyArray2<'py, f64>,
-    c: PyReadonlyArray2<'py, f64>,
-    d: PyReadonlyArray2<'py, f64>,
-    delays_s: PyReadonlyArray1<'py, f64>,
+    a: RowMajor2<'py, f64>,
+    b: RowMajor2<'py, f64>,
+    c: RowMajor2<'py, f64>,
+    d: RowMajor2<'py, f64>,
+    delays_s: RowMajor1<'py, f64>,
     sample_time_s: f64,
     first_order_hold: bool,
 ) -> PyResult<(Bound<'py, PyArray2<f64>>, Taps<'py>)> {
@@ -130,11 +128,11 @@ fn discretise_linear<'py>(
 }
 
 type Matrices<'py> = (
-    PyReadonlyArray3<'py, f64>,
-    PyReadonlyArray3<'py, f64>,
-    PyReadonlyArray3<'py, f64>,
-    PyReadonlyArray3<'py, f64>,
-    PyReadonlyArray2<'py, f64>,
+    RowMajor3<'py, f64>,
+    RowMajor3<'py, f64>,
+    RowMajor3<'py, f64>,
+    RowMajor3<'py, f64>,
+    RowMajor2<'py, f64>,
 );
 type Jets<'py> = (Bound<'py, PyArray3<f64>>, Vec<(usize, isize)>, Bound<'py, PyArray3<f64>>);
 
@@ -191,7 +189,7 @@ fn odd_shape() -> PyErr {
 #[pyfunction]
 fn matrix_exponential<'py>(
     py: Python<'py>,
-    matrix: PyReadonlyArray2<'py, f64>,
+    matrix: RowMajor2<'py, f64>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let n = matrix.as_array().nrows();
     let result = exponential(matrix.as_slice()?, n).map_err(from_core)?;

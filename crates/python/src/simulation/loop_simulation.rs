@@ -2,6 +2,7 @@
 
 use crate::error::from_core;
 use crate::models::state_space::StateSpace;
+use crate::row_major::{RowMajor1, RowMajor2};
 use crate::simulation::linear_simulation::matrix;
 use crate::simulation::vehicle_loop::{Matrices, system};
 use flightid_core::linear::discretisation::Hold;
@@ -10,23 +11,16 @@ use flightid_core::trajectories::equation_step::EquationStep;
 use flightid_core::trajectories::loop_simulation::{
     Element, Equations, Kept, Port, Recursion, simulate,
 };
-use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::PyArray2;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 /// Kind, places of signals and of rows, steps from sample to sample, numbers.
-type Given<'py> = (String, Vec<usize>, Vec<usize>, usize, PyReadonlyArray1<'py, f64>);
+type Given<'py> = (String, Vec<usize>, Vec<usize>, usize, RowMajor1<'py, f64>);
 /// Model, values of its parameters, trim of inputs and of outputs, initial state, substeps, which
 /// inputs are held.
-type Moving<'py> = (
-    PyRef<'py, StateSpace>,
-    PyReadonlyArray1<'py, f64>,
-    Vec<f64>,
-    Vec<f64>,
-    Vec<f64>,
-    usize,
-    Vec<bool>,
-);
+type Moving<'py> =
+    (PyRef<'py, StateSpace>, RowMajor1<'py, f64>, Vec<f64>, Vec<f64>, Vec<f64>, usize, Vec<bool>);
 
 fn element(
     kind: &str,
@@ -93,8 +87,8 @@ fn simulate_loops<'py>(
     py: Python<'py>,
     core: Matrices<'py>,
     first_order_hold: Vec<bool>,
-    rows: PyReadonlyArray2<'py, f64>,
-    initial_state: PyReadonlyArray1<'py, f64>,
+    rows: RowMajor2<'py, f64>,
+    initial_state: RowMajor1<'py, f64>,
     ports: Vec<Given<'py>>,
     models: Vec<Moving<'py>>,
     kept: Vec<usize>,

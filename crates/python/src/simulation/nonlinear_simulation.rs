@@ -3,11 +3,12 @@
 use flightid_core::linear::discretisation::Hold;
 use flightid_core::state_space::ode_model::OdeModel;
 use flightid_core::trajectories::runge_kutta::{Course, Setting};
-use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{IntoPyArray, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 
 use crate::error::from_core;
 use crate::models::state_space::StateSpace;
+use crate::row_major::{RowMajor1, RowMajor2};
 
 type States<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
 
@@ -19,9 +20,9 @@ type States<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
 fn simulate_equations<'py>(
     py: Python<'py>,
     model: &StateSpace,
-    values: PyReadonlyArray1<'py, f64>,
-    inputs: PyReadonlyArray2<'py, f64>,
-    initial_state: PyReadonlyArray1<'py, f64>,
+    values: RowMajor1<'py, f64>,
+    inputs: RowMajor2<'py, f64>,
+    initial_state: RowMajor1<'py, f64>,
     sample_time_s: f64,
     first_order_hold: bool,
     substeps: usize,

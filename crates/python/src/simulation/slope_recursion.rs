@@ -2,16 +2,17 @@
 //! identification/filter_error/innovations.py)
 
 use flightid_core::linear::slope_recursion::{Slopes, slopes};
-use numpy::{IntoPyArray, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3};
+use numpy::{IntoPyArray, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 
 use crate::error::from_core;
+use crate::row_major::{RowMajor2, RowMajor3};
 
-fn rows(of: &PyReadonlyArray2<'_, f64>) -> Vec<f64> {
+fn rows(of: &RowMajor2<'_, f64>) -> Vec<f64> {
     of.as_array().iter().copied().collect()
 }
 
-fn blocks(of: &PyReadonlyArray3<'_, f64>) -> Vec<f64> {
+fn blocks(of: &RowMajor3<'_, f64>) -> Vec<f64> {
     of.as_array().iter().copied().collect()
 }
 
@@ -22,11 +23,11 @@ fn blocks(of: &PyReadonlyArray3<'_, f64>) -> Vec<f64> {
 #[pyfunction]
 fn slope_recursion<'py>(
     py: Python<'py>,
-    transition: PyReadonlyArray2<'_, f64>,
-    output: PyReadonlyArray2<'_, f64>,
-    forced: PyReadonlyArray3<'_, f64>,
-    direct: PyReadonlyArray3<'_, f64>,
-    signals: PyReadonlyArray2<'_, f64>,
+    transition: RowMajor2<'_, f64>,
+    output: RowMajor2<'_, f64>,
+    forced: RowMajor3<'_, f64>,
+    direct: RowMajor3<'_, f64>,
+    signals: RowMajor2<'_, f64>,
 ) -> PyResult<Bound<'py, PyArray3<f64>>> {
     let ((p, n), (q, n_samples)) = (output.as_array().dim(), signals.as_array().dim());
     let count = forced.as_array().dim().0;

@@ -1,20 +1,20 @@
 //! Binding of closed-loop simulation (Python side: `vehicles/vehicle_loop.py`).
 
 use crate::error::from_core;
+use crate::row_major::{RowMajor1, RowMajor2};
 use crate::simulation::linear_simulation::{States, matrix};
 use flightid_core::linear::discretisation::{Hold, StateSpace};
 use flightid_core::linear::linear_simulation::Discrete;
 use flightid_core::vehicles::vehicle_loop::{ClosedLoop, Disturbance};
-use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
 /// A, B, C, D and the delay of each input, s.
 pub(crate) type Matrices<'py> = (
-    PyReadonlyArray2<'py, f64>,
-    PyReadonlyArray2<'py, f64>,
-    PyReadonlyArray2<'py, f64>,
-    PyReadonlyArray2<'py, f64>,
-    PyReadonlyArray1<'py, f64>,
+    RowMajor2<'py, f64>,
+    RowMajor2<'py, f64>,
+    RowMajor2<'py, f64>,
+    RowMajor2<'py, f64>,
+    RowMajor1<'py, f64>,
 );
 
 pub(crate) fn system<'a>(matrices: &'a Matrices<'_>) -> PyResult<StateSpace<'a>> {
@@ -40,7 +40,7 @@ fn fly_closed_loop<'py>(
     controller: Matrices<'py>,
     watched: Vec<usize>,
     driven: Vec<usize>,
-    added: PyReadonlyArray2<'py, f64>,
+    added: RowMajor2<'py, f64>,
     disturbances: Vec<(f64, f64)>,
     noise: Vec<f64>,
     sample_time_s: f64,

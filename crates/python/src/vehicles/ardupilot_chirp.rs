@@ -3,10 +3,11 @@
 use flightid_core::CoreError;
 use flightid_core::autopilots::ardupilot_chirp::Chirp;
 use num_traits::{Float, FloatConst};
-use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
+use numpy::{IntoPyArray, PyArray1};
 use pyo3::prelude::*;
 
 use crate::error::from_core;
+use crate::row_major::RowMajor1;
 
 type Pair<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
 
@@ -17,7 +18,7 @@ type Pair<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
 #[allow(clippy::too_many_arguments)]
 fn ardupilot_chirp<'py>(
     py: Python<'py>,
-    time_s: PyReadonlyArray1<'py, f64>,
+    time_s: RowMajor1<'py, f64>,
     magnitude: f64,
     start_hz: f64,
     stop_hz: f64,

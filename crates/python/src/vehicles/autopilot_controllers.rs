@@ -2,6 +2,7 @@
 //! runs in the firmware's single precision or, for linear views, in double.
 
 use crate::group::read;
+use crate::row_major::{RowMajor1, RowMajor2};
 use flightid_core::autopilots::ardupilot_mode::square_root_law;
 use flightid_core::autopilots::ardupilot_pid::{Pid, PidGains};
 use flightid_core::autopilots::gyro_filter::low_pass;
@@ -11,7 +12,7 @@ use flightid_core::autopilots::notch_filter::{
 use flightid_core::autopilots::px4_rate_control::{RateControl, RateGains, RateInputs, gyro_chain};
 use num_traits::{Float, FloatConst};
 use numpy::ndarray::Array2;
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -107,9 +108,9 @@ fn ardupilot_pid<'py>(
     py: Python<'py>,
     gains: &Bound<'py, PyDict>,
     loop_time_s: f64,
-    target: PyReadonlyArray1<'py, f64>,
-    measured: PyReadonlyArray1<'py, f64>,
-    limited: PyReadonlyArray1<'py, bool>,
+    target: RowMajor1<'py, f64>,
+    measured: RowMajor1<'py, f64>,
+    limited: RowMajor1<'py, bool>,
     leak: Option<[f64; 2]>,
     slew_scale: f64,
     start: Option<[f64; 4]>,
@@ -174,8 +175,8 @@ fn px4_rate_control<'py>(
     py: Python<'py>,
     gains: &Bound<'py, PyDict>,
     loop_time_s: f64,
-    signals: PyReadonlyArray2<'py, f64>,
-    flags: PyReadonlyArray2<'py, bool>,
+    signals: RowMajor2<'py, f64>,
+    flags: RowMajor2<'py, bool>,
     start: Option<[f64; 2]>,
     single_precision: bool,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
@@ -229,7 +230,7 @@ type Pair<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
 #[allow(clippy::too_many_arguments)]
 fn gyro_filters<'py>(
     py: Python<'py>,
-    raw: PyReadonlyArray1<'py, f64>,
+    raw: RowMajor1<'py, f64>,
     sample_rate_hz: f64,
     notches: Vec<Section<f64>>,
     cutoff_hz: f64,
@@ -293,7 +294,7 @@ fn gyro_low_pass_section(sample_rate_hz: f64, cutoff_hz: f64) -> Option<(f64, f6
 #[pyo3(name = "square_root_law")]
 fn square_root_laws<'py>(
     py: Python<'py>,
-    error_rad: PyReadonlyArray1<'py, f64>,
+    error_rad: RowMajor1<'py, f64>,
     gain_1_s: f64,
     acceleration_rad_s2: f64,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {

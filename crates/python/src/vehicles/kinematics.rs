@@ -1,9 +1,10 @@
 //! Binding of kinematic reconstruction (Python side: `conditioning/kinematics.py`).
 
 use crate::error::from_core;
+use crate::row_major::{RowMajor1, RowMajor2};
 use flightid_core::trajectories::kinematics::{COLUMNS, N, reconstruct};
 use numpy::ndarray::{Array2, Array3};
-use numpy::{IntoPyArray, PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{IntoPyArray, PyArray2, PyArray3};
 use pyo3::prelude::*;
 
 type Paths<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray3<f64>>);
@@ -14,8 +15,8 @@ type Paths<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray3<f64>>);
 #[pyfunction]
 fn reconstruct_kinematics<'py>(
     py: Python<'py>,
-    inputs: PyReadonlyArray2<'py, f64>,
-    initial: PyReadonlyArray1<'py, f64>,
+    inputs: RowMajor2<'py, f64>,
+    initial: RowMajor1<'py, f64>,
     sample_time_s: f64,
     gravity: f64,
 ) -> PyResult<Paths<'py>> {

@@ -3,6 +3,7 @@
 
 use crate::error::from_core;
 use crate::group::{item, read};
+use crate::row_major::{RowMajor1, RowMajor2};
 use crate::vehicles::autopilot_controllers::pid_gains;
 use flightid_core::autopilots::ardupilot_mixer::Mixer;
 use flightid_core::autopilots::ardupilot_mode::{AttitudeGains, SidRun};
@@ -10,7 +11,7 @@ use flightid_core::vehicles::quadrotor::{Gust, N_STATES, Quadrotor};
 use flightid_core::vehicles::quadrotor_flight::{Autopilot, COLUMNS, Plan, Sensors, fly};
 use flightid_core::vehicles::turbulence::Turbulence;
 use numpy::ndarray::Array2;
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -83,7 +84,7 @@ fn fly_quadrotor<'py>(
     autopilot: &Bound<'py, PyDict>,
     sensors: &Bound<'py, PyDict>,
     turbulence: &Bound<'py, PyDict>,
-    pilot: PyReadonlyArray2<'py, f64>,
+    pilot: RowMajor2<'py, f64>,
     runs: Vec<Bound<'py, PyDict>>,
     log_every: usize,
     seed: u64,
@@ -135,8 +136,8 @@ fn fly_quadrotor<'py>(
 fn quadrotor_derivative<'py>(
     py: Python<'py>,
     vehicle: &Bound<'py, PyDict>,
-    state: PyReadonlyArray1<'py, f64>,
-    thrust_n: PyReadonlyArray1<'py, f64>,
+    state: RowMajor1<'py, f64>,
+    thrust_n: RowMajor1<'py, f64>,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
     let vehicle = self::vehicle(vehicle)?;
     let (x, command): ([f64; N_STATES], [f64; 4]) =
@@ -151,8 +152,8 @@ fn quadrotor_derivative<'py>(
 fn quadrotor_trajectory<'py>(
     py: Python<'py>,
     vehicle: &Bound<'py, PyDict>,
-    state: PyReadonlyArray1<'py, f64>,
-    thrust_n: PyReadonlyArray1<'py, f64>,
+    state: RowMajor1<'py, f64>,
+    thrust_n: RowMajor1<'py, f64>,
     step_s: f64,
     n_steps: usize,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {

@@ -3,9 +3,10 @@
 
 use crate::error::from_core;
 use crate::group::read;
+use crate::row_major::{RowMajor1, RowMajor2};
 use flightid_core::vehicles::twin_rotor::{Draught, Encoders, N_STATES, Run, TwinRotor};
 use numpy::ndarray::Array2;
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -45,8 +46,8 @@ fn run_twin_rotor<'py>(
     rig: &Bound<'py, PyDict>,
     encoders: &Bound<'py, PyDict>,
     draught: &Bound<'py, PyDict>,
-    start: PyReadonlyArray1<'py, f64>,
-    voltages_v: PyReadonlyArray2<'py, f64>,
+    start: RowMajor1<'py, f64>,
+    voltages_v: RowMajor2<'py, f64>,
     sample_time_s: f64,
     substeps: usize,
     seed: u64,
@@ -70,9 +71,9 @@ fn run_twin_rotor<'py>(
 fn twin_rotor_derivative<'py>(
     py: Python<'py>,
     rig: &Bound<'py, PyDict>,
-    state: PyReadonlyArray1<'py, f64>,
-    voltage_v: PyReadonlyArray1<'py, f64>,
-    disturbance_n_m: PyReadonlyArray1<'py, f64>,
+    state: RowMajor1<'py, f64>,
+    voltage_v: RowMajor1<'py, f64>,
+    disturbance_n_m: RowMajor1<'py, f64>,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
     let rig = self::rig(rig)?;
     let x: [f64; N_STATES] = state.as_slice()?.try_into()?;
