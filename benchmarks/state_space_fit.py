@@ -68,6 +68,30 @@ class Case:
         """As the native fit takes it."""
         return [(OMEGA, row, self.gain, self.phase) for row in np.ascontiguousarray(self.measured)]
 
+    @property
+    def begun(self) -> fid.StateSpaceModel:
+        """The model at the start."""
+        names = (parameter.name for parameter in self.model.parameters.free)
+        return self.model.with_values(dict(zip(names, self.start.tolist(), strict=True)))
+
+    @property
+    def responses(self) -> fid.FrequencyResponse:
+        """As the verb takes it; pairs that are not fitted hold ones."""
+        names = [pair.split("/") for pair in PAIRS]
+        outputs, inputs = (list(dict.fromkeys(each)) for each in zip(*names, strict=True))
+        values = np.ones((len(outputs), len(inputs), len(OMEGA)), dtype=complex)
+        for (output, source), row in zip(names, self.measured, strict=True):
+            values[outputs.index(output), inputs.index(source)] = row
+        return fid.FrequencyResponse.from_values(
+            OMEGA,
+            values,
+            inputs=inputs,
+            outputs=outputs,
+            units={name: self.model.units[name] for name in (*outputs, *inputs)},
+            coherence=np.full(values.shape, 0.95),
+            random_error=np.full(values.shape, NOISE),
+        )
+
 
 def make_case(noise: float, seed: int, spread: float) -> Case:
     """Responses of the truth with noise, and a start within a relative spread of it."""
@@ -186,9 +210,14 @@ def _best(call: Callable[[], object], repeats: int) -> float:
 def run() -> Table:
     """Milliseconds a fit, and the ratio to the native fit."""
     case = make_case(NOISE, seed=0, spread=0.2)
-    peer = Peer(case)
+    peer, begun, data = Peer(case), case.begun, case.responses
+
+    def verb() -> fid.Fit:
+        return fid.identify(begun, data, n_omega=len(OMEGA))
+
     cases = (
         ("flightid, native", lambda: native_fit(case, case.start)[0][1], REPEATS),
+        ("flightid, identify with error bars", lambda: verb().cost, REPEATS),
         ("SciPy least_squares, analytic NumPy", lambda: peer.fit(peer.jacobian), 3),
         ("SciPy least_squares, finite differences", lambda: peer.fit("2-point"), 1),
     )

@@ -5,7 +5,7 @@ ratio holds on any machine; `history.json` keeps it, and a check compares by it.
 
 Run: python -m benchmarks verbs            the table beside what was kept
      python -m benchmarks.verbs --check    1 where a line is worse by more than a quarter
-     python -m benchmarks.verbs --keep     keep today's ratios
+     python -m benchmarks.verbs --keep     keep today's ratios; with names of lines, theirs alone
 """
 
 from __future__ import annotations
@@ -15,7 +15,8 @@ import resource
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from itertools import cycle
 from pathlib import Path
 from statistics import median
 
@@ -23,7 +24,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 import flightid as fid
-from benchmarks import output_error, subspace
+from benchmarks import output_error, responses, state_space_fit, subspace
 from flightid.table import Column, Table
 
 HISTORY = Path(__file__).with_name("history.json")
@@ -83,11 +84,42 @@ def _orders(n_samples: int) -> Work:
     return lambda: fid.identify(structure, record)
 
 
+def _responses() -> Work:
+    """4 x 9 responses of 12 records, 5 windows, 200 frequencies: records nobody has looked at."""
+    records = responses.flights(responses.make_samples())
+    return lambda: responses.estimate([each.replace() for each in records])
+
+
+def _response_fit(n_omega: int) -> Work:
+    case = state_space_fit.make_case(state_space_fit.NOISE, seed=0, spread=0.2)
+    model, data = case.begun, case.responses
+    return lambda: fid.identify(model, data, n_omega=n_omega)
+
+
+def _live(*, with_fit: bool) -> Work:
+    """What a page does when its band is moved, over the same record."""
+    output_error.N = 13_000
+    record, bands = output_error.two_rates_record(), cycle([(0.5, 12.0), (0.6, 11.0), (0.7, 10.0)])
+    pairs = [f"{output}/{source}" for output in "pr" for source in ("aileron", "rudder")]
+    model = output_error.two_rates().with_responses(*pairs)
+
+    def moved() -> object:
+        response = fid.estimate_response(record, band_rad_s=next(bands))
+        return fid.identify(model, response) if with_fit else response
+
+    return moved
+
+
 REST = {"initial_state": "trim", "output_bias": False}
 LINES: dict[str, Callable[[], Work]] = {
     "output error, 130 s, 8 parameters": lambda: _linear(13_000, **REST),
     "output error, 20 starts": lambda: _linear(13_000, starts=20, **REST),
     "output error, 10⁶ samples": lambda: _linear(1_000_000, **REST),
+    "responses 4 × 9, 12 records": _responses,
+    "response fit, 13 states, 40 parameters": lambda: _response_fit(20),
+    "response fit, all 60 frequencies": lambda: _response_fit(60),
+    "band moved, response": lambda: _live(with_fit=False),
+    "band moved, response and fit": lambda: _live(with_fit=True),
     "equation error, 130 s": lambda: _linear(13_000, method="equation_error"),
     "filter error, 130 s": lambda: _linear(13_000, method="filter_error"),
     "filter error, nonlinear, 4 × 30 s": _pitch,
@@ -129,10 +161,14 @@ def _apart(name: str) -> dict[str, float]:
     return dict(json.loads(found))
 
 
-def compared() -> tuple[dict[str, dict[str, float]], Table]:
-    """What every line takes today, and the table of it beside what was kept."""
-    kept = json.loads(HISTORY.read_text()) if HISTORY.exists() else {}
-    today = {name: _apart(name) for name in LINES}
+def _history() -> dict[str, dict[str, float]]:
+    return dict(json.loads(HISTORY.read_text())) if HISTORY.exists() else {}
+
+
+def compared(names: Sequence[str]) -> tuple[dict[str, dict[str, float]], Table]:
+    """What lines take today, and the table of it beside what was kept."""
+    kept = _history()
+    today = {name: _apart(name) for name in names}
     rows = []
     for name, now in today.items():
         was = kept.get(name)
@@ -159,7 +195,7 @@ def compared() -> tuple[dict[str, dict[str, float]], Table]:
 
 def run() -> Table:
     """The table alone."""
-    return compared()[1]
+    return compared(list(LINES))[1]
 
 
 def main(arguments: list[str]) -> int:
@@ -167,14 +203,16 @@ def main(arguments: list[str]) -> int:
     if arguments and arguments[0] in LINES:
         print(json.dumps(measured(arguments[0])))
         return 0
-    today, table = compared()
+    option, names = arguments[:1], arguments[1:] or list(LINES)
+    today, table = compared(names)
     print(table)
-    if arguments == ["--keep"]:
-        HISTORY.write_text(json.dumps(today, indent=1, ensure_ascii=False) + "\n")
+    if option == ["--keep"]:
+        text = json.dumps(_history() | today, indent=1, ensure_ascii=False)
+        HISTORY.write_text(text + "\n")
     worse = [row[0] for row in table.rows if max(row[3] or 0.0, row[5] or 0.0) > WORSE]
     for name in worse:
         print(f"worse than kept by more than a quarter: {name}")
-    return 1 if worse and arguments == ["--check"] else 0
+    return 1 if worse and option == ["--check"] else 0
 
 
 if __name__ == "__main__":
