@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -157,3 +158,25 @@ def test_a_constant_input_holds_no_noise() -> None:
     )
     found = fid.feedback_test(record)
     assert (found.loop, found.input) == ("open", "u")
+
+
+def test_a_moved_band_asks_the_same_samples_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[int] = []
+
+    def counted(*arguments: Any, **options: Any) -> FeedbackTest:
+        asked.append(1)
+        return find_feedback(*arguments, **options)
+
+    monkeypatch.setattr("flightid.responses.feedback.find_feedback", counted)
+    u, e = np.random.default_rng(0).standard_normal((2, 4000))
+    y = np.convolve(u, [0.0, 0.5, 0.3])[:4000] + e
+    record = fid.Record.from_arrays(np.arange(4000) / 100, inputs={"u": u}, outputs={"y": y + 1.0})
+    found = [
+        fid.estimate_response(record, band_rad_s=(2.0, high), n_omega=10).loop
+        for high in (40.0, 42.0)
+    ]
+    assert found[0] == found[1]
+    assert len(asked) == 1
+    fid.estimate_response(record, band_rad_s=(2.0, 10.0), n_omega=10)  # thinned otherwise
+    fid.estimate_response(record, band_rad_s=(2.0, 42.0), n_omega=10, detrend="none")
+    assert len(asked) == 3

@@ -116,14 +116,16 @@ class _ExaminedChannel:
 
 
 def _alone(values: Array) -> tuple[NDArray[np.intp], Array, float]:
-    from scipy.ndimage import maximum_filter1d  # noqa: PLC0415
-
     low, high = np.percentile(values, [1, 99])
     # A median is one of the neighbours: nothing lies further from it than steps can carry.
     if HALF_WIDTH * float(np.abs(np.diff(values)).max()) <= HARMFUL * (high - low):
         return np.empty(0, dtype=np.intp), np.zeros(0), 0.0
     away, spread = distances(values, HALF_WIDTH)
     tall = (away > FAR * spread) & (away > HARMFUL * (high - low))
+    if not tall.any():
+        return np.empty(0, dtype=np.intp), away, spread
+    from scipy.ndimage import maximum_filter1d  # noqa: PLC0415
+
     # The largest of the neighbours, without the few samples that a spike may last.
     around = maximum_filter1d(np.where(tall, 0.0, away), 2 * NEIGHBOURS + 1, mode="nearest")
     crowd = np.convolve(tall, np.ones(2 * (NEIGHBOURS + HALF_WIDTH) + 1), mode="same")
@@ -232,9 +234,6 @@ def _held(channel: _ExaminedChannel) -> SampleFault | None:
 def _clipped(channel: _ExaminedChannel) -> SampleFault | None:
     """Flat tops at the very extremes, met and left abruptly, again and again."""
     name, values = channel.name, channel.values
-    if np.unique(values).size < LEVELS:
-        return None
-    typical = float(np.median(np.abs(np.diff(values))))
     for end in (float(values.max()), float(values.min())):
         starts, stops = _runs(values == end)
         inner = (stops - starts >= LIMIT_RUN) & (starts > 0) & (stops < values.size)
@@ -242,8 +241,10 @@ def _clipped(channel: _ExaminedChannel) -> SampleFault | None:
         share = float(np.sum(stops - starts)) / values.size
         if starts.size < LIMIT_RUNS or share < LIMIT_SHARE:
             continue
+        if np.unique(values).size < LEVELS:
+            return None
         steps = np.minimum(np.abs(values[starts - 1] - end), np.abs(values[stops] - end))
-        if np.median(steps) < 0.1 * typical:
+        if np.median(steps) < 0.1 * np.median(np.abs(np.diff(values))):
             continue
         light = Light.RED if share >= RED_SHARE else Light.AMBER
         said = (
