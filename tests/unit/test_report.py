@@ -7,6 +7,7 @@ import gzip
 import hashlib
 import json
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
@@ -241,6 +242,17 @@ def test_long_plots_are_compressed_and_hold_the_same_values() -> None:
     assert json.loads(gzip.decompress(base64.b64decode(text))) == long
     plain = next(p for p in _parsed(to_html(page, packed=False)).scripts if "data-plot" in p[0])
     assert json.loads(plain[1]) == long
+
+
+def test_a_plot_shown_twice_is_stored_once() -> None:
+    drawn = Figure({"data": [{"type": "scatter", "y": [1, 2]}], "layout": {}}, "answer")
+    other = Figure({"data": [{"type": "scatter", "y": [1, 3]}], "layout": {}}, "other")
+    parts = (Section("Result", (drawn,)), Section("Roll", (other, replace(drawn, caption="again"))))
+    page = to_html(Document("Twice", "", parts))
+    assert sum("data-plot" in attributes for attributes, _ in _parsed(page).scripts) == 2
+    assert re.findall(r'id="(plot-\d)" data-spec="(plot-\d)"', page) == [
+        ("plot-1", "plot-1"), ("plot-2", "plot-2"), ("plot-3", "plot-1"),
+    ]  # fmt: skip
 
 
 def test_headings_tell_their_meaning_on_hover() -> None:

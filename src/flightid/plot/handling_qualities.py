@@ -17,6 +17,7 @@ from flightid.errors import DataError
 from flightid.plot import graph_objects as go
 from flightid.plot import look
 from flightid.plot.frequency_response import Curve, bode
+from flightid.plot.record import sparse
 from flightid.uncertainty.quantiles import ellipse_radius, shown
 
 SHADES = ("#b8dfc9", "#f7e3a1", "#f3bfa5", "#d9d9d9")
@@ -85,7 +86,8 @@ def bandwidth_curves(found: AttitudeBandwidth) -> go.PlotFigure:
     """
     curve, crossing = found.curve, found.omega_180_rad_s
     low = 0.3 * min(found.phase_bandwidth_rad_s, found.gain_bandwidth_rad_s or crossing)
-    keep = (curve.omega >= low) & (curve.omega <= 3.0 * crossing)
+    keep = np.flatnonzero((curve.omega >= low) & (curve.omega <= 3.0 * crossing))
+    keep = keep[sparse(keep.size)]
     made = look.figure(2, 1, row_heights=(2.0, 2.2), height_px=520)
     for row, values in enumerate((curve.decibels, curve.degrees), start=1):
         line = look.line(

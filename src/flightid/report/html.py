@@ -82,6 +82,7 @@ class _Numbering:
         self._packed = packed
         self._sections = 0
         self._plots = 0
+        self._first: dict[str, str] = {}
 
     def section(self, values: dict[str, Any]) -> dict[str, Any]:
         self._sections += 1
@@ -104,9 +105,12 @@ class _Numbering:
                 spec = values["spec"]
                 text = _script_json(spec)
                 small = self._packed and len(text) > LONG_PAYLOAD
+                place = f"plot-{self._plots}"
                 return {
                     **values,
-                    "id": f"plot-{self._plots}",
+                    "id": place,
+                    # A picture that is shown again, as the answer's is, is stored once.
+                    "spec_id": self._first.setdefault(text, place),
                     "height": int(spec.get("layout", {}).get("height") or DEFAULT_HEIGHT_PX),
                     "wide": sum(name.startswith("xaxis") for name in spec["layout"]) > MANY_PLOTS
                     if "layout" in spec

@@ -34,7 +34,7 @@
     isDark() ? lighter.reduce((now, [from, to]) => now.replaceAll(from, to), text) : text;
 
   async function draw(place) {
-    const holder = document.querySelector(`script[data-plot="${place.id}"]`);
+    const holder = document.querySelector(`script[data-plot="${place.dataset.spec}"]`);
     const spec = JSON.parse(recolour(await text(holder)));
     const style = getComputedStyle(root);
     spec.layout.font = { ...spec.layout.font, color: style.getPropertyValue("--ink").trim() };
