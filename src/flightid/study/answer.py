@@ -12,6 +12,7 @@ from flightid.control.tuning.limits import ANGLE
 from flightid.conventions import Light
 from flightid.findings import Finding, counted, worst
 from flightid.report.content import Document, Lights, Section, TableBlock
+from flightid.study.elsewhere import red_elsewhere
 from flightid.study.estimate_tables import structure_words
 from flightid.study.faults import CODE
 from flightid.table import Cell, Column, Table
@@ -109,12 +110,13 @@ def short_document(study: StudyResults, document: Document) -> Document:
     models = models_in_short(study.identified)
     faults = (Lights(study.faults),) if study.faults else ()
     tables = tuple(map(TableBlock, answer.tables))
+    red = red_elsewhere(answer.findings, document.sections[1:])
     sections = (
         Section("Models", (models, *faults)),
         *((Section("Gains", tables),) if tables else ()),
         Section(
             f"Answer: {document.verdict} ({document.tally})",
-            (Lights(answer.findings, repeats=True),),
+            (Lights((*answer.findings, *red), repeats=True),),
         ),
     )
     return Document(document.title, document.subtitle, sections)

@@ -30,6 +30,7 @@ from flightid.report.handling_qualities import handling_qualities_blocks
 from flightid.report.tuning import gain_flight_blocks, tuning_section
 from flightid.report.verification import prediction_picture
 from flightid.study.answer import answer_of, models_in_short
+from flightid.study.elsewhere import red_elsewhere
 from flightid.study.estimate_tables import model_table
 from flightid.study.faults import section_of, whole_section
 from flightid.study.model_section import model_section
@@ -61,25 +62,22 @@ def study_document(study: StudyResults) -> Document:
         Results of all stages.
     """
     settings = study.settings
-    models = [model_section(item, study.truth) for item in study.identified]
+    sections = (
+        *(
+            section_of(f"Data compatibility of “{name}”", _consistency, found)
+            for name, found in study.consistency.items()
+        ),
+        *(model_section(item, study.truth) for item in study.identified),
+        *_qualities(study),
+        *_uses(study),
+        section_of("The records" if study.inspection is None else "The log", _source_blocks, study),
+        *_review(study),
+        Section("Provenance", provenance(study.files, _options(study))),
+    )
     return Document(
         settings.title,
         settings.aircraft,
-        (
-            section_of("Result", _result, study),
-            *(
-                section_of(f"Data compatibility of “{name}”", _consistency, found)
-                for name, found in study.consistency.items()
-            ),
-            *models,
-            *_qualities(study),
-            *_uses(study),
-            section_of(
-                "The records" if study.inspection is None else "The log", _source_blocks, study
-            ),
-            *_review(study),
-            Section("Provenance", provenance(study.files, _options(study))),
-        ),
+        (section_of("Result", partial(_result, sections=sections), study), *sections),
         f"Made by flightid {VERSION} from {', '.join(study.files)}.",
     )
 
@@ -192,9 +190,10 @@ def _inside(parameter: Estimate, true_value: float | None) -> bool | None:
     return ends[0] <= true_value <= ends[1]
 
 
-def _result(study: StudyResults) -> Iterator[Block]:
+def _result(study: StudyResults, *, sections: tuple[Section, ...] = ()) -> Iterator[Block]:
     answer = answer_of(study)
-    yield Lights(answer.findings, repeats=True)
+    red = red_elsewhere(answer.findings, sections)
+    yield Lights((*answer.findings, *red), repeats=True)
     # The promise stands in a picture: its table opens on demand.
     pictures, promises = _pictures(study), answer.tables[1:]
     yield from islice(pictures, 1)
