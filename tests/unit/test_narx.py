@@ -230,7 +230,8 @@ def test_search_ranks_by_free_run_beside_the_linear_model() -> None:
     assert first.score is not None
     assert first.baseline is not None
     assert first.score.rms < first.baseline.rms
-    assert found.findings == ()
+    assert [each.code for each in found.findings] == ["at-edge-of-scan"]
+    assert "input lags" in found.findings[0].message
     assert "linear free-run rms" in found.summary().to_text()
     assert "4 structures" in repr(found)
     assert found.to_dict()["schema"] == "flightid.narx_search/1"

@@ -211,7 +211,7 @@ def test_a_fit_that_fails_whole_makes_way_for_the_next(monkeypatch):
             raise FitError("no statistics")
         return fid.identify(structure, records)
 
-    monkeypatch.setattr("flightid.validation.order_scan.scan_orders.identify", failing)
+    monkeypatch.setattr("flightid.validation.order_scan.trials.identify", failing)
     scan = fid.scan_orders(fitted, unseen, **orders)
     assert "no statistics" in [trial.note for trial in scan.trials if trial.structure == first]
     assert scan.trials[0].structure != first

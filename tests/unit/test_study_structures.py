@@ -14,7 +14,8 @@ from flightid.evidence.evidence import GUIDELINES
 from flightid.study import widened_scan
 from flightid.study.structure_settings import StructureSettings
 from flightid.study.structures import fit_structure, ranked
-from flightid.study.widened_scan import EDGE, ROUNDS
+from flightid.study.widened_scan import ROUNDS
+from flightid.validation.order_scan.edges import EDGE
 
 T_S = 0.02
 
@@ -83,6 +84,67 @@ def test_a_neighbour_beyond_the_edge_is_clearly_better_by_six(gain: float, doubt
         SimpleNamespace(structure=each, criteria=SimpleNamespace(bic=bic), settled=True)
         for each, bic in ((inner, 100.0), (beyond, 100.0 - gain))
     ]
-    found = widened_scan._better(inner, {"nb": 3}, SimpleNamespace(trials=trials))
+    found = widened_scan._better(inner, {"nb": 3}, trials)
     assert bool(found) is doubted
     assert all("beyond the scan's last nb" in each.message for each in found)
+
+
+def test_an_order_by_subspace_goes_on_past_the_largest() -> None:
+    whole = third_order()
+    settings = StructureSettings(
+        structure="subspace", inputs=("u",), outputs=("y",), options={"maximum_order": 3}
+    )
+    fit, scan = fit_structure(settings, ("u",), [whole.segment(0.0, 39.9)], [])
+    assert scan is None
+    assert fit.structure.maximum_order > fit.model.order > 3
+    assert EDGE not in {each.code for each in fit.findings}
+
+
+def test_an_order_by_subspace_that_stays_at_the_edge_is_amber(monkeypatch) -> None:
+    monkeypatch.setattr(widened_scan, "ROUNDS", 1)
+    settings = StructureSettings(
+        structure="subspace", inputs=("u",), outputs=("y",), options={"maximum_order": 2}
+    )
+    fit, _ = fit_structure(settings, ("u",), [third_order().segment(0.0, 39.9)], [])
+    (found,) = (each for each in fit.findings if each.code == EDGE)
+    assert "last order" in found.message
+    assert fit.covariance is None
+
+
+def nonlinear(seed: int, n: int = 400) -> fid.Record:
+    """Two lags of the output and three of the input behind a hyperbolic tangent."""
+    random = np.random.default_rng(seed)
+    u, y = random.uniform(-1, 1, n), 0.02 * random.standard_normal(n)
+    for t in range(3, n):
+        y[t] += 0.9 * np.tanh(y[t - 1]) - 0.5 * y[t - 2] + u[t - 3 : t] @ [0.6, 0.4, 0.3]
+    return fid.Record.from_arrays(0.2 * np.arange(n), inputs={"u": u}, outputs={"y": y})
+
+
+@pytest.mark.parametrize(("rounds", "stays"), [(ROUNDS, False), (1, True)])
+def test_lags_of_a_nonlinear_model_go_on_past_the_edge(monkeypatch, rounds, stays) -> None:
+    monkeypatch.setattr(widened_scan, "ROUNDS", rounds)
+    settings = StructureSettings(
+        structure="narx", inputs=("u",), outputs=("y",), output_lags=2, input_lags=(1, 2),
+        options={"kernel": None, "degree": 3, "maximum_terms": 8},
+    )  # fmt: skip
+    fit, search = fit_structure(settings, ("u",), [nonlinear(0)], [nonlinear(1)])
+    assert fit.structure.input_lags >= 3
+    assert (EDGE in {each.code for each in fit.findings}) is stays
+    assert len({each.structure for each in search.trials}) == len(search.trials)
+    if stays:
+        assert fit.covariance is None
+
+
+def test_of_any_kind_the_one_that_is_taken_goes_on(monkeypatch) -> None:
+    whole = third_order()
+    orders = {"na": 1, "nb": (1, 2), "nc": 1, "nd": 1, "nf": (1, 2), "nk": (4, 5)}
+    settings = StructureSettings(structure="any", inputs=("u",), outputs=("y",), **orders)
+    parts = [whole.segment(0.0, 39.9)], [whole.segment(39.9, 60.0)]
+    fit, scan = fit_structure(settings, ("u",), *parts)
+    kinds = {each.kind for each in scan.trials}
+    assert {"ARX", "ARMAX", "OE", "BJ", "subspace", "NARX"} <= kinds
+    assert EDGE not in {each.code for each in fit.findings}
+    monkeypatch.setattr(widened_scan, "ROUNDS", 0)
+    told, _ = fit_structure(settings, ("u",), *parts)
+    assert EDGE in {each.code for each in told.findings}
+    assert told.covariance is None

@@ -11,7 +11,8 @@ from flightid.plot import graph_objects as go
 from flightid.plot import look
 from flightid.uncertainty.quantiles import ellipse_radius, half_width, interval_words, shown
 from flightid.validation import OrderScan
-from flightid.validation.order_scan.result import Structure, words_of
+from flightid.validation.order_scan.edges import Structure
+from flightid.validation.order_scan.result import words_of
 
 HIGHEST = 3.0
 """Errors beyond this many times the smallest are drawn at the upper edge."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -10,15 +10,17 @@ from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.identification import Fit, identify
 from flightid.identification.prediction_error.findings import CANCELLATION
-from flightid.models import InnovationsModel, NarxStructure, PolynomialModel
-from flightid.models.polynomial.orders import ANY
+from flightid.models import InnovationsModel, NarxStructure, PolynomialModel, SubspaceStructure
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.record import Record
 from flightid.study.structure_settings import NARX, SUBSPACE, StructureSettings
 from flightid.study.widened_scan import doubted, widened
 from flightid.validation import NarxSearch, OrderScan, scan_orders, search_narx
-from flightid.validation.order_scan.result import OrderTrial, Structure, is_settled
-from flightid.validation.order_scan.scan_orders import fit_of
+from flightid.validation.order_scan.edges import Structure
+from flightid.validation.order_scan.narx_search import search_further
+from flightid.validation.order_scan.result import OrderTrial, is_settled
+from flightid.validation.order_scan.scan_orders import scan_further
+from flightid.validation.order_scan.trials import fit_of
 from flightid.validation.spectra.spectra import lags_of_spectrum
 
 Choice = OrderScan | NarxSearch
@@ -50,8 +52,7 @@ def fit_structure(
         The fit, and what was tried.
     """
     if settings.structure == SUBSPACE:
-        asked = InnovationsModel.subspace(inputs, settings.outputs, **settings.options)
-        return identify(asked, list(flown)), None
+        return _subspace(settings, inputs, list(flown)), None
     if settings.structure == NARX:
         return _narx(settings, inputs, list(flown), list(unseen))
     return _polynomial(settings, inputs, list(flown), list(unseen))
@@ -65,19 +66,40 @@ def _polynomial(
         orders: dict[str, Any] = {name: values[0] for name, values in settings.orders.items()}
         asked = PolynomialModel.general(inputs, output, **orders, **settings.options)
         return identify(asked, flown), None
-    usual: dict[str, Any] = {"kind": settings.structure, "inputs": inputs, "outputs": output}
-
-    def scanned(orders: Mapping[str, tuple[int, ...]]) -> OrderScan:
-        tried: dict[str, Any] = {**usual, **orders, **settings.options}
-        return scan_orders(flown, unseen, **tried)
-
-    scan = scanned(settings.orders)
-    findings: tuple[Finding, ...] = ()
-    if settings.structure != ANY:
-        scan, findings = widened(
-            scan, settings.orders, lambda each: ranked(each, settings.rule)[0], scanned
-        )
+    tried: dict[str, Any] = {**settings.orders, **settings.options}
+    scan, findings = widened(
+        scan_orders(flown, unseen, kind=settings.structure, inputs=inputs, outputs=output, **tried),
+        lambda each: [trial.structure for trial in each.trials],
+        lambda each: ranked(each, settings.rule)[0].structure,
+        lambda each, structures: scan_further(each, structures, flown, unseen),
+    )
     return doubted(_cleanest(scan, settings.rule, flown), findings), scan
+
+
+def _subspace(settings: StructureSettings, inputs: tuple[str, ...], flown: list[Record]) -> Fit:
+    """Of the order that is asked, or that free runs take of all up to the largest."""
+    asked = InnovationsModel.subspace(inputs, settings.outputs, **settings.options)
+    fit = identify(asked, flown)
+    if asked.order is not None:
+        return fit
+
+    def further(_: Fit, structures: list[Structure]) -> tuple[Fit, tuple[OrderTrial, ...]]:
+        largest = max(each.order or 0 for each in structures if isinstance(each, SubspaceStructure))
+        return identify(replace(asked, maximum_order=largest), flown), ()
+
+    fit, findings = widened(
+        fit,
+        lambda each: [replace(asked, order=n + 1) for n in range(_largest(each))],
+        lambda each: replace(asked, order=each.model.order),
+        further,
+    )
+    return doubted(fit, findings)
+
+
+def _largest(fit: Fit) -> int:
+    """Largest order that the choice considered."""
+    structure = fit.structure
+    return structure.maximum_order if isinstance(structure, SubspaceStructure) else 0
 
 
 def _cleanest(scan: OrderScan, choose: str, flown: list[Record]) -> Fit:
@@ -156,11 +178,17 @@ def _narx(
         width=settings.widths[0],
         **settings.options,
     )
-    search = None
-    if settings.is_scanned:
-        pairs = [(a, b) for a in outputs_back for b in inputs_back]
-        search = search_narx(asked, flown, unseen, lags=pairs, widths=settings.widths)
-    fit = identify(asked, flown) if search is None else search.best
+    if not settings.is_scanned:
+        fit = identify(asked, flown)
+        return replace(fit, findings=(*told, *fit.findings)), None
+    pairs = [(a, b) for a in outputs_back for b in inputs_back]
+    search, findings = widened(
+        search_narx(asked, flown, unseen, lags=pairs, widths=settings.widths),
+        lambda each: [trial.structure for trial in each.trials],
+        lambda each: each.trials[0].structure,
+        lambda each, structures: (search_further(each, structures, flown, unseen), ()),
+    )
+    fit = doubted(search.best, findings)
     return replace(fit, findings=(*told, *fit.findings)), search
 
 

@@ -21,6 +21,7 @@ from flightid.record import Record
 from flightid.result import Result
 from flightid.simulation.metrics import fit_percent, rms_error
 from flightid.table import Cell, Column, Table
+from flightid.validation.order_scan.edges import Structure, edge_findings
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,7 @@ class FreeRunScore:
 class NarxTrial:
     """One structure of a search: its fit (None with the reason where there is none) and scores."""
 
-    model: NarxStructure
+    structure: NarxStructure
     fit: Fit | None
     score: FreeRunScore | None
     baseline: FreeRunScore | None
@@ -168,10 +169,42 @@ def search_narx(
         replace(model, output_lags=n_y, input_lags=n_u, width=width)
         for (n_y, n_u), width in product(pairs, list(widths) or [model.width])
     ]
-    start = max(lag.lag for trial in models for lag in trial.lags)
-    trials = [
-        _trial(trial, records, unseen, start) for trial in track(models, "NARX lags and widths")
+    return search_further(NarxSearch((), ()), models, records, unseen)
+
+
+def search_further(
+    search: NarxSearch,
+    models: Sequence[Structure],
+    records: Record | Sequence[Record],
+    unseen: Sequence[Record],
+) -> NarxSearch:
+    """A search with further structures, all scored anew over the same samples.
+
+    Parameters
+    ----------
+    search : NarxSearch
+    models : sequence
+        Of NARX.
+    records : Record or sequence of Record
+    unseen : sequence of Record
+
+    Raises
+    ------
+    FitError
+        No structure could be fitted.
+    """
+    ends: list[tuple[NarxStructure, Fit | None, str]] = [
+        (each.structure, each.fit, each.reason) for each in search.trials
     ]
+    known = {each for each, *_ in ends}
+    new = [each for each in models if isinstance(each, NarxStructure) and each not in known]
+    for model in track(new, "NARX lags and widths"):
+        try:
+            ends.append((model, identify(model, records), ""))
+        except FitError as error:
+            ends.append((model, None, str(error)))
+    start = max(lag.lag for model, *_ in ends for lag in model.lags)
+    trials = [_scored(*end, unseen, start) for end in ends]
     if all(trial.fit is None for trial in trials):
         raise FitError(
             "no structure of the search could be fitted",
@@ -179,16 +212,16 @@ def search_narx(
             action="use fewer lags, longer or richer records",
         )
     trials.sort(key=lambda trial: np.inf if trial.score is None else trial.score.rms)
-    return NarxSearch(tuple(trials), _findings(trials[0]))
+    tried = [each.structure for each in trials]
+    findings = (*_findings(trials[0]), *edge_findings(trials[0].structure, tried))
+    return NarxSearch(tuple(trials), findings)
 
 
-def _trial(
-    model: NarxStructure, training: Record | Sequence[Record], unseen: Sequence[Record], start: int
+def _scored(
+    model: NarxStructure, fit: Fit | None, reason: str, unseen: Sequence[Record], start: int
 ) -> NarxTrial:
-    try:
-        fit = identify(model, training)
-    except FitError as error:
-        return NarxTrial(model, None, None, None, None, str(error))
+    if fit is None:
+        return NarxTrial(model, None, None, None, None, reason)
     one_step = _score(fit.model, unseen, start, 1).rms
     score = _score(fit.model, unseen, start, "free_run")
     return NarxTrial(
@@ -211,7 +244,7 @@ def _score(
 
 
 def _row(trial: NarxTrial) -> tuple[Cell, ...]:
-    model = trial.model
+    model = trial.structure
     head = (model.output_lags, model.input_lags, model.beta if model.kernel else None)
     if trial.fit is None or trial.score is None or trial.baseline is None:
         return (*head, None, None, None, None, None, None, trial.reason)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -14,15 +13,13 @@ from flightid.findings import Finding
 from flightid.identification.fit import Fit
 from flightid.identification.prediction_error.information_criteria import Criteria
 from flightid.models.innovations.model import InnovationsModel
-from flightid.models.innovations.structure import SubspaceStructure
 from flightid.models.model import Model
-from flightid.models.narx.structure import NarxStructure
 from flightid.models.polynomial.orders import ANY
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
+from flightid.validation.order_scan.edges import Structure, edge_findings
 
-Structure = PolynomialStructure | SubspaceStructure | NarxStructure
 Range = int | Iterable[int]
 CRITERIA = ("aic", "aicc", "bic", "mdl", "fpe")
 ALIKE = 0.02
@@ -179,17 +176,7 @@ class OrderScan(Result, schema="flightid.order_scan/1"):
                     "expected where the vehicle is unstable; else lower the orders",
                 )
             )
-        edges = _at_edge(self)
-        if edges:
-            found.append(
-                Finding(
-                    "at-edge-of-scan",
-                    Light.AMBER,
-                    f"the best model has the largest {', '.join(edges)} of the scan",
-                    "scan higher values",
-                )
-            )
-        return tuple(found)
+        return (*found, *edge_findings(best.structure, [each.structure for each in self.trials]))
 
     def summary(self, rows: int = SHOWN) -> Table:
         """Table of the best trials; marks say which structure each criterion would take."""
@@ -245,17 +232,6 @@ def words_of(scan: OrderScan, trial: OrderTrial) -> str:
     """A structure in words, its kind too where there are several."""
     text = trial.structure.orders_text
     return f"{trial.kind} {text}" if scan.is_of_several_kinds else text
-
-
-def _at_edge(scan: OrderScan) -> list[str]:
-    best = scan.trials[0]
-    alike = [trial.structure for trial in scan.trials if trial.kind == best.kind]
-    found = []
-    for name in ("na", "nb", "nc", "nd", "nf", "nk", "order", "output_lags"):
-        values: set[Any] = {getattr(structure, name, None) for structure in alike} - {None}
-        if len(values) > 1 and getattr(best.structure, name) == max(values):
-            found.append(name.replace("_", " "))
-    return found
 
 
 def _row(trial: OrderTrial, chosen: dict[str, OrderTrial]) -> tuple[Cell, ...]:
