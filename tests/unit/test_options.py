@@ -51,7 +51,7 @@ def test_good_values_are_taken_as_they_are() -> None:
             r"band has no meaning.*two numbers, low and high above 0 \[rad/s\] or none",
         ),
         ({"band": (-1.0, 2.0)}, "band is too small"),
-        ({"start": "rest"}, "start is not known: found 'rest'; needed 'trim' or a table"),
+        ({"start": "rest"}, "start is not known: found 'rest'; needed 'trim' or numbers by name"),
         ({"start_": "rest"}, "this fit has no such option: found start_.*Next: write 'start'"),
     ],
 )

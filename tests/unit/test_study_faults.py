@@ -130,7 +130,7 @@ def test_all_errors_of_a_study_file_are_told_at_once(folder: Path) -> None:
     (folder / "study.toml").write_text(wrong.replace("gains =", "gain ="), "utf-8")
     with pytest.raises(fid.errors.StudyError, match="the study file has 3 errors") as raised:
         fid.run_study(folder / "study.toml")
-    for said in ("[[record]] number 1: there is no key 'pth'", "'refrence'", "gains is missing"):
+    for said in ("[[record]] number 1: there is no key 'pth'", "'refrence'", "write 'gains'"):
         assert said in str(raised.value)
     # A model is not judged by a table that could not be read.
     (folder / "study.toml").write_text(STUDY.replace('"output_error"', '"magic"'), "utf-8")
