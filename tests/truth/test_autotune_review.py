@@ -45,9 +45,15 @@ def _inside(found: Margins | None, truth: tuple[float, float, float]) -> list[bo
     return held
 
 
-def test_margins_of_twitched_gains_are_those_of_the_vehicle(tuned: tuple[Path, Tuned]) -> None:
-    path, gains = tuned
-    review = fid.review_autotune(path)
+@pytest.fixture(scope="module")
+def reviewed(tuned: tuple[Path, Tuned]) -> fid.AutotuneReview:
+    return fid.review_autotune(tuned[0])
+
+
+def test_margins_of_twitched_gains_are_those_of_the_vehicle(
+    tuned: tuple[Path, Tuned], reviewed: fid.AutotuneReview
+) -> None:
+    (_, gains), review = tuned, reviewed
     (roll,) = review.opinions
     ends = replace(CALM, p=gains.p, i=gains.p, d=gains.d)
     assert all(_inside(roll.tuned, true_margins(ends)))
@@ -64,8 +70,12 @@ def test_margins_of_twitched_gains_are_those_of_the_vehicle(tuned: tuple[Path, T
 
 
 def test_the_command_prints_margins_and_writes_a_page(
-    tuned: tuple[Path, Tuned], tmp_path: Path
+    tuned: tuple[Path, Tuned],
+    reviewed: fid.AutotuneReview,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    monkeypatch.setattr(fid, "review_autotune", {tuned[0]: reviewed}.__getitem__)
     page = tmp_path / "autotune.html"
     made = CliRunner().invoke(command, [str(tuned[0]), "--html", str(page)])
     assert made.exit_code == 0, made.output

@@ -48,7 +48,11 @@ def _fly(seed: int) -> tuple[int, fid.Record]:
     return delay, fid.Record.from_arrays(np.arange(n) / 50, inputs={"u": u}, outputs={"y": y})
 
 
-@pytest.mark.parametrize("seed", [6, 7, 9], ids=["white", "prbs", "coloured"])
+@pytest.mark.parametrize(
+    "seed",
+    [pytest.param(6, marks=pytest.mark.nightly), 7, 9],
+    ids=["white", "prbs", "coloured"],
+)
 def test_a_lightly_damped_plant_tells_its_delay(seed: int) -> None:
     delay, record = _fly(seed)
     assert fid.impulse_response(record).delays == {"u": delay}

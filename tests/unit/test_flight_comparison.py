@@ -50,18 +50,27 @@ def test_even_intervals_add_in_squares_and_uneven_ones_keep_their_sides() -> Non
     assert difference_of(withheld, one).interval95 is None
 
 
-def test_a_flight_with_more_gain_is_told_from_one_with_the_same(logs: dict[str, Path]) -> None:
-    same = fid.compare_flights(logs["before"], logs["again"])
+@pytest.fixture(scope="module")
+def reviews(logs: dict[str, Path]) -> dict[str, fid.FlightReview]:
+    return {name: fid.review_flight(logs[name]) for name in ("before", "after")}
+
+
+def test_a_flight_with_more_gain_is_told_from_one_with_the_same(
+    logs: dict[str, Path], reviews: dict[str, fid.FlightReview]
+) -> None:
+    same = fid.compare_flights(reviews["before"], logs["again"])
     assert not same.significant
     assert same.findings[0].code == "loops-unchanged"
-    more = fid.compare_flights(logs["before"], logs["after"])
+    more = fid.compare_flights(reviews["before"], reviews["after"])
     assert "roll rate, rise time" in more.significant
     assert (more["roll rate, rise time"].difference.interval95 or (0.0, 0.0))[1] < 0.0
     assert len(compared_steps(more).data) > 4
 
 
-def test_a_slower_loop_is_amber_and_its_way_back_is_not(logs: dict[str, Path]) -> None:
-    slower = fid.compare_flights(logs["after"], logs["before"])
+def test_a_slower_loop_is_amber_and_its_way_back_is_not(
+    reviews: dict[str, fid.FlightReview],
+) -> None:
+    slower = fid.compare_flights(reviews["after"], reviews["before"])
     found = next(f for f in slower.findings if f.message.startswith("roll rate"))
     assert found.light is Light.AMBER
     assert "worse: " in found.action
@@ -137,10 +146,12 @@ def test_what_is_read_over_another_time_is_said(logs: dict[str, Path]) -> None:
 
 
 def test_parts_of_one_log_are_compared(
-    logs: dict[str, Path], capsys: pytest.CaptureFixture[str]
+    logs: dict[str, Path],
+    reviews: dict[str, fid.FlightReview],
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     log = logs["before"]
-    start_s = fid.review_flight(log).phases.airborne[0][0]
+    start_s = reviews["before"].phases.airborne[0][0]
     parts = [f"{log}@{start_s:.0f}:{start_s + 29:.0f}", f"{log}@{start_s + 30:.0f}:"]
     assert run(["compare", *parts]) == 0
     assert "no change beyond chance" in capsys.readouterr().out
