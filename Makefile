@@ -7,6 +7,7 @@ STAMP  := $(VENV)/.installed
 # One worker a core; a linear-algebra library that starts threads of its own would only get in the way.
 JOBS   ?= auto
 FUZZ_RUNS ?= 1000000
+FUZZ_TARGETS = $(basename $(notdir $(wildcard fuzz/fuzz_targets/*.rs)))
 
 # Rewritten asserts are kept between runs, whatever the shell says of byte code.
 PYTEST = PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest
@@ -84,10 +85,11 @@ kills: develop  ## kill commands at 200 random moments and look for losses
 fuzz-files: develop  ## throw damaged files at the Python readers, in children with limits
 	$(BIN)/python -m tests.fuzz --runs $(FUZZ_RUNS) --keep build/fuzz
 
-fuzz: fuzz-files  ## and damaged logs, formulas and models at the native ones (nightly toolchain, cargo-fuzz)
-	cd fuzz && for target in dataflash ulog small_logs expression model; do \
-	  mkdir -p corpus/$$target seeds/$$target && cargo +nightly fuzz run -s none $$target \
-	    corpus/$$target seeds/$$target -- -runs=$(FUZZ_RUNS) -max_len=4096 || exit 1; done
+fuzz: fuzz-files  ## and damaged logs, sheets, formulas and models at the native ones, address sanitiser on
+	cd fuzz && RUSTC_BOOTSTRAP=1 cargo build --release --quiet --target-dir target
+	cd fuzz && for target in $(FUZZ_TARGETS); do \
+	  mkdir -p corpus/$$target seeds/$$target && target/*/release/$$target -runs=$(FUZZ_RUNS) \
+	    -max_len=4096 -detect_leaks=0 corpus/$$target seeds/$$target || exit 1; done
 
 constraints: $(STAMP)  ## note the installed versions as the ones that `make` installs
 	head -2 constraints.txt > constraints.new

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 import flightid as fid
 from flightid.errors import LogFormatError
 
-SEEDS = Path(__file__).parents[2] / "fuzz" / "seeds" / "small_logs"
+SEEDS = Path(__file__).parents[2] / "fuzz" / "seeds"
 CHANGES = st.lists(st.tuples(st.integers(0, 10**6), st.binary(max_size=3)), max_size=8)
 
 
@@ -28,7 +28,9 @@ def _read(content: bytes, folder: Path) -> None:
         assert all(finding.message for finding in log.findings)
 
 
-@pytest.mark.parametrize("name", ["flight.bbl", "link.tlog", "flight.log"])
+@pytest.mark.parametrize(
+    "name", ["blackbox/flight.bbl", "telemetry/link.tlog", "printed/flight.log"]
+)
 @given(changes=CHANGES, cut=st.integers(0, 10**6))
 def test_damage_is_survived(
     name: str,

@@ -1,11 +1,7 @@
-//! The smaller log formats from a stranger: blackbox, telemetry, text logs; every column is read.
+//! Blackbox logs from a stranger: every flight is decoded, every column is as long as its table.
 #![no_main]
 
-use std::collections::HashMap;
-
 use flightid_logs::blackbox::{Blackbox, flights};
-use flightid_logs::dataflash::printed;
-use flightid_logs::mavlink;
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|data: &[u8]| {
@@ -21,12 +17,4 @@ fuzz_target!(|data: &[u8]| {
         }
         assert!(log.skipped.iter().all(|part| part.start < part.stop && part.stop <= stop - start));
     }
-    let known = HashMap::from([(0, (9, 50)), (30, (28, 39))]);
-    let heard = mavlink::read(data, &known);
-    for ((message, ..), frames) in &heard.frames {
-        assert_eq!(frames.payloads.len(), frames.stamps_us.len() * known[message].0);
-    }
-    let _ = mavlink::is_telemetry(data);
-    let made = printed::to_binary(data);
-    assert!(made.bytes.len() <= 16 * data.len() + 89);
 });
