@@ -1,4 +1,8 @@
-"""Kill commands at random moments, look for losses: `python -m tests.stress.kills --kills 200`."""
+"""Kill commands at random moments, look for losses: `python -m tests.stress.kills --kills 200`.
+
+A file is whole or the one before, a folder of a study too; one into which a verb writes file by
+file (`plan`) has each whole. What a kill leaves aside, the next run clears.
+"""
 
 from __future__ import annotations
 
@@ -9,20 +13,38 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections import Counter
 from pathlib import Path
 
+from tests.autotune_log import write_ardupilot
+from tests.ordinary_log import write_ordinary_log
+from tests.strangers.ordinary_flights import Axis
+
+PROGRAM = (sys.executable, "-m", "flightid")
 STUDY = Path(__file__).parents[2] / "examples" / "quadrotor_rig" / "study.toml"
 MODEL = ("rate_motor_lag", "--axis", "roll")
 
 
 def commands(folder: Path) -> dict[str, tuple[list[str], Path]]:
-    """Arguments and what each writes."""
-    written, flown, out = folder / "model.toml", folder / "flown.nc", folder / "out"
-    flight = ["fly", *MODEL, "--duration", "0.5", "--output", str(flown)]
+    """Arguments and what each writes; the study is flown once for the log that others read."""
+    flown, swept = folder / "flown", folder / "swept.bin"
+    subprocess.run([*PROGRAM, "run", str(STUDY), "--output", str(flown)], stdout=-3, check=True)
+    (flown / "flight.bin").replace(swept)
+    ordinary, tuned = folder / "ordinary.bin", folder / "autotune.bin"
+    write_ordinary_log(ordinary)
+    write_ardupilot(tuned, Axis(), most=12)
+    words: dict[str, tuple[list[object], str]] = {
+        "export": (["export", *MODEL], "model.toml"),
+        "fly": (["fly", *MODEL, "--duration", 0.5, "--output"], "flown.nc"),
+        "run": (["run", STUDY, "--output"], "out"),
+        "tune": (["tune", swept, "--output"], "tuned"),
+        "plan": (["plan", swept, "--overwrite", "--output"], "planned"),
+        "autotune": (["autotune", tuned, "--html"], "autotune.html"),
+        "flight": (["flight", ordinary, "--html"], "flight.html"),
+    }
     return {
-        "export": (["export", *MODEL, str(written)], written),
-        "fly": (flight, flown),
-        "run": (["run", str(STUDY), "--output", str(out)], out),
+        verb: ([*map(str, start), str(folder / name)], folder / name)
+        for verb, (start, name) in words.items()
     }
 
 
@@ -40,44 +62,49 @@ def loss(path: Path, before: dict[str, bytes]) -> str:
     after = contents(path)
     if missing := set(before) - set(after):
         return f"without {sorted(missing)[:3]}"
-    try:
-        for name, content in after.items():
+    for name, content in after.items():
+        if name.endswith(".html") and not content.rstrip().endswith(b"</html>"):
+            return f"half of {name}"
+        try:
             json.loads(content) if name.endswith(".json") else None
-    except ValueError as error:
-        return f"half written: {error}"
+        except ValueError as error:
+            return f"half of {name}: {error}"
     return "" if all(after.values()) else "empty files"
 
 
 def main() -> int:
-    """Kill each verb in turn."""
+    """Kill each verb in turn; a table of kills, those before the end, and losses."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--kills", type=int, default=200)
-    parser.add_argument("--verbs", nargs="+", default=["export", "fly", "run"])
+    parser.add_argument("--verbs", nargs="+")
     asked = parser.parse_args()
-    chance, losses = random.Random(0), 0
+    chance = random.Random(0)
+    kills, within, losses = Counter[str](), Counter[str](), Counter[str]()
     with tempfile.TemporaryDirectory() as name:
-        known = {verb: commands(Path(name))[verb] for verb in asked.verbs}
-        spans = {}
-        for verb, (words, _) in known.items():
-            begun = time.monotonic()
-            subprocess.run(
-                [sys.executable, "-m", "flightid", *words], check=True, stdout=subprocess.DEVNULL
-            )
-            spans[verb] = time.monotonic() - begun
-        before = {verb: contents(path) for verb, (_, path) in known.items()}
-        for kill in range(asked.kills):
-            verb = asked.verbs[kill % len(asked.verbs)]
+        known = commands(Path(name))
+        verbs = asked.verbs or list(known)
+        spans, before = {}, {}
+        for verb in verbs:
             words, path = known[verb]
-            made = subprocess.Popen(
-                [sys.executable, "-m", "flightid", *words], stdout=-3, stderr=-3
-            )
+            begun = time.monotonic()
+            subprocess.run([*PROGRAM, *words], check=True, stdout=-3, stderr=-3)
+            spans[verb], before[verb] = time.monotonic() - begun, contents(path)
+        for kill in range(asked.kills):
+            verb = verbs[kill % len(verbs)]
+            words, path = known[verb]
+            made = subprocess.Popen([*PROGRAM, *words], stdout=-3, stderr=-3)
             time.sleep(chance.uniform(0.3, 1.1) * spans[verb])
             made.kill()
-            made.wait()
+            kills[verb] += 1
+            within[verb] += made.wait() < 0
             if told := loss(path, before[verb]):
-                losses += 1
+                losses[verb] += 1
                 print(kill, verb, told, flush=True)
-    print(f"{asked.kills} kills, {losses} losses")
+        for verb in verbs:
+            print(
+                f"{verb:9}{kills[verb]:4} kills{within[verb]:4} before its end{losses[verb]:3} lost"
+            )
+    print(f"{asked.kills} kills, {losses.total()} losses")
     return 1 if losses else 0
 
 
