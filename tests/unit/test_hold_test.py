@@ -85,6 +85,19 @@ def test_a_hold_that_is_told_wrong_is_amber_and_bars_reach_the_truth(
     assert low < holds.TRUTH["tau"] < high
 
 
+def test_bars_reach_what_the_method_itself_makes_of_another_hold() -> None:
+    record = holds.flight(2, "smooth", told="zero")
+    fit, true = (
+        fid.identify(holds.model(), record, method="equation_error", **given)
+        for given in ({}, {"hold": "band_limited"})
+    )
+    assert str(fit.evidence.light) == "amber"
+    for name in fit.names:
+        assert fit.parameters[name].stderr is not None
+        moved = abs(fit.parameters[name].value - true.parameters[name].value)
+        assert moved <= fit.parameters[name].stderr
+
+
 @pytest.mark.parametrize("shape", IN_EVERY_RUN)
 def test_a_response_tells_what_its_records_know_of_a_wrong_hold(shape: str) -> None:
     lights = []

@@ -192,6 +192,14 @@ class _Rivals:
             for hold, there in zip(holds, others, strict=True)
         ]
 
+    def as_fitted(self, others: Sequence[OtherHold]) -> list[OtherHold]:
+        """Likely holds with what the method itself makes of the estimates under each."""
+        likely = [each for each in others if each.is_likely]
+        if self.is_likeliest:
+            return likely
+        made = self.under([each.hold for each in likely]) or likely
+        return [replace(own, gain=each.gain) for own, each in zip(made, likely, strict=True)]
+
     def _again(self, hold: InputHold) -> Fit:
         names = getattr(self.method.options, "__dataclass_fields__", {})
         fresh = {key: value for key, value in _STARTED.items() if key in names}
@@ -220,7 +228,7 @@ def _told(fit: Fit, held: ChosenHold, rivals: _Rivals) -> tuple[Fit, ChosenHold]
     fit = _noted(fit, known)
     if finding is None:
         return fit, held
-    fit = fit if finding.light is Light.GREEN else _widened(fit, known)
+    fit = fit if finding.light is Light.GREEN else _widened(fit, rivals.as_fitted(known))
     return fit, replace(held, findings=(*held.findings, finding))
 
 
