@@ -1,6 +1,7 @@
 """Several flights of vehicles that are alike or not, and flights that change midway; SciPy's.
 
-The truth is the mean vehicle of the fleet from which those of the flights are drawn.
+The truth of several flights is the mean vehicle of the fleet from which theirs are drawn; of one
+flight it is that flight's own: nothing else is claimed for it.
 """
 
 from __future__ import annotations
@@ -24,12 +25,13 @@ NOISE = 0.1
 """Of the output's deviation."""
 ARX_TRUTH = {"a1": -0.9, "b1": 0.5}
 Fit = Callable[[list[fid.Record]], fid.Fit]
-Flight = Callable[[np.random.Generator, float], fid.Record]
+Truth = dict[str, float]
+Flight = Callable[[np.random.Generator, float], tuple[fid.Record, Truth]]
 
 
-def drawn(random: np.random.Generator, scatter: float, truth: dict[str, float]) -> list[float]:
+def drawn(random: np.random.Generator, scatter: float, truth: Truth) -> Truth:
     """One vehicle of the fleet."""
-    return [value * (1.0 + scatter * random.standard_normal()) for value in truth.values()]
+    return {name: v * (1.0 + scatter * random.standard_normal()) for name, v in truth.items()}
 
 
 def response(inputs: noises.Array, rate: float, control: float, start: float) -> noises.Array:
@@ -55,26 +57,28 @@ def stepped(random: np.random.Generator, n: int) -> noises.Array:
     return 0.05 * np.repeat(random.choice([-1.0, 0.0, 1.0], n // 30 + 1), 30)[:n]
 
 
-def steps_flown(random: np.random.Generator, scatter: float) -> fid.Record:
+def steps_flown(random: np.random.Generator, scatter: float) -> tuple[fid.Record, Truth]:
     """Steps flown by one vehicle of the fleet."""
     n = round(DURATION_S / STEP_S)
     inputs = stepped(random, n)
-    rate = response(inputs, *drawn(random, scatter, TRUTH), 0.0)
-    return recorded(inputs, rate + NOISE * rate.std() * random.standard_normal(n))
+    vehicle = drawn(random, scatter, TRUTH)
+    rate = response(inputs, *vehicle.values(), 0.0)
+    return recorded(inputs, rate + NOISE * rate.std() * random.standard_normal(n)), vehicle
 
 
 def quiet_tail(
     random: np.random.Generator, scatter: float, *, busy: float, noise: Noise
-) -> fid.Record:
+) -> tuple[fid.Record, Truth]:
     """Steps flown for a share of the record, nothing after it, under noise of some colour."""
     n = round(DURATION_S / STEP_S)
     inputs = stepped(random, n)
     inputs[round(busy * n) :] = 0.0
-    rate = response(inputs, *drawn(random, scatter, TRUTH), 0.0)
-    return recorded(inputs, rate + NOISE * rate.std() * noise(random, n))
+    vehicle = drawn(random, scatter, TRUTH)
+    rate = response(inputs, *vehicle.values(), 0.0)
+    return recorded(inputs, rate + NOISE * rate.std() * noise(random, n)), vehicle
 
 
-def changed_midway(random: np.random.Generator, change: float) -> fid.Record:
+def changed_midway(random: np.random.Generator, change: float) -> tuple[fid.Record, Truth]:
     """Steps flown by a vehicle whose coefficients move apart by `change` in mid-flight."""
     n = round(DURATION_S / STEP_S)
     inputs, half = stepped(random, n), n // 2
@@ -84,25 +88,27 @@ def changed_midway(random: np.random.Generator, change: float) -> fid.Record:
     decay = np.exp(high[0] * STEP_S)
     carried = decay * first[-1] + high[1] * (decay - 1.0) / high[0] * inputs[half - 1]
     rate = np.concatenate([first, response(inputs[half:], *high, carried)])
-    return recorded(inputs, rate + NOISE * rate.std() * random.standard_normal(n))
+    return recorded(inputs, rate + NOISE * rate.std() * random.standard_normal(n)), TRUTH
 
 
-def sweep_flown(random: np.random.Generator, scatter: float) -> fid.Record:
+def sweep_flown(random: np.random.Generator, scatter: float) -> tuple[fid.Record, Truth]:
     """A smooth sweep, which samples hold well enough, flown by one vehicle of the fleet."""
     n = round(SWEEP_S / STEP_S)
     time_s = np.arange(n) * STEP_S
     inputs = 0.05 * chirp(time_s, 0.05, time_s[-1], 3.0, method="logarithmic")
-    rate = response(inputs, *drawn(random, scatter, TRUTH), 0.0)
-    return recorded(inputs, rate + NOISE * rate.std() * random.standard_normal(n))
+    vehicle = drawn(random, scatter, TRUTH)
+    rate = response(inputs, *vehicle.values(), 0.0)
+    return recorded(inputs, rate + NOISE * rate.std() * random.standard_normal(n)), vehicle
 
 
-def arx_flown(random: np.random.Generator, scatter: float) -> fid.Record:
+def arx_flown(random: np.random.Generator, scatter: float) -> tuple[fid.Record, Truth]:
     """An equation with white noise in it, of one vehicle of the fleet."""
     n = round(DURATION_S / STEP_S)
     inputs = stepped(random, n)
-    past, driven = drawn(random, scatter, {"pole": 1.0 + ARX_TRUTH["a1"], **ARX_TRUTH})[::2]
+    pole, _, driven = drawn(random, scatter, {"pole": 1.0 + ARX_TRUTH["a1"], **ARX_TRUTH}).values()
     drive = driven * np.concatenate([[0.0], inputs[:-1]]) + 0.005 * random.standard_normal(n)
-    return recorded(inputs, lfilter([1.0], [1.0, past - 1.0], drive))
+    vehicle = {"a1": pole - 1.0, "b1": driven}
+    return recorded(inputs, lfilter([1.0], [1.0, vehicle["a1"]], drive)), vehicle
 
 
 def by_output_error(records: list[fid.Record]) -> fid.Fit:
@@ -120,16 +126,15 @@ def by_arx(records: list[fid.Record]) -> fid.Fit:
     return fid.identify(fid.PolynomialModel.arx("da", "p", na=1, nb=1), records, loop="open")
 
 
-def fly(
-    seed: int, *, flight: Flight, count: int, scatter: float, fit: Fit, truth: dict[str, float]
-) -> Trial:
+def fly(seed: int, *, flight: Flight, count: int, scatter: float, fit: Fit, truth: Truth) -> Trial:
     """So many flights, fitted together."""
     random = np.random.default_rng(seed)
-    records = [flight(random, scatter) for _ in range(count)]
-    return fit_trial(lambda: fit(records), truth)
+    flown = [flight(random, scatter) for _ in range(count)]
+    records = [record for record, _ in flown]
+    return fit_trial(lambda: fit(records), flown[0][1] if count == 1 else truth)
 
 
-WAYS: dict[str, tuple[Flight, Fit, dict[str, float]]] = {
+WAYS: dict[str, tuple[Flight, Fit, Truth]] = {
     "output error": (steps_flown, by_output_error, TRUTH),
     "frequency domain": (sweep_flown, by_response, TRUTH),
     "ARX": (arx_flown, by_arx, ARX_TRUTH),

@@ -118,7 +118,8 @@ def test_one_record_says_that_it_cannot_know() -> None:
 
 def test_a_vehicle_that_changes_midway_is_red_and_its_bars_reach_both() -> None:
     same, changed = (
-        by_output_error([changed_midway(np.random.default_rng(1), share)]) for share in (0.0, 0.2)
+        by_output_error([changed_midway(np.random.default_rng(1), share)[0]])
+        for share in (0.0, 0.2)
     )
     assert same.agreement is not None
     assert same.agreement.agree
@@ -133,7 +134,7 @@ def test_a_vehicle_that_changes_midway_is_red_and_its_bars_reach_both() -> None:
 def test_vehicles_apart_widen_bars_of_grey_and_black_boxes() -> None:
     random = np.random.default_rng(2)
     for flown, fitted in ((steps_flown, by_output_error), (arx_flown, by_arx)):
-        fit = fitted([flown(random, 0.05) for _ in range(3)])
+        fit = fitted([flown(random, 0.05)[0] for _ in range(3)])
         assert fit.agreement is not None
         assert fit.agreement.by_scatter is not None
         assert all((p.freedom or 99.0) < 3.0 for p in fit.parameters.values())
