@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,10 +54,14 @@ OF_PARAMETERS = (INSENSITIVE, CRAMER_RAO, CORRELATED)
 """Codes of guides to parameters: they speak of model and band, and know nothing of the noise."""
 ON_A_WORD = "hold-told"
 """A hold that estimates rest on and that the data neither bear out nor contradict."""
+WINDOWS_SHORT = "windows-short"
+"""Of a response whose windows a mode outlasts: its leakage is corrected, its coherence is lost."""
+LIMITS = (ON_A_WORD, WINDOWS_SHORT)
 OVERFIT = "overfit"
 """An order that may be one too high: intervals hold what it costs."""
 BELONGS = {
     "estimator-bias": SETTLED,
+    WINDOWS_SHORT: SETTLED,
     "estimator-bias-not-corrected": SETTLED,
     "not-converged": SETTLED,
     "not-refined": SETTLED,
@@ -166,6 +170,15 @@ def _with_findings(checks: list[Check], made: FitFacts) -> list[Check]:
 
 
 def _of_findings(name: str, findings: Sequence[Finding], termination: str) -> Check | None:
+    """The check of a name, with what these data cannot tell beside it."""
+    words = "; ".join(each.message for each in findings if each.code in LIMITS)
+    check = _judged(name, [each for each in findings if each.code not in LIMITS], termination)
+    if not words:
+        return check
+    return replace(check or Check(name, Light.GREEN, words), limit=words[:1].upper() + words[1:])
+
+
+def _judged(name: str, findings: Sequence[Finding], termination: str) -> Check | None:
     light = worst(tuple(findings))
     if findings and light is not Light.GREEN:
         first = next(finding for finding in findings if finding.light is light)
@@ -177,9 +190,7 @@ def _of_findings(name: str, findings: Sequence[Finding], termination: str) -> Ch
         # A guide that is missed by what is well known, or known to do no harm, all the same.
         missed = (each.message for each in findings if each.code in (*OF_PARAMETERS, OVERFIT))
         return Check(name, Light.GREEN, next(missed, met))
-    word = next((each.message for each in findings if each.code == ON_A_WORD), "")
-    limit = word[:1].upper() + word[1:]
-    return Check(name, Light.GREEN, findings[0].message, limit=limit) if findings else None
+    return Check(name, Light.GREEN, findings[0].message) if findings else None
 
 
 def _ended(findings: Sequence[Finding], termination: str) -> Check | None:

@@ -25,6 +25,7 @@ from flightid.identification.fit_findings import (
     why_misfit,
 )
 from flightid.identification.fitted_response import FittedResponse
+from flightid.identification.frequency_domain.bias_findings import judge_windows
 from flightid.identification.frequency_domain.bias_objective import Curves, Objective
 from flightid.identification.frequency_domain.error_model import (
     ErrorModel,
@@ -126,7 +127,7 @@ def _fit_selected(
         bias=bias_of_points(fitted, data, errors, options.hold),
     )
     bent = judge_feedback(found.names, found.covariance, found.bias)
-    setup += bent
+    setup += [*bent, *judge_windows(fitted, data)]
     responses = compare_responses(fitted, selected)
     points = [each.model[chosen.places] for each, chosen in zip(responses, selected, strict=True)]
     noise = noise_costs(selected, points, by_noise)

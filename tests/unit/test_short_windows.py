@@ -1,0 +1,29 @@
+"""Windows that a light mode outlasts: said beside the light, with what to do."""
+
+from __future__ import annotations
+
+import pytest
+
+import flightid as fid
+from tests.strangers.response_bands import oscillator_record
+from tests.strangers.responses import oscillator
+
+
+@pytest.mark.parametrize(
+    ("zeta", "duration_s", "window_s", "said"),
+    [
+        (0.05, 60.0, "auto", "takes 27 s to die out, the longest window has 12 s: window_s=27.2 or"),
+        (0.05, 20.0, "auto", "outlasts half the record, the longest window has 4 s: a fit of the"),
+        (0.05, 60.0, 25.0, ""),
+        (0.3, 60.0, "auto", ""),
+    ],
+)
+def test_windows_come_from_the_damping_that_a_fit_finds(
+    zeta: float, duration_s: float, window_s: float, said: str
+) -> None:
+    record = oscillator_record(0, zeta=zeta, duration_s=duration_s, colour=0.0)
+    response = fid.estimate_response(record, window_s=window_s)
+    limits = fid.identify(oscillator(zeta), response).evidence.limits
+    about = [limit for limit in limits if limit.startswith("The mode at 2")]
+    assert len(about) == bool(said)
+    assert all(said in limit for limit in about)
