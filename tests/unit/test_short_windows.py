@@ -12,7 +12,7 @@ from tests.strangers.responses import oscillator
 @pytest.mark.parametrize(
     ("zeta", "duration_s", "window_s", "said"),
     [
-        (0.05, 60.0, "auto", "takes 27 s to die out, the longest window has 12 s: window_s=27.2 or"),
+        (0.05, 60.0, "auto", "takes 27 s to die out, the longest window has 12 s: window_s=27.2"),
         (0.05, 20.0, "auto", "outlasts half the record, the longest window has 4 s: a fit of the"),
         (0.05, 60.0, 25.0, ""),
         (0.3, 60.0, "auto", ""),
