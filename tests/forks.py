@@ -17,6 +17,7 @@ import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import groupby
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 
 PLACE = struct.Struct("=I")
 AT_ONCE = 1 << 20
+SHARING = {"contract", "guide"}  # trees of all sources and a fit of every kind; the demo's flight
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -41,13 +43,18 @@ def _count(config: pytest.Config) -> int:
     return len(os.sched_getaffinity(0)) if asked == "auto" else int(asked)
 
 
+def _together(item: pytest.Item) -> Path:
+    """What one process runs whole: a file, or a folder whose files share what they make."""
+    return item.path.parent if item.path.parent.name in SHARING else item.path
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtestloop(session: pytest.Session) -> bool | None:
     """Run the tests in forks where more than one is asked for; else pytest's own loop does."""
     count = _count(session.config)
     if count < 2 or session.testsfailed:
         return None
-    groups = [list(items) for _, items in groupby(session.items, key=lambda item: item.path)]
+    groups = [list(items) for _, items in groupby(session.items, key=_together)]
     session.config._tmp_path_factory.getbasetemp()  # type: ignore[attr-defined] - one for all
     sys.stdout.flush()
     queue, fill = os.pipe()
