@@ -73,7 +73,7 @@ def test_qgroundcontrol_columns_and_types(tmp_path: Path) -> None:
     ]
 
 
-@pytest.mark.parametrize("name", ["atc", "", "A" * 17, "A,B", "A\nB"])
+@pytest.mark.parametrize("name", ["Atc", "", "A" * 17, "A,B", "A\nB"])
 def test_refuses_names_that_no_autopilot_has(name: str) -> None:
     with pytest.raises(errors.OptionError, match="not a parameter's name"):
         GainChange(name, 1.0)
