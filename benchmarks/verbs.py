@@ -96,6 +96,15 @@ def _response_fit(n_omega: int) -> Work:
     return lambda: fid.identify(model, data, n_omega=n_omega)
 
 
+def _refit() -> Work:
+    """One of a thousand: the same structure, other data, from the fit at hand."""
+    case = state_space_fit.make_case(state_space_fit.NOISE, seed=0, spread=0.2)
+    model = fid.identify(case.begun, case.responses).model
+    drawn = [state_space_fit.make_case(state_space_fit.NOISE, k, 0.2).responses for k in range(20)]
+    data = cycle(drawn)
+    return lambda: fid.identify(model, next(data))
+
+
 def _live(*, with_fit: bool) -> Work:
     """What a page does when its band is moved, over the same record."""
     output_error.N = 13_000
@@ -117,6 +126,7 @@ LINES: dict[str, Callable[[], Work]] = {
     "output error, 10⁶ samples": lambda: _linear(1_000_000, **REST),
     "responses 4 × 9, 12 records": _responses,
     "response fit, 13 states, 40 parameters": lambda: _response_fit(20),
+    "refit of that to other data": _refit,
     "response fit, all 60 frequencies": lambda: _response_fit(60),
     "band moved, response": lambda: _live(with_fit=False),
     "band moved, response and fit": lambda: _live(with_fit=True),

@@ -153,6 +153,8 @@ def _approximate(data: FrequencyResponse, group: Sequence[SelectedResponse]) -> 
     for each in group:
         error = each.measured.random_error[each.places]
         blocks.append(window_covariance(each.response, error, each.omega_rad_s, window_s))
+    if len(blocks) == 1:
+        return blocks[0]
     sizes = [len(block) // 2 for block in blocks]
     total = sum(sizes)
     result = np.zeros((2 * total, 2 * total))

@@ -113,7 +113,8 @@ def statistics(
         if bias is not None:
             moved = -gain @ bias
             covariance = covariance + np.outer(moved, moved)
-    weighted = weighted[:, inner]
+    # Bounds and correlations ask for products of columns alone, which the triangle keeps.
+    weighted = np.asarray(np.linalg.qr(weighted[:, inner], mode="r"))
     correlation = correlation_of(inverse_hessian(weighted, names)) if names else np.zeros((0, 0))
     parameters = fitted_parameters(fitted, names, covariance, weighted, freedom, withheld=withheld)
     source = UNKNOWN if withheld else errors.source

@@ -13,8 +13,12 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 
-def curves_of(model: GreyBoxModel, grids: Sequence[Array]) -> list[Complex]:
+def curves_of(
+    model: GreyBoxModel, grids: Sequence[Array], free: Array | None = None
+) -> list[Complex]:
     """Each response of the model, in their order, on its own frequencies, rad/s.
+
+    `free` are values of the free parameters; default: the model's.
 
     Raises
     ------
@@ -22,7 +26,10 @@ def curves_of(model: GreyBoxModel, grids: Sequence[Array]) -> list[Complex]:
         The model has no response at one of the frequencies.
     """
     omega = np.unique(np.concatenate(grids))
-    found = model.native.response(model.parameters.independent_values(), omega)
+    values = model.parameters.independent_values()
+    if free is not None:
+        values[model.parameters.free_indices] = free
+    found = model.native.response(values, omega)
     return _chosen(found, omega, grids)
 
 

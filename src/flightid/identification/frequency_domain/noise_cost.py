@@ -57,7 +57,8 @@ def noise_costs(
         for place, (block, columns) in zip(group, blocks, strict=False):
             own = columns - first
             turned = block * believed[own]
-            part = turned @ covariance[np.ix_(own, own)] @ turned.T
+            alone = len(own) == len(covariance)
+            part = turned @ (covariance if alone else covariance[np.ix_(own, own)]) @ turned.T
             deviation = float(np.sqrt(2.0 * np.sum(part * part)))
             found[selected[place].name] = NoiseCost(float(np.trace(part)), deviation)
         first += len(covariance)

@@ -105,9 +105,7 @@ def _leaves(
     """Whether an end leaves more than random errors make of the cost of a model that is right."""
     if end.cost <= LEAVES * len(selected):
         return False
-    names = (parameter.name for parameter in model.parameters.free)
-    there = model.with_values(dict(zip(names, end.x.tolist(), strict=True)))
-    curves = curves_of(there, [each.omega_rad_s for each in selected])
+    curves = curves_of(model, [each.omega_rad_s for each in selected], end.x)
     noise = noise_costs(selected, curves, errors).values()
     spread = np.sqrt(sum(each.deviation**2 for each in noise))
     return end.cost > sum(each.mean for each in noise) + float(spread)

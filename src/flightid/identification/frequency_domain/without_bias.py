@@ -89,11 +89,11 @@ def take_out(
         Chooses the fitted points of a response.
     """
     plain = minima[0][0]
-    fitted = objective.at(plain.x)
 
     def not_done(reason: str, *, possible: bool = True) -> WithoutBias:
         outcome = BiasOutcome(reason, possible)
-        return WithoutBias(outcome, fitted, objective.selected, objective.errors, [], [[plain]])
+        model = objective.model
+        return WithoutBias(outcome, model, objective.selected, objective.errors, [], [[plain]])
 
     reason = why_unknown(objective.correction.data)
     if reason:
