@@ -87,6 +87,7 @@ def test_a_slower_loop_is_amber_and_its_way_back_is_not(
 
 def test_gains_filters_and_other_vehicles_are_said(
     stepped: tuple[Path, fid.TransferFunctionModel],
+    reviews: dict[str, fid.FlightReview],
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -100,7 +101,7 @@ def test_gains_filters_and_other_vehicles_are_said(
     for text in ("Gains that differ", "ATC_RAT_YAW_P", "Filters that differ", "two poles at 30 Hz"):
         assert text in said
         assert text in page.read_text()
-    review = fid.review_flight(old)
+    review = reviews["before"]
     battery = None if review.identity.battery is None else replace(review.identity.battery, cells=6)
     other = replace(
         review, name="b", firmware="V5", identity=replace(review.identity, battery=battery)

@@ -106,7 +106,7 @@ def _mutated(draw: st.DrawFn) -> str:
 
 
 @given(_mutated())
-@settings(examples(60), suppress_health_check=[HealthCheck.too_slow])
+@settings(examples(120), suppress_health_check=[HealthCheck.too_slow])
 def test_a_damaged_file_is_a_model_or_a_typed_error(text: str) -> None:
     try:
         content = tomllib.loads(text)
