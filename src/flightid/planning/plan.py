@@ -147,6 +147,7 @@ def plan_flight(
             enters = procedure.entry(axis)
             guess = guess_axis(axis, loop, procedure.kind, enters, opened, spans)
             swept = replace(guess.vehicle, loop=_while_swept(procedure, loop))
+            guess = replace(guess, vehicle=swept)
             made = _sweep(procedure, axis, swept, asked)
         excitation = None if made is None else made.excitation
         changes = settings_of(procedure, axis, excitation, current, chosen, asked)
