@@ -15,7 +15,7 @@ import pytest
 
 import flightid as fid
 from flightid.cli.program import run
-from flightid.errors import FileFormatError, OptionError, UnknownNameError
+from flightid.errors import DataError, FileFormatError, OptionError, UnknownNameError
 from flightid.record.contents import table_contents
 from flightid.record.formats.ros import read_columns
 from tests.bag_builder import Flight, write_bag1, write_db3, write_mcap
@@ -158,6 +158,11 @@ def test_a_definition_that_is_none_leaves_its_topic_out(
 
 def _at(content: bytes, place: int, letter: str) -> int:
     return int(struct.unpack_from("<" + letter, content, place)[0])
+
+
+def test_a_bag_in_which_nothing_moves_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match="a column that moves"):
+        fid.read_records(write_mcap(tmp_path / "a.mcap", Flight(n_rates=1)))
 
 
 def test_names_that_are_not_there_are_told_by_the_nearest(tmp_path: Path) -> None:

@@ -114,7 +114,10 @@ def _from_table(
     excitations: Sequence[str] | None,
 ) -> list[Record]:
     from flightid import read_records
+    from flightid.logs.joinable import joinable
 
+    if "join" in of_tables:
+        of_tables = {**of_tables, "join": joinable(of_tables["join"])}
     records = read_records(
         file, inputs or None, outputs or None, excitations=excitations or None, **of_tables
     )

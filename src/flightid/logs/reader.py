@@ -10,7 +10,7 @@ from flightid import _native
 from flightid.errors import FileFormatError, LogFormatError
 from flightid.logs.blackbox.reader import PRODUCT, open_blackbox
 from flightid.logs.dataflash.printed import open_printed
-from flightid.logs.dataflash.reader import open_dataflash
+from flightid.logs.dataflash.sdlog2 import open_binary
 from flightid.logs.log import Log
 from flightid.logs.mavlink.reader import open_telemetry
 from flightid.logs.source import LogSource
@@ -43,7 +43,7 @@ _FORMATS: tuple[tuple[Callable[[bytes], bool], str, Callable[[Path], LogSource]]
     (_native.is_telemetry_log, "MAVLink telemetry", open_telemetry),
 )
 # In other files these two bytes may stand by chance: asked last, and not where rig records are.
-_BY_CHANCE = (lambda head: DATAFLASH_HEADER in head, "ArduPilot DataFlash", open_dataflash)
+_BY_CHANCE = (lambda head: DATAFLASH_HEADER in head, "ArduPilot DataFlash", open_binary)
 # Beginnings of logs that are not read, and what to do with them.
 _BROKEN: tuple[tuple[bytes, str, str], ...] = (
     (b"FMT,", "a text log without a whole definition", "hand in the .bin file it was made from"),
@@ -58,8 +58,8 @@ _BROKEN: tuple[tuple[bytes, str, str], ...] = (
 def read_log(path: str | Path) -> Log:
     """Open a flight log, whose format its content tells.
 
-    ArduPilot DataFlash (binary and text), PX4 ULog, blackbox logs of Betaflight and INAV, and
-    telemetry that ground stations record (``.tlog``).
+    ArduPilot DataFlash (binary and text), PX4 ULog and its forerunner sdlog2, blackbox logs of
+    Betaflight and INAV, and telemetry that ground stations record (``.tlog``).
 
     The file is indexed once; columns are extracted when they are asked for. Damaged places are
     skipped and reported in `Log.skipped`.

@@ -70,6 +70,18 @@ class TableOptions(Options):
     max_gap_s: float | None = option(
         None, unit="s", above=0.0, doc="Longest gap that the new grid bridges with straight lines."
     )
+    join: tuple[str, ...] = option(
+        (), doc="File with a clock of its own, a flight log too, whose channels join those here."
+    )
+    join_on: str | None = option(
+        None, doc="Column of both files, or HERE=THERE, whose correlation tells the clocks' offset."
+    )
+    clock_offset_s: float | None = option(
+        None, unit="s", doc="Stamp here of zero on the clock of the joined file."
+    )
+    join_time_column: str | None = option(
+        None, doc="Column of the stamps in the joined file, where it has another name."
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

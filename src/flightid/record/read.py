@@ -15,6 +15,8 @@ from flightid.errors import DataError, OptionError, UnknownNameError
 from flightid.files import sha256_of_file
 from flightid.reading import of_file
 from flightid.record.channel import DECLARED, Channel
+from flightid.record.checks import fault_steps
+from flightid.record.clocks import with_files
 from flightid.record.derived import sources_of, with_derived
 from flightid.record.formats import ColumnTable, file_format
 from flightid.record.formats.columns import channel_name, is_unit
@@ -22,13 +24,14 @@ from flightid.record.history import Step
 from flightid.record.hold import InputHold, InputShape, Loop
 from flightid.record.interpolation import Interpolation
 from flightid.record.record import Record
-from flightid.record.row_grids import ChannelColumn, RowGrid
+from flightid.record.row_grids import ChannelColumn, RowGrid, Rows
 from flightid.record.rows import (
     column_unit,
     manoeuvres,
     row_stamps,
     with_time_unit,
 )
+from flightid.record.sample_faults import SampleFault
 from flightid.record.selection import Names, pairs_of, refuse_columns, selected_records
 from flightid.record.stamps import mean_spacing_s
 from flightid.record.store import RECORD_COLUMN
@@ -59,6 +62,10 @@ def read_records(
     sample_time_s: float | None = None,
     resample_to_s: float | None = None,
     max_gap_s: float | None = None,
+    join: Sequence[str | Path | Record] = (),
+    join_on: str | None = None,
+    clock_offset_s: float | None = None,
+    join_time_column: str | None = None,
     interpolation: Interpolation | str | Mapping[str, Interpolation | str] | None = None,
     outliers: Mapping[str, Any] | None = None,
     record_column: str | None = RECORD_COLUMN,
@@ -111,6 +118,17 @@ def read_records(
     max_gap_s : float, optional
         Longest spacing of rows that the new grid bridges with straight lines, s; longer ones part
         records. Default: 2.5 median spacings.
+    join : sequence of path or Record
+        Files with clocks of their own whose columns join those of this one, such as motion capture
+        or a flight log's record; all channels then go to one grid, as those of a bag.
+    join_on : str, optional
+        Column that both files hold, ``"gyro=p"`` where it has two names: the offset of the clocks,
+        and their drift where it shows, follow from its correlation, with an interval. A lag of
+        either sensor is part of it.
+    clock_offset_s : float, optional
+        Stamp on this file's clock of zero on the joined one's, in place of `join_on`.
+    join_time_column : str, optional
+        Time column of the joined files, where it has another name.
     interpolation : Interpolation or mapping of str to Interpolation, optional
         How samples of the new grid arise, for all channels or by name. Default: of inputs with
         `hold` "zero" the previous value, with "first" straight lines, of all else band-limited;
@@ -179,8 +197,13 @@ def read_records(
     if stored is not None:
         refuse_columns(source, column_names, derive)
         return [_declared(item, InputShape(hold, period_s, loop)) for item in stored]
-    table = with_derived(read_table(source, kind, column_names), derive, units)
-    shared = row_stamps(table, time_column, units, sample_time_s)
+    table = with_files(
+        read_table(source, kind, column_names), join, join_on=join_on,
+        clock_offset_s=clock_offset_s, time_column=time_column,
+        join_time_column=join_time_column, units=units, sample_time_s=sample_time_s,
+    )  # fmt: skip
+    table = with_derived(table, derive, units)
+    shared = row_stamps(table, time_column, units, None if join else sample_time_s)
     wanted = _wanted(
         table,
         roles,
@@ -201,6 +224,7 @@ def read_records(
         "time": time_column if shared.size and sample_time_s is None else None,
         "sample_time_s": sample_time_s,
         **_said_of_stamps(table, wanted),
+        **_said_of_files(join),
         **({"column_names": ",".join(column_names)} if column_names else {}),
         **{f"derived {name}": formula for name, formula in derive.items()},
     }
@@ -209,7 +233,8 @@ def read_records(
         if shared.size and sample_time_s is None:
             options["time_unit"] = units.get(time_column) or table.units.get(time_column)
             options["row_spacing_s"] = mean_spacing_s(shared[part])
-        history = (Step("read_records", dict(options), VERSION),)
+        doubts = fault_steps(_doubts(table, wanted, rows))
+        history = (Step("read_records", dict(options), VERSION), *doubts)
         some = {name: (time_s[part], values[part]) for name, (time_s, values) in rows.items()}
         with of_file(source.name):
             for time_s, samples, more in grid.pieces(some, beside):
@@ -224,7 +249,7 @@ def _rows(
     table: ColumnTable, wanted: Iterable[ChannelColumn], shared: NDArray[np.float64]
 ) -> dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]:
     """Stamps and samples by channel."""
-    rows = {}
+    rows: dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]] = {}
     for item in wanted:
         time_s = shared if table.clock is None else table.clock(item.column).time_s
         values = table.column(item.column)
@@ -243,6 +268,24 @@ def _said_of_stamps(table: ColumnTable, wanted: Iterable[ChannelColumn]) -> dict
     if table.clock is None:
         return {}
     return {"stamps": "; ".join(dict.fromkeys(table.clock(i.column).said for i in wanted))}
+
+
+def _said_of_files(files: Iterable[str | Path | Record]) -> dict[str, Cell]:
+    """Files that were joined, with their digests."""
+    paths = [Path(file) for file in files if not isinstance(file, Record)]
+    return {f"joined {path.name}": sha256_of_file(path) for path in paths}
+
+
+def _doubts(
+    table: ColumnTable, wanted: Iterable[ChannelColumn], rows: Rows
+) -> Iterator[SampleFault]:
+    """What is to be doubted of the clocks of channels."""
+    for item in wanted:
+        time_s = rows[item.channel.name][0]
+        finding = None if table.clock is None else table.clock(item.column).finding
+        if finding is not None:
+            first, last = float(time_s[0]), float(time_s[-1])
+            yield SampleFault(item.channel.name, first, last, finding)
 
 
 def _parts(
@@ -329,6 +372,15 @@ def _wanted(
                 action="name inputs and outputs; flightid inspect lists all columns",
             )
     names = [name for _, name, _ in pairs]
+    if not pairs:
+        raise DataError(
+            f"{table.path.name} holds nothing to read beside its time",
+            found=f"{len(table.lengths)} columns",
+            needed="columns of numbers as long as the time"
+            if table.clock is None
+            else "a column that moves",
+            action=table.advice or None,
+        )
     if repeated := {name for name in names if names.count(name) > 1}:
         raise OptionError(
             "a channel is named twice", found=", ".join(sorted(repeated)), needed="one role each"

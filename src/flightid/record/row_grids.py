@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.conventions import Role
+from flightid.errors import DataError
 from flightid.record.channel import Channel
 from flightid.record.checks import REMOVE_OUTLIERS, entry_steps
 from flightid.record.history import Step
@@ -64,6 +65,11 @@ class RowGrid:
         if self.resample_to_s is not None or not self.has_clocks:
             return self.resample_to_s
         roles = {item.channel.name: item.channel.role for item in self.wanted}
+        for name, (time_s, _) in rows.items():
+            if time_s.size < 2:
+                raise DataError(
+                    f"{name!r} has too few samples for a grid", found=time_s.size, needed="two"
+                )
         decide = [name for name, role in roles.items() if role in (Role.INPUT, Role.OUTPUT)]
         slowest = max(float(np.median(np.diff(rows[name][0]))) for name in decide or roles)
         return float(f"{slowest:.9g}")

@@ -10,6 +10,7 @@ from typing import Any
 
 from flightid.conventions import Role
 from flightid.errors import StudyError
+from flightid.logs.joinable import joinable
 from flightid.option_forms import NOTHING, SPAN
 from flightid.options import Options, option
 from flightid.record import InputShape, Record, read_records
@@ -74,7 +75,8 @@ def read_record_file(reader: TableReader, folder: Path) -> RecordFile:
         A key is unknown or a value does not fit.
     """
     made = read_table(RecordFile, reader)
-    return replace(made, paths=_paths(reader, folder, made.path))
+    joined = tuple(str(folder / name) for name in made.join)
+    return replace(made, paths=_paths(reader, folder, made.path), join=joined)
 
 
 def _paths(reader: TableReader, folder: Path, names: Iterable[str]) -> tuple[Path, ...]:
@@ -100,7 +102,7 @@ def require_files(files: Iterable[RecordFile]) -> None:
     """
     collected = ErrorList()
     for file in files:
-        for path in file.paths:
+        for path in (*file.paths, *map(Path, file.join)):
             collected.read(_require_file, None, file.name, path)
     collected.finish()
 
@@ -203,6 +205,7 @@ def _names(records: list[Record]) -> str:
 def _reading(file: RecordFile, roles: Mapping[str, Role]) -> dict[str, Any]:
     """How the file is read: one study may use it in several ways, of other channels each."""
     asked = {each.name: getattr(file, each.name) for each in fields(TableOptions)}
+    asked["join"] = joinable(file.join)
     known = {*roles, file.time_column, *map(channel_name, sources_of(file.derive))}
     asked["units"] = {key: unit for key, unit in file.units.items() if channel_name(key) in known}
     if isinstance(file.interpolation, Mapping):

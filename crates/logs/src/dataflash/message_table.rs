@@ -31,6 +31,11 @@ impl Table {
         self.offsets.is_empty()
     }
 
+    /// Place of each row in the file, header included.
+    pub fn offsets(&self) -> &[usize] {
+        &self.offsets
+    }
+
     /// Bytes of a row, header included.
     pub fn row_size(&self) -> usize {
         self.layout.size

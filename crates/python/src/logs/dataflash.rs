@@ -98,6 +98,14 @@ impl DataflashFile {
         Ok(fields.collect())
     }
 
+    /// offsets(self, table: int) -> NDArray[np.float64]
+    ///
+    /// Place of each row in the file.
+    fn offsets<'py>(&self, py: Python<'py>, table: usize) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let places = self.table_at(table)?.offsets().iter().map(|place| *place as f64);
+        Ok(places.collect::<Vec<f64>>().into_pyarray(py))
+    }
+
     /// describe(self, table: int) -> tuple[list[int], tuple[float, float, float | None] | None]
     ///
     /// Instances of a table, and its first stamp, last stamp and median step in s.

@@ -187,6 +187,10 @@ class DataflashSource:
         """Rows of a message, or of one of its instances."""
         return self._file.rows(self._layouts[message].table, instance)
 
+    def places(self, message: str) -> NDArray[np.float64]:
+        """Place of each row in the file, bytes."""
+        return self._file.offsets(self._layouts[message].table)
+
     def numbers(self, message: str, field: str, instance: int | None) -> NDArray[np.float64]:
         """Scaled numbers; an int16[32] field has shape (n_rows, 32)."""
         return self.columns(message, [field], instance)[0]

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError, FileFormatError, OptionError, UnitError, UnknownNameError
+from flightid.findings import Finding
 from flightid.reading import require_memory
 from flightid.units import canonical
 
@@ -32,10 +33,13 @@ class ColumnStamps:
     time_s : ndarray, shape (n,)
     said : str
         Where the stamps come from, in words.
+    finding : Finding or None
+        What is to be doubted of them.
     """
 
     time_s: NDArray[np.float64]
     said: str
+    finding: Finding | None = None
 
 
 @dataclass(frozen=True)

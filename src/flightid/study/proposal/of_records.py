@@ -16,6 +16,7 @@ from flightid.conventions import Light
 from flightid.errors import FlightidError, StudyError
 from flightid.findings import Finding
 from flightid.identification.advice.delays import delays_to_scan
+from flightid.logs.joinable import joinable
 from flightid.models.polynomial.orders import USED
 from flightid.models.save import toml_value
 from flightid.record import Record, read_records
@@ -108,7 +109,7 @@ def study_of_records(
     named = {"inputs": inputs, "outputs": outputs} if inputs and outputs else {}
     read = [part for path in paths for part in _parts(path, {**vars(reading), **named})]
     columns = columns_of([part.record for part in read], inputs, outputs)
-    told = _told(reading)
+    told = _told(reading, folder)
     groups, missed = _groups(read, columns)
     body: list[str] = []
     names: list[str] = []
@@ -126,22 +127,24 @@ def study_of_records(
                 missed.append(Finding("no-model", Light.RED, f"{name}: no model, {error}"))
                 continue
             names.append(name)
-    head = _head(paths, columns, missed)
+    head = _head(paths, (*columns.said, *_stamps(read)), missed)
     return Proposal((*head, *body), tuple(names), tuple(missed))
 
 
 def _parts(path: Path, reading: Mapping[str, Any]) -> list[_Stretch]:
     """Manoeuvres of a file."""
-    found = read_records(path, **reading)
+    found = read_records(path, **{**reading, "join": joinable(reading["join"])})
     if len(found) == 1:
         return [_Stretch(found[0], path)]
     return [_Stretch(record, path, str(record.name)) for record in found]
 
 
-def _told(reading: ReadOptions) -> list[str]:
+def _told(reading: ReadOptions, folder: Path) -> list[str]:
     """What every table of the study says of reading, where it is not the usual."""
     usual = vars(ReadOptions())
     told = {key: value for key, value in vars(reading).items() if value != usual[key]}
+    if "join" in told:
+        told["join"] = [Path(os.path.relpath(file, folder)).as_posix() for file in told["join"]]
     if "record_column" in told:
         told["experiment"] = told.pop("record_column")
     return [f"{name} = {toml_value(value)}" for name, value in told.items()]
@@ -282,12 +285,18 @@ def _structure(
     return good[-1], f"{said} {record.unit(output)}".rstrip(), of_kind[good[-1]]
 
 
-def _head(paths: Sequence[Path], columns: Columns, missed: Sequence[Finding]) -> list[str]:
+def _stamps(read: Sequence[_Stretch]) -> Iterator[str]:
+    """Where stamps come from, of records whose channels have clocks of their own."""
+    said = {step.options.get("stamps"): None for part in read for step in part.record.history}
+    yield from (f"Stamps of {text}" for text in said if text)
+
+
+def _head(paths: Sequence[Path], said: Sequence[str], missed: Sequence[Finding]) -> list[str]:
     files = ", ".join(path.name for path in paths)
     return [
         f"# Study of {files}.",
         "# docs/study.md describes every key; `flightid run` of this file gives the same numbers.",
-        *(f"# {said}." for said in columns.said),
+        *(f"# {text}." for text in said),
         *(f"# Left out: {finding.message}." for finding in missed),
         "", "[study]", f"title = {toml_value(f'Models of {paths[0].stem}')}",
         f"aircraft = {toml_value(f'records {files}')}",

@@ -1,0 +1,420 @@
+"""Files with clocks of their own: offset and drift between them, from a signal that both hold."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid._native import cubic_spline
+from flightid.conventions import Light
+from flightid.errors import DataError, OptionError
+from flightid.findings import Finding
+from flightid.record.formats import ColumnTable, file_format
+from flightid.record.formats.columns import ColumnStamps
+from flightid.record.record import Record
+from flightid.record.rows import row_stamps
+from flightid.record.stamps import mean_spacing_s
+from flightid.record.tables import read_table
+
+Array = NDArray[np.float64]
+Signal = tuple[Array, Array]
+"""Stamps, s, and samples, shape (n,) each."""
+LEAST_CORRELATION = 0.8
+"""Correlation of the shared channel below which it is not the same signal."""
+RIVAL = 0.98
+"""Part of the best correlation that no offset elsewhere may reach: a periodic signal has two."""
+LEAST_OVERLAP = 0.25
+"""Part of the shorter file that both have to cover."""
+STRETCHES, FEWEST = 12, 5
+"""Stretches whose own offsets tell interval and drift, and how few of them tell none."""
+FASTEST_DRIFT = 5e-4
+"""Difference of rates that is looked for: clocks of cheap crystals differ by 100 ppm."""
+SMOOTHED = 9
+"""Samples of the window under which signals are matched."""
+COARSE = 0.5
+"""Part of the sample time to which an offset should be known."""
+
+
+@dataclass(frozen=True)
+class ClockOffset:
+    """Relation of two clocks: first = offset_s + (1 + drift) * second.
+
+    Attributes
+    ----------
+    offset_s, drift : float
+    half_width_s : float or None
+        Half of the 95 % interval of the relation at the ends of the files' overlap, where an error
+        of the drift counts most; None: nothing tells it.
+    correlation : float or None
+        Of the shared signal; None where the offset was told.
+    sample_s : float
+        The longer spacing of both signals, s.
+    """
+
+    offset_s: float
+    drift: float
+    half_width_s: float | None
+    correlation: float | None
+    sample_s: float
+
+    @property
+    def said(self) -> str:
+        """The relation in words."""
+        text = f"clock offset {self.offset_s:.6g} s"
+        if self.correlation is None:
+            return f"{text}, as told"
+        text += "" if self.half_width_s is None else f" ± {self.half_width_s:.2g} s"
+        text += f", drift {1e6 * self.drift:.3g} ppm" if self.drift else ""
+        return f"{text} (correlation {self.correlation:.3f})"
+
+    @property
+    def finding(self) -> Finding | None:
+        """What is to be doubted of it."""
+        if self.correlation is None:
+            return Finding(
+                "clock-offset-told", Light.AMBER,
+                f"the {self.said}: nothing of the files was compared",
+                "name a column that both hold (join_on): an offset by 10 ms turns the phase at "
+                "10 rad/s by 6 degrees",
+            )  # fmt: skip
+        if self.half_width_s is None or self.half_width_s > COARSE * self.sample_s:
+            known = "nobody can say how well" if self.half_width_s is None else "within that alone"
+            return Finding(
+                "clock-offset-uncertain", Light.AMBER, f"{self.said}: it is known {known}",
+                "join on a signal that moves more, or over a longer span",
+            )  # fmt: skip
+        return None
+
+
+def clock_offset(first: Signal, second: Signal, name: str) -> ClockOffset:
+    """Offset and drift of a second clock against a first, by a signal that both recorded.
+
+    The offset with the largest correlation over the overlap is found at the coarser spacing; then
+    each of some stretches is matched by itself, between samples. A line through them is
+    offset and drift, their scatter about it the interval (Student's t). A lag between both sensors, such as a filter of one, is part of the offset.
+
+    Parameters
+    ----------
+    first, second : (time_s, values)
+        Each on its own clock.
+    name : str
+        Of the signal, for errors.
+
+    Raises
+    ------
+    DataError
+        Signals that do not correlate, or that correlate at other offsets as well.
+
+    Reference
+    ---------
+    Knapp & Carter, *IEEE Trans. ASSP* 24 (1976): delay by the maximum of a correlation.
+    """
+    sample_s = max(mean_spacing_s(first[0]), mean_spacing_s(second[0]))
+    one, two = (_gridded(*pair, sample_s) for pair in (first, second))
+    correlation = _correlations(one, two)
+    best = int(np.argmax(correlation))
+    found = float(correlation[best])
+    if not found >= LEAST_CORRELATION:
+        raise DataError(
+            f"{name!r} of the files is not one signal",
+            found=f"correlation {found:.2f} at best",
+            needed=f"at least {LEAST_CORRELATION}",
+            action="name another shared channel (join_on), or state clock_offset_s",
+        )
+    lags = np.arange(correlation.size) - (two.size - 1)
+    far = np.abs(lags - lags[best]) > _width(correlation, best)
+    if np.any(far) and float(np.max(correlation[far])) > RIVAL * found:
+        rival = lags[far][int(np.argmax(correlation[far]))]
+        raise DataError(
+            f"{name!r} does not tell the offset of the clocks",
+            found=f"correlation {found:.3f} at one offset, and about as much "
+            f"{abs(rival - lags[best]) * sample_s:.4g} s away",
+            needed="a signal that does not repeat",
+            action="state clock_offset_s, or join where the signal does not repeat",
+        )
+    start = float(first[0][0] - second[0][0]) + float(lags[best]) * sample_s
+    smooth = [_smooth(time_s[0], values, sample_s) for (time_s, _), values in (
+        (first, one), (second, two)
+    )]  # fmt: skip
+    return _of_stretches(smooth[0], smooth[1], start, sample_s, found)
+
+
+def _smooth(start_s: float, values: Array, step_s: float) -> Signal:
+    """A gridded signal without what is fast, so that it can be read between samples.
+
+    Interpolated noise is smaller between samples than at them, which draws a match there; a
+    symmetric window takes that away and moves nothing.
+    """
+    window = np.hanning(SMOOTHED + 2)[1:-1]
+    made = np.convolve(values, window / np.sum(window), "valid")
+    first = start_s + step_s * (SMOOTHED - 1) / 2
+    return first + step_s * np.arange(made.size), made
+
+
+def _gridded(time_s: Array, values: Array, step_s: float) -> Array:
+    grid = np.arange(time_s[0], time_s[-1] + step_s / 2, step_s)
+    made = np.interp(grid, time_s, values)
+    return np.asarray(made - np.mean(made), dtype=np.float64)
+
+
+def _correlations(one: Array, two: Array) -> Array:
+    """Correlation over the overlap at each lag of the second; 0 where it is too short."""
+    ones, twos = np.ones(one.size), np.ones(two.size)
+    power = _slid(one**2, twos) * _slid(ones, two**2)
+    count = np.rint(_slid(ones, twos))
+    floor = 1e-12 * float(np.max(power, initial=0.0))
+    enough = (count >= LEAST_OVERLAP * min(one.size, two.size)) & (power > floor)
+    return np.where(enough, _slid(one, two) / np.sqrt(np.maximum(power, floor or 1.0)), 0.0)
+
+
+def _slid(one: Array, two: Array) -> Array:
+    """Sum of products at each lag."""
+    size = one.size + two.size - 1
+    padded = 1 << (size - 1).bit_length()
+    product = np.fft.rfft(one, padded) * np.fft.rfft(two[::-1], padded)
+    return np.asarray(np.fft.irfft(product, padded)[:size])
+
+
+def _width(correlation: Array, best: int) -> int:
+    """Samples from the peak to where the correlation has fallen to half of it."""
+    low = np.flatnonzero(correlation < 0.5 * correlation[best])
+    return int(np.min(np.abs(low - best))) if low.size else correlation.size
+
+
+def _of_stretches(
+    first: Signal, second: Signal, start_s: float, sample_s: float, correlation: float
+) -> ClockOffset:
+    """Offset, interval and drift from stretches of the overlap in which the signal moves."""
+    from scipy.stats import t as student  # noqa: PLC0415 - commands that join nothing do without
+
+    inside = (first[0] >= second[0][0] + start_s) & (first[0] <= second[0][-1] + start_s)
+    moves = 0.1 * float(np.std(first[1][inside]))
+    span_s = float(np.ptp(first[0][inside]))
+    reach_s = 1.5 * sample_s + FASTEST_DRIFT * span_s
+    middles, own = [], []
+    for part in np.array_split(np.flatnonzero(inside), STRETCHES):
+        if part.size < 16 or float(np.std(first[1][part])) <= moves:
+            continue
+        found = _matched((first[0][part], first[1][part]), second, start_s, reach_s, sample_s)
+        if found is not None:
+            own.append(found)
+            middles.append(float(np.mean(first[0][part])))
+    if len(own) < FEWEST:
+        return ClockOffset(start_s, 0.0, None, correlation, sample_s)
+    time_s, offsets_s = np.array(middles), np.array(own)
+    centre_s = float(np.mean(time_s))
+    design = np.stack([np.ones(time_s.size), time_s - centre_s], axis=1)
+    line = np.linalg.lstsq(design, offsets_s, rcond=None)[0]
+    spread = float(np.sum((time_s - centre_s) ** 2))
+    error = float(np.sqrt(np.sum((offsets_s - design @ line) ** 2) / (time_s.size - 2)))
+    slope_error = error / np.sqrt(spread)
+    ends_s = float(np.hypot(error / np.sqrt(time_s.size), slope_error * span_s / 2))
+    half = float(student.ppf(0.975, time_s.size - 2)) * ends_s
+    # Stamps t of the first and s of the second: t - s = offset + slope (t - centre).
+    drift = float(line[1] / (1 - line[1]))
+    at_zero = float((line[0] - line[1] * centre_s) / (1 - line[1]))
+    return ClockOffset(at_zero, drift, half, correlation, sample_s)
+
+
+def _matched(
+    part: Signal, second: Signal, start_s: float, reach_s: float, sample_s: float
+) -> float | None:
+    """Offset at which a stretch fits the second signal best; None where it lies at the edge."""
+    time_s, values = part
+
+    def agreement(offset_s: float) -> float:
+        at = time_s - offset_s
+        inside = (at >= second[0][0]) & (at <= second[0][-1])
+        pair = values[inside], cubic_spline(*second, at[inside])
+        if pair[0].size < 16 or min(float(np.ptp(each)) for each in pair) == 0.0:
+            return -1.0
+        return float(np.corrcoef(*pair)[0, 1])
+
+    step_s = sample_s / 4
+    tried = start_s + step_s * np.arange(-np.ceil(reach_s / step_s), np.ceil(reach_s / step_s) + 1)
+    reached = np.array([agreement(each) for each in tried])
+    top = int(np.argmax(reached))
+    if top in (0, tried.size - 1):
+        return None
+    below, best, above = reached[top - 1 : top + 2]
+    bend = below - 2 * best + above
+    return float(tried[top] + (0.5 * step_s * (below - above) / bend if bend < 0 else 0.0))
+
+
+def with_files(
+    table: ColumnTable,
+    files: Sequence[str | Path | Record],
+    *,
+    join_on: str | None,
+    clock_offset_s: float | None,
+    time_column: str,
+    join_time_column: str | None,
+    units: Mapping[str, str],
+    sample_time_s: float | None,
+) -> ColumnTable:
+    """A table with the columns of files that have clocks of their own.
+
+    Parameters
+    ----------
+    table : ColumnTable
+    files : sequence of path or Record
+        Tables, bags, or records that were read before, of a flight log for example.
+    join_on, clock_offset_s
+        As `joined` takes them, for each of the files.
+    time_column, join_time_column : str, str or None
+        Time column of the table and of the files; default: the same.
+    units : mapping of str to str
+        Declared units, of the stamps too.
+    sample_time_s : float or None
+        Of a table without stamps.
+
+    Raises
+    ------
+    OptionError
+        An offset or a shared column without a file; see `joined`.
+    FlightidError
+        A file cannot be read, or its clock cannot be found.
+    """
+    if not files and (join_on is not None or clock_offset_s is not None):
+        raise OptionError(
+            "there is no second clock",
+            found=f"join_on={join_on!r}, clock_offset_s={clock_offset_s}",
+            needed="join, the file that has it",
+        )
+    for file in files:
+        if isinstance(file, Record):
+            other, second_s = _of_record(file), file.time_s
+        else:
+            other = read_table(Path(file), file_format(Path(file)), ())
+            second_s = row_stamps(other, join_time_column or time_column, units, None)
+        own = table.clock is not None
+        first_s = np.empty(0) if own else row_stamps(table, time_column, units, sample_time_s)
+        table = joined(
+            table,
+            first_s,
+            other,
+            second_s,
+            time_columns=(time_column, join_time_column or time_column),
+            join_on=join_on,
+            clock_offset_s=clock_offset_s,
+        )
+    return table
+
+
+def _of_record(record: Record) -> ColumnTable:
+    """Channels of a record as columns."""
+    names = dict.fromkeys(record.channels, record.n_samples)
+    units = {name: record.unit(name) for name in names}
+    return ColumnTable(Path(record.name or "record"), names, record.__getitem__, units)
+
+
+def joined(
+    first: ColumnTable,
+    first_s: Array,
+    second: ColumnTable,
+    second_s: Array,
+    *,
+    time_columns: tuple[str, str],
+    join_on: str | None,
+    clock_offset_s: float | None,
+) -> ColumnTable:
+    """Columns of two files, those of the second moved to the clock of the first.
+
+    Parameters
+    ----------
+    first, second : ColumnTable
+        A name that both have becomes ``<file>_<name>`` in the second.
+    first_s, second_s : ndarray, shape (n,)
+        Stamps of tables whose columns share them, s; empty where each has its own.
+    time_columns : (str, str)
+        Of the first and second: they become no channels.
+    join_on : str or None
+        Column that both hold, whose correlation tells the offset; ``"gyro=p"`` where it has two
+        names, that of the first file before that of the second.
+    clock_offset_s : float or None
+        Stamp on the first clock of zero on the second, in place of that.
+
+    Raises
+    ------
+    OptionError
+        Neither a shared column nor an offset, or both.
+    DataError
+        Stamps that do not rise; files without overlap; see `clock_offset`.
+    """
+    if (join_on is None) == (clock_offset_s is None):
+        raise OptionError(
+            f"the clock of {second.path.name} must be brought to that of {first.path.name} one way",
+            found="neither" if join_on is None else "both",
+            needed="join_on, a column that both hold, or clock_offset_s",
+        )
+    own_first, own_second = _stamps_of(first, first_s), _stamps_of(second, second_s)
+    if join_on is not None:
+        here, _, there = join_on.partition("=")
+        one, two = first.require(here), second.require(there or here)
+        found = clock_offset(
+            _signal(first, one, own_first(one).time_s),
+            _signal(second, two, own_second(two).time_s),
+            join_on,
+        )
+    else:
+        assert clock_offset_s is not None
+        found = ClockOffset(clock_offset_s, 0.0, None, None, 0.0)
+    names = {
+        f"{second.path.stem}_{name}" if name in first.lengths else name: name
+        for name in second.lengths
+        if name != time_columns[1]
+    }
+    kept = [name for name in first.lengths if name != time_columns[0]]
+
+    @cache
+    def moved(given: ColumnStamps) -> ColumnStamps:
+        time_s = found.offset_s + (1.0 + found.drift) * given.time_s
+        return ColumnStamps(time_s, f"{second.path.name}: {found.said}", found.finding)
+
+    def stamps(name: str) -> ColumnStamps:
+        return moved(own_second(names[name])) if name in names else own_first(name)
+
+    return ColumnTable(
+        first.path,
+        {name: first.lengths[name] for name in kept}
+        | {new: second.lengths[old] for new, old in names.items()},
+        lambda name: second.load(names[name]) if name in names else first.load(name),
+        {
+            **first.units,
+            **{n: second.units[old] for n, old in names.items() if old in second.units},
+        },
+        first.advice,
+        stamps,
+    )
+
+
+def _stamps_of(table: ColumnTable, shared: Array) -> Callable[[str], ColumnStamps]:
+    """Stamps by column, of a table whose columns share them too."""
+    if table.clock is not None:
+        return table.clock
+    common = ColumnStamps(shared, f"{table.path.name}: its own stamps")
+    return lambda _: common
+
+
+def _signal(table: ColumnTable, name: str, time_s: Array) -> Signal:
+    """Stamps and samples of a column that are there.
+
+    Raises
+    ------
+    DataError
+        Stamps that do not rise.
+    """
+    values = table.column(name)
+    there = np.isfinite(values) & np.isfinite(time_s)
+    time_s, values = time_s[there], values[there]
+    if time_s.size < 2 or not np.all(np.diff(time_s) > 0):
+        raise DataError(
+            f"stamps of {table.path.name} do not rise",
+            needed="rising stamps, to join another file by them",
+        )
+    return time_s, values

@@ -1,0 +1,137 @@
+"""Two files with clocks of their own: offset, drift, interval, and one grid."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import flightid as fid
+from flightid.errors import DataError, OptionError
+from flightid.record.checks import record_findings
+from flightid.record.clocks import clock_offset
+from flightid.study.proposal import propose_study
+from tests.closeness import assert_close
+
+OFFSET_S, DRIFT = 5.4321, 2e-4
+RANDOM = np.random.default_rng(7)
+TONES = RANDOM.uniform(0.3, 9.0, 12), RANDOM.uniform(0.0, 6.0, 12)
+
+
+def motion(time_s: np.ndarray) -> np.ndarray:
+    """A signal that does not repeat."""
+    rates, phases = TONES
+    return np.sin(np.outer(time_s, rates) + phases).sum(axis=1)
+
+
+def signals(*, noise: float, drift: float) -> tuple[tuple[np.ndarray, ...], tuple[np.ndarray, ...]]:
+    random = np.random.default_rng(3)
+    here, there = np.arange(0, 60, 0.01), np.arange(0, 48, 1 / 73)
+    first = motion(here) + noise * random.standard_normal(here.size)
+    second = motion(OFFSET_S + (1 + drift) * there) + noise * random.standard_normal(there.size)
+    return (here, first), (there, second)
+
+
+def test_offset_is_found_between_samples_with_an_interval_that_holds_it() -> None:
+    found = clock_offset(*signals(noise=0.2, drift=0.0), "p")
+    assert found.half_width_s is not None
+    assert abs(found.offset_s - OFFSET_S) < found.half_width_s < 2e-3
+    assert abs(found.drift) * 48 < 2e-3
+    assert found.finding is None
+    exact = clock_offset(*signals(noise=0.0, drift=0.0), "p")
+    assert_close(exact.offset_s, OFFSET_S, atol=5e-5, why="a parabola through quarters of samples")
+
+
+def test_drift_is_found_where_it_shows() -> None:
+    found = clock_offset(*signals(noise=0.05, drift=DRIFT), "p")
+    assert_close(found.drift, DRIFT, rtol=0.1, why="noise of 5 %")
+    for there in (0.0, 48.0):
+        error = found.offset_s + (1 + found.drift) * there - OFFSET_S - (1 + DRIFT) * there
+        assert abs(error) < (found.half_width_s or 0.0)
+
+
+def test_signals_that_repeat_or_differ_are_refused() -> None:
+    time_s = np.arange(0, 40, 0.01)
+    with pytest.raises(DataError, match="does not tell the offset"):
+        clock_offset((time_s, np.sin(time_s * 3)), (time_s[:3000], np.sin(time_s[:3000] * 3)), "p")
+    noise = np.random.default_rng(1).standard_normal(time_s.size)
+    with pytest.raises(DataError, match="is not one signal"):
+        clock_offset((time_s, motion(time_s)), (time_s, noise), "p")
+
+
+def write_both(folder: Path) -> tuple[Path, Path]:
+    (here, first), (there, second) = signals(noise=0.02, drift=0.0)
+    steps = np.sign(np.sin(0.8 * here))
+    rows = ["time,u,gyro"] + [
+        f"{t:.4f},{u},{p}" for t, u, p in zip(here, steps, first, strict=True)
+    ]
+    (folder / "rig.csv").write_text("\n".join(rows))
+    rows = ["t,gyro,angle [deg]"] + [
+        f"{t:.6f},{p},{2 * p}" for t, p in zip(there, second, strict=True)
+    ]
+    (folder / "mocap.csv").write_text("\n".join(rows))
+    return folder / "rig.csv", folder / "mocap.csv"
+
+
+def test_channels_of_both_files_are_on_one_grid_and_steps_stay(tmp_path: Path) -> None:
+    rig, mocap = write_both(tmp_path)
+    (record,) = fid.read_records(
+        rig, "u", ["angle", "mocap_gyro"], join=[mocap], join_on="gyro", join_time_column="t",
+        hold="zero", resample_to_s=0.01,
+    )  # fmt: skip
+    assert record.unit("angle") == "deg"
+    assert set(np.unique(record["u"])) <= {-1.0, 0.0, 1.0}
+    inner = slice(100, -100)
+    assert_close(
+        record["mocap_gyro"][inner],
+        motion(record.time_s)[inner],
+        atol=0.3,
+        why="noise of 2 %, of 12 tones",
+    )
+    told = record.history[0].options
+    assert "clock offset 5.43" in str(told["stamps"])
+    assert len(str(told["joined mocap.csv"])) == 64
+    (slow,) = fid.read_records(
+        rig, "u", "angle", join=[mocap], join_on="gyro", join_time_column="t"
+    )
+    assert_close(slow.sample_time_s, 1 / 73, rtol=1e-4, why="the slower of input and output")
+
+
+def test_a_told_offset_is_taken_and_amber(tmp_path: Path) -> None:
+    rig, mocap = write_both(tmp_path)
+    options = {"join": [mocap], "join_time_column": "t"}
+    (record,) = fid.read_records(rig, "u", "angle", clock_offset_s=OFFSET_S, **options)
+    assert "clock-offset-told" in [each.code for each in record_findings(record, ["angle"])]
+    assert "clock-offset-told" not in [each.code for each in record_findings(record, ["u"])]
+    for both in ({}, {"clock_offset_s": 1.0, "join_on": "gyro"}):
+        with pytest.raises(OptionError, match="one way"):
+            fid.read_records(rig, "u", "angle", **options, **both)
+    with pytest.raises(OptionError, match="no second clock"):
+        fid.read_records(rig, "u", "gyro", clock_offset_s=1.0)
+    with pytest.raises(DataError, match="overlap"):
+        fid.read_records(rig, "u", "angle", clock_offset_s=500.0, **options)
+
+
+def test_a_record_of_a_log_joins_a_table(tmp_path: Path) -> None:
+    rig, _ = write_both(tmp_path)
+    time_s = np.arange(0, 40, 0.0125)
+    flown = fid.Record.from_arrays(
+        time_s, outputs={"p": motion(time_s + 8.0)}, units={"p": "rad/s"}, name="flight"
+    )
+    (record,) = fid.read_records(rig, "u", "p", join=[flown], join_on="gyro=p")
+    assert record.unit("p") == "rad/s"
+    inner = slice(200, -200)
+    truth = motion(record.time_s)[inner]
+    assert_close(record["p"][inner], truth, atol=0.02, why="offset within 0.2 ms")
+    assert "flight: clock offset " in str(record.history[0].options["stamps"])
+
+
+def test_a_study_that_is_proposed_joins_by_itself(tmp_path: Path) -> None:
+    rig, mocap = write_both(tmp_path)
+    made = propose_study(
+        [rig], folder=tmp_path, inputs=["u"], outputs=["angle"],
+        join=(str(mocap),), join_on="gyro", join_time_column="t", model="rate_motor_lag",
+    )  # fmt: skip
+    assert 'join = ["mocap.csv"]' in made.lines
+    assert any("clock offset 5.43" in line for line in made.lines)
