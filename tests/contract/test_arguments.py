@@ -153,7 +153,8 @@ OWN = {
     ),
     "record": (
         "parts of a record and columns of a file",
-        "column_names derive excitation gaps history input_shape interpolation make max_gap_s "
+        "clock_offset_s column_names derive excitation gaps history input_shape interpolation join "
+        "join_on join_time_column make max_gap_s "
         "outliers record_column reference resample_to_s role roles samples stamps start_s step "
         "stop_s time_column time_unit",
     ),

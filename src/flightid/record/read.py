@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,38 +11,35 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.conventions import Role
-from flightid.errors import DataError, OptionError, UnknownNameError
+from flightid.errors import OptionError, UnknownNameError
 from flightid.files import sha256_of_file
 from flightid.reading import of_file
 from flightid.record.channel import DECLARED, Channel
 from flightid.record.checks import fault_steps
-from flightid.record.clocks import with_files
 from flightid.record.derived import sources_of, with_derived
 from flightid.record.formats import ColumnTable, file_format
 from flightid.record.formats.columns import channel_name, is_unit
 from flightid.record.history import Step
 from flightid.record.hold import InputHold, InputShape, Loop
 from flightid.record.interpolation import Interpolation
+from flightid.record.joined_files import with_files
 from flightid.record.record import Record
-from flightid.record.row_grids import ChannelColumn, RowGrid, Rows
+from flightid.record.row_grids import ChannelColumn, RowGrid
 from flightid.record.rows import (
     column_unit,
-    manoeuvres,
     row_stamps,
     with_time_unit,
 )
-from flightid.record.sample_faults import SampleFault
 from flightid.record.selection import Names, pairs_of, refuse_columns, selected_records
+from flightid.record.source_rows import SourceRows, moves
 from flightid.record.stamps import mean_spacing_s
 from flightid.record.store import RECORD_COLUMN
 from flightid.record.tables import read_table
 from flightid.record.validation import require_period
-from flightid.record.witnesses import turning_columns
 from flightid.table import Cell
 from flightid.units import canonical
 from flightid.version import VERSION
 
-_Witness = tuple[Channel, NDArray[np.float64], NDArray[np.float64]]
 MOST_UNNAMED = 24
 """Columns with clocks of their own that are taken where none is named."""
 
@@ -180,15 +177,7 @@ def read_records(
     """
     source = Path(path)
     kind = file_format(source)
-    groups = {
-        Role.INPUT: inputs,
-        Role.OUTPUT: outputs,
-        Role.EXCITATION: excitations,
-        Role.OTHER: others,
-    }
-    roles: dict[Role, Names | None] = {
-        role: (names,) if isinstance(names, str) else names for role, names in groups.items()
-    }
+    roles = _roles(inputs, outputs, excitations, others)
     units = {
         key if key == time_column else channel_name(key): u for key, u in (units or {}).items()
     }
@@ -213,9 +202,10 @@ def read_records(
         shared.size,
         set(map(channel_name, sources_of(derive))),
     )
-    rows = _rows(table, wanted, shared)
+    read = SourceRows(table, shared, tuple(wanted))
+    rows = read.rows()
     grid = RowGrid(
-        tuple(wanted), resample_to_s, max_gap_s, interpolation, outliers, hold, time_column,
+        read.wanted, resample_to_s, max_gap_s, interpolation, outliers, hold, time_column,
         has_clocks=table.clock is not None,
     )  # fmt: skip
     options: dict[str, Cell] = {
@@ -223,18 +213,14 @@ def read_records(
         "sha256": sha256_of_file(source),
         "time": time_column if shared.size and sample_time_s is None else None,
         "sample_time_s": sample_time_s,
-        **_said_of_stamps(table, wanted),
-        **_said_of_files(join),
-        **({"column_names": ",".join(column_names)} if column_names else {}),
-        **{f"derived {name}": formula for name, formula in derive.items()},
+        **read.said(join, column_names, derive),
     }
     records: list[Record] = []
-    for part, label, beside in _parts(table, wanted, shared, record_column, grid):
+    for part, label, beside in read.parts(record_column, split_gaps=resample_to_s is None):
         if shared.size and sample_time_s is None:
             options["time_unit"] = units.get(time_column) or table.units.get(time_column)
             options["row_spacing_s"] = mean_spacing_s(shared[part])
-        doubts = fault_steps(_doubts(table, wanted, rows))
-        history = (Step("read_records", dict(options), VERSION), *doubts)
+        history = (Step("read_records", dict(options), VERSION), *fault_steps(read.doubts(rows)))
         some = {name: (time_s[part], values[part]) for name, (time_s, values) in rows.items()}
         with of_file(source.name):
             for time_s, samples, more in grid.pieces(some, beside):
@@ -245,64 +231,19 @@ def read_records(
     return [_declared(item, InputShape(kept, period_s, loop)) for item in records]
 
 
-def _rows(
-    table: ColumnTable, wanted: Iterable[ChannelColumn], shared: NDArray[np.float64]
-) -> dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]:
-    """Stamps and samples by channel."""
-    rows: dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]] = {}
-    for item in wanted:
-        time_s = shared if table.clock is None else table.clock(item.column).time_s
-        values = table.column(item.column)
-        if values.size != time_s.size:
-            raise DataError(
-                f"column {item.column!r} is not as long as the time",
-                found=f"{values.size} samples",
-                needed=f"{time_s.size}",
-            )
-        rows[item.channel.name] = time_s, values
-    return rows
-
-
-def _said_of_stamps(table: ColumnTable, wanted: Iterable[ChannelColumn]) -> dict[str, Cell]:
-    """Where the stamps of columns that have their own come from."""
-    if table.clock is None:
-        return {}
-    return {"stamps": "; ".join(dict.fromkeys(table.clock(i.column).said for i in wanted))}
-
-
-def _said_of_files(files: Iterable[str | Path | Record]) -> dict[str, Cell]:
-    """Files that were joined, with their digests."""
-    paths = [Path(file) for file in files if not isinstance(file, Record)]
-    return {f"joined {path.name}": sha256_of_file(path) for path in paths}
-
-
-def _doubts(
-    table: ColumnTable, wanted: Iterable[ChannelColumn], rows: Rows
-) -> Iterator[SampleFault]:
-    """What is to be doubted of the clocks of channels."""
-    for item in wanted:
-        time_s = rows[item.channel.name][0]
-        finding = None if table.clock is None else table.clock(item.column).finding
-        if finding is not None:
-            first, last = float(time_s[0]), float(time_s[-1])
-            yield SampleFault(item.channel.name, first, last, finding)
-
-
-def _parts(
-    table: ColumnTable,
-    wanted: Iterable[ChannelColumn],
-    shared: NDArray[np.float64],
-    record_column: str | None,
-    grid: RowGrid,
-) -> Iterator[tuple[slice, str | None, list[_Witness]]]:
-    """Rows of each manoeuvre, its name, and the columns that bear witness to its units."""
-    if table.clock is not None:
-        yield slice(None), None, []
-        return
-    witnesses = turning_columns(table, {i.column: i.channel for i in wanted}, shared.size)
-    split = grid.resample_to_s is None
-    for part, label in manoeuvres(table, record_column, shared, split_gaps=split):
-        yield part, label, [(channel, shared[part], values[part]) for channel, values in witnesses]
+def _roles(
+    inputs: Names | str | None,
+    outputs: Names | str | None,
+    excitations: Names | str | None,
+    others: Names | str | None,
+) -> dict[Role, Names | None]:
+    """Channels by role."""
+    groups = zip(
+        (Role.INPUT, Role.OUTPUT, Role.EXCITATION, Role.OTHER),
+        (inputs, outputs, excitations, others),
+        strict=True,
+    )
+    return {role: (names,) if isinstance(names, str) else names for role, names in groups}
 
 
 def _numbered(records: Sequence[Record]) -> list[Record]:
@@ -342,11 +283,6 @@ def _note(table: ColumnTable, column: str, name: str, units: Mapping[str, str]) 
     return ", ".join(notes)
 
 
-def _moves(table: ColumnTable, key: str) -> bool:
-    values = table.raw(key)
-    return bool(values.size > 1 and np.all(np.isfinite(values)) and np.ptp(values) > 0.0)
-
-
 def _wanted(
     table: ColumnTable,
     roles: Mapping[Role, Names | None],
@@ -362,7 +298,7 @@ def _wanted(
             (Role.OTHER, channel_name(key), key)
             for key, length in table.lengths.items()
             if key not in (time, record)
-            and (length == n_samples if table.clock is None else _moves(table, key))
+            and (length == n_samples if table.clock is None else moves(table, key))
         ]
         if table.clock is not None and len(pairs) > MOST_UNNAMED:
             raise OptionError(
@@ -372,15 +308,6 @@ def _wanted(
                 action="name inputs and outputs; flightid inspect lists all columns",
             )
     names = [name for _, name, _ in pairs]
-    if not pairs:
-        raise DataError(
-            f"{table.path.name} holds nothing to read beside its time",
-            found=f"{len(table.lengths)} columns",
-            needed="columns of numbers as long as the time"
-            if table.clock is None
-            else "a column that moves",
-            action=table.advice or None,
-        )
     if repeated := {name for name in names if names.count(name) > 1}:
         raise OptionError(
             "a channel is named twice", found=", ".join(sorted(repeated)), needed="one role each"

@@ -102,7 +102,20 @@ class RowGrid:
     def pieces(
         self, rows: Rows, beside: Sequence[tuple[Channel, Array, Array]]
     ) -> list[tuple[Array, Mapping[str, Array], tuple[Step, ...]]]:
-        """Stamps, samples and history of each piece between gaps."""
+        """Stamps, samples and history of each piece between gaps.
+
+        Raises
+        ------
+        DataError
+            There is no channel, or gaps leave no span.
+        """
+        if not rows:
+            raise DataError(
+                "there is nothing to read beside the time",
+                needed="columns of numbers as long as the time"
+                if not self.has_clocks
+                else "a column that moves",
+            )
         steps: tuple[Step, ...] = ()
         if self.outliers is not None:
             rows, step = self._without_outliers(rows, self.outliers)
