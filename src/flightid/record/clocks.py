@@ -146,7 +146,7 @@ def _smooth(start_s: float, values: Array, step_s: float) -> Signal:
     window = np.hanning(SMOOTHED + 2)[1:-1]
     made = np.asarray(np.convolve(values, window / np.sum(window), "valid"), dtype=np.float64)
     first = start_s + step_s * (SMOOTHED - 1) / 2
-    return first + step_s * np.arange(made.size), made
+    return np.asarray(first + step_s * np.arange(made.size), dtype=np.float64), made
 
 
 def _gridded(time_s: Array, values: Array, step_s: float) -> Array:
