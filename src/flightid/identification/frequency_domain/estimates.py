@@ -99,11 +99,11 @@ def statistics(
     # One that nothing answers to keeps its value and costs the others nothing.
     inner &= seen | ~np.any(inner & seen)
     names = tuple(p.name for p, keep in zip(free, inner, strict=True) if keep)
-    jacobian = end.jacobian[:, inner]
-    require_identifiable(names, jacobian)
+    basis, triangle = np.linalg.qr(end.jacobian[:, inner])
+    require_identifiable(names, triangle)
     covariance, freedom, agreement, moved = None, None, None, None
     if sensitivity is not None and names and not withheld:
-        gain = estimator_gain(jacobian, sensitivity)
+        gain = estimator_gain(triangle, basis.T @ sensitivity)
         if compare is None:
             covariance = errors.propagated(gain)
         else:
