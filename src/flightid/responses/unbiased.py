@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from flightid.errors import DataError
 from flightid.responses.errors.linear_estimate import LinearEstimate
 from flightid.responses.errors.noise import AVERAGED, mean_spectrum
-from flightid.responses.errors.pilot import BEYOND_BAND, Pilot
+from flightid.responses.errors.pilot import Pilot
+from flightid.responses.errors.pilot_search import BEYOND_BAND
 from flightid.responses.errors.random_error import StoredCovariance
 from flightid.responses.response import FrequencyResponse
 from flightid.uncertainty.quantiles import LEVEL, half_width

@@ -8,6 +8,7 @@ use num_complex::Complex64;
 
 use crate::numerics::complex_lanes::Lanes;
 use crate::numerics::complex_lu::ComplexLu;
+use crate::numerics::widest::widest;
 
 /// Smallest share of the largest entry of its column that a pivot may have when it is planned.
 const THRESHOLD: f64 = 0.1;
@@ -150,6 +151,11 @@ impl Plan {
 
     /// Factor at eight frequencies; false where the planned pivots do not serve all of them.
     pub fn factor(&self, entry: impl Fn(usize, usize) -> Lanes, factors: &mut Factors) -> bool {
+        widest(|| self.factored(entry, factors))
+    }
+
+    #[inline(always)]
+    fn factored(&self, entry: impl Fn(usize, usize) -> Lanes, factors: &mut Factors) -> bool {
         let slots = &mut factors.slots;
         slots.clear();
         slots.extend(self.entries.iter().map(|&(row, column)| entry(row, column)));
@@ -180,6 +186,11 @@ impl Plan {
 
     /// x = A⁻¹ b; b is overwritten.
     pub fn solve(&self, factors: &Factors, b: &mut [Lanes], x: &mut [Lanes]) {
+        widest(|| self.solved(factors, b, x));
+    }
+
+    #[inline(always)]
+    fn solved(&self, factors: &Factors, b: &mut [Lanes], x: &mut [Lanes]) {
         for step in &self.steps {
             let value = b[step.row];
             for &(row, place, _) in &step.lower {
@@ -197,6 +208,11 @@ impl Plan {
 
     /// y = A⁻ᵀ c (transposed, not conjugated); c is overwritten.
     pub fn solve_transposed(&self, factors: &Factors, c: &mut [Lanes], y: &mut [Lanes]) {
+        widest(|| self.solved_transposed(factors, c, y));
+    }
+
+    #[inline(always)]
+    fn solved_transposed(&self, factors: &Factors, c: &mut [Lanes], y: &mut [Lanes]) {
         for (step, inverse) in self.steps.iter().zip(&factors.inverses) {
             let value = c[step.column].times(inverse);
             for &(column, place) in &step.upper {

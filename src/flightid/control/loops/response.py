@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from flightid import _native
 from flightid.control.loops.block import Block, Hold
 from flightid.control.loops.linear_core import Core, assemble, linear_view
 from flightid.control.loops.wiring import Wiring
-from flightid.errors import DataError
+from flightid.errors import DataError, SingularError
 from flightid.models.linear.linear_system import LinearSystem
 
 Complex = NDArray[np.complex128]
@@ -66,7 +67,7 @@ class ConnectionBlocks:
         omega = np.atleast_1d(np.asarray(omega_rad_s, dtype=np.float64))
         try:
             found = self._closed(self.core.places(outputs), omega)
-        except np.linalg.LinAlgError:
+        except (np.linalg.LinAlgError, SingularError):
             found = np.full(1, np.nan, dtype=np.complex128)
         if not np.all(np.isfinite(found)):
             raise DataError(
@@ -109,11 +110,10 @@ class ConnectionBlocks:
     def _driven(self, watched: list[int], omega: Array) -> Complex:
         """Signals by row, delays left out, shape (n_f, n_watched, n_rows)."""
         core = self.core
-        pencil = 1j * omega[:, None, None] * np.eye(len(core.a)) - core.a
-        states = np.linalg.solve(
-            pencil, np.broadcast_to(core.b.astype(complex), (len(omega), *core.b.shape))
-        )
-        return np.asarray(core.c[watched] @ states + core.d[watched])
+        a, b, c, d = map(np.ascontiguousarray, (core.a, core.b, core.c[watched], core.d[watched]))
+        points = np.asarray(1j * omega, dtype=np.complex128)
+        found = _native.linear_response(a, b, c, d, points)
+        return np.moveaxis(found, -1, 0)
 
     def _port_responses(self, n_late: int, n_given: int, n_reads: int, omega: Array) -> Complex:
         """From what goes around to what it drives: ones for late signals, then the ports."""

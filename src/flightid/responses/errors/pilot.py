@@ -15,6 +15,16 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from flightid.responses.errors.pilot_search import (
+    SPARE,
+    PilotBins,
+    PilotState,
+    columns_of,
+    joined,
+    search,
+    spectra_of,
+    turns,
+)
 from flightid.responses.errors.unseen_peaks import has_unseen_peak
 
 Complex = NDArray[np.complex128]
@@ -22,12 +32,6 @@ Real = NDArray[np.float64]
 
 ORDERS = (1, 2, 3, 4, 5, 6, 8, 10)
 """Orders that are tried, each started by itself."""
-SPARE = 2
-"""Terms of a transient beyond the order: band limits and aliases bend it."""
-BEYOND_BAND = 1.3
-"""Bins are fitted up to this multiple of the highest frequency of the response."""
-STARTS, STEPS, HALVINGS = 6, 12, 6
-SETTLED = 1e-5
 SMOOTHED = 15
 """Bins over which squared residuals are averaged to a noise spectrum."""
 LEAST = 1e-10
@@ -91,15 +95,6 @@ class Pilot:
         return found
 
 
-def turns(omega: Real, scale_rad_s: float, order: int) -> Complex:
-    """Powers of the all-pass ``(ω0 − s)/(ω0 + s)`` on the imaginary axis, (order + 1, n_f).
-
-    Of unit modulus, so that polynomials in them stay well conditioned over many octaves.
-    """
-    angle = -2.0 * np.arctan(omega / scale_rad_s)
-    return np.asarray(np.exp(1j * np.multiply.outer(np.arange(order + 1), angle)))
-
-
 @dataclass(frozen=True, eq=False)
 class Pilots:
     """Pilot models of some records, fitted when first asked for.
@@ -122,45 +117,6 @@ class Pilots:
     def found(self) -> list[Pilot | None]:
         """One for each output."""
         return fit_pilots(self.inputs, self.outputs, self.sample_time_s, self.highest_rad_s)
-
-
-@dataclass(frozen=True)
-class _Spectra:
-    """Fourier bins of the records inside the band."""
-
-    omega: tuple[Real, ...]
-    inputs: tuple[Complex, ...]
-    output: tuple[Complex, ...]
-    lengths: tuple[int, ...]
-    sample_time_s: float
-
-    @property
-    def size(self) -> int:
-        return sum(len(each) for each in self.omega)
-
-    def samples(self, values: Complex) -> tuple[Real, ...]:
-        """Samples of each record from its bins in the band."""
-        made: list[Real] = []
-        at = 0
-        for omega, n in zip(self.omega, self.lengths, strict=True):
-            bins = np.zeros(n // 2 + 1, dtype=np.complex128)
-            bins[1 : len(omega) + 1] = values[at : at + len(omega)]
-            scaled = bins * np.sqrt(n / (2.0 * self.sample_time_s))
-            made.append(np.asarray(np.fft.irfft(scaled, n), dtype=np.float64))
-            at += len(omega)
-        return tuple(made)
-
-
-@dataclass(frozen=True)
-class _PilotState:
-    """Coefficients, what they make of the bins, and the weighted residuals."""
-
-    numerators: Real
-    denominator: Real
-    transients: tuple[Real, ...]
-    modelled: Complex
-    residual: Complex
-    cost: float
 
 
 def fit_pilots(
@@ -194,27 +150,14 @@ def fit_pilots(
     be a bias that no covariance holds.
     """
     return [
-        _fit_output(_spectra(inputs, [each[row] for each in outputs], sample_time_s, highest_rad_s))
+        _fit_output(
+            spectra_of(inputs, [each[row] for each in outputs], sample_time_s, highest_rad_s)
+        )
         for row in range(len(outputs[0]))
     ]
 
 
-def _spectra(
-    inputs: Sequence[Real], output: Sequence[Real], sample_time_s: float, highest: float
-) -> _Spectra:
-    omegas, ins, outs = [], [], []
-    for u, y in zip(inputs, output, strict=True):
-        n = len(y)
-        last = min((n - 1) // 2, int(BEYOND_BAND * highest * n * sample_time_s / (2.0 * np.pi)))
-        scale = np.sqrt(2.0 * sample_time_s / n)
-        omegas.append(2.0 * np.pi / (n * sample_time_s) * np.arange(1, last + 1, dtype=np.float64))
-        ins.append(scale * np.fft.rfft(u, axis=1)[:, 1 : last + 1])
-        outs.append(scale * np.fft.rfft(y)[1 : last + 1])
-    lengths = tuple(len(each) for each in output)
-    return _Spectra(tuple(omegas), tuple(ins), tuple(outs), lengths, sample_time_s)
-
-
-def _fit_output(data: _Spectra) -> Pilot | None:
+def _fit_output(data: PilotBins) -> Pilot | None:
     n_in, n_records = len(data.inputs[0]), len(data.output)
     target = np.concatenate(data.output)
     if not data.size or not np.any(target):
@@ -229,7 +172,7 @@ def _fit_output(data: _Spectra) -> Pilot | None:
             unknowns = (order + 1) * (n_in + n_records) + order + SPARE * n_records
             if 2 * data.size < SPENT * unknowns:
                 break
-            state = _search(data, order, scale, weights)
+            state = search(data, order, scale, weights)
             if has_unseen_peak(data.omega, state.numerators, state.denominator, scale):
                 continue
             # The criterion for an unknown variance of the noise.
@@ -247,12 +190,12 @@ def _fit_output(data: _Spectra) -> Pilot | None:
     return best
 
 
-def _pilot(data: _Spectra, state: _PilotState, scale: float, weights: Real) -> Pilot:
+def _pilot(data: PilotBins, state: PilotState, scale: float, weights: Real) -> Pilot:
     order = len(state.denominator) - 1
     basis = [turns(omega, scale, order) for omega in data.omega]
     ends = [turns(omega, scale, order + SPARE) for omega in data.omega]
     under = state.denominator @ np.concatenate(basis, axis=1)
-    slopes = _columns(data, basis, ends, state.modelled) / under
+    slopes = joined(columns_of(data, basis, ends, state.modelled)) / under
     weighed = slopes * weights
     left = np.concatenate([weighed.real, weighed.imag], axis=1)
     norms = np.maximum(np.linalg.norm(left, axis=1), np.finfo(float).tiny)
@@ -280,121 +223,3 @@ def _weights(residual: Complex, target: Complex, spent: Real) -> Real:
     power /= np.convolve(1.0 - spent, window, "same")
     least = LEAST * float(np.mean(np.abs(target) ** 2))
     return np.asarray(1.0 / np.sqrt(np.maximum(power, least)))
-
-
-def _search(data: _Spectra, order: int, scale: float, weights: Real) -> _PilotState:
-    """Sanathanan and Koerner's iteration, then Gauss–Newton steps from its best."""
-    basis = [turns(omega, scale, order) for omega in data.omega]
-    ends = [turns(omega, scale, order + SPARE) for omega in data.omega]
-    joined = np.concatenate(basis, axis=1)
-    target = np.concatenate(data.output)
-    state, denominator = None, np.ones(len(target), dtype=np.complex128)
-    for _ in range(STARTS):
-        found = _solve(data, basis, ends, target, weights / np.abs(denominator))
-        made = _made(data, basis, ends, weights, *found)
-        state = made if state is None or made.cost < state.cost else state
-        denominator = found[1] @ joined
-    assert state is not None
-    for _ in range(STEPS):
-        stepped = _gauss_newton(data, basis, ends, weights, state)
-        done = stepped.cost > state.cost * (1.0 - SETTLED)
-        state = stepped
-        if done:
-            break
-    return state
-
-
-def _columns(
-    data: _Spectra, basis: Sequence[Complex], ends: Sequence[Complex], output: Complex
-) -> Complex:
-    """Sensitivities times the denominator: numerators, transients, denominator but its first."""
-    n_in = len(data.inputs[0])
-    driven = [
-        np.concatenate([u[k] * phi for k in range(n_in)])
-        for u, phi in zip(data.inputs, basis, strict=True)
-    ]
-    sizes = [phi.shape[1] for phi in basis]
-    edges = np.cumsum(sizes)[:-1]
-    blocks = [np.concatenate(driven, axis=1)]
-    for place, end in enumerate(ends):
-        parts = [end if k == place else np.zeros((len(end), n)) for k, n in enumerate(sizes)]
-        blocks.append(np.concatenate(parts, axis=1))
-    pieces = np.split(output, edges)
-    poles = [-y * phi[1:] for y, phi in zip(pieces, basis, strict=True)]
-    blocks.append(np.concatenate(poles, axis=1))
-    return np.concatenate(blocks)
-
-
-def _solve(
-    data: _Spectra,
-    basis: Sequence[Complex],
-    ends: Sequence[Complex],
-    output: Complex,
-    weights: Real,
-) -> tuple[Real, Real, tuple[Real, ...]]:
-    columns = _columns(data, basis, ends, output) * weights
-    return _parted(_least_squares(columns, output * weights), data, basis, ends)
-
-
-def _least_squares(columns: Complex, target: Complex) -> Real:
-    left = np.concatenate([columns.real, columns.imag], axis=1)
-    norms = np.maximum(np.linalg.norm(left, axis=1), np.finfo(float).tiny)
-    right = np.concatenate([target.real, target.imag])
-    solved = np.linalg.lstsq((left / norms[:, None]).T, right, rcond=1e-10)[0]
-    return np.asarray(solved / norms)
-
-
-def _parted(
-    solved: Real, data: _Spectra, basis: Sequence[Complex], ends: Sequence[Complex]
-) -> tuple[Real, Real, tuple[Real, ...]]:
-    n_in, size, end = len(data.inputs[0]), len(basis[0]), len(ends[0])
-    at, last = n_in * size, n_in * size + len(ends) * end
-    transients = tuple(solved[at:last].reshape(len(ends), end))
-    return solved[:at].reshape(n_in, size), np.concatenate([[1.0], solved[last:]]), transients
-
-
-def _made(
-    data: _Spectra,
-    basis: Sequence[Complex],
-    ends: Sequence[Complex],
-    weights: Real,
-    numerators: Real,
-    denominator: Real,
-    transients: tuple[Real, ...],
-) -> _PilotState:
-    modelled = np.concatenate(
-        [
-            (np.einsum("if,if->f", numerators @ phi, u) + transient @ end) / (denominator @ phi)
-            for phi, end, u, transient in zip(basis, ends, data.inputs, transients, strict=True)
-        ]
-    )
-    residual = weights * (np.concatenate(data.output) - modelled)
-    cost = float(np.mean(np.abs(residual) ** 2))
-    return _PilotState(numerators, denominator, transients, modelled, residual, cost)
-
-
-def _gauss_newton(
-    data: _Spectra,
-    basis: Sequence[Complex],
-    ends: Sequence[Complex],
-    weights: Real,
-    state: _PilotState,
-) -> _PilotState:
-    under = state.denominator @ np.concatenate(basis, axis=1)
-    columns = _columns(data, basis, ends, state.modelled) * (weights / under)
-    moves = _parted(_least_squares(columns, state.residual), data, basis, ends)
-    length = 1.0
-    for _ in range(HALVINGS):
-        moved = _made(
-            data,
-            basis,
-            ends,
-            weights,
-            state.numerators + length * moves[0],
-            np.concatenate([[1.0], state.denominator[1:] + length * moves[1][1:]]),
-            tuple(a + length * b for a, b in zip(state.transients, moves[2], strict=True)),
-        )
-        if moved.cost < state.cost:
-            return moved
-        length *= 0.5
-    return state

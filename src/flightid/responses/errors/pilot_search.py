@@ -1,0 +1,224 @@
+"""Least squares of a rational response with the transients of records, over their Fourier bins."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+SPARE = 2
+"""Terms of a transient beyond the order: band limits and aliases bend it."""
+BEYOND_BAND = 1.3
+"""Bins are fitted up to this multiple of the highest frequency of the response."""
+STARTS, STEPS, HALVINGS = 6, 12, 6
+SETTLED = 1e-5
+
+
+def turns(omega: Real, scale_rad_s: float, order: int) -> Complex:
+    """Powers of the all-pass ``(ω0 − s)/(ω0 + s)`` on the imaginary axis, (order + 1, n_f).
+
+    Of unit modulus, so that polynomials in them stay well conditioned over many octaves.
+    """
+    angle = -2.0 * np.arctan(omega / scale_rad_s)
+    return np.asarray(np.exp(1j * np.multiply.outer(np.arange(order + 1), angle)))
+
+
+@dataclass(frozen=True)
+class PilotBins:
+    """Fourier bins of the records inside the band."""
+
+    omega: tuple[Real, ...]
+    inputs: tuple[Complex, ...]
+    output: tuple[Complex, ...]
+    lengths: tuple[int, ...]
+    sample_time_s: float
+
+    @property
+    def size(self) -> int:
+        """Number of bins."""
+        return sum(len(each) for each in self.omega)
+
+    def samples(self, values: Complex) -> tuple[Real, ...]:
+        """Samples of each record from its bins in the band."""
+        made: list[Real] = []
+        at = 0
+        for omega, n in zip(self.omega, self.lengths, strict=True):
+            bins = np.zeros(n // 2 + 1, dtype=np.complex128)
+            bins[1 : len(omega) + 1] = values[at : at + len(omega)]
+            scaled = bins * np.sqrt(n / (2.0 * self.sample_time_s))
+            made.append(np.asarray(np.fft.irfft(scaled, n), dtype=np.float64))
+            at += len(omega)
+        return tuple(made)
+
+
+@dataclass(frozen=True)
+class PilotState:
+    """Coefficients, what they make of the bins, and the weighted residuals."""
+
+    numerators: Real
+    denominator: Real
+    transients: tuple[Real, ...]
+    modelled: Complex
+    residual: Complex
+    cost: float
+
+
+def spectra_of(
+    inputs: Sequence[Real], output: Sequence[Real], sample_time_s: float, highest: float
+) -> PilotBins:
+    """Bins of the records inside the band, of all inputs and one output."""
+    omegas, ins, outs = [], [], []
+    for u, y in zip(inputs, output, strict=True):
+        n = len(y)
+        last = min((n - 1) // 2, int(BEYOND_BAND * highest * n * sample_time_s / (2.0 * np.pi)))
+        scale = np.sqrt(2.0 * sample_time_s / n)
+        omegas.append(2.0 * np.pi / (n * sample_time_s) * np.arange(1, last + 1, dtype=np.float64))
+        ins.append(scale * np.fft.rfft(u, axis=1)[:, 1 : last + 1])
+        outs.append(scale * np.fft.rfft(y)[1 : last + 1])
+    lengths = tuple(len(each) for each in output)
+    return PilotBins(tuple(omegas), tuple(ins), tuple(outs), lengths, sample_time_s)
+
+
+def search(data: PilotBins, order: int, scale: float, weights: Real) -> PilotState:
+    """Sanathanan and Koerner's iteration, then Gauss–Newton steps from its best."""
+    basis = [turns(omega, scale, order) for omega in data.omega]
+    ends = [turns(omega, scale, order + SPARE) for omega in data.omega]
+    joined = np.concatenate(basis, axis=1)
+    target = np.concatenate(data.output)
+    state, denominator = None, np.ones(len(target), dtype=np.complex128)
+    for _ in range(STARTS):
+        scaled = weights / np.abs(denominator)
+        found = solve(data, basis, ends, target, scaled, target * scaled)
+        made = _made(data, basis, ends, weights, *found)
+        state = made if state is None or made.cost < state.cost else state
+        denominator = found[1] @ joined
+    assert state is not None
+    for _ in range(STEPS):
+        stepped = _gauss_newton(data, basis, ends, weights, state)
+        done = stepped.cost > state.cost * (1.0 - SETTLED)
+        state = stepped
+        if done:
+            break
+    return state
+
+
+def columns_of(
+    data: PilotBins, basis: Sequence[Complex], ends: Sequence[Complex], output: Complex
+) -> list[tuple[Complex, Complex]]:
+    """Sensitivities times the denominator of each record: of its transient alone, and of the rest.
+
+    The rest: numerators, then the denominator but its first.
+    """
+    pieces = np.split(output, np.cumsum([phi.shape[1] for phi in basis])[:-1])
+    return [
+        (end, np.concatenate([*(row * phi for row in u), -y * phi[1:]]))
+        for u, y, phi, end in zip(data.inputs, pieces, basis, ends, strict=True)
+    ]
+
+
+def joined(columns: Sequence[tuple[Complex, Complex]]) -> Complex:
+    """Of all records: numerators, transients, denominator but its first."""
+    size = len(columns[0][0])
+    order = size - 1 - SPARE
+    whole = np.concatenate([shared for _, shared in columns], axis=1)
+    own = np.zeros((size * len(columns), whole.shape[1]), dtype=np.complex128)
+    at = 0
+    for place, (transient, _) in enumerate(columns):
+        own[place * size : (place + 1) * size, at : at + transient.shape[1]] = transient
+        at += transient.shape[1]
+    n_shared = len(whole) - order
+    return np.concatenate([whole[:n_shared], own, whole[n_shared:]])
+
+
+def solve(
+    data: PilotBins,
+    basis: Sequence[Complex],
+    ends: Sequence[Complex],
+    output: Complex,
+    weights: Real | Complex,
+    target: Complex,
+) -> tuple[Real, Real, tuple[Real, ...]]:
+    """Coefficients whose weighed sensitivities come nearest to a target; a denominator from one on.
+
+    Each record's transient is eliminated by an orthogonal triangle of its own rows.
+    """
+    edges = np.cumsum([phi.shape[1] for phi in basis])[:-1]
+    triangles: list[Real] = []
+    for (own, shared), weight, right in zip(
+        columns_of(data, basis, ends, output),
+        np.split(weights, edges),
+        np.split(target, edges),
+        strict=True,
+    ):
+        rows = np.concatenate([own * weight, shared * weight, right[None]])
+        parts = np.concatenate([rows.real, rows.imag], axis=1)
+        triangles.append(np.asarray(np.linalg.qr(parts.T, mode="r")))
+    n_own = len(ends[0])
+    sizes = np.linalg.norm(np.concatenate(triangles), axis=0)[n_own:-1]
+    solved = _least_squares(np.concatenate([each[n_own:, n_own:] for each in triangles]), sizes)
+    transients = []
+    for each in triangles:
+        top = each[:n_own, : n_own + 1].copy()
+        top[:, -1] = each[:n_own, -1] - each[:n_own, n_own:-1] @ solved
+        transients.append(_least_squares(top, np.linalg.norm(top[:, :-1], axis=0)))
+    n_in, size = len(data.inputs[0]), len(basis[0])
+    split = n_in * size
+    denominator = np.concatenate([[1.0], solved[split:]])
+    return solved[:split].reshape(n_in, size), denominator, tuple(transients)
+
+
+def _least_squares(rows: Real, sizes: Real) -> Real:
+    """Least squares for the last column by the others, each scaled by its size."""
+    sizes = np.maximum(sizes, np.finfo(float).tiny)
+    solved = np.linalg.lstsq(rows[:, :-1] / sizes, rows[:, -1], rcond=1e-10)[0]
+    return np.asarray(solved / sizes)
+
+
+def _made(
+    data: PilotBins,
+    basis: Sequence[Complex],
+    ends: Sequence[Complex],
+    weights: Real,
+    numerators: Real,
+    denominator: Real,
+    transients: tuple[Real, ...],
+) -> PilotState:
+    modelled = np.concatenate(
+        [
+            (np.einsum("if,if->f", numerators @ phi, u) + transient @ end) / (denominator @ phi)
+            for phi, end, u, transient in zip(basis, ends, data.inputs, transients, strict=True)
+        ]
+    )
+    residual = weights * (np.concatenate(data.output) - modelled)
+    cost = float(np.mean(np.abs(residual) ** 2))
+    return PilotState(numerators, denominator, transients, modelled, residual, cost)
+
+
+def _gauss_newton(
+    data: PilotBins,
+    basis: Sequence[Complex],
+    ends: Sequence[Complex],
+    weights: Real,
+    state: PilotState,
+) -> PilotState:
+    under = state.denominator @ np.concatenate(basis, axis=1)
+    moves = solve(data, basis, ends, state.modelled, weights / under, state.residual)
+    length = 1.0
+    for _ in range(HALVINGS):
+        moved = _made(
+            data,
+            basis,
+            ends,
+            weights,
+            state.numerators + length * moves[0],
+            np.concatenate([[1.0], state.denominator[1:] + length * moves[1][1:]]),
+            tuple(a + length * b for a, b in zip(state.transients, moves[2], strict=True)),
+        )
+        if moved.cost < state.cost:
+            return moved
+        length *= 0.5
+    return state

@@ -1,0 +1,33 @@
+"""Least squares of pilots: transients eliminated record by record change nothing."""
+
+import numpy as np
+
+from flightid.responses.errors.pilot_search import (
+    SPARE,
+    columns_of,
+    joined,
+    solve,
+    spectra_of,
+    turns,
+)
+from tests.closeness import assert_close
+
+
+def test_eliminated_transients_solve_the_whole_problem() -> None:
+    """Three records of unlike length, two inputs: as by one problem of all columns."""
+    random = np.random.default_rng(3)
+    inputs = [random.standard_normal((2, n)) for n in (300, 180, 240)]
+    data = spectra_of(inputs, [np.cumsum(u.sum(0)) for u in inputs], 0.02, 60.0)
+    order, target = 3, np.concatenate(data.output)
+    basis = [turns(omega, 10.0, order) for omega in data.omega]
+    ends = [turns(omega, 10.0, order + SPARE) for omega in data.omega]
+    weights = 1.0 / (1.0 + np.abs(target))
+    numerators, denominator, transients = solve(
+        data, basis, ends, target, weights, target * weights
+    )
+    columns = joined(columns_of(data, basis, ends, target)) * weights
+    both = np.concatenate([columns.real, columns.imag], axis=1).T
+    right = np.concatenate([(target * weights).real, (target * weights).imag])
+    whole = np.linalg.lstsq(both, right, rcond=None)[0]
+    found = [numerators.ravel(), *transients, denominator[1:]]
+    assert_close(np.concatenate(found), whole, atol=1e-9 * np.max(np.abs(whole)), why="rounding")
