@@ -163,13 +163,11 @@ def _errors(
     source = linear.errors_with(mean_spectrum(residuals, linear.sample_time_s, highest, spent))
     places = [np.arange(size) for size in response.response.shape]
     total = source.covariance(*places)
-    apply = linear.functional()
-    seen = np.stack([apply(each) for each in _slopes(pilots)], axis=1)
     onto = np.kron(np.eye(2 * len(columns)), spread)
     found = []
     for row, pilot in enumerate(pilots):
         own = _real(pilot.response_slopes(omega)[:, columns])
-        made = _real(seen[row][: len(own)])
+        made = _real(linear.of_pilot(row)[:, columns])
         left = _positive(total[row] - made.T @ pilot.covariance @ made)
         known = onto.T @ left @ onto + own.T @ pilot.covariance @ own
         found.append(_widened(pilot) * known)
@@ -182,23 +180,6 @@ def _widened(pilot: Pilot) -> float:
     groups = max(1, n_bins // AVERAGED)
     freedom = (2.0 * n_bins - len(pilot.covariance)) / groups
     return (half_width(LEVEL, max(freedom, 1.0)) / half_width(LEVEL)) ** 2
-
-
-def _slopes(pilots: Sequence[Pilot]) -> list[list[Real]]:
-    """Of each coefficient, of each record, the slopes of all outputs; zero where one has fewer."""
-    most = max(len(each.covariance) for each in pilots)
-    return [
-        [
-            np.stack(
-                [
-                    each.slopes[record][k] if k < len(each.covariance) else np.zeros_like(samples)
-                    for each in pilots
-                ]
-            )
-            for record, samples in enumerate(pilots[0].outputs)
-        ]
-        for k in range(most)
-    ]
 
 
 def _real(slopes: Complex) -> Real:

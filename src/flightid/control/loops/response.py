@@ -110,10 +110,9 @@ class ConnectionBlocks:
     def _driven(self, watched: list[int], omega: Array) -> Complex:
         """Signals by row, delays left out, shape (n_f, n_watched, n_rows)."""
         core = self.core
-        a, b, c, d = map(np.ascontiguousarray, (core.a, core.b, core.c[watched], core.d[watched]))
         points = np.asarray(1j * omega, dtype=np.complex128)
-        found = _native.linear_response(a, b, c, d, points)
-        return np.moveaxis(found, -1, 0)
+        c, d = core.c[watched], core.d[watched]
+        return np.moveaxis(_native.linear_response(core.a, core.b, c, d, points), -1, 0)
 
     def _port_responses(self, n_late: int, n_given: int, n_reads: int, omega: Array) -> Complex:
         """From what goes around to what it drives: ones for late signals, then the ports."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from flightid.dynamics.handling_qualities.branch import Branch, branch_of
 from flightid.errors import DataError, UnknownNameError
-from flightid.models import LinearSystem, StateSpaceModel, TransferFunctionModel
+from flightid.models import LinearSystem, TransferFunctionModel
 from flightid.models.model import linear_system
 from flightid.responses import FrequencyResponse
 from flightid.responses.unbiased import WITHOUT_BIAS
@@ -213,16 +213,15 @@ def smoother_of(response: FrequencyResponse, pair: Pair) -> Array | None:
 
 def _evaluator(thing: object, pair: Pair) -> tuple[Callable[[Array], Complex], float]:
     """Attitude response of a model, and the highest frequency at which it means anything."""
-    system = (
-        thing
-        if isinstance(thing, TransferFunctionModel | StateSpaceModel)
-        else linear_system(thing)
-    )
+    system = thing if isinstance(thing, TransferFunctionModel) else linear_system(thing)
     for name, known in ((pair.output, system.outputs), (pair.input, system.inputs)):
         if name not in known:
             raise UnknownNameError("there is no such channel", found=name, needed=", ".join(known))
+    step = None
+    if isinstance(system, LinearSystem):
+        step = system.sample_time_s
+        system = system.select(outputs=[pair.output], inputs=[pair.input])
     row, column = list(system.outputs).index(pair.output), list(system.inputs).index(pair.input)
-    step = system.sample_time_s if isinstance(system, LinearSystem) else None
 
     def respond(omega: Array) -> Complex:
         return pair.attitude(omega, system.frequency_response(omega)[row, column])

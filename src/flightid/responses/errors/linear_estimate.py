@@ -249,6 +249,20 @@ class LinearEstimate:
         known = [each for each in found if each is not None]
         return known if len(known) == len(found) else None
 
+    def of_pilot(self, row: int) -> Complex:
+        """The estimate of slopes of an output's pilot, shape (n_coefficients, n_in, n_f).
+
+        By all inputs that the estimate was conditioned on, kept for further pairs of the output.
+        """
+        place, points = int(self.places[0][row]), self.places[2]
+        kept, key = self.pilots.seen, (place, points.tobytes())
+        pilot = self.pilots.found[place]
+        if key not in kept and pilot is not None:
+            rows = np.full(len(pilot.covariance), place)
+            apply = self.weights.functional(rows, np.arange(len(self.inputs)), points)
+            kept[key] = apply(pilot.slopes)
+        return kept[key]
+
     def errors_of(self, residuals: Sequence[Real]) -> CovarianceSource | None:
         """Errors of the response with the noise that a model's residuals show.
 

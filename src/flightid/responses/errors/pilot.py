@@ -9,7 +9,7 @@ model's outputs, less its own response, is the bias to expect.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -106,12 +106,15 @@ class Pilots:
     sample_time_s : float
     highest_rad_s : float
         Highest frequency of the response.
+    seen : dict
+        The estimate of a pilot's slopes, by output and frequencies: see `LinearEstimate`.
     """
 
     inputs: tuple[Real, ...]
     outputs: tuple[Real, ...]
     sample_time_s: float
     highest_rad_s: float
+    seen: dict[tuple[int, bytes], Complex] = field(default_factory=dict, repr=False)
 
     @cached_property
     def found(self) -> list[Pilot | None]:
