@@ -50,8 +50,8 @@ def fit_flight(axis: str, seed: int) -> fid.Fit:
     settings, task = _settings(), _task(axis)
     plan = settings.flight
     assert plan is not None
-    sweep = next(run for run in plan.sweeps if run.axis == 10 + AXES.index(axis))
-    flown = replace(plan, sweeps=(replace(sweep, start_s=START_S),), doublets=(), seed=seed).fly()
+    sweep = next(run for run in plan.sweep if run.axis == 10 + AXES.index(axis))
+    flown = replace(plan, sweep=(replace(sweep, start_s=START_S),), doublet=(), seed=seed).fly()
     # One second after the mode is entered the chirp starts; the log's segment is the chirp.
     # As of a log: what moves at the loop's rate is nearly straight between logged samples.
     record = flown.record((START_S + 1.0, START_S + 1.0 + sweep.record_s)).declare(hold="first")
