@@ -127,8 +127,8 @@ def _response(
     high = 2.0 * math.pi * kept[0].sample_rate_hz / SAMPLES_PER_CYCLE_LEAST.value
     if high < 1.2 * low:
         return None, (
-            f"the windows reach down to {low / (2 * math.pi):.2g} Hz, the sampling up to "
-            f"{high / (2 * math.pi):.2g} Hz: no band is left{_cut(made, kept, spans)}"
+            f"the windows reach down to {low / (2 * math.pi):.3g} Hz, the sampling up to "
+            f"{high / (2 * math.pi):.3g} Hz: no band is left{_cut(made, kept, spans)}"
         )
     try:
         # Nobody reads the findings of this response: no command's options are looked up for them.

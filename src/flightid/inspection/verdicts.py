@@ -112,7 +112,7 @@ def _length(found: Inspection) -> list[Finding]:
             "too-short",
             Light.RED,
             f"{airborne:.1f} s in the air: five independent windows of two cycles reach down to "
-            f"{lowest_hz(airborne):.2g} Hz only",
+            f"{lowest_hz(airborne):.3g} Hz only",
             advice.record_length(),
         )
     ]
