@@ -134,4 +134,5 @@ def test_a_study_that_is_proposed_joins_by_itself(tmp_path: Path) -> None:
         join=(str(mocap),), join_on="gyro", join_time_column="t", model="rate_motor_lag",
     )  # fmt: skip
     assert 'join = ["mocap.csv"]' in made.lines
+    assert sum("Stamps of" in line for line in made.lines) == 1
     assert any("clock offset 5.43" in line for line in made.lines)

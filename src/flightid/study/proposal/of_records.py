@@ -287,7 +287,12 @@ def _structure(
 
 def _stamps(read: Sequence[_Stretch]) -> Iterator[str]:
     """Where stamps come from, of records whose channels have clocks of their own."""
-    said = {step.options.get("stamps"): None for part in read for step in part.record.history}
+    said = dict.fromkeys(
+        step.options.get("stamps")
+        for part in read
+        for step in part.record.history
+        if step.operation == "read_records"
+    )
     yield from (f"Stamps of {text}" for text in said if text)
 
 
