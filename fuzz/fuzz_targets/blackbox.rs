@@ -6,7 +6,7 @@ use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|data: &[u8]| {
     for (start, stop) in flights(data) {
-        let Ok(log) = Blackbox::decode(&data[start..stop]) else {
+        let Ok(log) = Blackbox::decode(&data[start..stop], 1 << 24) else {
             continue;
         };
         for table in [&log.main, &log.slow, &log.gps] {

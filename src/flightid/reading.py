@@ -75,6 +75,27 @@ def require_memory(name: str, n_bytes: float) -> None:
 
 
 @contextmanager
+def within_memory(name: str) -> Iterator[None]:
+    """Turn a native reader's MemoryError, which holds bytes, into the refusal of `require_memory`.
+
+    Parameters
+    ----------
+    name : str
+        Of the file.
+
+    Raises
+    ------
+    FileFormatError
+        What the file holds takes more than the budget.
+    """
+    try:
+        yield
+    except MemoryError as fault:
+        require_memory(name, *fault.args)
+        raise
+
+
+@contextmanager
 def decoding(name: str, whole: str, action: str = "write or copy it again") -> Iterator[None]:
     """Turn whatever a library's decoder raises at a damaged file into `FileFormatError`.
 

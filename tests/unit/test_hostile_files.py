@@ -196,3 +196,30 @@ def test_depth_is_refused_whatever_python_allows() -> None:
     deep = "[" * 300 + "]" * 300
     with pytest.raises(FileFormatError, match="nested deeper than 64"):
         parse_toml(f"x = {deep}", "a model", "a.toml")
+
+
+def _grown_log(kind: str) -> bytes:
+    """Less than a MiB, of which more than that comes."""
+    seeds = Path(__file__).parents[2] / "fuzz" / "seeds"
+    if kind == "printed":
+        return b"FMT, 200, 67, TXT, Z, Text\n" + 20_000 * b"TXT,a\n"
+    if kind == "telemetry":
+        link = (seeds / "telemetry" / "link.tlog").read_bytes()
+        return link * (900_000 // len(link))
+    flight = (seeds / "blackbox" / "flight.bbl").read_bytes().split(b"E\xff")[0]
+    frames = flight[flight.index(b"\n", flight.rindex(b"\nH ") + 1) + 1 :]
+    return flight + frames * (900_000 // len(frames))
+
+
+@pytest.mark.parametrize("kind", ["blackbox", "printed", "telemetry"])
+def test_logs_that_grow_keep_to_the_budget(
+    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "grown"
+    path.write_bytes(_grown_log(kind))
+    assert path.stat().st_size < 1 << 20
+    monkeypatch.setenv(VARIABLE, "1")
+    with pytest.raises(FileFormatError, match="declares more than is read into memory"):
+        fid.read_log(path)
+    monkeypatch.setenv(VARIABLE, "64")
+    assert fid.read_log(path).messages

@@ -29,6 +29,12 @@ pub enum LogError {
         /// What it asks for.
         what: String,
     },
+    /// What the log holds takes more than its reader was allowed.
+    #[error("what the log holds takes {bytes} bytes and more")]
+    TooLarge {
+        /// Where it was met.
+        bytes: usize,
+    },
     /// The bytes are not those that were indexed.
     #[error("the log changed while it was read: no sample at byte {at}")]
     Changed {

@@ -4,6 +4,8 @@
 
 use std::collections::{BTreeMap, HashMap};
 
+use crate::error::LogError;
+
 const STAMP: usize = 8;
 const V1: (u8, usize) = (0xFE, 6);
 const V2: (u8, usize) = (0xFD, 10);
@@ -30,6 +32,8 @@ pub struct Telemetry {
     pub frames: BTreeMap<(u32, u8, u8), Frames>,
     /// Bytes that are in no frame.
     pub lost: usize,
+    /// Bytes that the frames take, those of their copies for Python too.
+    held: usize,
 }
 
 struct Frame<'a> {
@@ -49,8 +53,11 @@ pub fn is_telemetry(bytes: &[u8]) -> bool {
 }
 
 /// Read all frames of the messages that are known.
-pub fn read(bytes: &[u8], known: &Known) -> Telemetry {
-    let mut log = Telemetry::default();
+///
+/// # Errors
+/// Bytes and frames take more than `budget` bytes: a frame of few bytes may stand for many.
+pub fn read(bytes: &[u8], known: &Known, budget: usize) -> Result<Telemetry, LogError> {
+    let mut log = Telemetry { held: bytes.len(), ..Telemetry::default() };
     let mut at = 0;
     while let Some((stamp, rest)) =
         bytes.get(at..).and_then(|rest| rest.split_first_chunk::<STAMP>())
@@ -63,9 +70,12 @@ pub fn read(bytes: &[u8], known: &Known) -> Telemetry {
             continue;
         };
         at += STAMP + size;
+        if log.held > budget {
+            return Err(LogError::TooLarge { bytes: log.held });
+        }
     }
     log.lost += bytes.len() - at;
-    log
+    Ok(log)
 }
 
 fn keep(log: &mut Telemetry, stamp_us: u64, found: &Frame, known: &Known) -> Option<usize> {
@@ -80,6 +90,7 @@ fn keep(log: &mut Telemetry, stamp_us: u64, found: &Frame, known: &Known) -> Opt
     kept.stamps_us.push(stamp_us);
     kept.payloads.extend(taken);
     kept.payloads.resize(kept.stamps_us.len() * width, 0);
+    log.held += 2 * (STAMP + width);
     Some(found.size)
 }
 

@@ -3,6 +3,7 @@
 
 use flightid_core::CoreError;
 use flightid_logs::LogError;
+use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 
 fn raise(class: &str, message: String) -> PyErr {
@@ -39,6 +40,8 @@ pub fn from_logs(error: LogError) -> PyErr {
     match error {
         LogError::NotALog { .. } => raise("LogFormatError", message),
         LogError::Missing { .. } => raise("MissingColumnError", message),
+        // `reading.within_memory` says what to do.
+        LogError::TooLarge { bytes } => PyMemoryError::new_err(bytes),
         LogError::Unsupported { .. } | LogError::Changed { .. } => raise("LogFormatError", message),
     }
 }

@@ -163,7 +163,10 @@ struct Memory {
 
 impl Blackbox {
     /// Decode one flight of a file: the bytes from its first line to the next flight's.
-    pub fn decode(bytes: &[u8]) -> Result<Self, LogError> {
+    ///
+    /// # Errors
+    /// A header that does not say what frames hold; bytes and frames of more than `budget` bytes.
+    pub fn decode(bytes: &[u8], budget: usize) -> Result<Self, LogError> {
         let header = Header::read(bytes)?;
         let layouts = Layouts::read(&header)?;
         let mut log = Self {
@@ -174,13 +177,14 @@ impl Blackbox {
         };
         let mut memory = Memory::default();
         let mut left = bytes.len().saturating_mul(VALUES_A_BYTE);
-        let mut at = header.size;
+        let (mut at, mut held) = (header.size, bytes.len());
         let mut values = Vec::new();
         while at < bytes.len() && !log.ended {
             let mut reader = Bytes::new(bytes, at);
             match log.frame(&mut reader, &layouts, &mut memory, &mut values) {
                 Some(n_values) if n_values <= left => {
                     left -= n_values;
+                    held += size_of::<i32>() * n_values + size_of::<Event>();
                     at = reader.at;
                 }
                 Some(_) => {
@@ -192,6 +196,10 @@ impl Blackbox {
                     log.skip(at, at + 1, "no frame");
                     at += 1;
                 }
+            }
+            let taken = held + size_of::<Skipped>() * log.skipped.len();
+            if taken > budget {
+                return Err(LogError::TooLarge { bytes: taken });
             }
         }
         log.header = header;

@@ -6,6 +6,8 @@
 
 use std::collections::HashMap;
 
+use crate::error::LogError;
+
 use super::format::{
     FMT_SIZE, FMT_TYPE, HEADER_1, HEADER_2, Kind, Layout, Scale, definition, terminated,
 };
@@ -25,7 +27,10 @@ pub struct Binary {
 }
 
 /// Turn a text log into a binary one.
-pub fn to_binary(text: &[u8]) -> Binary {
+///
+/// # Errors
+/// The text, the log and a copy of it take more than `budget` bytes.
+pub fn to_binary(text: &[u8], budget: usize) -> Result<Binary, LogError> {
     let mut made = Binary::default();
     let most = text.len().saturating_mul(GROWTH).saturating_add(FMT_SIZE);
     let mut layouts: HashMap<Vec<u8>, Layout> = HashMap::new();
@@ -45,8 +50,12 @@ pub fn to_binary(text: &[u8]) -> Binary {
             made.bytes.truncate(kept);
             made.bad_lines += 1;
         }
+        let bytes = text.len() + 2 * made.bytes.len();
+        if bytes > budget {
+            return Err(LogError::TooLarge { bytes });
+        }
     }
-    made
+    Ok(made)
 }
 
 /// The part before the first comma, and the part after it.

@@ -10,6 +10,8 @@ use super::fault::{DelimitedError, Fault};
 /// Longest line, bytes.
 const LONGEST_LINE: usize = 1 << 20;
 const BLOCK: usize = 1 << 20;
+/// Held at first: most texts are short.
+const FIRST: usize = 1 << 14;
 
 /// A text in blocks that end where lines end.
 pub struct Blocks<R> {
@@ -23,7 +25,7 @@ pub struct Blocks<R> {
 
 impl<R: Read> Blocks<R> {
     pub fn new(source: R) -> Self {
-        Self { source, held: vec![0; LONGEST_LINE + BLOCK], given: 0, filled: 0, is_ended: false }
+        Self { source, held: vec![0; FIRST], given: 0, filled: 0, is_ended: false }
     }
 
     /// The next whole lines, the last one with a line end even where the text has none.
@@ -31,7 +33,10 @@ impl<R: Read> Blocks<R> {
         self.held.copy_within(self.given..self.filled, 0);
         self.filled -= self.given;
         self.given = 0;
-        while !self.is_ended && self.filled < self.held.len() {
+        while !self.is_ended && self.filled < LONGEST_LINE + BLOCK {
+            if self.filled == self.held.len() {
+                self.held.resize((2 * self.filled).min(LONGEST_LINE + BLOCK), 0);
+            }
             match self.source.read(&mut self.held[self.filled..]) {
                 Ok(0) => self.is_ended = true,
                 Ok(count) => self.filled += count,

@@ -9,9 +9,9 @@ use crate::error::from_logs;
 
 type Event = (Option<i64>, u8, i64, i64);
 
-/// __init__(self, data: bytes, flight: int) -> None
+/// __init__(self, data: bytes, flight: int, budget: int) -> None
 ///
-/// One flight of a blackbox log, decoded.
+/// One flight of a blackbox log, decoded; MemoryError holds the bytes beyond the budget.
 #[pyclass(frozen, name = "Blackbox", module = "flightid._native")]
 pub struct PyBlackbox {
     log: Blackbox,
@@ -20,10 +20,10 @@ pub struct PyBlackbox {
 #[pymethods]
 impl PyBlackbox {
     #[new]
-    fn new(py: Python<'_>, data: &[u8], flight: usize) -> PyResult<Self> {
+    fn new(py: Python<'_>, data: &[u8], flight: usize, budget: usize) -> PyResult<Self> {
         let decoded = py.detach(|| {
             let (start, stop) = flights(data).get(flight).copied().unwrap_or((0, data.len()));
-            Blackbox::decode(&data[start..stop])
+            Blackbox::decode(&data[start..stop], budget)
         });
         Ok(Self { log: decoded.map_err(from_logs)? })
     }

@@ -39,13 +39,18 @@ fn index_dataflash(py: Python<'_>, data: &[u8]) -> PyResult<DataflashFile> {
     index(py, FileBytes::Owned(data.to_vec()))
 }
 
-/// dataflash_of_text(text: bytes) -> tuple[bytes, int]
+/// dataflash_of_text(text: bytes, budget: int) -> tuple[bytes, int]
 ///
 /// The binary log that a text log was printed from, and how many of its lines are no message.
+/// MemoryError holds the bytes beyond the budget.
 #[pyfunction]
-fn dataflash_of_text<'py>(py: Python<'py>, text: &[u8]) -> (Bound<'py, PyBytes>, usize) {
-    let made = py.detach(|| printed::to_binary(text));
-    (PyBytes::new(py, &made.bytes), made.bad_lines)
+fn dataflash_of_text<'py>(
+    py: Python<'py>,
+    text: &[u8],
+    budget: usize,
+) -> PyResult<(Bound<'py, PyBytes>, usize)> {
+    let made = py.detach(|| printed::to_binary(text, budget)).map_err(from_logs)?;
+    Ok((PyBytes::new(py, &made.bytes), made.bad_lines))
 }
 
 fn index(py: Python<'_>, bytes: FileBytes) -> PyResult<DataflashFile> {

@@ -21,11 +21,9 @@ from flightid.errors import LogFormatError
 from flightid.findings import Finding, counted
 from flightid.logs.source import ByteRange, Event, Gap
 from flightid.logs.table_source import Array, MessageRows, TableSource
-from flightid.reading import bounded_bytes
+from flightid.reading import bounded_bytes, memory_budget, within_memory
 
 PRODUCT = b"H Product:Blackbox flight data recorder"
-LARGEST = 1 << 30
-"""Bytes of a file that are read: decoded frames are held in memory."""
 GAP_FRAMES = 20.0
 """Median steps without a frame that count as a gap."""
 LOOP = "main"
@@ -51,16 +49,19 @@ def open_blackbox(path: Path) -> TableSource:
     Raises
     ------
     LogFormatError
-        The header does not say what frames hold, or the file is larger than is read.
+        The header does not say what frames hold, or the file is larger than the memory budget.
+    FileFormatError
+        Its frames take more than that.
     OSError
         The file cannot be read.
     """
-    data = bounded_bytes(path, LARGEST, LogFormatError)
+    data = bounded_bytes(path, memory_budget(), LogFormatError)
     data = data[max(data.find(PRODUCT), 0) :]
     flights = _native.blackbox_flights(data)
     sizes = [stop - start for start, stop in flights]
     taken = int(np.argmax(sizes)) if sizes else 0
-    native = _native.Blackbox(data, taken)
+    with within_memory(path.name):
+        native = _native.Blackbox(data, taken, memory_budget())
     header = dict(native.headers())
     scales, untold = _scales(header)
     tables = dict(_tables(native, scales, untold))

@@ -7,10 +7,7 @@ from pathlib import Path
 from flightid import _native
 from flightid.errors import LogFormatError
 from flightid.logs.dataflash.reader import DataflashSource
-from flightid.reading import bounded_bytes
-
-LARGEST = 1 << 29
-"""Bytes of a file that are read."""
+from flightid.reading import bounded_bytes, memory_budget, within_memory
 
 
 def open_printed(path: Path) -> DataflashSource:
@@ -21,10 +18,13 @@ def open_printed(path: Path) -> DataflashSource:
     Raises
     ------
     LogFormatError
-        The file holds no message, or is larger than is read.
+        The file holds no message, or is larger than the memory budget.
+    FileFormatError
+        What it holds takes more than that.
     OSError
         The file cannot be read.
     """
-    text = bounded_bytes(path, LARGEST, LogFormatError)
-    made, bad_lines = _native.dataflash_of_text(text)
+    text = bounded_bytes(path, memory_budget(), LogFormatError)
+    with within_memory(path.name):
+        made, bad_lines = _native.dataflash_of_text(text, memory_budget())
     return DataflashSource(_native.index_dataflash(made), bad_lines)

@@ -22,10 +22,8 @@ from flightid.logs.dataflash.events import mode_text
 from flightid.logs.mavlink.messages import TelemetryMessage, telemetry_messages
 from flightid.logs.source import Event, changes_among
 from flightid.logs.table_source import Array, MessageRows, TableSource
-from flightid.reading import bounded_bytes
+from flightid.reading import bounded_bytes, memory_budget, within_memory
 
-LARGEST = 1 << 30
-"""Bytes of a file that are read."""
 ARDUPILOT = 3
 AUTOPILOTS = {ARDUPILOT: "ArduPilot", 12: "PX4"}
 VEHICLES = {1: "plane", 2: "copter", 3: "copter", 4: "copter", 10: "rover", 13: "copter",
@@ -49,14 +47,17 @@ def open_telemetry(path: Path) -> TableSource:
     Raises
     ------
     LogFormatError
-        No autopilot is heard in it, or the file is larger than is read.
+        No autopilot is heard in it, or the file is larger than the memory budget.
+    FileFormatError
+        Its frames take more than that.
     OSError
         The file cannot be read.
     """
     known = telemetry_messages()
-    data = bounded_bytes(path, LARGEST, LogFormatError)
+    data = bounded_bytes(path, memory_budget(), LogFormatError)
     asked = {number: (m.layout.itemsize, m.seed) for number, m in known.items()}
-    frames, lost = _native.telemetry_frames(data, asked)
+    with within_memory(path.name):
+        frames, lost = _native.telemetry_frames(data, asked, memory_budget())
     sender = _autopilot(frames, known[0])
     heard: dict[str, tuple[Array, Table]] = {}
     for (number, system, component), arrived_s, payloads in frames:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from flightid import _native
 from flightid.errors import FileFormatError
-from flightid.reading import memory_budget, require_memory
+from flightid.reading import memory_budget, within_memory
 from flightid.record.formats.columns import (
     ColumnTable,
     is_unit,
@@ -86,12 +86,10 @@ def _columns(
     path: Path, skipped: int, n_columns: int, delimiter: str, encoding: str
 ) -> list[NDArray[Any]]:
     try:
-        read = _native.read_delimited(
-            str(path), skipped, n_columns, delimiter, encoding == "utf-16", memory_budget()
-        )
-    except MemoryError as fault:
-        require_memory(path.name, fault.args[0])
-        raise
+        with within_memory(path.name):
+            read = _native.read_delimited(
+                str(path), skipped, n_columns, delimiter, encoding == "utf-16", memory_budget()
+            )
     except ValueError as fault:
         raise FileFormatError(
             f"{path.name} is not a table of numbers under its headings",
