@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 import flightid as fid
+from flightid.identification.frequency_domain.bias_findings import judge_windows
 from tests.strangers.response_bands import oscillator_record
 from tests.strangers.responses import oscillator
 
@@ -27,3 +28,12 @@ def test_windows_come_from_the_damping_that_a_fit_finds(
     about = [limit for limit in limits if limit.startswith("The mode at 2")]
     assert len(about) == bool(said)
     assert all(said in limit for limit in about)
+
+
+def test_a_delay_below_zero_ends_no_fit() -> None:
+    response = fid.estimate_response(oscillator_record(0, zeta=0.05, duration_s=20.0, colour=0.0))
+    path = fid.TransferFunction("y", "u", "K", denominator=("s^2 + 0.2*s + 4",), delay="tau")
+    known = fid.Parameters([fid.Parameter("K", 8.0, "1/s^2"), fid.Parameter("tau", 0.01, "s")])
+    model = fid.TransferFunctionModel((path,), known)
+    assert judge_windows(model, response)
+    assert judge_windows(model.with_values({"tau": -0.01}), response) == []

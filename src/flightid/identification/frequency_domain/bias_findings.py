@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.conventions import Light
+from flightid.errors import ModelError, SingularError
 from flightid.evidence.gather import WINDOWS_SHORT
 from flightid.findings import Finding
 from flightid.identification.frequency_domain.error_model import ErrorModel
@@ -153,7 +154,12 @@ def judge_windows(model: GreyBoxModel, data: FrequencyResponse) -> list[Finding]
     """
     if data.linear is None or not data.window_s:
         return []
-    poles = model.linear_system().poles()
+    try:
+        poles = model.linear_system().poles()
+    except (ModelError, SingularError):
+        # A fit may end at a delay below zero, or where equations do not give every derivative: that
+        # is said elsewhere, and there is no mode to speak of here.
+        return []
     seen = (poles.imag > 0.0) & (poles.real < 0.0) & (np.abs(poles) < data.omega_rad_s[-1])
     if not seen.any():
         return []
