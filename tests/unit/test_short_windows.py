@@ -32,8 +32,9 @@ def test_windows_come_from_the_damping_that_a_fit_finds(
 
 def test_a_delay_below_zero_ends_no_fit() -> None:
     response = fid.estimate_response(oscillator_record(0, zeta=0.05, duration_s=20.0, colour=0.0))
-    path = fid.TransferFunction("y", "u", "K", denominator=("s^2 + 0.2*s + 4",), delay="tau")
-    known = fid.Parameters([fid.Parameter("K", 8.0, "1/s^2"), fid.Parameter("tau", 0.01, "s")])
+    path = fid.TransferFunction("y", "u", "K", denominator=("s^2 + d*s + w2",), delay="tau")
+    units = {"K": (8.0, "1/s^2"), "d": (0.2, "1/s"), "w2": (4.0, "1/s^2"), "tau": (0.01, "s")}
+    known = fid.Parameters([fid.Parameter(name, *each) for name, each in units.items()])
     model = fid.TransferFunctionModel((path,), known)
     assert judge_windows(model, response)
     assert judge_windows(model.with_values({"tau": -0.01}), response) == []
