@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from flightid.models import Model
     from flightid.options import Options
 
-ON_RESPONSES, JOINT = "frequency_domain", "joint"
+USUAL, JOINT = "frequency_domain", "joint"
 
 
 def methods() -> dict[str, type[Options]]:
@@ -25,6 +25,12 @@ def methods() -> dict[str, type[Options]]:
     from flightid.models import StateSpaceModel
 
     return {way.name: way.options for way in METHODS if StateSpaceModel in way.kinds}
+
+
+def _on_responses(method: str) -> bool:
+    from flightid.identification.methods import takes_responses
+
+    return takes_responses(method)
 
 
 def equations() -> dict[str, type[Options]]:
@@ -66,7 +72,7 @@ def fits_of(
     from flightid import identify
     from flightid.models import load_structure
 
-    way, loop = method or ON_RESPONSES, options.pop("loop", None)
+    way, loop = method or USUAL, options.pop("loop", None)
     of_response, of_method, *of_files = _divided(way, options)
     models = {name: load_structure(name, axis=axis) for name in names}
     _require_same_channels(models)
@@ -100,7 +106,7 @@ def _data(
     channels: dict[str, Any] = {"inputs": model.inputs, "outputs": model.outputs}
     injected = of_response.get("excitations")
     read = read_files(files, *of_files, **channels, units=model.units, excitations=injected)
-    if way not in (ON_RESPONSES, JOINT):
+    if not _on_responses(way):
         return read
     return estimate_response(read, **channels, **of_response, loop=loop)
 
@@ -129,7 +135,7 @@ def _divided(method: str, options: dict[str, Any]) -> list[dict[str, Any]]:
     if method not in known:
         raise click.BadParameter(f"{method!r} is none of {', '.join(known)}", param_hint="--method")
     fitted = known[method]
-    if method not in (ON_RESPONSES, JOINT):
+    if not _on_responses(method):
         return [{}, *parted(options, {method: fitted, **reading()})]
     given = {name: value for name, value in options.items() if value not in (None, ())}
     of_response, of_fit, *of_files = parted(

@@ -104,6 +104,11 @@ METHODS: list[Method] = [
 """The first method of a kind of model and a kind of data is its default."""
 
 
+def takes_responses(name: str) -> bool:
+    """Whether a method of that name fits responses, alone or with records."""
+    return any(way.data != RECORDS for way in METHODS if way.name == name)
+
+
 def flat(data: object) -> list[object]:
     """The items of data, those of sequences in it among them."""
     if not (isinstance(data, list | tuple) and data):

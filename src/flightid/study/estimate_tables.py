@@ -26,13 +26,8 @@ WORDS = {
     "periodic": "estimate at harmonics",
     "instrument": "instrument estimate",
     "prewhitened": "estimate with a noise model",
-    "output_error": "output error on the records",
-    "equation_error": "equation error on the records",
-    "fourier_regression": "regression on Fourier integrals",
-    "fourier_output_error": "output error at the harmonics",
-    "filter_error": "filter error on the records",
 }
-"""Estimators and methods in words, as legends and tables name them."""
+"""Estimators in words, as legends and tables name them."""
 
 
 def estimates_table(item: ModelResults, truth: Truth | None) -> Table:
@@ -48,7 +43,7 @@ def estimates_table(item: ModelResults, truth: Truth | None) -> Table:
     (first, *_) = item.fits.values()
     known = {} if truth is None else truth.parameters(first.model)
     columns = [Column("parameter"), Column("unit")]
-    columns += [Column(WORDS[method]) for method in item.fits]
+    columns += [Column(WORDS[estimator]) for estimator in item.fits]
     columns += [Column("truth")] if known else []
     rows: list[tuple[Cell, ...]] = []
     for name, parameter in first.parameters.items():

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, cast
 
 from flightid.errors import StudyError
-from flightid.identification.methods import METHODS, RECORDS
+from flightid.identification.methods import METHODS, takes_responses
 from flightid.identification.prediction.request import FREE_RUN
 from flightid.models import StateSpaceModel
 from flightid.option_forms import WHOLE, Form
@@ -37,7 +37,17 @@ class FitSettings:
     @property
     def on_responses(self) -> bool:
         """Whether the method takes frequency responses, alone or with records."""
-        return all(way.data != RECORDS for way in METHODS if way.name == self.method)
+        return takes_responses(self.method)
+
+    def asked(self, usual: Mapping[str, Any]) -> dict[str, Any]:
+        """What `flightid.identify` is given: `usual` where the method has such an option."""
+        known = [each.name for each in options_of(_options_by(self.method))]
+        kept = {name: value for name, value in usual.items() if name in known}
+        return {"method": self.method, **kept, **self.options}
+
+
+def _options_by(method: str) -> type[Options]:
+    return next(way.options for way in METHODS if way.name == method)
 
 
 def _are_horizons(value: object) -> bool:
@@ -113,7 +123,7 @@ def read_fit(reader: TableReader, usual: FitSettings | None = None) -> FitSettin
     """
     usual = usual or FitSettings()
     method = read_own(FitMethod, reader).method if "method" in reader else usual.method
-    kind = next(way.options for way in METHODS if way.name == method)
+    kind = _options_by(method)
     known = [each.name for each in options_of(kind)]
     kept = {key: value for key, value in usual.options.items() if key in known}
     given = reader.options(kind)

@@ -148,13 +148,13 @@ def fit_equations(
         Bands of the responses, where coherence chose them.
     reducing : ReduceSettings or None
     """
-    options: dict[str, Any] = {"method": settings.method, **settings.options}
-    if settings.on_responses:
-        options.setdefault("minimum_coherence", minimum_coherence)
-        if coherent is not None:
-            fitted = set(model.response_names)
-            bands = {name: band for name, band in coherent.bands.items() if name in fitted}
-            options.setdefault("band_rad_s", bands)
+    usual: dict[str, Any] = {"minimum_coherence": minimum_coherence}
+    if coherent is not None:
+        fitted = set(model.response_names)
+        usual["band_rad_s"] = {
+            name: band for name, band in coherent.bands.items() if name in fitted
+        }
+    options = settings.asked(usual if settings.on_responses else {})
     (counts, data), *others = [(name, _data(source)) for name, source in sources.items()]
     reduction = None
     if reducing is None:
