@@ -24,7 +24,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 import flightid as fid
-from benchmarks import output_error, responses, state_space_fit, subspace
+from benchmarks import output_error, polynomial, responses, state_space_fit, subspace
 from flightid.table import Column, Table
 
 HISTORY = Path(__file__).with_name("history.json")
@@ -84,6 +84,17 @@ def _orders(n_samples: int) -> Work:
     return lambda: fid.identify(structure, record)
 
 
+def _pulses() -> Work:
+    record = subspace.flown(1, 10_000)
+    return lambda: fid.impulse_response(record)
+
+
+def _box_jenkins() -> Work:
+    record = polynomial.flown(0, 4000)
+    structure = fid.PolynomialModel.bj("u", "y", nb=3, nc=2, nd=2, nf=3, nk=0)
+    return lambda: fid.identify(structure, record)
+
+
 def _responses() -> Work:
     """4 x 9 responses of 12 records, 5 windows, 200 frequencies: records nobody has looked at."""
     records = responses.flights(responses.make_samples())
@@ -133,7 +144,11 @@ LINES: dict[str, Callable[[], Work]] = {
     "equation error, 130 s": lambda: _linear(13_000, method="equation_error"),
     "filter error, 130 s": lambda: _linear(13_000, method="filter_error"),
     "filter error, nonlinear, 4 × 30 s": _pitch,
+    "output error, 60 s, starts and biases": lambda: _linear(6000),
+    "subspace with order search, 10⁴": lambda: _orders(10_000),
     "subspace with order search, 10⁵": lambda: _orders(100_000),
+    "pulse response, 10⁴": _pulses,
+    "Box–Jenkins, 4000 samples": _box_jenkins,
 }
 
 

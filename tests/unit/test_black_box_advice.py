@@ -38,6 +38,16 @@ def test_products_of_lags_give_the_triangle_s_regression(levels):
     assert equal.dependent is not None
 
 
+@pytest.mark.parametrize("levels", [True, False])
+def test_an_autoregression_by_products_is_that_of_the_triangle(levels):
+    output, none = np.random.default_rng(0).standard_normal(2000), np.empty((0, 2000))
+    given = lfilter([1.0], [1.0, -0.9], output) + 3.0, none, [1200, 800], 20, [], []
+    found, known = regress(*given, levels=levels), regress(*given, 20, levels=levels)
+    assert found.n_rows == known.n_rows
+    assert_close(found.theta, known.theta, why="the same normal equations", rtol=1e-9)
+    assert_close(found.sum_of_squares, known.sum_of_squares, why="the last pivot", rtol=1e-12)
+
+
 def test_a_regression_without_finite_numbers_is_a_typed_error():
     ran_away = LinearRegression(np.zeros(2), np.full((3, 3), np.nan), 10, None)
     with pytest.raises(FitError, match="a regression ran away"):

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from flightid import _native
@@ -16,8 +15,8 @@ from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.models.sampled.channels import SampledChannels
 
 Array = NDArray[np.float64]
-MANY = 80
-"""Regressors from which their products are much quicker than their triangle."""
+WORTH = 4e5
+"""Rows times squared regressors from which their products are quicker than their triangle."""
 FEWEST_DIGITS = 1e-4
 """Least pivot of the products, of unit diagonal: half of the digits are left there."""
 SMALLEST = 1e-10
@@ -83,6 +82,8 @@ def regress(
 
     Rows whose lags reach before a record are left out by default.
     """
+    if na and not nb and skip is None:
+        return _autoregression(output, lengths, na, levels=levels)
     spans = [n + k - 1 for n, k in zip(nb, nk, strict=True) if n]
     orders = (na, list(nb), 0, 0, [0] * len(nb), list(nk))
     first = max([na, *spans]) if skip is None else skip
@@ -118,27 +119,40 @@ def regress_lags(
     lose too many digits, by their triangle.
     """
     count = len(inputs)
-    if n * count < MANY:
+    if (n * count) ** 2 * output.size < WORTH or min(lengths) <= n + skip:
         return regress(output, inputs, lengths, 0, [n] * count, [0] * count, skip, levels=levels)
     products = np.zeros((n * count + 1, n * count + 1))
     start, rows = 0, 0
-    for length in lengths:
-        span = slice(start, start + length)
-        products += _products(output[span], inputs[:, span], n, skip)
-        if levels:
-            sums = _sums(output[span], inputs[:, span], n, skip)
-            products -= np.outer(sums, sums) / (length - skip)
-        start, rows = start + length, rows + length - skip - levels
-    scale = np.sqrt(np.diag(products))
-    try:
-        lower = np.linalg.cholesky(products / np.outer(scale, scale))
-    except np.linalg.LinAlgError:
-        lower = np.zeros((1, 1))
+    # What runs away goes by its triangle.
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        for length in lengths:
+            span = slice(start, start + length)
+            products += _products(output[span], inputs[:, span], n, skip)
+            if levels:
+                sums = _sums(output[span], inputs[:, span], n, skip)
+                products -= np.outer(sums, sums) / (length - skip)
+            start, rows = start + length, rows + length - skip - levels
+        scale = np.sqrt(np.diag(products))
+        try:
+            lower = np.linalg.cholesky(products / np.outer(scale, scale))
+        except np.linalg.LinAlgError:
+            lower = np.zeros((1, 1))
     if not np.diag(lower).min() > FEWEST_DIGITS:
         return regress(output, inputs, lengths, 0, [n] * count, [0] * count, skip, levels=levels)
     triangle = (scale[:, None] * lower).T
     theta = -scipy.linalg.solve_triangular(triangle[:-1, :-1], triangle[:-1, -1])
     return LinearRegression(np.asarray(theta), triangle, rows, None)
+
+
+def _autoregression(
+    output: Array, lengths: Sequence[int], na: int, *, levels: bool
+) -> LinearRegression:
+    """`regress` of outputs on themselves: on what they were a sample before, as on an input."""
+    ends = np.cumsum(lengths)
+    late = np.delete(output, ends - np.asarray(lengths))
+    early = -np.delete(output, ends - 1)[None]
+    before = [length - 1 for length in lengths]
+    return regress_lags(late, early, before, na, na - 1, levels=levels)
 
 
 def _products(output: Array, inputs: Array, n: int, skip: int) -> Array:
@@ -149,12 +163,11 @@ def _products(output: Array, inputs: Array, n: int, skip: int) -> Array:
     found[-1, -1] = y @ y
     for i, left in enumerate(inputs):
         mine = slice(i * n, (i + 1) * n)
-        lagged = sliding_window_view(left, last - skip)[skip - n + 1 : skip + 1][::-1]
-        found[mine, -1] = found[-1, mine] = -(lagged @ y)
+        found[mine, -1] = found[-1, mine] = -_with_lags(left, y, n, skip)
         for j, right in enumerate(inputs[: i + 1]):
-            other = sliding_window_view(right, last - skip)[skip - n + 1 : skip + 1][::-1]
             block = np.zeros((n, n))
-            block[0], block[:, 0] = other @ left[skip:], lagged @ right[skip:]
+            block[:, 0] = _with_lags(left, right[skip:], n, skip)
+            block[0] = block[:, 0] if i == j else _with_lags(right, left[skip:], n, skip)
             # A lag later: one row more at the beginning, one less at the end.
             early = np.outer(left[skip - n + 1 : skip][::-1], right[skip - n + 1 : skip][::-1])
             late = np.outer(left[last - n + 1 :][::-1], right[last - n + 1 :][::-1])
@@ -164,6 +177,11 @@ def _products(output: Array, inputs: Array, n: int, skip: int) -> Array:
             found[mine, j * n : (j + 1) * n] = block
             found[j * n : (j + 1) * n, mine] = block.T
     return found
+
+
+def _with_lags(lagged: Array, row: Array, n: int, skip: int) -> Array:
+    """Products of a row from sample `skip` with a channel so many samples before."""
+    return np.correlate(lagged[skip - n + 1 :], row, "valid")[::-1]
 
 
 def _sums(output: Array, inputs: Array, n: int, skip: int) -> Array:
