@@ -11,8 +11,11 @@ from click.testing import CliRunner
 import flightid as fid
 from flightid.cli.flight import command
 from flightid.cli.program import program
+from flightid.control.autopilots import NotchTracking
 from flightid.logs.dataflash.layout import MessageLayout
 from flightid.logs.dataflash.writer import DataflashWriter
+from flightid.review.gyro_noise import GyroNoise
+from flightid.review.notch_proposal import _series
 from tests.closeness import assert_close
 
 PARAMETERS = {
@@ -79,10 +82,32 @@ def test_a_notch_by_throttle_is_proposed_where_motors_shake_the_gyro(tmp_path: P
     assert back["INS_HNTCH_ENABLE"] == 0.0
 
 
+@pytest.mark.parametrize(
+    ("heights", "first", "found"),
+    [
+        ({60.0: 50.0, 120.0: 90.0, 180.0: 20.0}, 60.0, (1, 2, 3)),
+        ({60.0: 50.0, 180.0: 90.0}, 60.0, (1, 3)),
+        ({60.0: 3.0, 120.0: 90.0}, 120.0, (1,)),  # less than four times its floor
+    ],
+)
+def test_the_lowest_harmonic_that_stands_out_counts_the_others(
+    heights: dict[float, float], first: float, found: tuple[int, ...]
+) -> None:
+    frequency = np.arange(1.0, 500.0)
+    power = np.ones(frequency.size)
+    for hz, height in heights.items():
+        power[frequency == hz] = height
+    noise = GyroNoise(frequency_hz=frequency, spectrum=np.stack([power] * 3))
+    assert _series(noise, NotchTracking()) == (first, found)
+
+
 def test_telemetry_of_the_motors_leads_the_notch_where_it_is_logged(tmp_path: Path) -> None:
     path = tmp_path / "shaken.bin"
     _write(path, tone=0.6, white=0.002, esc=True)
-    choice = fid.review_flight(path).filters.choice
+    review = fid.review_flight(path)
+    sources = {peak.source for peak in review.noise.peaks}
+    assert sources == {"two blades: ESCs say 89.5 to 109 turns a second"}
+    choice = review.filters.choice
     assert choice is not None
     assert (choice.values["INS_HNTCH_MODE"], choice.values["INS_HNTCH_REF"]) == (3.0, 1.0)
 

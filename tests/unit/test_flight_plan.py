@@ -231,6 +231,11 @@ def test_what_the_stick_moves_is_no_gust() -> None:
         float(np.mean(found[1])), 2.0 * 0.1**2 / 100.0, rtol=0.06,
         why="white: 2 σ² dt; nine windows of 500 lines, 2 %",
     )  # fmt: skip
+    silent = still_rate(
+        [fid.Record.from_arrays(time_s, inputs={"u": stick}, outputs={"p": 0.0 * time_s})]
+    )
+    assert silent is not None
+    assert set(silent[1]) == {1e-12}  # its logarithm stays finite
 
 
 def test_command_writes_card_and_settings(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +13,8 @@ from numpy.typing import NDArray
 import flightid as fid
 from flightid.control.autopilots.axis_loop import AxisLoop
 from flightid.errors import DataError
-from flightid.planning.axis_guess import _fitted, _measured, _typical
+from flightid.logs.dataflash.writer import DataflashWriter
+from flightid.planning.axis_guess import _fitted, _measured, _pieces, _typical
 from tests.closeness import assert_close
 
 STEP_S, GAIN, DAMPING, LAG_S, DELAY = 1.0 / 400.0, 18.0, 0.5, 0.04, 2
@@ -136,3 +138,11 @@ def test_an_axis_that_flew_far_below_its_crossover_is_not_measured() -> None:
         "ATC_RAT_YAW_P", "ATC_RAT_YAW_I")})  # fmt: skip
     with pytest.raises(DataError, match="far from its crossover"):
         _measured("yaw", [flown(1.0)], _typical(loop, "multirotor"), faint)
+
+
+def test_a_log_of_no_command_has_no_pieces(tmp_path: Path) -> None:
+    stamps = (1e7 + 1e4 * np.arange(3000)).astype(np.int64)
+    writer = DataflashWriter()
+    writer.message(int(stamps[0]), "ArduCopter V4.6.0 (test)")
+    writer.add("IMU", stamps, {"GyrX": np.sin(1e-6 * stamps)})
+    assert _pieces(fid.read_log(writer.write(tmp_path / "gyro.bin")), "roll", ((10.0, 39.0),)) == []

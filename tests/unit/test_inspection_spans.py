@@ -96,7 +96,18 @@ def test_a_pause_between_arms_is_no_slow_card(tmp_path: Path) -> None:
     assert (said.code, said.light) == ("pauses", Light.GREEN)
     flown = FlightPhases(((11.0, 58.0),), True, None, "test")
     (said,) = gap_findings(log, rate, flown)
-    assert (said.code, said.message[:27]) == ("gaps", "RATE has 1 gap in flight, t")
+    assert (said.code, said.message[:45]) == (
+        "gaps",
+        "RATE has 1 gap in flight, the longest 20 s (m",
+    )
+    unarmed = written(tmp_path, stamps)
+    for near, code in (
+        ((24.99, 45.0), "gaps"),
+        ((23.9, 45.0), "pauses"),
+        ((24.99, 46.1), "pauses"),
+    ):
+        spans = FlightPhases(((11.0, near[0]), (near[1], 58.0)), True, None, "test")
+        assert [said.code for said in gap_findings(unarmed, rate, spans)] == [code]
 
 
 def test_the_gyroscope_of_a_driver_is_read(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from flightid.conventions import Light
 from flightid.evidence import inspection_check
 from flightid.findings import Finding
 from flightid.inspection import advice
-from flightid.inspection.excitation_found import _plain
+from flightid.inspection.excitation_found import _plain, _steps, _sweep
 from flightid.inspection.flight_phases import FlightPhases
 from flightid.inspection.gap_findings import _remedy
 from flightid.inspection.inspection import Inspection
@@ -23,6 +23,7 @@ from flightid.inspection.signals import Signal
 from flightid.inspection.skew import StreamSkew, _skew
 from flightid.inspection.usable_band import _without_scraps
 from flightid.logs.source import Event, Gap
+from tests.closeness import assert_close
 
 
 def log(**fields: object) -> Any:
@@ -139,3 +140,28 @@ def test_evidence_of_an_axis_is_not_that_of_another() -> None:
     assert inspection_check(seen, ("tau_theta", "q")).light is Light.GREEN
     assert inspection_check(seen, ("tau_phi", "p")).what == "roll: too narrow"
     assert inspection_check(seen, ("u", "y")).light is Light.AMBER
+
+
+@pytest.mark.parametrize(
+    ("first", "last", "found"), [(0.5, 5.0, True), (5.0, 0.5, True), (1.0, 2.5, False)]
+)
+def test_a_sweep_of_a_set_point_grows_or_shrinks_threefold(
+    first: float, last: float, *, found: bool
+) -> None:
+    stamps = np.arange(0.0, 20.0, 0.01)
+    swept = np.sin(2.0 * np.pi * (first * stamps + (last - first) * stamps**2 / 40.0))
+    ends = _sweep(stamps, swept)
+    assert (ends is not None) is found
+    if ends is not None:
+        # The middle one of the 13 half periods at either end, 3.5 cycles from it.
+        slope = (last**2 - first**2) / (2.75 * 20.0)
+        middle = np.sqrt([first**2 + 3.5 * slope, last**2 - 3.5 * slope])
+        assert_close(np.array(ends), middle, rtol=0.05, why="stamps of 0.01 s")
+
+
+def test_steps_of_a_set_point_are_counted_where_a_level_is_held() -> None:
+    stamps = np.arange(0.0, 12.0, 0.02)
+    stairs = np.floor(stamps / 3.0) % 2
+    assert _steps(stamps, stairs) == 3
+    assert _steps(stamps, np.sin(stamps)) == 0
+    assert _steps(stamps[:39], stairs[:39]) == 0

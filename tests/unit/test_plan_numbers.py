@@ -43,6 +43,8 @@ def test_the_band_is_an_eighth_of_the_crossover_to_two_and_a_half_times_the_turn
     assert_close(high, 2.5 * turned, rtol=0.05, why="two digits of Hz, and a grid of 1 %")
     assert_close(low, crossover / 8.0, rtol=0.05, why="the same")
     assert _band(BARE, by_stick=True)[1] <= 2.0 * math.tau
+    slow = replace(BARE, loop=fid.axis_loop("arducopter", "roll", loop_rate_hz=50.0))
+    assert_close(_band(slow, by_stick=False)[1], 2.0 * math.tau, rtol=1e-9, why="25 in a cycle")
 
 
 def test_an_amplitude_is_as_large_as_coherence_asks_for_between_half_and_all() -> None:

@@ -10,6 +10,7 @@ import pytest
 import flightid as fid
 from flightid.conditioning import remove_outliers
 from flightid.conventions import Light
+from flightid.evidence.data_checks import sample_checks
 from flightid.record import Record
 from flightid.record.checks import data_findings, record_findings
 
@@ -111,3 +112,7 @@ def test_findings_reach_responses_and_the_evidence_of_fits() -> None:
     fit = fid.identify(fid.PolynomialModel.arx("u", "y", na=1, nb=1, nk=1), bad)
     (check,) = [check for check in fit.evidence.checks if check.name == "samples"]
     assert check.light is Light.RED
+    worse = Record.from_arrays(TIME_S, inputs={"u": NOISE[2]}, outputs={"y": 2.0 * spiked()})
+    (one,), (two,) = sample_checks([good, bad], {"y"}), sample_checks([good, bad, worse], {"y"})
+    assert two.what == f"{one.what} (and 1 other finding on the samples)"
+    assert sample_checks([good], {"y"}) == []
