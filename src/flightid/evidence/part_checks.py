@@ -14,6 +14,7 @@ from flightid.uncertainty.foretold import MATERIAL_PERCENT
 
 ONE = "One record does not tell how far flights differ: what is known is of that flight alone"
 AGAIN = "repeat the manoeuvre in a second record or segment"
+ALL_AGAIN = "repeat what moves all inputs, and hand in each repetition as one record or segment"
 HALVES_ACTION = (
     "do not use one set of numbers: look for a vehicle, trim or wind that changed, for a faulty "
     "stretch, or for dynamics that the model lacks, and fit the parts by themselves"
@@ -54,10 +55,11 @@ def agreement_check(found: Agreement, values: NDArray[np.float64] | None = None)
 def _compared(found: Agreement, apart: float | None) -> Check:
     if not found.tested:
         # Longer alone does not help: a longer sweep passes each frequency once all the same.
-        what = "flown once: nothing shows whether a second flight would agree"
+        what, action = "flown once: nothing shows whether a second flight would agree", AGAIN
         if found.n_records > 1:
-            what = "records cannot be compared: no two hold the same frequencies and parameters"
-        return Check(AGREEMENT, Light.UNKNOWN, what, AGAIN)
+            what = "records are not compared: not each holds all inputs and frequencies by itself"
+            action = ALL_AGAIN
+        return Check(AGREEMENT, Light.UNKNOWN, what, action)
     several = found.n_records > 1
     widened = ""
     if found.factor > 1.0:
