@@ -6,8 +6,8 @@ from pathlib import Path
 
 import click
 
-from flightid.cli.output import emit_values, json_option, leave_by_verdict, level_option, note
-from flightid.cli.pages import html_option
+from flightid.cli.output import json_option, leave_by_verdict, level_option
+from flightid.cli.pages import html_option, show_review
 
 
 @click.command("autotune", short_help="A second opinion on an autotune: margins, why it failed.")
@@ -23,18 +23,10 @@ def command(log: Path, level: float | None, html: Path | None, as_json: bool) ->
     the autopilot's own filters: margins with intervals. Where it failed, it says why.
     """
     from flightid import review_autotune
+    from flightid.report.flight import autotune_document
     from flightid.uncertainty.quantiles import showing
 
     with showing(level):
         review = review_autotune(log)
-        if as_json:
-            emit_values(review.to_dict())
-        else:
-            click.echo(review.to_text())
-        if html is not None:
-            from flightid.files import write_atomically
-            from flightid.report.flight import autotune_document
-            from flightid.report.html import to_html
-
-            note(f"Wrote {write_atomically(html, to_html(autotune_document(review)))}")
+        show_review(review, autotune_document, as_json=as_json, html=html)
     leave_by_verdict(review.findings)

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from flightid.cli.output import emit_values, json_option, leave_by_verdict, level_option, note
-from flightid.cli.pages import html_option
+from flightid.cli.output import json_option, leave_by_verdict, level_option, note
+from flightid.cli.pages import html_option, show_review
 
 if TYPE_CHECKING:
     from flightid.review import FlightReview
@@ -44,20 +44,12 @@ def command(
     """
     from flightid import review_flight
     from flightid.progress import progress
+    from flightid.report.flight import flight_document
     from flightid.uncertainty.quantiles import showing
 
     with progress(None, f"reviewing {log.name}"), showing(level):
         review = review_flight(log)
-        if as_json:
-            emit_values(review.to_dict())
-        else:
-            click.echo(review.to_text())
-        if html is not None:
-            from flightid.files import write_atomically
-            from flightid.report.flight import flight_document
-            from flightid.report.html import to_html
-
-            note(f"Wrote {write_atomically(html, to_html(flight_document(review)))}")
+        show_review(review, flight_document, as_json=as_json, html=html)
         if target is not None:
             _write(review, target, overwrite)
     leave_by_verdict(review.findings)

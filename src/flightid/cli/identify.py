@@ -12,7 +12,7 @@ from flightid.cli.black_boxes import KINDS, black_boxes, structure_of
 from flightid.cli.equations import equations, fits_of
 from flightid.cli.option_fields import OptionsCommand
 from flightid.cli.output import all_option, emit, json_option, leave_by_verdict, level_option, note
-from flightid.cli.pages import html_option, write_page
+from flightid.cli.pages import html_option, model_file_option, write_page
 from flightid.cli.records import FILES, reading
 from flightid.cli.sources import AXES, known_models
 
@@ -51,12 +51,7 @@ def _fields() -> dict[str, type[Options]]:
 @click.option(
     "--reduce", "reduced", is_flag=True, help="Drop the parameters that the data do not determine."
 )
-@click.option(
-    "--write",
-    "written",
-    type=click.Path(dir_okay=False, path_type=Path),
-    help="Model file (.toml) to write: estimates with covariance and evidence.",
-)
+@model_file_option
 @level_option
 @html_option
 @all_option

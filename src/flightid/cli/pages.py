@@ -11,7 +11,9 @@ import click
 from flightid.cli.output import emit, emit_values, leave_by_verdict, note
 
 if TYPE_CHECKING:
+    from flightid.report.content import Document
     from flightid.result import Result
+    from flightid.review import AutotuneReview, FlightReview
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -22,6 +24,17 @@ def html_option(function: Function) -> Function:
         "--html",
         type=click.Path(dir_okay=False, path_type=Path),
         help="Write a page with numbers and pictures to this file.",
+    )
+    return decorate(function)
+
+
+def model_file_option(function: Function) -> Function:
+    """Add ``--write`` to a command that fits a model; its argument is ``written``."""
+    decorate = click.option(
+        "--write",
+        "written",
+        type=click.Path(dir_okay=False, path_type=Path),
+        help="Model file (.toml) to write: estimates with covariance and evidence.",
     )
     return decorate(function)
 
@@ -60,6 +73,25 @@ def show(
         with showing(level):
             note(f"Wrote {write_page(result, title, html, *beside)}")
     leave_by_verdict([finding for one in (result, *beside) for finding in one.findings])
+
+
+def show_review(
+    review: FlightReview | AutotuneReview,
+    document: Callable[[Any], Document],
+    *,
+    as_json: bool,
+    html: Path | None,
+) -> None:
+    """Print the review of a log, and write its page where one was asked for."""
+    if as_json:
+        emit_values(review.to_dict())
+    else:
+        click.echo(review.to_text())
+    if html is not None:
+        from flightid.files import write_atomically
+        from flightid.report.html import to_html
+
+        note(f"Wrote {write_atomically(html, to_html(document(review)))}")
 
 
 def write_page(result: Result, title: str, path: Path, *beside: Result) -> Path:

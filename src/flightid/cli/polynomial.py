@@ -10,7 +10,7 @@ import click
 from flightid.cli.black_boxes import channels_of, one_each, only
 from flightid.cli.option_fields import OptionsCommand, parted
 from flightid.cli.output import all_option, emit, json_option, leave_by_verdict, level_option, note
-from flightid.cli.pages import html_option, write_page
+from flightid.cli.pages import html_option, model_file_option, write_page
 from flightid.cli.records import FILES, read_files, reading
 
 if TYPE_CHECKING:
@@ -43,12 +43,7 @@ def _fields() -> dict[str, type[Options]]:
 @click.option(
     "--validation", type=FILES, multiple=True, help="File of records that the fit does not see."
 )
-@click.option(
-    "--write",
-    "written",
-    type=click.Path(dir_okay=False, path_type=Path),
-    help="Model file (.toml) to write: estimates with covariance and evidence.",
-)
+@model_file_option
 @level_option
 @html_option
 @all_option

@@ -10,18 +10,21 @@ import scipy
 from numpy.typing import NDArray
 
 from flightid.conventions import Light
-from flightid.errors import DataError, FitError, OptionError, SingularError
+from flightid.errors import DataError, FitError, SingularError
 from flightid.evidence import FeedbackTest, feedback_test
 from flightid.findings import Finding
 from flightid.identification.advice.delays import InputDelay, find_delays
-from flightid.identification.advice.impulse_response import ImpulseResponse, impulse_response
+from flightid.identification.advice.impulse_response import (
+    ImpulseResponse,
+    impulse_response,
+    named_channels,
+)
 from flightid.identification.prediction_error.sampling_rate import SAMPLING
 from flightid.identification.subspace.fit import fit_subspace
 from flightid.models import InnovationsModel
 from flightid.models.sampled.channels import SampledChannels, gather_channels
 from flightid.record import Record
 from flightid.record.hold import Loop
-from flightid.record.several import as_records
 from flightid.result import Result
 from flightid.table import Column, Table
 
@@ -143,15 +146,7 @@ def advise(
     >>> advise(record).findings[0].code
     'poor-excitation'
     """
-    listed = list(as_records(records))
-    if not listed:
-        raise DataError("there is no record", needed="one or more")
-    if outputs is None and len(listed[0].outputs) != 1:
-        raise OptionError(
-            "the output is not said", found=", ".join(listed[0].outputs), needed="output='…'"
-        )
-    name = listed[0].outputs[0] if outputs is None else outputs
-    names = tuple(listed[0].inputs if inputs is None else inputs)
+    listed, names, name = named_channels(records, inputs, outputs)
     data = gather_channels(listed, name, names, "mean")
     data.require_change()
     orders = {

@@ -162,6 +162,21 @@ class ImpulseResponse(
         return f"ImpulseResponse({self.output!r}, {self.lags.size} lags, {found})"
 
 
+def named_channels(
+    records: Record | Sequence[Record], inputs: Sequence[str] | None, outputs: str | None
+) -> tuple[list[Record], tuple[str, ...], str]:
+    """Records as a list, with the inputs and the one output that were named or have these roles."""
+    listed = list(as_records(records))
+    if not listed:
+        raise DataError("there is no record", needed="one or more")
+    if outputs is None and len(listed[0].outputs) != 1:
+        raise OptionError(
+            "the output is not said", found=", ".join(listed[0].outputs), needed="output='…'"
+        )
+    name = listed[0].outputs[0] if outputs is None else outputs
+    return listed, tuple(listed[0].inputs if inputs is None else inputs), name
+
+
 def impulse_response(
     records: Record | Sequence[Record],
     *,
@@ -218,15 +233,7 @@ def impulse_response(
     >>> impulse_response(record).delays
     {'u': 3}
     """
-    listed = list(as_records(records))
-    if not listed:
-        raise DataError("there is no record", needed="one or more")
-    if outputs is None and len(listed[0].outputs) != 1:
-        raise OptionError(
-            "the output is not said", found=", ".join(listed[0].outputs), needed="output='…'"
-        )
-    name = listed[0].outputs[0] if outputs is None else outputs
-    names = tuple(listed[0].inputs if inputs is None else inputs)
+    listed, names, name = named_channels(records, inputs, outputs)
     _require(names, n_lags, negative_lags, kernel)
     whole = gather_channels(listed, name, names, offsets)
     whole.require_change()

@@ -29,6 +29,7 @@ from flightid.identification.regression.fit import (
     Knowledge,
     assemble,
     check_records,
+    known_by_spectra,
     limits_of,
     require_seen,
 )
@@ -50,7 +51,6 @@ from flightid.identification.regression.sampled_equations import (
     StateMeasurements,
 )
 from flightid.identification.regression.weights import (
-    compared_covariance,
     level_weights,
     spectral_weights,
 )
@@ -118,20 +118,8 @@ def fit_fourier_regression(
     count = len(problem.motions)
     settled = settle(problem, start, lambda rows: spectral_weights(rows, omegas), limits, count)
     inner = Inner.of(model, settled.end.x)
-    kept = [replace(rows, slopes=rows.slopes[:, :, inner.mask]) for rows in settled.rows]
-    jacobian = stack(
-        [each.slopes * w[:, :, None] for each, w in zip(kept, settled.weights, strict=True)]
-    )
     action = f"{APART}; constants have no harmonic: method='equation_error', output_bias=False"
-    require_seen(inner, jacobian, action)
-    agreed = compared_covariance(kept, settled.weights, omegas)
-    known = Knowledge(
-        jacobian,
-        agreed.covariance,
-        agreed.freedom,
-        "spectra of residuals",
-        agreement=agreed.agreement,
-    )
+    known = known_by_spectra(inner, settled.rows, settled.weights, omegas, action)
     return _finish("Fourier regression", problem, data, options, settled, limits, inner, known)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,8 @@ from flightid.identification.frequency_domain.estimates import (
 from flightid.identification.multistart import DenseEnd, local_minima
 from flightid.identification.records.findings import judge_fit
 from flightid.identification.regression.options import RegressionOptions
-from flightid.identification.regression.rounds import SearchBounds
+from flightid.identification.regression.rounds import Rows, SearchBounds, stack
+from flightid.identification.regression.weights import compared_covariance
 from flightid.models import GreyBoxModel, StateSpaceModel
 from flightid.record import Record
 from flightid.record.several import as_records
@@ -165,6 +166,27 @@ def require_seen(inner: Inner, jacobian: Array, action: str = APART) -> None:
         Some combination of them leaves the residuals as they are.
     """
     require_identifiable(inner.names, jacobian, action)
+
+
+def known_by_spectra(
+    inner: Inner,
+    rows: Sequence[Rows],
+    weights: Sequence[Array],
+    omegas: Sequence[Array],
+    action: str = APART,
+) -> Knowledge:
+    """What harmonics with weights say of the parameters inside their bounds."""
+    kept = [replace(each, slopes=each.slopes[:, :, inner.mask]) for each in rows]
+    jacobian = stack([each.slopes * w[:, :, None] for each, w in zip(kept, weights, strict=True)])
+    require_seen(inner, jacobian, action)
+    agreed = compared_covariance(kept, weights, omegas)
+    return Knowledge(
+        jacobian,
+        agreed.covariance,
+        agreed.freedom,
+        "spectra of residuals",
+        agreement=agreed.agreement,
+    )
 
 
 def assemble(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,12 +13,11 @@ from flightid.identification.fitted_record import FittedRecord
 from flightid.identification.multistart import cluster, collect, draw_starts
 from flightid.identification.regression.fit import (
     Inner,
-    Knowledge,
     assemble,
     check_records,
+    known_by_spectra,
     limits_of,
     require_linear,
-    require_seen,
     require_states,
 )
 from flightid.identification.regression.fourier_output_error import (
@@ -27,8 +25,8 @@ from flightid.identification.regression.fourier_output_error import (
     TransformedRecord,
 )
 from flightid.identification.regression.options import FourierOutputErrorOptions
-from flightid.identification.regression.rounds import Rows, SettledRounds, settle, stack
-from flightid.identification.regression.weights import compared_covariance, spectral_weights
+from flightid.identification.regression.rounds import Rows, SettledRounds, settle
+from flightid.identification.regression.weights import spectral_weights
 from flightid.models import StateSpaceModel
 from flightid.record import Record, Step
 
@@ -57,19 +55,7 @@ def fit_fourier_output_error(
     groups = cluster(collect([each.end for each in settled]))
     best = next(each for each in settled if each.end is groups[0][0])
     inner = Inner.of(model, best.end.x)
-    kept = [replace(rows, slopes=rows.slopes[:, :, inner.mask]) for rows in best.rows]
-    jacobian = stack(
-        [each.slopes * w[:, :, None] for each, w in zip(kept, best.weights, strict=True)]
-    )
-    require_seen(inner, jacobian)
-    agreed = compared_covariance(kept, best.weights, omegas)
-    known = Knowledge(
-        jacobian,
-        agreed.covariance,
-        agreed.freedom,
-        "spectra of residuals",
-        agreement=agreed.agreement,
-    )
+    known = known_by_spectra(inner, best.rows, best.weights, omegas)
     return assemble(
         "Fourier output error",
         inner,

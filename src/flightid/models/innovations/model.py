@@ -12,10 +12,10 @@ from flightid.models.innovations.form import Array, InnovationsForm
 from flightid.models.innovations.prediction import forced_run
 from flightid.models.innovations.structure import SubspaceOptions, SubspaceStructure
 from flightid.models.sampled.channels import gather_channels, hold_diverged, require_same
-from flightid.models.sampled.discrete_modes import zero_note
+from flightid.models.sampled.discrete_modes import roots_table
 from flightid.record import Record
 from flightid.result import TableView
-from flightid.table import Cell, Column, Table
+from flightid.table import Table
 
 
 class InnovationsModel(InnovationsForm, TableView):
@@ -91,26 +91,8 @@ class InnovationsModel(InnovationsForm, TableView):
 
     def summary(self) -> Table:
         """Table of poles, and of the zeros of each response."""
-        columns = (
-            Column("response"),
-            Column("root"),
-            Column("z real", digits=5),
-            Column("z imaginary", digits=5),
-            Column("|z|", digits=5),
-            Column("natural frequency", "rad/s"),
-            Column("damping"),
-            Column("note"),
-        )
-        rows: list[tuple[Cell, ...]] = []
-        for mode in self.modes():
-            note = "; ".join(filter(None, (mode.reason, "unstable" if abs(mode.z) > 1.0 else "")))
-            shown = (mode.natural_frequency_rad_s, mode.damping, note)
-            rows.append(("all", "pole", mode.z.real, mode.z.imag, abs(mode.z), *shown))
-        for response, zeros in self.zeros().items():
-            for zero in zeros[zeros.imag >= 0]:
-                place = (float(zero.real), float(zero.imag), float(abs(zero)))
-                rows.append((response, "zero", *place, None, None, zero_note(zero)))
-        return Table(repr(self), columns, tuple(rows), ("one line for each conjugate pair",))
+        zeros = [(response, (), found) for response, found in self.zeros().items()]
+        return roots_table(repr(self), [("all", self.modes(), None), *zeros])
 
     def to_dict(self) -> dict[str, object]:
         """Plain values with a ``schema`` key, which `from_dict` and TOML files take back."""

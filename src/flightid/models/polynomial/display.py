@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.models.polynomial.polynomials import Polynomials
-from flightid.models.sampled.discrete_modes import discrete_modes, zero_note
-from flightid.table import Cell, Column, Table
+from flightid.models.sampled.discrete_modes import discrete_modes, roots_table
+from flightid.table import Table
 
 
 def difference_equation(model: Polynomials) -> str:
@@ -79,29 +79,9 @@ def _factors(roots: NDArray[np.complex128]) -> str:
     return " ".join(said)
 
 
-def roots_table(model: Polynomials) -> Table:
-    """Poles and zeros of each response with natural frequency, damping and what to know."""
-    columns = (
-        Column("response"),
-        Column("root"),
-        Column("z real", digits=5),
-        Column("z imaginary", digits=5),
-        Column("|z|", digits=5),
-        Column("natural frequency", "rad/s"),
-        Column("damping"),
-        Column("note"),
-    )
-    rows: list[tuple[Cell, ...]] = []
-    for (response, poles), zeros in zip(model.poles().items(), model.zeros().values(), strict=True):
-        for mode in discrete_modes(poles, model.sample_time_s):
-            unstable = "unstable" if abs(mode.z) > 1.0 else ""
-            note = "; ".join(filter(None, (mode.reason, unstable)))
-            shown = (mode.natural_frequency_rad_s, mode.damping, note)
-            rows.append((response, "pole", *_parts(mode.z), *shown))
-        rows.extend(
-            (response, "zero", *_parts(complex(zero)), None, None, zero_note(zero))
-            for zero in zeros[zeros.imag >= 0]
-        )
+def polynomial_table(model: Polynomials) -> Table:
+    """Poles and zeros of each response, with equation, steady gains and delays."""
+    found = zip(model.poles().items(), model.zeros().values(), strict=True)
     notes = (
         difference_equation(model),
         *(factored(model, name) for name in model.inputs),
@@ -111,10 +91,12 @@ def roots_table(model: Polynomials) -> Table:
             for name, gain in model.gains().items()
         ),
         f"delays: {', '.join(f'{k} samples' for k in model.nk)}",
-        "one line for each conjugate pair",
     )
-    return Table(repr(model), columns, tuple(rows), notes)
-
-
-def _parts(root: complex) -> tuple[float, float, float]:
-    return float(root.real), float(root.imag), abs(root)
+    return roots_table(
+        repr(model),
+        [
+            (response, discrete_modes(poles, model.sample_time_s), zeros)
+            for (response, poles), zeros in found
+        ],
+        notes,
+    )

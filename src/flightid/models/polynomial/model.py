@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Self
 
 from flightid.models.polynomial.description import model_from_table, model_to_table
-from flightid.models.polynomial.display import difference_equation, factored, roots_table
+from flightid.models.polynomial.display import difference_equation, factored, polynomial_table
 from flightid.models.polynomial.makers import StructureMakers
 from flightid.models.polynomial.polynomials import Array, Polynomials
 from flightid.models.polynomial.prediction import forced_run
@@ -81,7 +81,7 @@ class PolynomialModel(Polynomials, StructureMakers, TableView):
 
     def summary(self) -> Table:
         """Table of poles and zeros with natural frequencies and dampings."""
-        return roots_table(self)
+        return polynomial_table(self)
 
     def to_dict(self) -> dict[str, object]:
         """Plain values with a ``schema`` key, which `from_dict` and TOML files take back."""

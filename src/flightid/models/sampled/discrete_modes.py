@@ -10,6 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.table import Cell, Column, Table
+
 NO_COUNTERPART = "a negative real pole has no real continuous counterpart"
 AT_ORIGIN = "a pole at the origin is a delay"
 
@@ -124,6 +126,35 @@ def polynomial_roots(polynomial: Sequence[float] | NDArray[np.float64]) -> NDArr
     array([0.5])
     """
     return np.asarray(np.roots(np.trim_zeros(np.asarray(polynomial), "fb")), dtype=np.complex128)
+
+
+def roots_table(
+    title: str,
+    roots: Iterable[tuple[str, Iterable[DiscreteMode], NDArray[np.complex128] | None]],
+    notes: tuple[str, ...] = (),
+) -> Table:
+    """Poles and zeros by response, with natural frequency, damping and what to know of them."""
+    columns = (
+        Column("response"),
+        Column("root"),
+        Column("z real", digits=5),
+        Column("z imaginary", digits=5),
+        Column("|z|", digits=5),
+        Column("natural frequency", "rad/s"),
+        Column("damping"),
+        Column("note"),
+    )
+    rows: list[tuple[Cell, ...]] = []
+    for response, poles, zeros in roots:
+        for mode in poles:
+            note = "; ".join(filter(None, (mode.reason, "unstable" if abs(mode.z) > 1.0 else "")))
+            shown = (mode.natural_frequency_rad_s, mode.damping, note)
+            rows.append((response, "pole", mode.z.real, mode.z.imag, abs(mode.z), *shown))
+        rows.extend(
+            (response, "zero", z.real, z.imag, abs(z), None, None, zero_note(z))
+            for z in map(complex, () if zeros is None else zeros[zeros.imag >= 0])
+        )
+    return Table(title, columns, tuple(rows), (*notes, "one line for each conjugate pair"))
 
 
 def zero_note(zero: complex | np.complex128) -> str:
