@@ -15,6 +15,7 @@ from flightid.record import Record
 from flightid.responses import FrequencyResponse, estimate_response
 from flightid.responses.windows.defaults import (
     DEFAULT_FREQUENCIES,
+    DEFAULT_OVERLAP,
     longest_window,
     overlap_factor,
     shifts_of,
@@ -23,7 +24,8 @@ from flightid.uncertainty.residual_correlation import LEVEL
 from flightid.validation.spectra.result import Peak, ResidualSpectra, SpectrumComparison
 from flightid.validation.verification.result import Verification
 
-OVERLAP = 0.5
+OVERLAP = overlap_factor(shifts_of(DEFAULT_OVERLAP)) ** 2
+"""Variance with overlapped windows, over that of as many apart (`estimate_response`)."""
 PEAK_DB = 3.0
 """Least height of a peak above its surroundings, dB; more where the spectrum is less certain."""
 SHARE_ALLOWED = 0.10
@@ -93,7 +95,7 @@ def residual_spectra(
         records, inputs, outputs, window_s, omega_rad_s, band_rad_s=band_rad_s, n_omega=n_omega
     )
     density, low, high = _with_bounds(response)
-    n_effective = response.n_independent[:, :1, :] / overlap_factor(shifts_of(OVERLAP)) ** 2
+    n_effective = response.n_independent[:, :1, :] / OVERLAP
     free = np.maximum(n_effective - len(response.inputs), 1.0)
     limit = np.broadcast_to(1.0 - (1.0 - LEVEL) ** (1.0 / free), response.coherence.shape)
     return ResidualSpectra(
@@ -280,7 +282,6 @@ def _estimate(
         n_omega=n_omega,
         omega_rad_s=omega_rad_s,
         window_s=[length],
-        overlap=OVERLAP,
         covariance=False,
     )
 
@@ -290,7 +291,7 @@ def _with_bounds(
 ) -> tuple[NDArray[np.float64], ...]:
     """Auto-spectra with their intervals, each shape (n_out, n_f)."""
     density = np.asarray(response.output_spectrum, dtype=np.float64)
-    degrees = 2.0 * response.n_independent[:, 0, :] / overlap_factor(shifts_of(OVERLAP)) ** 2
+    degrees = 2.0 * response.n_independent[:, 0, :] / OVERLAP
     low = density * degrees / scipy.special.chdtri(degrees, 0.5 - 0.5 * level)
     high = density * degrees / scipy.special.chdtri(degrees, 0.5 + 0.5 * level)
     return density, low, high
