@@ -26,13 +26,17 @@ def rates(n_rows: int) -> np.ndarray:
     return np.sin(0.05 * np.arange(n_rows))
 
 
-def write_sdlog2(path: Path, n_rows: int = 600) -> Path:
-    """A copter's log at 200 Hz: attitude and inertial sensors each time, commands each second."""
+def write_sdlog2(path: Path, n_rows: int = 600, *, pause_s: float = 0.0) -> Path:
+    """A copter's log at 200 Hz: attitude and inertial sensors each time, commands each second.
+
+    Nothing is written in a pause half way.
+    """
     content = b"".join(_format(name) for name in FORMATS)
     content += _row("VER", b"PX4FMU_V2", b"0123456789abcdef")
     content += _row("PARM", b"MAV_TYPE", 2.0) + _row("PARM", b"MC_ROLLRATE_P", 0.15)
     for k, rate in enumerate(rates(n_rows)):
-        content += _row("TIME", 10_000_000 + k * STEP_US)
+        paused_us = round(1e6 * pause_s) if 2 * k >= n_rows else 0
+        content += _row("TIME", 10_000_000 + k * STEP_US + paused_us)
         content += _row("ATT", 0.1, 0.2, 0.3, rate, 2 * rate, -rate)
         content += _row("IMU", 0.0, 0.0, -9.81, rate, 2 * rate, -rate, 0.2, 0.0, 0.4)
         if k % 2 == 0:

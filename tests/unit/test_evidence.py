@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from flightid.evidence.evidence import ALWAYS, NAMES
 from flightid.evidence.parameter_checks import declared_signs
 from flightid.evidence.spans import Span, judge_coherence, judge_span, spans_of
 from flightid.findings import Finding, worst
+from tests.closeness import assert_close
 
 
 def _all_green() -> Evidence:
@@ -87,6 +89,15 @@ def test_coherence_counts_the_gaps_of_a_band_and_its_text_names_them() -> None:
     assert judge_coherence([span]).light == "amber"
     assert str(span) == "y 1.41 to 2 and 11.3 rad/s"
     assert "y 1.41 to 2 and 11.3 rad/s: too narrow" in judge_span([span]).what
+
+
+def test_a_broken_band_counts_the_decades_without_its_gaps() -> None:
+    parts = ((1.0, 2.0), (3.0, 4.0), (5.0, 6.0))
+    three = Span("y", (1.0, 100.0), 0.9, 0.5, parts)
+    assert str(three) == "y 1 to 2 and 3 to 4 and 5 to 6 rad/s"
+    assert_close(three.ratio, math.sqrt(10.0), rtol=1e-12, why="half a decade")
+    four = Span("y", (1.0, 100.0), 0.9, 0.5, (*parts, (7.0, 100.0)))
+    assert str(four) == "y 1 to 100 rad/s in 4 pieces, together 3.16 to 1"
 
 
 @pytest.mark.parametrize(("ratio", "light"), [(20.0, "green"), (4.0, "amber"), (2.0, "amber")])

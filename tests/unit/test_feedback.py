@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -12,9 +13,11 @@ from scipy import signal
 import flightid as fid
 from flightid.conventions import Light
 from flightid.errors import OptionError
-from flightid.evidence.data_checks import loop_check
+from flightid.evidence.data_checks import _band, _windows, loop_check, loop_of_responses
 from flightid.responses.store import read_response, write_response
+from flightid.responses.windows.defaults import CYCLES_AT_LOWEST, HIGHEST_FRACTION
 from flightid.uncertainty.feedback import LEVEL, FeedbackTest, find_feedback
+from tests.closeness import assert_close
 from tests.feedback_flights import DT, flight
 
 
@@ -180,3 +183,20 @@ def test_a_moved_band_asks_the_same_samples_once(monkeypatch: pytest.MonkeyPatch
     fid.estimate_response(record, band_rad_s=(2.0, 10.0), n_omega=10)  # thinned otherwise
     fid.estimate_response(record, band_rad_s=(2.0, 42.0), n_omega=10, detrend="none")
     assert len(asked) == 3
+
+
+def test_responses_say_the_worst_of_their_loops_where_all_know() -> None:
+    opened, closed = FeedbackTest("open", "declared"), FeedbackTest("closed", "declared")
+    some = [cast("fid.FrequencyResponse", SimpleNamespace(loop=t)) for t in (opened, closed, None)]
+    assert loop_of_responses(some[:2]) == loop_check(closed)
+    assert loop_of_responses(some[:1]) == loop_check(opened)
+    assert loop_of_responses(some) is None
+
+
+def test_the_quick_response_spans_from_cycles_in_its_window_to_the_samples() -> None:
+    record = fid.Record.from_arrays(np.arange(3000) * 0.01, outputs={"y": np.zeros(3000)})
+    for records, longest_s in (([record], 20.0), ([record] * 2, 30.0)):
+        found = np.array([*_windows(records), *_band(records)])
+        low = CYCLES_AT_LOWEST * 2.0 * np.pi / (longest_s / 3.0)
+        wanted = [longest_s / 3.0, longest_s / 15.0, low, HIGHEST_FRACTION * 200.0 * np.pi]
+        assert_close(found, np.array(wanted), rtol=1e-12, why="30 s at 100 Hz")

@@ -14,7 +14,7 @@ from flightid.cli.program import program
 from flightid.control.autopilots import NotchTracking
 from flightid.logs.dataflash.layout import MessageLayout
 from flightid.logs.dataflash.writer import DataflashWriter
-from flightid.review.gyro_noise import GyroNoise
+from flightid.review.gyro_noise import GyroNoise, floor_beneath
 from flightid.review.notch_proposal import _series
 from tests.closeness import assert_close
 
@@ -99,6 +99,14 @@ def test_the_lowest_harmonic_that_stands_out_counts_the_others(
         power[frequency == hz] = height
     noise = GyroNoise(frequency_hz=frequency, spectrum=np.stack([power] * 3))
     assert _series(noise, NotchTracking()) == (first, found)
+
+
+def test_the_floor_follows_what_is_wider_than_half_of_a_frequency() -> None:
+    frequency = np.arange(1.0, 1000.0)
+    for wide, floor in ((1.2, 1.0), (2.0, 100.0)):
+        inside = np.abs(np.log(frequency / 200.0)) < 0.5 * np.log(wide)
+        found = floor_beneath(frequency, np.where(inside, 100.0, 1.0))
+        assert_close(found[199], floor, rtol=1e-9, why="a median")
 
 
 def test_telemetry_of_the_motors_leads_the_notch_where_it_is_logged(tmp_path: Path) -> None:

@@ -214,7 +214,7 @@ def test_plans_refuse() -> None:
     with pytest.raises(OptionError, match="sweeps no such axis"):
         fid.plan_flight(vehicle="plane", axes=("yaw",))
     with pytest.raises(OptionError, match="FW_AT_SYSID_TIME leaves"):
-        fid.plan_flight(vehicle="plane", autopilot="px4", duration_s=200.0)
+        fid.plan_flight(vehicle="plane", autopilot="px4", duration_s=121.0)
 
 
 def test_what_the_stick_moves_is_no_gust() -> None:

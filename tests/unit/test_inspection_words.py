@@ -38,14 +38,19 @@ def log(**fields: object) -> Any:
     return SimpleNamespace(**{**known, **fields})
 
 
-def skew(late_s: float, rate_hz: float, seconds: float, noise: float) -> StreamSkew:
+def skew(
+    late_s: float, rate_hz: float, seconds: float, noise: float, scale: float = 1.0
+) -> StreamSkew:
     rng = np.random.default_rng(3)
     fast_s = np.arange(0.0, seconds, 0.005)
     motion = np.convolve(rng.standard_normal(fast_s.size + 40), np.hanning(41), "valid")
     slow_s = np.arange(1.0, seconds - 1.0, 1.0 / rate_hz)
     values = np.interp(slow_s - late_s, fast_s, motion)
     values += noise * motion.std() * rng.standard_normal(slow_s.size)
-    first, second = Signal("p", fast_s, motion, "rad/s", "a"), Signal("p", slow_s, values, "", "b")
+    first, second = (
+        Signal("p", fast_s, motion, "rad/s", "a"),
+        Signal("p", slow_s, scale * values, "", "b"),
+    )
     found = _skew("p", first, second, ((0.0, seconds),))
     assert found is not None
     return found
@@ -55,6 +60,8 @@ def test_a_lag_has_an_interval_and_is_told_only_where_the_streams_tell_it() -> N
     clear = skew(0.02, 50.0, 60.0, noise=0.1)
     assert abs(clear.lag_s - 0.02) < clear.half_width_s < 0.002
     assert clear.exceeds(0.004)
+    other_unit = skew(0.02, 50.0, 60.0, noise=0.1, scale=57.3).half_width_s
+    assert_close(other_unit, clear.half_width_s, rtol=1e-6, why="a lag has no unit of the values")
     assert not skew(0.03, 1.0, 90.0, noise=0.1).is_told
     short = skew(0.012, 10.0, 8.0, noise=0.4)
     assert short.half_width_s > 0.004

@@ -11,7 +11,7 @@ from flightid.evidence import Check, Evidence
 from flightid.evidence.part_checks import agreement_check
 from flightid.uncertainty.agreement import Agreement, compare_parts
 from flightid.uncertainty.blocks import RecordBlock, flights_of, noise_heard
-from flightid.uncertainty.parts import RecordParts, chance_alike, larger, scatter
+from flightid.uncertainty.parts import RecordParts, _freedom, chance_alike, larger, scatter
 from flightid.uncertainty.residual_noise import Autoregression
 from tests.closeness import assert_close
 from tests.strangers.parts import arx_flown, by_arx, by_output_error, changed_midway, steps_flown
@@ -138,3 +138,10 @@ def test_vehicles_apart_widen_bars_of_grey_and_black_boxes() -> None:
         assert fit.agreement is not None
         assert fit.agreement.by_scatter is not None
         assert all((p.freedom or 99.0) < 3.0 for p in fit.parameters.values())
+
+
+def test_alike_parts_have_one_degree_of_freedom_less_than_they_are() -> None:
+    for n in (2, 5, 30):
+        assert_close(_freedom(np.full(n, 1.0 / n)), n - 1.0, rtol=1e-9, why="a mean of n")
+    assert _freedom(np.array([1.0, 0.0])) == 1.0
+    assert _freedom(np.array([0.9, 0.05, 0.05])) < 1.1

@@ -59,6 +59,7 @@ def test_an_amplitude_is_as_large_as_coherence_asks_for_between_half_and_all() -
 
     largest, _ = swept(1e6)
     assert_close(swept(1e-9)[0], 0.5 * largest, rtol=0.1, why="never less than half; two digits")
+    assert_close(swept(1e-9, 0.7 * largest)[0], 0.7 * largest, rtol=1e-6, why="as asked for")
     _, least = swept(1e-4, 0.7 * largest)
     density = 1e-4 * least / (1.0 - least) / 19.0
     amplitude, reached = swept(density)
@@ -68,8 +69,17 @@ def test_an_amplitude_is_as_large_as_coherence_asks_for_between_half_and_all() -
 
 def test_the_integrator_that_the_file_sets_to_zero_is_out_of_the_forecast() -> None:
     for vehicle, stays in (("quad", False), ("heli", True)):
-        (sweep,) = fid.plan_flight(vehicle=vehicle, axes=("roll",)).sweeps
+        plan = fid.plan_flight(vehicle=vehicle, axes=("roll",))
+        (sweep,) = plan.sweeps
+        assert sweep.plan is not None
+        edges = np.array(plan.summary().rows[0][2:4], dtype=np.float64)
+        assert_close(math.tau * edges, sweep.plan.band_rad_s, rtol=1e-9, why="shown in Hz")
         assert sweep.guess is not None
+        told = sweep.plan.axes[0]
+        percent = 100.0 * told.peak_control / sweep.guess.vehicle.full_command
+        shown = np.array(plan.expected().rows[0][1:3], dtype=np.float64)
+        wanted = np.array([percent, math.degrees(told.peak_rate_rad_s)])
+        assert_close(shown, wanted, rtol=1e-9, why="percent and degrees")
         assert sweep.guess.vehicle.loop is not None
         assert bool(sweep.guess.vehicle.loop.values["i"]) is stays
 

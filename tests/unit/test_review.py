@@ -18,11 +18,14 @@ from flightid.control.tuning.pid_design import PidDesign
 from flightid.control.tuning.responses import ResponseBand
 from flightid.conventions import Light
 from flightid.errors import DataError
+from flightid.inspection.actuators import Actuators
 from flightid.logs.dataflash.writer import DataflashWriter
 from flightid.plot.gains import has_both, measured_and_predicted
 from flightid.plot.glance import flight_glance
+from flightid.review.apart import gains_between
 from flightid.review.deconvolution import LoopSamples, closed_loop
 from flightid.review.gyro_noise import GyroNoise
+from flightid.review.motors import motor_use, turning, yaw_trim
 from flightid.review.verdicts import judge_flight
 from flightid.uncertainty.estimate import Estimate
 from tests.closeness import assert_close
@@ -217,3 +220,44 @@ def test_noise_is_drawn_over_throttle_where_throttle_moved(bins: int, rows: int)
     )  # fmt: skip
     drawn = noise.plot().to_dict()
     assert sum(trace["type"] == "heatmap" for trace in drawn["data"]) == rows - 1
+
+
+def test_motors_that_turn_one_way_work_harder_by_their_share_of_the_mean() -> None:
+    shares = np.tile([[0.6], [0.6], [0.4], [0.4]], (1, 100))
+    shares[:, :20] = 0.0  # two of the ten stretches at the lower limit say nothing of balance
+    shares[0, -10:] = 1.0
+    made = Actuators(
+        "RCOU", ("C1", "C2", "C3", "C4"), np.arange(100.0), 1000 + 1000 * shares, 1e3, 2e3
+    )
+    trim = yaw_trim(made, ((0.0, 100.0),), (1, 1, -1, -1))
+    assert trim is not None
+    assert_close(
+        trim.value, (7 * 0.4 + 2 * (0.8 - 0.4) / 1.2) / 8, rtol=1e-12, why="one stretch at 1.0"
+    )
+    assert trim.freedom == 7
+    first, *_, last = motor_use(made, ((0.0, 100.0),))
+    assert (first.at_lower, first.at_upper, last.at_upper) == (0.2, 0.1, 0.0)
+    assert_close(last.difference.value, -(7 * 0.2 + 0.2 / 0.6) / 8, rtol=1e-12, why="as above")
+    assert_close(last.mean.value, 0.32, rtol=1e-12, why="eight tenths of 0.4")
+    assert yaw_trim(made, ((0.0, 18.0),), (1, 1, -1, -1)) is None
+    assert motor_use(made, ((0.0, 18.0),)) == ()
+
+
+def test_which_way_motors_turn_is_told_by_the_parameters() -> None:
+    quadrotor = {f"SERVO{i}_FUNCTION": 32.0 + i for i in range(1, 5)} | {"FRAME_CLASS": 1.0}
+    log = cast("fid.Log", SimpleNamespace(kind="ardupilot", parameters=quadrotor))
+    assert turning(log, 4) is None
+    quadrotor["FRAME_TYPE"] = 1.0
+    assert (turning(log, 4), turning(log, 6)) == ((1, 1, -1, -1), None)
+    moments = {"CA_ROTOR0_KM": 0.05, "CA_ROTOR1_KM": -0.05}
+    px4 = cast("fid.Log", SimpleNamespace(kind="px4", parameters=moments))
+    assert (turning(px4, 2), turning(px4, 3)) == ((1, -1), None)
+
+
+def test_gains_between_flights_are_those_that_differ_in_both() -> None:
+    def flight(**gains: float) -> fid.FlightReview:
+        identity = SimpleNamespace(gains={"roll": gains})
+        return cast("fid.FlightReview", SimpleNamespace(identity=identity))
+
+    found = gains_between(flight(P=1.0, I=2.0, D=3.0), flight(P=1.0, I=2.5, FF=4.0))
+    assert found == {"I": (2.0, 2.5)}

@@ -45,3 +45,10 @@ def test_a_cut_log_keeps_what_is_whole_and_rows_before_time_are_left_out(tmp_pat
     log = fid.read_log(path)
     assert_close(log.table("vehicle_attitude").time_s[0], 10.005, atol=1e-9, why="TIME, µs")
     assert 590 <= log.messages["vehicle_attitude"].count < 600
+    assert log.gaps == ()
+
+
+def test_a_pause_of_the_logger_is_a_gap_between_its_stamps(tmp_path: Path) -> None:
+    log = fid.read_log(write_sdlog2(tmp_path / "log.bin", pause_s=2.0))
+    (gap,) = log.gaps
+    assert_close(np.array([gap.start_s, gap.stop_s]), [11.495, 13.5], atol=1e-9, why="TIME, µs")

@@ -4,15 +4,21 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
 import flightid as fid
 from flightid.control.autopilots import axis_loop, axis_loop_of
-from flightid.control.tuning.loop_problem import highest_crossover
+from flightid.control.tuning.axis_tuning import Setting, noise_limit
+from flightid.control.tuning.controller_paths import ControllerPaths
+from flightid.control.tuning.gain_search import _report
+from flightid.control.tuning.loop_problem import LoopProblem, highest_crossover
 from flightid.control.tuning.order_statistics import content_of_worst, least_share
 from flightid.control.tuning.requirements import TuningRequirements
+from flightid.control.tuning.tune_pid import naming_filters
 from flightid.conventions import Light
 from flightid.errors import DataError, ModelError, OptionError, UnknownNameError
 from flightid.findings import Finding
@@ -321,6 +327,66 @@ def test_requirements_without_meaning_are_refused(changes: dict, said: str) -> N
         TuningRequirements(**changes)
 
 
+@pytest.mark.parametrize(
+    ("growth", "allowed", "stable", "flown", "limit"),
+    [
+        (2.0, None, True, 1.0, 0.06), (None, None, True, 1.0, 0.1), (2.0, None, False, 1.0, 0.1),
+        (2.0, None, True, 0.0, 0.1), (None, 0.02, True, 1.0, 0.03), (2.0, 0.02, False, 1.0, 0.02),
+        (2.0, 0.05, True, 1.0, 0.05),
+    ],
+)  # fmt: skip
+def test_noise_is_held_to_the_least_of_what_is_asked_flown_and_allowed(
+    growth: float | None, allowed: float | None, *, stable: bool, flown: float, limit: float
+) -> None:
+    need = TuningRequirements(noise_growth=growth, output_noise_rms=0.1)
+    judged = SimpleNamespace(stable=np.array([[stable]]), noise=np.array([[0.03]]))
+    problem = cast("LoopProblem", SimpleNamespace(judge=lambda *_: judged))
+    setting = cast("Setting", SimpleNamespace(requirements=need, noise=(), noise_allowed=allowed))
+    assert noise_limit(setting, problem, np.array([flown])) == limit
+
+
+def test_a_gain_at_its_range_is_said_to_bind() -> None:
+    judged = SimpleNamespace(names=("margin",), slack=np.array([[[0.5, 0.4]]]))
+    problem = cast(
+        "LoopProblem",
+        SimpleNamespace(
+            judge=lambda _: judged, kinds=("P", "D"), low=np.full(2, 0.01), high=np.ones(2),
+            integral_ratio=1.0,
+        ),
+    )  # fmt: skip
+    said = [(0.5, 0.5), (0.01, 0.5), (0.5, 0.01), (1.0, 0.5), (0.5, 1.0)]
+    assert [_report(problem, np.array(gains)).binding for gains in said] == [
+        (), ("range of P",), (), ("range of P",), ("range of D",),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("exists", "axis", "named"), [(1, "roll", 1), (0, "roll", 0), (1, "yaw", 0)]
+)
+def test_filters_are_named_by_a_design_that_was_tuned_with_them(
+    exists: int, axis: str, named: int
+) -> None:
+    @dataclasses.dataclass(frozen=True)
+    class Design:
+        exists: bool
+        axis: str
+        filters: tuple[str, ...] = ()
+
+    made: Any = SimpleNamespace(loops={"roll": None}, changes_of=lambda axis: (axis,))
+    design: Any = Design(exists, axis)
+    assert naming_filters(design, made).filters == ("roll",) * named
+    assert naming_filters(design, None) is design
+
+
+def test_a_late_output_turns_both_paths_by_its_delay() -> None:
+    omega = np.array([1.0, 30.0, 200.0])
+    late = dataclasses.replace(FLOWN, computation_delay_s=0.002)
+    here, after = (ControllerPaths(loop, "filtered", False) for loop in (FLOWN, late))
+    turned = np.exp(-0.002j * omega)
+    for path in (ControllerPaths.feedback, ControllerPaths.forward):
+        assert_close(path(after, omega), path(here, omega) * turned, rtol=1e-12, why="exact")
+
+
 def test_the_highest_crossing_counts_for_the_band() -> None:
     omega = np.geomspace(0.1, 100.0, 2000)
     s = 1j * omega
@@ -329,6 +395,8 @@ def test_the_highest_crossing_counts_for_the_band() -> None:
     assert found[0] > 30.0
     assert_close(found[1], 2.0, rtol=1e-9, why="an integrator, straight in its logarithm")
     assert np.isnan(found[2])
+    (above,) = highest_crossover(np.array([1.0, 2.0, 4.0]), np.array([[2.0, 1.5, 1.2]]) + 0j)
+    assert_close(above, 4.0, rtol=1e-12, why="above one to the end: no line is drawn beyond it")
 
 
 def test_a_preset_moves_what_is_left_as_usual() -> None:

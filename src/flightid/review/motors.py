@@ -52,8 +52,8 @@ def motor_use(actuators: Actuators | None, spans: tuple[Span, ...]) -> tuple[Mot
     span = actuators.high - actuators.low
     shares = (actuators.values[:, mask] - actuators.low) / span
     parts = np.array([part.mean(axis=1) for part in np.array_split(shares, STRETCHES, axis=1)])
-    all_of_them = parts.mean()
-    relative = parts / parts.mean(axis=1, keepdims=True) - 1.0 if all_of_them > 0 else 0.0 * parts
+    worked = parts[parts.mean(axis=1) > 0.0]
+    relative = worked / worked.mean(axis=1, keepdims=True) - 1.0 if len(worked) > 2 else 0.0 * parts
     return tuple(
         MotorUse(
             f"{actuators.message}.{name}",
