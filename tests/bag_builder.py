@@ -7,6 +7,7 @@ import sqlite3
 import struct
 from dataclasses import dataclass
 from pathlib import Path
+from zlib import crc32
 
 import numpy as np
 
@@ -101,24 +102,40 @@ def write_mcap(path: Path, flight: Flight = Flight(), *, chunked: bool = True) -
     for number, topic in enumerate(("/imu", "/cmd"), 1):
         kind, text = definition(topic, ros1=False)
         name = kind.replace("/", "/msg/")
-        records += _record(3, struct.pack("<H", number) + _texts(name, "ros2msg", text))
-        records += _record(4, struct.pack("<HH", number, number) + _texts(topic, "cdr", ""))
+        records += record_of(3, struct.pack("<H", number) + texts_of(name, "ros2msg", text))
+        records += record_of(4, struct.pack("<HH", number, number) + texts_of(topic, "cdr", ""))
     for stamp, topic, payload in flight.messages(cdr=True):
         number = 1 if topic == "/imu" else 2
-        records += _record(5, struct.pack("<HIQQ", number, 0, stamp, stamp) + payload)
+        records += record_of(5, struct.pack("<HIQQ", number, 0, stamp, stamp) + payload)
     if chunked:
-        head = struct.pack("<QQQI", 0, 0, len(records), 0) + _texts("")
-        records = _record(6, head + struct.pack("<Q", len(records)) + records)
-    magic = b"\x89MCAP0\r\n"
-    path.write_bytes(magic + _record(1, _texts("ros2", "")) + records + _record(15, bytes(4)))
+        head = struct.pack("<QQQI", 0, 0, len(records), crc32(records)) + texts_of("")
+        records = record_of(6, head + struct.pack("<Q", len(records)) + records)
+    return mcap_of(path, records)
+
+
+def mcap_of(path: Path, records: bytes) -> Path:
+    """A file of MCAP with these records."""
+    head = b"\x89MCAP0\r\n" + record_of(1, texts_of("ros2", ""))
+    path.write_bytes(head + records + record_of(15, bytes(4)))
     return path
 
 
-def _record(kind: int, body: bytes) -> bytes:
+def topic_of(text: str, kind: str = "a/msg/B") -> bytes:
+    """Records of MCAP that declare a topic, /a, of a type with this definition."""
+    schema = record_of(3, struct.pack("<H", 1) + texts_of(kind, "ros2msg", text))
+    return schema + record_of(4, struct.pack("<HH", 1, 1) + texts_of("/a", "cdr", ""))
+
+
+def message_of(stamp: int, payload: bytes) -> bytes:
+    """A message of it."""
+    return record_of(5, struct.pack("<HIQQ", 1, 0, stamp, stamp) + payload)
+
+
+def record_of(kind: int, body: bytes) -> bytes:
     return struct.pack("<BQ", kind, len(body)) + body
 
 
-def _texts(*texts: str) -> bytes:
+def texts_of(*texts: str) -> bytes:
     return b"".join(struct.pack("<I", len(each.encode())) + each.encode() for each in texts)
 
 
@@ -127,26 +144,33 @@ def write_bag1(path: Path, flight: Flight = Flight(), *, packing: str = "none") 
     inner = b""
     for number, topic in enumerate(("/imu", "/cmd")):
         kind, text = definition(topic, ros1=True)
-        said = _fields(topic=topic.encode(), type=kind.encode(), message_definition=text.encode())
-        head = _fields(op=b"\x07", conn=struct.pack("<I", number), topic=topic.encode())
-        inner += _block(head) + _block(said)
+        said = fields_of(topic=topic.encode(), type=kind.encode(), message_definition=text.encode())
+        head = fields_of(op=b"\x07", conn=struct.pack("<I", number), topic=topic.encode())
+        inner += block_of(head) + block_of(said)
     for stamp, topic, payload in flight.messages(cdr=False):
         number = struct.pack("<I", 0 if topic == "/imu" else 1)
         time = struct.pack("<II", stamp // NS, stamp % NS)
-        inner += _block(_fields(op=b"\x02", conn=number, time=time)) + _block(payload)
-    head = _fields(op=b"\x05", compression=packing.encode(), size=struct.pack("<I", len(inner)))
-    packed = bz2.compress(inner) if packing == "bz2" else inner
-    content = _block(_fields(op=b"\x03")) + _block(b"") + _block(head) + _block(packed)
+        inner += block_of(fields_of(op=b"\x02", conn=number, time=time)) + block_of(payload)
+    return bag1_of(path, inner, packing=packing)
+
+
+def bag1_of(path: Path, *chunks: bytes, packing: str = "bz2") -> Path:
+    """A file of ROS 1 with these chunks."""
+    content = block_of(fields_of(op=b"\x03")) + block_of(b"")
+    for inner in chunks:
+        size = struct.pack("<I", len(inner))
+        head = fields_of(op=b"\x05", compression=packing.encode(), size=size)
+        content += block_of(head) + block_of(bz2.compress(inner) if packing == "bz2" else inner)
     path.write_bytes(b"#ROSBAG V2.0\n" + content)
     return path
 
 
-def _block(body: bytes) -> bytes:
+def block_of(body: bytes) -> bytes:
     return struct.pack("<I", len(body)) + body
 
 
-def _fields(**fields: bytes) -> bytes:
-    return b"".join(_block(key.encode() + b"=" + value) for key, value in fields.items())
+def fields_of(**fields: bytes) -> bytes:
+    return b"".join(block_of(key.encode() + b"=" + value) for key, value in fields.items())
 
 
 def write_db3(folder: Path, flight: Flight = Flight(), *, defined: bool = True) -> Path:

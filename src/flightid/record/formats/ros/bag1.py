@@ -8,13 +8,14 @@ from __future__ import annotations
 import io
 import struct
 from pathlib import Path
+from sys import getsizeof
 from typing import BinaryIO
 
-from flightid.reading import require_memory
-from flightid.record.formats.ros.content import BagContent, Topic, inflated
+from flightid.record.formats.ros.content import BagContent, Topic
 
 MAGIC = b"#ROSBAG V2.0\n"
 MESSAGE, CHUNK, CONNECTION = 2, 5, 7
+MOST_FIELDS = 100
 
 
 def gather(path: Path, content: BagContent) -> None:
@@ -34,7 +35,7 @@ def _walk(
     stream: BinaryIO, path: Path, content: BagContent, end: int, *, is_chunk: bool = False
 ) -> None:
     while len(size := stream.read(4)) == 4:
-        header = _fields(_block(stream, size, end, path))
+        header = _fields(_block(stream, size, end, content))
         size = stream.read(4)
         kind = header["op"][0]
         if kind not in (MESSAGE, CHUNK, CONNECTION) or (kind == CHUNK and is_chunk):
@@ -42,19 +43,20 @@ def _walk(
             continue
         if len(size) < 4 or int.from_bytes(size, "little") > end - stream.tell():
             break
-        data = _block(stream, size, end, path)
+        data = _block(stream, size, end, content)
         if kind == CHUNK:
             unpacked = int.from_bytes(header["size"], "little")
-            inner = inflated(path.name, header["compression"].decode("ascii"), data, unpacked)
-            _walk(io.BytesIO(inner), path, content, len(inner), is_chunk=True)
+            packing = header["compression"].decode("ascii")
+            with content.inflated(packing, data, unpacked) as inner:
+                _walk(io.BytesIO(inner), path, content, len(inner), is_chunk=True)
         elif kind == CONNECTION:
             said = _fields(data)
             said_type, definition, name = (
                 value.decode("utf-8", "replace")
                 for value in (said["type"], said["message_definition"], header["topic"])
             )
-            topic = Topic(name, said_type, definition, "ros1")
-            content.topics.setdefault((path, header["conn"]), topic)
+            content.hold(getsizeof(definition))
+            content.declare((path, header["conn"]), Topic(name, said_type, definition, "ros1"))
         else:
             seconds, rest = struct.unpack("<II", header["time"])
             content.add((path, header["conn"]), seconds * 1_000_000_000 + rest, data)
@@ -63,15 +65,18 @@ def _walk(
     content.cut = path.name
 
 
-def _block(stream: BinaryIO, size: bytes, end: int, path: Path) -> bytes:
+def _block(stream: BinaryIO, size: bytes, end: int, content: BagContent) -> bytes:
     count = int.from_bytes(size, "little")
-    require_memory(path.name, count)
+    content.require(count)
     return stream.read(min(count, max(0, end - stream.tell())))
 
 
 def _fields(header: bytes) -> dict[str, bytes]:
-    found, at = {}, 0
+    found: dict[str, bytes] = {}
+    at = 0
     while at < len(header):
+        if len(found) > MOST_FIELDS:
+            raise ValueError(f"a header of more than {MOST_FIELDS} fields")
         (size,) = struct.unpack_from("<I", header, at)
         name, _, value = header[at + 4 : at + 4 + size].partition(b"=")
         found[name.decode("ascii", "replace")] = value

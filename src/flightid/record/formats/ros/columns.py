@@ -24,6 +24,12 @@ CONTAINERS: tuple[tuple[bytes, Callable[[Path, BagContent], None]], ...] = (
     (storage.MAGIC, storage.gather),
 )
 """Readers by the first bytes of a file."""
+RECOVERIES = {
+    mcap.gather: "copy it again; `mcap recover {0}` keeps what is whole",
+    bag1.gather: "copy it again, or `rosbag reindex {0}`",
+    storage.gather: "copy it again; `sqlite3 {0} .recover | sqlite3 whole.db3` keeps what is whole",
+}
+"""What to do with a damaged file, by its reader."""
 UNITS = {
     "sensor_msgs/Imu.angular_velocity": "rad/s",
     "sensor_msgs/Imu.linear_acceleration": "m/s^2",
@@ -100,7 +106,7 @@ def read_columns(path: Path) -> ColumnTable:
         gather = next((read for magic, read in CONTAINERS if head.startswith(magic)), None)
         if gather is None:
             raise FileFormatError(f"{file.name} is no bag", found=head[:8].hex(" ") or "nothing")
-        with decoding(file.name, "a whole bag", "copy it again, or `ros2 bag reindex`"):
+        with decoding(file.name, "a whole bag", RECOVERIES[gather].format(file.name)):
             gather(file, content)
     return _table(path, content)
 

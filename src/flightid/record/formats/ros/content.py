@@ -5,7 +5,9 @@ from __future__ import annotations
 import bz2
 import io
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+from sys import getsizeof
 from typing import IO, cast
 
 from flightid.errors import FileFormatError
@@ -79,10 +81,57 @@ class BagContent:
             topic.received_ns.clear()
             topic.payloads.clear()
             return
-        self.n_bytes += len(payload) + OVERHEAD
-        require_memory(self.name, self.n_bytes)
+        self.hold(len(payload) + OVERHEAD)
         topic.received_ns.append(received_ns)
         topic.payloads.append(payload)
+
+    def declare(self, key: object, topic: Topic) -> None:
+        """Keep a topic that messages may be of; the first of a key counts.
+
+        Raises
+        ------
+        FileFormatError
+            What is held is more than the memory budget.
+        """
+        if key not in self.topics:
+            self.hold(4 * OVERHEAD + sum(map(getsizeof, (topic.name, topic.type))))
+            self.topics[key] = topic
+
+    def hold(self, n_bytes: float) -> None:
+        """Count what is kept in memory.
+
+        Raises
+        ------
+        FileFormatError
+            All that is held is more than the memory budget.
+        """
+        self.require(n_bytes)
+        self.n_bytes += int(n_bytes)
+
+    def require(self, n_bytes: float) -> None:
+        """Ask for memory beside what is held, for a while.
+
+        Raises
+        ------
+        FileFormatError
+            Both are more than the memory budget.
+        """
+        require_memory(self.name, self.n_bytes + n_bytes)
+
+    @contextmanager
+    def inflated(self, kind: str, data: bytes, size: int) -> Iterator[bytes]:
+        """Content of a chunk, held as long as it is walked through; as `inflated`.
+
+        Raises
+        ------
+        FlightidError
+            As `inflated`; all that is held is more than the memory budget.
+        """
+        self.require(len(data) + 2 * size)
+        content = inflated(self.name, kind, data, size)
+        self.hold(size)
+        yield content
+        self.n_bytes -= size
 
 
 def inflated(name: str, kind: str, data: bytes, size: int) -> bytes:
@@ -101,11 +150,10 @@ def inflated(name: str, kind: str, data: bytes, size: int) -> bytes:
     Raises
     ------
     FileFormatError
-        It is of another size, or more than the memory budget.
+        It is of another size, or packed in a way that is not read.
     OptionError
         The library that unpacks it is not installed.
     """
-    require_memory(name, size)
     if kind in ("", "none"):
         stream: IO[bytes] = io.BytesIO(data)
     elif kind == "bz2":

@@ -8,10 +8,12 @@ from __future__ import annotations
 import io
 import struct
 from pathlib import Path
+from sys import getsizeof
 from typing import BinaryIO
+from zlib import crc32
 
-from flightid.reading import require_memory
-from flightid.record.formats.ros.content import BagContent, Topic, inflated
+from flightid.errors import FileFormatError
+from flightid.record.formats.ros.content import OVERHEAD, BagContent, Topic
 from flightid.record.formats.ros.definitions import short_name
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -52,26 +54,40 @@ def _walk(
         if kind not in (SCHEMA, CHANNEL, MESSAGE, CHUNK) or (kind == CHUNK and is_chunk):
             stream.seek(size, 1)
             continue
-        require_memory(path.name, size)
+        content.require(2 * size)
         body = stream.read(size)
         if kind == SCHEMA:
             number, (name, encoding, text) = _leading(body, 2, 3)
-            schemas[number] = short_name(name), text if encoding in ENCODINGS else ""
+            if number not in schemas:
+                content.hold(OVERHEAD + getsizeof(name) + getsizeof(text))
+                schemas[number] = short_name(name), text if encoding in ENCODINGS else ""
         elif kind == CHANNEL:
             number, (topic, encoding) = _leading(body, 4, 2)
             known = schemas.get(number >> 16, ("", ""))
             made = Topic(topic, known[0], known[1], encoding)
-            content.topics.setdefault((path, number & 0xFFFF), made)
+            content.declare((path, number & 0xFFFF), made)
         elif kind == MESSAGE:
             channel, _, logged_ns, _ = struct.unpack_from("<HIQQ", body)
             content.add((path, channel), logged_ns, body[22:])
         else:
-            _, _, unpacked, _ = struct.unpack_from("<QQQI", body)
+            _, _, unpacked, declared = struct.unpack_from("<QQQI", body)
             packing, at = _text(body, 28)
-            inner = inflated(path.name, packing, body[at + 8 :], unpacked)
-            _walk(io.BytesIO(inner), path, content, schemas, len(inner), is_chunk=True)
+            with content.inflated(packing, body[at + 8 :], unpacked) as inner:
+                _require_sum(path.name, declared, crc32(inner))
+                _walk(io.BytesIO(inner), path, content, schemas, len(inner), is_chunk=True)
     if not is_chunk:
         content.cut = path.name
+
+
+def _require_sum(name: str, declared: int, found: int) -> None:
+    """A chunk whose bytes are not those that were recorded is refused; 0 says nothing of them."""
+    if declared not in (0, found):
+        raise FileFormatError(
+            f"a chunk of {name} is damaged",
+            found=f"checksum {found:08x}",
+            needed=f"{declared:08x}, as the chunk says",
+            action="copy the bag again; `mcap recover` keeps its whole chunks",
+        )
 
 
 def _leading(body: bytes, width: int, count: int) -> tuple[int, list[str]]:
