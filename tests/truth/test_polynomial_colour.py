@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 
 import flightid as fid
 from flightid import _native
 from flightid.identification.prediction_error.coloured_errors import (
+    answers,
     has_noise_model,
+    noise_bias,
     output_error_covariance,
 )
 from flightid.models.sampled.channels import gather_channels
@@ -67,6 +70,29 @@ def test_sensitivities_are_those_of_the_errors() -> None:
         rtol=5e-3,
         why="the slopes of a projection hold a little of the errors, too",
     )
+
+
+def test_noise_bias_is_the_slope_of_the_restricted_likelihood() -> None:
+    """Dense, with more impulses of the start than F reaches: samples dropped gave c1 ± 1."""
+    structure = fid.PolynomialModel.bj("u", "y", nb=2, nc=1, nd=1, nf=2, nk=4)
+    data = gather_channels([_flight(1, 0.9, n=200)], "y", ("u",), "mean")
+    theta = np.array([1.0, 0.5, -0.6, -0.95, -1.5, 0.7])
+    errors = np.random.default_rng(2).standard_normal(200)
+    columns = answers(structure, data, theta, errors, 0)
+    found = noise_bias(structure, theta, columns, np.eye(2))
+    known = np.hstack(columns[0][:2])
+
+    def half_log_determinant(c: float, d: float) -> float:
+        white = toeplitz(lfilter([1.0, d], [1.0, c], np.eye(200)[0]), np.zeros(200)) @ known
+        return 0.5 * float(np.linalg.slogdet(white.T @ white)[1])
+
+    slopes = [
+        (half_log_determinant(-0.6 + c, -0.95 + d) - half_log_determinant(-0.6 - c, -0.95 - d))
+        / 2e-4
+        for c, d in ((1e-4, 0.0), (0.0, 1e-4))
+    ]
+    assert_close(found, slopes, rtol=1e-5, why="the same differences by triangles")
+    assert np.max(np.abs(found)) < 20.0  # of c1: 1e3 by what rounding leaves of a dependent start
 
 
 def test_colour_widens_and_noise_models_keep_their_own_errors() -> None:

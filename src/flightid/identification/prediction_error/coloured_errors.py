@@ -81,9 +81,7 @@ def output_error_covariance(
     for shared, own, rest in answers(structure, data, theta, errors, skip):
         block = RecordBlock.of(shared[None], own[None], rest[None])
         if own_of_noise:
-            white = _whitened(structure, theta, shared, own)
-            weighed = np.zeros_like(shared)
-            weighed[own_of_noise:] = white.projected
+            weighed = _whitened(structure, theta, shared, own).projected
             turned = scipy.signal.lfilter(*noise_filter(structure, theta), weighed[::-1], axis=0)
             block = RecordBlock.of(turned[None, ::-1], own[None], rest[None])
             block = replace(block, answering=shared)
@@ -155,10 +153,13 @@ def noise_bias(
 def _whitened(
     structure: PolynomialStructure, theta: Array, shared: Array, own: Array
 ) -> RecordBlock:
-    """Sensitivities through D/C, without the samples that its own past takes."""
-    first = structure.nc + structure.nd
+    """Sensitivities through D/C from rest.
+
+    All samples count: beyond the reach of F a start is an impulse for each of the first samples,
+    and what D/C leaves of several behind the reach of D is one direction, C's own.
+    """
     shared, own = (
-        scipy.signal.lfilter(*noise_filter(structure, theta), part, axis=0)[first:]
+        scipy.signal.lfilter(*noise_filter(structure, theta), part, axis=0)
         for part in (shared, own)
     )
     return RecordBlock.of(shared[None], own[None], np.zeros((1, len(shared))))
