@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from flightid.errors import DataError, OptionError, ShapeError, UnknownNameError
 from flightid.record import GapPolicy, StampPolicy, to_uniform
+from flightid.record.interpolation import HALF_LENGTH, KAISER_BETA, windowed_sinc
 from tests.closeness import assert_close
 from tests.examples import examples
 
@@ -213,3 +214,23 @@ def test_refused_channels() -> None:
         to_uniform({"y": ([0.0, 1.0], [0.0, np.nan])}, sample_time_s=0.1)
     with pytest.raises(OptionError, match="no channel to resample"):
         to_uniform({}, sample_time_s=0.1)
+
+
+@pytest.mark.parametrize(("cutoff", "rate"), [(0.5, 1.0), (0.2, 0.45)])
+@pytest.mark.parametrize("count", [1, 2, 20, 500])
+def test_windowed_sinc_is_its_formula(cutoff: float, rate: float, count: int) -> None:
+    random = np.random.default_rng(3)
+    values = random.standard_normal(count)
+    irregular = random.uniform(-3.0, count + 2.0, 300)
+    half = int(np.ceil(HALF_LENGTH / rate))
+    long = np.pad(values, half + 1, mode="reflect", reflect_type="odd")
+    for position in (irregular, np.arange(0.0, count, 0.25)):
+        nearest = np.floor(position)
+        # Phases count to 1e-9 of a sample.
+        distance = np.arange(-half, half + 2) - np.round(position - nearest, 9)[:, None]
+        bell = np.i0(KAISER_BETA * np.sqrt(np.clip(1 - (distance / (half + 1)) ** 2, 0, None)))
+        weights = np.sinc(2 * cutoff * distance) * bell * (np.abs(distance) < half + 1)
+        place = nearest.astype(int)[:, None] + np.arange(2 * half + 2) + 1
+        truth = np.sum(weights * long[np.clip(place, 0, long.size - 1)], axis=1) / weights.sum(1)
+        made = windowed_sinc(values, position, cutoff, rate)
+        assert_close(made, truth, atol=1e-13, why="sums of some hundred products")

@@ -11,7 +11,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid._native import cubic_spline
+from flightid import _native
 from flightid.record.stamps import StampedSamples
 
 ATTENUATION_DB = 100.0
@@ -20,7 +20,6 @@ TRANSITION = 0.1
 """Width of the transition band as a fraction of the lower sampling rate."""
 HALF_LENGTH = (ATTENUATION_DB - 7.95) / (2 * 14.36 * TRANSITION)
 """Half length of the kernel in samples of the lower rate (Kaiser's formula)."""
-BLOCK = 1 << 21
 SAME_RATE = 0.05
 """Relative difference of a grid from a source's mean spacing that counts as the same rate: the
 mean of jittered stamps lies on either side of their nominal spacing."""
@@ -153,7 +152,7 @@ def spline(source: StampedSamples, time_s: NDArray[np.float64]) -> NDArray[np.fl
     """Cubic spline through the samples at their true stamps; a line where there are only two."""
     if source.time_s.size < 3:
         return np.interp(time_s, source.time_s, source.values)
-    return cubic_spline(source.time_s, source.values, time_s)
+    return _native.cubic_spline(source.time_s, source.values, time_s)
 
 
 def uniform_samples(source: StampedSamples) -> tuple[float, float, NDArray[np.float64]]:
@@ -177,7 +176,7 @@ def windowed_sinc(
     """Evaluate uniform samples at fractional positions under a Kaiser-windowed sinc.
 
     The ends are continued by odd reflection, which carries a line on exactly. A constant comes out
-    exactly: each row of weights is divided by its sum.
+    exactly: each row of weights is divided by its sum. Positions count to 1e-9 of a sample.
 
     Parameters
     ----------
@@ -195,27 +194,7 @@ def windowed_sinc(
     ndarray, shape (m,)
     """
     half = int(np.ceil(HALF_LENGTH / rate))
-    padded = np.pad(values, half + 1, mode="reflect", reflect_type="odd")
-    nearest = np.floor(position).astype(np.intp)
-    fraction = position - nearest
-    taps = np.arange(-half, half + 2)
-    result = np.empty(position.size)
-    block = max(1, BLOCK // taps.size)
-    for first in range(0, position.size, block):
-        rows = slice(first, first + block)
-        # Rational ratios repeat their few phases: weights are computed once for each.
-        phases, which = np.unique(np.round(fraction[rows], 9), return_inverse=True)
-        weights = _weights(taps[None, :] - phases[:, None], cutoff, half + 1)
-        index = np.clip(nearest[rows, None] + taps + half + 1, 0, padded.size - 1)
-        result[rows] = np.einsum("ij,ij->i", weights[which], padded[index])
-    return result
-
-
-def _weights(distance: NDArray[np.float64], cutoff: float, half: int) -> NDArray[np.float64]:
-    inside = np.clip(1 - (distance / half) ** 2, 0, None)
-    window = np.i0(KAISER_BETA * np.sqrt(inside)) * (inside > 0)
-    kernel = np.sinc(2 * cutoff * distance) * window
-    return np.asarray(kernel / np.sum(kernel, axis=1, keepdims=True))
+    return _native.windowed_sinc(values, position, cutoff, half, KAISER_BETA)
 
 
 def _is_same_grid(source: StampedSamples, time_s: NDArray[np.float64]) -> bool:

@@ -10,3 +10,4 @@ pub mod polynomial_roots;
 pub mod random;
 pub mod sparse_lu;
 pub(crate) mod widest;
+pub mod windowed_sinc;

@@ -6,6 +6,7 @@ use flightid_core::CoreError;
 use flightid_core::language::lookup_table::{
     Interpolation, LookupTable as CoreTable, Outside, cubic_spline as spline,
 };
+use flightid_core::numerics::windowed_sinc::windowed_sinc as sinc;
 use numpy::{IntoPyArray, PyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -93,11 +94,29 @@ fn cubic_spline<'py>(
     Ok(made.into_pyarray(py))
 }
 
+/// windowed_sinc(values: NDArray[np.float64], position: NDArray[np.float64], cutoff: float, half: int, beta: float) -> NDArray[np.float64]
+///
+/// Uniform samples at fractional positions, by a sinc of `half` samples on each side under a Kaiser
+/// window; `cutoff` in cycles per sample. The ends are continued by odd reflection.
+#[pyfunction]
+fn windowed_sinc<'py>(
+    py: Python<'py>,
+    values: RowMajor1<'_, f64>,
+    position: RowMajor1<'_, f64>,
+    cutoff: f64,
+    half: usize,
+    beta: f64,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let (values, position) = (values.as_slice()?, position.as_slice()?);
+    Ok(py.detach(|| sinc(values, position, cutoff, half, beta)).into_pyarray(py))
+}
+
 /// Add this file's names to the module.
 ///
 /// # Errors
 /// Never in practice; PyO3's own.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(cubic_spline, module)?)?;
+    module.add_function(wrap_pyfunction!(windowed_sinc, module)?)?;
     module.add_class::<LookupTable>()
 }
