@@ -8,6 +8,7 @@ pub mod dataflash;
 pub mod delimited;
 pub mod error;
 pub mod mavlink;
+pub mod places;
 pub mod ulog;
 
 pub use error::LogError;

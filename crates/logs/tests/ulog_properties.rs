@@ -37,7 +37,7 @@ fn truncation_at_every_byte_keeps_every_whole_sample() {
         if let Ok(log) = Ulog::index(&bytes[..cut]) {
             let ends = whole.tables.iter().flat_map(|table| {
                 // Both messages hold 20 bytes.
-                table.offsets.iter().map(|at| *at as usize + 20)
+                table.offsets.iter().map(|at| at + 20)
             });
             let expected = ends.filter(|&end| end <= cut).count();
             assert_eq!(rows(&log), expected, "cut at {cut}");
@@ -107,15 +107,15 @@ fn the_crate_px4_ulog_panics_where_this_reader_goes_on() {
 }
 
 /// Samples of a flight, message number excluded: every one is 25 bytes with head and number.
-fn samples(log: &Ulog) -> impl Iterator<Item = (usize, u64)> {
+fn samples(log: &Ulog) -> impl Iterator<Item = (usize, usize)> {
     let tables = log.tables.iter().enumerate();
-    tables.flat_map(|(index, table)| table.offsets.iter().map(move |at| (index, *at)))
+    tables.flat_map(|(index, table)| table.offsets.iter().map(move |at| (index, at)))
 }
 
 /// The bytes from the first sample on.
 fn flight_data(bytes: &[u8]) -> std::ops::Range<usize> {
     let whole = Ulog::index(bytes).expect("a log");
-    let first = samples(&whole).map(|(_, at)| at as usize - 5).min().expect("samples");
+    let first = samples(&whole).map(|(_, at)| at - 5).min().expect("samples");
     first..bytes.len()
 }
 
@@ -123,7 +123,7 @@ fn flight_data(bytes: &[u8]) -> std::ops::Range<usize> {
 /// need not be. Of those that the hit did not touch only one may go: the last before a hit that
 /// starts in the head or number of the record behind it. ULog has no checksum, so where that
 /// record cannot be recognised, nothing tells an intact sample from one whose end was hit too.
-fn lost_to_hit(at: usize, fill: &[u8]) -> Vec<u64> {
+fn lost_to_hit(at: usize, fill: &[u8]) -> Vec<usize> {
     let intact = flight(60);
     let whole = Ulog::index(&intact).expect("a log");
     let start = flight_data(&intact).start + at;
@@ -134,7 +134,7 @@ fn lost_to_hit(at: usize, fill: &[u8]) -> Vec<u64> {
     let kept: std::collections::HashSet<_> = samples(&log).collect();
     samples(&whole)
         .filter(|sample| {
-            let (from, to) = (sample.1 as usize - 5, sample.1 as usize + 20);
+            let (from, to) = (sample.1 - 5, sample.1 + 20);
             (to + 5 <= start || from >= stop) && !kept.contains(sample)
         })
         .map(|(_, at)| at)
@@ -151,7 +151,7 @@ fn a_damaged_length_does_not_cost_the_next_sample() {
     for (length, (_, sample)) in
         (22..=34).flat_map(|length| samples(&whole).map(move |s| (length, s)))
     {
-        let at = sample as usize - 5 - data;
+        let at = sample - 5 - data;
         assert_eq!(lost_to_hit(at, &[length]), [], "{length} at {at}");
         let hit = [&[0; 48][..], &[length]].concat();
         assert_eq!(lost_to_hit(at.saturating_sub(48), &hit), [], "48 zeros, {length} at {at}");
@@ -185,6 +185,6 @@ proptest! {
     #[test]
     fn one_hit_costs_what_it_covers(at in any::<prop::sample::Index>(), fill in proptest::collection::vec(any::<u8>(), 1..300)) {
         let lost = lost_to_hit(at.index(flight_data(&flight(60)).len()), &fill);
-        prop_assert_eq!(lost, Vec::<u64>::new());
+        prop_assert_eq!(lost, Vec::<usize>::new());
     }
 }

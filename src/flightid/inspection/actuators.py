@@ -121,5 +121,5 @@ def _limits(
 
 
 def _made(table: LogTable, names: list[str], low: float, high: float) -> Actuators:
-    values = np.nan_to_num(np.array([table[name] for name in names]), nan=low)
+    values = np.nan_to_num(np.array([table[name] for name in names]), copy=False, nan=low)
     return Actuators(table.name, tuple(names), table.time_s, values, low, high)

@@ -8,7 +8,7 @@ from flightid.inspection.advice import logging
 from flightid.inspection.flight_phases import FlightPhases
 from flightid.inspection.rates import StreamRate, stream_gaps
 from flightid.inspection.signals import Span
-from flightid.inspection.stamps import believable
+from flightid.inspection.stamps import believed
 from flightid.logs import Log
 
 NEAR_S = 1.0
@@ -17,8 +17,7 @@ NEAR_S = 1.0
 
 def gap_findings(log: Log, rate: StreamRate, phases: FlightPhases) -> list[Finding]:
     """What the gaps of one stream cost; an autopilot that logs while armed pauses between arms."""
-    stamps = log.table(rate.message, rate.instance).time_s
-    gaps = stream_gaps(stamps[believable(stamps)])
+    gaps = stream_gaps(believed(log.table(rate.message, rate.instance).time_s))
     armed = [e.time_s for e in log.events if e.kind == "arming" and e.time_s is not None]
     flown = [gap for gap in gaps if not phases.is_known or _in_flight(gap, phases.airborne, armed)]
     findings = []

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.inspection.signals import Span
-from flightid.inspection.stamps import believable
+from flightid.inspection.stamps import believed, longer_steps
 from flightid.inspection.thresholds import GAP_FACTOR
 from flightid.logs import Log
 
@@ -75,8 +75,7 @@ def stream_rates(log: Log) -> tuple[StreamRate, ...]:
         if info.rate_hz is None or info.first_s is None:
             continue
         for instance in info.instances or (None,):
-            stamps = log.table(info.name, instance).time_s
-            rate = _of(info.name, instance, stamps)
+            rate = _of(info.name, instance, log.table(info.name, instance).time_s)
             if rate is not None:
                 found.append(rate)
     return tuple(sorted(found, key=lambda rate: -rate.rate_hz))
@@ -85,13 +84,14 @@ def stream_rates(log: Log) -> tuple[StreamRate, ...]:
 def _of(message: str, instance: int | None, stamps: NDArray[np.float64]) -> StreamRate | None:
     if stamps.size < FEWEST_ROWS:
         return None
-    good = stamps[believable(stamps)]
-    forward = np.diff(good)
-    if forward.size < FEWEST_ROWS - 1:
+    good = believed(stamps)
+    if good.size < FEWEST_ROWS:
         return None
-    middle = float(np.median(forward))
-    gaps = np.array([stop - start for start, stop in stream_gaps(good)])
-    low, high = np.percentile(forward, [5, 95])
+    forward = np.diff(good)
+    # Sorted in place: the steps of a large log are not held twice.
+    middle = float(np.median(forward, overwrite_input=True))
+    low, high = np.percentile(forward, [5, 95], overwrite_input=True)
+    gaps = np.array([stop - start for start, stop in _gaps(good, middle)])
     return StreamRate(
         message,
         instance,
@@ -107,8 +107,10 @@ def _of(message: str, instance: int | None, stamps: NDArray[np.float64]) -> Stre
 
 def stream_gaps(stamps: NDArray[np.float64]) -> list[Span]:
     """Spans between increasing stamps that are longer than 2.5 median steps, s."""
-    steps = np.diff(stamps)
-    if not steps.size:
+    if stamps.size < 2:
         return []
-    at = np.flatnonzero(steps > GAP_FACTOR.value * float(np.median(steps)))
-    return [(float(stamps[i]), float(stamps[i + 1])) for i in at]
+    return _gaps(stamps, float(np.median(np.diff(stamps), overwrite_input=True)))
+
+
+def _gaps(stamps: NDArray[np.float64], usual_s: float) -> list[Span]:
+    return longer_steps(stamps, GAP_FACTOR.value * usual_s)

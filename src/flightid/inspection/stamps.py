@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_left
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,8 @@ LONGEST_LOG_S = 1e6
 MARGIN = 0.2
 """A stamp may lie so many spans of the middle 98 % outside of them."""
 SLACK_S = 1.0
+BLOCK = 1 << 16
+"""Steps looked at together: stamps of a large log are not held twice."""
 
 
 def believable(time_s: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -34,18 +37,55 @@ def believable(time_s: NDArray[np.float64]) -> NDArray[np.bool_]:
     >>> believable(np.array([1.0, 2.0, 9.0, 3.0, 3.0, 4.0])).tolist()
     [True, True, False, False, True, True]
     """
+    if _are_all_believable(time_s):
+        return np.ones(time_s.shape, np.bool_)
     mask = np.isfinite(time_s)
     if not np.any(mask):
         return mask
-    low, high = np.percentile(time_s[mask], [1, 99])
-    if high - low > LONGEST_LOG_S:
-        return np.zeros_like(mask)
-    margin = MARGIN * (high - low) + SLACK_S
-    mask &= (time_s >= low - margin) & (time_s <= high + margin)
+    first, last = _limits(*np.percentile(time_s[mask], [1, 99]))
+    mask &= (time_s >= first) & (time_s <= last)
     kept = np.flatnonzero(mask)
     if kept.size > 1 and np.any(np.diff(time_s[kept]) <= 0):
         mask[kept] = _longest_increasing(time_s[kept])
     return mask
+
+
+def believed(time_s: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Stamps that are `believable`: the array itself where all are."""
+    return time_s if _are_all_believable(time_s) else time_s[believable(time_s)]
+
+
+def longer_steps(time_s: NDArray[np.float64], limit_s: float) -> list[tuple[float, float]]:
+    """Stamps before and after each step above a limit, s."""
+    return [
+        (float(part[at]), float(part[at + 1]))
+        for part in _parts(time_s)
+        for at in np.flatnonzero(np.diff(part) > limit_s)
+    ]
+
+
+def _parts(time_s: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:
+    """Blocks of steps: each begins with the stamp that the one before ends with."""
+    for first in range(0, max(time_s.size - 1, 0), BLOCK):
+        yield time_s[first : first + BLOCK + 1]
+
+
+def _are_all_believable(time_s: NDArray[np.float64]) -> bool:
+    """Tell by a pass without copies that stamps increase and none lies far from the others."""
+    if time_s.size == 0 or not all(np.all(part[1:] > part[:-1]) for part in _parts(time_s)):
+        return False
+    places = np.array([0.01, 0.99]) * (time_s.size - 1)
+    # Percentiles of what is sorted, rounded to a stamp, to the side that finds fault.
+    first, last = _limits(time_s[int(np.ceil(places[0]))], time_s[int(places[1])])
+    return bool(first <= time_s[0] and time_s[-1] <= last)
+
+
+def _limits(low: float, high: float) -> tuple[float, float]:
+    """First and last stamp that can be believed, by those below and above which 1 % lie, s."""
+    if high - low > LONGEST_LOG_S:
+        return np.inf, -np.inf
+    margin = MARGIN * (high - low) + SLACK_S
+    return low - margin, high + margin
 
 
 def _longest_increasing(values: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -76,7 +116,7 @@ def log_span(log: Log) -> tuple[float, float]:
     for info in sorted(stamped, key=lambda info: -info.count):
         instance = info.instances[0] if info.instances else None
         time_s = log.table(info.name, instance).time_s
-        good = time_s[believable(time_s)]
+        good = believed(time_s)
         if good.size > 1:
             return float(good[0]), float(good[-1])
     return 0.0, 0.0

@@ -1,6 +1,5 @@
 //! Columns on demand: one field of one table, all rows or one instance, scaled to physical numbers.
 
-use std::borrow::Cow;
 use std::collections::BTreeSet;
 
 use super::format::{Field, Kind, Scale, text};
@@ -35,14 +34,14 @@ impl<B: AsRef<[u8]>> Dataflash<B> {
         fields: &[&Field],
         instance: Option<i64>,
     ) -> Vec<Vec<f64>> {
-        let places = self.places(table, instance);
-        let reserved = |field: &&Field| Vec::with_capacity(places.len() * field.kind.width());
+        let rows = self.rows(table, instance);
+        let reserved = |field: &&Field| Vec::with_capacity(rows * field.kind.width());
         let mut columns: Vec<Vec<f64>> = fields.iter().map(reserved).collect();
-        for block in places.chunks(BLOCK) {
+        self.each_block(table, instance, |block| {
             for (column, field) in columns.iter_mut().zip(fields) {
                 self.append(column, block, field);
             }
-        }
+        });
         columns
     }
 
@@ -71,7 +70,6 @@ impl<B: AsRef<[u8]>> Dataflash<B> {
         };
         let bytes = self.bytes();
         self.places(table, instance)
-            .iter()
             .map(|at| {
                 let start = at + field.offset;
                 text(bytes.get(start..start + size).unwrap_or_default())
@@ -96,32 +94,53 @@ impl<B: AsRef<[u8]>> Dataflash<B> {
         };
         if field.kind == Kind::U8 {
             let mut seen = [false; 256];
-            for at in &table.offsets {
+            for at in table.offsets.iter() {
                 seen[usize::from(self.bytes().get(at + field.offset).copied().unwrap_or(0))] = true;
             }
             return (0..256).zip(seen).filter(|(_, seen)| *seen).map(|(id, _)| id).collect();
         }
-        let found: BTreeSet<i64> =
-            table.offsets.iter().map(|at| self.integer(*at, field)).collect();
+        let found: BTreeSet<i64> = table.offsets.iter().map(|at| self.integer(at, field)).collect();
         found.into_iter().collect()
     }
 
     /// Number of rows of an instance, or of all.
     pub fn rows(&self, table: &Table, instance: Option<i64>) -> usize {
-        self.places(table, instance).len()
+        match instance {
+            None => table.len(),
+            Some(_) => self.places(table, instance).count(),
+        }
     }
 
     /// Places of the rows of one instance, or of all.
-    pub(super) fn places<'a>(&self, table: &'a Table, instance: Option<i64>) -> Cow<'a, [usize]> {
-        let Some(wanted) = instance else {
-            return (&table.offsets).into();
-        };
-        let Some(field) = instance_field(table) else {
-            return Vec::new().into();
-        };
-        let keeps = |at: &&usize| self.integer(**at, field) == wanted;
-        let kept: Vec<usize> = table.offsets.iter().filter(keeps).copied().collect();
-        kept.into()
+    pub(super) fn places(
+        &self,
+        table: &Table,
+        instance: Option<i64>,
+    ) -> impl Iterator<Item = usize> + Clone {
+        let field = instance_field(table);
+        table.offsets.iter().filter(move |&at| match (instance, field) {
+            (None, _) => true,
+            (Some(wanted), Some(field)) => self.integer(at, field) == wanted,
+            (Some(_), None) => false,
+        })
+    }
+
+    /// Do something with the places of `BLOCK` rows at a time.
+    pub(super) fn each_block(
+        &self,
+        table: &Table,
+        instance: Option<i64>,
+        mut work: impl FnMut(&[usize]),
+    ) {
+        let mut block = Vec::with_capacity(BLOCK);
+        for place in self.places(table, instance) {
+            block.push(place);
+            if block.len() == BLOCK {
+                work(&block);
+                block.clear();
+            }
+        }
+        work(&block);
     }
 
     fn integer(&self, at: usize, field: &Field) -> i64 {

@@ -73,7 +73,7 @@ fn rows<'a, const N: usize>(
             for (span, (offset, kind)) in spans.iter_mut().zip(found) {
                 *span = (offset, kind.size());
             }
-            offsets.clone_from(&table.offsets);
+            offsets = table.offsets.iter().collect();
         }
     }
     offsets.into_iter().map(move |at| {

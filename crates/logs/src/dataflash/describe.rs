@@ -24,30 +24,32 @@ impl<B: AsRef<[u8]>> Dataflash<B> {
     /// Describe the stamps of a table, given its instances; None without rows or stamps.
     pub fn describe(&self, table: &Table, instances: &[i64]) -> Option<Stamps> {
         let field = table.layout.stamp()?;
-        let (first_s, last_s) = self.extremes(&table.offsets, field)?;
+        let (first_s, last_s) = self.extremes(table, field)?;
         let lowest = match instances {
             [lowest, _, ..] => Some(*lowest),
             _ => None,
         };
-        let interval_s = self.median_step(&self.places(table, lowest), field);
+        let interval_s = self.median_step(table, lowest, field);
         Some(Stamps { first_s, last_s, interval_s })
     }
 
     /// Least and greatest number of a field.
-    fn extremes(&self, places: &[usize], field: &Field) -> Option<(f64, f64)> {
+    fn extremes(&self, table: &Table, field: &Field) -> Option<(f64, f64)> {
         let mut values = Vec::with_capacity(BLOCK);
-        let blocks = places.chunks(BLOCK).map(|block| {
+        let mut ends = (f64::NAN, f64::NAN);
+        self.each_block(table, None, |block| {
             values.clear();
             self.append(&mut values, block, field);
-            let least = values.iter().copied().fold(f64::NAN, f64::min);
-            (least, values.iter().copied().fold(f64::NAN, f64::max))
+            ends = values.iter().fold(ends, |(low, high), &each| (low.min(each), high.max(each)));
         });
-        blocks.reduce(|all, block| (all.0.min(block.0), all.1.max(block.1)))
+        (!table.is_empty()).then_some(ends)
     }
 
-    fn median_step(&self, places: &[usize], field: &Field) -> Option<f64> {
-        let stride = (places.len() / STEPS).max(1);
-        let pairs: Vec<usize> = places.windows(2).step_by(stride).flatten().copied().collect();
+    fn median_step(&self, table: &Table, instance: Option<i64>, field: &Field) -> Option<f64> {
+        let stride = (self.rows(table, instance) / STEPS).max(1);
+        let places = self.places(table, instance);
+        let steps = places.clone().zip(places.skip(1)).step_by(stride);
+        let pairs: Vec<usize> = steps.flat_map(|(from, to)| [from, to]).collect();
         let mut stamps = Vec::with_capacity(pairs.len());
         self.append(&mut stamps, &pairs, field);
         let mut steps: Vec<f64> = stamps

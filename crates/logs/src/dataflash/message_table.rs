@@ -1,13 +1,14 @@
 //! One message type of a DataFlash log: its layout and where its rows lie.
 
 use super::format::{Field, Layout};
+use crate::places::Places;
 
 /// Rows of one message type, as places in the file.
 #[derive(Debug, Clone)]
 pub struct Table {
     pub(super) layout: Layout,
     /// Place of each row in the file, header included.
-    pub(super) offsets: Vec<usize>,
+    pub(super) offsets: Places,
 }
 
 impl Table {
@@ -32,7 +33,7 @@ impl Table {
     }
 
     /// Place of each row in the file, header included.
-    pub fn offsets(&self) -> &[usize] {
+    pub fn offsets(&self) -> &Places {
         &self.offsets
     }
 

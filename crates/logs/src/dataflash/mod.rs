@@ -12,6 +12,7 @@ mod log_index;
 mod message_table;
 pub mod printed;
 mod scan;
+mod silence;
 
 pub use describe::Stamps;
 pub use format::{Field, Kind, Scale};

@@ -14,6 +14,7 @@
 
 use super::format::{FMT_SIZE, FMT_TYPE, HEADER_1, HEADER_2, HEADER_SIZE, Layout, definition};
 use super::message_table::Table;
+use crate::places::Places;
 
 /// Stamps this close to the last one prove a message after garbage, µs.
 const NEAR_US: u64 = 60_000_000;
@@ -100,7 +101,7 @@ struct Scanner<'a> {
     known: [Known; 256],
     tables: Vec<Table>,
     /// Rows by table: apart from the tables, so that those in use share a few cache lines.
-    offsets: Vec<Vec<usize>>,
+    offsets: Vec<Places>,
     skipped: Vec<Skipped>,
     /// Place of the last stamp read; 0 before the first.
     last_stamp: usize,
@@ -305,8 +306,8 @@ impl<'a> Scanner<'a> {
         };
         self.known[slot] = Known { size: layout.size, table, stamp };
         if table == self.tables.len() && table < MAXIMUM_TABLES {
-            self.tables.push(Table { layout, offsets: Vec::new() });
-            self.offsets.push(Vec::new());
+            self.tables.push(Table { layout, offsets: Places::default() });
+            self.offsets.push(Places::default());
         }
     }
 

@@ -9,6 +9,7 @@ use super::framing::{
 };
 use super::message_format::{Formats, Shape, is_message_name};
 use crate::error::LogError;
+use crate::places::Places;
 
 const MAGIC: [u8; 7] = [0x55, 0x4c, 0x6f, 0x67, 0x01, 0x12, 0x35];
 const HEADER: usize = 16;
@@ -35,7 +36,7 @@ pub struct Table {
     /// Instance (0 for the first sensor of a kind).
     pub instance: u8,
     /// Place of each sample's payload in the file, message number excluded.
-    pub offsets: Vec<u64>,
+    pub offsets: Places,
     pub(crate) shape: Shape,
 }
 
@@ -272,7 +273,7 @@ impl Ulog {
         let Some(table) = self.tables.get_mut(index as usize) else {
             return;
         };
-        table.offsets.push((at + 5) as u64);
+        table.offsets.push(at + 5);
         self.last_sample = Some((index, at, stop));
         let stamp = table.shape.stamp.and_then(|(primitive, offset)| {
             primitive.unsigned(sample.get(offset..offset + primitive.size())?)
@@ -301,7 +302,12 @@ impl Ulog {
         };
         let key = (Box::from(name), instance);
         let index = *self.by_key.entry(key).or_insert_with(|| {
-            self.tables.push(Table { name: name.into(), instance, offsets: Vec::new(), shape });
+            self.tables.push(Table {
+                name: name.into(),
+                instance,
+                offsets: Places::default(),
+                shape,
+            });
             (self.tables.len() - 1) as u32
         });
         let id = usize::from(u16::from_le_bytes([low, high]));

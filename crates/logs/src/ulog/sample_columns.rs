@@ -1,6 +1,5 @@
 //! Columns of a ULog table: samples gathered from their places in the file to 64-bit floats.
 
-use std::borrow::Cow;
 use std::collections::HashMap;
 
 use super::log_index::{Table, Ulog};
@@ -21,7 +20,7 @@ impl Ulog {
         instance: Option<u8>,
         names: &[String],
     ) -> Result<Vec<Vec<f64>>, LogError> {
-        let offsets = self.offsets(message, instance)?;
+        let chosen = self.chosen(message, instance)?;
         let columns = self.formats.columns(message);
         let by_name: HashMap<&str, &Column> =
             columns.iter().map(|column| (column.name.as_str(), column)).collect();
@@ -29,38 +28,45 @@ impl Ulog {
             .iter()
             .map(|name| by_name.get(name.as_str()).ok_or_else(|| missing_field(name, &columns)))
             .collect::<Result<Vec<_>, _>>()?;
-        let mut values: Vec<Vec<f64>> =
-            wanted.iter().map(|_| Vec::with_capacity(offsets.len())).collect();
-        for block in offsets.chunks(BLOCK) {
+        let rows = chosen.iter().map(|table| table.offsets.len()).sum();
+        let mut values: Vec<Vec<f64>> = wanted.iter().map(|_| Vec::with_capacity(rows)).collect();
+        let mut offsets = in_file_order(&chosen);
+        let mut block: Vec<usize> = Vec::with_capacity(BLOCK);
+        loop {
+            block.clear();
+            block.extend(offsets.by_ref().take(BLOCK));
+            if block.is_empty() {
+                return Ok(values);
+            }
             for (column, values) in wanted.iter().zip(&mut values) {
-                gather_block(bytes, block, column, values)?;
+                gather_block(bytes, &block, column, values)?;
             }
         }
-        Ok(values)
     }
 
-    fn offsets(&self, message: &str, instance: Option<u8>) -> Result<Cow<'_, [u64]>, LogError> {
-        let chosen: Vec<&Table> = self
-            .tables
-            .iter()
-            .filter(|table| &*table.name == message)
-            .filter(|table| instance.is_none_or(|instance| table.instance == instance))
-            .collect();
-        match chosen.as_slice() {
-            [] => Err(LogError::Missing {
+    /// Tables of one instance of a message, or of all.
+    fn chosen(&self, message: &str, instance: Option<u8>) -> Result<Vec<&Table>, LogError> {
+        let named = self.tables.iter().filter(|table| &*table.name == message);
+        let chosen: Vec<&Table> =
+            named.filter(|table| instance.is_none_or(|number| table.instance == number)).collect();
+        if chosen.is_empty() {
+            return Err(LogError::Missing {
                 what: "message",
                 name: instance.map_or(message.to_string(), |i| format!("{message} instance {i}")),
                 available: shortened(self.tables.iter().map(|table| &*table.name)),
-            }),
-            [table] => Ok(Cow::Borrowed(&table.offsets)),
-            several => {
-                let mut all: Vec<u64> =
-                    several.iter().flat_map(|table| table.offsets.iter().copied()).collect();
-                all.sort_unstable();
-                Ok(Cow::Owned(all))
-            }
+            });
         }
+        Ok(chosen)
     }
+}
+
+/// Places of the samples of some tables, merged: of one, or of the few instances of a message.
+fn in_file_order(tables: &[&Table]) -> impl Iterator<Item = usize> {
+    let mut parts: Vec<_> = tables.iter().map(|table| table.offsets.iter().peekable()).collect();
+    std::iter::from_fn(move || {
+        let ahead = parts.iter_mut().filter_map(|part| part.peek().copied().map(|at| (at, part)));
+        ahead.min_by_key(|(at, _)| *at)?.1.next()
+    })
 }
 
 fn missing_field(name: &str, columns: &[Column]) -> LogError {
@@ -82,7 +88,7 @@ fn shortened<'a>(names: impl Iterator<Item = &'a str>) -> String {
 
 fn gather_block(
     bytes: &[u8],
-    offsets: &[u64],
+    offsets: &[usize],
     column: &Column,
     values: &mut Vec<f64>,
 ) -> Result<(), LogError> {
@@ -106,16 +112,16 @@ fn gather_block(
 
 fn push<const N: usize>(
     bytes: &[u8],
-    offsets: &[u64],
+    offsets: &[usize],
     at: usize,
     values: &mut Vec<f64>,
     convert: impl Fn([u8; N]) -> f64,
 ) -> Result<(), LogError> {
     for &offset in offsets {
         let raw = bytes
-            .get(offset as usize + at..)
+            .get(offset + at..)
             .and_then(|rest| rest.first_chunk::<N>())
-            .ok_or(LogError::Changed { at: offset })?;
+            .ok_or(LogError::Changed { at: offset as u64 })?;
         values.push(convert(*raw));
     }
     Ok(())

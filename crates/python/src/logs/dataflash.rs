@@ -107,7 +107,7 @@ impl DataflashFile {
     ///
     /// Place of each row in the file.
     fn offsets<'py>(&self, py: Python<'py>, table: usize) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let places = self.table_at(table)?.offsets().iter().map(|place| *place as f64);
+        let places = self.table_at(table)?.offsets().iter().map(|place| place as f64);
         Ok(places.collect::<Vec<f64>>().into_pyarray(py))
     }
 
@@ -129,6 +129,13 @@ impl DataflashFile {
     fn skipped(&self) -> Vec<(usize, usize, String)> {
         let ranges = self.0.skipped().iter();
         ranges.map(|range| (range.start, range.stop, range.reason.to_string())).collect()
+    }
+
+    /// silences(self, longest_s: float) -> list[tuple[float, float]]
+    ///
+    /// Last stamp before and first after each span above `longest_s` without any stamp, s.
+    fn silences(&self, py: Python<'_>, longest_s: f64) -> PyResult<Vec<(f64, f64)>> {
+        self.read(py, || self.0.silences(longest_s))
     }
 
     /// size(self) -> int

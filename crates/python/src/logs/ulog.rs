@@ -1,6 +1,7 @@
 //! Binding of `flightid_logs::ulog` (used by `logs/ulog/reader.py`).
 
-use flightid_logs::LogError;
+use std::path::PathBuf;
+
 use flightid_logs::ulog::Ulog;
 use flightid_logs::ulog::entry::{Entry, Value};
 use numpy::{IntoPyArray, PyArray1};
@@ -9,26 +10,47 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use crate::error::from_logs;
+use crate::file_bytes::FileBytes;
 
 type Pair = (String, Py<PyAny>);
 type Line = (u64, u8, Option<u16>, String);
 
 /// __init__(self, data: bytes) -> None
 ///
-/// Index of a PX4 ULog; columns are gathered from the bytes when they are asked for.
+/// Index of a PX4 ULog; columns are gathered from the bytes, here a copy, when they are asked for.
 #[pyclass(frozen, name = "Ulog", module = "flightid._native")]
 pub struct PyUlog {
-    data: Py<PyBytes>,
+    data: FileBytes,
     log: Ulog,
+}
+
+/// open_ulog(path: str) -> Ulog
+///
+/// Map and index a log. Of a file that is shortened while it is in use every reading fails.
+#[pyfunction]
+fn open_ulog(py: Python<'_>, path: PathBuf) -> PyResult<PyUlog> {
+    let bytes = py.detach(|| FileBytes::open(&path))?;
+    index(py, bytes)
+}
+
+fn index(py: Python<'_>, data: FileBytes) -> PyResult<PyUlog> {
+    let log = py.detach(|| Ulog::index(data.as_ref()));
+    data.require_whole()?;
+    Ok(PyUlog { data, log: log.map_err(from_logs)? })
 }
 
 #[pymethods]
 impl PyUlog {
     #[new]
-    fn new(py: Python<'_>, data: Py<PyBytes>) -> PyResult<Self> {
-        let bytes = data.as_bytes(py);
-        let log = py.detach(|| Ulog::index(bytes)).map_err(from_logs)?;
-        Ok(Self { data, log })
+    fn new(py: Python<'_>, data: &[u8]) -> PyResult<Self> {
+        index(py, FileBytes::Owned(data.to_vec()))
+    }
+
+    /// size(self) -> int
+    ///
+    /// Bytes of the file.
+    fn size(&self) -> usize {
+        self.data.as_ref().len()
     }
 
     /// header(self) -> tuple[int, int, int, list[int]]
@@ -64,9 +86,9 @@ impl PyUlog {
         instance: Option<u8>,
         columns: Vec<String>,
     ) -> PyResult<Vec<Bound<'py, PyArray1<f64>>>> {
-        let bytes = self.data.as_bytes(py);
-        let gathered: Result<Vec<Vec<f64>>, LogError> =
-            py.detach(|| self.log.gather(bytes, message, instance, &columns));
+        let bytes = self.data.as_ref();
+        let gathered = py.detach(|| self.log.gather(bytes, message, instance, &columns));
+        self.data.require_whole()?;
         let arrays = gathered.map_err(from_logs)?;
         Ok(arrays.into_iter().map(|values| values.into_pyarray(py)).collect())
     }
@@ -156,5 +178,6 @@ fn pair(py: Python<'_>, entry: &Entry) -> PyResult<Pair> {
 
 /// Add the class of this file to the module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<PyUlog>()
+    module.add_class::<PyUlog>()?;
+    module.add_function(wrap_pyfunction!(open_ulog, module)?)
 }

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
+from itertools import repeat
 from pathlib import Path
 from typing import NamedTuple
 
@@ -233,23 +234,21 @@ class DataflashSource:
         """Vehicle named by the firmware text."""
         return vehicle_of(self.firmware) if self.firmware else None
 
-    @cached_property
-    def _parameter_rows(self) -> list[tuple[float | None, str, float]]:
-        if not self._has("PARM", "Name", "Value"):
-            return []
-        names = self.texts("PARM", "Name", None)
-        values = self.numbers("PARM", "Value", None).tolist()
-        return list(zip(self._stamps_or_none("PARM"), names, values, strict=True))
+    def _parameter_rows(self) -> Iterator[tuple[float | None, str, float]]:
+        if self._has("PARM", "Name", "Value"):
+            names = self.texts("PARM", "Name", None)
+            values = map(float, self.numbers("PARM", "Value", None))
+            yield from zip(self._stamps_or_none("PARM"), names, values, strict=True)
 
     @cached_property
     def parameters(self) -> dict[str, float]:
         """Last value by parameter name."""
-        return {name: value for _, name, value in self._parameter_rows}
+        return {name: value for _, name, value in self._parameter_rows()}
 
     @cached_property
     def parameter_changes(self) -> list[ParameterChange]:
         """Values that differ from the one logged before."""
-        return changes_among(self._parameter_rows)
+        return changes_among(self._parameter_rows())
 
     @cached_property
     def events(self) -> list[Event]:
@@ -291,14 +290,8 @@ class DataflashSource:
     @cached_property
     def gaps(self) -> list[Gap]:
         """Spans above `GAP_S` in which no message of any kind is stamped."""
-        stamped = [m.name for m in self._messages.values() if m.first_s is not None]
-        if not stamped:
-            return []
-        stamps = np.sort(np.concatenate([self.time_s(name, None) for name in stamped]))
-        places = np.flatnonzero(np.diff(stamps) > GAP_S)
-        return [
-            Gap(float(stamps[i]), float(stamps[i + 1]), "no message of any kind") for i in places
-        ]
+        silences = self._file.silences(GAP_S)
+        return [Gap(start_s, stop_s, "no message of any kind") for start_s, stop_s in silences]
 
     @cached_property
     def findings(self) -> list[Finding]:
@@ -370,11 +363,11 @@ class DataflashSource:
         info = self._messages.get(message)
         return info is not None and all(field in info.fields for field in fields)
 
-    def _stamps_or_none(self, message: str) -> Sequence[float | None]:
+    def _stamps_or_none(self, message: str) -> Iterable[float | None]:
         info = self._messages[message]
         if info.first_s is None:
-            return [None] * info.count
-        return list(map(float, self.time_s(message, None)))
+            return repeat(None, info.count)
+        return map(float, self.time_s(message, None))
 
     def _integers(self, message: str, field: str) -> list[int]:
         return [int(value) for value in self.numbers(message, field, None)]

@@ -32,7 +32,7 @@ class UlogSource:
     Parameters
     ----------
     path : path-like
-        The file; its bytes are read once and kept, columns are made from them on demand.
+        The file; it is mapped and walked through once, columns are made from them on demand.
 
     Raises
     ------
@@ -43,9 +43,7 @@ class UlogSource:
     """
 
     def __init__(self, path: str | Path) -> None:
-        data = Path(path).read_bytes()
-        self._size = len(data)
-        self._native = _native.Ulog(data)
+        self._native = _native.open_ulog(str(path))
 
     @property
     def kind(self) -> str:
@@ -170,7 +168,7 @@ class UlogSource:
                 Finding(
                     "log-damaged",
                     Light.AMBER,
-                    f"{lost} of {self._size} bytes could not be read, in "
+                    f"{lost} of {self._native.size()} bytes could not be read, in "
                     f"{counted(len(damaged), 'place')}; all records between them were kept",
                     "copy the log from the card again and compare; Log.skipped lists the places",
                 )
