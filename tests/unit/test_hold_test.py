@@ -9,7 +9,8 @@ import pytest
 
 import flightid as fid
 from flightid.identification.hold_likelihood import HeldOutputs, held_outputs
-from flightid.identification.hold_test import OtherHold, judged
+from flightid.identification.hold_test import judged
+from flightid.identification.rival_holds import OtherHold
 from flightid.models import load_model
 from tests.closeness import assert_close
 from tests.strangers import holds
@@ -186,3 +187,44 @@ def test_a_model_that_runs_away_is_asked_nothing_of_its_hold() -> None:
     small = {name: 1e-4 * flown[name] for name in flown.outputs}
     with pytest.raises(fid.FlightidError, match="leads away"):
         held_outputs(holds.model(), [flown.replace(small)], {}, ["zero", "first"])
+
+
+def _fed_back(seed: int, n: int = 2000, step_s: float = 0.02) -> fid.Record:
+    """Roll rate under an exactly held controller that feeds the gyro's noise back (Euler, 2 ms)."""
+    random, fine = np.random.default_rng(seed), 10
+    late, time_s = round(0.03 * fine / step_s), np.arange(n) * step_s
+    sweep = 0.1 * np.sin(2.0 * np.pi * (0.2 + 1.9 * time_s / time_s[-1]) * time_s)
+    rate, angle, held = 0.0, 0.0, [0.0] * (late + 1)
+    rows = np.zeros((2, n))
+    for k in range(n):
+        seen = rate + 0.3 * random.standard_normal()
+        rows[:, k] = sweep[k] - 0.15 * seen - 0.3 * angle, seen
+        for _ in range(fine):
+            held.append(float(rows[0, k]))
+            rate += step_s / fine * (40.0 * held[-1 - late] - 3.0 * rate)
+            angle += step_s / fine * rate
+    return fid.Record.from_arrays(
+        time_s, inputs={"u": rows[0]}, outputs={"p": rows[1]}, hold="zero",
+        units={"u": "1", "p": "rad/s"},
+    )  # fmt: skip
+
+
+def test_a_closed_loop_does_not_speak_against_a_hold_that_is_true() -> None:
+    """Smooth inputs are made of samples to come, and those know the noise by then."""
+    known = [
+        fid.Parameter("K", 30.0, "rad/s^2"),
+        fid.Parameter("Lp", -2.0, "1/s"),
+        fid.Parameter("tau", 0.02, "s", minimum=0.0),
+    ]
+    path = fid.TransferFunction("p", "u", "K", denominator=("s - Lp",), delay="tau")
+    units = {"u": "1", "p": "rad/s"}
+    model = fid.TransferFunctionModel((path,), fid.Parameters(known), units=units)
+    fits = {
+        loop: fid.identify(model, _fed_back(7), method="output_error", loop=loop)
+        for loop in (None, "closed", "open")
+    }
+    said = {loop: [each.code for each in fit.findings] for loop, fit in fits.items()}
+    assert "hold-contradicted" not in said[None] + said["closed"]
+    assert "hold-contradicted" in said["open"]
+    line = next(line for line in fits["closed"].evidence.lines if "the data cannot tell" in line)
+    assert "Inputs are steps between samples as the records say" in line

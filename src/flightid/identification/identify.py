@@ -192,7 +192,7 @@ def identify(
     known = data_provenance(flat(data), channels)
     fit = replace(fit, provenance={**fit.provenance, **known, "told": told})
     if held is not None:
-        fit = with_hold_said(*with_hold_tested(fit, chosen, data, given, held))
+        fit = with_hold_said(*with_hold_tested(fit, chosen, data, given, held, loop))
     if not in_doubt(fit.findings):
         fit = with_residuals_judged(fit)
     fit = replace(fit, provenance={**fit.provenance, LEFT: left_by_fit(fit)})
