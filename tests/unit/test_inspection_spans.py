@@ -13,7 +13,7 @@ from flightid.inspection.actuators import find_actuators
 from flightid.inspection.flight_phases import FlightPhases, flight_phases
 from flightid.inspection.gap_findings import gap_findings
 from flightid.inspection.rates import stream_rates
-from flightid.inspection.signals import Signal, find, records
+from flightid.inspection.signals import Signal, find, inside, records
 from flightid.logs import Log, read_log
 from flightid.logs.dataflash.writer import DataflashWriter
 from flightid.logs.ulog.reader import UlogSource
@@ -46,6 +46,16 @@ def test_a_span_that_ends_a_microsecond_after_a_stream_keeps_the_stream() -> Non
     signals = [Signal(name, stamps, np.sin(stamps), "1", name) for name in ("tau_phi", "p")]
     (made,) = records(signals, {"tau_phi"}, [(-1e-6, stamps[-1] + 1e-6)])
     assert made.n_samples == stamps.size
+
+
+def test_both_ends_of_a_span_are_inside() -> None:
+    assert inside(np.arange(5.0), [(0.0, 1.0), (3.0, 3.0)]).tolist() == [
+        True,
+        True,
+        False,
+        True,
+        False,
+    ]
 
 
 @pytest.mark.parametrize("rate", [None, 50.0])

@@ -9,7 +9,7 @@ import pytest
 from scipy.signal import lfilter
 
 import flightid as fid
-from flightid.uncertainty.residual_noise import autoregression, periodogram
+from flightid.uncertainty.residual_noise import _lags, autoregression, periodogram
 from flightid.uncertainty.slow_drift import Drift, _is_slow
 from tests.closeness import assert_close
 from tests.strangers import noises, output_error
@@ -80,3 +80,10 @@ def test_slow_noise_does_not_hide_a_missing_lag() -> None:
     fit = fid.identify(output_error.model(), late, method="output_error")
     assert any(found.code == "inputs-in-errors" for found in fit.findings)
     assert fit.covariance is None
+
+
+def test_lags_of_a_padded_periodogram_are_those_of_the_samples() -> None:
+    values = np.array([1.0, -2.0, 0.5, 3.0])
+    found = _lags(np.abs(np.fft.rfft(values, 8)) ** 2, 8, 2)
+    wanted = [float(values[k:] @ values[: 4 - k]) for k in range(3)]
+    assert_close(found, np.array(wanted), rtol=1e-12, why="Wiener and Khinchin")

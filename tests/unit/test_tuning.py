@@ -18,7 +18,7 @@ from flightid.control.tuning.gain_search import _report
 from flightid.control.tuning.loop_problem import LoopProblem, highest_crossover
 from flightid.control.tuning.order_statistics import content_of_worst, least_share
 from flightid.control.tuning.requirements import TuningRequirements
-from flightid.control.tuning.tune_pid import naming_filters
+from flightid.control.tuning.tune_pid import naming_filters, noise_density
 from flightid.conventions import Light
 from flightid.errors import DataError, ModelError, OptionError, UnknownNameError
 from flightid.findings import Finding
@@ -385,6 +385,24 @@ def test_a_late_output_turns_both_paths_by_its_delay() -> None:
     turned = np.exp(-0.002j * omega)
     for path in (ControllerPaths.feedback, ControllerPaths.forward):
         assert_close(path(after, omega), path(here, omega) * turned, rtol=1e-12, why="exact")
+
+
+def test_white_gyro_noise_has_its_variance_up_to_half_the_rate() -> None:
+    found = noise_density(0.1, 0.0025)
+    assert found is not None
+    variance = np.trapezoid(found[1], found[0] / (2.0 * np.pi))
+    assert_close(variance, 0.1**2, rtol=1e-12, why="0 to 200 Hz")
+    for given in (0.0, -0.1, np.inf):
+        with pytest.raises(OptionError, match="gyro_noise has no meaning"):
+            noise_density(given, 0.0025)
+
+
+@pytest.mark.parametrize("confidence", [0.0, 1.0, np.nan])
+def test_a_statement_about_content_needs_a_confidence_between_none_and_all(
+    confidence: float,
+) -> None:
+    with pytest.raises(OptionError, match="no statement about content"):
+        content_of_worst(10, confidence)
 
 
 def test_the_highest_crossing_counts_for_the_band() -> None:

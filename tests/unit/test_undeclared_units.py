@@ -9,6 +9,7 @@ import pytest
 
 import flightid as fid
 from flightid.conventions import Light
+from flightid.logs.scale_check import ScaleCheck
 from flightid.record.checks import record_findings
 from tests.old_log import write_old_log
 
@@ -44,3 +45,21 @@ def test_a_scale_that_is_wrong_is_red_with_the_factor(tmp_path: Path, scale: flo
     assert f"{DEGREES / scale:.4g} times the turning of RATE.P" in " ".join(f.message for f in said)
     record = fid.read_log(path).record(names=["tau_theta", "q"])
     assert [finding.code for finding in record_findings(record)] == ["scale-contradicted"]
+
+
+@pytest.mark.parametrize(
+    ("factor", "correlation", "said"),
+    [
+        (1.04, 1.0, None), (0.96, 1.0, None), (1.06, 1.0, "1.06 times"), (0.94, 1.0, "0.94 times"),
+        (1.0, -1.0, "-1 times"), (55.0, 1.0, "degrees"), (60.0, 1.0, "degrees"),
+        (1 / 55.0, 1.0, "degrees"), (1 / 60.0, 1.0, "degrees"), (30.0, 1.0, "30 times"),
+    ],
+)  # fmt: skip
+def test_a_scale_may_be_a_twentieth_off(
+    factor: float, correlation: float, said: str | None
+) -> None:
+    found = ScaleCheck("p", "GYR", "RATE", factor, correlation, 100).finding
+    assert (found is None) is (said is None)
+    if found is not None and said is not None:
+        assert said in found.message
+        assert ("degrees" in found.message) is (said == "degrees")
