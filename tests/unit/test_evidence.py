@@ -112,6 +112,7 @@ def test_a_narrow_band_is_not_green(ratio: float, light: str) -> None:
         (1, 2.0, (1.0, 3.0), "green"),
         (1, 2.0, (-1.0, 5.0), "amber"),
         (-1, -2.0, (-5.0, 0.5), "amber"),
+        (-1, -2.0, (-5.0, 0.0), "amber"),
         (-1, 0.0, None, "amber"),
     ],
 )

@@ -25,6 +25,7 @@ from flightid.plot.glance import flight_glance
 from flightid.review.apart import gains_between
 from flightid.review.deconvolution import LoopSamples, closed_loop
 from flightid.review.gyro_noise import GyroNoise
+from flightid.review.loops import _pair
 from flightid.review.motors import motor_use, turning, yaw_trim
 from flightid.review.verdicts import judge_flight
 from flightid.uncertainty.estimate import Estimate
@@ -261,3 +262,18 @@ def test_gains_between_flights_are_those_that_differ_in_both() -> None:
 
     found = gains_between(flight(P=1.0, I=2.0, D=3.0), flight(P=1.0, I=2.5, FF=4.0))
     assert found == {"I": (2.0, 2.5)}
+
+
+@pytest.mark.parametrize("told", [True, False])
+def test_the_attitude_goes_with_a_loop_where_it_was_logged(tmp_path: Path, *, told: bool) -> None:
+    stamps = (1e7 + 1e4 * np.arange(300)).astype(np.int64)
+    writer = DataflashWriter()
+    writer.message(int(stamps[0]), "ArduCopter V4.6.0 (test)")
+    moved = np.sin(1e-6 * stamps)
+    writer.add("RATE", stamps, {"RDes": moved, "R": moved, "ROut": moved})
+    if told:
+        writer.add("ATT", stamps, {"Roll": moved})
+    pair = _pair(fid.read_log(writer.write(tmp_path / "log.bin")), "roll", "rate")
+    assert pair is not None
+    assert (pair.set_point.name, pair.measured.name) == ("set_point", "measured")
+    assert (pair.attitude.name if pair.attitude else None) == ("attitude" if told else None)
