@@ -14,6 +14,7 @@ from flightid.conventions import Light
 from flightid.errors import OptionError
 from flightid.evidence import Check, Evidence, inspection_check, residual_check
 from flightid.evidence.evidence import ALWAYS, NAMES
+from flightid.evidence.gather import LIMITS, _of_findings
 from flightid.evidence.parameter_checks import declared_signs
 from flightid.evidence.spans import Span, judge_coherence, judge_span, spans_of
 from flightid.findings import Finding, worst
@@ -202,3 +203,15 @@ def test_the_headline_begins_with_what_is_predicted_of_unseen_data() -> None:
     assert _all_green().with_checks([seen]).verdict.message.startswith("predicts 84 % of y; every")
     poor = Check("prediction", Light.RED, "predicts y no better than a constant", "add terms")
     assert _all_green().with_checks([poor]).verdict.message == poor.what
+
+
+def test_what_data_cannot_tell_stands_beside_what_they_say() -> None:
+    code = min(LIMITS)
+    unseen = Finding(code, Light.AMBER, "no data tell of drift", "")
+    bad = Finding("residuals-not-white", Light.RED, "fails", "raise the order")
+    alone = _of_findings("residuals", [unseen], "")
+    both = _of_findings("residuals", [unseen, bad], "")
+    assert alone is not None
+    assert (alone.light, alone.limit) == (Light.GREEN, "No data tell of drift")
+    assert both is not None
+    assert (both.light, both.what, both.limit) == (Light.RED, "fails", "No data tell of drift")

@@ -109,6 +109,8 @@ def test_bits_of_the_logging_mask_are_those_of_the_vehicle() -> None:
 def test_who_flew_is_read_from_the_modes(modes: list[str], kind: str, words: str) -> None:
     events = tuple(Event(5.0 + 3 * i, "mode", mode) for i, mode in enumerate(modes))
     found = _plain(log(events=events), (6.0, 20.0))
+    to_the_last = _plain(log(events=events), (6.0, 5.0 + 3 * max(1, len(events) - 1)))
+    assert to_the_last == found
     assert found[0] == kind
     assert found[1].startswith(words)
     if kind == "flying" and modes:

@@ -9,6 +9,7 @@ import pytest
 import flightid as fid
 from flightid.errors import LogFormatError
 from flightid.logs.mavlink.messages import telemetry_messages
+from flightid.logs.ulog.names import AIRFRAMES
 
 mavlink = pytest.importorskip("pymavlink.dialects.v20.ardupilotmega")
 START_US = 1_700_000_000_000_000
@@ -132,3 +133,11 @@ def test_table_agrees_with_the_definitions(message: object) -> None:
     assert (message.id, message.seed) == (peer.id, peer.crc_extra)
     assert list(message.layout.names) == list(peer.ordered_fieldnames)
     assert message.layout.itemsize == peer.unpacker.size
+
+
+def test_airframes_of_ulog_are_those_of_mavlink() -> None:
+    kinds = {
+        "FIXED_WING": "plane", "HELICOPTER": "heli", "GROUND_ROVER": "rover", "QUADROTOR": "copter",
+        "COAXIAL": "copter", "HEXAROTOR": "copter", "OCTOROTOR": "copter", "TRICOPTER": "copter",
+    }  # fmt: skip
+    assert {getattr(mavlink, f"MAV_TYPE_{name}"): kind for name, kind in kinds.items()} == AIRFRAMES
