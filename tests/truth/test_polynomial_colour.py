@@ -106,6 +106,23 @@ def test_colour_widens_and_noise_models_keep_their_own_errors() -> None:
     assert not has_noise_model(fid.PolynomialModel.arx("u", "y", na=0, nb=4))
 
 
+@pytest.mark.parametrize(("colour", "told"), [(1.0, False), (0.9, True)])
+def test_a_root_of_d_that_may_be_one_has_no_interval(colour: float, *, told: bool) -> None:
+    """A random walk's D ends inside the circle: to first order 63 % held and all were green."""
+    random = np.random.default_rng(4)
+    u = np.repeat(random.standard_normal(150), 4)
+    walk = lfilter([1.0], [1.0, -colour], 0.3 * random.standard_normal(u.size))
+    y = lfilter([0.0, 1.0, 0.5], [1.0, -1.5, 0.7], u) + walk
+    record = fid.Record.from_arrays(
+        np.arange(u.size) * STEP_S, inputs={"u": u}, outputs={"y": y}, hold="zero"
+    )
+    structure = fid.PolynomialModel.bj("u", "y", nb=2, nc=0, nd=1, nf=2)
+    found = fid.identify(structure, record, loop="open").parameters
+    assert (found["d1"].stderr is not None) == told
+    assert ("unit circle" in found["d1"].reason) != told
+    assert found["f1"].stderr is not None
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("colour", [-0.5, 0.0, 0.5, 0.9])
 def test_intervals_cover(colour: float) -> None:

@@ -38,6 +38,12 @@ from flightid.uncertainty.foretold import chance_share, independent_samples, lik
 Array = NDArray[np.float64]
 UNDETERMINED = "the data do not tell the coefficients apart"
 NOISE_MODEL = "prediction errors are not white, so the noise model's coefficients are not its truth"
+DRIFT = "a root of D may lie on the unit circle, where its errors to first order do not hold"
+UNIT_ROOT = 2.86
+"""Standard errors that 5 % of estimates of a root at one lie further inside, with a level fitted.
+
+Reference: Dickey & Fuller (1979), J. American Statistical Association 74, 427-431.
+"""
 
 SLOW = 0.05
 """Independent samples over samples below which noise seems to follow inputs: AR(0.95)."""
@@ -133,11 +139,10 @@ def compared(
         )
         if not shares_poles(structure) and structure.method != "iv4":
             found = _by_colour(structure, data, found, errors, None if tests.is_white else blocks)
-    first = structure.na + sum(structure.nb)
-    of_c = slice(first, first + structure.nc)
-    noise = np.concatenate([[1.0], found.theta[of_c]])
-    if structure.nc and farthest(noise, plain[of_c, of_c]) >= 1.0:
+    if _reach(structure, found.theta, plain, "c") >= 1.0:
         return replace(found, covariance=None, reason=NOISE_AT_CIRCLE)
+    if _reach(structure, found.theta, plain, "d", UNIT_ROOT) >= 1.0:
+        found = replace(found, noise_reason=DRIFT)
     tests = judged_tests(tests, data, found, errors)
     if not has_noise_model(structure) and _tells_nothing(data, errors, plain):
         return replace(found, covariance=None, reason=NOTHING)
@@ -147,6 +152,19 @@ def compared(
     if _fits_elsewhere(found):
         return replace(found, covariance=None, reason=ELSEWHERE)
     return found if times == 1.0 else widened(found, times)
+
+
+def _reach(
+    structure: PolynomialStructure,
+    theta: Array,
+    plain: Array,
+    letter: str,
+    errors: float | None = None,
+) -> float:
+    """How far the real roots of C or D may lie from zero."""
+    places = np.flatnonzero([name[0] == letter for name in structure.names])
+    polynomial = np.concatenate([[1.0], theta[places]])
+    return farthest(polynomial, plain[np.ix_(places, places)], errors)
 
 
 def _fits_elsewhere(found: SearchResult) -> bool:

@@ -266,8 +266,10 @@ def propagated(
     return derived(first_order(name, value, unit, variance, errors.degrees))
 
 
-def farthest(polynomial: Array, covariance: Array) -> float:
-    """Largest size of a real root, a 95 % half-width further out, by coefficients after the first.
+def farthest(polynomial: Array, covariance: Array, errors: float | None = None) -> float:
+    """Largest size of a real root, some standard errors further out; default: a 95 % half-width.
+
+    The covariance is that of the coefficients after the first.
 
     Levels and starts that are eliminated pile estimates of such a root of C up at the unit circle,
     and next to it nothing has errors to first order.
@@ -280,13 +282,14 @@ def farthest(polynomial: Array, covariance: Array) -> float:
     0.9196
     """
     slope, reach = np.polyder(polynomial), 0.0
+    errors = half_width() if errors is None else errors
     for z in np.roots(polynomial):
         if z.imag != 0.0:
             continue
         rate = -(z ** np.arange(polynomial.size - 2, -1, -1)) / (np.polyval(slope, z) or np.inf)
         outwards = np.real(np.conj(z) / (abs(z) or 1.0) * rate)
         spread = np.sqrt(max(float(outwards @ covariance @ outwards), 0.0))
-        reach = max(reach, abs(z) + half_width() * spread)
+        reach = max(reach, abs(z) + errors * spread)
     return float(reach)
 
 
