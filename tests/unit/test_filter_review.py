@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from flightid.cli.program import program
 from flightid.control.autopilots import NotchTracking
 from flightid.logs.dataflash.layout import MessageLayout
 from flightid.logs.dataflash.writer import DataflashWriter
+from flightid.review.filter_findings import _advice
 from flightid.review.gyro_noise import GyroNoise, floor_beneath
 from flightid.review.notch_proposal import _series
 from tests.closeness import assert_close
@@ -163,3 +166,9 @@ def test_the_command_tunes_with_suggested_filters_and_writes_them(tmp_path: Path
     written = sorted(tmp_path.glob("gains*.param"))
     changed = {fid.read_parameters(each)["INS_GYRO_FILTER"] for each in written}
     assert changed == {80.0, 40.0}, "every step, and the way back"
+
+
+def test_filters_that_change_nothing_are_not_advised() -> None:
+    nothing: Any = SimpleNamespace(within_limit=True, axes=())
+    assert _advice("", "", nothing).startswith("balance propellers")
+    assert _advice("", "", None).startswith("balance propellers")

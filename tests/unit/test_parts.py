@@ -144,4 +144,5 @@ def test_alike_parts_have_one_degree_of_freedom_less_than_they_are() -> None:
     for n in (2, 5, 30):
         assert_close(_freedom(np.full(n, 1.0 / n)), n - 1.0, rtol=1e-9, why="a mean of n")
     assert _freedom(np.array([1.0, 0.0])) == 1.0
+    assert _freedom(np.zeros(3)) == 1.0  # nothing is told
     assert _freedom(np.array([0.9, 0.05, 0.05])) < 1.1
