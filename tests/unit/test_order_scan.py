@@ -117,6 +117,16 @@ def test_output_error_and_box_jenkins_are_scanned_one_by_one(kind, more):
         )
 
 
+@pytest.mark.parametrize(("nk", "said"), [(1, True), (3, False), (range(1, 5), False)])
+def test_a_delay_that_was_not_scanned_is_told_where_it_may_be_longer(nk, said):
+    truth = P(("u",), "y", 0.1, a=[1, -0.8], b=[[1.0]], nk=(3,))
+    fitted, unseen = (flown(truth, seed, n=400, noise=0.1) for seed in (0, 2))
+    scan = fid.scan_orders(fitted, unseen, kind="arx", na=1, nb=3, nk=nk)
+    told = [each.message for each in scan.findings if each.code == "delay-not-scanned"]
+    assert bool(told) == said
+    assert not said or "u (nk 1)" in told[0]
+
+
 def test_edges_simpler_models_and_growth_are_told():
     scan = fid.scan_orders(
         flown(ARMAX, 6, n=900, noise=0.3),

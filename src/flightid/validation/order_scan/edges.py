@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from itertools import product
@@ -14,9 +14,11 @@ from flightid.findings import Finding
 from flightid.models.innovations.structure import SubspaceStructure
 from flightid.models.narx.structure import NarxStructure
 from flightid.models.polynomial.structure import PolynomialStructure
+from flightid.uncertainty.estimate import Estimate
 
 Structure = PolynomialStructure | SubspaceStructure | NarxStructure
 EDGE = "at-edge-of-scan"
+DELAY = "delay-not-scanned"
 ORDERS = ("na", "nb", "nc", "nd", "nf", "nk", "order", "output_lags", "input_lags")
 
 
@@ -55,6 +57,28 @@ def edge_findings(best: Structure, tried: Iterable[Structure]) -> tuple[Finding,
         return ()
     said = f"the best model has the last {edges} of the scan"
     return (Finding(EDGE, Light.AMBER, said, "scan higher orders and other delays"),)
+
+
+def delay_findings(
+    taken: Structure, parameters: Mapping[str, Estimate], tried: Iterable[Structure]
+) -> tuple[Finding, ...]:
+    """Amber where one delay alone was tried and the best's first coefficient of B may be zero.
+
+    Without an interval it may be anything.
+    """
+    delays = {each.nk for each in tried if isinstance(each, PolynomialStructure)}
+    if not isinstance(taken, PolynomialStructure) or len(delays) > 1:
+        return ()
+    late = []
+    for i, (name, delay) in enumerate(zip(taken.inputs, taken.nk, strict=True)):
+        place = taken.na + sum(taken.nb[:i])
+        first = parameters[taken.names[place]].interval95
+        if first is None or first[0] <= 0.0 <= first[1]:
+            late.append(f"{name} (nk {delay})")
+    if not late:
+        return ()
+    said = f"one delay alone was tried, and it may be longer: {', '.join(late)}"
+    return (Finding(DELAY, Light.AMBER, said, "scan delays: nk=range(1, 6)"),)
 
 
 def neighbours(taken: Structure, further: dict[str, int]) -> list[Structure]:

@@ -18,7 +18,7 @@ from flightid.models.polynomial.orders import ANY
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
-from flightid.validation.order_scan.edges import Structure, edge_findings
+from flightid.validation.order_scan.edges import Structure, delay_findings, edge_findings
 
 Range = int | Iterable[int]
 CRITERIA = ("aic", "aicc", "bic", "mdl", "fpe")
@@ -176,7 +176,10 @@ class OrderScan(Result, schema="flightid.order_scan/1"):
                     "expected where the vehicle is unstable; else lower the orders",
                 )
             )
-        return (*found, *edge_findings(best.structure, [each.structure for each in self.trials]))
+        tried = [each.structure for each in self.trials]
+        at_edges = edge_findings(best.structure, tried)
+        late = delay_findings(best.structure, self.best.parameters, tried)
+        return (*found, *at_edges, *late)
 
     def summary(self, rows: int = SHOWN) -> Table:
         """Table of the best trials; marks say which structure each criterion would take."""
