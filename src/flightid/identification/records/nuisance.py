@@ -75,11 +75,16 @@ class NuisanceDirections:
     @classmethod
     def of(cls, directions: Array) -> NuisanceDirections:
         """From directions of shape (n_rows, n_constants)."""
-        size = np.linalg.norm(directions, axis=0)
+        # Starts die out: most rows may show nothing of them.
+        shown = directions.any(axis=1)
+        seen = directions[shown]
+        size = np.linalg.norm(seen, axis=0)
         size[size == 0.0] = 1.0
-        left, values, right = np.linalg.svd(directions / size, full_matrices=False)
+        left, values, right = np.linalg.svd(seen / size, full_matrices=False)
         kept = values > _RANK * max(float(values.max(initial=0.0)), 1e-300)
-        return cls(left[:, kept], right[kept].T / values[kept] / size[:, None])
+        space = np.zeros((len(directions), int(kept.sum())))
+        space[shown] = left[:, kept]
+        return cls(space, right[kept].T / values[kept] / size[:, None])
 
     def best(self, rows: Array) -> Nuisance:
         """The best constants for some rows (n_rows,)."""

@@ -17,6 +17,8 @@ INSIDE = 1.0 - 1e-3
 """Size of a pole that was at the circle."""
 NOISELESS = 1e-16
 """Innovations with less than this share of the outputs' power are rounding."""
+SPENT = 1e-20
+"""Largest entry of a transition's power that leaves nothing of a state."""
 ROWS = 20_000
 """Rows that are folded into a triangular factor at a time."""
 
@@ -144,11 +146,30 @@ def own_columns(
 def run_columns(closed: Array, c: Array, columns: tuple[Array, Array], y: Array, u: Array) -> Array:
     """G s − C x with x⁺ = Ā x + F s for several F and G, shape (n_samples, p, n_columns).
 
-    The signals s are inputs, outputs, a one at the first sample, and ones.
+    The signals s are inputs, outputs, a one at the first sample, and ones. Columns that the first
+    sample alone drives are run until nothing is left of them.
     """
     begun = np.zeros((2, y.shape[1]))
     begun[0, :1], begun[1] = 1.0, 1.0
-    return _native.slope_recursion(closed, c, *columns, np.concatenate([u, y, begun]))
+    signals, lasting = np.concatenate([u, y, begun]), _lasting(closed, y.shape[1])
+    once = len(signals) - len(begun)
+    brief = ~np.any([np.delete(each, once, axis=2).any(axis=(1, 2)) for each in columns], axis=0)
+    if 2 * lasting > y.shape[1] or not brief.any():
+        return _native.slope_recursion(closed, c, *columns, signals)
+    made = np.zeros((y.shape[1], len(c), len(brief)))
+    for chosen, until in ((brief, lasting), (~brief, y.shape[1])):
+        driven = [each[chosen] for each in columns]
+        made[:until, :, chosen] = _native.slope_recursion(closed, c, *driven, signals[:, :until])
+    return made
+
+
+def _lasting(closed: Array, most: int) -> int:
+    """Samples after which nothing is left of a state, to rounding; `most` where it goes on."""
+    samples, power = 1, closed
+    with np.errstate(over="ignore", invalid="ignore"):
+        while samples < most and not np.abs(power).max(initial=0.0) < SPENT:
+            samples, power = 2 * samples, power @ power
+    return min(samples, most)
 
 
 def folded(rows: Array) -> Array:
