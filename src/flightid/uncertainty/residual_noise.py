@@ -146,6 +146,8 @@ class Autoregression:
     def _fast_spectrum(self) -> Array:
         order = self.weights.size
         innovation = max(float(self.lags[0] - self.weights @ self.lags[1 : order + 1]), 0.0)
+        if not order:
+            return np.full(self.length // 2 + 1, innovation)
         gain = scipy.fft.rfft(np.concatenate(([1.0], -self.weights)), self.length)
         # A pole that rounding puts onto the circle: no line holds more than all power, by far.
         most = SHARPEST * self.length * max(float(self.lags[0]), np.finfo(float).tiny)

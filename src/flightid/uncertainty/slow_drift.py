@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Protocol, TypeVar
 
 import numpy as np
@@ -72,8 +73,15 @@ class Drift:
     def _parts(self, length: int) -> tuple[float, Array]:
         """Power of the drive of unit variance, and what the recursion divides by at each bin."""
         pole = 1.0 - self.corner
-        turn = 1.0 - np.cos(2.0 * np.pi * np.arange(length // 2 + 1) / length)
-        return 1.0 - pole**2, self.corner**2 + 2.0 * pole * turn
+        return 1.0 - pole**2, self.corner**2 + 2.0 * pole * _turns(length)
+
+
+@lru_cache(maxsize=2)
+def _turns(length: int) -> Array:
+    """One less the cosine of each bin's angle."""
+    found = 1.0 - np.cos(2.0 * np.pi * np.arange(length // 2 + 1) / length)
+    found.flags.writeable = False
+    return np.asarray(found)
 
 
 class Spectral(Protocol):
