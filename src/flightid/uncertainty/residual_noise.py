@@ -92,8 +92,7 @@ class Autoregression:
         """Columns' covariance by this noise: XᵀΩX, shape (k, k)."""
         if self.is_white:
             return np.asarray(self.lags[0] * (columns.T @ columns))
-        n = len(columns)
-        length = _length(n)
+        n, length = len(columns), _length(len(columns))
         spectrum = scipy.fft.rfft(_ring(self.autocovariance(n), length)).real
         moved = _transform(columns, length)
         return np.asarray((moved * _both(_twice(length) * spectrum / length)) @ moved.T)
@@ -106,8 +105,7 @@ class Autoregression:
         Weights are known to ``innovation / n`` times the inverse of their autocovariance, and the
         level goes with the inverse square of one less their sum.
         """
-        order = self.weights.size
-        share = 2.0 / self.n
+        order, share = self.weights.size, 2.0 / self.n
         if order:
             innovation = float(self.lags[0] - self.weights @ self.lags[1 : order + 1])
             ones = np.ones(order)

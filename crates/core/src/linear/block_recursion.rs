@@ -81,6 +81,12 @@ pub fn carry<const L: usize>(transition: &[f64], states: &mut [[f64; L]], lines:
         4 => carry_few::<4, L>(transition, states, lines),
         5 => carry_few::<5, L>(transition, states, lines),
         6 => carry_few::<6, L>(transition, states, lines),
+        7 => carry_few::<7, L>(transition, states, lines),
+        8 => carry_few::<8, L>(transition, states, lines),
+        9 => carry_few::<9, L>(transition, states, lines),
+        10 => carry_few::<10, L>(transition, states, lines),
+        11 => carry_few::<11, L>(transition, states, lines),
+        12 => carry_few::<12, L>(transition, states, lines),
         n => {
             for (state, lines) in states.chunks_exact_mut(n).zip(lines.chunks_exact_mut(n)) {
                 carry_many(transition, state, lines);
@@ -186,7 +192,7 @@ mod tests {
 
     #[test]
     fn a_block_is_its_samples_one_by_one() {
-        for n in 1..=8 {
+        for n in 1..=14 {
             for groups in 1..=3 {
                 // A factor in four is zero; the others keep the states from growing.
                 let phi: Vec<f64> = (0..n * n)
