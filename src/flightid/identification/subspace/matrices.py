@@ -158,8 +158,9 @@ def run_columns(closed: Array, c: Array, columns: tuple[Array, Array], y: Array,
         return _native.slope_recursion(closed, c, *columns, signals)
     made = np.zeros((y.shape[1], len(c), len(brief)))
     for chosen, until in ((brief, lasting), (~brief, y.shape[1])):
-        driven = [each[chosen] for each in columns]
-        made[:until, :, chosen] = _native.slope_recursion(closed, c, *driven, signals[:, :until])
+        forced, shown = (each[chosen] for each in columns)
+        driven = _native.slope_recursion(closed, c, forced, shown, signals[:, :until])
+        made[:until, :, chosen] = driven
     return made
 
 
