@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
 from flightid.conditioning import check_consistency
+from flightid.conditioning.consistency_findings import _of_parameter
 from flightid.conditioning.kinematics import OUTPUTS, UNITS, KinematicModel, rotation_rows
 from flightid.conventions import STANDARD_GRAVITY_M_S2
 from flightid.errors import DataError, OptionError, SingularError, UnitError, UnknownNameError
@@ -118,6 +120,9 @@ def test_errors_of_rates_are_recovered_without_noise() -> None:
     assert_close(found.corrected["p"], _motion(found.corrected.time_s)["p"], atol=1e-5, why="bias")
     assert found.corrected.history[-2].operation == "conditioning.check_consistency"
     assert {"bias", "delay"} <= {finding.code for finding in found.findings}
+    assert not any("vane" in finding.action for finding in found.findings)
+    late = replace(found.parameters["delay_phi"], name="delay_alpha")
+    assert "a vane ahead" in _of_parameter(late, 0.01)[0].action
     assert "bias_p" in found.summary().to_text()
     assert "phi" in found.fits().to_text()
     assert found.to_dict()["schema"] == "flightid.kinematic_consistency/1"

@@ -23,6 +23,13 @@ LARGEST_DRIFT = 0.15
 SMALLEST_DRIFT_RAD = 1e-4
 
 
+VANES = ("alpha", "beta")
+VANE = (
+    "; a vane ahead of the centre of gravity looks alike: move it there first "
+    "(conditioning.air_data_at_cg, or air_data_m of [[conditioning]])"
+)
+
+
 def require_separable(
     parameters: Sequence[str], size: NDArray[np.float64], triangle: NDArray[np.float64]
 ) -> None:
@@ -162,7 +169,7 @@ def _of_parameter(parameter: Estimate, sample_time_s: float) -> list[Finding]:
                 "delay",
                 Light.AMBER,
                 f"{channel} lags the rates by {text}",
-                "use the corrected record, which is aligned",
+                f"use the corrected record, which is aligned{VANE * (channel in VANES)}",
             )
         ]
     return []
