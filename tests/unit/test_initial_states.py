@@ -9,7 +9,9 @@ import pytest
 
 import flightid as fid
 from flightid.errors import FitError, OptionError
-from flightid.models.state_space.measured_states import measured_start, state_outputs
+from flightid.models import RecordValue
+from flightid.models.state_space.first_sample import measured_start
+from flightid.models.state_space.measured_states import state_outputs
 from tests.closeness import assert_close
 
 
@@ -112,12 +114,12 @@ def test_noise_of_a_measured_start_is_carried_into_the_intervals() -> None:
     assert np.all(stated < 4.0 * gained), "and most of it: one sample against 300"
 
 
-def test_a_nonlinear_model_is_verified_from_the_measured_state_on_its_own_inputs() -> None:
+def test_a_nonlinear_model_is_verified_on_its_own_inputs() -> None:
     record = glide()
     result = fid.verify(glider(), record)
     (made,) = result.predictions
     assert max(result.theil.values()) < 1e-9
-    assert "from the measured state" in result.protocol
+    assert "from an initial state solved for over the whole record" in result.protocol
     assert_close(made.shifts.input_bias, [0.0], atol=1e-300, why="no shift was asked for")
     off = record.replace({"lift": record["lift"] + 0.2})
     asked = fid.verify(glider(), off, state_bias=True)
@@ -187,3 +189,82 @@ def test_a_bias_that_is_a_constant_is_found_before_the_search() -> None:
         fid.identify(product, record, output_bias=False).parameters["Mde"].value,
         -8.0, rtol=1e-6, why="a start at zero is no reason to refuse",
     )  # fmt: skip
+
+
+def speeds(**initial: RecordValue) -> fid.StateSpaceModel:
+    """Body speeds, measured by their size and angle alone; it has no slope at rest."""
+    return fid.StateSpaceModel(
+        states={"u": "m/s", "w": "m/s"},
+        input_units={"d": "m/s^2"},
+        measurements={
+            "V": fid.Output("sqrt(u^2 + w^2)", "m/s"),
+            "alpha": fid.Output("atan2(w, u)", "rad"),
+        },
+        equations={"u'": "X*u + D*d", "w'": "Z*w + d"},
+        parameters=fid.Parameters(
+            [
+                fid.Parameter("X", -0.1, "1/s"),
+                fid.Parameter("Z", -0.5, "1/s"),
+                fid.Parameter("D", 3.0, "1"),
+            ]
+        ),
+        initial=initial,
+        name="speeds",
+    )
+
+
+def speeding() -> fid.Record:
+    drive = np.repeat(np.random.default_rng(4).choice([-2.0, 0.0, 2.0], 15), 20)
+    driven = fid.Record.from_arrays(
+        np.arange(300) * 0.02, inputs={"d": drive}, units={"d": "m/s^2"}, hold="zero"
+    )
+    return fid.simulate(speeds(), driven, initial_state={"u": 40.0, "w": 3.0})
+
+
+@pytest.mark.parametrize("method", ["output_error", "filter_error"])
+def test_states_that_only_curved_outputs_tell_begin_at_the_measurement(method: str) -> None:
+    record, model = speeding(), speeds()
+    assert_close(measured_start(model, record), [40.0, 3.0], rtol=1e-9, why="V and alpha, inverted")
+    if method == "output_error":
+        fit = fid.identify(
+            model.with_values({"X": -0.2, "D": 2.0}), record, method=method, output_bias=False
+        )
+        assert_close(
+            fit.parameters["D"].value, 3.0, rtol=1e-6, why="nothing but the model moves it"
+        )
+    else:
+        assert max(fid.verify(model, record).theil.values()) < 1e-9
+
+
+def test_declared_initial_values_begin_simulations_and_free_runs() -> None:
+    record = speeding()
+    held = speeds(u=RecordValue(40.0, free=False), w=RecordValue(3.0, free=False))
+    again = fid.simulate(held, record)
+    assert_close(again["V"], record["V"], rtol=1e-12, why="the same start, declared")
+    for run in (fid.predict(held, record), *fid.verify(held, record).predictions):
+        assert run.initial_state == "a given state"
+        assert_close(run.predicted["V"], record["V"], rtol=1e-9, why="nothing is solved for")
+    near = speeds(u=RecordValue(35.0), w=RecordValue(1.0))
+    free = fid.verify(near, record)
+    assert max(free.theil.values()) < 1e-9
+    assert "an initial state solved for" in free.protocol
+    assert fid.simulate(near, record)["V"][0] == pytest.approx(np.hypot(35.0, 1.0), rel=1e-12)
+    at_rest = fid.simulate(near, record, initial_state="trim")
+    assert at_rest["V"][0] == 0.0, "what the user says comes first"
+
+
+def test_an_output_without_a_slope_at_the_start_is_named() -> None:
+    record, rest = speeding(), {"u": 0.0, "w": 0.0}
+    said = r"V, alpha by u, w at u = 0, w = 0.*declare \[initial\] of u"
+    with pytest.raises(FitError, match=said):
+        fid.identify(speeds(), record, method="output_error", initial_state=rest)
+    with pytest.raises(FitError, match=said):
+        fid.verify(speeds(), record, initial_state=rest, state_bias=True)
+
+
+def test_the_default_start_does_not_depend_on_the_method_that_fitted() -> None:
+    record = glide(0.01)
+    for method in ("output_error", "filter_error", "equation_error"):
+        options = {} if method == "equation_error" else {"output_bias": False}
+        fit = fid.identify(glider(), record, method=method, **options)
+        assert "an initial state solved for" in fid.verify(fit, record).protocol, method

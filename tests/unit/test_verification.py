@@ -105,13 +105,14 @@ def test_result_shows_itself_and_its_horizon() -> None:
     assert "worst Theil coefficient 0.000" in repr(result)
     text = str(result.summary())
     assert "Free run over the whole record on measured inputs alone" in text
-    assert "from rest at trim" in text
+    assert "from an initial state solved for over the whole record" in text
+    assert "from rest at trim" in str(fid.verify(LAG, _record(), initial_state="trim").summary())
     assert "state biases and output biases solved for" in text
     plain = json.loads(json.dumps(result.to_dict(), allow_nan=False))
     assert plain["schema"] == "flightid.verification/1"
     assert plain["units"]["p"] == "rad/s"
     assert "<table>" in result._repr_html_()
-    assert {finding.light for finding in result.findings} == {Light.GREEN}
+    assert {each.light for each in result.findings} == {Light.GREEN, Light.UNKNOWN}
     assert result.predicted.history[-1].operation == "predict"
 
 
@@ -169,7 +170,7 @@ def test_refusals() -> None:
 def test_a_run_that_explodes_is_an_error() -> None:
     burst = LinearSystem([[200.0]], [[1.0]], [[1.0]], [[0.0]], ("u",), ("p",))
     with pytest.raises(DataError, match=r"grows beyond|infinity|not finite|diverge"):
-        fid.verify(burst, _record())
+        fid.verify(burst, _record(), initial_state="trim")
 
 
 def test_mismatch_refuses_and_shows() -> None:

@@ -11,18 +11,20 @@ from flightid import _native
 from flightid.errors import DataError, ShapeError, UnknownNameError
 from flightid.models import StateSpaceModel
 from flightid.models.state_space.integration_steps import steps_per_sample
+from flightid.models.state_space.measured_states import declared_start
 
 Array = NDArray[np.float64]
 
 
 def start_of(model: StateSpaceModel, given: ArrayLike | Mapping[str, float] | None) -> Array:
-    """Initial state in the model's order: the trim, changed by name or replaced whole.
+    """Initial state in the model's order: as declared, changed by name or replaced whole.
 
     Parameters
     ----------
     model : StateSpaceModel
     given : array_like, shape (n_states,), or mapping of str to float, or None
-        States in their units; a mapping changes some of the trim, None takes the trim.
+        States in their units; a mapping changes some of the model's declared initial
+        values, which are those of the trim where it declares none; None takes them.
 
     Returns
     -------
@@ -51,8 +53,8 @@ def start_of(model: StateSpaceModel, given: ArrayLike | Mapping[str, float] | No
                 raise UnknownNameError(
                     "the model has no such state", found=name, needed=", ".join(names)
                 )
-        point = {**model.trim, **changed}
-        state = np.array([float(point.get(name, 0.0)) for name in names])
+        point = {**declared_start(model), **changed}
+        state = np.array([float(point[name]) for name in names])
     else:
         state = np.array(given, dtype=np.float64)
         if state.shape != (len(names),):

@@ -16,7 +16,8 @@ from flightid.models import LinearModel, LinearSystem, NarxModel, StateSpaceMode
 from flightid.models.linear.hold_equivalent import Hold
 from flightid.models.model import Model, linear_system, model_of
 from flightid.models.sampled.recursion import run_recursion
-from flightid.models.state_space.measured_states import measured_start
+from flightid.models.state_space.first_sample import measured_start
+from flightid.models.state_space.measured_states import declared_start
 from flightid.record import Channel, InputHold, Record, Step
 from flightid.record.chosen_hold import chosen_hold
 from flightid.simulation.noise import (
@@ -65,9 +66,10 @@ def simulate(
         What the inputs do between samples. Default: what the record knows, else "first"; the
         record that comes back knows what was used.
     initial_state : str, array_like, shape (n,), or mapping of str to float, optional
-        State at the first sample. Left out or ``"trim"``: zero, for a nonlinear model its trim; a
-        mapping by state of a `StateSpaceModel` changes some entries of that. ``"measured"``: what
-        the outputs of the record tell at its first sample.
+        State at the first sample. Left out: the initial values that a `StateSpaceModel` declares,
+        else trim; a mapping by state changes some entries of that. ``"trim"``: zero, for a
+        nonlinear model its trim. ``"measured"``: what the outputs of the record tell at its first
+        sample.
     substeps : int, optional
         Runge-Kutta steps in a sample interval, for a nonlinear model. Left out: enough for the
         fastest eigenvalue at the trim (step times eigenvalue at most 0.25).
@@ -149,8 +151,15 @@ def simulate(
 
 def _start_in_words(source: object, record: Record, given: Any) -> Any:  # noqa: ANN401
     """The initial state that a word stands for; anything else as it is."""
-    if not isinstance(given, str) or given == "trim":
-        return None if isinstance(given, str) else given
+    if not isinstance(given, str):
+        return given
+    if given == "trim":
+        inner = model_of(source)
+        # Of a linear model the start is a departure from the trim.
+        if not isinstance(inner, StateSpaceModel):
+            return None
+        trim = {} if inner.is_linear else inner.trim
+        return {name: trim.get(name, 0.0) for name in inner.states}
     if given != "measured":
         raise OptionError(
             "unknown start of a simulation",
@@ -288,13 +297,15 @@ def _linear_start(
     model: LinearModel, given: ArrayLike | Mapping[str, float] | None, n: int
 ) -> NDArray[np.float64]:
     """Departure from the trim at the first sample."""
-    if given is None:
-        return np.zeros(n)
-    if not isinstance(given, Mapping):
+    if given is not None and not isinstance(given, Mapping):
         return np.array(given, dtype=np.float64)
     if not isinstance(model, StateSpaceModel):
-        raise OptionError("states of this model have no names", found=", ".join(given))
-    return start_of(replace(model, trim={}), given)
+        if given:
+            raise OptionError("states of this model have no names", found=", ".join(given))
+        return np.zeros(n)
+    begun = declared_start(model).items()
+    departs = {name: value - model.trim.get(name, 0.0) for name, value in begun}
+    return start_of(model, {**departs, **(given or {})})
 
 
 def _biases(biases: Mapping[str, float] | None, names: tuple[str, ...]) -> NDArray[np.float64]:

@@ -23,8 +23,8 @@ from flightid.identification.filter_error.innovations import (
 from flightid.identification.filter_error.steady_filter import SteadyFilter
 from flightid.identification.records.held_model import LinearPoint
 from flightid.models import StateSpaceModel
+from flightid.models.state_space.first_sample import first_outputs, measured_point
 from flightid.models.state_space.integration_steps import steps_per_sample
-from flightid.models.state_space.measured_states import measured_point, state_outputs
 from flightid.record import Record
 
 Array = NDArray[np.float64]
@@ -114,7 +114,7 @@ class ExtendedProblem(InnovationsProblem):
         n, (m, _), (p, _) = len(self.model.states), data.inputs.shape, data.outputs.shape
         shifted = list(range(m)) if self.input_bias else []
         biased = list(range(p)) if self.output_bias else []
-        seen = state_outputs(self.model, data.inputs, data.outputs)
+        seen = first_outputs(self.model, data.inputs, data.outputs)
         start = np.zeros(n + len(shifted) + len(biased))
         start[:n] = seen.states(data.outputs[:, :1])[:, 0]
         prior = np.zeros((len(start), len(start)))
@@ -146,7 +146,7 @@ class ExtendedProblem(InnovationsProblem):
         for place, state in enumerate(self.noisy, self.n_free):
             densities[place, state] = 2.0 * process[state]
         begun = np.zeros((count, *prior.shape))
-        seen = state_outputs(self.model, data.inputs, data.outputs)
+        seen = first_outputs(self.model, data.inputs, data.outputs)
         for output in range(1, p):
             place = self.n_free + len(self.noisy) + output - 1
             variances[place, output] = 2.0 * variance[output]

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from flightid.errors import DataError, FitError, SingularError
 from flightid.identification.output_error.equation_records import EquationRuns
 from flightid.identification.records.setup import OwnNumbers, RecordSet
+from flightid.identification.records.slopes_at_start import require_slopes
 from flightid.models import GreyBoxModel
 
 Array = NDArray[np.float64]
@@ -68,7 +69,7 @@ def require_distinct(
     Raises
     ------
     FitError
-        Names them, and says which to hold.
+        Names them, and says which to hold; or names an output without a slope at the start.
     """
     try:
         if _alike(model, prepared, runs_of) is None:
@@ -107,7 +108,10 @@ def _alike(
     scale = _scale(prepared)
     shared, own = [], []
     for place, numbers in enumerate(prepared.own):
-        slopes = run_with_slopes(model, prepared, runs_of, place, numbers)[1] / scale
+        slopes = run_with_slopes(model, prepared, runs_of, place, numbers)[1]
+        if numbers.start is None and len(numbers.initial) == len(prepared.states):
+            require_slopes(slopes, numbers, prepared.states, model.outputs, n)
+        slopes = slopes / scale
         rows = slopes.reshape(-1, slopes.shape[2])
         shared.append(rows[:, :n])
         own.append(rows[:, n:])

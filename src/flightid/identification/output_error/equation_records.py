@@ -19,8 +19,9 @@ from flightid.errors import DataError, OptionError, SingularError
 from flightid.findings import Finding
 from flightid.identification.records.setup import OwnNumbers, RecordSet
 from flightid.models import GreyBoxModel, StateSpaceModel
+from flightid.models.state_space.first_sample import measured_point
 from flightid.models.state_space.integration_steps import steps_per_sample
-from flightid.models.state_space.measured_states import measured_point, state_outputs
+from flightid.models.state_space.measured_states import state_outputs
 
 Array = NDArray[np.float64]
 Segments = tuple[list[int], Array, int, Array]

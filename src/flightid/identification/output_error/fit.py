@@ -48,7 +48,7 @@ from flightid.identification.regression.options import FourierOutputErrorOptions
 from flightid.identification.rival_fits import judged
 from flightid.identification.withheld_intervals import without_intervals
 from flightid.models import GreyBoxModel, StateSpaceModel
-from flightid.models.state_space.measured_states import state_outputs
+from flightid.models.state_space.first_sample import first_outputs
 from flightid.record import Channel, Record, Step
 from flightid.uncertainty.agreement import Agreement
 from flightid.uncertainty.blocks import JointResiduals
@@ -301,7 +301,7 @@ def _held_start(
     moved = replace(own, free_initial=held, free_shift=[], free_bias=[], limits=[])
     slopes = run_with_slopes(fitted, prepared, runs_of, place, moved)[1]
     inputs, outputs, _ = prepared.arrays[place]
-    covariance = state_outputs(fitted, inputs, outputs).noise(noise)[np.ix_(held, held)]
+    covariance = first_outputs(fitted, inputs, outputs).noise(noise)[np.ix_(held, held)]
     return HeldStart(slopes[:, :, len(fitted.parameters.free) :], covariance)
 
 

@@ -16,7 +16,7 @@ from flightid.identification.prediction.result import Prediction, Shifts
 from flightid.identification.prediction.weights import guide_weights
 from flightid.models import StateSpaceModel
 from flightid.models.model import LinearModel
-from flightid.models.state_space.measured_states import measured_start
+from flightid.models.state_space.first_sample import measured_start
 from flightid.record import Channel, Record, Step
 from flightid.simulation.simulate import with_constants
 
@@ -44,9 +44,6 @@ def predict_continuous(
         )
     settle = request.settle_samples(record.n_samples, record.sample_time_s)
     whole = is_whole(model)
-    if whole and request.initial_state is None:
-        # Its channels are whole, so a record says where it starts.
-        request = replace(request, initial_state="measured")
     freedom = replace(_freedom(model, record, request), stretch=settle or _least(model, request))
     if whole and isinstance(model, StateSpaceModel):
         return _of_equations(model, record, outputs, request, freedom)
@@ -92,8 +89,10 @@ def _freedom(model: LinearModel, record: Record, request: Request) -> Freedom:
         for name, value in start.items()
         if not isinstance(value, str)
     }
+    # What nothing says of whole channels is measured, and there their search begins.
+    asked = ("measured", "estimate") if is_whole(model) else ("measured",)
     unsaid = [name for name in names if name not in start] if is_whole(model) else []
-    wanted = [*unsaid, *(name for name, value in start.items() if value == "measured")]
+    wanted = [*unsaid, *(name for name, value in start.items() if value in asked)]
     if wanted and isinstance(model, StateSpaceModel):
         given |= _measured(model, record, [names.index(name) for name in wanted])
     return Freedom(request.state_bias, request.output_bias, free, given)
@@ -197,9 +196,14 @@ def start_words(request: Request, start: int, sample_time_s: float, *, named: bo
     """Where a model without a noise model started; `named`: whether its states have names."""
     on = f"over the first {start * sample_time_s:.3g} s" if start else "over the whole record"
     if isinstance(request.initial_state, Mapping):
-        return "a given state"
+        solved = [name for name, value in request.initial_state.items() if value == "estimate"]
+        if not solved:
+            return "a given state"
+        if len(solved) < len(request.initial_state):
+            return f"a given state, of which {', '.join(solved)} solved for {on}"
+        return f"an initial state solved for {on}"
     if request.initial_state == "measured" and named:
         return "the measured state"
     if request.initial_state in ("estimate", "measured"):
         return f"an initial state solved for {on}"
-    return "rest at trim" if request.initial_state in (None, "trim") else "rest"
+    return "rest at trim" if request.initial_state == "trim" else "rest"

@@ -16,6 +16,7 @@ from flightid.identification.multistart import DenseEnd
 from flightid.identification.prediction.linear import RANK_TOLERANCE, Freedom
 from flightid.identification.prediction.result import Shifts
 from flightid.identification.records.setup import OwnNumbers
+from flightid.identification.records.slopes_at_start import require_slopes
 from flightid.models import StateSpaceModel
 from flightid.models.state_space.integration_steps import steps_per_sample
 
@@ -135,7 +136,9 @@ def predict_equations(
     Raises
     ------
     DataError
-        The run from trim diverges, or a formula has no value.
+        The run from its start diverges, or a formula has no value.
+    FitError
+        An output has no finite slope at the start.
     """
     run = NonlinearRun.of(model, inputs, sample_time_s, rows, freedom, hold)
     told = slice(None, freedom.stretch)
@@ -143,6 +146,8 @@ def predict_equations(
     best, rank = run.start, 0
     n_free = run.start.n_free
     if n_free:
+        names = [list(model.outputs)[row] for row in rows]
+        require_slopes(run.outputs(run.start)[1], run.start, list(model.states), names)
         start, size = _places(run.start), measured[:, told].size
 
         def residuals(x: Array) -> Array:

@@ -8,7 +8,7 @@ from typing import Any, overload
 from flightid.errors import ModelError, OptionError, UnknownNameError
 from flightid.identification.prediction.continuous import predict_continuous
 from flightid.identification.prediction.narx import predict_narx
-from flightid.identification.prediction.remembered import of_record, remembered
+from flightid.identification.prediction.remembered import of_record, remembered, start_of_runs
 from flightid.identification.prediction.request import FREE_RUN, InitialState, Request
 from flightid.identification.prediction.result import Prediction
 from flightid.identification.prediction.sampled import predict_sampled
@@ -89,13 +89,13 @@ def predict(
     outputs : str or sequence of str, optional
         Outputs to predict; default: those of the model that the record holds.
     initial_state : str or mapping, optional
-        Where the run starts: ``"trim"`` (default of linear models in continuous time), ``"zero"``
-        (rest at the point the model holds about), ``"measured"`` (at the first sample; default of
-        nonlinear equations and, with its lags, of NARX; states without a name are solved for on as
-        few samples as there are), ``"estimate"`` (solved for on the first stretch; default of
-        polynomial and innovations models), or by state a number or one of these words. What
-        nothing measures is at trim; so are states of a linear model that a mapping leaves out.
-        A fit that was told one of these words is predicted so by default.
+        Where the run starts: ``"trim"``, ``"zero"`` (rest at the point the model holds about),
+        ``"measured"`` (at the first sample; default of NARX, with its lags; states without a name
+        are solved for on as few samples as there are), ``"estimate"`` (solved for), or by state a
+        number or one of these words. Default: the word that a fit was told, else the initial values
+        that the model declares (free ones solved for), else ``"estimate"``, whatever method fitted
+        the model. What nothing measures begins as declared, else at trim; states of a linear model
+        that a mapping leaves out are at trim.
     settle_s : float, optional
         First stretch, s, on which the start and the biases are solved for and which no score
         counts. Default: a tenth of the record for polynomial and innovations models; for those in
@@ -151,6 +151,8 @@ def predict(
     model, way = predictor_of(source)
     asked = (outputs,) if isinstance(outputs, str) else outputs
     flown = as_records(records)
+    if way is predict_continuous:
+        initial_state = start_of_runs(source, initial_state)
     if not flown:
         raise OptionError("there is nothing to predict", needed="one record or more")
     chosen = outputs_held(model, flown, asked)
@@ -162,17 +164,17 @@ def predict(
             record,
             chosen,
             Request(
-                horizon, initial_state or _start_of(source, way), settle_s, state_bias, output_bias,
+                horizon,
+                initial_state,
+                settle_s,
+                state_bias,
+                output_bias,
                 chosen_hold(record, hold, known=HOLDS, fitted=remembered(source).hold).hold,
             ),
         )
         for record in flown
     )  # fmt: skip
     return made[0] if isinstance(records, Record) else made
-
-
-def _start_of(source: object, way: Predictor) -> str | None:
-    return remembered(source).initial_state if way is predict_continuous else None
 
 
 def predictor_of(source: object) -> tuple[Any, Predictor]:

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from flightid.identification.prediction.request import InitialState
+from flightid.identification.records.options import ESTIMATE, MEASURED, TRIM
 from flightid.identification.records.record_parameters import with_record_values
 from flightid.models import StateSpaceModel
 from flightid.models.model import model_of
@@ -13,7 +15,7 @@ from flightid.record import Record
 from flightid.record.chosen_hold import DECLARED, RECORDED, SEEN
 from flightid.record.hold import HOLDS, InputHold
 
-WORDS = ("estimate", "measured", "trim")
+WORDS = (ESTIMATE, MEASURED, TRIM)
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,41 @@ def remembered(source: object) -> StartChoice:
         hold=hold if known else None,
         assumed_hold=None if known else hold,
     )
+
+
+def start_of_runs(source: object, asked: InitialState | None) -> InitialState:
+    """Where free runs begin: one rule for models of every kind, whatever method fitted them.
+
+    As the user says; else with the word that the fit was told; else as the model declares (a free
+    initial value is solved for); else solved for at the start of each record, as output error does.
+
+    Parameters
+    ----------
+    source : Fit or model
+        In continuous time.
+    asked : str, mapping or None
+        The user's word.
+
+    Example
+    -------
+    >>> start_of_runs(object(), None), start_of_runs(object(), "trim")
+    ('estimate', 'trim')
+    """
+    told = asked or remembered(source).initial_state
+    if told not in (None, ESTIMATE) or asked:
+        return told or ESTIMATE
+    model = model_of(source)
+    declared = model.initial if isinstance(model, StateSpaceModel) else {}
+    if not declared or not isinstance(model, StateSpaceModel):
+        return ESTIMATE
+    # Runs of a linear model are told departures from its trim.
+    trim = model.trim if model.is_linear else {}
+    return {
+        name: declared[name].value - trim.get(name, 0.0)
+        if name in declared and not declared[name].free
+        else ESTIMATE
+        for name in model.states
+    }
 
 
 def of_record(source: object, model: object, record: Record) -> object:

@@ -27,7 +27,9 @@ class PredictionOptions(Options):
         FREE_RUN, unit="samples", minimum=1, choices=(FREE_RUN,), doc="How far ahead."
     )
     initial_state: InitialState | None = option(
-        None, choices=STARTS, doc="Where a state begins; default: by the kind of model."
+        None,
+        choices=STARTS,
+        doc="Where a state begins; default: as told to the fit or declared, else solved for.",
     )
     settle_s: float | None = option(
         None, unit="s", minimum=0.0, doc="First stretch that tells a start and counts no score."

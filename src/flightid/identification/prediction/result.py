@@ -88,8 +88,9 @@ class Prediction(
     >>> time_s = np.arange(300) * 0.02
     >>> lag = fid.LinearSystem([[-2.0]], [[2.0]], [[1.0]], [[0.0]], ("u",), ("y",))
     >>> flown = fid.Record.from_arrays(time_s, inputs={"u": np.sin(time_s)})
-    >>> fid.predict(lag, fid.simulate(lag, flown))
-    Prediction(free run from rest at trim, 300 samples, fit y 100.0 %)
+    >>> fid.predict(lag, fid.simulate(lag, flown))  # doctest: +NORMALIZE_WHITESPACE
+    Prediction(free run from an initial state solved for over the whole record, 300 samples, fit y
+    100.0 %)
     """
 
     measured: Record

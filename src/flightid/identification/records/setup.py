@@ -16,7 +16,7 @@ from flightid.identification.records.options import (
     initial_values,
 )
 from flightid.models import GreyBoxModel, StateSpaceModel
-from flightid.models.state_space.measured_states import state_outputs
+from flightid.models.state_space.first_sample import first_outputs
 from flightid.record import Record
 from flightid.record.several import as_records
 from flightid.units import require_match
@@ -224,7 +224,7 @@ def _measured(model: GreyBoxModel, inputs: Array, outputs: Array, at_trim: Array
     """Where the search for a record's initial state begins, or where that state is held."""
     if not isinstance(model, StateSpaceModel):
         return at_trim
-    seen = state_outputs(model, inputs, outputs)
+    seen = first_outputs(model, inputs, outputs)
     return seen.states(outputs[:, :1])[:, 0]
 
 

@@ -7,15 +7,13 @@ rest.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError, SingularError
 from flightid.models.state_space.model import StateSpaceModel
-from flightid.record import Record
 
 Array = NDArray[np.float64]
 _SAME = 1e-9
@@ -35,7 +33,7 @@ class StateOutputs:
     offset : ndarray, shape (n_direct,)
         h.
     trim : ndarray, shape (n_states,)
-        Where states that nothing measures stay.
+        Where states that nothing measures stay: as declared, else at trim.
     """
 
     places: tuple[int, ...]
@@ -89,7 +87,7 @@ class StateOutputs:
         direct = tuple(int(place) for place in np.flatnonzero(~strange))
         matrix = rows[0][list(direct), n : 2 * n].reshape(len(direct), n)
         offset = found[0, n:][list(direct)] - matrix @ probes[0, n : 2 * n]
-        return cls(direct, matrix, offset, _trim(model))
+        return cls(direct, matrix, offset, _start(model))
 
 
 def state_outputs(model: StateSpaceModel, inputs: Array, outputs: Array) -> StateOutputs:
@@ -119,53 +117,21 @@ def state_outputs(model: StateSpaceModel, inputs: Array, outputs: Array) -> Stat
         return plain
 
 
-def measured_start(model: StateSpaceModel, record: Record) -> Array:
-    """State at a record's first sample as its outputs tell it, shape (n_states,).
-
-    Of a linear model departures from the record's declared trim, of a nonlinear one whole values.
-    The record may lack outputs.
+def declared_start(model: StateSpaceModel) -> dict[str, float]:
+    """Where each state begins when nothing measures it: its declared initial value, else its trim.
 
     Example
     -------
     >>> import flightid as fid
-    >>> yaw = fid.load_model("quadrotor_yaw")
-    >>> record = fid.Record.from_arrays(
-    ...     np.arange(9) / 50, inputs={"tau_psi": np.zeros(9)},
-    ...     outputs={"r": np.full(9, 0.5)}, units={"r": "rad/s"})
-    >>> measured_start(yaw, record)
-    array([0.5, 0. ])
+    >>> declared_start(fid.load_model("quadrotor_yaw"))
+    {'r': 0.0, 'psi': 0.0}
     """
-    departs = record.trim if model.is_linear else {}
-    blank = np.full(record.n_samples, np.nan)
-
-    def rows(names: tuple[str, ...]) -> Array:
-        return np.array([record[n] - departs.get(n, 0.0) if n in record else blank for n in names])
-
-    outputs = rows(model.outputs)
-    seen = state_outputs(model, rows(model.inputs), outputs)
-    if model.is_linear and (departs or any(model.trim.values())):
-        seen = replace(seen, offset=0.0 * seen.offset, trim=0.0 * seen.trim)
-    return np.asarray(seen.states(outputs[:, :1])[:, 0])
+    begun = {name: item.value for name, item in model.initial.items()}
+    return {name: float(begun.get(name, model.trim.get(name, 0.0))) for name in model.states}
 
 
-def measured_point(model: StateSpaceModel, records: Sequence[Record]) -> dict[str, float]:
-    """Where the model is looked at: its trim, or without one the first measured sample.
-
-    Returns
-    -------
-    dict of str to float
-        States and inputs; empty where the model declares a trim or is linear.
-    """
-    if model.is_linear or any(name in model.trim for name in model.states):
-        return {}
-    inputs, outputs = records[0].matrix(model.inputs), records[0].matrix(model.outputs)
-    start = state_outputs(model, inputs, outputs).states(outputs[:, :1])[:, 0]
-    values = (*map(float, start), *map(float, inputs[:, 0]))
-    return dict(zip((*model.states, *model.inputs), values, strict=True))
-
-
-def _trim(model: StateSpaceModel) -> Array:
-    return np.array([float(model.trim.get(name, 0.0)) for name in model.states])
+def _start(model: StateSpaceModel) -> Array:
+    return np.array([*declared_start(model).values()])
 
 
 def _by_name(model: StateSpaceModel, outputs: Array) -> StateOutputs:
@@ -178,7 +144,7 @@ def _by_name(model: StateSpaceModel, outputs: Array) -> StateOutputs:
     ]
     matrix = np.zeros((len(places), len(names)))
     matrix[range(len(places)), [names.index(shown[row]) for row in places]] = 1.0
-    return StateOutputs(tuple(places), matrix, np.zeros(len(places)), _trim(model))
+    return StateOutputs(tuple(places), matrix, np.zeros(len(places)), _start(model))
 
 
 def _probes(model: StateSpaceModel, inputs: Array, outputs: Array) -> Array:

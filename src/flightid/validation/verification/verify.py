@@ -20,7 +20,7 @@ from flightid.identification.prediction.predict import (
     predictor_of,
     require_units,
 )
-from flightid.identification.prediction.remembered import of_record, remembered
+from flightid.identification.prediction.remembered import of_record, remembered, start_of_runs
 from flightid.identification.prediction.request import FREE_RUN, InitialState, Request
 from flightid.identification.prediction.result import Prediction
 from flightid.record import Record
@@ -90,20 +90,20 @@ def verify(
 
     Models in continuous time, ``dx/dt = A x + B (u - u_ref) + b``, ``y = C x + D (u - u_ref) +
     y_ref``: a free run over the whole record. Nothing of the model changes; state biases b, output
-    biases y_ref and, with ``initial_state="estimate"``, the initial state are solved for by
+    biases y_ref and the initial state are solved for by
     weighted least squares in each record, since they belong to the record. u_ref is the record's
     declared trim, or zero. The equations of a nonlinear model are integrated instead, on the
-    channels as they are, from the measured state; ``state_bias=True`` solves for a constant shift
+    channels as they are; ``state_bias=True`` solves for a constant shift
     of each of its inputs, which is never done unasked. Sampled models (ARX …
     Box–Jenkins, innovations forms, NARX) run about the operating point of their training records,
     from a state that a first stretch tells, which no score counts; no bias is taken off.
 
-    Assumes: records that were not used in the fit, and start in trim unless the initial state is
-    fitted; a nonlinear model that does not explode within a record. Biased when the record is short
-    against the slowest mode: a free initial state can then imitate a response. For an unstable
-    model fit the initial state: growing modes are then run backward from the end of the record,
-    which is exact for records of any length, and a finding says where that explains rather than
-    predicts.
+    Assumes: records that were not used in the fit, and that start in trim where
+    ``initial_state="trim"`` holds the initial state there; a nonlinear model that does not explode
+    within a record. Biased when the record is short against the slowest mode: a free initial state
+    can then imitate a response. Growing modes of an unstable model are run backward from the end of
+    the record where the initial state is solved for, which is exact for records of any length, and
+    a finding says where that explains rather than predicts.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def verify(
     horizon : int or "free_run"
         Samples ahead, for models that predict from the measured past; see `flightid.predict`.
     initial_state : {"trim", "zero", "measured", "estimate"} or mapping, optional
-        Where runs start; default by the kind of model, see `flightid.predict`.
+        Where runs start; default: one rule for all methods, see `flightid.predict`.
     settle_s : float, optional
         First stretch, s, on which start and biases are solved for and which no score counts.
     state_bias, output_bias : bool, optional
@@ -237,7 +237,7 @@ def _request(
     output = True if known.output_bias is None else known.output_bias
     return replace(
         asked,
-        initial_state=asked.initial_state or known.initial_state,
+        initial_state=start_of_runs(source, asked.initial_state),
         state_bias=asked.state_bias if told[0] else state,
         output_bias=asked.output_bias if told[1] else output,
     )
