@@ -231,8 +231,14 @@ def test_records_that_cannot_do_are_refused():
     with pytest.raises(DataError, match="too short for the horizon"):
         fid.identify(M.subspace("u", "y", horizon=110, method="pbsid"), record)
     sine = record.replace({"u": np.sin(record.time_s)})
-    with pytest.raises(DataError, match="not persistently exciting"):
+    with pytest.raises(DataError, match="fit an output-error model"):
         fid.identify(structure, sine)
+    tones = np.sum([np.sin(k * record.time_s) for k in (2.0, 9.0, 20.0)], axis=0)
+    told = "horizon=3, maximum_order=2"
+    with pytest.raises(DataError, match=told):
+        fid.identify(structure, record.replace({"u": tones}))
+    few = M.subspace("u", "y", horizon=3, maximum_order=2)
+    assert fid.identify(few, record.replace({"u": tones})).model.order <= 2
     with pytest.raises(DataError, match="constant"):
         fid.identify(structure, record.replace({"u": np.full(300, 2.0)}))
     clean = flown(SINGLE, 1, n=300)

@@ -273,13 +273,28 @@ def compress(data: SubspaceData, horizon: int) -> RowSpaceFactor:
     places = np.arange(2 * horizon * (m + p)).reshape(2 * horizon, m + p)
     ordered = places[horizon:, :m], places[:horizon, :m], places[:, m:]
     triangle = data.hankel_factor(2 * horizon, np.concatenate([each.ravel() for each in ordered]))
-    excited = np.linalg.svd(triangle[: 2 * horizon * m, : 2 * horizon * m], compute_uv=False)
-    if excited[-1] < POOR * excited[0]:
-        order = int(np.sum(excited > POOR * excited[0]))
+    lags = _independent_lags(triangle[: 2 * horizon * m, : 2 * horizon * m])
+    if lags < 2 * horizon * m:
         raise DataError(
             "the inputs are not persistently exciting",
-            found=f"{order} independent input lags",
+            found=f"{lags} independent input lags",
             needed=f"{2 * horizon * m} for a horizon of {horizon}",
-            action="excite more frequencies, or shorten the horizon",
+            action=_less_excited(data, horizon),
         )
     return RowSpaceFactor(triangle.T, horizon, m, p, columns)
+
+
+def _independent_lags(triangle: Array) -> int:
+    excited = np.linalg.svd(triangle, compute_uv=False)
+    return int(np.sum(excited >= POOR * excited[0]))
+
+
+def _less_excited(data: SubspaceData, horizon: int) -> str:
+    """What to do: lags of a smooth input grow alike, so a horizon is tried before it is named."""
+    p, m = data.n_outputs, data.n_inputs
+    for rows in range(horizon - 1, 1, -1):
+        now = [first + i for first in range(0, 2 * rows * (m + p), m + p) for i in range(m)]
+        if _independent_lags(data.hankel_factor(2 * rows, np.array(now))) == len(now):
+            most = p * (rows - 1)
+            return f"excite more frequencies, or take horizon={rows}, maximum_order={most}"
+    return "excite more frequencies, or fit an output-error model (kind 'oe')"
