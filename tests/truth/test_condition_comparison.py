@@ -157,3 +157,14 @@ def test_modes_without_common_states_do_not_answer_to_each_other() -> None:
     assert found.only_modes["longitudinal"] == ("phugoid", "short period")
     assert found.only_modes["lateral"] == ("spiral", "Dutch roll", "roll")
     assert found.modes_table().rows == ()
+
+
+def test_one_rule_judges_parameters_and_modes_together() -> None:
+    slow = fid.load_model("fixed_wing_lateral")
+    fast = slow.with_values({"Lp": slow.parameters["Lp"].value * 1.04})
+    # Seeds with which a rule of its own for modes would call the spiral changed.
+    found = fid.compare_conditions({"slow": _fit(slow, 2), "fast": _fit(fast, 102)})
+    rows = (*found.parameters, *(n for mode in found.modes for n in mode.numbers))
+    chances = {f"{row.name} {name}": p for row in rows for name, p in row.chances.items()}
+    said = {f"{f.message.split(':')[0]} fast" for f in found.findings if "changed" in f.code}
+    assert said == holm(chances)

@@ -64,8 +64,8 @@ def compare_conditions(sources: Mapping[str, object]) -> ConditionComparison:
     Assumes
     -------
     Conditions identified from different flights, so that their errors are independent. A change is
-    called significant by Holm's rule: one false verdict among all parameters, or among all modes,
-    in 5 % of comparisons.
+    called significant by Holm's rule: one false verdict among all parameters and modes together in
+    5 % of comparisons.
 
     Reference
     ---------
@@ -93,24 +93,17 @@ def compare_conditions(sources: Mapping[str, object]) -> ConditionComparison:
         c.name: tuple(n for n in c.values if not any(n in o.values for o in conditions if o != c))
         for c in conditions
     }
+    of_modes = [number for mode in matched for number in mode.numbers]
     significant = holm(
         {
             f"{number.name} {name}": chance
-            for number in numbers
-            for name, chance in number.chances.items()
-        }
-    )
-    significant_modes = holm(
-        {
-            f"{number.name} {name}": chance
-            for mode in matched
-            for number in mode.numbers
+            for number in (*numbers, *of_modes)
             for name, chance in number.chances.items()
         }
     )
     findings = [
         *_changes(numbers, significant),
-        *_changes([n for mode in matched for n in mode.numbers], significant_modes),
+        *_changes(of_modes, significant),
         *_turned(conditions, matched),
         *(
             replace(finding, message=f"{name}: {finding.message}")

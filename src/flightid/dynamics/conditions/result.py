@@ -188,7 +188,9 @@ class ConditionComparison(Result, schema="flightid.condition_comparison/1"):
             for name in self.conditions[1:]:
                 cells += [*_ratio(number.ratios.get(name), level), number.chances.get(name)]
             rows.append(tuple(cells))
-        said: tuple[str, ...] = ("chance: of so large a difference between equal truths.",)
+        said: tuple[str, ...] = (
+            "chance: of so large a difference between equal truths, of this row alone.",
+        )
         if not any(number.chances for number in numbers):
             said = ()
         said = (*said, *_withheld(numbers))
