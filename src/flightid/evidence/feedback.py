@@ -6,10 +6,16 @@ from collections.abc import Iterable, Sequence
 
 from flightid.errors import DataError
 from flightid.record import Record
+from flightid.record.history import spread_channels
 from flightid.record.hold import common_loop
 from flightid.record.repeats import found_period
 from flightid.record.several import as_records
-from flightid.uncertainty.feedback import FeedbackTest, declared_loop, find_feedback
+from flightid.uncertainty.feedback import (
+    FeedbackTest,
+    declared_loop,
+    find_feedback,
+    unless_spread,
+)
 
 MAXIMUM_SAMPLES = 20_000
 """Of all records together."""
@@ -74,9 +80,11 @@ def feedback_test(
     most = MAXIMUM_SAMPLES // len(listed)
     moved = [record.matrix(driven) for record in listed]
     answers = [record.matrix(seen) for record in listed]
-    return find_feedback(
+    test = find_feedback(
         [(rows - rows.mean(axis=1, keepdims=True))[:, :most] for rows in moved],
         [(rows - rows.mean(axis=1, keepdims=True))[:, :most] for rows in answers],
         driven,
         repeats=all(found_period(rows) is not None for rows in moved),
     )
+    names = (*driven, *seen)
+    return unless_spread(test, spread_channels([each.history for each in listed], names))

@@ -9,6 +9,9 @@ from flightid.table import Cell
 
 FROM_LOG = "Log.record"
 """Operation that heads the history of a log's record."""
+NEW_BASES = ("conditioning.to_uniform", "conditioning.resample")
+SPREADS = ("low-pass", "band-limited", JITTERED := "previous value of stamps that jitter")
+"""What these do to a channel that puts what is later into a sample."""
 
 
 @dataclass(frozen=True)
@@ -43,3 +46,21 @@ class Step:
 def is_of_log(histories: Iterable[Iterable[Step]]) -> bool:
     """Whether any of the data come from an autopilot's log."""
     return any(step.operation == FROM_LOG for history in histories for step in history)
+
+
+def spread_channels(histories: Iterable[Iterable[Step]], names: Iterable[str]) -> tuple[str, ...]:
+    """Channels among these whose samples were made of earlier and later ones.
+
+    Logs are passed over: an autopilot closes a loop around what it logs.
+
+    Example
+    -------
+    >>> moved = Step("conditioning.resample", {"q": "low-pass 22.5 Hz, zero phase"})
+    >>> spread_channels([[moved]], ["u", "q"])
+    ('q',)
+    """
+    steps = [
+        step for history in map(list, histories) if not is_of_log([history]) for step in history
+    ]
+    said = [step.options for step in steps if step.operation in NEW_BASES]
+    return tuple(n for n in names if any(str(each.get(n, "")).startswith(SPREADS) for each in said))

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid import _native
+from flightid.record.history import JITTERED
 from flightid.record.stamps import StampedSamples
 
 ATTENUATION_DB = 100.0
@@ -23,6 +24,8 @@ HALF_LENGTH = (ATTENUATION_DB - 7.95) / (2 * 14.36 * TRANSITION)
 SAME_RATE = 0.05
 """Relative difference of a grid from a source's mean spacing that counts as the same rate: the
 mean of jittered stamps lies on either side of their nominal spacing."""
+FEWEST_ON_LINE = 3
+"""Samples in a step of the grid that tell a line."""
 CLOCK_JITTER = 0.15
 """Largest jitter, as a fraction of a sample, of stamps that belong to a clock."""
 
@@ -33,8 +36,11 @@ class Interpolation(StrEnum):
     `BAND_LIMITED`: windowed sinc (jittered stamps first pass through a cubic spline on the true
     stamps). `CUBIC`: spline. `LINEAR`: straight lines, which lose amplitude near the source's
     Nyquist frequency. `PREVIOUS`: the last value holds, stamps that jitter counting for the grid
-    point they belong to; for modes and other discrete values, and the only choice that is never
-    low-passed.
+    point they belong to; for modes and other discrete values. `POINT`: the value at the instant,
+    by a straight line fitted to the samples since the grid point before (between both neighbours
+    where those are fewer than three). These two are never low-passed without phase: a sample does
+    not know what a held input does after it; what lies above the grid's Nyquist frequency folds
+    back, as in any logger at that rate.
 
     Example
     -------
@@ -46,6 +52,7 @@ class Interpolation(StrEnum):
     CUBIC = "cubic"
     LINEAR = "linear"
     PREVIOUS = "previous"
+    POINT = "point"
 
 
 def sample_at(
@@ -83,13 +90,15 @@ def sample_at(
     (array([ 5., 10., 15.]), 'linear')
     """
     if method is Interpolation.PREVIOUS:
-        index = (
-            np.searchsorted(source.time_s, time_s + _slack_s(source, sample_time_s), "right") - 1
-        )
-        return source.values[np.maximum(index, 0)], "previous value"
+        index = np.searchsorted(source.time_s, time_s + slack_s(source, sample_time_s), "right") - 1
+        same = abs(sample_time_s / source.sample_time_s - 1) <= SAME_RATE
+        done = JITTERED if same and source.jitter > CLOCK_JITTER else "previous value"
+        return source.values[np.maximum(index, 0)], done
     if _is_same_grid(source, time_s):
         first = int(np.argmin(np.abs(source.time_s - time_s[0])))
         return source.values[first : first + time_s.size].copy(), "copied"
+    if method is Interpolation.POINT:
+        return _read_at(source, time_s, sample_time_s), "value at the instant"
     step = source.sample_time_s
     coarser = is_coarser(sample_time_s, step)
     if not coarser and method is Interpolation.LINEAR:
@@ -139,7 +148,32 @@ def is_coarser(sample_time_s: float, source_s: float) -> bool:
     return sample_time_s > source_s * (1 + SAME_RATE)
 
 
-def _slack_s(source: StampedSamples, sample_time_s: float) -> float:
+def _read_at(
+    source: StampedSamples, time_s: NDArray[np.float64], sample_time_s: float
+) -> NDArray[np.float64]:
+    """Ends of straight lines fitted to the samples of each step up to its grid point."""
+    near = 1e-6 * sample_time_s
+    last = np.searchsorted(source.time_s, time_s + near, "right")
+    first = np.searchsorted(source.time_s, time_s - sample_time_s + near, "right")
+    count = last - first
+    mean_t, mean_v, spread, product = np.zeros((4, time_s.size))
+    for moments in (False, True):
+        for back in range(1, int(np.max(count, initial=0)) + 1):
+            at = np.maximum(last - back, 0)
+            x, v = source.time_s[at] - time_s, source.values[at]
+            weight = (back <= count) / np.maximum(count, 1)
+            if moments:
+                spread += weight * (x - mean_t) ** 2
+                product += weight * (x - mean_t) * (v - mean_v)
+            else:
+                mean_t += weight * x
+                mean_v += weight * v
+    between = np.interp(time_s, source.time_s, source.values)
+    line = mean_v - mean_t * product / np.where(spread > 0, spread, 1.0)
+    return np.where(count >= FEWEST_ON_LINE, line, between)
+
+
+def slack_s(source: StampedSamples, sample_time_s: float) -> float:
     """How much later than a grid point a stamp may be and still belong to it, s."""
     jitter = source.jitter
     # Rare events are no jittered clock: their stamps mean what they say.

@@ -15,10 +15,12 @@ from flightid.record.channel import Channel
 from flightid.record.checks import REMOVE_OUTLIERS, entry_steps
 from flightid.record.history import Step
 from flightid.record.hold import InputHold
-from flightid.record.interpolation import Interpolation, is_coarser, usual_method
+from flightid.record.interpolation import SAME_RATE, Interpolation, is_coarser, usual_method
 from flightid.record.outlying import bridge_outliers
+from flightid.record.repeats import is_switched
 from flightid.record.rows import require_sensible_base
 from flightid.record.stamps import mean_spacing_s
+from flightid.record.step_instants import clock_step_s, moves_on, span_of_steps
 from flightid.record.timebase import to_uniform
 from flightid.record.validation import unknown_channel
 from flightid.table import Cell
@@ -71,20 +73,44 @@ class RowGrid:
                     f"{name!r} has too few samples for a grid", found=time_s.size, needed="two"
                 )
         decide = [name for name, role in roles.items() if role in (Role.INPUT, Role.OUTPUT)]
-        slowest = max(float(np.median(np.diff(rows[name][0]))) for name in decide or roles)
-        return float(f"{slowest:.9g}")
+        return max(clock_step_s(rows[name][0]) for name in decide or roles)
+
+    @property
+    def driving(self) -> list[str]:
+        """Names of the inputs."""
+        return [each.channel.name for each in self.wanted if each.channel.role is Role.INPUT]
 
     def methods(self, rows: Rows, step_s: float) -> dict[str, Interpolation | str]:
-        """Interpolation by channel: what was asked for, else what the inputs' hold calls for."""
+        """Interpolation by channel: what was asked for, else what the inputs call for.
+
+        Where the grid is the inputs' own, outputs are read at its instants: a low-pass without
+        phase would put what an input does later into them, as a closed loop puts noise of the past
+        into inputs.
+        """
         given = self.interpolation
         if isinstance(given, str):
             return {item.channel.name: given for item in self.wanted}
         found: dict[str, Interpolation | str] = {}
+        for name in self.driving:
+            hold = self.hold or ("zero" if is_switched(rows[name][1]) else None)
+            if hold == "zero" and moves_on(rows[name], step_s):
+                found[name] = Interpolation.PREVIOUS
+            else:
+                found[name] = usual_method(hold, mean_spacing_s(rows[name][0]), step_s)
+        own = bool(found) and not self._low_passed(rows, step_s, found)
         for item in self.wanted:
-            hold = self.hold if item.channel.role is Role.INPUT else None
-            source_s = mean_spacing_s(rows[item.channel.name][0])
-            found[item.channel.name] = usual_method(hold, source_s, step_s)
-        return {**found, **(given or {})}
+            name = item.channel.name
+            is_dense = mean_spacing_s(rows[name][0]) <= step_s * (1 + SAME_RATE)
+            if own and is_dense and item.channel.role is Role.OUTPUT:
+                found[name] = Interpolation.POINT
+        return {**dict.fromkeys(rows, Interpolation.BAND_LIMITED), **found, **(given or {})}
+
+    def _low_passed(self, rows: Rows, step_s: float, ways: Mapping[str, str]) -> bool:
+        """Whether an input is low-passed on its way to the grid."""
+        return any(
+            is_coarser(step_s, mean_spacing_s(rows[name][0])) and ways[name] != "previous"
+            for name in self.driving
+        )
 
     def hold_after(self, rows: Rows) -> InputHold | None:
         """What is still true of the inputs: what was low-passed is smooth."""
@@ -92,11 +118,7 @@ class RowGrid:
         if step_s is None or self.hold is None:
             return self.hold
         ways = self.methods(rows, step_s)
-        driving = [i.channel.name for i in self.wanted if i.channel.role is Role.INPUT]
-        filtered = any(
-            is_coarser(step_s, mean_spacing_s(rows[name][0])) and ways[name] != "previous"
-            for name in driving
-        )
+        filtered = self._low_passed(rows, step_s, ways)
         return "band_limited" if filtered else self.hold
 
     def pieces(
@@ -128,12 +150,15 @@ class RowGrid:
             return [(stamps, {name: values for name, (_, values) in rows.items()}, steps)]
         fastest = min((time_s for time_s, _ in rows.values()), key=mean_spacing_s)
         require_sensible_base(fastest, step_s, self.time_column)
+        ways = self.methods(rows, step_s)
+        held = [name for name in self.driving if ways[name] == "previous"]
         made = to_uniform(
             rows,
             sample_time_s=step_s,
+            span_s=span_of_steps(rows, held, step_s),
             gaps="split",
             max_gap_s=self.max_gap_s,
-            interpolation=self.methods(rows, step_s),
+            interpolation=ways,
         )
         steps = (*steps, Step("conditioning.to_uniform", made.options, VERSION))
         return [(span.time_s, span.samples, steps) for span in made.spans]

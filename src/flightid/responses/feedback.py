@@ -10,12 +10,18 @@ from numpy.typing import NDArray
 from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.record import Record
+from flightid.record.history import spread_channels
 from flightid.record.hold import common_loop
 from flightid.record.repeats import found_period
 from flightid.responses.response import FrequencyResponse
 from flightid.responses.windows.samples import Samples
 from flightid.uncertainty.fed_noise import fed_noise_spectrum
-from flightid.uncertainty.feedback import FeedbackTest, declared_loop, find_feedback
+from flightid.uncertainty.feedback import (
+    FeedbackTest,
+    declared_loop,
+    find_feedback,
+    unless_spread,
+)
 
 SAMPLES_A_CYCLE = 8.0
 """Samples kept in a cycle of the highest frequency of interest."""
@@ -52,7 +58,9 @@ def feedback_of(
     # Another band asks the same of the same samples; their first ones tell whether means are off.
     begun = tuple(rows[:, 0].tobytes() for rows in samples.records)
     key = ("feedback", *records[1:], samples.inputs, samples.outputs, begun, step, most)
-    return records[0].once(key, lambda: _tested(samples, step, most))
+    test = records[0].once(key, lambda: _tested(samples, step, most))
+    names = (*samples.inputs, *samples.outputs)
+    return unless_spread(test, spread_channels([each.history for each in records], names))
 
 
 def _tested(samples: Samples, step: int, most: int) -> FeedbackTest:

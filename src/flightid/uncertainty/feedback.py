@@ -54,7 +54,8 @@ class FeedbackTest:
         How it is known: the test of past noise; the user's word; inputs that repeat exactly, or
         outputs without noise, which feed nothing back; an estimate by way of an excitation or of a
         model of the noise, which a closed loop does not bias. Or why it is not ("same sample", "too
-        short"): input and output go together within a sample; records too short to tell.
+        short", "filtered"): input and output go together within a sample; records too short to
+        tell; samples made of later ones, which look like feedback.
     p_value : float or None
         Chance of so large a share with the loop open, over all inputs; None without a test.
     input : str or None
@@ -106,6 +107,10 @@ class FeedbackTest:
             "instrument": "estimated by way of the excitation, which a closed loop does not bias",
             "noise model": "estimated with a model of the noise, which a closed loop does not bias",
             "no noise": "no loop seen: the outputs hold no noise that could be fed back",
+            "filtered": (
+                "whether a loop is closed cannot be told: channels were brought to another grid "
+                "with samples from before and after it, so that outputs foretell inputs"
+            ),
             "too short": "whether a loop is closed cannot be told: the records are too short",
         }
         if self.source in words:
@@ -131,6 +136,12 @@ class FeedbackTest:
 def _percent(share: float | None) -> str:
     """A share in percent, cut so that only all of it reads 100."""
     return f"{np.floor(1e4 * (share or 0.0)) / 100.0:.4g}"
+
+
+def unless_spread(test: FeedbackTest, spread: Sequence[str]) -> FeedbackTest:
+    """A test of channels of which some were filtered without phase, which looks like feedback."""
+    found = test.source == "test" and test.is_closed and bool(spread)
+    return replace(test, loop="unknown", source="filtered") if found else test
 
 
 def declared_loop(loop: str) -> FeedbackTest:

@@ -1,0 +1,60 @@
+"""Outputs of a rig on the grid of its held command: no sample knows what the command does later."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from flightid import feedback_test
+from flightid.conventions import Role
+from flightid.record import Record
+from flightid.record.channel import Channel
+from flightid.record.interpolation import Interpolation
+from flightid.record.row_grids import ChannelColumn, RowGrid, Rows
+from flightid.uncertainty.feedback import find_feedback
+
+STEP_S = 0.02
+POLE = np.exp(-5.0 * 0.001)
+WANTED = tuple(
+    ChannelColumn(Channel(name, "1", role), name)
+    for name, role in (("u", Role.INPUT), ("y", Role.OUTPUT))
+)
+GRID = RowGrid(WANTED, None, None, None, None, None, "time", has_clocks=True)
+
+
+def rig(seed: int, input_hz: int = 50) -> Rows:
+    """A lag of 0.2 s at 1 kHz under a two-level command at 50 Hz; its output logged at 200 Hz."""
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.choice([-1.0, 1.0], 500), 120)
+    moved = u + 0.3 * np.repeat(rng.standard_normal(3000), 20)
+    y = np.zeros(u.size)
+    for k in range(1, y.size):
+        y[k] = POLE * y[k - 1] + (1 - POLE) * moved[k - 1]
+    time_s, every = np.arange(u.size) * 0.001, 1000 // input_hz
+    seen = slice(2, None, 5)
+    noise = 0.02 * rng.standard_normal(y[seen].size)
+    return {"u": (time_s[::every], u[::every]), "y": (time_s[seen], y[seen] + noise)}
+
+
+@pytest.mark.parametrize("input_hz", [50, 200])
+def test_an_open_rig_with_a_faster_output_is_not_called_closed(input_hz: int) -> None:
+    for seed in range(3):
+        rows = rig(seed, input_hz)
+        grid = replace(GRID, resample_to_s=STEP_S)
+        assert set(grid.methods(rows, STEP_S).values()) == {
+            Interpolation.PREVIOUS, Interpolation.POINT
+        }  # fmt: skip
+        _, made, _ = grid.pieces(rows, ())[0]
+        u, y = (made[name] - np.mean(made[name]) for name in ("u", "y"))
+        assert find_feedback([u[None]], [y[None]], ["u"]).loop == "open"
+
+
+def test_a_low_passed_output_leaves_the_loop_unknown() -> None:
+    _, made, steps = replace(GRID, interpolation={"y": "band-limited"}).pieces(rig(0), ())[0]
+    time_s = STEP_S * np.arange(made["u"].size)
+    plain = Record.from_arrays(time_s, inputs={"u": made["u"]}, outputs={"y": made["y"]})
+    assert feedback_test(plain).loop == "closed"
+    told = plain.replace({}, step=steps[-1])
+    assert (feedback_test(told).loop, feedback_test(told).source) == ("unknown", "filtered")
