@@ -132,11 +132,17 @@ impl Layouts {
     }
 
     /// Frames left out on purpose after an iteration (`P interval`, a share or every how many).
+    ///
+    /// A frame is written where its place in the interval plus `part - 1`, modulo `whole`, is below
+    /// `part`. The next one written begins a group of `whole` or an interval, whichever is nearer.
     fn left_out(&self, iteration: i64) -> i64 {
         let (part, whole) = self.shown;
-        (1..=self.interval)
-            .take_while(|ahead| ((iteration + ahead) % self.interval + part - 1) % whole >= part)
-            .count() as i64
+        let place = (iteration + 1).rem_euclid(self.interval);
+        let in_group = (place + part - 1) % whole;
+        if in_group < part {
+            return 0;
+        }
+        (whole - in_group).min(self.interval - place)
     }
 }
 
@@ -167,7 +173,7 @@ impl Blackbox {
     /// # Errors
     /// A header that does not say what frames hold; bytes and frames of more than `budget` bytes.
     pub fn decode(bytes: &[u8], budget: usize) -> Result<Self, LogError> {
-        let header = Header::read(bytes)?;
+        let header = Header::read(bytes, budget)?;
         let layouts = Layouts::read(&header)?;
         let mut log = Self {
             main: FrameTable::new(&layouts.intra),
@@ -177,7 +183,7 @@ impl Blackbox {
         };
         let mut memory = Memory::default();
         let mut left = bytes.len().saturating_mul(VALUES_A_BYTE);
-        let (mut at, mut held) = (header.size, bytes.len());
+        let (mut at, mut held) = (header.size, bytes.len() + header.held);
         let mut values = Vec::new();
         while at < bytes.len() && !log.ended {
             let mut reader = Bytes::new(bytes, at);
@@ -347,5 +353,45 @@ impl Memory {
             _ => true,
         };
         later && counted
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_left_out_are_those_that_steps_count() -> Result<(), LogError> {
+        let text = |interval: i64, part: i64, whole: i64| {
+            format!(
+                "H Product:Blackbox flight data recorder\nH Field I name:time\n\
+                 H Field I signed:0\nH Field I predictor:0\nH Field I encoding:1\n\
+                 H Field P predictor:0\nH Field P encoding:1\n\
+                 H I interval:{interval}\nH P interval:{part}/{whole}\n"
+            )
+        };
+        for interval in [1, 2, 7, 8, 32] {
+            for whole in 1..=9 {
+                for part in 1..=whole {
+                    let header = Header::read(text(interval, part, whole).as_bytes(), 1 << 20)?;
+                    let layouts = Layouts::read(&header)?;
+                    for iteration in 0..70 {
+                        let left_out =
+                            |ahead| ((iteration + ahead) % interval + part - 1) % whole >= part;
+                        let counted = (1..=interval).take_while(|&ahead| left_out(ahead)).count();
+                        assert_eq!(layouts.left_out(iteration), counted as i64);
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn lines_of_a_header_keep_to_the_budget() {
+        let text =
+            format!("{}\n{}", "H Product:Blackbox flight data recorder", "H a:b\n".repeat(9999));
+        assert!(Header::read(text.as_bytes(), 1 << 30).is_ok());
+        assert!(matches!(Header::read(text.as_bytes(), 1 << 18), Err(LogError::TooLarge { .. })));
     }
 }

@@ -5,6 +5,8 @@ use crate::error::LogError;
 /// First line of every flight.
 pub const PRODUCT: &[u8] = b"H Product:Blackbox flight data recorder";
 const LONGEST_LINE: usize = 16 * 1024;
+/// Bytes that the allocator takes beside the texts of a line.
+const OVERHEAD: usize = 32;
 
 /// Where each flight of a file begins and ends.
 pub fn flights(bytes: &[u8]) -> Vec<(usize, usize)> {
@@ -40,13 +42,18 @@ fn find(bytes: &[u8], wanted: &[u8]) -> Option<usize> {
 pub struct Header {
     /// Name and value of each line.
     pub lines: Vec<(String, String)>,
-    /// Bytes that the header takes.
+    /// Bytes that the header takes in the file.
     pub size: usize,
+    /// Bytes that its lines take in memory.
+    pub held: usize,
 }
 
 impl Header {
     /// Read the lines that begin a flight.
-    pub fn read(bytes: &[u8]) -> Result<Self, LogError> {
+    ///
+    /// # Errors
+    /// Bytes that begin no flight; bytes and lines of more than `budget` bytes.
+    pub fn read(bytes: &[u8], budget: usize) -> Result<Self, LogError> {
         if !bytes.starts_with(PRODUCT) {
             return Err(LogError::NotALog {
                 expected: "blackbox",
@@ -59,6 +66,12 @@ impl Header {
             let text = String::from_utf8_lossy(&line[2..]);
             if let Some((name, value)) = text.split_once(':') {
                 header.lines.push((name.trim().to_string(), value.trim().to_string()));
+                // A list that grows is there twice while it does; Python takes a second copy.
+                header.held += 2 * (2 * size_of::<(String, String)>() + line.len() + OVERHEAD);
+                let taken = bytes.len() + header.held;
+                if taken > budget {
+                    return Err(LogError::TooLarge { bytes: taken });
+                }
             }
         }
         Ok(header)
