@@ -74,6 +74,28 @@ def require_memory(name: str, n_bytes: float) -> None:
         )
 
 
+def require_file(path: Path) -> None:
+    """Refuse devices, pipes and sockets: to open or read one may wait without end.
+
+    Parameters
+    ----------
+    path : Path
+        A file, a folder, or nothing yet.
+
+    Raises
+    ------
+    FileFormatError
+        It is another thing.
+    """
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise FileFormatError(
+            f"{path.name} is no file",
+            found="a pipe, a socket or a device",
+            needed="a file, or the folder of a bag",
+            action="write what comes from it to a file first",
+        )
+
+
 @contextmanager
 def within_memory(name: str) -> Iterator[None]:
     """Turn a native reader's MemoryError, which holds bytes, into the refusal of `require_memory`.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sqlite3
 import struct
 import time
@@ -12,9 +13,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flightid.errors import FileFormatError
+import flightid as fid
+from flightid.errors import FileFormatError, OptionError
+from flightid.reading import VARIABLE
 from flightid.record.formats.ros import read_columns
-from tests.bag_builder import NS, Flight, write_db3, write_mcap
+from tests.bag_builder import (
+    NS,
+    START_NS,
+    Flight,
+    mcap_of,
+    message_of,
+    topic_of,
+    write_db3,
+    write_mcap,
+)
 
 RATE = "/imu/rate.x"
 FLIGHT = Flight(n_rates=60)
@@ -87,3 +99,67 @@ def test_a_cut_database_is_refused_whole_and_says_how_to_recover_it(tmp_path: Pa
     path.write_bytes(path.read_bytes()[:-8192])
     with pytest.raises(FileFormatError, match=r"sqlite3 bag_0\.db3 \.recover"):
         read_columns(path)
+
+
+EMPTY = f"{'=' * 80}\nMSG: a/E\n# nothing\n"
+REPEATED = {
+    "one": "a/E[999999999] e\n" + EMPTY,
+    "nested": f"a/F[999999999] f\n{'=' * 80}\nMSG: a/F\na/E[999999999] e\n{EMPTY}",
+    "none of each": f"a/F[999999999] f\n{'=' * 80}\nMSG: a/F\nuint8[0] x\nstring[0] y\n",
+    "long": "uint8 x\n" * 40_000,
+}
+
+
+@pytest.mark.parametrize("text", REPEATED.values(), ids=REPEATED)
+def test_definitions_that_repeat_nothing_leave_their_topic_out(text: str, tmp_path: Path) -> None:
+    payload = b"\x00\x01\x00\x00" + bytes(8)
+    messages = b"".join(message_of(START_NS + k * NS, payload) for k in range(9))
+    path = mcap_of(tmp_path / "a.mcap", topic_of("float64 v\n" + text) + messages)
+    with _at_once(), pytest.raises(FileFormatError, match=r"which holds nothing|is too long"):
+        read_columns(path)
+
+
+def _numbers(tmp_path: Path, stamps: list[int], head: bytes = b"\x00\x01\x00\x00") -> Path:
+    order = ">d" if head[1] == 0 else "<d"
+    parts = [message_of(at, head + struct.pack(order, k)) for k, at in enumerate(stamps)]
+    return mcap_of(tmp_path / "a.mcap", topic_of("float64 v\n") + b"".join(parts))
+
+
+def test_stamps_beyond_the_clock_are_refused(tmp_path: Path) -> None:
+    last = (1 << 63) - 1
+    assert read_columns(_numbers(tmp_path, [last - 1, last])).lengths == {"/a/v": 2}
+    with pytest.raises(FileFormatError, match="holds a stamp that is none"):
+        read_columns(_numbers(tmp_path, [last, last + 1]))
+
+
+def test_numbers_are_read_in_the_order_of_their_bytes(tmp_path: Path) -> None:
+    path = _numbers(tmp_path, [0, NS, 2 * NS], head=bytes(4))
+    assert read_columns(path).column("/a/v").tolist() == [0.0, 1.0, 2.0]
+
+
+def test_messages_as_they_lie_in_memory_keep_to_the_budget(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = _numbers(tmp_path, list(range(8000)))
+    monkeypatch.setenv(VARIABLE, "1")
+    assert path.stat().st_size < 1 << 19
+    with pytest.raises(FileFormatError, match="more than is read into memory"):
+        read_columns(path)
+
+
+def test_pipes_are_refused_without_waiting(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "a.mcap")
+    for read in (fid.read_records, fid.read_log):
+        with pytest.raises(FileFormatError, match=r"a\.mcap is no file"):
+            read(tmp_path / "a.mcap")
+    with pytest.raises(FileFormatError, match="null is no file"):
+        fid.read_records("/dev/null")
+
+
+def test_grids_without_end_and_filters_without_poles_are_refused() -> None:
+    record = fid.Record.from_arrays(np.arange(50) / 50, outputs={"p": np.arange(50.0)})
+    with pytest.raises(OptionError, match=r"grid of sample_time_s=1e-12.*memory budget"):
+        fid.conditioning.resample(record, 1e-12)
+    with pytest.raises(OptionError, match=r"needed 1 of 5e-05 Hz to 25 Hz"):
+        fid.conditioning.filter_record(record, 1e-300)
+    fid.conditioning.filter_record(record, 5e-5, order=2)

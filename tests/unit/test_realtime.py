@@ -203,10 +203,11 @@ def test_the_first_sound_sender_is_the_pilot_and_a_frame_takes_a_bounded_count()
         with pilot, other:
             there = ("127.0.0.1", link.port)
             other.sendto(b"nonsense", there)
+            other.sendto(b"{}", there)
             pilot.sendto(b'{"u": 0.5}', there)
             other.sendto(b'{"u": 9.0}', there)
             assert link.pilot(0.0, {}) == {"u": 0.5}
-            assert link.rejected == 2
+            assert (link.rejected, link.strangers) == (2, 1)
             for _ in range(2 * MOST_A_FRAME):
                 other.sendto(b'{"u": 9.0}', there)
             pilot.sendto(b'{"u": 0.25}', there)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -66,6 +67,10 @@ def command(
     from flightid.simulation.fly_options import FlyOptions
     from flightid.simulation.realtime import fly_model
 
+    if output is not None and not output.parent.is_dir():
+        raise click.UsageError(f"--output: there is no folder {output.parent}; make it first")
+    if output is not None and output.suffix not in (".parquet", ".nc"):
+        raise click.UsageError(f"--output: {output.name} ends in neither .parquet nor .nc")
     asked = FlyOptions(**given_options(FlyOptions, options, "a flight"))
     if gains is not None and blocks is not None:
         raise click.UsageError("--gains and --blocks move the same inputs: give one of them")
@@ -77,7 +82,12 @@ def command(
         around = _blocks(blocks, source, asked.step_s(source))
     if around is not None and around.commands:
         note(f"The pilot commands {', '.join(around.commands)} too")
-    session = fly_model(source, asked, controller=around, say=note)
+    # Who ends the flight by a signal keeps it, as Ctrl-C does.
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        session = fly_model(source, asked, controller=around, say=note)
+    finally:
+        signal.signal(signal.SIGTERM, before)
     if output is not None:
         note(f"Wrote {write_records(session.record, output)}")
     emit(session, as_json=as_json)

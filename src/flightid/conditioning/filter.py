@@ -32,6 +32,8 @@ class FilterDesign(StrEnum):
 
 Band = Literal["lowpass", "highpass", "bandpass", "bandstop"]
 BANDS = ("lowpass", "highpass", "bandpass", "bandstop")
+LOWEST = 1e-6
+"""Lowest cut-off over the sample rate: below it a filter's poles are one in double precision."""
 
 
 @dataclass(frozen=True)
@@ -168,11 +170,11 @@ def _design(
         raise OptionError("band is not known", found=repr(band), needed=", ".join(BANDS))
     edges = np.atleast_1d(np.asarray(cutoff_hz, dtype=np.float64))
     n_edges = 2 if band.startswith("band") else 1
-    if edges.size != n_edges or not (edges[0] > 0 and edges[-1] < rate_hz / 2):
+    if edges.size != n_edges or not (edges[0] >= LOWEST * rate_hz and edges[-1] < rate_hz / 2):
         raise OptionError(
             f"cut-off does not suit a {band} filter",
             found=f"{cutoff_hz} Hz",
-            needed=f"{n_edges} frequencies between 0 and {rate_hz / 2:g} Hz",
+            needed=f"{n_edges} of {LOWEST * rate_hz:g} Hz to {rate_hz / 2:g} Hz",
         )
     if n_edges == 2 and edges[0] >= edges[1]:
         raise OptionError("cut-offs are not in order", found=cutoff_hz, needed="(low, high)")

@@ -15,6 +15,7 @@ from flightid.logs.log import Log
 from flightid.logs.mavlink.reader import open_telemetry
 from flightid.logs.source import LogSource
 from flightid.logs.ulog.reader import UlogSource
+from flightid.reading import require_file
 from flightid.record.formats.foreign import foreign
 from flightid.record.formats.sniff import file_format
 
@@ -127,6 +128,7 @@ def is_log(path: str | Path) -> bool:
 
 def _head(path: Path) -> bytes:
     """First bytes of a file; none of a folder, which may be a bag of records."""
+    require_file(path)
     if path.is_dir():
         return b""
     with path.open("rb") as file:

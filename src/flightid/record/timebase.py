@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flightid.errors import DataError, OptionError, UnknownNameError
+from flightid.reading import VARIABLE, memory_budget
 from flightid.record.interpolation import Interpolation, sample_at
 from flightid.record.stamps import GAP_FACTOR, StampedSamples, StampPolicy, stamped
 from flightid.record.uniform_base import ChannelResampling, UniformBase, UniformSpan, doubts
@@ -78,7 +79,8 @@ def to_uniform(
     Raises
     ------
     OptionError
-        Neither or both of `sample_time_s` and `reference`; a spacing that is not positive.
+        Neither or both of `sample_time_s` and `reference`; a spacing that is not positive, or
+        so short that the grid takes more than the memory budget.
     UnknownNameError
         `reference` or a key of `interpolation` is not a channel.
     DataError
@@ -112,6 +114,7 @@ def to_uniform(
     spans: list[UniformSpan] = []
     done: dict[str, str] = {}
     short = 0
+    _require_samples(step, sum(last - first for first, last in pieces), len(checked))
     for first, last in pieces:
         grid = _grid(start, step, first, last)
         if grid.size < 2:
@@ -268,6 +271,18 @@ def _stretch(
         if begin >= last:
             high = min(high, begin)
     return channel.within(low, high).bridged()
+
+
+def _require_samples(step: float, span_s: float, n_channels: int) -> None:
+    """Refuse a grid of more than the memory budget, before it is made."""
+    n_bytes = 8.0 * (1 + n_channels) * span_s / step
+    if n_bytes > memory_budget():
+        raise OptionError(
+            f"the grid of sample_time_s={step:g} takes more than the memory budget",
+            found=f"{span_s / step:.3g} samples, {n_bytes / (1 << 20):,.0f} MiB",
+            needed=f"at most {memory_budget() >> 20:,} MiB",
+            action=f"take a longer sample time (resample_to_s), or allow more by {VARIABLE}",
+        )
 
 
 def _grid(start: float, step: float, first: float, last: float) -> NDArray[np.float64]:

@@ -217,6 +217,8 @@ def fly_model(
         )
         if say is not None and link.rejected:
             say(f"{link.rejected} datagrams were damaged or not delivered.")
+        if say is not None and link.strangers:
+            say(f"{link.strangers} datagrams came from another sender than the pilot.")
     return replace(session, options=options.to_dict())
 
 
@@ -275,7 +277,7 @@ class UdpLink:
             self._socket.bind(listen)
         self._sender: object = None
         self._held: dict[str, float] = {}
-        self.rejected = 0
+        self.rejected = self.strangers = 0
 
     @property
     def port(self) -> int:
@@ -283,7 +285,7 @@ class UdpLink:
         return int(self._socket.getsockname()[1])
 
     def pilot(self, time_s: float, outputs: Mapping[str, float]) -> dict[str, float]:
-        """Inputs of the newest datagrams; damaged ones are counted in `rejected`."""
+        """Inputs of the newest datagrams; `rejected` counts damaged ones, `strangers` others'."""
         del time_s, outputs
         for _ in range(MOST_A_FRAME if self._listens else 0):
             try:
@@ -293,7 +295,8 @@ class UdpLink:
             try:
                 # What others sent before the pilot was known may still wait.
                 if self._sender not in (None, sender):
-                    raise DataError("a datagram comes from another sender")
+                    self.strangers += 1
+                    continue
                 self._held |= self._read(data)
             except (ValueError, RecursionError):
                 self.rejected += 1
@@ -308,6 +311,8 @@ class UdpLink:
         if not isinstance(content, dict):
             raise DataError("a datagram holds no table")
         found = {}
+        if not content:
+            raise DataError("a datagram moves no input")
         for name, value in content.items():
             known = name in self._inputs and isinstance(value, int | float)
             if not known or isinstance(value, bool) or not abs(value) <= LARGEST_INPUT:

@@ -10,13 +10,15 @@ from typing import Any
 
 from flightid.control.closed_loop.close_loop import DRAWS
 from flightid.dynamics.rotor.options import RotorOptions
-from flightid.errors import StudyError
+from flightid.errors import OptionError, StudyError
 from flightid.export.options import FORMATS
 from flightid.export.to_file import format_of
 from flightid.option_forms import NOTHING, SPAN
 from flightid.options import Options, option
 from flightid.study.loop_blocks import made_block
 from flightid.study.reading import TableReader, read_own, read_table
+
+LONGEST_NAME = 255
 
 
 @dataclass(frozen=True)
@@ -29,6 +31,18 @@ class ExportSettings(Options):
     )
     format: str | None = option(None, choices=FORMATS, doc="Default: by the file's suffix.")
     options: Options = field(default_factory=Options)
+
+    def __post_init__(self) -> None:
+        """Refuse a path that names no file before anything is computed."""
+        super().__post_init__()
+        parts = [""] if self.path is None else self.path.split("/")
+        longest = max(len(part.encode()) for part in parts)
+        if self.path == "" or longest > LONGEST_NAME or "\0" in "".join(parts):
+            raise OptionError(
+                "path of an export names no file",
+                found=repr(self.path)[:60],
+                needed=f"a name of 1 to {LONGEST_NAME} bytes, without NUL",
+            )
 
     @property
     def file(self) -> str:

@@ -7,6 +7,7 @@ from enum import StrEnum
 from pathlib import Path
 
 from flightid.errors import FileFormatError
+from flightid.reading import require_file
 from flightid.record.formats.foreign import foreign
 
 TEXT_SUFFIXES = {".csv", ".txt", ".tsv", ".dat"}
@@ -51,6 +52,7 @@ def file_format(path: Path) -> FileFormat:
     ...     file_format(write_atomically(Path(folder) / "a.csv", "time,p"))
     <FileFormat.CSV: 'csv'>
     """
+    require_file(path)
     if path.is_dir():
         return FileFormat.BAG
     with path.open("rb") as stream:

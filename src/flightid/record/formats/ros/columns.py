@@ -24,7 +24,7 @@ CONTAINERS: tuple[tuple[bytes, Callable[[Path, BagContent], None]], ...] = (
     (storage.MAGIC, storage.gather),
 )
 """Readers by the first bytes of a file."""
-RECOVERIES = {
+RECOVERIES: dict[Callable[[Path, BagContent], None], str] = {
     mcap.gather: "copy it again; `mcap recover {0}` keeps what is whole",
     bag1.gather: "copy it again, or `rosbag reindex {0}`",
     storage.gather: "copy it again; `sqlite3 {0} .recover | sqlite3 whole.db3` keeps what is whole",

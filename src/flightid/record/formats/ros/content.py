@@ -64,7 +64,8 @@ class BagContent:
         Raises
         ------
         FileFormatError
-            The topic was not declared, or the messages are more than the memory budget.
+            The topic was not declared, the stamp is none, or the messages are more than the memory
+            budget.
         """
         topic = self.topics.get(key)
         if topic is None:
@@ -72,6 +73,13 @@ class BagContent:
                 f"{self.name} holds a message of no topic",
                 found=repr(key)[:40],
                 needed="a channel for each",
+            )
+        if not 0 <= received_ns < 1 << 63:
+            raise FileFormatError(
+                f"{self.name} holds a stamp that is none",
+                found=f"{received_ns} ns"[:60],
+                needed="ns since 1970, below 2^63",
+                action="record it again, or correct the clock of the recorder",
             )
         if topic.is_long:
             return

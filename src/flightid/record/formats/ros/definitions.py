@@ -16,6 +16,7 @@ LINE = re.compile(
     r"(?P<type>\w[\w/]*)(?:<=\d+)?(?P<array>\[(?:<=\d+|(?P<count>\d{0,9}))\])?\s+"
     r"(?P<name>[A-Za-z]\w*)\s*(?P<rest>.*)"
 )
+LONGEST_DEFINITION = 1 << 18
 OF_ROS1 = {"Header": "std_msgs/Header"}
 STORES = ("LATEST", "ROS2_HUMBLE", "ROS2_FOXY")
 """Releases whose message types the extra brings, the newest first."""
@@ -63,13 +64,19 @@ def parsed(type_name: str, text: str) -> Definitions:
     Raises
     ------
     FileFormatError
-        A line is no definition.
+        A line is no definition, or there are too many.
 
     Example
     -------
     >>> parsed("a/B", "float64 x  # m")
     {'a/B': (Field(name='x', type='float64', count=None),)}
     """
+    if len(text) > LONGEST_DEFINITION:
+        raise FileFormatError(
+            f"the definition of {type_name[:60]} is too long",
+            found=f"{len(text)} letters",
+            needed=f"at most {LONGEST_DEFINITION}",
+        )
     found: dict[str, tuple[Field, ...]] = {}
     for place, section in enumerate(SECTION.split(text)):
         name, body = type_name, section

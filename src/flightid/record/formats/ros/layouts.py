@@ -123,9 +123,12 @@ class _LayoutDraft:
 
     def field(self, each: Field, place: str, source: str, depth: int) -> None:
         """One field, single or many."""
+        self.count()
+        if each.count == 0:
+            return
         if each.count is None:
             self.value(each.type, place, source, depth)
-        elif 0 <= each.count <= MOST_ELEMENTS and each.type not in TEXTS:
+        elif 0 < each.count <= MOST_ELEMENTS and each.type not in TEXTS:
             for index in range(each.count):
                 self.value(each.type, f"{place}[{index}]", source, depth)
         elif (letter := LETTERS.get(each.type)) is not None:
@@ -144,13 +147,14 @@ class _LayoutDraft:
         inner = _LayoutDraft(self.subject, self.known, n_values=self.n_values)
         inner.value(each.type, "", "", depth + 1)
         self.n_values = inner.n_values
-        return Repeat(count, steps=_nameless(inner.taken()))
+        steps = inner.taken()
+        if not steps:
+            raise self.refusal(f"many of {each.type}, which holds nothing")
+        return Repeat(count, steps=_nameless(steps))
 
     def value(self, kind: str, place: str, source: str, depth: int) -> None:
         """One value: a number, a time, a text or a message."""
-        self.n_values += 1
-        if self.n_values > MOST_VALUES:
-            raise self.refusal("thousands of fields")
+        self.count()
         if kind in TIMES:
             names = [f"{place}.s", f"{place}.ns"]
             self.letters += TIMES[kind]
@@ -165,6 +169,12 @@ class _LayoutDraft:
             self.repeat(Repeat(1, text_width=TEXTS[kind]))
         else:
             self.fields(kind, place, source, depth + 1)
+
+    def count(self) -> None:
+        """Count a field or a value: a walk is bounded whatever it takes of a message."""
+        self.n_values += 1
+        if self.n_values > 2 * MOST_VALUES:
+            raise self.refusal("thousands of fields")
 
     def refusal(self, found: str) -> FileFormatError:
         """No layout can be made."""
