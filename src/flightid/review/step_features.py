@@ -47,13 +47,13 @@ def _overshoots(shares: Array) -> Array:
     told = np.isfinite(peaks)
     told[0] = False
     if not told.any() or not np.isfinite(peaks[0]):
-        return np.maximum(peaks, 0.0)
+        return np.asarray(np.maximum(peaks, 0.0))
     centre = float(peaks[told].mean())
     lifted, spread = centre - peaks[0], float(peaks[told].std())
     wider = np.hypot(spread, lifted) / spread if spread > 0.0 else 1.0
     moved = peaks[0] - lifted + wider * (peaks - centre)
     moved[0] = peaks[0] - lifted
-    return np.maximum(moved, 0.0)
+    return np.asarray(np.maximum(moved, 0.0))
 
 
 def frequency_features(loop: LoopDraws, slowest_hz: float) -> tuple[Reading, ...]:
