@@ -26,6 +26,8 @@ STRETCHES, FEWEST = 12, 5
 """Stretches whose own offsets tell interval and drift, and how few of them tell none."""
 FASTEST_DRIFT = 5e-4
 """Difference of rates that is looked for: clocks of cheap crystals differ by 100 ppm."""
+STEP, STEP_LEVEL = 0.25, 1e-3
+"""Least step of a clock that is looked for, in samples, and the chance of seeing one in none."""
 SMOOTHED = 9
 """Samples of the window under which signals are matched."""
 COARSE = 0.5
@@ -46,6 +48,10 @@ class ClockOffset:
         Of the shared signal; None where the offset was told.
     sample_s : float
         The longer spacing of both signals, s.
+    middle_s : float
+        Stamp on the second clock in the middle of the overlap, where the offset is told in words.
+    step_s : float
+        Step of a clock within the overlap, s, of which a line knows nothing; 0 where none is seen.
     """
 
     offset_s: float
@@ -53,13 +59,17 @@ class ClockOffset:
     half_width_s: float | None
     correlation: float | None
     sample_s: float
+    middle_s: float = 0.0
+    step_s: float = 0.0
 
     @property
     def said(self) -> str:
         """The relation in words."""
-        text = f"clock offset {self.offset_s:.6g} s"
         if self.correlation is None:
-            return f"{text}, as told"
+            return f"clock offset {self.offset_s:.6g} s, as told"
+        half = self.half_width_s or self.sample_s
+        digits = int(np.clip(1 - np.floor(np.log10(half)), 0, 9)) if half > 0 else 9
+        text = f"clock offset {self.offset_s + self.drift * self.middle_s:.{digits}f} s"
         text += "" if self.half_width_s is None else f" ± {self.half_width_s:.2g} s"
         text += f", drift {1e6 * self.drift:.3g} ppm" if self.drift else ""
         return f"{text} (correlation {self.correlation:.3f})"
@@ -73,6 +83,13 @@ class ClockOffset:
                 f"the {self.said}: nothing of the files was compared",
                 "name a column that both hold (join_on): an offset by 10 ms turns the phase at "
                 "10 rad/s by 6 degrees",
+            )  # fmt: skip
+        if self.step_s:
+            return Finding(
+                "clock-steps", Light.RED,
+                f"{self.said}: a clock steps by about {1e3 * self.step_s:.3g} ms within the "
+                "overlap, so that no line relates the clocks",
+                "cut the files where the clock was set, and join each part by itself",
             )  # fmt: skip
         if self.half_width_s is None or self.half_width_s > COARSE * self.sample_s:
             known = "nobody can say how well" if self.half_width_s is None else "within that alone"
@@ -112,6 +129,14 @@ def clock_offset(first: Signal, second: Signal, name: str) -> ClockOffset:
     correlation = _correlations(one, two)
     best = int(np.argmax(correlation))
     found = float(correlation[best])
+    opposite = -float(np.min(correlation))
+    if opposite >= LEAST_CORRELATION and opposite > found:
+        raise DataError(
+            f"{name!r} of the files has opposite signs",
+            found=f"correlation {-opposite:.3f}",
+            needed="one sign",
+            action="turn one of them, and look whether its axes are those of the other",
+        )
     if not found >= LEAST_CORRELATION:
         raise DataError(
             f"{name!r} of the files is not one signal",
@@ -134,7 +159,19 @@ def clock_offset(first: Signal, second: Signal, name: str) -> ClockOffset:
     smooth = [_smooth(time_s[0], values, sample_s) for (time_s, _), values in (
         (first, one), (second, two)
     )]  # fmt: skip
-    return _of_stretches(smooth[0], smooth[1], start, sample_s, found)
+    held = all(_is_held(values) for _, values in (first, second))
+    spacings = sum(mean_spacing_s(time_s) for time_s, _ in (first, second))
+    floor_s = spacings / 2 if held else 0.0
+    return _of_stretches(smooth[0], smooth[1], start, sample_s, found, floor_s)
+
+
+def _is_held(values: Array) -> bool:
+    """Whether a signal moves by jumps alone: its edges are known within a sample each."""
+    moves = np.abs(np.diff(values))
+    edges = moves > 0.25 * np.max(moves, initial=0.0)
+    apart = not np.any(edges[1:] & edges[:-1])
+    most = float(np.sum(moves[edges] ** 2)) > 0.9 * float(np.sum(moves**2))
+    return bool(np.any(edges)) and apart and most
 
 
 def _smooth(start_s: float, values: Array, step_s: float) -> Signal:
@@ -180,7 +217,12 @@ def _width(correlation: Array, best: int) -> int:
 
 
 def _of_stretches(
-    first: Signal, second: Signal, start_s: float, sample_s: float, correlation: float
+    first: Signal,
+    second: Signal,
+    start_s: float,
+    sample_s: float,
+    correlation: float,
+    floor_s: float,
 ) -> ClockOffset:
     """Offset, interval and drift from stretches of the overlap in which the signal moves."""
     from scipy.stats import t as student  # noqa: PLC0415 - commands that join nothing do without
@@ -207,11 +249,40 @@ def _of_stretches(
     error = float(np.sqrt(np.sum((offsets_s - design @ line) ** 2) / (time_s.size - 2)))
     slope_error = error / np.sqrt(spread)
     ends_s = float(np.hypot(error / np.sqrt(time_s.size), slope_error * span_s / 2))
-    half = float(student.ppf(0.975, time_s.size - 2)) * ends_s
+    # Edges of held signals lie anywhere within the spacing before the sample that shows them.
+    half = max(float(student.ppf(0.975, time_s.size - 2)) * ends_s, floor_s)
+    step_s = _step(design, offsets_s, max(STEP * sample_s, 2 * floor_s))
     # Stamps t of the first and s of the second: t - s = offset + slope (t - centre).
     drift = float(line[1] / (1 - line[1]))
     at_zero = float((line[0] - line[1] * centre_s) / (1 - line[1]))
-    return ClockOffset(at_zero, drift, half, correlation, sample_s)
+    if abs(drift) > FASTEST_DRIFT:
+        raise DataError(
+            "the clocks differ by more than clocks do",
+            found=f"drift {1e6 * drift:.3g} ppm",
+            needed=f"at most {1e6 * FASTEST_DRIFT:.3g} ppm",
+            action="look for a clock that was set within the files, and cut them there",
+        )
+    middle_s = centre_s - float(line[0])
+    return ClockOffset(at_zero, drift, half, correlation, sample_s, middle_s, step_s)
+
+
+def _step(design: Array, offsets_s: Array, least_s: float) -> float:
+    """Step between stretches that a line with one explains far better than a line; else 0."""
+    from scipy.stats import f as fisher  # noqa: PLC0415 - as above
+
+    n = offsets_s.size
+    line = np.linalg.lstsq(design, offsets_s, rcond=None)[0]
+    whole = float(np.sum((offsets_s - design @ line) ** 2))
+    best, size = whole, 0.0
+    for cut in range(2, n - 1):
+        with_step = np.column_stack([design, np.arange(n) >= cut])
+        found = np.linalg.lstsq(with_step, offsets_s, rcond=None)[0]
+        left = float(np.sum((offsets_s - with_step @ found) ** 2))
+        if left < best:
+            best, size = left, float(found[2])
+    gain = (whole - best) / max(best / max(n - 4, 1), np.finfo(float).tiny)
+    sure = float(fisher.sf(gain, 1, max(n - 4, 1))) * n < STEP_LEVEL
+    return size if sure and abs(size) > least_s else 0.0
 
 
 def _matched(
