@@ -163,6 +163,8 @@ def _next(study: StudyResults, source: str) -> str:
         return ""
     if study.inspection is not None:
         return f"for gains: flightid tune {source}"
+    if all(item.fit is None or item.fit.covariance is None for item in study.identified):
+        return "gains of a PID need a model whose errors are known: mend first what is named above"
     return f"for gains of a PID: flightid tune {source} --controller pi_d"
 
 
