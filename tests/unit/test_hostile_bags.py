@@ -163,3 +163,57 @@ def test_grids_without_end_and_filters_without_poles_are_refused() -> None:
     with pytest.raises(OptionError, match=r"needed 1 of 5e-05 Hz to 25 Hz"):
         fid.conditioning.filter_record(record, 1e-300)
     fid.conditioning.filter_record(record, 5e-5, order=2)
+
+
+def test_numbers_of_all_topics_keep_to_the_budget(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    head, stamps = b"\x00\x01\x00\x00", range(3000)
+    parts = b"".join(message_of(at, head + bytes(64)) for at in stamps)
+    path = mcap_of(tmp_path / "a.mcap", topic_of("uint8[64] v\n") + parts)
+    table = read_columns(path)
+    assert table.column("/a/v[63]").tolist() == [0.0] * len(stamps)
+    monkeypatch.setenv(VARIABLE, "2")
+    with pytest.raises(FileFormatError, match="more than is read into memory"):
+        read_columns(path).column("/a/v[0]")
+
+
+def test_arrays_of_64_become_columns_and_of_65_do_not(tmp_path: Path) -> None:
+    head = b"\x00\x01\x00\x00"
+    text = "uint8[64] a\nuint8[65] b\nuint8[] c\n"
+    body = head + bytes(64 + 65) + bytes(3) + struct.pack("<I", 65) + bytes(65)
+    path = mcap_of(tmp_path / "a.mcap", topic_of(text) + message_of(0, body) + message_of(NS, body))
+    found = set(read_columns(path).lengths)
+    assert {"/a/a[63]", "/a/c[63]"} < found
+    assert not {"/a/b[0]", "/a/c[64]"} & found
+
+
+def test_an_array_longer_than_its_message_leaves_its_topic_out(tmp_path: Path) -> None:
+    body = b"\x00\x01\x00\x00" + struct.pack("<I", 1000) + bytes(8)
+    path = mcap_of(tmp_path / "a.mcap", topic_of("string[] v\n") + message_of(0, body))
+    with pytest.raises(FileFormatError, match="1000 elements in 8 bytes"):
+        read_columns(path)
+
+
+def test_messages_of_64_kib_are_samples_and_longer_ones_are_not(tmp_path: Path) -> None:
+    for size, is_long in ((1 << 16, False), ((1 << 16) + 1, True)):
+        body = b"\x00\x01\x00\x00" + bytes(size - 4)
+        path = mcap_of(tmp_path / f"{size}.mcap", topic_of("float64 v\n") + message_of(0, body))
+        if is_long:
+            with pytest.raises(FileFormatError, match="too long for samples"):
+                read_columns(path)
+        else:
+            assert read_columns(path).lengths == {"/a/v": 1}
+
+
+def test_stamps_of_headers_that_stand_are_not_taken(tmp_path: Path) -> None:
+    text = f"std_msgs/Header header\nfloat64 v\n{'=' * 80}\nMSG: std_msgs/Header\n"
+    text += f"builtin_interfaces/Time stamp\n{'=' * 80}\nMSG: builtin_interfaces/Time\n"
+    topic = topic_of(text + "int32 sec\nuint32 nanosec\n")
+    parts = [
+        message_of(k * NS, b"\x00\x01\x00\x00" + struct.pack("<iId", max(k, 1), 0, k))
+        for k in range(4)
+    ]
+    clock = read_columns(mcap_of(tmp_path / "a.mcap", topic + b"".join(parts))).clock
+    assert clock is not None
+    assert "those of the headers stand" in clock("/a/v").said

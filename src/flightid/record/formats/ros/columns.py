@@ -125,7 +125,7 @@ def _table(path: Path, content: BagContent) -> ColumnTable:
     missing: OptionError | None = None
     for topic in topics.values():
         try:
-            numbers = _NumberTopic(path.name, topic, _layout(topic), min(stamps, default=0))
+            numbers = _NumberTopic(content, topic, _layout(topic), min(stamps, default=0))
             of_column |= numbers.columns
         except FlightidError as fault:
             missing = fault if isinstance(fault, OptionError) else missing
@@ -174,13 +174,15 @@ def _layout(topic: Topic) -> FieldLayout:
 class _NumberTopic:
     """A topic whose numbers are columns, decoded when one is asked for."""
 
-    def __init__(self, bag: str, topic: Topic, layout: FieldLayout, origin_ns: int) -> None:
-        self.bag, self.topic, self.layout, self.origin_ns = bag, topic, layout, origin_ns
+    def __init__(
+        self, content: BagContent, topic: Topic, layout: FieldLayout, origin_ns: int
+    ) -> None:
+        self.content, self.topic, self.layout, self.origin_ns = content, topic, layout, origin_ns
         self.n_messages = len(topic.payloads)
         prefix = topic.name.rstrip("/")
         self.columns = {
             f"{prefix}/{key}": (self, key)
-            for key in leading_columns(topic, layout, bag)
+            for key in leading_columns(topic, layout, content.name)
             if key in layout.origins or key.rpartition("[")[0] in layout.origins
             if not key.startswith("header.") and key not in layout.stamp
         }
@@ -193,7 +195,7 @@ class _NumberTopic:
     @cached_property
     def values(self) -> dict[str, NDArray[np.float64]]:
         """Numbers by field."""
-        names, values = decoded(self.topic, self.layout, self.bag)
+        names, values = decoded(self.topic, self.layout, self.content)
         self.topic.payloads.clear()
         return {name: values[:, index] for index, name in enumerate(names) if name}
 

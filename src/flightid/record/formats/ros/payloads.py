@@ -14,15 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import FileFormatError
-from flightid.reading import decoding, require_memory
-from flightid.record.formats.ros.content import Topic
+from flightid.reading import decoding
+from flightid.record.formats.ros.content import BagContent, Topic
 from flightid.record.formats.ros.layouts import MOST_ELEMENTS, FieldLayout, NumberRun, Repeat
 
 CDR_HEADER = 4
 PLAIN_CDR = {b"\x00\x00": ">", b"\x00\x01": "<"}
 
 
-def decoded(topic: Topic, layout: FieldLayout, name: str) -> tuple[list[str], NDArray[np.float64]]:
+def decoded(
+    topic: Topic, layout: FieldLayout, content: BagContent
+) -> tuple[list[str], NDArray[np.float64]]:
     """Numbers of all messages of a topic.
 
     An array as long as a message says has as many columns as in the first message; where a later
@@ -33,8 +35,8 @@ def decoded(topic: Topic, layout: FieldLayout, name: str) -> tuple[list[str], ND
     topic : Topic
         With at least one message.
     layout : FieldLayout
-    name : str
-        Of the bag, for errors.
+    content : BagContent
+        Counts the numbers beside what it holds.
 
     Returns
     -------
@@ -45,12 +47,13 @@ def decoded(topic: Topic, layout: FieldLayout, name: str) -> tuple[list[str], ND
     Raises
     ------
     FileFormatError
-        A message is not of its type, or of an encoding that is not read.
+        A message is not of its type, or of an encoding that is not read; all numbers that were
+        asked for are more than the memory budget.
     """
-    with decoding(f"{name}, topic {topic.name}", f"messages of type {topic.type}"):
+    with decoding(f"{content.name}, topic {topic.name}", f"messages of type {topic.type}"):
         first = _Message(topic.payloads[0], topic.encoding)
         first.walk(layout.steps)
-        require_memory(name, 8.0 * len(first.columns) * len(topic.payloads))
+        content.hold(8.0 * len(first.columns) * len(topic.payloads))
         values = np.empty((len(topic.payloads), len(first.columns)))
         for row, payload in zip(values, topic.payloads, strict=True):
             message = _Message(payload, topic.encoding, first.sizes)
