@@ -42,7 +42,7 @@ def test_bias_and_reference_alone_are_unique() -> None:
     seen = _flown(LAG)
     answer = (0.4 / 2.0) * (1 - np.exp(-2.0 * TIME_S))
     record = seen.replace({"p": seen["p"] + answer + 0.25})
-    result = fid.verify(LAG, record)
+    result = fid.verify(LAG, record, initial_state="trim")
     shifts = result.predictions[0].shifts
     assert_close(shifts.state_bias, [0.4], rtol=1e-9, why="what was added to the state derivative")
     assert_close(shifts.output_bias, [0.25], rtol=1e-9, why="what was added to the output")
@@ -52,7 +52,7 @@ def test_bias_and_reference_alone_are_unique() -> None:
 def test_without_free_shifts_the_offset_is_an_error() -> None:
     seen = _flown(LAG)
     record = seen.replace({"p": seen["p"] + 0.25})
-    result = fid.verify(LAG, record, state_bias=False, output_bias=False)
+    result = fid.verify(LAG, record, initial_state="trim", state_bias=False, output_bias=False)
     assert_close(result.rms_error["p"], 0.25, rtol=1e-9, why="a constant error")
     assert_close(result.mse["p"], 0.0625, rtol=1e-9, why="its square")
     assert_close(result.vaf["p"], 100.0, rtol=1e-9, why="blind to a constant")
@@ -90,7 +90,7 @@ def test_an_unstable_model_needs_its_initial_state() -> None:
     )
     noise = np.random.default_rng(1).standard_normal((2, TIME_S.size)) * 1e-3
     seen = truth.replace({"q": truth["q"] + noise[0], "theta": truth["theta"] + noise[1]})
-    at_trim = fid.verify(growing, seen, state_bias=False, output_bias=False)
+    at_trim = fid.verify(growing, seen, initial_state="trim", state_bias=False, output_bias=False)
     fitted = fid.verify(
         growing, seen, initial_state="estimate", state_bias=False, output_bias=False
     )
@@ -134,7 +134,7 @@ def test_j_rms_counts_a_degree_as_a_foot_per_second() -> None:
     record = fid.Record.from_arrays(TIME_S, inputs={"u": STEP})
     seen = fid.simulate(pair, record, units={"p": "deg/s", "w": "ft/s"})
     shifted = seen.replace({"p": seen["p"] + 3.0, "w": seen["w"] - 4.0})
-    options = {"state_bias": False, "output_bias": False}
+    options = {"initial_state": "trim", "state_bias": False, "output_bias": False}
     result = fid.verify(pair, shifted, **options)  # type: ignore[arg-type]
     assert_close(result.j_rms, np.sqrt((9 + 16) / 2), rtol=1e-9, why="by definition")
     in_radians = fid.verify(pair, shifted.to_units(p="rad/s", w="m/s"), **options)  # type: ignore[arg-type]
