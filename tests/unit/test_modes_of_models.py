@@ -173,6 +173,10 @@ def test_sampled_models_are_turned_to_continuous_time() -> None:
     assert "no-continuous-counterpart" in {f.code for f in found.findings}
     assert np.isnan(found.natural_frequency_rad_s[-1])
     assert found.modes[-1].named.character == "alternates from sample to sample"
+    late = fid.PolynomialModel(("u",), "y", 0.1, f=[[1, -0.5]], b=[[0.0, 0.0, 0.0, 1.0]])
+    delays = [m.named.character for m in fid.modes(late) if m.root == 0.0]
+    assert delays == ["delay of one sample"] * len(delays)
+    assert delays
 
 
 def test_black_box_fits_have_intervals_like_their_roots() -> None:

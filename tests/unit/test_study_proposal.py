@@ -55,6 +55,26 @@ def _rig(folder: Path, name: str = "rig.csv", seed: int = 0) -> Path:
     return path
 
 
+def test_an_input_that_is_still_where_the_fit_looks_is_left_out(tmp_path: Path) -> None:
+    rows = (_rig(tmp_path).read_text()).splitlines()
+    late = [f"{row},{float(k > 500)}" for k, row in enumerate(rows[1:])]
+    still = [f"{row},0" for row in rows[1:]]
+    for name, body in (("late.csv", late), ("still.csv", still)):
+        (tmp_path / name).write_text("\n".join([rows[0] + ",pedal [V]", *body]) + "\n")
+    found = propose_study(
+        [tmp_path / "late.csv"], folder=tmp_path, inputs=("volts", "pedal"), outputs=("beam",)
+    )
+    assert found.models == ("beam from volts",)
+    (said,) = found.findings
+    assert (said.code, said.light) == ("input-still", Light.AMBER)
+    assert "pedal left out, still from 0 to" in said.message
+    told = "\n".join(found.lines)
+    assert "# Left out: late, fitted: pedal left out" in told
+    assert propose_study(
+        [tmp_path / "still.csv"], folder=tmp_path, inputs=("volts", "pedal"), outputs=("beam",)
+    ).models == ("beam from volts",)
+
+
 @pytest.mark.nightly
 def test_records_become_the_study_of_their_structure(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,7 @@ from flightid.uncertainty.roots import UNSIGNED, UncertainRoot
 
 Array = NDArray[np.float64]
 UNFITTED = "does not depend on what was fitted"
+ONE_SAMPLE = "delay of one sample"
 SEEN = 1e-6
 """Size in an output, against the largest, below which the output does not show a mode."""
 
@@ -102,10 +104,11 @@ def _mode(read: StateMatrix, pair: Eigenpair) -> Mode:
     covariance = None if rows is None else np.asarray(rows @ rows.T)
     numbers = UncertainRoot(value, covariance, reason)
     parts = tuple(_participations(read, pair)) if read.physical else ()
+    named = _named(read, pair, value)
     return Mode(
         value,
         pair.value,
-        _named(read, pair, value),
+        replace(named, character=ONE_SAMPLE) if lacking == AT_ORIGIN else named,
         numbers.real(),
         numbers.imaginary(),
         numbers.natural_frequency(),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -113,8 +113,10 @@ def study_of_records(
     groups, missed = _groups(read, columns)
     body: list[str] = []
     names: list[str] = []
-    for group in groups:
-        segments = _segments(group)
+    for whole in groups:
+        segments = _segments(whole)
+        group, still = _driven(whole, segments)
+        missed += still
         for name, part, span in segments.all:
             body += [*part.lines(name, span, folder), *told]
         for output in columns.outputs if model is None else columns.outputs[:1]:
@@ -124,7 +126,9 @@ def study_of_records(
             try:
                 body += list(_model(name, group, segments, output, model))
             except FlightidError as error:
-                missed.append(Finding("no-model", Light.RED, f"{name}: no model, {error}"))
+                why = str(error).partition(". Next: ")[0]
+                said = f"{name}: no model, {why}"
+                missed.append(Finding("no-model", Light.RED, said, error.action or ""))
                 continue
             names.append(name)
     head = _head(paths, (*columns.said, *_stamps(read)), missed)
@@ -214,6 +218,19 @@ def _segments(group: _Group) -> _Segments:
         (*parts, *unseen), parts[0][0], parts[1][0],
         tuple(each[0] for each in unseen), (parts[0][2], parts[1][2]),
     )  # fmt: skip
+
+
+def _driven(group: _Group, segments: _Segments) -> tuple[_Group, list[Finding]]:
+    """The group with the inputs that move in the part that is fitted, and word of the others."""
+    record, (start, stop) = group.parts[0].record, segments.spans[0]
+    fitted = (record.time_s >= start) & (record.time_s <= stop)
+    moving = tuple(name for name in group.inputs if np.ptp(record[name][fitted]) > 0.0)
+    still = [name for name in group.inputs if name not in moving]
+    if not still or not moving:
+        return group, []
+    said = f"{segments.fitted}: {', '.join(still)} left out, still from {start:g} to {stop:g} s"
+    action = f"record a manoeuvre that moves {' and '.join(still)} early, or name other inputs"
+    return replace(group, inputs=moving), [Finding("input-still", Light.AMBER, said, action)]
 
 
 def _ends_richer(record: Record, inputs: tuple[str, ...]) -> bool:
