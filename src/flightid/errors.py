@@ -49,9 +49,14 @@ class FlightidError(Exception):
         if needed is not None:
             clauses.append(f"needed {needed}")
         text = problem + (": " + "; ".join(clauses) if clauses else "")
-        if action is not None:
+        if action:
             text += f". Next: {action}."
         super().__init__(spoken(text))
+
+    @property
+    def reason(self) -> str:
+        """What is wrong and what was found, without what to do."""
+        return self.problem if self.found is None else f"{self.problem}: found {self.found}"
 
 
 class DataError(FlightidError, ValueError):

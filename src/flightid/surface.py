@@ -19,6 +19,8 @@ GIVEN = re.compile(
     r"(?P<value>'[^']*'|\"[^\"]*\"|\[[^\]]*\]|\{[^}]*\}|\([^)]*\)|<[^>]*>|…|\.\.\.|-?[\w./]+)?"
 )
 """An option with its value, as Python has it."""
+OWN = r"(?<![\w=])'[^'\n]*'"
+"""What a user wrote, in quotes: nothing in it is an option."""
 PAIR = re.compile(r"\{'(?P<key>[^']*)': '(?P<value>[^']*)'\}")
 """One entry of a table."""
 ANY = re.compile(r"…|\.\.\.|[\[{(]\W*[\]})]|<.*>|")
@@ -84,6 +86,18 @@ def held_in(text: str, place: str) -> str:
     return FIXED.sub(key, text)
 
 
+def replaced(options: re.Pattern[str], change: Callable[[re.Match[str]], str], text: str) -> str:
+    """A text with what is an option in it changed; what a user wrote stays as it is.
+
+    Example
+    -------
+    >>> replaced(GIVEN, lambda found: found["name"].upper(), "'hold=rate', declare hold='zero'")
+    "'hold=rate', declare HOLD"
+    """
+    either = re.compile(f"(?P<own>{OWN})|{options.pattern}")
+    return either.sub(lambda found: found[0] if found["own"] else change(found), text)
+
+
 def as_key(text: str) -> str:
     """Options as keys of a study file."""
 
@@ -96,4 +110,4 @@ def as_key(text: str) -> str:
         plain = {"True": "true", "False": "false", "None": '"none"'}.get(value, value)
         return f"{name} = " + plain.replace("'", '"')
 
-    return GIVEN.sub(key, held_in(text, "[model.parameters]"))
+    return replaced(GIVEN, key, held_in(text, "[model.parameters]"))

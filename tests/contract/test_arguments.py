@@ -154,7 +154,7 @@ OWN = {
     "record": (
         "parts of a record and columns of a file",
         "clock_offset_s column_names derive excitation gaps history input_shape interpolation join "
-        "join_on join_time_column make max_gap_s "
+        "join_on join_time_column join_time_unit make max_gap_s "
         "outliers record_column reference resample_to_s role roles samples stamps start_s step "
         "stop_s time_column time_unit",
     ),

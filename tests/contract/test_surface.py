@@ -72,6 +72,16 @@ def test_a_command_says_its_own_flags(name: str) -> None:
     assert said == f"{flag} has no meaning. Next: give {flag}."
 
 
+def test_what_a_user_wrote_is_no_option() -> None:
+    command = program.get_command(click.Context(program), "identify")
+    assert command is not None
+    command.get_params(click.Context(command))
+    with click.Context(command, parent=click.Context(program)):
+        said = as_typed("'gyro=rate' and 'time_unit' of the files: time_unit='ms', or join_on=…")
+    assert said == "'gyro=rate' and 'time_unit' of the files: --time-unit ms, or --join-on"
+    assert as_key("'gyro=rate', declare hold='zero'") == "'gyro=rate', declare hold = \"zero\""
+
+
 def test_each_surface_has_its_spelling() -> None:
     text = "declare hold='zero' and covariance=False"
     assert as_key(text) == 'declare hold = "zero" and covariance = false'

@@ -104,7 +104,7 @@ def test_flightid_error_is_a_sentence(
     ("raised", "code", "said"),
     [
         (KeyboardInterrupt(), 130, "Interrupted"),
-        (FileNotFoundError(2, "No such file", "x.bin"), 2, "FileNotFoundError"),
+        (FileNotFoundError(2, "No such file", "x.bin"), 2, "Error: x.bin: no such file"),
         (RuntimeError("inner"), 70, "fault in flightid"),
         (BrokenPipeError(), 0, ""),
     ],

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import flightid as fid
+from flightid.cli.program import run
 from flightid.errors import DataError, OptionError
 from flightid.record.checks import record_findings
 from flightid.record.clocks import clock_offset
@@ -136,3 +137,46 @@ def test_a_study_that_is_proposed_joins_by_itself(tmp_path: Path) -> None:
     assert 'join = ["mocap.csv"]' in made.lines
     assert sum("Stamps of" in line for line in made.lines) == 1
     assert any("clock offset 5.43" in line for line in made.lines)
+
+
+def test_stamps_of_a_joined_file_have_a_unit_of_their_own(tmp_path: Path) -> None:
+    rig, mocap = write_both(tmp_path)
+    options = {"join_on": "gyro", "join_time_column": "t"}
+    (told,) = fid.read_records(rig, "u", "angle", join=[mocap], **options)
+    heading, *rows = mocap.read_text().splitlines()
+    cells = [row.split(",") for row in rows]
+    slow = tmp_path / "slow.csv"
+    body = [f"{1e3 * float(t):.3f},{p},{angle}" for t, p, angle in cells]
+    slow.write_text("\n".join([heading, *body]))
+    (same,) = fid.read_records(rig, "u", "angle", join=[slow], join_time_unit="ms", **options)
+    assert_close(same["angle"], told["angle"], atol=1e-3, why="the same stamps to a microsecond")
+    with pytest.raises(OptionError, match="needed join_time_unit='ms'"):
+        fid.read_records(rig, "u", "angle", join=[mocap], units={"t": "ms"}, **options)
+    # What the other file's heading says goes before what is declared of stamps here.
+    here = tmp_path / "here.csv"
+    heading, *rows = rig.read_text().splitlines()
+    cells = [row.split(",") for row in rows]
+    here.write_text("\n".join([heading, *(f"{1e3 * float(t):.1f},{u},{p}" for t, u, p in cells)]))
+    named = tmp_path / "named.csv"
+    named.write_text(mocap.read_text().replace("t,", "time [s],", 1))
+    (mixed,) = fid.read_records(
+        here, "u", "angle", join=[named], join_on="gyro", time_unit="ms"
+    )  # fmt: skip
+    assert_close(mixed["angle"], told["angle"], atol=1e-3, why="the same stamps")
+
+
+def test_a_command_names_what_is_wrong_with_a_joined_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rig, mocap = write_both(tmp_path)
+    asked = ["run", str(rig), "--inputs", "u", "--outputs", "angle", "--join-on", "gyro=angle"]
+    assert run([*asked, "--join", "nope.csv"]) == 2
+    assert "not there: found --join nope.csv; needed a table" in capsys.readouterr().err
+    assert run([*asked, "--join", str(mocap)]) == 2
+    assert "needed --join-time-column. Next: 't' looks like the time" in capsys.readouterr().err
+    noise = tmp_path / "noise.csv"
+    random = np.random.default_rng(2).standard_normal((4000, 2))
+    np.savetxt(noise, np.c_[np.arange(4000) / 73, random], "%.6g", ",", header="t,rate,angle",
+               comments="")  # fmt: skip
+    assert run([*asked[:-1], "gyro=rate", "--join", str(noise), "--join-time-column", "t"]) == 2
+    assert "Error: 'gyro=rate' of the files is not one signal" in capsys.readouterr().err

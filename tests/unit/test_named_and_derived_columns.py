@@ -205,3 +205,13 @@ def test_a_timetable_is_named_with_the_way_out_of_it(tmp_path: Path, level: str)
         read_records(path)
     (record,) = read_records(path, sample_time_s=0.1)
     assert list(record.channels) == ["x"]
+
+
+def test_a_formula_that_divides_by_zero_is_named_with_its_row(tmp_path: Path) -> None:
+    path = tmp_path / "zero.csv"
+    path.write_text("time,u,y\n0,2,1\n1,0,3\n2,4,5\n")
+    with pytest.raises(DataError, match=r"derived channel 'w' is not finite: 'y / u'") as caught:
+        read_records(path, outputs="w", derive={"w": "y / u"})
+    assert "found y = 3, u = 0 in row 2 of 3" in str(caught.value)
+    (guarded,) = read_records(path, outputs="w", derive={"w": "where(u > 0, y / u, 0)"})
+    assert guarded["w"].tolist() == [0.5, 0.0, 1.25]

@@ -171,7 +171,7 @@ def test_uneven_stamps_take_a_new_grid_into_the_study(tmp_path: Path) -> None:
     uneven = tmp_path / "uneven.csv"
     uneven.write_text("\n".join([head, *rows]))
     asked = {"folder": tmp_path, "model": "rate_first_order"}
-    with pytest.raises(DataError, match="--resample-to-s"):
+    with pytest.raises(DataError, match="resample_to_s="):
         propose_study([uneven], **asked)
     made = propose_study([uneven], resample_to_s=0.1, **asked)
     assert [line for line in made.lines if line.startswith("resample")] == [

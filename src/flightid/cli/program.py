@@ -168,5 +168,8 @@ def _explain(error: Exception, arguments: list[str] | None) -> None:
 
     if "--debug" in (sys.argv[1:] if arguments is None else arguments):
         note(traceback.format_exc())
-    kind = "" if isinstance(error, FlightidError) else f"{type(error).__name__}: "
-    note(f"Error: {kind}{error}")
+    if isinstance(error, OSError) and error.filename is not None and error.strerror:
+        said = f"{error.filename}: {error.strerror[:1].lower()}{error.strerror[1:]}"
+    else:
+        said = f"{'' if isinstance(error, FlightidError) else f'{type(error).__name__}: '}{error}"
+    note(f"Error: {said}")

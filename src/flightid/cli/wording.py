@@ -8,7 +8,7 @@ from functools import cache
 import click
 
 from flightid.cli.option_fields import NONE, OptionsCommand
-from flightid.surface import ANY, GIVEN, PAIR, held_in
+from flightid.surface import ANY, GIVEN, PAIR, held_in, replaced
 
 NAME = re.compile(r"(?<![\w.\-/\[])[a-z][a-z0-9]*(?:_[a-z0-9]+)+(?![\w(=.])")
 VERB = re.compile(r"\b(?:flightid|fid)\.([a-z_]+)\b(?:\([^)]*\))?")
@@ -28,8 +28,8 @@ def as_typed(text: str) -> str:
         return text
     known, program = _flags(here.command), here.find_root().command
     text = held_in(text, "the model's file")
-    made = GIVEN.sub(lambda found: _given(found, known, program), text)
-    made = NAME.sub(lambda found: known[found[0]][-1] if found[0] in known else found[0], made)
+    made = replaced(GIVEN, lambda found: _given(found, known, program), text)
+    made = replaced(NAME, lambda found: known.get(found[0], [found[0]])[-1], made)
     return VERB.sub(lambda found: _verb(found, program), made)
 
 

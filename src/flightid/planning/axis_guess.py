@@ -116,7 +116,7 @@ def guess_axis(
     try:
         base = _measured(axis, pieces, base, loop)
     except FlightidError as error:
-        reason = f"{error.problem}: found {error.found}"
+        reason = error.reason
     check = _checked(axis, pieces, base, loop)
     return AxisGuess(base, not reason, reason, check)
 

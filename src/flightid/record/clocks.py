@@ -142,7 +142,8 @@ def clock_offset(first: Signal, second: Signal, name: str) -> ClockOffset:
             f"{name!r} of the files is not one signal",
             found=f"correlation {found:.2f} at best",
             needed=f"at least {LEAST_CORRELATION}",
-            action="name another shared channel (join_on), or state clock_offset_s",
+            action="name another shared channel (join_on), state clock_offset_s, or see to the "
+            "unit of the stamps (join_time_unit)",
         )
     lags = np.arange(correlation.size) - (two.size - 1)
     far = np.abs(lags - lags[best]) > _width(correlation, best)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from flightid import _native
 from flightid.dimensions import unit_of
-from flightid.errors import ModelError, OptionError
+from flightid.errors import DataError, ModelError, OptionError
 from flightid.formula import RESERVED, formula_names
 from flightid.record.formats import ColumnTable
 from flightid.record.formats.columns import channel_name
@@ -133,8 +133,10 @@ def _derived(table: ColumnTable, name: str, formula: str, units: Mapping[str, st
             found=", ".join(f"{key}: {table.lengths[key]}" for key in sources) or "no column",
             needed="columns of one length",
         )
-    derived = _FormulaColumn(table, words, dict(zip(names, sources, strict=True)), compiled)
-    made = derived.unit(subject, formula, units)
+    derived = _FormulaColumn(
+        name, table, formula, words, dict(zip(names, sources, strict=True)), compiled
+    )
+    made = derived.unit(subject, units)
     return replace(
         table,
         lengths={**table.lengths, name: lengths.pop()},
@@ -148,16 +150,31 @@ def _derived(table: ColumnTable, name: str, formula: str, units: Mapping[str, st
 class _FormulaColumn:
     """A formula of columns."""
 
+    name: str
     table: ColumnTable
     formula: str
+    words: str
     sources: Mapping[str, str]
     compiled: _native.Tape
 
     def values(self) -> NDArray[np.float64]:
         rows = np.stack([self.table.column(each) for each in self.sources.values()], axis=1)
-        return np.concatenate([self.compiled.evaluate(row) for row in rows])
+        made = []
+        for place, row in enumerate(rows):
+            try:
+                made.append(self.compiled.evaluate(row))
+            except DataError as fault:
+                cells = zip(self.sources.values(), row, strict=True)
+                of = ", ".join(f"{column} = {value:.6g}" for column, value in cells)
+                raise DataError(
+                    f"derived channel {self.name!r} is not finite: {self.formula!r}",
+                    found=f"{of} in row {place + 1} of {len(rows)}",
+                    needed="a finite number in every row",
+                    action="guard the formula, as in where(u > 0, y / u, 0), or cut those rows",
+                ) from fault
+        return np.concatenate(made)
 
-    def unit(self, subject: str, formula: str, units: Mapping[str, str]) -> str | None:
+    def unit(self, subject: str, units: Mapping[str, str]) -> str | None:
         """Unit of the formula; None where no column in it has any."""
         columns = self.sources.values()
         if not any(each in self.table.units or channel_name(each) in units for each in columns):
@@ -167,10 +184,10 @@ class _FormulaColumn:
             for word, each in self.sources.items()
         }
         try:
-            return unit_of(self.formula, known, subject=subject)
+            return unit_of(self.words, known, subject=subject)
         except ModelError as fault:
             raise OptionError(
-                f"{subject} does not have its unit: {formula!r}",
+                f"{subject} does not have its unit: {self.formula!r}",
                 found=fault.found,
                 needed=fault.needed,
                 action="declare the units of the columns in it (units), or scale one of them",

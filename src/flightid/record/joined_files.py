@@ -25,6 +25,7 @@ def with_files(
     clock_offset_s: float | None,
     time_column: str,
     join_time_column: str | None,
+    join_time_unit: str | None,
     units: Mapping[str, str],
     sample_time_s: float | None,
 ) -> ColumnTable:
@@ -39,8 +40,11 @@ def with_files(
         As `joined` takes them, for each of the files.
     time_column, join_time_column : str, str or None
         Time column of the table and of the files; default: the same.
+    join_time_unit : str or None
+        Unit of the files' stamps; default: what their heading says, else as those of the table
+        where both columns have one name, else s.
     units : mapping of str to str
-        Declared units, of the stamps too.
+        Declared units, of the table's stamps too.
     sample_time_s : float or None
         Of a table without stamps.
 
@@ -57,12 +61,13 @@ def with_files(
             found=f"join_on={join_on!r}, clock_offset_s={clock_offset_s}",
             needed="join, the file that has it",
         )
+    named = join_time_column or time_column
     for file in files:
         if isinstance(file, Record):
             other, second_s = _of_record(file), file.time_s
         else:
             other = read_table(Path(file), file_format(Path(file)), ())
-            second_s = row_stamps(other, join_time_column or time_column, units, None)
+            second_s = _stamps_to_join(other, named, join_time_unit, units, time_column)
         own = table.clock is not None
         first_s = np.empty(0) if own else row_stamps(table, time_column, units, sample_time_s)
         table = joined(
@@ -70,11 +75,34 @@ def with_files(
             first_s,
             other,
             second_s,
-            time_columns=(time_column, join_time_column or time_column),
+            time_columns=(time_column, named),
             join_on=join_on,
             clock_offset_s=clock_offset_s,
         )
     return table
+
+
+def _stamps_to_join(
+    table: ColumnTable, column: str, unit: str | None, units: Mapping[str, str], of_first: str
+) -> Array:
+    """Stamps of a file that joins another, s.
+
+    Raises
+    ------
+    OptionError
+        Their unit is told as that of a channel, or they have no such column.
+    """
+    if column != of_first and column in units:
+        raise OptionError(
+            f"{column!r} holds stamps of {table.path.name}, and is no channel",
+            found=f"units={{{column!r}: {units[column]!r}}}",
+            needed=f"join_time_unit={units[column]!r}",
+        )
+    told = unit or (None if column in table.units else units.get(column))
+    return row_stamps(
+        table, column, {} if told is None else {column: told}, None,
+        needed="join_time_column=<name of the column>",
+    )  # fmt: skip
 
 
 def _of_record(record: Record) -> ColumnTable:

@@ -82,6 +82,9 @@ class TableOptions(Options):
     join_time_column: str | None = option(
         None, doc="Column of the stamps in the joined file, where it has another name."
     )
+    join_time_unit: str | None = option(
+        None, doc="Unit of the joined file's stamps, where its heading does not say."
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -63,6 +63,7 @@ def read_records(
     join_on: str | None = None,
     clock_offset_s: float | None = None,
     join_time_column: str | None = None,
+    join_time_unit: str | None = None,
     interpolation: Interpolation | str | Mapping[str, Interpolation | str] | None = None,
     outliers: Mapping[str, Any] | None = None,
     record_column: str | None = RECORD_COLUMN,
@@ -126,6 +127,9 @@ def read_records(
         Stamp on this file's clock of zero on the joined one's, in place of `join_on`.
     join_time_column : str, optional
         Time column of the joined files, where it has another name.
+    join_time_unit : str, optional
+        Unit of its stamps, such as "ms"; default: what its heading says, else as those here where
+        both columns have one name, else s.
     interpolation : Interpolation or mapping of str to Interpolation, optional
         How samples of the new grid arise, for all channels or by name. Default: of inputs with
         `hold` "zero" the previous value, with "first" straight lines, of all else band-limited;
@@ -189,19 +193,15 @@ def read_records(
     table = with_files(
         read_table(source, kind, column_names), join, join_on=join_on,
         clock_offset_s=clock_offset_s, time_column=time_column,
-        join_time_column=join_time_column, units=units, sample_time_s=sample_time_s,
+        join_time_column=join_time_column, join_time_unit=join_time_unit, units=units,
+        sample_time_s=sample_time_s,
     )  # fmt: skip
     table = with_derived(table, derive, units)
     shared = row_stamps(table, time_column, units, None if join else sample_time_s)
     wanted = _wanted(
-        table,
-        roles,
-        units,
-        time_column,
-        record_column,
-        shared.size,
+        table, roles, units, time_column, record_column, shared.size,
         set(map(channel_name, sources_of(derive))),
-    )
+    )  # fmt: skip
     read = SourceRows(table, shared, tuple(wanted))
     rows = read.rows()
     grid = RowGrid(

@@ -19,7 +19,12 @@ MOST_SAMPLES_PER_ROW = 10
 
 
 def row_stamps(
-    table: ColumnTable, time_column: str, units: Mapping[str, str], sample_time_s: float | None
+    table: ColumnTable,
+    time_column: str,
+    units: Mapping[str, str],
+    sample_time_s: float | None,
+    *,
+    needed: str = "time_column=<name of the column> or sample_time_s=<seconds>",
 ) -> NDArray[np.float64]:
     """Time of each row, s, from the column of the stamps or from a stated sample time.
 
@@ -61,7 +66,7 @@ def row_stamps(
         raise OptionError(
             f"{table.path.name} has no time column {time_column!r}",
             found="columns " + ", ".join(table.lengths),
-            needed="time_column=<name of the column> or sample_time_s=<seconds>",
+            needed=needed,
             action=_looks_like_time(table)
             or table.advice
             or "no sample time is invented: state it",

@@ -147,7 +147,7 @@ def uniform_sample_time(time_s: NDArray[np.float64]) -> float:
             "time stamps are not uniform",
             found=f"a stamp {100 * worst:.3g} % of a sample time off the grid",
             needed=f"at most {100 * UNIFORM_TOLERANCE:g} %",
-            action="bring the channels to one time base: --resample-to-s on the command line, "
-            "resample_to_s in a study, conditioning.to_uniform in Python",
+            action="bring the channels to one time base where they are read, resample_to_s=…, or "
+            "by conditioning.to_uniform in Python",
         )
     return sample_time_s

@@ -111,8 +111,7 @@ def identify_models(
 
 def _refused(task: Task, error: FlightidError) -> Part:
     """A model that its data do not allow: it is named, and the others stand."""
-    found = "" if error.found is None else f": found {error.found}"
-    said = f"not identified: {error.problem}{found}"
+    said = f"not identified: {error.reason}"
     finding = Finding("model-refused", Light.RED, said, str(error.action or ""))
     key = digest((task.settings.name, said))
     return Part(task, {}, None, StageResult(ModelFits(refused=finding), key))

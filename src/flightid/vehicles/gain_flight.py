@@ -126,7 +126,7 @@ def fly_gains(
                 loops[name] = _measured(flight, run, design.axis, loop)
                 made += _beside(tuning, design, loop, loops[name])
             except DataError as error:
-                lost[name] = f"{error.problem}: found {error.found}"
+                lost[name] = error.reason
             advance()
     return GainFlight(gains, tuple(made), loops, largest, lost)
 

@@ -38,8 +38,7 @@ class RefusedAxis:
     @classmethod
     def by(cls, axis: str, error: FlightidError) -> RefusedAxis:
         """The axis that an error stops."""
-        found = "" if error.found is None else f": found {error.found}"
-        return cls(axis, f"{error.problem}{found}", str(error.action or ""))
+        return cls(axis, error.reason, str(error.action or ""))
 
     @property
     def finding(self) -> Finding:

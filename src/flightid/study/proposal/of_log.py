@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterator, MutableMapping
+from collections.abc import Iterator, Mapping, MutableMapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from flightid.conventions import Light
@@ -95,6 +96,7 @@ def study_of_log(
     model: str | None,
     tune: bool,
     cache: MutableMapping[str, Any] | None = None,
+    declared: Mapping[str, Any] = MappingProxyType({}),
 ) -> Proposal:
     """Study file for a log.
 
@@ -110,6 +112,8 @@ def study_of_log(
         Whether gains are wanted.
     cache : mutable mapping of str to object, optional
         Takes what was read and inspected, for the run of the study.
+    declared : mapping of str to object
+        Keys of every ``[[segment]]``: hold, period_s and loop.
     """
     runner = StageRunner(cache)
     opened = runner.stage("log", read_log, path)
@@ -122,7 +126,7 @@ def study_of_log(
             axes.append(made)
         else:
             missed.append(made)
-    lines = tuple(_lines(path, folder, inspection, axes, missed, tune))
+    lines = tuple(_lines(path, folder, inspection, axes, missed, tune, declared))
     return Proposal(lines, tuple(axis.name for axis in axes), tuple(missed), inspection)
 
 
@@ -202,6 +206,7 @@ def _lines(
     axes: list[_Axis],
     missed: list[Finding],
     tune: bool,
+    declared: Mapping[str, Any],
 ) -> Iterator[str]:
     """The study file, line by line."""
     yield f"# Study of {path.name}, from what `flightid inspect` finds in it."
@@ -216,6 +221,7 @@ def _lines(
     for axis in axes:
         for segment in (*axis.flown, *axis.unseen):
             yield from segment.lines()
+            yield from (f"{name} = {toml_value(value)}" for name, value in declared.items())
     if any(axis.estimator == "instrument" for axis in axes):
         yield ""
         yield "# The injection is logged, so a controller in the loop does not bias the estimate."

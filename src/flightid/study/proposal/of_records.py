@@ -21,8 +21,8 @@ from flightid.models.polynomial.orders import USED
 from flightid.models.save import toml_value
 from flightid.record import Record, read_records
 from flightid.record.formats.columns import channel_name
-from flightid.record.options import ReadOptions
 from flightid.study.proposal.columns import Columns, columns_of
+from flightid.study.proposal.options import DataOptions, told
 from flightid.study.proposal.proposal import Proposal
 from flightid.study.structures import ranked
 from flightid.validation import scan_orders
@@ -81,7 +81,7 @@ def study_of_records(
     model: str | None,
     inputs: tuple[str, ...],
     outputs: tuple[str, ...],
-    reading: ReadOptions | None = None,
+    reading: DataOptions | None = None,
 ) -> Proposal:
     """Study file for records.
 
@@ -95,7 +95,7 @@ def study_of_records(
         Equations in place of a structure that is looked for.
     inputs, outputs : tuple of str
         Columns, where their names do not tell.
-    reading : ReadOptions, optional
+    reading : DataOptions, optional
         How the files are read; default: with the times in the column "time".
 
     Raises
@@ -103,13 +103,13 @@ def study_of_records(
     StudyError
         No column can be told for an input or output.
     """
-    reading = reading or ReadOptions()
+    reading = reading or DataOptions()
     inputs, outputs = (tuple(map(channel_name, names)) for names in (inputs, outputs))
     # What is named alone is read, so that no other column's gaps part its manoeuvres.
     named = {"inputs": inputs, "outputs": outputs} if inputs and outputs else {}
     read = [part for path in paths for part in _parts(path, {**vars(reading), **named})]
     columns = columns_of([part.record for part in read], inputs, outputs)
-    told = _told(reading, folder)
+    keys = _keys(reading, folder)
     groups, missed = _groups(read, columns)
     body: list[str] = []
     names: list[str] = []
@@ -118,7 +118,7 @@ def study_of_records(
         group, still = _driven(whole, segments)
         missed += still
         for name, part, span in segments.all:
-            body += [*part.lines(name, span, folder), *told]
+            body += [*part.lines(name, span, folder), *keys]
         for output in columns.outputs if model is None else columns.outputs[:1]:
             name = (
                 f"{output} from {' and '.join(group.inputs)}" if model is None else Path(model).stem
@@ -143,15 +143,14 @@ def _parts(path: Path, reading: Mapping[str, Any]) -> list[_Stretch]:
     return [_Stretch(record, path, str(record.name)) for record in found]
 
 
-def _told(reading: ReadOptions, folder: Path) -> list[str]:
+def _keys(reading: DataOptions, folder: Path) -> list[str]:
     """What every table of the study says of reading, where it is not the usual."""
-    usual = vars(ReadOptions())
-    told = {key: value for key, value in vars(reading).items() if value != usual[key]}
-    if "join" in told:
-        told["join"] = [Path(os.path.relpath(file, folder)).as_posix() for file in told["join"]]
-    if "record_column" in told:
-        told["experiment"] = told.pop("record_column")
-    return [f"{name} = {toml_value(value)}" for name, value in told.items()]
+    keys = told(reading)
+    if "join" in keys:
+        keys["join"] = [Path(os.path.relpath(file, folder)).as_posix() for file in keys["join"]]
+    if "record_column" in keys:
+        keys["experiment"] = keys.pop("record_column")
+    return [f"{name} = {toml_value(value)}" for name, value in keys.items()]
 
 
 def _groups(read: Sequence[_Stretch], columns: Columns) -> tuple[list[_Group], list[Finding]]:

@@ -3,13 +3,37 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
-from flightid.options import option
+from flightid.options import Options, option
 from flightid.record.options import ReadOptions
+from flightid.study.record_files import ShapeOptions
+
+
+@dataclass(frozen=True, kw_only=True)
+class DataOptions(ShapeOptions, ReadOptions):
+    """How records are read, and what is declared of their inputs.
+
+    Example
+    -------
+    >>> told(DataOptions(loop="open", time_column="t"))
+    {'time_column': 't', 'loop': 'open'}
+    """
+
+    @property
+    def declared(self) -> dict[str, Any]:
+        """What is declared of inputs, by name: logs take that too."""
+        return {name: value for name, value in told(self).items() if name in vars(ShapeOptions())}
+
+
+def told(options: Options) -> dict[str, Any]:
+    """Options that are not as usual, by name."""
+    usual = vars(type(options)())
+    return {name: value for name, value in vars(options).items() if value != usual[name]}
 
 
 @dataclass(frozen=True)
-class ProposalOptions(ReadOptions):
+class ProposalOptions(DataOptions):
     """What a proposal is told; see `flightid.study.proposal.propose_study`.
 
     Example

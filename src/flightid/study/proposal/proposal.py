@@ -61,7 +61,7 @@ class Proposal:
             noted = self.inspection.findings
             fallen = [each.action for each in noted if each.code == "tipped-over"]
             actions = [*fallen, *self._next(), *actions, *(f.action for f in noted if f.action)]
-        said += ["", "What to do, the first first"]
+        said += ["", "What to do, the first first"] if actions else []
         said += [line for each in dict.fromkeys(actions) for line in _wrapped(f"- {each}")]
         return "\n".join(said)
 

@@ -9,9 +9,9 @@ from typing import Any
 from flightid.errors import OptionError
 from flightid.logs import is_log
 from flightid.options import checked
-from flightid.record.options import ReadOptions
 from flightid.study.proposal.of_log import study_of_log
 from flightid.study.proposal.of_records import study_of_records
+from flightid.study.proposal.options import DataOptions, told
 from flightid.study.proposal.proposal import Proposal
 
 
@@ -24,7 +24,7 @@ def propose_study(
     outputs: Sequence[str] = (),
     tune: bool = False,
     cache: MutableMapping[str, Any] | None = None,
-    **reading: Any,  # noqa: ANN401 — fields of ReadOptions
+    **reading: Any,  # noqa: ANN401 — fields of DataOptions
 ) -> Proposal:
     """Write the study that data ask for: what was flown says what can be identified, and how.
 
@@ -44,7 +44,8 @@ def propose_study(
     cache : mutable mapping of str to object, optional
         Takes what is read of a log and found in it; given to `run_study`, nothing is done twice.
     **reading : object
-        How records are read: arguments of `flightid.read_records`.
+        How records are read, and what is declared of inputs (of a log too): arguments of
+        `flightid.read_records`.
 
     Returns
     -------
@@ -58,8 +59,7 @@ def propose_study(
         A file cannot be read.
     """
     paths = [Path(file) for file in files]
-    usual = ReadOptions()
-    asked = checked(ReadOptions, reading, "a study of records")
+    asked = checked(DataOptions, reading, "a study of records")
     logs = [path for path in paths if is_log(path)]
     if not logs:
         return study_of_records(
@@ -70,10 +70,12 @@ def propose_study(
             outputs=tuple(outputs),
             reading=asked,
         )
-    if len(paths) > 1 or inputs or outputs or asked != usual:
+    if len(paths) > 1 or inputs or outputs or told(asked) != asked.declared:
         raise OptionError(
             "a log is taken alone, and its channels have names, units and stamps",
             found=", ".join(path.name for path in paths),
             needed="one log without options of tables, or records from files",
         )
-    return study_of_log(logs[0], Path(folder), model=model, tune=tune, cache=cache)
+    return study_of_log(
+        logs[0], Path(folder), model=model, tune=tune, cache=cache, declared=asked.declared
+    )
