@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import sqlite3
 import struct
 import time
@@ -15,15 +16,22 @@ import pytest
 
 import flightid as fid
 from flightid.errors import FileFormatError, OptionError
-from flightid.reading import VARIABLE
-from flightid.record.formats.ros import read_columns
+from flightid.reading import VARIABLE, memory_budget
+from flightid.record.formats.ros import read_columns, storage
+from flightid.record.formats.ros.content import LONGEST, BagContent, Topic
 from tests.bag_builder import (
     NS,
     START_NS,
     Flight,
+    bag1_of,
+    block_of,
+    fields_of,
     mcap_of,
     message_of,
+    record_of,
+    texts_of,
     topic_of,
+    write_bag1,
     write_db3,
     write_mcap,
 )
@@ -59,6 +67,98 @@ def test_what_waits_in_a_write_ahead_log_is_read_and_nothing_is_touched(tmp_path
     assert np.array_equal(table.column(RATE), np.tile(FLIGHT.rates, 2))
     assert {each.name: each.read_bytes() for each in path.parent.iterdir()} == held
     base.close()
+    # Of a log that is written into the file nothing is left; SQLite would make one for a while.
+    before = path.parent.stat().st_mtime_ns
+    assert read_columns(path).lengths[RATE] == 2 * FLIGHT.n_rates
+    assert path.parent.stat().st_mtime_ns == before
+
+
+def test_a_bag_that_grows_while_it_is_copied_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, base = _in_log(tmp_path / "bag")
+    full, copied = BagContent("bag", n_bytes=memory_budget()), shutil.copyfile
+    with pytest.raises(FileFormatError, match="more than is read"), storage._opened(path, full):
+        pass
+
+    def copyfile(source: Path, made: Path) -> None:
+        copied(source, made)
+        if source == path:
+            base.execute("INSERT INTO messages(topic_id, timestamp, data) VALUES(0, 0, '')")
+            base.commit()
+
+    monkeypatch.setattr(shutil, "copyfile", copyfile)
+    with pytest.raises(FileFormatError, match=r"bag_0\.db3 is still written"):
+        read_columns(path)
+    base.close()
+
+
+def test_a_database_is_opened_to_run_nothing_of_its_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = write_db3(tmp_path / "bag", FLIGHT) / "bag_0.db3"
+    monkeypatch.setattr(storage, "STEPS", 1000)
+    endless = "WITH RECURSIVE n(k) AS (SELECT 1 UNION ALL SELECT k + 1 FROM n) SELECT max(k) FROM n"
+    with storage._opened(path, BagContent("bag")) as db:
+        assert db.execute("PRAGMA trusted_schema").fetchone() == (0,)
+        with pytest.raises(sqlite3.OperationalError, match="readonly"):
+            db.execute("CREATE TABLE more(name)")
+        with pytest.raises(sqlite3.OperationalError, match="interrupted"):
+            db.execute(endless + " LIMIT 1")
+
+
+@pytest.mark.parametrize("container", ["mcap", "bag1"])
+def test_memory_is_asked_for_before_it_is_taken(
+    container: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A message may take all of a large file, a chunk its bytes and twice what it unpacks to."""
+    monkeypatch.setenv(VARIABLE, "1")
+    if container == "mcap":
+        path = mcap_of(tmp_path / "a", topic_of("uint8 v\n") + message_of(0, bytes(600_000)))
+    else:
+        path = bag1_of(tmp_path / "a")
+        head = fields_of(op=b"\x02", conn=bytes(4), time=bytes(8))
+        path.write_bytes(path.read_bytes() + block_of(head) + block_of(bytes(1_200_000)))
+    with pytest.raises(FileFormatError, match="more than is read into memory"):
+        read_columns(path)
+    full = BagContent("a", n_bytes=(1 << 20) - 8)
+    with pytest.raises(FileFormatError, match="more than is read"), full.inflated("", b"abc", 3):
+        pass
+    with full.inflated("", b"ab", 2) as inner:
+        assert (inner, full.n_bytes) == (b"ab", (1 << 20) - 6)
+    assert full.n_bytes == (1 << 20) - 8
+
+
+def test_definitions_of_ros1_count_and_headers_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    chunks = []
+    for k in range(12):
+        head = fields_of(op=b"\x07", conn=struct.pack("<I", k), topic=b"/a")
+        said = fields_of(type=b"a/B", message_definition=b"#" * 100_000)
+        chunks.append(block_of(head) + block_of(said))
+    path = bag1_of(tmp_path / "a.bag", *chunks)
+    monkeypatch.setenv(VARIABLE, "1")
+    with pytest.raises(FileFormatError, match="more than is read into memory"):
+        read_columns(path)
+    many = fields_of(**{f"a{k}": b"" for k in range(102)})
+    path.write_bytes(path.read_bytes()[:13] + block_of(many) + block_of(b""))
+    with pytest.raises(FileFormatError, match="more than 100 fields"):
+        read_columns(path)
+
+
+def test_chunks_within_chunks_are_passed_over(tmp_path: Path) -> None:
+    records = topic_of("float64 v\n") + message_of(0, b"\x00\x01\x00\x00" + bytes(8))
+    for _ in range(2):
+        head = struct.pack("<QQQI", 0, 0, len(records), 0) + texts_of("")
+        records = record_of(6, head + struct.pack("<Q", len(records)) + records)
+    path = mcap_of(tmp_path / "a.mcap", records)
+    whole = write_bag1(tmp_path / "b.bag", FLIGHT).read_bytes()
+    # Behind the magic and the header of the bag: its chunk.
+    nested = bag1_of(tmp_path / "b.bag", whole[13 + len(block_of(fields_of(op=b"\x03"))) + 4 :])
+    for each in (path, nested):
+        with pytest.raises(FileFormatError, match="holds no topic of numbers"):
+            read_columns(each)
 
 
 def test_a_bag_in_the_middle_of_a_change_is_refused(tmp_path: Path) -> None:
@@ -88,6 +188,12 @@ def test_a_chunk_that_is_not_as_recorded_is_refused(tmp_path: Path) -> None:
     path = write_mcap(tmp_path / "a.mcap", FLIGHT)
     whole = path.read_bytes()
     assert np.array_equal(read_columns(path).column(RATE), FLIGHT.rates)
+    size = whole.index(b"\x06", 8) + 9 + 16
+    (said,) = struct.unpack_from("<Q", whole, size)
+    for wrong in (said - 1, said + 1):
+        path.write_bytes(whole[:size] + struct.pack("<Q", wrong) + whole[size + 8 :])
+        with pytest.raises(FileFormatError, match=r"a\.mcap is not as long as it says"):
+            read_columns(path)
     at = whole.index(struct.pack("<d", FLIGHT.rates[20])) + 7
     path.write_bytes(whole[:at] + bytes([whole[at] ^ 0x40]) + whole[at + 1 :])
     with pytest.raises(FileFormatError, match=r"a chunk of a\.mcap is damaged.*checksum"):
@@ -204,6 +310,21 @@ def test_messages_of_64_kib_are_samples_and_longer_ones_are_not(tmp_path: Path) 
                 read_columns(path)
         else:
             assert read_columns(path).lengths == {"/a/v": 1}
+    path = write_db3(tmp_path / "bag", FLIGHT) / "bag_0.db3"
+    with sqlite3.connect(path) as base:
+        base.execute("INSERT INTO messages(topic_id, data) VALUES(1, ?)", (body,))
+        base.execute("UPDATE messages SET timestamp = 0 WHERE timestamp IS NULL")
+    base.close()
+    assert "/cmd left out: its messages are too long" in read_columns(path).advice
+
+
+def test_messages_that_are_left_out_are_no_longer_counted() -> None:
+    content = BagContent("a")
+    content.declare(1, Topic("/a", "a/B", "", "cdr"))
+    empty = content.n_bytes
+    for size in (100, 200, LONGEST + 1, 300):
+        content.add(1, 0, bytes(size))
+    assert (content.n_bytes, content.topics[1].payloads) == (empty, [])
 
 
 def test_stamps_of_headers_that_stand_are_not_taken(tmp_path: Path) -> None:

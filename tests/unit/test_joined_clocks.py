@@ -50,6 +50,8 @@ def test_drift_is_found_where_it_shows() -> None:
     for there in (0.0, 48.0):
         error = found.offset_s + (1 + found.drift) * there - OFFSET_S - (1 + DRIFT) * there
         assert abs(error) < (found.half_width_s or 0.0)
+    with pytest.raises(DataError, match=r"more than clocks do: found drift 69. ppm.*most 500 ppm"):
+        clock_offset(*signals(noise=0.0, drift=7e-4), "p")
 
 
 def test_signals_that_repeat_or_differ_are_refused() -> None:

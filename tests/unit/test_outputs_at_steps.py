@@ -24,14 +24,19 @@ WANTED = tuple(
 GRID = RowGrid(WANTED, None, None, None, None, None, "time", has_clocks=True)
 
 
-def rig(seed: int, input_hz: int = 50) -> Rows:
-    """A lag of 0.2 s at 1 kHz under a two-level command at 50 Hz; its output logged at 200 Hz."""
+def rig(seed: int, input_hz: int = 50, *, gain: float = 0.0) -> Rows:
+    """A lag of 0.2 s at 1 kHz under a two-level command at 50 Hz; its output logged at 200 Hz.
+
+    With a gain the command follows the output: the loop is closed.
+    """
     rng = np.random.default_rng(seed)
     u = np.repeat(rng.choice([-1.0, 1.0], 500), 120)
-    moved = u + 0.3 * np.repeat(rng.standard_normal(3000), 20)
-    y = np.zeros(u.size)
+    gust = 0.3 * np.repeat(rng.standard_normal(3000), 20)
+    y, fed = np.zeros(u.size), 0.0
     for k in range(1, y.size):
-        y[k] = POLE * y[k - 1] + (1 - POLE) * moved[k - 1]
+        y[k] = POLE * y[k - 1] + (1 - POLE) * (u[k - 1] + gust[k - 1])
+        fed = gain * y[k] if k % 20 == 0 else fed
+        u[k] -= fed
     time_s, every = np.arange(u.size) * 0.001, 1000 // input_hz
     seen = slice(2, None, 5)
     noise = 0.02 * rng.standard_normal(y[seen].size)
@@ -49,6 +54,15 @@ def test_an_open_rig_with_a_faster_output_is_not_called_closed(input_hz: int) ->
         _, made, _ = grid.pieces(rows, ())[0]
         u, y = (made[name] - np.mean(made[name]) for name in ("u", "y"))
         assert find_feedback([u[None]], [y[None]], ["u"]).loop == "open"
+
+
+def test_a_closed_rig_is_found_by_samples_at_the_instants() -> None:
+    for seed in range(3):
+        rows = rig(seed, gain=2.0)
+        assert GRID.methods(rows, STEP_S)["y"] is Interpolation.POINT
+        _, made, _ = replace(GRID, resample_to_s=STEP_S).pieces(rows, ())[0]
+        u, y = (made[name] - np.mean(made[name]) for name in ("u", "y"))
+        assert find_feedback([u[None]], [y[None]], ["u"]).loop == "closed"
 
 
 def test_a_low_passed_output_leaves_the_loop_unknown() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 import socket
 import subprocess
 import sys
@@ -13,7 +14,7 @@ import pytest
 import flightid as fid
 from flightid.cli.program import run
 from flightid.errors import DataError, OptionError, UnknownNameError
-from flightid.simulation.realtime import MOST_A_FRAME, UdpLink, fly_in_real_time
+from flightid.simulation.realtime import MOST_A_FRAME, UdpLink, fly_in_real_time, fly_model
 from flightid.simulation.stepper import Stepper
 from tests.closeness import assert_close
 
@@ -168,8 +169,14 @@ def test_datagrams_in_and_out() -> None:
         UdpLink(["u"], style="morse")
 
 
-def test_fly_from_the_command_line(tmp_path, capsys) -> None:
-    path = tmp_path / "flown.nc"
+def test_fly_from_the_command_line(tmp_path, capsys, monkeypatch) -> None:
+    path, before, ended_by = tmp_path / "flown.nc", signal.getsignal(signal.SIGTERM), []
+
+    def flown(*arguments: object, **options: object) -> object:
+        ended_by.append(signal.getsignal(signal.SIGTERM))
+        return fly_model(*arguments, **options)
+
+    monkeypatch.setattr("flightid.simulation.realtime.fly_model", flown)
     words = ["fly", "short_period", "--duration", "0.1", "--rate", "50", "--listen", "0"]
     assert (
         run(
@@ -190,9 +197,15 @@ def test_fly_from_the_command_line(tmp_path, capsys) -> None:
     plain = json.loads(said.out)
     assert (plain["frames"], plain["options"]["limits"]) == (5, {"elevator": [-0.3, 0.3]})
     assert "Listening at 127.0.0.1" in said.err
+    assert ended_by == [signal.default_int_handler], "a signal ends it as Ctrl-C does"
+    assert signal.getsignal(signal.SIGTERM) is before
     assert fid.read_records(path)[0].n_samples == 5
-    for wrong, words_said in ((["--feedback", "elevator=q"], "needed INPUT=OUTPUT:GAIN"),
-                              (["--send", "nowhere"], "needed HOST:PORT")):  # fmt: skip
+    for wrong, words_said in (
+        (["--feedback", "elevator=q"], "needed INPUT=OUTPUT:GAIN"),
+        (["--send", "nowhere"], "needed HOST:PORT"),
+        (["--output", str(tmp_path / "no" / "a.nc")], "there is no folder"),
+        (["--output", str(tmp_path / "a.csv")], "neither .parquet nor .nc"),
+    ):
         assert run(["fly", "short_period", *wrong]) == 2
         assert words_said in capsys.readouterr().err
 

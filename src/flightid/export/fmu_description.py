@@ -157,8 +157,8 @@ def unique_names(*groups: Iterable[str]) -> list[str]:
 
     Example
     -------
-    >>> unique_names(["p", "q"], ["p", ""])
-    ['p', 'q', 'p#2', 'value']
+    >>> unique_names(["p", "time"], ["p", ""])
+    ['p', 'time#2', 'p#2', 'value']
     """
     found: list[str] = []
     for name in (each for group in groups for each in group):
