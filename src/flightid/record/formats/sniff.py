@@ -13,7 +13,8 @@ from flightid.record.formats.foreign import foreign
 TEXT_SUFFIXES = {".csv", ".txt", ".tsv", ".dat"}
 SNIFFED = 4096
 OTHERS = "read autopilot logs with read_log; export other data as CSV or Parquet"
-BAG_SIGNATURES = (b"\x89MCAP0\r\n", b"#ROSBAG V2.0\n", b"SQLite format 3\x00")
+MCAP, ROSBAG, SQLITE = b"\x89MCAP0\r\n", b"#ROSBAG V2.0\n", b"SQLite format 3\x00"
+"""First bytes of bags."""
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
@@ -83,7 +84,7 @@ def _by_content(head: bytes, suffix: str) -> FileFormat | None:
     hdf5 = FileFormat.MATLAB_HDF5 if suffix == ".mat" else FileFormat.NETCDF
     # Level 5 MATLAB files begin with a text and end their header with a byte-order mark.
     signs = (
-        (head.startswith(BAG_SIGNATURES), FileFormat.BAG),
+        (head.startswith((MCAP, ROSBAG, SQLITE)), FileFormat.BAG),
         (head[:4] == b"PAR1", FileFormat.PARQUET),
         (head[:4] in (b"CDF\x01", b"CDF\x02", b"CDF\x05"), FileFormat.NETCDF_CLASSIC),
         (head[:8] == HDF5_SIGNATURE, hdf5),

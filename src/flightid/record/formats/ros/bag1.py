@@ -12,8 +12,8 @@ from sys import getsizeof
 from typing import BinaryIO
 
 from flightid.record.formats.ros.content import BagContent, Topic
+from flightid.record.formats.sniff import ROSBAG
 
-MAGIC = b"#ROSBAG V2.0\n"
 MESSAGE, CHUNK, CONNECTION = 2, 5, 7
 MOST_FIELDS = 100
 
@@ -27,7 +27,7 @@ def gather(path: Path, content: BagContent) -> None:
         A record is not one, or more than the memory budget.
     """
     with path.open("rb") as stream:
-        stream.seek(len(MAGIC))
+        stream.seek(len(ROSBAG))
         _walk(stream, path, content, path.stat().st_size)
 
 

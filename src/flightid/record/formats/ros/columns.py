@@ -17,19 +17,17 @@ from flightid.record.formats.ros.content import BagContent, Topic
 from flightid.record.formats.ros.definitions import parsed, shipped
 from flightid.record.formats.ros.layouts import FieldLayout, layout_of
 from flightid.record.formats.ros.payloads import decoded, leading_columns
+from flightid.record.formats.sniff import MCAP, ROSBAG, SQLITE
 
-CONTAINERS: tuple[tuple[bytes, Callable[[Path, BagContent], None]], ...] = (
-    (mcap.MAGIC, mcap.gather),
-    (bag1.MAGIC, bag1.gather),
-    (storage.MAGIC, storage.gather),
-)
-"""Readers by the first bytes of a file."""
-RECOVERIES: dict[Callable[[Path, BagContent], None], str] = {
-    mcap.gather: "copy it again; `mcap recover {0}` keeps what is whole",
-    bag1.gather: "copy it again, or `rosbag reindex {0}`",
-    storage.gather: "copy it again; `sqlite3 {0} .recover | sqlite3 whole.db3` keeps what is whole",
+CONTAINERS: dict[bytes, tuple[Callable[[Path, BagContent], None], str]] = {
+    MCAP: (mcap.gather, "copy it again; `mcap recover {0}` keeps what is whole"),
+    ROSBAG: (bag1.gather, "copy it again, or `rosbag reindex {0}`"),
+    SQLITE: (
+        storage.gather,
+        "copy it again; `sqlite3 {0} .recover | sqlite3 whole.db3` keeps what is whole",
+    ),
 }
-"""What to do with a damaged file, by its reader."""
+"""Reader, and what to do with a damaged file, by its first bytes."""
 UNITS = {
     "sensor_msgs/Imu.angular_velocity": "rad/s",
     "sensor_msgs/Imu.linear_acceleration": "m/s^2",
@@ -103,10 +101,11 @@ def read_columns(path: Path) -> ColumnTable:
     for file in bag_files(path):
         with file.open("rb") as stream:
             head = stream.read(16)
-        gather = next((read for magic, read in CONTAINERS if head.startswith(magic)), None)
-        if gather is None:
+        known = next((each for sign, each in CONTAINERS.items() if head.startswith(sign)), None)
+        if known is None:
             raise FileFormatError(f"{file.name} is no bag", found=head[:8].hex(" ") or "nothing")
-        with decoding(file.name, "a whole bag", RECOVERIES[gather].format(file.name)):
+        gather, recovery = known
+        with decoding(file.name, "a whole bag", recovery.format(file.name)):
             gather(file, content)
     return _table(path, content)
 

@@ -15,8 +15,8 @@ from zlib import crc32
 from flightid.errors import FileFormatError
 from flightid.record.formats.ros.content import OVERHEAD, BagContent, Topic
 from flightid.record.formats.ros.definitions import short_name
+from flightid.record.formats.sniff import MCAP
 
-MAGIC = b"\x89MCAP0\r\n"
 SCHEMA, CHANNEL, MESSAGE, CHUNK, DATA_END = 3, 4, 5, 6, 15
 ENCODINGS = {"ros2msg", "ros1msg"}
 
@@ -30,7 +30,7 @@ def gather(path: Path, content: BagContent) -> None:
         A record is not one, or more than the memory budget.
     """
     with path.open("rb") as stream:
-        stream.seek(len(MAGIC))
+        stream.seek(len(MCAP))
         _walk(stream, path, content, {}, path.stat().st_size)
 
 

@@ -19,7 +19,6 @@ from flightid.reading import memory_budget
 from flightid.record.formats.ros.content import LONGEST, OVERHEAD, BagContent, Topic
 from flightid.record.formats.ros.definitions import short_name
 
-MAGIC = b"SQLite format 3\x00"
 JOURNAL_MAGIC = b"\xd9\xd5\x05\xf9\x20\xa1\x63\xd7"
 STEPS = 200_000_000
 """Instructions of the database after which a query is no reading of a bag."""
