@@ -6,7 +6,6 @@ from collections.abc import Iterable, Sequence
 
 from flightid.errors import DataError
 from flightid.record import Record
-from flightid.record.history import spread_channels
 from flightid.record.hold import common_loop
 from flightid.record.repeats import found_period
 from flightid.record.several import as_records
@@ -86,5 +85,4 @@ def feedback_test(
         driven,
         repeats=all(found_period(rows) is not None for rows in moved),
     )
-    names = (*driven, *seen)
-    return unless_spread(test, spread_channels([each.history for each in listed], names))
+    return unless_spread(test, [each.history for each in listed], (*driven, *seen))

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.record import Record
-from flightid.record.history import spread_channels
 from flightid.record.hold import common_loop
 from flightid.record.repeats import found_period
 from flightid.responses.response import FrequencyResponse
@@ -60,7 +59,7 @@ def feedback_of(
     key = ("feedback", *records[1:], samples.inputs, samples.outputs, begun, step, most)
     test = records[0].once(key, lambda: _tested(samples, step, most))
     names = (*samples.inputs, *samples.outputs)
-    return unless_spread(test, spread_channels([each.history for each in records], names))
+    return unless_spread(test, [each.history for each in records], names)
 
 
 def _tested(samples: Samples, step: int, most: int) -> FeedbackTest:

@@ -15,7 +15,7 @@ loop is not known.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -24,6 +24,7 @@ import scipy
 from numpy.typing import NDArray
 
 from flightid.errors import OptionError
+from flightid.record.history import Step, spread_channels
 from flightid.record.hold import LOOPS
 
 Array = NDArray[np.float64]
@@ -138,9 +139,11 @@ def _percent(share: float | None) -> str:
     return f"{np.floor(1e4 * (share or 0.0)) / 100.0:.4g}"
 
 
-def unless_spread(test: FeedbackTest, spread: Sequence[str]) -> FeedbackTest:
-    """A test of channels of which some were filtered without phase, which looks like feedback."""
-    found = test.source == "test" and test.is_closed and bool(spread)
+def unless_spread(
+    test: FeedbackTest, histories: Iterable[Iterable[Step]], names: Iterable[str]
+) -> FeedbackTest:
+    """A test of channels, "filtered" where some were without phase, which looks like feedback."""
+    found = test.source == "test" and test.is_closed and spread_channels(histories, names)
     return replace(test, loop="unknown", source="filtered") if found else test
 
 

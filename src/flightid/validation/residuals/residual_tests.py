@@ -12,7 +12,6 @@ from flightid.errors import DataError, OptionError
 from flightid.evidence.feedback import feedback_test
 from flightid.identification import Fit
 from flightid.record import Record
-from flightid.record.history import spread_channels
 from flightid.record.hold import LOOPS, common_loop
 from flightid.record.repeats import found_period
 from flightid.uncertainty.feedback import (
@@ -201,7 +200,7 @@ def _loop(
     repeats = all(found_period(rows) is not None for rows in inputs)
     channels = (*data.inputs, *data.residuals)
     found = find_feedback(inputs, left, tuple(data.inputs), repeats=repeats)
-    found = unless_spread(found, spread_channels([each.history for each in records], channels))
+    found = unless_spread(found, [each.history for each in records], channels)
     if found.loop == "open" and records and all(n in r for r in records for n in channels):
         measured = feedback_test(records, inputs=data.inputs, outputs=data.residuals)
         found = measured if measured.loop == "unknown" else found
