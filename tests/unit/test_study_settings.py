@@ -77,7 +77,7 @@ def test_a_model_file_lies_beside_the_study(tmp_path: Path) -> None:
 
 def test_rivals_are_library_models_or_files_beside_the_study(tmp_path: Path) -> None:
     text = GOOD.replace("band_rad_s", 'rivals = ["rate_integrator", "own.toml"]\nband_rad_s')
-    rivals = read_settings(_write(tmp_path, text)).models[0].beside
+    rivals = read_settings(_write(tmp_path, text)).models[0].rival_sources
     assert rivals == {"rate_integrator": "rate_integrator", "own.toml": str(tmp_path / "own.toml")}
 
 

@@ -59,7 +59,7 @@ class ModelSettings(AnyModel):
     ----------
     response, fit, check
         How responses are estimated, and how the model is fitted and verified.
-    beside : mapping of str to str
+    rival_sources : mapping of str to str
         Library name, or path of a model file, of each rival.
     figures : PublishedFigures or None
         Of the file `published`.
@@ -95,7 +95,7 @@ class ModelSettings(AnyModel):
     response: ResponseSettings = field(default_factory=ResponseSettings)
     fit: FitSettings = field(default_factory=FitSettings)
     check: VerifySettings = field(default_factory=VerifySettings)
-    beside: Mapping[str, str] = field(default_factory=dict)
+    rival_sources: Mapping[str, str] = field(default_factory=dict)
     figures: PublishedFigures | None = None
     structure: StructureSettings | None = None
 
@@ -202,7 +202,7 @@ def _beside(made: ModelSettings, folder: Path) -> ModelSettings:
     """With what stands beside the estimates as it lies in the folder of the study."""
     return replace(
         made,
-        beside={rival: placed(folder, rival) for rival in made.rivals},
+        rival_sources={rival: placed(folder, rival) for rival in made.rivals},
         reference=None if made.reference is None else placed(folder, made.reference),
         figures=None if made.published is None else read_published(folder / made.published),
     )

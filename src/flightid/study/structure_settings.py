@@ -74,11 +74,7 @@ class StructureSettings(OrderOptions):
         """Orders to try by name; none where the spectrum of the output tells them."""
         told = {name: getattr(self, name) for name in ORDERS[self.structure]}
         return {
-            name: self.usual[name]
-            if given is None
-            else ()
-            if given == SPECTRUM
-            else _several(given)
+            name: _several(self.usual[name] if given is None else given)
             for name, given in told.items()
         }
 
@@ -100,6 +96,8 @@ class StructureSettings(OrderOptions):
 
 
 def _several(given: Any) -> tuple[Any, ...]:  # noqa: ANN401 - numbers, one or several
+    if given == SPECTRUM:
+        return ()
     return tuple(given) if isinstance(given, list | tuple) else (given,)
 
 

@@ -68,7 +68,7 @@ def load_task(settings: ModelSettings, others: tuple[str, ...] = ()) -> Task:
     """
     rivals = {
         name: load_model(source_of(path), axis=settings.axis)
-        for name, path in settings.beside.items()
+        for name, path in settings.rival_sources.items()
         if name not in others
     }
     structure = settings.structure
