@@ -49,13 +49,14 @@ class LoopCheck:
         hertz = " to ".join(
             f"{each / math.tau:.2g}" for each in (self.lowest_rad_s, self.highest_rad_s)
         )
-        said = f"{self.miss:.0%} of its closed loop in this flight, {hertz} Hz"
+        flown = f"its closed loop in this flight, {hertz} Hz"
         if self.holds:
-            return Finding("loop-as-flown", Light.GREEN, f"{axis}: expected within {said}")
+            said = f"{axis}: expected within {self.miss:.0%} of {flown}"
+            return Finding("loop-as-flown", Light.GREEN, said)
         return Finding(
             "loop-not-as-flown",
             Light.AMBER,
-            f"{axis}: what the plan expects is {said.replace('of', 'away from', 1)}",
+            f"{axis}: what the plan expects is {self.miss:.0%} away from {flown}",
             "begin with a third of the amplitude, look at the log, then fly the whole",
         )
 

@@ -15,9 +15,9 @@ from flightid.errors import FileFormatError, OptionError
 from flightid.files import as_path, write_atomically
 
 NAME = re.compile(r"[A-Z][A-Z0-9_]{0,15}")
+"""ArduPilot and PX4 keep names in 16 characters."""
 CLI_NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
 """Betaflight's settings, by the line."""
-"""Both autopilots keep names in 16 characters."""
 PX4_INTEGERS = ("IMU_GYRO_DNF_EN",)
 REAL32, INT32 = 9, 6
 """MAVLink's numbers for the types of a parameter."""

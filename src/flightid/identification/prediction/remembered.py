@@ -91,17 +91,16 @@ def start_of_runs(source: object, asked: InitialState | None) -> InitialState:
     ('estimate', 'trim')
     """
     told = asked or remembered(source).initial_state
-    if told not in (None, ESTIMATE) or asked:
-        return told or ESTIMATE
+    if told is not None and (asked or told != ESTIMATE):
+        return told
     model = model_of(source)
-    declared = model.initial if isinstance(model, StateSpaceModel) else {}
-    if not declared or not isinstance(model, StateSpaceModel):
+    if not isinstance(model, StateSpaceModel) or not model.initial:
         return ESTIMATE
     # Runs of a linear model are told departures from its trim.
     trim = model.trim if model.is_linear else {}
     return {
-        name: declared[name].value - trim.get(name, 0.0)
-        if name in declared and not declared[name].free
+        name: model.initial[name].value - trim.get(name, 0.0)
+        if name in model.initial and not model.initial[name].free
         else ESTIMATE
         for name in model.states
     }
