@@ -174,8 +174,12 @@ def test_a_command_names_what_is_wrong_with_a_joined_file(
     asked = ["run", str(rig), "--inputs", "u", "--outputs", "angle", "--join-on", "gyro=angle"]
     assert run([*asked, "--join", "nope.csv"]) == 2
     assert "not there: found --join nope.csv; needed a table" in capsys.readouterr().err
-    assert run([*asked, "--join", str(mocap)]) == 2
-    assert "needed --join-time-column. Next: 't' looks like the time" in capsys.readouterr().err
+    text = mocap.read_text().replace("t,", "x,", 1)
+    (tmp_path / "bare.csv").write_text(text)
+    assert run([*asked, "--join", str(tmp_path / "bare.csv")]) == 2
+    assert "no time column 'time': found columns x, gyro, angle; needed --join-time-column" in (
+        capsys.readouterr().err
+    )
     noise = tmp_path / "noise.csv"
     random = np.random.default_rng(2).standard_normal((4000, 2))
     np.savetxt(noise, np.c_[np.arange(4000) / 73, random], "%.6g", ",", header="t,rate,angle",

@@ -173,7 +173,7 @@ def test_milliseconds_are_asked_about_and_never_taken_for_seconds(tmp_path: Path
 @pytest.mark.parametrize(
     ("text", "options", "error", "message"),
     [
-        ("t,p\n0,1\n1,2\n", {}, OptionError, "no time column 'time': found columns t, p"),
+        ("x,p\n0,1\n1,2\n", {}, OptionError, "no time column 'time': found columns x, p"),
         ("time,p\n0,1\n1,2\n", {"sample_time_s": 1.0}, OptionError, "stated twice"),
         ("t,p\n0,1\n1,2\n", {"sample_time_s": -1.0}, OptionError, "not positive"),
         ("time,p\n0,1\n1,2\n", {"outputs": ["q"]}, UnknownNameError, "found q; needed one of time"),
@@ -406,8 +406,3 @@ def test_g_is_what_the_model_makes_of_it(tmp_path: Path) -> None:
 )
 def test_spellings_of_test_reports_are_read(spelling: str, unit: str) -> None:
     assert canonical(spelling) == canonical(unit)
-
-
-def test_a_column_that_looks_like_the_time_is_named(tmp_path: Path) -> None:
-    with pytest.raises(OptionError, match="'time_s' looks like the time"):
-        read_records(_csv(tmp_path, "time_s,p\n0,1\n1,2\n"))

@@ -9,7 +9,7 @@ import click
 
 from flightid.cli.option_fields import OptionsCommand, parted
 from flightid.cli.output import note
-from flightid.cli.proposals import of_data, propose, study_path
+from flightid.cli.proposals import note_of, of_data, propose, study_path
 from flightid.cli.records import FILES
 
 
@@ -41,6 +41,5 @@ def command(
     target = target or study_path(files)
     (asked,) = parted(options, of_data())
     made = propose(files, target, **asked, tune=tune)
-    for finding in made.findings:
-        note(f"{finding.light}: {finding.message}")
+    note_of(made)
     note(f"Wrote {made.write(target)}: {', '.join(made.models)}")

@@ -38,6 +38,14 @@ def propose(files: Sequence[Path], target: Path, **asked: Any) -> Proposal:  # n
         return propose_study(files, folder=target.parent, **asked)
 
 
+def note_of(made: Proposal) -> None:
+    """Say what data were taken for, and what was left out of the study."""
+    for text in made.said:
+        note(text)
+    for finding in made.findings:
+        note(f"{finding.light}: {finding.message}")
+
+
 def is_study(files: Sequence[Path]) -> bool:
     """Whether a study is meant: one file in TOML."""
     return len(files) == 1 and files[0].suffix == ".toml"
@@ -87,8 +95,7 @@ def taken_study(
         click.get_current_context().exit(Exit.RED)
     made.write(target)
     note(f"Wrote {target}")
-    for finding in made.findings:
-        note(f"{finding.light}: {finding.message}")
+    note_of(made)
     return target, output or target.with_name(f"{files[0].stem}-output")
 
 

@@ -115,12 +115,15 @@ def _from_table(
 ) -> list[Record]:
     from flightid import read_records
     from flightid.logs.joinable import joinable
+    from flightid.record.time_question import time_said
 
     if "join" in of_tables:
         of_tables = {**of_tables, "join": joinable(of_tables["join"])}
     records = read_records(
         file, inputs or None, outputs or None, excitations=excitations or None, **of_tables
     )
+    for said in filter(None, dict.fromkeys(map(time_said, records))):
+        note(said)
     for record in records:
         for channel in record.channels.values():
             if channel.is_declared:

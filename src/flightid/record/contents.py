@@ -6,8 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
+from flightid.errors import OptionError
 from flightid.record.formats import ColumnTable, file_format
 from flightid.record.tables import read_table
+from flightid.record.time_columns import near_times, told_time, with_time
 from flightid.table import Cell, Column, Table
 
 
@@ -39,6 +41,7 @@ def table_contents(path: str | Path) -> Table:
     rows = tuple(_row(table, name) for name in table.lengths)
     moving = tuple(row for row in rows if row[-2] is None or row[-2] != row[-1])
     notes = [table.advice] if table.advice else []
+    notes += _time(table)
     if table.clock is not None:
         notes += dict.fromkeys(table.clock(name).said for name in table.lengths)
     if len(moving) < len(rows):
@@ -49,6 +52,19 @@ def table_contents(path: str | Path) -> Table:
         *(Column("least"), Column("most")),
     )
     return Table(f"{path.name}: {len(rows)} columns, {kind}", columns, moving, tuple(notes))
+
+
+def _time(table: ColumnTable) -> list[str]:
+    """Which column is the time, or why none is."""
+    try:
+        timed, name = with_time(table, None)
+    except OptionError as error:
+        return [str(error)]
+    if table.clock is None and name not in table.lengths:
+        near = near_times(table) or "no column is named as one"
+        return [f"No time: {near}; say --time COLUMN or --sample-time-s SECONDS."]
+    told = told_time(timed, name)
+    return [f"{table.path.name}: {told}."] if told else []
 
 
 def _row(table: ColumnTable, name: str) -> tuple[Cell, ...]:

@@ -13,8 +13,8 @@ from flightid.record.clocks import Array, ClockOffset, Signal, clock_offset
 from flightid.record.formats import ColumnTable, file_format
 from flightid.record.formats.columns import ColumnStamps
 from flightid.record.record import Record
-from flightid.record.rows import row_stamps
 from flightid.record.tables import read_table
+from flightid.record.time_columns import USUAL, row_stamps, told_time, with_time
 
 
 def with_files(
@@ -39,7 +39,7 @@ def with_files(
     join_on, clock_offset_s
         As `joined` takes them, for each of the files.
     time_column, join_time_column : str, str or None
-        Time column of the table and of the files; default: the same.
+        Time column of the table and of the files; default: found by name and content.
     join_time_unit : str or None
         Unit of the files' stamps; default: what their heading says, else as those of the table
         where both columns have one name, else s.
@@ -61,12 +61,13 @@ def with_files(
             found=f"join_on={join_on!r}, clock_offset_s={clock_offset_s}",
             needed="join, the file that has it",
         )
-    named = join_time_column or time_column
     for file in files:
         if isinstance(file, Record):
-            other, second_s = _of_record(file), file.time_s
+            other, named, second_s = _of_record(file), USUAL, file.time_s
         else:
             other = read_table(Path(file), file_format(Path(file)), ())
+            there = join_time_column or (time_column if time_column in other.lengths else None)
+            other, named = with_time(other, there, option="join_time_column")
             second_s = _stamps_to_join(other, named, join_time_unit, units, time_column)
         own = table.clock is not None
         first_s = np.empty(0) if own else row_stamps(table, time_column, units, sample_time_s)
@@ -173,7 +174,8 @@ def joined(
     @cache
     def moved(given: ColumnStamps) -> ColumnStamps:
         time_s = found.offset_s + (1.0 + found.drift) * given.time_s
-        return ColumnStamps(time_s, f"{second.path.name}: {found.said}", found.finding)
+        told = filter(None, (second.path.name, told_time(second, time_columns[1])))
+        return ColumnStamps(time_s, f"{', '.join(told)}: {found.said}", found.finding)
 
     def stamps(name: str) -> ColumnStamps:
         return moved(own_second(names[name])) if name in names else own_first(name)

@@ -46,7 +46,9 @@ class TableOptions(Options):
     0.01
     """
 
-    time_column: str = option("time", doc="Column of the time stamps.")
+    time_column: str | None = option(
+        None, doc="Column of the time stamps; default: time, else the one named so that rises."
+    )
     time_unit: str | None = option(None, doc="Unit of the stamps, where the file does not say.")
     units: Mapping[str, str] = option(
         default_factory=dict, doc="Unit of a channel or column where the file says none: p=rad/s."
@@ -80,10 +82,10 @@ class TableOptions(Options):
         None, unit="s", doc="Stamp here of zero on the clock of the joined file."
     )
     join_time_column: str | None = option(
-        None, doc="Column of the stamps in the joined file, where it has another name."
+        None, doc="Column of the stamps in the joined file; default: found as that of this one."
     )
     join_time_unit: str | None = option(
-        None, doc="Unit of the joined file's stamps, where its heading does not say."
+        None, doc="Unit of the joined file's stamps, where their name does not say."
     )
 
 

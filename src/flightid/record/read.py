@@ -25,16 +25,13 @@ from flightid.record.interpolation import Interpolation
 from flightid.record.joined_files import with_files
 from flightid.record.record import Record
 from flightid.record.row_grids import ChannelColumn, RowGrid
-from flightid.record.rows import (
-    column_unit,
-    row_stamps,
-    with_time_unit,
-)
+from flightid.record.rows import column_unit
 from flightid.record.selection import Names, pairs_of, refuse_columns, selected_records
 from flightid.record.source_rows import SourceRows, moves
 from flightid.record.stamps import mean_spacing_s
 from flightid.record.store import RECORD_COLUMN
 from flightid.record.tables import read_table
+from flightid.record.time_columns import USUAL, row_stamps, with_time, with_time_unit
 from flightid.record.validation import require_period
 from flightid.table import Cell
 from flightid.units import canonical
@@ -51,7 +48,7 @@ def read_records(
     *,
     excitations: Names | str | None = None,
     others: Names | str | None = None,
-    time_column: str = "time",
+    time_column: str | None = None,
     time_unit: str | None = None,
     units: Mapping[str, str] | None = None,
     column_names: Sequence[str] = (),
@@ -74,8 +71,10 @@ def read_records(
     r"""Read records from CSV, Parquet, MATLAB .mat (level 5 to 7.3), netCDF or ROS bags.
 
     A file that `write_records` made comes back as it was; naming channels then selects and
-    assigns roles. In any other file the time is the column `time_column`, or `sample_time_s` is
-    stated; neither is guessed. Rows fall into several records where the column `record_column`
+    assigns roles. In any other file the time is the column `time_column`, else ``time``, else the
+    one that is named as a time (``t_s``, ``TimeUS``, ``Time (s)``, ``elapsed`` …) and rises
+    strictly; or `sample_time_s` is stated. Several that tell different times are an error. The
+    history says which was taken. Rows fall into several records where the column `record_column`
     changes, where time starts again, or where it has a gap (a spacing above 2.5 median spacings).
     Text with semicolons or tabs may have decimal commas. Units come from
     headings such as ``p [rad/s]``, from a second row of units in CSV, or from the file's metadata;
@@ -94,8 +93,9 @@ def read_records(
     inputs, outputs, excitations, others : names or mapping of str to str, optional
         Columns by role, or one name; a mapping gives new names, channel to column. With none of
         the four, every numeric column becomes a channel of role "other".
-    time_column : str
-        Column of the time stamps; in s unless the file, `time_unit` or `units` says otherwise.
+    time_column : str, optional
+        Column of the time stamps; in s unless its name, its heading, `time_unit` or `units` says
+        otherwise.
     time_unit : str, optional
         Unit of the stamps, such as "ms".
     units : mapping of str to str, optional
@@ -126,10 +126,10 @@ def read_records(
     clock_offset_s : float, optional
         Stamp on this file's clock of zero on the joined one's, in place of `join_on`.
     join_time_column : str, optional
-        Time column of the joined files, where it has another name.
+        Time column of the joined files; default: found as that of this one.
     join_time_unit : str, optional
-        Unit of its stamps, such as "ms"; default: what its heading says, else as those here where
-        both columns have one name, else s.
+        Unit of its stamps, such as "ms"; default: what its name or heading says, else as those
+        here where both columns have one name, else s.
     interpolation : Interpolation or mapping of str to Interpolation, optional
         How samples of the new grid arise, for all channels or by name. Default: of inputs with
         `hold` "zero" the previous value, with "first" straight lines, of all else band-limited;
@@ -181,18 +181,19 @@ def read_records(
     """
     source = Path(path)
     kind = file_format(source)
-    roles = _roles(inputs, outputs, excitations, others)
-    units = {
-        key if key == time_column else channel_name(key): u for key, u in (units or {}).items()
-    }
-    units, derive = with_time_unit(units, time_column, time_unit), derive or {}
-    stored = selected_records(source, kind, roles, units)
+    roles, derive = _roles(inputs, outputs, excitations, others), derive or {}
+    asked = time_column if sample_time_s is None else time_column or USUAL
+    named = _named_units(units, asked or USUAL, time_unit)
+    stored = selected_records(source, kind, roles, named)
     if stored is not None:
         refuse_columns(source, column_names, derive)
         return [_declared(item, InputShape(hold, period_s, loop)) for item in stored]
+    taken = {column for names in roles.values() for _, column in pairs_of(names)}
+    table = read_table(source, kind, column_names)
+    table, time_column = with_time(table, asked, taken, record=record_column)
+    units = _named_units(units, time_column, time_unit)
     table = with_files(
-        read_table(source, kind, column_names), join, join_on=join_on,
-        clock_offset_s=clock_offset_s, time_column=time_column,
+        table, join, join_on=join_on, clock_offset_s=clock_offset_s, time_column=time_column,
         join_time_column=join_time_column, join_time_unit=join_time_unit, units=units,
         sample_time_s=sample_time_s,
     )  # fmt: skip
@@ -244,6 +245,14 @@ def _roles(
         strict=True,
     )
     return {role: (names,) if isinstance(names, str) else names for role, names in groups}
+
+
+def _named_units(
+    units: Mapping[str, str] | None, time_column: str, time_unit: str | None
+) -> Mapping[str, str]:
+    """Declared units by name of channel, and that of the time by its column."""
+    names = {k if k == time_column else channel_name(k): u for k, u in (units or {}).items()}
+    return with_time_unit(names, time_column, time_unit)
 
 
 def _numbered(records: Sequence[Record]) -> list[Record]:

@@ -12,96 +12,10 @@ from flightid.errors import FileFormatError, OptionError, UnitError
 from flightid.record.formats import ColumnTable
 from flightid.record.formats.columns import is_unit
 from flightid.record.stamps import GAP_FACTOR
-from flightid.units import canonical, convert, same_dimension
+from flightid.units import canonical
 
 MOST_SAMPLES_PER_ROW = 10
 """A new base that makes as many samples of a row invents them: the unit of the time is wrong."""
-
-
-def row_stamps(
-    table: ColumnTable,
-    time_column: str,
-    units: Mapping[str, str],
-    sample_time_s: float | None,
-    *,
-    needed: str = "time_column=<name of the column> or sample_time_s=<seconds>",
-) -> NDArray[np.float64]:
-    """Time of each row, s, from the column of the stamps or from a stated sample time.
-
-    Columns with stamps of their own have none in common: it is empty.
-
-    Raises
-    ------
-    OptionError
-        Time stated twice, or not at all.
-    UnitError
-        A unit of the column that is none of time.
-    """
-    if table.clock is not None:
-        if sample_time_s is not None:
-            raise OptionError(
-                f"the columns of {table.path.name} have stamps",
-                found=f"sample_time_s={sample_time_s}",
-                needed="no sample time; resample_to_s is that of the new grid",
-            )
-        return np.empty(0)
-    if time_column in table.lengths:
-        if sample_time_s is not None:
-            raise OptionError(
-                "the time is stated twice",
-                found=f"column {time_column!r} and sample_time_s={sample_time_s}",
-                needed="one of them",
-                action="leave out sample_time_s, or name another time_column",
-            )
-        unit = column_unit(table, time_column, time_column, units, default="s")
-        if not same_dimension(unit, "s"):
-            raise UnitError(
-                f"the unit of the time column {time_column!r} is none of time",
-                found=unit,
-                needed="s, ms, us, min …",
-            )
-        values = table.column(time_column)
-        return values if unit == "s" else convert(values, unit, "s")
-    if sample_time_s is None:
-        raise OptionError(
-            f"{table.path.name} has no time column {time_column!r}",
-            found="columns " + ", ".join(table.lengths),
-            needed=needed,
-            action=_looks_like_time(table)
-            or table.advice
-            or "no sample time is invented: state it",
-        )
-    if not (np.isfinite(sample_time_s) and sample_time_s > 0):
-        raise OptionError("sample time is not positive", found=sample_time_s, needed="above 0 s")
-    longest = max(table.lengths.values(), default=0)
-    return np.asarray(sample_time_s * np.arange(longest), dtype=np.float64)
-
-
-def with_time_unit(
-    units: Mapping[str, str], time_column: str, time_unit: str | None
-) -> Mapping[str, str]:
-    """Declared units with that of the stamps.
-
-    Raises
-    ------
-    OptionError
-        It is declared twice, and differently.
-    """
-    said = units.get(time_column, time_unit)
-    if time_unit is None or said is None:
-        return units
-    if said != time_unit:
-        raise OptionError(
-            "the unit of the time is declared twice",
-            found=f"time_unit = {time_unit!r}, units {time_column} = {said!r}",
-            needed="one of them",
-        )
-    return {**units, time_column: time_unit}
-
-
-def _looks_like_time(table: ColumnTable) -> str:
-    near = [name for name in table.lengths if name.lower() == "t" or name.lower()[:4] == "time"]
-    return f"{near[0]!r} looks like the time: name it as that" if near else ""
 
 
 def column_unit(

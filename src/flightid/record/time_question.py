@@ -1,16 +1,40 @@
-"""Whether stamps that nobody gave a unit look like milliseconds: a question, never an answer."""
+"""Where a record's stamps come from, and whether a unit that nobody gave is plausible."""
 
 from __future__ import annotations
 
 from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.record.record import Record
+from flightid.record.time_columns import USUAL
 
 READ = "read_records"
 SLOWEST_S = 1.0
 """Samples further apart are rare in dynamics, and usual in files whose time is in ms."""
 IN_MS_S = 1000.0
 """Whole numbers further apart than this look like microseconds rather than milliseconds."""
+
+
+def time_column(record: Record) -> str:
+    """The file's column of the time, where it is not the usual one; else empty."""
+    read = next((step for step in record.history if step.operation == READ), None)
+    column = USUAL if read is None else read.options.get("time") or USUAL
+    return "" if column == USUAL else str(column)
+
+
+def time_said(record: Record) -> str:
+    """The same with its unit, in words; empty where it is the usual one.
+
+    Example
+    -------
+    >>> import numpy as np
+    >>> time_said(Record.from_arrays(np.arange(9) * 0.1, outputs={"y": np.arange(9.0)}))
+    ''
+    """
+    if not (column := time_column(record)):
+        return ""
+    read = next(step for step in record.history if step.operation == READ)
+    unit = read.options["time_unit"] or "s, as nothing says otherwise"
+    return f"{read.options['file']}: time from column {column!r} ({unit})"
 
 
 def time_question(record: Record) -> Finding | None:

@@ -19,6 +19,7 @@ from flightid.record.formats.columns import channel_name
 from flightid.record.hold import HOLDS, LOOPS
 from flightid.record.options import TableOptions
 from flightid.record.store import RECORD_COLUMN
+from flightid.record.time_columns import is_time_unit, unit_in_name
 from flightid.study.error_list import ErrorList
 from flightid.study.reading import TableReader, read_table
 
@@ -207,7 +208,11 @@ def _reading(file: RecordFile, roles: Mapping[str, Role]) -> dict[str, Any]:
     asked = {each.name: getattr(file, each.name) for each in fields(TableOptions)}
     asked["join"] = joinable(file.join)
     known = {*roles, file.time_column, *map(channel_name, sources_of(file.derive))}
-    asked["units"] = {key: unit for key, unit in file.units.items() if channel_name(key) in known}
+    asked["units"] = {
+        key: unit
+        for key, unit in file.units.items()
+        if channel_name(key) in known or (unit_in_name(key) is not None and is_time_unit(unit))
+    }
     if isinstance(file.interpolation, Mapping):
         asked["interpolation"] = {k: way for k, way in file.interpolation.items() if k in roles}
     return asked

@@ -79,6 +79,8 @@ def read_columns(path: Path, headings: Sequence[str] = ()) -> ColumnTable:
             f"{path.name} holds headings only", needed="rows of numbers below the headings"
         )
     by_name = dict(zip(names, columns, strict=True))
+    dates = {name: "s" for name, text in zip(names, second, strict=False) if DATE.match(text)}
+    units = {**dates, **units}
     return ColumnTable(path, dict.fromkeys(names, n_rows), by_name.__getitem__, units)
 
 

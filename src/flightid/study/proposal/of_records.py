@@ -21,6 +21,7 @@ from flightid.models.polynomial.orders import USED
 from flightid.models.save import toml_value
 from flightid.record import Record, read_records
 from flightid.record.formats.columns import channel_name
+from flightid.record.time_question import time_column, time_said
 from flightid.study.proposal.columns import Columns, columns_of
 from flightid.study.proposal.options import DataOptions, told
 from flightid.study.proposal.proposal import Proposal
@@ -65,6 +66,11 @@ class _Stretch:
         if span is not None:
             yield f"span_s = {toml_value(list(span))}"
 
+    def time_key(self) -> list[str]:
+        """The column that was taken for the time, so that the study keeps it."""
+        name = time_column(self.record)
+        return [f"time_column = {toml_value(name)}"] if name else []
+
 
 @dataclass(frozen=True, eq=False)
 class _Group:
@@ -96,7 +102,7 @@ def study_of_records(
     inputs, outputs : tuple of str
         Columns, where their names do not tell.
     reading : DataOptions, optional
-        How the files are read; default: with the times in the column "time".
+        How the files are read.
 
     Raises
     ------
@@ -119,6 +125,7 @@ def study_of_records(
         missed += still
         for name, part, span in segments.all:
             body += [*part.lines(name, span, folder), *keys]
+            body += [] if reading.time_column else part.time_key()
         for output in columns.outputs if model is None else columns.outputs[:1]:
             name = (
                 f"{output} from {' and '.join(group.inputs)}" if model is None else Path(model).stem
@@ -131,8 +138,10 @@ def study_of_records(
                 missed.append(Finding("no-model", Light.RED, said, error.action or ""))
                 continue
             names.append(name)
-    head = _head(paths, (*columns.said, *_stamps(read)), missed)
-    return Proposal((*head, *body), tuple(names), tuple(missed))
+    times = filter(None, dict.fromkeys(time_said(part.record) for part in read))
+    told_of = (*columns.said, *times, *_stamps(read))
+    head = _head(paths, told_of, missed)
+    return Proposal((*head, *body), tuple(names), tuple(missed), said=told_of)
 
 
 def _parts(path: Path, reading: Mapping[str, Any]) -> list[_Stretch]:

@@ -33,12 +33,15 @@ class Proposal:
         What cannot be identified from these data, why, and what to do.
     inspection : Inspection or None
         Of the log; None where records come from files.
+    said : tuple of str
+        What the columns of records were taken for.
     """
 
     lines: tuple[str, ...]
     models: tuple[str, ...]
     findings: tuple[Finding, ...] = ()
     inspection: Inspection | None = None
+    said: tuple[str, ...] = ()
 
     @property
     def text(self) -> str:
