@@ -70,7 +70,9 @@ def _tested(samples: Samples, step: int, most: int) -> FeedbackTest:
         [rows[:, ::step][:, :most] for rows in outputs],
         samples.inputs,
         repeats=all(found_period(rows) is not None for rows in inputs),
-        unthinned=([rows[:, :most] for rows in inputs], [rows[:, :most] for rows in outputs]),
+        unthinned=None
+        if step == 1
+        else ([rows[:, :most] for rows in inputs], [rows[:, :most] for rows in outputs]),
     )
 
 

@@ -26,8 +26,17 @@ from numpy.typing import NDArray
 from flightid.errors import OptionError
 from flightid.record.history import Step, spread_channels
 from flightid.record.hold import LOOPS
+from flightid.uncertainty.lagged_products import (
+    RIDGE,
+    explained,
+    lagged_products,
+    left_by_past,
+    products_with_past,
+    weights_of,
+)
 
 Array = NDArray[np.float64]
+Pair = tuple[Array, Array]
 LEVEL = 0.01
 """Share of open loops that are called closed."""
 LARGEST_ORDER = 20
@@ -40,8 +49,6 @@ SMALLEST_NOISE = 1e-8
 """Share of an output's power below which its noise is rounding, or cannot bias anything."""
 NEARLY = 0.999
 """Share of what is new in an input from which outputs leave nothing else that moves it."""
-RIDGE = 1e-11
-"""Added to columns of unit length: noise 110 dB below each channel."""
 
 
 @dataclass(frozen=True)
@@ -220,7 +227,8 @@ def find_feedback(
     free = sum(_room(u, order) for u, _ in pairs) - n_in * order - LAGS * n_out
     if order < 1 or free < FEWEST_FREE:
         return FeedbackTest("unknown", "too short")
-    noise = _noise(pairs, order)
+    news = _news([np.concatenate(pair) for pair in pairs], order, n_in + n_out)
+    noise = _noise(pairs, news, n_in)
     power = sum(np.sum(y**2, axis=1) for _, y in pairs)
     noisy = sum(np.sum(e**2, axis=1) for e in noise) > SMALLEST_NOISE * power
     past_noise = FeedbackTest("open", "no noise")
@@ -228,8 +236,10 @@ def find_feedback(
         past_noise = _worst(_shares(pairs, [e[noisy] for e in noise], order), names, "test")
     if past_noise.p_value is not None and past_noise.p_value < LEVEL:
         return replace(past_noise, loop="closed")
-    own = list(zip(whole, unthinned[1] if unthinned else outputs, strict=True))
-    at_once = _worst(_shares_at_once(own, order), names, "same sample")
+    if unthinned:
+        pairs = [(u, y) for u, y in zip(whole, unthinned[1], strict=True) if u.shape[1] > order]
+        news = _news([np.concatenate(pair) for pair in pairs], order, n_in + n_out)
+    at_once = _worst(_shares_at_once(pairs, news, order), names, "same sample")
     if at_once.p_value is not None and at_once.p_value < LEVEL:
         return replace(at_once, loop="unknown")
     return past_noise
@@ -257,71 +267,76 @@ def past(rows: Array, first: int, lags: range) -> Array:
     return np.concatenate([rows[:, first - lag : n - lag] for lag in lags]).T
 
 
-def _noise(pairs: Sequence[tuple[Array, Array]], order: int) -> list[Array]:
-    """What a long ARX model leaves of the outputs of each record, (n_out, n − order)."""
-    own, now = range(1, order + 1), range(order + 1)
-    known = np.vstack([np.hstack([past(y, order, own), past(u, order, now)]) for u, y in pairs])
-    left = _left(known, np.vstack([y[:, order:].T for _, y in pairs]))
-    cuts = np.cumsum([y.shape[1] - order for _, y in pairs])[:-1]
-    return [part.T for part in np.split(left, cuts)]
+def _news(records: Sequence[Array], order: int, size: int) -> list[Array]:
+    """What the pasts of all channels leave of the first of them, (size, n − order)."""
+    products = lagged_products(records, order, order)
+    channels = products.shape[1]
+    known, targets = np.arange(channels, channels * (order + 1)), np.arange(size)
+    weights = weights_of(products.reshape(2 * (channels * (order + 1),)), known, targets)
+    return left_by_past(records, weights.reshape(order, channels, size))
 
 
-def _shares(
-    pairs: Sequence[tuple[Array, Array]], noise: Sequence[Array], order: int
-) -> list[tuple[float, float]]:
+def _noise(pairs: Sequence[Pair], news: Sequence[Array], n_in: int) -> list[Array]:
+    """What a long ARX model leaves of the outputs of each record, (n_out, n − order).
+
+    Inputs of the same sample are taken out as news, for their pasts have been.
+    """
+    products = np.sum([new @ new.T for new in news], axis=0)
+    power = np.sum([np.sum(u**2, axis=1) for u, _ in pairs], axis=0)
+    ridge = np.diag(RIDGE * np.maximum(power, np.finfo(float).tiny))
+    turn = np.linalg.solve(products[:n_in, :n_in] + ridge, products[:n_in, n_in:]).T
+    return [new[n_in:] - turn @ new[:n_in] for new in news]
+
+
+def _shares(pairs: Sequence[Pair], noise: Sequence[Array], order: int) -> list[tuple[float, float]]:
     """By input: share of what its past leaves that past noise explains, and its F probability."""
-    own = np.vstack([past(u, order + LAGS, range(1, order + 1)) for u, _ in pairs])
-    moved = np.vstack([past(e, LAGS, range(1, LAGS + 1)) for e in noise])
-    targets = np.vstack([u[:, order + LAGS :].T for u, _ in pairs])
-    left = _left(own, np.hstack([targets, moved]))
-    n_in, n_moved = targets.shape[1], moved.shape[1]
-    fresh, moved = left[:, :n_in], left[:, n_in:]
-    rest = _left(moved, fresh)
-    free = len(own) - own.shape[1] - n_moved
+    n_in, longest = len(pairs[0][0]), max(order, LAGS)
+    padded = [np.pad(e, ((0, 0), (order, 0))) for e in noise]
+    rows = [np.concatenate([u, e]) for (u, _), e in zip(pairs, padded, strict=True)]
+    products = lagged_products(rows, order + LAGS, longest)
+    places = np.arange((longest + 1) * len(rows[0])).reshape(longest + 1, -1)
+    products = products.reshape(2 * (places.size,))
+    own, moved = places[1 : order + 1, :n_in].ravel(), places[1 : LAGS + 1, n_in:].ravel()
+    # The past of inputs, taken out of them sample by sample, out of past noise by products.
+    weights = weights_of(products, own, np.append(places[0, :n_in], moved))
+    of_inputs, of_noise = weights[:, :n_in].reshape(order, n_in, n_in), weights[:, n_in:]
+    fresh = left_by_past([u[:, LAGS:] for u, _ in pairs], of_inputs)
+    aims = products_with_past(fresh, rows, longest).reshape(places.size, n_in)
+    cross = products[np.ix_(own, moved)].T @ of_noise
+    among = products[np.ix_(moved, moved)] - cross - cross.T
+    among += of_noise.T @ products[np.ix_(own, own)] @ of_noise
+    free = sum(u.shape[1] - order - LAGS for u, _ in pairs) - own.size - moved.size
     tiny = np.finfo(float).tiny
-    found = []
-    for k in range(n_in):
-        whole = max(float(fresh[:, k] @ fresh[:, k]), tiny)
-        share = max(0.0, 1.0 - float(rest[:, k] @ rest[:, k]) / whole)
-        f = share / n_moved / max((1.0 - share) / free, tiny)
-        found.append((share, float(scipy.special.fdtrc(n_moved, free, f))))
-    return found
+    whole = np.maximum(np.sum([np.sum(new**2, axis=1) for new in fresh], axis=0), tiny)
+    shares = explained(among, aims[moved] - of_noise.T @ aims[own]) / whole
+    shares = np.clip(shares, 0.0, 1.0)
+    f = shares / moved.size / np.maximum((1.0 - shares) / free, tiny)
+    chances = scipy.special.fdtrc(moved.size, free, f)
+    return list(zip(shares.tolist(), chances.tolist(), strict=True))
 
 
-def _shares_at_once(pairs: Sequence[tuple[Array, Array]], order: int) -> list[tuple[float, float]]:
+def _shares_at_once(
+    pairs: Sequence[Pair], news: Sequence[Array], order: int
+) -> list[tuple[float, float]]:
     """By input: share of what its past leaves that outputs up to its sample explain, and F's p.
 
     The probability is that of the outputs of the same sample alone.
     """
-    lags = range(1, order + 1)
-    pairs = [pair for pair in pairs if pair[0].shape[1] > order]
-    own = np.vstack([past(u, order, lags) for u, _ in pairs])
-    both = np.hstack([own, np.vstack([past(y, order, lags) for _, y in pairs])])
-    now_in, now_out = (np.vstack([rows[k][:, order:].T for rows in pairs]) for k in (0, 1))
-    n_in = now_in.shape[1]
-    fresh = np.sum(_left(own, now_in) ** 2, axis=0)
-    left = _left(both, np.hstack([now_in, now_out]))
-    seen = np.sum(left[:, n_in:] ** 2, axis=0) > SMALLEST_NOISE * np.sum(now_out**2, axis=0)
-    before, now = left[:, :n_in], left[:, n_in:][:, seen]
-    free = len(own) - both.shape[1] - now.shape[1]
-    if free < FEWEST_FREE or not now.shape[1]:
+    n_in, n_out = len(pairs[0][0]), len(pairs[0][1])
+    power = [np.sum(np.concatenate(pair)[:, order:] ** 2, axis=1) for pair in pairs]
+    floor = SMALLEST_NOISE * np.sum(power, axis=0)
+    own = _news([u for u, _ in pairs], order, n_in)
+    fresh = np.sum([np.sum(new**2, axis=1) for new in own], axis=0)
+    products = np.sum([new @ new.T for new in news], axis=0)
+    seen = n_in + np.flatnonzero(np.diagonal(products)[n_in:] > floor[n_in:])
+    free = sum(new.shape[1] for new in news) - order * (n_in + n_out) - seen.size
+    if free < FEWEST_FREE or not seen.size:
         return [(0.0, 1.0)] * n_in
-    rest = np.sum(_left(now, before) ** 2, axis=0)
-    gain = np.sum(before**2, axis=0) - rest
+    way = weights_of(products, seen, np.arange(n_in)).T
+    rest = np.sum([np.sum((new[:n_in] - way @ new[seen]) ** 2, axis=1) for new in news], axis=0)
+    gain = np.diagonal(products)[:n_in] - rest
     tiny = np.finfo(float).tiny
-    f = np.maximum(gain, 0.0) / now.shape[1] / np.maximum(rest / free, tiny)
-    is_new = fresh > SMALLEST_NOISE * np.sum(now_in**2, axis=0)
-    chance = np.where(is_new, scipy.special.fdtrc(now.shape[1], free, f), 1.0)
+    f = np.maximum(gain, 0.0) / seen.size / np.maximum(rest / free, tiny)
+    chance = np.where(fresh > floor[:n_in], scipy.special.fdtrc(seen.size, free, f), 1.0)
     shares = np.maximum(0.0, 1.0 - rest / np.maximum(fresh, tiny))
     return list(zip(shares.tolist(), chance.tolist(), strict=True))
-
-
-def _left(known: Array, targets: Array) -> Array:
-    """What least squares on the known columns leave of the targets."""
-    size = np.maximum(np.sqrt(np.sum(known**2, axis=0)), np.finfo(float).tiny)
-    columns = known / size
-    products = columns.T @ columns
-    products.flat[:: columns.shape[1] + 1] += RIDGE
-    factor = scipy.linalg.cho_factor(products, overwrite_a=True)
-    weights = scipy.linalg.cho_solve(factor, columns.T @ targets)
-    return np.asarray(targets - columns @ weights)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError
-from flightid.responses.windows.local_fit import Bins, bins_needed, fit_locally
+from flightid.responses.windows.local_fit import Bins, bins_needed, fit_locally, local_residuals
 from flightid.responses.windows.samples import Samples
 
 Complex = NDArray[np.complex128]
@@ -213,16 +213,25 @@ def _groups(
     edges = np.append(longest.omega[::stride], np.inf)
     inside_band = int(np.searchsorted(edges, BEYOND_BAND * highest_rad_s))
     edges = edges[: max(inside_band + 1, 2)]
+    groups: list[list[slice]] = []
     for low, high in pairwise(edges):
         places = [
             slice(*np.searchsorted(bins.omega, [low * (1 - 1e-12), high * (1 - 1e-12)]))
             for bins in records
         ]
-        if sum(place.stop - place.start for place in places) < 0.9 * count * len(records):
-            continue
+        if sum(place.stop - place.start for place in places) >= 0.9 * count * len(records):
+            groups.append(places)
+    alike = [group[0] for group in groups if group[0].stop - group[0].start == count]
+    if len({len(bins.omega) for bins in records}) > 1:
+        alike = []
+    at_once = dict(enumerate(local_residuals(records, alike, n_regressors)))
+    for number, places in enumerate(groups):
         inside = longest.omega[places[at_longest]]
         centre = float(0.5 * (inside[0] + inside[-1]))
-        yield centre, fit_locally(records, places, centre, n_regressors).residual
+        residual = at_once.get(number)
+        if residual is None:
+            residual = fit_locally(records, places, centre, n_regressors).residual
+        yield centre, residual
 
 
 def _of_outputs(

@@ -19,6 +19,10 @@ SPARE = 1.6
 """Equations for each unknown in a local fit, before `SPARE_BINS`."""
 SPARE_BINS = 8
 RANK_TOLERANCE = 1e-9
+CLEAR_RANK = 1e-5
+"""Least part of a column that others leave, over its length, from which no rank is in doubt."""
+AT_ONCE = 256
+"""Groups of bins that are worked on at a time, to bound memory."""
 
 
 @dataclass(frozen=True)
@@ -153,3 +157,45 @@ def fit_locally(
         float(freedom),
         rank == matrix.shape[1],
     )
+
+
+def local_residuals(
+    records: Sequence[Bins], groups: Sequence[slice], n_inputs: int, order: int = ORDER
+) -> list[NDArray[np.complex128] | None]:
+    """`LocalFit.residual` of many groups of as many bins each, of records of one length.
+
+    Bins of all groups lie alike about their middle: one projection takes the leakage out of all.
+
+    Returns
+    -------
+    list of ndarray of complex or None
+        None where inputs might not be told apart: the group is for `fit_locally`.
+    """
+    if not groups:
+        return []
+    count = groups[0].stop - groups[0].start
+    powers = np.linspace(-1.0, 1.0, count)[:, None] ** np.arange(order + 1)
+    left = np.linalg.qr(powers, mode="complete")[0][:, order + 1 :]
+    of_inputs = (powers[:, :, None] * left[:, None]).reshape(count, -1)
+    rows, columns = len(records) * (count - order - 1), n_inputs * (order + 1)
+    freedom = max(rows - columns, 1)
+    found: list[NDArray[np.complex128] | None] = []
+    for first in range(0, len(groups), AT_ONCE):
+        some = groups[first : first + AT_ONCE]
+        places = np.concatenate([np.arange(place.start, place.stop) for place in some])
+        values = np.stack([bins.values[:, places] for bins in records])
+        values = values.reshape(len(records), -1, len(some), count).transpose(2, 0, 3, 1)
+        # Group, record, bin, channel: real matrices act on bins.
+        inputs = np.tensordot(values[..., :n_inputs], of_inputs, axes=(2, 0))
+        inputs = inputs.reshape(*inputs.shape[:3], order + 1, -1).transpose(0, 1, 4, 2, 3)
+        outputs = np.tensordot(values[..., n_inputs:], left, axes=(2, 0)).transpose(0, 1, 3, 2)
+        matrix = inputs.reshape(len(some), rows, columns)
+        norms = np.linalg.norm(matrix, axis=1, keepdims=True)
+        matrix = matrix / np.maximum(norms, np.finfo(float).tiny)
+        joined = np.concatenate([matrix, outputs.reshape(len(some), rows, -1)], axis=2)
+        triangle = np.asarray(np.linalg.qr(joined, mode="r"))
+        clear = np.min(np.abs(np.diagonal(triangle, 0, 1, 2)[:, :columns]), axis=1) > CLEAR_RANK
+        rest = triangle[:, columns:, columns:]
+        residual = rest.conj().transpose(0, 2, 1) @ rest / freedom
+        found += [one if sure else None for one, sure in zip(residual, clear, strict=True)]
+    return found

@@ -1,0 +1,130 @@
+"""Products of channels with their own past, and least squares from these products alone.
+
+Columns of past samples repeat each other, one sample on: their products follow from those of the
+first lag and the samples at both ends, without the columns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Places = NDArray[np.intp]
+RIDGE = 1e-11
+"""Added to columns of unit length: noise 110 dB below each channel."""
+
+
+def lagged_products(records: Sequence[Array], first: int, longest: int) -> Array:
+    """Products of all lags of all channels, summed over the samples from `first` on.
+
+    Parameters
+    ----------
+    records : sequence of ndarray, each shape (n_channels, n_samples)
+    first : int
+        First sample that is summed, `longest` at least.
+    longest : int
+        Longest lag.
+
+    Returns
+    -------
+    ndarray, shape (longest + 1, n_channels, longest + 1, n_channels)
+        ``[i, a, j, b]``: Σ a(t − i) b(t − j).
+
+    Example
+    -------
+    >>> lagged_products([np.array([[1.0, 2.0, 3.0]])], 1, 1)[:, 0, :, 0]
+    array([[13.,  8.],
+           [ 8.,  5.]])
+    """
+    lags, channels = np.arange(longest + 1), len(records[0])
+    found = np.empty((lags.size, channels, lags.size, channels))
+    for lag in lags:
+        now = sum(x[:, first:] @ x[:, first - lag : x.shape[1] - lag].T for x in records)
+        found[0, :, lag], found[lag, :, 0] = now, np.transpose(now)
+    # What comes in at the beginning and drops out at the end where both lags grow by one.
+    shape = len(records), channels * longest
+    begin = np.reshape([x[:, first - 1 - lags[:-1]].T for x in records], shape)
+    end = np.reshape([x[:, x.shape[1] - 1 - lags[:-1]].T for x in records], shape)
+    moved = (begin.T @ begin - end.T @ end).reshape(longest, channels, longest, channels)
+    for lag in lags[1:]:
+        found[lag, :, 1:] = found[lag - 1, :, :-1] + moved[lag - 1]
+    return found
+
+
+def weights_of(products: Array, known: Places, targets: Places) -> Array:
+    """Least squares of some columns on others from their products, shape (n_known, n_targets)."""
+    return _solved(products[np.ix_(known, known)], products[np.ix_(known, targets)])
+
+
+def explained(products: Array, aims: Array) -> Array:
+    """Squares of each target that columns explain.
+
+    Parameters
+    ----------
+    products : ndarray, shape (n_known, n_known)
+        Of the columns.
+    aims : ndarray, shape (n_known, n_targets)
+        Of the columns with the targets.
+    """
+    weights = _solved(products, aims)
+    return np.asarray(np.sum(weights * (2.0 * aims - products @ weights), axis=0))
+
+
+def _solved(products: Array, aims: Array) -> Array:
+    size = np.maximum(np.sqrt(np.diagonal(products)), np.finfo(float).tiny)
+    scaled = products / np.outer(size, size)
+    scaled.flat[:: size.size + 1] += RIDGE
+    factor = scipy.linalg.cho_factor(scaled, overwrite_a=True)
+    return np.asarray(scipy.linalg.cho_solve(factor, aims / size[:, None]) / size[:, None])
+
+
+def left_by_past(records: Sequence[Array], weights: Array) -> list[Array]:
+    """Channels less their weighted pasts, from the first sample that has all lags.
+
+    Sums of products would lose the little that is left of smooth channels.
+
+    Parameters
+    ----------
+    records : sequence of ndarray, each shape (n_channels, n_samples)
+    weights : ndarray, shape (n_lags, n_channels, n_targets)
+        Of lags from one sample on; targets are the first channels.
+
+    Returns
+    -------
+    list of ndarray, each shape (n_targets, n_samples − n_lags)
+    """
+    order, _, targets = weights.shape
+    found = []
+    for rows in records:
+        left = rows[:targets, order:].copy()
+        for lag, weight in enumerate(weights, 1):
+            left -= weight.T @ rows[:, order - lag : rows.shape[1] - lag]
+        found.append(left)
+    return found
+
+
+def products_with_past(news: Sequence[Array], records: Sequence[Array], longest: int) -> Array:
+    """Products of all lags of all channels with series that end where their records do.
+
+    Parameters
+    ----------
+    news : sequence of ndarray, each shape (n_news, n_summed)
+    records : sequence of ndarray, each shape (n_channels, n_samples)
+    longest : int
+        Longest lag.
+
+    Returns
+    -------
+    ndarray, shape (longest + 1, n_channels, n_news)
+    """
+    both = list(zip(news, records, strict=True))
+    found = np.zeros((longest + 1, len(records[0]), len(news[0])))
+    for lag in range(longest + 1):
+        for new, rows in both:
+            stop = rows.shape[1] - lag
+            found[lag] += rows[:, stop - new.shape[1] : stop] @ new.T
+    return found
