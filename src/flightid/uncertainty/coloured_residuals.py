@@ -155,6 +155,8 @@ def residual_covariance(
     beside: JointResiduals | None = None,
     noise: tuple[InputNoise, Array] | None = None,
     inputs: Sequence[Array] | None = None,
+    *,
+    coloured: bool = True,
 ) -> ResidualCovariance:
     """Covariance of estimates by the colour of their residuals.
 
@@ -169,6 +171,8 @@ def residual_covariance(
         outputs; of one record alone.
     inputs : sequence of ndarray, shape (n_inputs, n_samples), optional
         By record: tested for what they foretell of the residuals.
+    coloured : bool
+        False takes residuals for white, of the power that they have.
 
     Returns
     -------
@@ -205,7 +209,8 @@ def residual_covariance(
     turned = half @ root.T
     taken = directions_taken(whitened)
     walks = None if noise is None else _walks(taken[0], *noise)
-    models = noise_models([block.residual for block in blocks], taken, walks)
+    errors = [block.residual for block in blocks]
+    models = noise_models(errors, taken, walks) if coloured else _white_models(errors)
     apart = noise_heard(models, whitened)
     answers = [joined(each, block) for each, block in zip(apart, blocks, strict=True)]
     sizes = [block.basis.shape[1] for block in blocks]
@@ -285,16 +290,19 @@ def white_covariance(
     ---------
     See `flightid.uncertainty.agreement.compare_parts`.
     """
-    total = sum(block.residual.shape[1] for block in blocks)
-    power = [
-        np.sum([np.sum(block.residual[o] ** 2) for block in blocks]) / total
-        for o in range(len(blocks[0].residual))
-    ]
-    models = [Autoregression(np.array([level]), np.empty(0), total, 0) for level in power]
     root = _inverse_root(triangle_of(blocks))
     degrees = np.full(len(covariance), freedom)
-    flights = flights_of(noise_heard(models, blocks), blocks)
+    flights = flights_of(
+        noise_heard(_white_models([each.residual for each in blocks]), blocks), blocks
+    )
     return compare_parts(flights, root @ root.T, covariance, degrees)
+
+
+def _white_models(errors: Sequence[Array]) -> list[Autoregression]:
+    """By output, the mean power of its residuals."""
+    total = sum(each.shape[1] for each in errors)
+    power = np.sum([np.sum(each**2, axis=1) for each in errors], axis=0) / total
+    return [Autoregression(np.array([level]), np.empty(0), total, 0) for level in power]
 
 
 def triangle_of(blocks: Sequence[RecordBlock], beside: Array | None = None) -> Array:

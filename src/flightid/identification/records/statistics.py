@@ -20,6 +20,7 @@ from flightid.identification.frequency_domain.estimates import (
     require_identifiable,
 )
 from flightid.identification.records.setup import OwnNumbers, RecordSet
+from flightid.identification.rival_fits import judged
 from flightid.models import GreyBoxModel, StateSpaceModel
 from flightid.uncertainty import correlation as correlation_of
 from flightid.uncertainty.agreement import Agreement
@@ -125,7 +126,8 @@ def record_statistics(
     other = None if beside is None else beside.of(inner)
     triangle = triangle_of(blocks, None if other is None else other.slopes)
     require_identifiable(names, triangle)
-    known = residual_covariance(blocks, other, inputs=[each[0] for each in prepared.arrays])
+    inputs = [each[0] for each in prepared.arrays] if judged() else None
+    known = residual_covariance(blocks, other, inputs=inputs, coloured=judged())
     covariance = known.covariance + _of_starts(starts, blocks, whitener, known.white)
     moved = None
     if other is not None and other.bias is not None:
