@@ -334,18 +334,17 @@ def _linearised(problem: LoopProblem, space: _Space, point: Array, rows: list[in
 def _linear_step(linear: Linear, low: Array, high: Array) -> Array | None:
     """Step that raises the lowest level, violations penalised; None where there is none."""
     limits, levels, limit_slopes, level_slopes = linear
-    near = limits < limits.min() + FAR
+    near = (limits < limits.min() + FAR) & (_lowest(limits, limit_slopes, low, high) < 0.0)
     limits, limit_slopes = limits[near], limit_slopes[near]
-    low_levels = levels < levels.min() + FAR
+    reached = _lowest(levels, level_slopes, low, high)
+    ceiling = -np.max(_lowest(-levels, -level_slopes, low, high))
+    low_levels = (levels < levels.min() + FAR) & (reached <= ceiling)
     levels, level_slopes = levels[low_levels], level_slopes[low_levels]
     n = limit_slopes.shape[1]
     # Unknowns: the step, the level t, the violation v >= 0.
-    above = np.vstack(
-        [
-            np.hstack([-limit_slopes, np.zeros((len(limits), 1)), -np.ones((len(limits), 1))]),
-            np.hstack([-level_slopes, np.ones((len(levels), 1)), np.zeros((len(levels), 1))]),
-        ]
-    )
+    above = np.zeros((len(limits) + len(levels), n + 2))
+    above[:, :n] = -np.vstack([limit_slopes, level_slopes])
+    above[: len(limits), n + 1], above[len(limits) :, n] = -1.0, 1.0
     # A mixed-integer problem without integers: the same solver as `linprog`, checked less often.
     found = scipy.optimize.milp(
         np.concatenate([np.zeros(n), [-1.0, PENALTY]]),
@@ -355,6 +354,11 @@ def _linear_step(linear: Linear, low: Array, high: Array) -> Array | None:
         ),
     )
     return None if found.x is None else np.asarray(found.x[:n])
+
+
+def _lowest(values: Array, slopes: Array, low: Array, high: Array) -> Array:
+    """Least value of each line inside a box: what never falls below zero there binds no step."""
+    return np.asarray(values + np.minimum(slopes * low, slopes * high).sum(axis=1))
 
 
 def _violating(judged: LoopAssessment, rows: list[int]) -> list[int]:
