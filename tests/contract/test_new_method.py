@@ -70,7 +70,7 @@ from flightid.cli.program import run
 
 outputs, folder = [], sys.argv[1]
 for method, band in {"toy": [], "toy_curve": ["--band", "1.0", "20.0"]}.items():
-    asked = ["identify", f"{folder}/sweep.parquet", "--model", f"{folder}/roll.toml",
+    asked = ["identify", f"{folder}/sweep.nc", "--model", f"{folder}/roll.toml",
              "--method", method, "--write", f"{folder}/{method}.toml"]
     outputs.append([
         run([*asked, *band, "--pull", "0.25"]),
@@ -106,7 +106,7 @@ title = "A toy"
 
 [[record]]
 name = "sweep"
-path = "sweep.parquet"
+path = "sweep.nc"
 
 [response]
 band_rad_s = [1.0, 20.0]
@@ -123,16 +123,16 @@ fit = {{ method = "{method}", pull = 0.25 }}
 def used(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any], str]:
     """Folder of what commands and studies wrote, what they returned, and what they printed."""
     folder = tmp_path_factory.mktemp("toy")
-    time_s = np.arange(3000) * 0.02
+    time_s = np.arange(1000) * 0.02
     record = fid.Record.from_arrays(
-        time_s, inputs={"aileron": 0.1 * np.sin(0.15 * time_s**2 + time_s)},
+        time_s, inputs={"aileron": 0.1 * np.sin(0.45 * time_s**2 + time_s)},
         units={"aileron": "rad"}, hold="zero",
     )  # fmt: skip
     (folder / "roll.toml").write_text(MODEL)
     truth = fid.load_model(folder / "roll.toml").with_values({"Lp": -4.0, "Lda": 10.0})
     flown = fid.simulate(truth, record)
     noise = np.random.default_rng(3).standard_normal(time_s.size) * 1e-3
-    fid.write_records([flown.replace({"p": flown["p"] + noise})], folder / "sweep.parquet")
+    fid.write_records([flown.replace({"p": flown["p"] + noise})], folder / "sweep.nc")
     for method in ("toy", "toy_curve"):
         (folder / f"{method}-study.toml").write_text(STUDY.format(method=method))
     done = subprocess.run(

@@ -13,6 +13,10 @@ QUANTILES = re.compile(
     r"(?<![\w.])(1\.96\d*|1\.959\d*|2\.576|2\.5758\d*|1\.645|1\.6448\d*)(?![\w.])"
     r"|\b(norm|t)\.(ppf|isf|interval)\b|\bstdtrit\b|\bndtri\b|NormalDist|NORMAL_95|erfinv"
 )
+WORDS = (
+    *("1.96", "1.959", "2.57", "1.64", ".ppf", ".isf", ".interval", "stdtrit"),
+    *("ndtri", "NormalDist", "NORMAL_95", "erfinv"),
+)  # worth a look by the expression, which is slow
 HAND_MADE = re.compile(r"^    (interval95|stderr)\w*: ", re.MULTILINE)
 MADE_IN = "estimate.py"
 OTHERWISE = {
@@ -29,10 +33,21 @@ def test_quantiles_stand_in_one_file() -> None:
         if path == HOME:
             continue
         text = path.read_text("utf-8")
+        if not any(word in text for word in WORDS):
+            continue
         for match in QUANTILES.finditer(text):
             number = text.count("\n", 0, match.start()) + 1
             offenders.append(f"{path.relative_to(SOURCE)}:{number}: {match[0]}")
     assert not offenders, "take half_width(level, freedom) of uncertainty/quantiles.py"
+
+
+def test_a_quantile_elsewhere_is_seen() -> None:
+    for planted in (
+        *("1.96", "1.9600", "1.95996", "2.576", "2.5758", "1.645", "1.64485", "norm.ppf", "t.isf"),
+        *("t.interval", "stdtrit(", "ndtri(", "NormalDist", "NORMAL_95", "erfinv"),
+    ):
+        assert QUANTILES.search(f"x = 2 * {planted}")
+        assert any(word in planted for word in WORDS)
 
 
 def test_no_result_keeps_an_interval_of_its_own() -> None:

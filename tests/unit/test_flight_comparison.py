@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -27,6 +28,25 @@ from tests.strangers.ordinary_flights import Axis
 from tests.unit.test_flight_plan import ordinary
 
 LIVELIER = {"ATC_RAT_RLL_P": 0.12, "ATC_RAT_RLL_I": 0.12, "ATC_RAT_RLL_D": 0.0033}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def kept() -> Iterator[None]:
+    """Each part of each log is reviewed once for all tests: logs of this file do not change."""
+    whole, made = fid.review_flight, {}
+
+    def once(
+        log: fid.Log | Path | str, *, span_s: tuple[float, float] | None = None
+    ) -> fid.FlightReview:
+        key = str(log.path if isinstance(log, fid.Log) else log), span_s
+        if key not in made:
+            made[key] = whole(log, span_s=span_s)
+        return made[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("flightid.review.before_after.review_flight", once)
+        patch.setattr(fid, "review_flight", once, raising=False)
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -134,8 +154,10 @@ def test_a_tenth_or_five_points_of_overshoot_are_felt(
     assert found.is_worse is worse
 
 
-def test_what_is_read_over_another_time_is_said(logs: dict[str, Path]) -> None:
-    long = fid.review_flight(logs["before"])
+def test_what_is_read_over_another_time_is_said(
+    reviews: dict[str, fid.FlightReview],
+) -> None:
+    long = reviews["before"]
     cut = tuple(
         replace(each, time_s=each.time_s[:-9], step=each.step[:-9], draws=each.draws[:, :-9])
         for each in long.loops
