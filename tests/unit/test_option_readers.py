@@ -161,3 +161,31 @@ def test_held_parameters_are_told_as_a_file_has_them() -> None:
             spoken("fix one of a, b with model.with_fixed, or excite them")
         )
     assert spoken("fix with model.with_fixed(a=...)") == "fix with model.with_fixed(a=...)"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lists(Options):
+    """Options that take several."""
+
+    inputs: tuple[str, ...] = option((), doc="Names.")
+    nb: tuple[float, ...] = option((), doc="Numbers.")
+    units: Mapping[str, str] = option(default_factory=dict, doc="Words by name.")
+
+
+def test_lists_are_repeated_or_have_commas(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text('time,u,"x,y"\n0,1,2\n1,3,4\n')
+
+    @click.command(cls=OptionsCommand, fields_of=lambda: {"": Lists})
+    @click.argument("file", type=click.Path(path_type=Path))
+    def command(file: Path, **options: object) -> None:
+        del file
+        click.echo(str(sorted(given_options(Lists, options, "").items())))
+
+    for given in ("--input u,v --input x,y --nb 1,2 --units u=V,v=rad/s {}",
+                  "{} --inputs u --inputs v --inputs x,y --nb 1 --nb 2 --units u=V --units v=rad/s",
+                  ):  # fmt: skip
+        result = CliRunner().invoke(command, given.format(path).split())
+        assert result.output == (
+            "[('inputs', ('u', 'v', 'x,y')), ('nb', (1.0, 2.0)), ('units', {'u': 'V', 'v': 'rad/s'})]\n"
+        )

@@ -10,6 +10,7 @@ import click
 
 from flightid.cli.black_boxes import KINDS, black_boxes, structure_of
 from flightid.cli.equations import equations, fits_of
+from flightid.cli.lists import ListOption
 from flightid.cli.option_fields import OptionsCommand
 from flightid.cli.output import all_option, emit, json_option, leave_by_verdict, level_option, note
 from flightid.cli.pages import html_option, model_file_option, write_page
@@ -43,6 +44,7 @@ def _fields() -> dict[str, type[Options]]:
 )
 @click.option(
     "--records",
+    cls=ListOption,
     type=FILES,
     multiple=True,
     help="Of method joint: records fitted beside the response of FILES, best of another flight.",

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from flightid.cli.lists import ListsCommand
 from flightid.cli.option_fields import OptionsCommand, given_options
 from flightid.cli.output import all_option, json_option, level_option
 from flightid.cli.pages import html_option, show
@@ -82,7 +83,7 @@ def model_command(
     for decorate in decorators:
         function = decorate(function)
     if fields_of is None:
-        return click.command()(function)
+        return click.command(cls=ListsCommand)(function)
     made = fields_of
     return click.command(cls=OptionsCommand, fields_of=lambda: {title.lower(): made()})(function)
 

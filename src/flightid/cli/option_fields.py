@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from flightid.cli.lists import ListOption, ListsCommand
 from flightid.cli.pairs import pairs
 from flightid.options import OFF
 
@@ -74,7 +75,7 @@ def _in_hertz(one: click.Option) -> click.Option:
     )
 
 
-class OptionsCommand(click.Command):
+class OptionsCommand(ListsCommand):
     """A command whose options are those of its own and the fields of some dataclasses.
 
     The dataclasses are loaded when the options are asked for, so that the list of all commands
@@ -197,18 +198,19 @@ def _click_option(name: str, uses: list[tuple[str, Option]], *, everywhere: bool
     if BAND in forms:
         return made(nargs=2, type=float, help=help_text)
     if {NAMES, FIGURES, TABLE, WORDS} & forms:
-        extra = "repeat for several"
+        extra = "several with commas, or repeated"
         if {FIGURES, TABLE, WORDS} & forms:
-            extra = f"NAME={'TEXT' if WORDS in forms else 'NUMBER'}, repeated"
+            extra = f"NAME={'TEXT' if WORDS in forms else 'NUMBER'}, …"
             extra = f"{', '.join(choices)} or {extra}" if WORD in forms else extra
         if FLAG in forms:
             extra += f"; '{ALL}' or '{NONE}'"
         return made(multiple=True, help=f"{help_text} ({extra})")
     if {NUMBERS, WHOLES} & forms:
-        return made(
+        return ListOption(
+            [*flags_of(name), name],
             multiple=True,
             type=int if WHOLE in forms else float,
-            help=f"{help_text} (repeat for several)",
+            help=f"{help_text} (several with commas, or repeated)",
         )
     if FLAG in forms:
         both = "/".join((flags_of(name)[0], f"--no-{name.replace('_', '-')}"))

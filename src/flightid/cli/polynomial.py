@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from flightid.cli.black_boxes import channels_of, one_each, only
+from flightid.cli.lists import ListOption
 from flightid.cli.option_fields import OptionsCommand, parted
 from flightid.cli.output import all_option, emit, json_option, leave_by_verdict, level_option, note
 from flightid.cli.pages import html_option, model_file_option, write_page
@@ -41,7 +42,11 @@ def _fields() -> dict[str, type[Options]]:
     "that are not given are about those that the records tell.",
 )
 @click.option(
-    "--validation", type=FILES, multiple=True, help="File of records that the fit does not see."
+    "--validation",
+    cls=ListOption,
+    type=FILES,
+    multiple=True,
+    help="File of records that the fit does not see.",
 )
 @model_file_option
 @level_option

@@ -50,6 +50,7 @@ NOT_VERBS = frozenset(
         "bar",
         "black_boxes",
         "equations",
+        "lists",
         "model_commands",
         "option_fields",
         "output",

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from flightid.cli.lists import ListsCommand
 from flightid.cli.output import all_option, json_option, level_option
 from flightid.cli.pages import html_option
 from flightid.cli.response import netcdf_option, show_response
@@ -25,7 +26,10 @@ ALONE = "loop-of-sensitivity"
 MODELS = (".toml", ".json")
 
 
-@click.command(short_help="Multiply, divide, add saved responses; close and open loops.")
+@click.command(
+    cls=ListsCommand,
+    short_help="Multiply, divide, add saved responses; close and open loops.",
+)
 @click.argument("operation", type=click.Choice([*OF_TWO, *OF_LOOPS, ALONE]))
 @click.argument("response", type=click.Path(exists=True, dir_okay=False, path_type=Path))
 @click.argument("other", required=False)

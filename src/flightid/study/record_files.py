@@ -37,7 +37,7 @@ class ShapeOptions(Options):
         None, unit="s", above=0.0, doc="Time after which the inputs repeat exactly."
     )
     loop: str | None = option(
-        None, choices=LOOPS, doc="Whether anything moved the inputs after what the outputs did."
+        None, choices=LOOPS, doc="Whether a loop was closed; default: a test decides."
     )
 
     @property
