@@ -36,6 +36,17 @@ def test_failure_or_interrupt_leaves_the_old_file_and_no_other(
     assert [entry.name for entry in tmp_path.iterdir()] == ["out.csv"]
 
 
+def test_bytes_are_on_the_disk_before_the_name_and_the_name_at_the_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, flushed = tmp_path / "a.txt", []
+    monkeypatch.setattr(
+        os, "fsync", lambda handle: flushed.append((os.fstat(handle).st_ino, path.exists()))
+    )
+    write_atomically(path, "new")
+    assert flushed == [(path.stat().st_ino, False), (tmp_path.stat().st_ino, True)]
+
+
 def test_a_writer_sees_the_final_suffix(tmp_path: Path) -> None:
     suffixes = []
     write_atomically(tmp_path / "a.parquet", lambda p: (suffixes.append(p.suffix), p.touch()))
