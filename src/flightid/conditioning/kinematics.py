@@ -158,9 +158,9 @@ class KinematicModel:
         drift = np.zeros_like(y)
         if delay is not None:
             late = self.time_s - delay
-            spline = scipy.interpolate.CubicSpline(self.time_s, y)
-            y, drift = spline(late), spline(late, 1)
-            slope = scipy.interpolate.CubicSpline(self.time_s, slope, axis=0)(late)
+            both = scipy.interpolate.CubicSpline(self.time_s, np.column_stack([y, slope]))
+            moved, drift = both(late), both(late, 1)[:, 0]
+            y, slope = moved[:, 0], moved[:, 1:]
         gain = 1 + value.get(f"scale_{name}", 0.0)
         slope = gain * slope
         for kind, own in (("bias", 1.0), ("scale", y), ("delay", -gain * drift)):

@@ -30,6 +30,8 @@ STEP, STEP_LEVEL = 0.25, 1e-3
 """Least step of a clock that is looked for, in samples, and the chance of seeing one in none."""
 SMOOTHED = 9
 """Samples of the window under which signals are matched."""
+SETTLED = 32
+"""Samples beyond which a spline knows nothing of where its signal was cut: 0.27³² of it."""
 COARSE = 0.5
 """Part of the sample time to which an offset should be known."""
 
@@ -291,11 +293,15 @@ def _matched(
 ) -> float | None:
     """Offset at which a stretch fits the second signal best; None where it lies at the edge."""
     time_s, values = part
+    ends_s = time_s[[0, -1]] - start_s + 1.5 * reach_s * np.array([-1.0, 1.0])
+    low, high = np.searchsorted(second[0], ends_s) + np.array([-SETTLED, SETTLED])
+    near = slice(max(0, low), high)
+    stamps, samples = second[0][near], second[1][near]
 
     def agreement(offset_s: float) -> float:
         at = time_s - offset_s
-        inside = (at >= second[0][0]) & (at <= second[0][-1])
-        pair = values[inside], cubic_spline(*second, at[inside])
+        inside = (at >= stamps[0]) & (at <= stamps[-1])
+        pair = values[inside], cubic_spline(stamps, samples, at[inside])
         if pair[0].size < 16 or min(float(np.ptp(each)) for each in pair) == 0.0:
             return -1.0
         return float(np.corrcoef(*pair)[0, 1])
