@@ -215,17 +215,19 @@ def test_correlated_pairs_and_wrong_signs_are_named() -> None:
     found = check_consistency(flight(), estimate=["bias_p", "bias_phi"])
     pairs = [f.message for f in found.findings if f.code == "correlated-pair"]
     assert any("phi_0" in text and "bias_phi" in text for text in pairs)
-    reversed_p = check_consistency(flight(truth={"scale_p": -2.0}), estimate=["scale_p", "bias_p"])
+    reversed_p = check_consistency(
+        flight(n=600, truth={"scale_p": -2.0}), estimate=["scale_p", "bias_p"]
+    )
     assert "sign-reversed" in {f.code for f in reversed_p.findings}
-    scaled = check_consistency(flight(truth={"scale_q": 0.2}), estimate=["scale_q"])
+    scaled = check_consistency(flight(n=600, truth={"scale_q": 0.2}), estimate=["scale_q"])
     assert "scale-factor" in {f.code for f in scaled.findings}
-    clean = check_consistency(flight(truth={}), estimate=["bias_p"])
+    clean = check_consistency(flight(n=600, truth={}), estimate=["bias_p"])
     assert [f.code for f in clean.findings] == ["consistent"]
-    noisy = flight(truth={}, noise=0.001)
-    rough = np.random.default_rng(1).standard_normal(1200)
+    noisy = flight(n=600, truth={}, noise=0.001)
+    rough = np.random.default_rng(1).standard_normal(600)
     noisy = noisy.replace({"p": noisy["p"] + 0.005 * rough})
     assert "gyro-noise" in {f.code for f in check_consistency(noisy, estimate=["bias_p"]).findings}
-    poor = flight(truth={}).replace({"theta": 0.3 * np.sin(np.arange(1200))})
+    poor = flight(n=600, truth={}).replace({"theta": 0.3 * np.sin(np.arange(600))})
     assert "poor-fit" in {f.code for f in check_consistency(poor, estimate=["bias_p"]).findings}
 
 

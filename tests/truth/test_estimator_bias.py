@@ -167,7 +167,7 @@ def two_by_two() -> fid.TransferFunctionModel:
 def test_two_inputs_two_outputs_two_records_and_selections() -> None:
     truth, random = two_by_two(), np.random.default_rng(1)
     records = []
-    for n in (3000, 4000):
+    for n in (2000, 2600):
         shaped = np.cumsum(random.standard_normal((2, n)), axis=1)
         shaped -= np.linspace(0, 1, n) * shaped[:, -1:]
         given = fid.Record.from_arrays(np.arange(n) / 50.0, inputs={"u": shaped[0], "w": shaped[1]})

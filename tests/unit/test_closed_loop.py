@@ -40,7 +40,7 @@ def test_the_record_holds_what_the_vehicle_did_with_its_logged_inputs() -> None:
 
 def test_the_loop_is_the_pilots_equation() -> None:
     """Against an adaptive integrator that knows the delay by its own history."""
-    flight = fly_closed_loop(SPIRAL, PILOT, chirp(duration_s=10.0))
+    flight = fly_closed_loop(SPIRAL, PILOT, chirp(duration_s=5.0))
     late = np.interp(flight.time_s - 0.1, flight.time_s, flight["p"], left=0.0)
 
     def arm(t: float, y: np.ndarray) -> np.ndarray:

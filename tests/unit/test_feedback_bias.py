@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -65,10 +67,15 @@ def test_a_fit_claims_the_shift_that_is_there() -> None:
     assert_close(claimed["Zw"], shift["Zw"], rtol=0.5, why="two flights' scatter")
 
 
+@cache
+def _swept(feedback: float) -> fid.FrequencyResponse:
+    flown = closed_loops.record(1, feedback=feedback)
+    return fid.estimate_response(flown, band_rad_s=(0.5, 10.0), n_omega=40)
+
+
 @pytest.mark.parametrize("feedback", [0.0, closed_loops.PILOT])
 def test_a_fit_names_what_the_pilot_bends(feedback: float) -> None:
-    flown = closed_loops.record(1, feedback=feedback)
-    response = fid.estimate_response(flown, band_rad_s=(0.5, 10.0), n_omega=40)
+    response = _swept(feedback)
     fit = fid.identify(closed_loops.model(), response)
     named = [each.message for each in fit.findings if each.code == "loop-bias"]
     assert len(named) == (feedback > 0.0)
@@ -77,8 +84,7 @@ def test_a_fit_names_what_the_pilot_bends(feedback: float) -> None:
 
 
 def test_a_joint_fit_names_what_the_pilot_bends_in_its_response() -> None:
-    swept = closed_loops.record(1, feedback=closed_loops.PILOT)
-    response = fid.estimate_response(swept, band_rad_s=(0.5, 10.0), n_omega=40)
+    response = _swept(closed_loops.PILOT)
     beside = closed_loops.record(7, feedback=closed_loops.PILOT, duration_s=10.0)[0]
     fit = fid.identify(
         closed_loops.model(),

@@ -42,7 +42,7 @@ def test_bounds_hold_the_level_of_white_noise_and_coherence_its_limit() -> None:
     inside, above = [], []
     for seed in range(30):
         rng = np.random.default_rng(seed)
-        made = residual_spectra(_record(3.0 * rng.normal(size=4000), rng.normal(size=4000)))
+        made = residual_spectra(_record(3.0 * rng.normal(size=2000), rng.normal(size=2000)))
         level = 9.0 * 2.0 * SAMPLE_TIME_S
         inside.append(np.mean((made.low < level) & (level < made.high)))
         above.append(np.mean(made.coherence > made.coherence_limit))

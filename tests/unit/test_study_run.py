@@ -6,6 +6,7 @@ import json
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import flightid as fid
@@ -57,6 +58,23 @@ verify = "doublet"
 rivals = "rate_integrator"
 band_rad_s = [4.0, 40.0]
 parameters.T_m = { maximum = 0.15 }
+"""
+
+SHORT = """
+[study]
+title = "Short record"
+[[record]]
+name = "r"
+path = "short.csv"
+[[model]]
+name = "Black"
+structure = "arx"
+inputs = "u"
+outputs = "y"
+identify = "r"
+na = 1
+nb = 1
+nk = 1
 """
 
 
@@ -146,16 +164,11 @@ def test_a_run_that_breaks_off_leaves_nothing(
         raise failure
 
     monkeypatch.setattr(running, "to_html", broken)
-    text = STUDY.replace('compare = ["composite"]\n[reduce]\n', "")
-    (study.output.parent / "short.toml").write_text(
-        text.replace('verify = "doublet"\nrivals = "rate_integrator"\n', "")
-    )
+    (study.output.parent / "short.toml").write_text(SHORT)
+    rows = (f"{0.1 * k},{np.sin(k)},{np.cos(k)}" for k in range(100))
+    (study.output.parent / "short.csv").write_text("\n".join(["t,u,y", *rows]))
     with pytest.raises(failure):
-        fid.run_study(
-            study.output.parent / "short.toml",
-            output=tmp_path / "out",
-            log=study.output / "flight.bin",
-        )
+        fid.run_study(study.output.parent / "short.toml", output=tmp_path / "out")
     assert list(tmp_path.iterdir()) == []
 
 
@@ -195,6 +208,7 @@ def test_of_several_responses_those_asked_for_are_fitted(
 ) -> None:
     (tmp_path / "two.toml").write_text(TWO_RESPONSES)
     text = STUDY.replace('"rate_motor_lag"\naxis = "roll"', f'"two.toml"\nresponses = {wanted}')
+    text = text.replace('compare = ["composite"]\n[reduce]\n', "")
     (tmp_path / "study.toml").write_text(text)
     item = fid.run_study(tmp_path / "study.toml", log=study.output / "flight.bin").identified[0]
     # A roll sweep on a rig moves no pitch: that response has no coherence.

@@ -224,7 +224,7 @@ def plan(
     -------
     >>> axis = RateAxis(gain=40.0, time_constant_s=0.2, delay_s=0.01, rate_feedback=0.1,
     ...                 attitude_feedback_per_s=4.0)
-    >>> made = plan("multisine", axis, band_rad_s=(4.0, 12.0), inputs=("tau_phi", "tau_theta"))
+    >>> made = plan("multisine", axis, band_rad_s=(4.0, 9.0), inputs=("tau_phi", "tau_theta"))
     >>> made.is_go
     True
     """

@@ -92,7 +92,7 @@ def multisine(
     Example
     -------
     >>> both = multisine(band_rad_s=(1.2, 12.0), amplitude=0.1, period_s=10.0,
-    ...                  sample_rate_hz=50.0, names=("tau_phi", "tau_theta"))
+    ...                  sample_rate_hz=50.0, names=("tau_phi", "tau_theta"), starts=3)
     >>> bool(abs(both.correlation()[0, 1]) < 1e-12), bool(max(both.peak_factor) < 1.1)
     (True, True)
     """
