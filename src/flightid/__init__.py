@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from flightid.control.autopilots.parameter_files import (
         read_parameters,
         write_ardupilot_parameters,
+        write_betaflight_settings,
         write_px4_parameters,
     )
     from flightid.control.autopilots.px4_autotune import px4_autotune_gains
@@ -146,6 +147,7 @@ _HOMES = {
     "read_parameters": "flightid.control.autopilots.parameter_files",
     "replay": "flightid.control.autopilots.replay",
     "write_ardupilot_parameters": "flightid.control.autopilots.parameter_files",
+    "write_betaflight_settings": "flightid.control.autopilots.parameter_files",
     "write_px4_parameters": "flightid.control.autopilots.parameter_files",
     **dict.fromkeys(
         [
@@ -287,7 +289,8 @@ __all__ = [
     "review_flight", "rotor_physics", "run_study", "scan_orders", "simulate",
     "to_continuous", "to_control",
     "to_discrete", "to_scipy", "tune", "tune_controller", "tune_pid", "validation", "verify",
-    "without_bias", "write_ardupilot_parameters", "write_model", "write_px4_parameters",
+    "without_bias", "write_ardupilot_parameters", "write_betaflight_settings", "write_model",
+    "write_px4_parameters",
     "write_records", "write_system",
 ]  # fmt: skip
 

@@ -91,7 +91,7 @@ OWN = {
         "what a firmware calls its parameters, filters and clocks",
         "airspeed_scale at_s changes computation_delay_s denominator detuning eas2tas flags flown "
         "gyro_rate_hz integers loop_rate_hz named notch_tracking numerator parameters "
-        "rate_rad_s rise_time_s setpoint_rad_s single_precision with_hold",
+        "rate_rad_s rise_time_s role setpoint_rad_s single_precision with_hold",
     ),
     "control.closed_loop": ("signals of the loop", "actuator logged outside"),
     "control.loops": (

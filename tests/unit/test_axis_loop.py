@@ -162,7 +162,7 @@ def test_px4_dynamic_notches_are_named() -> None:
 @pytest.mark.parametrize(
     ("arguments", "options", "kind", "match"),
     [
-        (("betaflight", "roll"), {}, errors.OptionError, "autopilot is not known"),
+        (("emuflight", "roll"), {}, errors.OptionError, "autopilot is not known"),
         (("arducopter", "heave"), {}, errors.OptionError, "axis is not known"),
         (("arducopter", "roll"), {}, errors.OptionError, "rate of the controller is not known"),
         (

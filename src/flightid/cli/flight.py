@@ -57,7 +57,7 @@ def command(
 
 def _write(review: FlightReview, target: Path, overwrite: bool) -> None:
     """Write the filters that would serve better; say why there are none."""
-    from flightid import write_ardupilot_parameters, write_px4_parameters
+    from flightid.control.autopilots import write_parameters
 
     choice = review.filters.choice
     if choice is None or not choice.changes:
@@ -65,10 +65,7 @@ def _write(review: FlightReview, target: Path, overwrite: bool) -> None:
         note(f"Not written: {target}: no better filters ({why})")
         return
     notes = ["flightid: filters for the noise of this flight", *review.filters.words()]
-    px4 = review.kind == "px4"
-    made = (write_px4_parameters if px4 else write_ardupilot_parameters)(
-        choice.changes, target, notes=notes, overwrite=overwrite
-    )
+    made = write_parameters(review.kind, choice.changes, target, notes=notes, overwrite=overwrite)
     note(f"Wrote {made.path}")
     if made.rollback is not None:
         note(f"Wrote {made.rollback}")

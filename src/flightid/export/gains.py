@@ -21,7 +21,8 @@ def write_gains(
     ----------
     tuning : Tuning
     path : Path
-        ``gains.param`` of ArduPilot, ``gains.params`` of PX4, ``gains.toml`` or ``gains.c`` of a
+        ``gains.param`` of ArduPilot, ``gains.params`` of PX4, ``gains.txt`` of
+        Betaflight, ``gains.toml`` or ``gains.c`` of a
         PID of its own. Of several loops each gets a C file of its own, ``gains_<loop>.c``.
     overwrite : bool
         Whether files that exist may be replaced.

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.inspection.axes import axes_of
+from flightid.inspection.betaflight_chirps import chirps
 from flightid.inspection.signals import Signal, Span, find, inside
 from flightid.inspection.stamps import log_span
 from flightid.inspection.thresholds import RESTING_RATE
@@ -32,7 +33,8 @@ class FoundExcitation:
     Attributes
     ----------
     kind : str
-        ``"sid"``, ``"autotune"``, ``"sweep"``, ``"steps"``; plain flying by ``"pilot"`` or
+        ``"sid"``, ``"autotune"``, ``"chirp"`` (of Betaflight, in the set-point of the rate),
+        ``"sweep"``, ``"steps"``; plain flying by ``"pilot"`` or
         ``"autopilot"``, ``"flying"`` where both did or the log does not tell; ``"hand"`` on the
         ground.
     axis : str
@@ -52,7 +54,7 @@ class FoundExcitation:
     @property
     def is_injected(self) -> bool:
         """Whether the autopilot made it, so that it is independent of what the sensors read."""
-        return self.kind in ("sid", "autotune")
+        return self.kind in ("sid", "autotune", "chirp")
 
     @property
     def is_plain(self) -> bool:
@@ -65,7 +67,7 @@ def excitations(log: Log, spans: tuple[Span, ...]) -> tuple[FoundExcitation, ...
 
     Looks in the spans in the air; without any, in the whole log.
     """
-    found = [*map(_injected, log.sid_runs), *_autotune(log)]
+    found = [*map(_injected, log.sid_runs), *_chirped(log), *_autotune(log)]
     flying = bool(spans)
     spans = spans or (log_span(log),)
     for axis, names in axes_of(log.vehicle).items():
@@ -77,6 +79,23 @@ def excitations(log: Log, spans: tuple[Span, ...]) -> tuple[FoundExcitation, ...
             manoeuvre = _shape(set_point, axis, span) or _motion(rate, axis, span, *moved)
             found += [manoeuvre] if manoeuvre is not None else []
     return tuple(found)
+
+
+def injected_spans(log: Log) -> list[Span]:
+    """Spans of sweeps that the autopilot made: of its own mode, or chirps of Betaflight."""
+    runs = [(run.start_s, run.stop_s) for run in log.sid_runs]
+    return runs or [each.span_s for each in chirps(log)]
+
+
+def _chirped(log: Log) -> list[FoundExcitation]:
+    return [
+        FoundExcitation(
+            "chirp", each.axis, *each.span_s,
+            f"rate set-point, {each.low_hz:.3g} to {each.high_hz:.3g} Hz, {each.size_deg_s:.3g} "
+            "deg/s at most",
+        )
+        for each in chirps(log)
+    ]  # fmt: skip
 
 
 def _overlap(span: Span, excitation: FoundExcitation) -> bool:

@@ -118,7 +118,10 @@ def _values(table: LogTable, source: ChannelSource) -> NDArray[np.float64]:
     fields = [*table.arrays(source.fields).values()]
     if source.angle is not None:
         return _euler(source.angle, *fields)
-    return np.asarray(np.sum(fields, axis=0), np.float64)
+    total = np.asarray(np.sum(fields, axis=0), np.float64)
+    if source.phase_scale is not None:
+        return np.where(total == 0.0, 0.0, np.cos(total / source.phase_scale))
+    return total
 
 
 def _unit(table: LogTable, source: ChannelSource, channel: MappedChannel) -> str:

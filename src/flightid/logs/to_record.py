@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from flightid._native import cubic_spline
 from flightid.conventions import Role
 from flightid.errors import DataError, MissingColumnError
+from flightid.logs.blackbox.settings import loop_step_s
 from flightid.logs.channels.channel_map import (
     ChannelMap,
     ChannelSource,
@@ -36,6 +37,8 @@ EDGE_STEPS = 3.0
 """Steps of its own by which a channel may begin late or end early and still cover a span."""
 OWN_STAMPS = 1e-3
 """Largest relative difference of a record's sample time from that of a channel that it copies."""
+EVERY_LOOP = 0.1
+"""Relative difference of a log's step from that of a loop, for jitter of its stamps."""
 SI = {"deg": "rad", "deg/s": "rad/s"}
 
 
@@ -95,7 +98,7 @@ def make_record(
     options |= {"left_out": ", ".join(left_out) or None}
     if check is not None:
         options |= {"sid_run": repr(run), "injection": str(check.findings[0])}
-    shape = _input_shape(declared, chosen, found, base.sample_time_s)
+    shape = _input_shape(log, declared, chosen, found, base.sample_time_s)
     made = record.replace(channels=labels, step=Step("Log.record", options), input_shape=shape)
     entering = [(c, i.time_s, i.values) for c, i in zip(labels, ordered, strict=True)]
     inside = float(span.time_s[0]), float(span.time_s[-1])
@@ -110,10 +113,20 @@ def make_record(
 
 
 def _input_shape(
-    declared: InputShape, chosen: ChannelMap, found: list[ChannelSamples], step_s: float
+    log: LogContents,
+    declared: InputShape,
+    chosen: ChannelMap,
+    found: list[ChannelSamples],
+    step_s: float,
 ) -> InputShape:
-    """What is declared; else what the map knows, for inputs that are not resampled."""
+    """What is declared; else what the map knows, for inputs that are not resampled.
+
+    Of a controller whose loops were not all logged nothing is known between the rows.
+    """
     if declared.hold is not None or chosen.hold is None:
+        return declared
+    loop_s = loop_step_s(log.parameters)
+    if loop_s is not None and abs(step_s / loop_s - 1.0) > EVERY_LOOP:
         return declared
     inputs = [item for item in found if item.channel.role == Role.INPUT]
     own = all(abs(item.interval_s / step_s - 1.0) < OWN_STAMPS for item in inputs)

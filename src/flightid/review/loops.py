@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.control.autopilots.make import LOOP_RATE_PARAMETERS
+from flightid.control.autopilots.make import told_loop_rate_hz
 from flightid.errors import FlightidError
 from flightid.inspection.advice import logging
 from flightid.inspection.signals import Signal, Span, find, inside, places, records
@@ -115,8 +115,7 @@ def _loop(log: Log, spans: tuple[Span, ...], axis: str, loop: str) -> LoopRespon
 
 def loop_rate_hz(log: Log) -> float:
     """Rate of the controller by the log's parameters, Hz; 0 where they do not tell."""
-    found = (log.parameters.get(name, 0.0) for name in LOOP_RATE_PARAMETERS)
-    return next((rate for rate in found if rate > 0.0), 0.0)
+    return told_loop_rate_hz(log.parameters) or 0.0
 
 
 def _pair(log: Log, axis: str, loop: str) -> _Pair | None:

@@ -8,14 +8,14 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from flightid.control.autopilots.parameter_files import ROLLBACK, read_parameters
+from flightid.control.autopilots.parameter_files import ROLLBACK, WRITERS, read_parameters
 from flightid.conventions import Light
 from flightid.errors import FileFormatError
 from flightid.findings import Finding
 
 SAME = 1e-4
 """Relative difference of gains that went through single precision and a ground station."""
-SUFFIXES = (".param", ".params")
+SUFFIXES = tuple(suffix for suffix, _ in WRITERS.values())
 
 
 @dataclass(frozen=True)

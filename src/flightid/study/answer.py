@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from shlex import quote
 from typing import TYPE_CHECKING
 
+from flightid.control.autopilots.parameter_files import parameter_suffix
 from flightid.control.autopilots.pid_loop import PidLoop
 from flightid.control.tuning.limits import ANGLE
 from flightid.conventions import Light
@@ -186,7 +187,7 @@ def _gains(tuning: Tuning) -> Finding:
     steps = max(len(design.stages) for design in designs)
     axes = ", ".join(design.axis for design in designs)
     plain = any(isinstance(design.loop, PidLoop) for design in designs)
-    file = "gains.c (or .toml)" if plain else "gains.param"
+    file = "gains.c (or .toml)" if plain else f"gains{parameter_suffix(designs[0].flown.autopilot)}"
     way = f"--write {file} writes them; " + (
         f"fly step 1 of {steps}, log, and look again" if steps > 1 else "fly them, and log"
     )

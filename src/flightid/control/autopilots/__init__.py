@@ -12,6 +12,8 @@ from flightid.control.autopilots.parameter_files import (
     WrittenParameters,
     read_parameters,
     write_ardupilot_parameters,
+    write_betaflight_settings,
+    write_parameters,
     write_px4_parameters,
 )
 from flightid.control.autopilots.parameter_table import AXES, GainRange, defaults, gain_ranges
@@ -45,5 +47,7 @@ __all__ = [
     "read_parameters",
     "replay",
     "write_ardupilot_parameters",
+    "write_betaflight_settings",
+    "write_parameters",
     "write_px4_parameters",
 ]

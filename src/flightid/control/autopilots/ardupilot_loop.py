@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from flightid import _native
-from flightid.control.autopilots.axis_loop import AxisLoop, Gyro, samples
+from flightid.control.autopilots.axis_loop import AxisLoop, Gyro
 from flightid.control.autopilots.filter_stages import (
     FilterPath,
     FilterStage,
@@ -25,7 +25,7 @@ from flightid.control.autopilots.filters import (
     one_pole_response,
     sections_response,
 )
-from flightid.control.autopilots.loop_run import LoopFlags, LoopRun, LoopState
+from flightid.control.autopilots.loop_run import LoopFlags, LoopRun, LoopState, samples
 
 NOTCH_OFF = (0.0, 0.0, 0.0)
 PID_COLUMNS = ("Tar", "Err", "P", "I", "D", "FF", "DFF", "Dmod", "SRate")

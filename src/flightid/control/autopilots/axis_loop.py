@@ -20,9 +20,10 @@ from flightid.control.autopilots.filters import (
     hold_response,
     sections_response,
 )
-from flightid.control.autopilots.loop_run import LoopFlags, LoopRun, Samples
+from flightid.control.autopilots.loop_run import LoopFlags, LoopRun
+from flightid.control.autopilots.parameter_files import GainChange
 from flightid.control.autopilots.parameter_table import GainRange, gain_ranges
-from flightid.errors import DataError, OptionError, ShapeError, UnknownNameError
+from flightid.errors import DataError, OptionError, UnknownNameError
 from flightid.result import Result
 from flightid.table import Column, Table
 
@@ -61,6 +62,8 @@ class AxisLoop(Result, schema="flightid.axis_loop/1"):
         Parameters that the vehicle's firmware did not have.
     unmodelled : tuple of str
         What of the vehicle's settings this view leaves out, one sentence each.
+    beside_gains : tuple of GainChange
+        What else is to be set with new gains so that the vehicle flies this loop.
 
     Example
     -------
@@ -83,6 +86,7 @@ class AxisLoop(Result, schema="flightid.axis_loop/1"):
     assumed: tuple[str, ...] = ()
     unmodelled: tuple[str, ...] = ()
     plant_gyro: tuple[Section, ...] | None = field(default=None, kw_only=True)
+    beside_gains: tuple[GainChange, ...] = field(default=(), kw_only=True)
     autopilot: ClassVar[str] = ""
     output_unit: ClassVar[str] = "1"
     full_output: ClassVar[float] = 1.0
@@ -91,6 +95,8 @@ class AxisLoop(Result, schema="flightid.axis_loop/1"):
     """Loops between an angle error and the rate loop that acts on it."""
     inner: ClassVar[str] = "rate loop"
     """What the innermost loop is called."""
+    gains_are_whole: ClassVar[bool] = False
+    _units: ClassVar[Mapping[str, float]] = {}
 
     def __post_init__(self) -> None:
         if not (self.loop_rate_hz > 0 and self.gyro_rate_hz >= self.loop_rate_hz * (1 - 1e-9)):
@@ -119,6 +125,14 @@ class AxisLoop(Result, schema="flightid.axis_loop/1"):
     def time_scale(self) -> float:
         """Of its dynamics over those of a vehicle's rate loop, which a search begins from."""
         return 1.0
+
+    def unit_of(self, role: str) -> float:
+        """What one of a gain is worth in the controller's own units."""
+        return self._units.get(role, 1.0)
+
+    def written(self, value: float) -> float:
+        """A gain as the autopilot keeps it: rounded to four digits."""
+        return float(f"{value:.4g}")
 
     @property
     def gains(self) -> dict[str, float]:
@@ -372,18 +386,3 @@ def _frequencies(omega_rad_s: ArrayLike) -> Omega:
             needed="one axis of frequencies above zero",
         )
     return omega
-
-
-def samples(setpoint: ArrayLike, rate: ArrayLike, per_loop: int) -> tuple[Samples, Samples]:
-    """Contiguous arrays of set-points and rates whose lengths agree."""
-    first = np.ascontiguousarray(setpoint, dtype=np.float64)
-    second = np.ascontiguousarray(rate, dtype=np.float64)
-    if first.ndim != 1 or second.shape != (first.size * per_loop,):
-        raise ShapeError(
-            "set-points and rates do not belong together",
-            found=f"{first.shape} and {second.shape}",
-            needed=f"{per_loop} rates for each set-point",
-        )
-    if not (np.isfinite(first).all() and np.isfinite(second).all()):
-        raise DataError("set-point or rate holds a value that is not finite")
-    return first, second

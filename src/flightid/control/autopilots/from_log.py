@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -13,6 +14,7 @@ from flightid.control.autopilots.notch_tracking import notch_tracking
 from flightid.control.autopilots.parameter_table import parameter_entries
 from flightid.errors import DataError
 from flightid.inspection.actuators import find_actuators
+from flightid.inspection.excitation_found import injected_spans
 from flightid.inspection.flight_phases import flight_phases
 from flightid.inspection.signals import Span
 from flightid.inspection.stamps import log_span
@@ -23,10 +25,13 @@ AUTOPILOT_OF = {
     ("ardupilot", "plane"): "arduplane",
     ("px4", "copter"): "px4_multicopter",
     ("px4", "plane"): "px4_fixed_wing",
+    ("betaflight", "copter"): "betaflight",
 }
 HELICOPTER_FRAMES = (6.0, 11.0, 13.0)
 """FRAME_CLASS of single, dual and quad helicopters."""
 SCALE_BOUNDS = (0.5, 2.0)
+OLDEST_BETAFLIGHT = (4, 3)
+"""Before, filters and headers had other names."""
 SLOWEST_LOOP_HZ = 100.0
 """No rate controller runs slower: such a message was thinned out by the logger."""
 
@@ -48,7 +53,20 @@ def autopilot_of(log: Log) -> str:
         )
     if name == "arducopter" and log.parameters.get("FRAME_CLASS") in HELICOPTER_FRAMES:
         return "arduheli"
+    if name == "betaflight" and betaflight_version(log.firmware) < OLDEST_BETAFLIGHT:
+        raise DataError(
+            "the controllers of this firmware are not known",
+            found=log.firmware or "a firmware that is not named",
+            needed="Betaflight 4.3 or newer",
+            action="update the firmware, and log a flight with it",
+        )
     return name
+
+
+def betaflight_version(firmware: str) -> tuple[int, int]:
+    """Major and minor number of a version of Betaflight; zeros of anything else."""
+    found = re.search(r"Betaflight\D{0,3}(\d{1,4})\.(\d{1,3})", firmware, re.IGNORECASE)
+    return (int(found[1]), int(found[2])) if found else (0, 0)
 
 
 def parameters_at(log: Log, time_s: float) -> dict[str, float]:
@@ -73,7 +91,7 @@ def axis_loop_of(
     Parameters
     ----------
     log : Log
-        ArduCopter, ArduPlane, PX4 multicopter or fixed wing.
+        ArduCopter, ArduPlane, PX4 multicopter or fixed wing, Betaflight 4.3 or newer.
     axis : {"roll", "pitch", "yaw"}
         Axis.
     at_s : float, optional
@@ -137,9 +155,9 @@ def _chosen_parameters(log: Log, autopilot: str, axis: str, at_s: float | None) 
 
 
 def _counted(log: Log, at_s: float | None) -> list[Span]:
-    """Where notches count: the sweeps, else what was flown, else the whole log."""
-    if at_s is None and log.sid_runs:
-        return [(run.start_s, run.stop_s) for run in log.sid_runs]
+    """Where notches and throttle count: the sweeps, else what was flown, else the whole log."""
+    if at_s is None and (swept := injected_spans(log)):
+        return swept
     return list(flight_phases(log, find_actuators(log)).airborne) or [log_span(log)]
 
 

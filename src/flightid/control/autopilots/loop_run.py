@@ -6,7 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+
+from flightid.errors import DataError, ShapeError
 
 Samples = NDArray[np.float64]
 
@@ -80,3 +82,18 @@ class LoopRun:
     def __repr__(self) -> str:
         """Length and terms on one line."""
         return f"LoopRun({self.output.size} loops, terms {', '.join(self.terms)})"
+
+
+def samples(setpoint: ArrayLike, rate: ArrayLike, per_loop: int) -> tuple[Samples, Samples]:
+    """Contiguous arrays of set-points and rates whose lengths agree."""
+    first = np.ascontiguousarray(setpoint, dtype=np.float64)
+    second = np.ascontiguousarray(rate, dtype=np.float64)
+    if first.ndim != 1 or second.shape != (first.size * per_loop,):
+        raise ShapeError(
+            "set-points and rates do not belong together",
+            found=f"{first.shape} and {second.shape}",
+            needed=f"{per_loop} rates for each set-point",
+        )
+    if not (np.isfinite(first).all() and np.isfinite(second).all()):
+        raise DataError("set-point or rate holds a value that is not finite")
+    return first, second

@@ -7,13 +7,17 @@ from collections.abc import Mapping
 from flightid.control.autopilots.arducopter import ArduCopterLoop, ArduHeliLoop
 from flightid.control.autopilots.arduplane import ArduPlaneLoop
 from flightid.control.autopilots.axis_loop import AxisLoop
+from flightid.control.autopilots.betaflight_loop import betaflight_loop
 from flightid.control.autopilots.gyro_notches import ardupilot_notches, pid_notch, px4_notches
 from flightid.control.autopilots.notch_tracking import NotchTracking
 from flightid.control.autopilots.parameter_table import AXES, Axis, defaults, resolve
 from flightid.control.autopilots.px4_loop import Px4FixedWingLoop, Px4MulticopterLoop
 from flightid.errors import OptionError
+from flightid.logs.blackbox.settings import loop_step_s
 
-AUTOPILOTS = ("arducopter", "arduheli", "arduplane", "px4_multicopter", "px4_fixed_wing")
+AUTOPILOTS = (
+    "arducopter", "arduheli", "arduplane", "px4_multicopter", "px4_fixed_wing", "betaflight",
+)  # fmt: skip
 LOOP_RATE_PARAMETERS = ("SCHED_LOOP_RATE", "IMU_GYRO_RATEMAX")
 
 
@@ -34,8 +38,8 @@ def axis_loop(
     Parameters
     ----------
     autopilot : str
-        ``"arducopter"``, ``"arduheli"``, ``"arduplane"``, ``"px4_multicopter"`` or
-        ``"px4_fixed_wing"``.
+        ``"arducopter"``, ``"arduheli"``, ``"arduplane"``, ``"px4_multicopter"``,
+        ``"px4_fixed_wing"`` or ``"betaflight"``.
     axis : {"roll", "pitch", "yaw"}
         Axis.
     parameters : mapping of str to float, optional
@@ -90,6 +94,8 @@ def axis_loop(
     found = resolve(autopilot, axis, known)
     kept: Axis = AXES[AXES.index(axis)]
     shared = (kept, found.values, found.names, rate_hz, gyro_hz, computation_delay_s)
+    if autopilot == "betaflight":
+        return betaflight_loop(found, known, shared, notch_tracking or NotchTracking())
     if autopilot.startswith("px4"):
         notches = px4_notches(known, gyro_hz, notch_tracking, AXES.index(kept))
         rest = (notches.sections, notches.unknown, found.assumed, ())
@@ -109,17 +115,27 @@ def axis_loop(
 def _loop_rate(parameters: Mapping[str, float], given: float | None) -> float:
     if given is not None:
         return float(given)
-    for name in LOOP_RATE_PARAMETERS:
-        if parameters.get(name, 0.0) > 0:
-            return float(parameters[name])
+    if found := told_loop_rate_hz(parameters):
+        return found
     raise OptionError(
         "the rate of the controller is not known",
-        needed="loop_rate_hz, or one of " + ", ".join(LOOP_RATE_PARAMETERS),
+        needed="loop_rate_hz, or one of " + ", ".join((*LOOP_RATE_PARAMETERS, "looptime")),
     )
 
 
+def told_loop_rate_hz(parameters: Mapping[str, float]) -> float | None:
+    """Rate of the controller by the parameters, Hz; None where they do not tell it."""
+    for name in LOOP_RATE_PARAMETERS:
+        if parameters.get(name, 0.0) > 0:
+            return float(parameters[name])
+    step_s = loop_step_s(parameters)
+    return None if step_s is None else 1.0 / step_s
+
+
 def _gyro_rate(parameters: Mapping[str, float], loop_rate_hz: float) -> float:
-    """ArduPilot filters the gyro at 1 kHz · 2^INS_GYRO_RATE."""
+    """ArduPilot filters the gyro at 1 kHz · 2^INS_GYRO_RATE; Betaflight's `looptime` is in µs."""
+    if parameters.get("looptime", 0.0) > 0.0:
+        return max(1e6 / parameters["looptime"], loop_rate_hz)
     if "INS_GYRO_RATE" in parameters:
         return max(1000.0 * 2.0 ** round(parameters["INS_GYRO_RATE"]), loop_rate_hz)
     return loop_rate_hz

@@ -97,8 +97,11 @@ def notch_tracking(log: Log, spans: Sequence[Span]) -> NotchTracking:
         return NotchTracking(motors=_px4_motors(log, spans), peaks=peaks, peaks_bandwidth_hz=width)
     throttle = find(log, "thrust")
     mixer = None if throttle is None else throttle.within(spans)
+    turned = None if mixer is None else Centre.of(mixer[mixer > RUNNING])
+    if log.kind == "betaflight":
+        return NotchTracking(turned, _betaflight_motors(log, spans))
     return NotchTracking(
-        None if mixer is None else Centre.of(mixer[mixer > RUNNING]),
+        turned,
         _instances(log, "ESC", "RPM", spans, 60.0),
         _rotors(log, spans),
         _logged_centres(log, spans),
@@ -155,6 +158,18 @@ def _logged_centres(log: Log, spans: Sequence[Span]) -> dict[int, tuple[Centre, 
             if read:
                 found.setdefault(place, read)
     return found
+
+
+def _betaflight_motors(log: Log, spans: Sequence[Span]) -> tuple[Centre, ...]:
+    """Electrical turns, counted in hundreds a minute; a pair of poles is one."""
+    pairs = log.parameters.get("motor_poles", 0.0) / 2.0
+    if pairs < 1.0:
+        return ()
+    every = (
+        Centre.of(_samples(log, "main", f"eRPM[{k}]", spans) * 100.0 / 60.0 / pairs)
+        for k in range(MOST_SOURCES)
+    )
+    return tuple(centre for centre in every if centre is not None)
 
 
 def _px4_motors(log: Log, spans: Sequence[Span]) -> tuple[Centre, ...]:

@@ -18,6 +18,8 @@ NAME = re.compile(r"[A-Z][A-Z0-9_]{0,15}")
 """ArduPilot and PX4 keep names in 16 characters."""
 CLI_NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
 """Betaflight's settings, by the line."""
+CLI_WORDS = {"simplified_pids_mode": ("OFF", "RP", "RPY")}
+"""Settings of which Betaflight's command line takes words: those of the numbers."""
 PX4_INTEGERS = ("IMU_GYRO_DNF_EN",)
 REAL32, INT32 = 9, 6
 """MAVLink's numbers for the types of a parameter."""
@@ -233,13 +235,102 @@ def write_px4_parameters(
     return _write(path, "\n".join(head + new) + "\n", back, overwrite)
 
 
+def write_betaflight_settings(
+    changes: Changes, path: str | Path, *, notes: Iterable[str] = (), overwrite: bool = False
+) -> WrittenParameters:
+    """Write lines for Betaflight's command line, as its ``diff`` prints them, and ``save``.
+
+    Parameters
+    ----------
+    changes : iterable of GainChange, or mapping of str to float
+        What to set: whole numbers.
+    path : str or Path
+        File, usually ``*.txt``.
+    notes : iterable of str
+        Comment lines at the top.
+    overwrite : bool
+        Whether files that exist may be replaced.
+
+    Raises
+    ------
+    OptionError
+        Nothing to write, a name or value that Betaflight does not take, or a file that exists.
+    OSError
+        The folder is missing or cannot be written.
+
+    Reference
+    ---------
+    Betaflight, src/main/cli/cli.c: comments have lines of their own; `save` restarts.
+
+    Example
+    -------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     written = write_betaflight_settings([GainChange("p_roll", 52, 45)], f"{folder}/a.txt")
+    ...     print(written.path.read_text(), end="")
+    ...     read_parameters(written.rollback)
+    # p_roll: was 45
+    set p_roll = 52
+    save
+    {'p_roll': 45.0}
+    """
+    found = _listed(changes)
+    lines = [f"# {_comment(note)}" for note in notes]
+    for each in found:
+        if remark := _remark(each).removeprefix(" # "):
+            lines.append(f"# {each.name}: {remark}")
+        lines.append(_cli_line(each.name, each.value))
+    old = [_cli_line(each.name, each.old) for each in found if each.old is not None]
+    back = "\n".join([*old, "save"]) + "\n" if old else None
+    return _write(path, "\n".join([*lines, "save"]) + "\n", back, overwrite)
+
+
+def _cli_line(name: str, value: float) -> str:
+    words = CLI_WORDS.get(name)
+    if not CLI_NAME.fullmatch(name) or value != round(value):
+        raise OptionError(
+            "Betaflight's command line takes no such setting",
+            found=f"{name} = {value:g}",
+            needed="a name in small letters, and a whole number",
+        )
+    kept = round(value)
+    return f"set {name} = {words[kept] if words and 0 <= kept < len(words) else kept}"
+
+
+WRITERS = {
+    "px4": (".params", write_px4_parameters),
+    "betaflight": (".txt", write_betaflight_settings),
+    "ardu": (".param", write_ardupilot_parameters),
+}
+"""Usual suffix and writer of parameter files by what the name of an autopilot begins with."""
+
+
+def parameter_suffix(autopilot: str) -> str:
+    """Suffix of an autopilot's parameter files, by its name."""
+    return next(suffix for start, (suffix, _) in WRITERS.items() if autopilot.startswith(start))
+
+
+def write_parameters(
+    autopilot: str,
+    changes: Changes,
+    path: str | Path,
+    *,
+    notes: Iterable[str] = (),
+    overwrite: bool = False,
+) -> WrittenParameters:
+    """Write the parameter file of an autopilot, by its name; see the writers of `WRITERS`."""
+    write = next(each for start, (_, each) in WRITERS.items() if autopilot.startswith(start))
+    return write(changes, path, notes=notes, overwrite=overwrite)
+
+
 def read_parameters(path: str | Path) -> dict[str, float]:
-    r"""Read a parameter file of either form.
+    r"""Read a parameter file of any of these forms.
 
     Parameters
     ----------
     path : str or Path
-        ``NAME,value`` (or with a blank, a tab or ``=`` between), or QGroundControl's five columns.
+        ``NAME,value`` (or with a blank, a tab or ``=`` between), QGroundControl's five columns, or
+        Betaflight's ``set name = value``.
 
     Returns
     -------
@@ -254,7 +345,7 @@ def read_parameters(path: str | Path) -> dict[str, float]:
 
     Reference
     ---------
-    As `write_ardupilot_parameters` and `write_px4_parameters`.
+    As `write_ardupilot_parameters`, `write_px4_parameters` and `write_betaflight_settings`.
 
     Example
     -------
@@ -271,7 +362,7 @@ def read_parameters(path: str | Path) -> dict[str, float]:
     text = source.read_text(encoding="utf-8", errors="replace")
     for number, raw in enumerate(text.splitlines(), start=1):
         line = raw.split("#", 1)[0].strip()
-        if line:
+        if line and line != "save":
             name, value = _parsed(line, f"line {number} of {source.name}")
             found[name] = value
     return found
@@ -280,10 +371,14 @@ def read_parameters(path: str | Path) -> dict[str, float]:
 def _parsed(line: str, where: str) -> tuple[str, float]:
     parts = re.split(r"[,\s=]+", line)
     pair = parts[2:4] if len(parts) == 5 else parts
-    if len(pair) != 2 or not NAME.fullmatch(pair[0]):
+    names = NAME
+    if parts[0] == "set":
+        pair, names = parts[1:], CLI_NAME
+    if len(pair) != 2 or not names.fullmatch(pair[0]):
         raise FileFormatError(f"{where} is not a parameter", found=line[:80])
+    words = CLI_WORDS.get(pair[0], ())
     try:
-        value = float(pair[1])
+        value = float(words.index(pair[1]) if pair[1] in words else pair[1])
     except ValueError:
         raise FileFormatError(f"{where} has no number", found=line[:80]) from None
     if not math.isfinite(value):

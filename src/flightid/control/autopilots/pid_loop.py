@@ -9,14 +9,14 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from flightid.control.autopilots.axis_loop import AxisLoop, Gyro, samples
+from flightid.control.autopilots.axis_loop import AxisLoop, Gyro
 from flightid.control.autopilots.filters import (
     Omega,
     Response,
     difference_response,
     one_pole_response,
 )
-from flightid.control.autopilots.loop_run import LoopFlags, LoopRun
+from flightid.control.autopilots.loop_run import LoopFlags, LoopRun, samples
 from flightid.control.autopilots.parameter_table import GainRange
 from flightid.table import Column, Table
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from flightid import _native
-from flightid.control.autopilots.axis_loop import AxisLoop, Gyro, samples
+from flightid.control.autopilots.axis_loop import AxisLoop, Gyro
 from flightid.control.autopilots.filter_stages import FilterStage, pole_stage
 from flightid.control.autopilots.filters import (
     Omega,
@@ -18,7 +18,7 @@ from flightid.control.autopilots.filters import (
     difference_response,
     one_pole_response,
 )
-from flightid.control.autopilots.loop_run import LoopFlags, LoopRun
+from flightid.control.autopilots.loop_run import LoopFlags, LoopRun, samples
 from flightid.errors import OptionError, ShapeError
 
 

@@ -25,6 +25,7 @@ from flightid.control.tuning.sampled_plants import (
     loop_grid,
     plants_of_axis,
 )
+from flightid.control.tuning.whole_gains import whole_gains
 from flightid.control.tuning.worst_cases import WorstCase, worst_cases
 
 Array = NDArray[np.float64]
@@ -205,6 +206,8 @@ def tune_axis(
     plants = setting.searched.axis(place, loops, setting.gyro)
     first = list(range(1 + len(setting.evidence.corners)))
     found = search(problem_of(setting, plants, paths, limit), first, advance)
+    if paths.loop.gains_are_whole:
+        found = whole_gains(problem_of(setting, plants, paths, limit), paths, found)
     loop = paths.with_parameters(paths.parameters(found.gains))
     fresh, old = _judged(setting, paths, limit, loops, flown, place)
     gains = paths.gains_of(loop)
@@ -300,7 +303,7 @@ def stages_of(
     problem = problem_of(setting, plants, paths, None)
     stages = []
     for k in range(1, count + 1):
-        gains = {c.name: _between(c, k / count) for c in changes}
+        gains = {c.name: loops[place].written(_between(c, k / count)) for c in changes}
         judged = problem.judge(paths.gains_of(paths.with_parameters(gains))[None])
         inner = [each for name, each in judged.metrics.items() if name != ANGLE]
         stages.append(
@@ -322,7 +325,7 @@ def _between(change: TunedGain, share: float) -> float:
         value = change.flown * change.ratio**share
     else:
         value = change.flown + share * (change.new - change.flown)
-    return float(f"{value:.4g}")
+    return float(value)
 
 
 def _least(values: list[Array]) -> float | None:

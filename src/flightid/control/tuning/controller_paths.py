@@ -78,8 +78,9 @@ class ControllerPaths:
             least, most = known[name].low, known[name].high
             if role == "angle_tc":
                 least, most = 1.0 / most, 1.0 / max(least, LEAST_SHARE * most)
-            low.append(least if role == "d" else least or LEAST_SHARE * most)
-            high.append(most)
+            one = self.loop.unit_of(role)
+            low.append(one * (least if role == "d" else least or LEAST_SHARE * most))
+            high.append(one * most)
         return np.array(low), np.array(high)
 
     def integral_ratio(self, factor: float | None) -> float:
@@ -87,23 +88,28 @@ class ControllerPaths:
         known, names = self.loop.ranges, self.loop.names
         if factor is None or not {"p", "i"} <= names.keys() & self.loop.values.keys():
             return float(np.inf)
-        usual = [known[names[role]].default if names[role] in known else 0.0 for role in "pi"]
-        flown = [self.loop.values[role] for role in "pi"]
+        one = {role: self.loop.unit_of(role) for role in "pi"}
+        usual = [
+            known[names[role]].default * one[role] if names[role] in known else 0.0 for role in "pi"
+        ]
+        flown = [self.loop.values[role] * one[role] for role in "pi"]
         if min(usual) <= 0.0:
             return float(np.inf)
         return max(factor * usual[1] / usual[0], flown[1] / flown[0] if flown[0] > 0.0 else 0.0)
 
     def gains_of(self, loop: AxisLoop) -> Array:
-        """Values of the gains that move."""
-        inner = [loop.values[role] for role in self.roles if role in RATE_ROLES]
+        """Values of the gains that move, in the controller's own units."""
+        inner = [
+            loop.values[role] * loop.unit_of(role) for role in self.roles if role in RATE_ROLES
+        ]
         return np.array([*inner, loop.angle_gain_1_s] if self.with_angle else inner)
 
     def parameters(self, gains: Array) -> dict[str, float]:
-        """Parameters by the autopilot's names, rounded to four digits, for gains."""
+        """Parameters by the autopilot's names, as it keeps them, for gains."""
         values = {}
         for role, name, gain in zip(self.roles, self.names, gains, strict=True):
             value = 1.0 / gain if role == "angle_tc" else gain
-            values[name] = float(f"{value:.4g}")
+            values[name] = self.loop.written(value / self.loop.unit_of(role))
         return values
 
     def with_parameters(self, values: Mapping[str, float]) -> AxisLoop:
@@ -145,7 +151,7 @@ class ControllerPaths:
         nothing = np.zeros(terms.shape[-1], dtype=np.complex128)
         return np.array(
             [
-                found.get(self.loop.names[role], nothing)
+                found.get(self.loop.names[role], nothing) / self.loop.unit_of(role)
                 for role in RATE_ROLES
                 if role in self.loop.names
             ]

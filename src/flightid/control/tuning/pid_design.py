@@ -10,8 +10,7 @@ from pathlib import Path
 from flightid.control.autopilots import (
     AxisLoop,
     GainChange,
-    write_ardupilot_parameters,
-    write_px4_parameters,
+    write_parameters,
 )
 from flightid.control.autopilots.pid_loop import PidLoop
 from flightid.control.tuning.gain_steps import Stage, TunedGain
@@ -253,12 +252,13 @@ class PidDesign(
         Those of a PID of its own are written as TOML, in every form (`flightid.export`: as C).
 
         One file for each step (``name-1.param``, … where there are several), each with a file
-        ``….rollback.param`` of the flown values; QGroundControl's layout for PX4.
+        ``….rollback.param`` of the flown values; QGroundControl's layout for PX4, lines for the
+        command line for Betaflight.
 
         Parameters
         ----------
         path : str or Path
-            Name of the file, usually ``*.param`` or, for PX4, ``*.params``.
+            Name of the file, usually ``*.param``, for PX4 ``*.params``, for Betaflight ``*.txt``.
         overwrite : bool
             Whether files that exist may be replaced.
         accept_red : bool
@@ -331,11 +331,6 @@ def write_steps(
     if plain:
         return write_settings(plain, as_path(path), accepted, overwrite=overwrite)
     final, count = Path(path), max(len(design.stages) for design in designs)
-    write = (
-        write_px4_parameters
-        if designs[0].flown.autopilot.startswith("px4")
-        else write_ardupilot_parameters
-    )
     written = []
     for k in range(count):
         changes = chain.from_iterable(
@@ -343,8 +338,12 @@ def write_steps(
         )
         name = final if count == 1 else final.with_name(f"{final.stem}-{k + 1}{final.suffix}")
         notes = [f"flightid: step {k + 1} of {count}; fly each before the next", *accepted]
-        made = write(
-            {each.name: each for each in changes}.values(), name, notes=notes, overwrite=overwrite
+        made = write_parameters(
+            designs[0].flown.autopilot,
+            {each.name: each for each in changes}.values(),
+            name,
+            notes=notes,
+            overwrite=overwrite,
         )
         written += [each for each in (made.path, made.rollback) if each is not None]
     return tuple(written)
@@ -385,6 +384,7 @@ def _step_changes(design: PidDesign, step: int) -> list[GainChange]:
     flown = design.flown.gains
     return [
         *design.filters,
+        *design.flown.beside_gains,
         *(
             GainChange(name, value, flown[name], f"{design.axis}")
             for name, value in design.stages[step].gains.items()

@@ -19,6 +19,7 @@ from flightid import _native
 from flightid.conventions import Light
 from flightid.errors import LogFormatError
 from flightid.findings import Finding, counted
+from flightid.logs.blackbox.settings import settings_of
 from flightid.logs.source import ByteRange, Event, Gap
 from flightid.logs.table_source import Array, MessageRows, TableSource
 from flightid.reading import bounded_bytes, memory_budget, within_memory
@@ -71,7 +72,7 @@ def open_blackbox(path: Path) -> TableSource:
         "copter" if header.get("Firmware type", "").lower() != "inav" else None,
         header.get("Firmware revision", "blackbox"),
         tables,
-        _parameters(header),
+        settings_of(header),
         events=_events(native),
         skipped=lost,
         gaps=_gaps(tables[LOOP].time_s) if LOOP in tables else (),
@@ -80,22 +81,6 @@ def open_blackbox(path: Path) -> TableSource:
             *_findings(native, lost, len(data), taken, len(flights)),
         ),
     )
-
-
-def _parameters(header: Mapping[str, str]) -> dict[str, float]:
-    """Settings that are numbers; ``rollPID`` with three becomes ``rollPID[0]`` to ``[2]``."""
-    found: dict[str, float] = {}
-    for name, value in header.items():
-        if name.startswith("Field "):
-            continue
-        parts = value.split(",")
-        for place, part in enumerate(parts):
-            try:
-                number = float(part)
-            except ValueError:
-                continue
-            found[name if len(parts) == 1 else f"{name}[{place}]"] = number
-    return found
 
 
 def _tables(
@@ -129,7 +114,7 @@ def _scaled(
 def _scales(header: Mapping[str, str]) -> tuple[dict[str, float], dict[str, str]]:
     """Factor by the beginning of a field's name; of fields without one, what the header lacks."""
     fine = 1.0 / HIGH_RESOLUTION if header.get("blackbox_high_resolution") == "1" else 1.0
-    gyro, gravity = _gyro_scale(header), _parameters(header).get(GRAVITY, 0.0)
+    gyro, gravity = _gyro_scale(header), settings_of(header).get(GRAVITY, 0.0)
     volts, amperes = _battery_scales(header.get("Firmware revision", ""))
     told = {
         **dict.fromkeys(RATES, ("gyro_scale", gyro and gyro * fine)),

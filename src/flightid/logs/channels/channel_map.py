@@ -26,7 +26,8 @@ DEFAULTS = {
 }
 ANGLES = ("roll", "pitch", "yaw")
 _SOURCE_KEYS = {
-    "message", "field", "instance", "unit", "factor", "stamp", "quaternion", "angle", "note",
+    "message", "field", "instance", "unit", "factor", "stamp", "quaternion", "angle", "phase_scale",
+    "note",
 }  # fmt: skip
 _CHANNEL_KEYS = {"unit", "role", "unwrap", "sets_rate", "on_request", "sources"}
 
@@ -51,6 +52,9 @@ class ChannelSource:
         Field with a better stamp than the message's own, in µs; used where it exists.
     angle : str or None
         ``"roll"``, ``"pitch"`` or ``"yaw"`` of a quaternion; None for plain numbers.
+    phase_scale : float or None
+        Counts of a radian where the field is a phase, whose cosine is the channel: zero where the
+        field is. None for plain numbers.
     note : str
         What the source is.
 
@@ -67,6 +71,7 @@ class ChannelSource:
     factor: float = 1.0
     stamp: str | None = None
     angle: str | None = None
+    phase_scale: float | None = None
     note: str = ""
 
     def __str__(self) -> str:
@@ -268,6 +273,7 @@ def _source(name: str, item: dict[str, Any]) -> ChannelSource:
         float(item.get("factor", 1.0)),
         item.get("stamp"),
         angle,
+        item.get("phase_scale"),
         item.get("note", ""),
     )
 

@@ -27,11 +27,13 @@ from flightid.study.stage_runner import StageRunner
 
 TEMPLATES = {"roll": "rate_motor_lag", "pitch": "rate_motor_lag", "yaw": "rate_rotor_inertia"}
 """Rate of a multirotor to its mixer's command; in yaw the rotors' own inertia turns it first."""
+CHIRP = "chirp"
+"""Channel of the maps: the chirp of Betaflight, of whichever axis."""
 OF_SWEEP = 0.75
 """Part of the last frequency of a sweep up to which its power lasts, fade-out included."""
 OF_WINDOW = 2.0
 """Above the lowest coherent frequency: there a window holds two cycles, and a fit wants four."""
-SEARCHED = ("sweep", "autotune")
+SEARCHED = ("chirp", "sweep", "autotune")
 """Excitations without a logged injection from which a model may be tried."""
 
 
@@ -65,6 +67,7 @@ class _Axis:
     estimator: str
     template: str
     found: str
+    chirped: bool = False
 
     @property
     def name(self) -> str:
@@ -84,7 +87,10 @@ class _Axis:
         yield f"band_rad_s = {toml_value([_three(low), _three(high)])}"
         if self.template == "rate_motor_lag":
             yield "parameters.T_m = { maximum = 0.15 } # the motor is the faster of the two lags"
-        if self.estimator != "instrument":
+        if self.chirped:
+            yield "# The chirp is logged, so a controller in the loop does not bias the estimate."
+            yield f'response = {{ estimator = "instrument", excitations = ["{CHIRP}"] }}'
+        elif self.estimator != "instrument":
             yield "# No injection was logged here: a direct estimate, with the loop's bias in it."
             yield f"response = {{ estimator = {toml_value(self.estimator)} }}"
 
@@ -160,6 +166,7 @@ def _axis(log: Log, inspection: Inspection, band: AxisBand, model: str | None) -
     return _Axis(
         axis, flown, unseen, (low, high), "instrument" if runs else "composite",
         model or TEMPLATES[axis], f"{said}, inside what was swept",
+        not runs and bool(_chirped(others)),
     )  # fmt: skip
 
 
@@ -172,9 +179,12 @@ def _flown(
 ) -> tuple[tuple[_Segment, ...], tuple[_Segment, ...], float]:
     """Segments of the fit, a run kept back where there are several, and the highest swept rad/s."""
     if not runs:
-        spans = [(each.start_s, each.stop_s) for each in others]
-        numbered = enumerate(spans, 1)
-        return tuple(_Segment(f"{axis} {k}", span_s=span) for k, span in numbered), (), math.inf
+        # A chirp is told from what else moved the axis, which is no part of its fit.
+        told = _chirped(others) or others
+        numbered = enumerate(((each.start_s, each.stop_s) for each in told), 1)
+        made = [_Segment(f"{axis} {k}", span_s=span) for k, span in numbered]
+        kept = made[-1:] if len(made) > 1 and _chirped(others) else []
+        return tuple(made[: len(made) - len(kept)]), tuple(kept), math.inf
     segments = []
     for k, run in enumerate(runs, 1):
         alike = [each for each in log.sid_runs if each.axis == run.axis]
@@ -183,6 +193,11 @@ def _flown(
     high = math.tau * OF_SWEEP * max(max(run.f_start_hz, run.f_stop_hz) for run in runs)
     kept = segments[-1:] if len(segments) > 1 else []
     return tuple(segments[: len(segments) - len(kept)]), tuple(kept), high
+
+
+def _chirped(others: list[FoundExcitation]) -> list[FoundExcitation]:
+    """Chirps, whose set-point is an instrument."""
+    return [each for each in others if each.kind == "chirp"]
 
 
 def _span_of(run: SidRun) -> Span:

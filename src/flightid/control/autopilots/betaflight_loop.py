@@ -1,0 +1,288 @@
+"""Betaflight's rate controller as a loop."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.signal import lfilter
+
+from flightid.control.autopilots.axis_loop import AxisLoop, Gyro
+from flightid.control.autopilots.betaflight_filters import betaflight_filters
+from flightid.control.autopilots.filter_stages import FilterStage
+from flightid.control.autopilots.filters import (
+    Omega,
+    Response,
+    difference_response,
+    one_pole_response,
+    one_pole_weight,
+)
+from flightid.control.autopilots.loop_run import LoopFlags, LoopRun, samples
+from flightid.control.autopilots.notch_tracking import NotchTracking
+from flightid.control.autopilots.parameter_files import GainChange
+from flightid.control.autopilots.parameter_table import Axis, AxisParameters
+from flightid.errors import DataError, OptionError
+
+P_SCALE, I_SCALE, D_SCALE = 0.032029, 0.244381, 0.000529
+"""PTERM_SCALE, ITERM_SCALE and DTERM_SCALE: PID sum over deg/s for a gain of one."""
+YAW_I = 2.5
+"""What the firmware multiplies the I of yaw by."""
+MIXER = 1000.0
+"""PID sum of a full command."""
+SUM_LIMIT, I_SHARE = 500.0, 85.0
+TPA_OF_D = 1.0
+"""`tpa_mode` D: throttle takes from D alone, else from P and D."""
+SLIDERS = "simplified_pids_mode"
+
+
+@dataclass(frozen=True, repr=False)
+class BetaflightLoop(AxisLoop):
+    """One axis of Betaflight: output is the PID sum over 1000, the mixer's command.
+
+    P and I act on the error, D on the filtered gyro's difference behind the D-term filters. I takes
+    the error of the loop itself, and has 2.5 times its weight in yaw, where P passes a low-pass.
+    Feed-forward acts on the sticks, not on the set-point, and has no part in this view.
+
+    Attributes
+    ----------
+    stages : tuple of FilterStage
+        Filters on the gyro and on the D-term, where throttle and motors have them.
+    throttle_shares : tuple of float
+        What TPA leaves of P and of D at the throttle of the flight.
+    integral_limit : float
+        Of I, in `output_unit`.
+
+    Reference
+    ---------
+    Betaflight, src/main/flight/pid.c, pid.h and pid_init.c (4.3 to 2025.12).
+
+    Example
+    -------
+    >>> from flightid.control.autopilots import axis_loop
+    >>> axis_loop("betaflight", "roll", loop_rate_hz=4000.0)
+    AxisLoop(betaflight roll, 4000 Hz, P 45, I 80, D 30, FF 120)
+    """
+
+    stages: tuple[FilterStage, ...] = ()
+    throttle_shares: tuple[float, float] = (1.0, 1.0)
+    integral_limit: float = math.inf
+    autopilot: ClassVar[str] = "betaflight"
+    full_output: ClassVar[float] = SUM_LIMIT / MIXER
+    gains_are_whole: ClassVar[bool] = True
+
+    @property
+    def angle_gain_1_s(self) -> float:
+        """No angle controller is modelled.
+
+        Raises
+        ------
+        OptionError
+            Always.
+        """
+        raise OptionError(
+            "the angle controller of Betaflight is not modelled",
+            found="an angle loop",
+            needed="its rate loop",
+        )
+
+    def unit_of(self, role: str) -> float:
+        """Of P, I and D: what one count is worth, in output per rad/s, per rad, per rad/s²."""
+        scale = {"p": P_SCALE, "i": I_SCALE, "d": D_SCALE}.get(role)
+        if scale is None:
+            return 1.0
+        if (role, self.axis) == ("i", "yaw"):
+            scale *= YAW_I
+        return math.degrees(scale) / MIXER
+
+    def written(self, value: float) -> float:
+        """The whole number that the command line takes."""
+        return float(round(value))
+
+    def gyro_response(self, omega_rad_s: ArrayLike) -> Response:
+        """Filters between the gyro's samples and the rate that the controller takes."""
+        return self._along("gyro", np.atleast_1d(np.asarray(omega_rad_s, dtype=np.float64)))
+
+    def plant_gyro_response(self, omega_rad_s: ArrayLike) -> Response:
+        """Filters of the gyro that a plant identified from the filtered rate holds."""
+        return self.gyro_response(omega_rad_s)
+
+    def _along(self, path: str, omega: Omega) -> Response:
+        product = np.ones(omega.size, dtype=np.complex128)
+        for stage in self.stages:
+            if stage.path == path:
+                product = product * stage.response(omega)
+        return product
+
+    def _stages(self) -> tuple[FilterStage, ...]:
+        return self.stages
+
+    def _error_terms(self, omega: Omega) -> dict[str, Response]:
+        share, rate_hz = self.throttle_shares[0], self.loop_rate_hz
+        smooth = one_pole_response(self.values.get("p_filter", 0.0), omega, rate_hz)
+        return {
+            "p": self.unit_of("p") * share * smooth,
+            "i": self.unit_of("i") / difference_response(omega, rate_hz),
+        }
+
+    def _feedback_terms(self, omega: Omega) -> dict[str, Response]:
+        slope = difference_response(omega, self.loop_rate_hz) * self._along("derivative", omega)
+        return self._error_terms(omega) | {"d": self.unit_of("d") * self.throttle_shares[1] * slope}
+
+    def _forward_terms(self, omega: Omega) -> dict[str, Response]:
+        return self._error_terms(omega)
+
+    def run(
+        self,
+        setpoint_rad_s: ArrayLike,
+        rate_rad_s: ArrayLike,
+        flags: LoopFlags | None = None,
+        *,
+        gyro: Gyro = "filtered",
+        single_precision: bool = True,
+    ) -> LoopRun:
+        """See `AxisLoop.run`; in double precision, from the filtered rate."""
+        if gyro == "raw":
+            raise OptionError(
+                "Betaflight's gyro filters are not run",
+                found="gyro='raw'",
+                needed="the filtered rate, gyroADC of the blackbox",
+            )
+        del flags, single_precision
+        setpoint, rate = samples(setpoint_rad_s, rate_rad_s, 1)
+        error, rate_hz = setpoint - rate, self.loop_rate_hz
+        weight = one_pole_weight(self.values.get("p_filter", 0.0), rate_hz)
+        gain = self.unit_of("p") * self.values["p"] * self.throttle_shares[0]
+        smooth = rate
+        for stage in self.stages:
+            if stage.path == "derivative":
+                for b0, b1, b2, a1, a2 in stage.sections:
+                    smooth = lfilter([b0, b1, b2], [1.0, a1, a2], smooth)
+        slope = np.diff(smooth, prepend=0.0) * rate_hz
+        step = self.unit_of("i") * self.values["i"] / rate_hz
+        terms = {
+            "P": lfilter([weight], [1.0, weight - 1.0], gain * error),
+            "I": _clamped_sum(step * error, self.integral_limit),
+            "D": -self.unit_of("d") * self.values["d"] * self.throttle_shares[1] * slope,
+        }
+        return LoopRun(sum(terms.values(), np.zeros(rate.size)), terms, rate)
+
+
+def _clamped_sum(steps: np.ndarray, limit: float) -> np.ndarray:
+    total = np.cumsum(steps)
+    if np.abs(total).max(initial=0.0) <= limit:
+        return np.asarray(total)
+    made, held = np.empty_like(steps), 0.0
+    for place, step in enumerate(steps):
+        held = min(max(held + step, -limit), limit)
+        made[place] = held
+    return made
+
+
+def betaflight_loop(
+    found: AxisParameters,
+    known: Mapping[str, float],
+    shared: tuple[Axis, dict[str, float], dict[str, str], float, float, float],
+    tracking: NotchTracking,
+) -> BetaflightLoop:
+    """Loop of an axis from its parameters, at the throttle and the motors' turns of a flight.
+
+    Raises
+    ------
+    DataError
+        Yaw is controlled in another form.
+    """
+    axis, rate_hz, gyro_hz = shared[0], shared[3], shared[4]
+    if axis == "yaw" and known.get("use_integrated_yaw"):
+        raise DataError(
+            "yaw integrates its whole PID sum, which is another controller",
+            found="use_integrated_yaw 1",
+            needed="use_integrated_yaw OFF",
+        )
+    throttle = 0.0 if tracking.throttle is None else min(max(tracking.throttle.middle, 0.0), 1.0)
+    motors_hz = [each.middle for each in tracking.motors]
+    stages = betaflight_filters(
+        known, loop_rate_hz=rate_hz, gyro_rate_hz=gyro_hz, throttle=throttle, motors_hz=motors_hz
+    )
+    limit = known.get("pidsum_limit_yaw" if axis == "yaw" else "pidsum_limit", SUM_LIMIT)
+    return BetaflightLoop(
+        *shared,
+        (),
+        tuple(_unknown(known, motors_hz)),
+        found.assumed,
+        tuple(_said(known, axis, throttle)),
+        stages=stages,
+        throttle_shares=_throttle_shares(known, throttle),
+        integral_limit=limit * known.get("iterm_windup", I_SHARE) / 100.0 / MIXER,
+        beside_gains=tuple(_beside(known, axis)),
+    )
+
+
+def _throttle_shares(known: Mapping[str, float], throttle: float) -> tuple[float, float]:
+    """What TPA leaves of P and of D."""
+    begin = (known.get("tpa_breakpoint", 1350.0) - 1000.0) / 1000.0
+    rate = known.get("tpa_rate", 0.0) / 100.0
+    if begin >= 1.0:
+        return 1.0, 1.0
+    left = 1.0 - rate * max(throttle - begin, 0.0) / (1.0 - begin)
+    return (1.0 if known.get("tpa_mode", TPA_OF_D) == TPA_OF_D else left), left
+
+
+def _unknown(known: Mapping[str, float], motors_hz: list[float]) -> list[str]:
+    said = []
+    if known.get("dyn_notch_count"):
+        said.append("dynamic notches follow peaks that the log does not tell: not in this view")
+    if known.get("rpm_filter_harmonics") and not motors_hz:
+        said.append("notches at the motors' turns, which the log does not tell: not in this view")
+    return said
+
+
+def _said(known: Mapping[str, float], axis: str, throttle: float) -> list[str]:
+    """What a view of small signals at one throttle leaves out."""
+    said = [
+        "output limits, mixer, thrust linearisation, dynamic idle and battery compensation act "
+        "behind the PID sum: the plant is that of the flight's throttle and battery"
+    ]
+    shares = _throttle_shares(known, throttle)
+    if known.get("tpa_rate"):
+        said.append(
+            f"TPA leaves {shares[0]:.0%} of P and {shares[1]:.0%} of D at the flight's throttle "
+            f"of {throttle:.0%}: this view stays there"
+        )
+    if known.get("iterm_relax"):
+        said.append("iterm_relax holds I back in fast set-points: steps are without it")
+    if known.get("anti_gravity_gain"):
+        said.append("anti_gravity raises P and I while the throttle moves: not in this view")
+    if known.get(f"f_{axis}"):
+        said.append(f"f_{axis} acts on the sticks: steps of the set-point are without it")
+    if known.get("abs_control_gain"):
+        said.append("abs_control corrects the set-point: not in this view")
+    least, most = _boost(known, axis)
+    if most > least:
+        said.append(
+            f"D moved between {least:g} and {most:g} with the motion: as flown stands "
+            f"{known[f'd_{axis}']:g}"
+        )
+    return said
+
+
+def _boost(known: Mapping[str, float], axis: str) -> tuple[float, float]:
+    """Between what D moves: up to d_max since 2025.12, from d_min before."""
+    own = known.get(f"d_{axis}", 0.0)
+    least = known.get(f"d_min_{axis}", 0.0)
+    return (least if 0.0 < least < own else own), max(own, known.get(f"d_max_{axis}", 0.0))
+
+
+def _beside(known: Mapping[str, float], axis: str) -> list[GainChange]:
+    """Off, so that D is what was tuned; and no slider may write over the gains."""
+    found = []
+    least, most = _boost(known, axis)
+    name = f"d_min_{axis}" if least < known.get(f"d_{axis}", 0.0) else f"d_max_{axis}"
+    if most > least:
+        found.append(GainChange(name, 0.0, known[name], "D stays what it is tuned to"))
+    if known.get(SLIDERS):
+        found.append(GainChange(SLIDERS, 0.0, known[SLIDERS], "no slider writes over the gains"))
+    return found

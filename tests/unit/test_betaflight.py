@@ -1,0 +1,195 @@
+"""Betaflight: its controller against its own arithmetic, its chirps, its files of gains."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import flightid as fid
+from flightid.control.autopilots import (
+    axis_loop,
+    axis_loop_of,
+    read_parameters,
+    write_parameters,
+)
+from flightid.control.autopilots.from_log import autopilot_of
+from flightid.control.autopilots.notch_tracking import Centre, NotchTracking
+from flightid.control.tuning.controller_paths import ControllerPaths
+from flightid.control.tuning.gain_search import GainSearchResult
+from flightid.control.tuning.whole_gains import ROUNDED, whole_gains
+from flightid.errors import DataError, OptionError
+from flightid.inspection.betaflight_chirps import chirps
+from flightid.inspection.excitation_found import injected_spans
+from flightid.logs.blackbox.settings import settings_of
+from tests import betaflight_flight as betaflight
+from tests.blackbox_builder import SETTINGS, blackbox
+from tests.closeness import assert_close
+
+RATE_HZ = 1.0 / betaflight.STEP
+
+
+def _settings() -> dict[str, float]:
+    """Of the simulated vehicles, by the names of the command line."""
+    return settings_of(betaflight.header_of(betaflight.default_gains(1), 0))
+
+
+def test_a_gain_is_worth_what_the_firmware_makes_of_it() -> None:
+    """PTERM_SCALE 0.032029, ITERM_SCALE 0.244381, DTERM_SCALE 0.000529; the mixer takes 1000ths."""
+    roll, yaw = (axis_loop("betaflight", axis, loop_rate_hz=4000.0) for axis in ("roll", "yaw"))
+    hundred, still = np.radians([100.0, 100.0]), np.zeros(2)
+    made, turned = roll.run(hundred, still).terms, roll.run(still, np.radians([0.0, 1.0])).terms
+    for found, by_hand in (
+        (made["P"][0], 0.1441305),  # 45 · 0.032029 · 100 deg/s / 1000
+        (made["I"][1], 2.0 * 4.88762e-4),  # 80 · 0.244381 · 100 deg/s · 25e-5 s / 1000
+        (turned["D"][1], -0.06348),  # 30 · 0.000529 · 1 deg/s · 4000 Hz / 1000
+        (yaw.run(hundred, still).terms["I"][0], 2.5 * 4.88762e-4),
+    ):
+        assert_close(found, by_hand, why="arithmetic by hand", rtol=1e-12)
+
+
+def test_terms_are_those_of_the_firmware() -> None:
+    """P, I and D of a noisy flight, TPA and filters at work, against the simulated firmware."""
+    quads = betaflight.Quads.of(1, seed=3)
+    gains = betaflight.default_gains(1) | {"d": np.array([[30.0, 34.0, 9.0]])}
+    none = np.full(500, -1)
+    flown = betaflight.fly(
+        quads, gains, np.zeros(500), none, noise=3.0, d_max=np.zeros(3), every=1
+    ).columns
+    throttle = float(quads.throttle[0, 0])
+    assert throttle > 0.36, "TPA is at work"
+    tracking = NotchTracking(throttle=Centre(throttle, throttle, throttle))
+    for place, axis in enumerate(betaflight.AXES):
+        settings = _settings() | {f"d_{axis}": gains["d"][0, place]}
+        loop = axis_loop("betaflight", axis, settings, notch_tracking=tracking)
+        assert_close(loop.loop_rate_hz, RATE_HZ, why="the arithmetic by hand", rtol=1e-12)
+        rates = {name: np.radians(flown[name][:, 0, place]) for name in ("set", "gyro")}
+        made = loop.run(rates["set"], rates["gyro"])
+        for name, term in made.terms.items():
+            # The columns are single precision.
+            size = np.abs(flown[name]).max()
+            assert_close(1e3 * term, flown[name][:, 0, place], why="single", atol=2e-5 * size)
+        # The linear view is that of the recursion.
+        time_s, omega = np.arange(4000) / RATE_HZ, 2.0 * np.pi * 40.0
+        wave = loop.run(np.zeros(4000), np.sin(omega * time_s)).output
+        last = slice(2000, 4000)
+        basis = np.column_stack([np.sin(omega * time_s), np.cos(omega * time_s), np.ones(4000)])
+        found = np.linalg.lstsq(basis[last], wave[last], rcond=None)[0]
+        told = -loop.feedback([omega], gyro="filtered", with_hold=False)[0]
+        assert_close(
+            [found[0], found[1]], [told.real, told.imag], why="settled", atol=2e-4 * abs(told)
+        )
+
+
+def _log(folder: Path, **changes: str) -> fid.Log:
+    """Chirps of 4 s on roll and yaw without a vehicle: the set-point and the phase alone."""
+    n = round(4.0 / betaflight.STEP)
+    axis = np.concatenate([np.full(1000, -1), np.zeros(n, int), np.full(3000, -1), np.full(n, 2)])
+    run = 2.0 * np.pi * np.cumsum(np.linspace(3.0, 20.0, n)) * betaflight.STEP
+    phase = np.zeros(axis.size)
+    phase[axis == 0] = phase[axis == 2] = run
+    rng = np.random.default_rng(0)
+    columns = {
+        name: 5.0 * rng.standard_normal((axis.size // betaflight.LOGGED, 1, 3))
+        for name in ("P", "I", "D", "gyro", "set", "sum")
+    }
+    for place in (0, 2):
+        moved = np.where(axis == place, 200.0 * np.cos(phase - 0.8), 0.0)
+        columns["set"][:, 0, place] += moved[:: betaflight.LOGGED]
+    gains = betaflight.default_gains(1)
+    flown = betaflight.Blackbox(columns, gains)
+    content = betaflight.blackbox_of(flown, betaflight.Quads.of(1), phase, axis, 0)
+    for line, value in changes.items():
+        content = content.replace(line.encode(), value.encode())
+    path = folder / "chirps.bfl"
+    path.write_bytes(content)
+    return fid.read_log(path)
+
+
+def test_chirps_are_found_by_the_phase_that_moves_a_set_point(tmp_path: Path) -> None:
+    log = _log(tmp_path)
+    roll, yaw = chirps(log)
+    assert (roll.axis, yaw.axis) == ("roll", "yaw")
+    assert_close(roll.span_s, [5.25, 9.25], why="ends", atol=0.005)
+    assert_close(
+        [roll.low_hz, roll.high_hz, roll.size_deg_s], [3.0, 20.0, 200.0], why="ends", rtol=0.02
+    )
+    assert injected_spans(log) == [roll.span_s, yaw.span_s]
+    record = log.record(names=["tau_phi", "p", "chirp"], span_s=roll.span_s)
+    assert record.hold is None, "every second loop is logged: nothing is known between"
+    inside = record["chirp"][10:-10]
+    assert_close([inside.max(), inside.min()], [1.0, -1.0], why="a cosine", atol=1e-3)
+    # A phase that no set-point follows is another debug field.
+    told = log.table("main")["debug[0]"]
+    assert told.max() > 31_000
+    moved = _log(tmp_path, **{"setpoint[": "setsomes["})
+    assert chirps(moved) == ()
+
+
+def test_loops_of_a_log_are_those_of_its_header(tmp_path: Path) -> None:
+    log = _log(tmp_path)
+    loop = axis_loop_of(log, "roll")
+    assert [loop.gains[name] for name in ("p_roll", "i_roll", "d_roll")] == [45.0, 80.0, 30.0]
+    assert [stage.name for stage in loop.filter_stages()] == [
+        "gyro_lpf2", "gyro_lpf1", "dterm_lpf1", "dterm_lpf2",
+    ]  # fmt: skip
+    assert {each.name: each.old for each in loop.beside_gains} == {
+        "d_max_roll": 40.0,
+        "simplified_pids_mode": 2.0,
+    }
+    assert "TPA leaves 100% of P and " in " ".join(loop.unmodelled)
+    for firmware in ("Betaflight 4.2.11", "EmuFlight 0.4.1"):
+        other = _log(tmp_path, **{"Betaflight 2025.12.1": firmware})
+        with pytest.raises(DataError, match=r"needed Betaflight 4\.3 or newer"):
+            autopilot_of(other)
+    integrated = _settings() | {"use_integrated_yaw": 1.0}
+    with pytest.raises(DataError, match="integrates its whole PID sum"):
+        axis_loop("betaflight", "yaw", integrated)
+    with pytest.raises(OptionError, match="not modelled"):
+        _ = loop.angle_gain_1_s
+    with pytest.raises(OptionError, match="gyro filters are not run"):
+        loop.run([0.0], [0.0], gyro="raw")
+
+
+def test_gains_are_written_as_lines_and_taken_back(tmp_path: Path) -> None:
+    loop = axis_loop("betaflight", "roll", _settings())
+    made = write_parameters("betaflight", loop.beside_gains, tmp_path / "gains.txt")
+    assert made.path.read_text().splitlines() == [
+        "# d_max_roll: D stays what it is tuned to; was 40",
+        "set d_max_roll = 0",
+        "# simplified_pids_mode: no slider writes over the gains; was 2",
+        "set simplified_pids_mode = OFF",
+        "save",
+    ]
+    assert made.rollback is not None
+    assert read_parameters(made.rollback) == {"d_max_roll": 40.0, "simplified_pids_mode": 2.0}
+    for wrong in ({"p_roll": 45.5}, {"ATC_RAT_RLL_P": 1.0}):
+        with pytest.raises(OptionError, match="command line takes no such setting"):
+            write_parameters("betaflight", wrong, tmp_path / "wrong.txt")
+
+
+def test_gains_are_whole_numbers_that_keep_their_margins() -> None:
+    plant = fid.load_model("rate_integrator", axis="roll").with_values(
+        {"Ltphi": 900.0, "tau": 0.02}
+    )
+    loop = axis_loop("betaflight", "roll", _settings())
+    design = fid.tune_pid(plant, gains=loop, band_rad_s=(2.0, 400.0), nominal=True)
+    assert design.exists
+    assert all(value == round(value) for value in design.gains.values())
+    assert all(v == round(v) for stage in design.stages for v in stage.gains.values())
+    assert design.worst_case("rate loop", "phase margin").nominal >= 45.0
+    paths = ControllerPaths(loop, "filtered", with_angle=False)
+    found = GainSearchResult(paths.gains_of(loop) * 40.0, True, (), {})
+    far = whole_gains(design.problem, paths, found)
+    assert not far.exists
+    assert far.binding == (ROUNDED,)
+
+
+def test_a_log_of_every_loop_tells_its_hold(tmp_path: Path) -> None:
+    n = 64
+    columns = {"time": 10_000_000 + 500 * np.arange(n), "gyroADC[0]": np.arange(n)}
+    path = tmp_path / "a.bfl"
+    for denominator, hold in (("2", "zero"), ("1", None)):
+        path.write_bytes(blackbox(columns, {**SETTINGS, "pid_process_denom": denominator}))
+        assert fid.read_log(path).record().hold == hold
