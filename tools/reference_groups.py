@@ -200,6 +200,7 @@ GROUPS = {
             "px4_autotune_gains",
             "read_parameters",
             "write_ardupilot_parameters",
+            "write_betaflight_settings",
             "write_px4_parameters",
         ),
     ),
