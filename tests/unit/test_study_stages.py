@@ -17,7 +17,7 @@ from flightid.report.text import to_text
 from flightid.study.answer import _models
 from flightid.study.settings import Segment
 from flightid.study.stage_runner import digest
-from flightid.study.stages import compare_free_run
+from flightid.study.stages import compare_free_run, select_coherent
 from flightid.study.taking import _with_injected
 from tests.unit.test_study_records import OWN, rig
 
@@ -261,3 +261,18 @@ def test_no_model_is_none_to_use() -> None:
     said = _models(study, "study.toml")  # type: ignore[arg-type]
     assert said.light is Light.UNKNOWN
     assert "no model was made" in said.message
+
+
+def test_a_narrow_response_is_no_reason_to_leave_out_the_only_input() -> None:
+    omega = np.geomspace(1.0, 10.0, 21)
+    coherence = np.where(omega < 1.3, 0.9, 0.2)
+    seen = fid.FrequencyResponse.from_values(
+        omega,
+        np.ones((1, 2, 21)),
+        inputs=["drive", "idle"],
+        outputs=["angle"],
+        coherence=np.stack([coherence, np.full(21, 0.2)])[None],
+    )
+    assert select_coherent(seen, 0.6, 0.3, False).names == ()
+    assert select_coherent(seen, 0.6, 0.3, False, on_samples=True).names == ("angle/drive",)
+    assert select_coherent(seen, 0.6, 0.1, False, on_samples=True).names == ("angle/drive",)

@@ -197,6 +197,7 @@ def _fit(
             settings.response.minimum_coherence,
             settings.response.minimum_decades,
             settings.responses == (UNBROKEN,),
+            task.model is None,
         )
         task = chosen_by(task, coherent.value)
     flown = [records[name] for name in settings.identify]

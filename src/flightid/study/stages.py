@@ -75,6 +75,7 @@ def select_coherent(
     minimum_coherence: float,
     minimum_decades: float,
     unbroken: bool,
+    on_samples: bool = False,
 ) -> CoherentPairs:
     """Which responses are coherent over a band wide enough to fit.
 
@@ -84,10 +85,16 @@ def select_coherent(
     minimum_coherence, minimum_decades : float
     unbroken : bool
         Take each response's widest coherent band without a gap in place of all its frequencies.
+    on_samples : bool
+        The model is fitted to samples, so that a narrow response is no reason to leave out the
+        only inputs that there are: the fit's own evidence judges it.
     """
     found = coherent_pairs(
         response, minimum_coherence=minimum_coherence, minimum_decades=minimum_decades
     )
+    if on_samples and not found.names:
+        seen = tuple(replace(each, kept=each.band_rad_s is not None) for each in found.pairs)
+        found = replace(found, pairs=seen)
     if not unbroken:
         return found
     judged = []
