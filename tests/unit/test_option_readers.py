@@ -187,5 +187,6 @@ def test_lists_are_repeated_or_have_commas(tmp_path: Path) -> None:
                   ):  # fmt: skip
         result = CliRunner().invoke(command, given.format(path).split())
         assert result.output == (
-            "[('inputs', ('u', 'v', 'x,y')), ('nb', (1.0, 2.0)), ('units', {'u': 'V', 'v': 'rad/s'})]\n"
+            "[('inputs', ('u', 'v', 'x,y')), ('nb', (1.0, 2.0)), "
+            "('units', {'u': 'V', 'v': 'rad/s'})]\n"
         )

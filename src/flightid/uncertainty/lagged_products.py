@@ -69,13 +69,20 @@ def explained(products: Array, aims: Array) -> Array:
         Of the columns.
     aims : ndarray, shape (n_known, n_targets)
         Of the columns with the targets.
+
+    Example
+    -------
+    >>> explained(np.array([[4.0, 0.0], [0.0, 0.0]]), np.array([[2.0], [0.0]])).round(9)
+    array([1.])
     """
     weights = _solved(products, aims)
     return np.asarray(np.sum(weights * (2.0 * aims - products @ weights), axis=0))
 
 
 def _solved(products: Array, aims: Array) -> Array:
-    size = np.maximum(np.sqrt(np.diagonal(products)), np.finfo(float).tiny)
+    size = np.sqrt(np.diagonal(products))
+    # A column of zeros has no weight; the square of the smallest number would be zero too.
+    size = np.where(size > 0.0, size, 1.0)
     scaled = products / np.outer(size, size)
     scaled.flat[:: size.size + 1] += RIDGE
     factor = scipy.linalg.cho_factor(scaled, overwrite_a=True)
