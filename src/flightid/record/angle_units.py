@@ -86,10 +86,13 @@ def angle_unit_faults(
     >>> fault.finding.code
     'units-swapped'
     """
-    finite = {name: _finite(*data) for name, data in channels.items()}
+    angles = [name for name in channels if is_convertible(units[name], "rad")]
+    rates = [name for name in channels if is_convertible(units[name], "rad/s")]
+    if not (angles and rates):
+        return []
+    finite = {name: _finite(*channels[name]) for name in (*angles, *rates)}
     moving = {n: d for n, d in finite.items() if d[1].size >= FEWEST and np.ptp(d[1]) > 0.0}
-    angles = [name for name in moving if is_convertible(units[name], "rad")]
-    rates = [name for name in moving if is_convertible(units[name], "rad/s")]
+    angles, rates = ([n for n in names if n in moving] for names in (angles, rates))
     found: dict[str, SampleFault] = {}
     known = set(channels) if taken is None else set(taken)
     for angle, rate in product(angles, rates):

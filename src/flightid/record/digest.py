@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid import _native
 from flightid.errors import DataError
 from flightid.record.record import Record
 
@@ -19,7 +20,6 @@ MARKS = 64
 """Marks of a channel: a tenth of its record holds some six of them."""
 FEWEST = 3
 """Marks in common that say that samples are the same."""
-_MIX = np.uint64(0x9E3779B97F4A7C15)
 
 
 @dataclass(frozen=True)
@@ -137,18 +137,7 @@ def _digested(record: Record, held: Sequence[str]) -> RecordDigest:
 
 def _hashes(samples: NDArray[np.float64]) -> NDArray[np.uint64]:
     """Hashes of all spans that move: of samples, of pairs, of fours, to spans of `SPAN`."""
-    # Negative zero is zero; products of unsigned integers wrap, as they are meant to.
-    found = (samples + 0.0).view(np.uint64)
-    if found.size < SPAN:
-        return np.zeros(0, np.uint64)
-    changes = np.cumsum(np.diff(found, prepend=found[:1]) != 0)
-    moving = changes[SPAN - 1 :] > changes[: found.size - SPAN + 1]
-    step = 1
-    while step < SPAN:
-        found = (found[:-step] ^ (found[step:] >> np.uint64(7))) * _MIX + found[step:]
-        found ^= found >> np.uint64(29)
-        step *= 2
-    return found[moving]
+    return _native.span_hashes(samples, SPAN)
 
 
 def _smallest(found: NDArray[np.uint64]) -> NDArray[np.uint64]:

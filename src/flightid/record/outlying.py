@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid import _native
 from flightid.errors import DataError, OptionError
 
 NORMAL_MAD = 1.4826
@@ -81,24 +82,31 @@ def bridge_outliers(
     return np.where(bad, np.interp(time_s, time_s[good], samples[good]), samples), count
 
 
-def distances(samples: NDArray[np.float64], half_width: int) -> tuple[NDArray[np.float64], float]:
-    """Distance of each sample from its running median, and their robust standard deviation."""
-    # A tenth of a second of imports that no record without outliers needs.
-    from scipy.ndimage import median_filter  # noqa: PLC0415
+def none_stands_out(away: NDArray[np.float64], deviations: float) -> bool:
+    """Whether no distance exceeds so many robust deviations, as far as a count can tell."""
+    near = float(away.max()) / (NORMAL_MAD * deviations) * (1.0 + 1e-9)
+    return 2 * int(np.count_nonzero(away > near)) > away.size + 1
 
-    away = np.abs(samples - median_filter(samples, 2 * half_width + 1, mode="nearest"))
+
+def distances(samples: NDArray[np.float64], half_width: int) -> NDArray[np.float64]:
+    """Distance of each sample from its running median."""
+    return np.abs(samples - _native.running_median(samples, half_width))
+
+
+def spread_of(away: NDArray[np.float64]) -> float:
+    """Robust standard deviation of distances."""
     typical = float(np.median(away))
     if typical == 0.0:
         # More than half of the samples are their neighbours' median: a held or quiet channel.
         moved = away[away > 0.0]
         typical = float(np.median(moved)) if moved.size else 0.0
-    return away, NORMAL_MAD * typical
+    return NORMAL_MAD * typical
 
 
 def _outlying(
     samples: NDArray[np.float64], deviations: float, half_width: int
 ) -> NDArray[np.bool_]:
-    away, spread = distances(samples, half_width)
+    away = distances(samples, half_width)
     # A clean curve lies near its running median everywhere: what rounding adds is no outlier.
     rounding = 1e-9 * float(np.ptp(samples))
-    return np.asarray(away > deviations * spread + rounding)
+    return np.asarray(away > deviations * spread_of(away) + rounding)

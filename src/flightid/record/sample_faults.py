@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from flightid.conventions import Light, Role
 from flightid.findings import Finding, counted
-from flightid.record.outlying import distances
+from flightid.record.outlying import distances, none_stands_out, spread_of
 from flightid.record.repeats import found_staircase
 from flightid.units import DIMENSIONLESS, is_convertible, si_base
 
@@ -103,6 +103,16 @@ class _ExaminedChannel:
         """Samples alone; distances of all from the median of their neighbours; their spread."""
         return _alone(self.values)
 
+    @cached_property
+    def steps(self) -> Array:
+        """From each sample to the next."""
+        return np.diff(self.values)
+
+    @cached_property
+    def rests(self) -> bool:
+        """Whether any sample is that before."""
+        return not np.all(self.steps)
+
     @property
     def of_unit(self) -> str:
         """The unit as it follows a number."""
@@ -116,12 +126,15 @@ class _ExaminedChannel:
 
 
 def _alone(values: Array) -> tuple[NDArray[np.intp], Array, float]:
+    away = distances(values, HALF_WIDTH)
+    if none_stands_out(away, FAR):
+        return np.empty(0, dtype=np.intp), away, 0.0
     low, high = np.percentile(values, [1, 99])
-    # A median is one of the neighbours: nothing lies further from it than steps can carry.
-    if HALF_WIDTH * float(np.abs(np.diff(values)).max()) <= HARMFUL * (high - low):
-        return np.empty(0, dtype=np.intp), np.zeros(0), 0.0
-    away, spread = distances(values, HALF_WIDTH)
-    tall = (away > FAR * spread) & (away > HARMFUL * (high - low))
+    beyond = away > HARMFUL * (high - low)
+    if not beyond.any():
+        return np.empty(0, dtype=np.intp), away, 0.0
+    spread = spread_of(away)
+    tall = beyond & (away > FAR * spread)
     if not tall.any():
         return np.empty(0, dtype=np.intp), away, spread
     from scipy.ndimage import maximum_filter1d  # noqa: PLC0415
@@ -170,11 +183,11 @@ def _spikes(channel: _ExaminedChannel) -> SampleFault | None:
 
 
 def _wraps(channel: _ExaminedChannel) -> SampleFault | None:
-    name, values = channel.name, channel.values
+    name = channel.name
     if not is_convertible(channel.unit, "rad"):
         return None
     turn = TURN / si_base(channel.unit)[0]
-    steps = np.diff(values)
+    steps = channel.steps
     at = np.flatnonzero(np.abs(np.abs(steps) - turn) < 0.05 * turn)
     alone, _, _ = channel.alone
     # A lone sample that is off by a turn is a spike; both of its steps are.
@@ -190,8 +203,10 @@ def _dead(channel: _ExaminedChannel) -> SampleFault | None:
 
     One at the beginning or the end may be rest.
     """
+    if not channel.rests:
+        return None
     name, stamps, values = channel.name, channel.stamps, channel.values
-    starts, stops = _runs(np.diff(values) == 0.0)
+    starts, stops = _runs(channel.steps == 0.0)
     inner = (starts > 0) & (stops < values.size - 1)
     starts, stops = starts[inner], stops[inner]
     long = (stops - starts) >= max(DEAD_SAMPLES, DEAD_SHARE * values.size)
@@ -200,7 +215,7 @@ def _dead(channel: _ExaminedChannel) -> SampleFault | None:
     moving = np.ones(values.size - 1, dtype=np.bool_)
     for start, stop in zip(starts[long], stops[long], strict=True):
         moving[start:stop] = False
-    steps = np.diff(values)[moving]
+    steps = channel.steps[moving]
     turning = np.mean(np.diff(np.sign(steps)) != 0) if steps.size > DEAD_SAMPLES else 0.0
     if turning < NOISY or np.mean(steps == 0.0) > 1.0 - 2 * NOISY:
         return None
@@ -218,6 +233,8 @@ def _dead(channel: _ExaminedChannel) -> SampleFault | None:
 
 
 def _held(channel: _ExaminedChannel) -> SampleFault | None:
+    if not channel.rests:
+        return None
     name, values = channel.name, channel.values
     found = found_staircase(values)
     if found is None or found.samples < 2:
@@ -233,6 +250,8 @@ def _held(channel: _ExaminedChannel) -> SampleFault | None:
 
 def _clipped(channel: _ExaminedChannel) -> SampleFault | None:
     """Flat tops at the very extremes, met and left abruptly, again and again."""
+    if not channel.rests:
+        return None
     name, values = channel.name, channel.values
     for end in (float(values.max()), float(values.min())):
         starts, stops = _runs(values == end)

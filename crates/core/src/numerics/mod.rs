@@ -8,6 +8,8 @@ pub mod householder;
 pub mod matrix_exponential;
 pub mod polynomial_roots;
 pub mod random;
+pub mod running_median;
+pub mod span_hashes;
 pub mod sparse_lu;
 pub(crate) mod widest;
 pub mod windowed_sinc;

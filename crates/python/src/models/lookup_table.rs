@@ -6,6 +6,8 @@ use flightid_core::CoreError;
 use flightid_core::language::lookup_table::{
     Interpolation, LookupTable as CoreTable, Outside, cubic_spline as spline,
 };
+use flightid_core::numerics::running_median::running_median as medians;
+use flightid_core::numerics::span_hashes::span_hashes as hashes;
 use flightid_core::numerics::windowed_sinc::windowed_sinc as sinc;
 use numpy::{IntoPyArray, PyArray1};
 use pyo3::exceptions::PyValueError;
@@ -111,6 +113,32 @@ fn windowed_sinc<'py>(
     Ok(py.detach(|| sinc(values, position, cutoff, half, beta)).into_pyarray(py))
 }
 
+/// running_median(values: NDArray[np.float64], half: int) -> NDArray[np.float64]
+///
+/// Median of each sample and `half` neighbours on either side; the ends go on as they are.
+#[pyfunction]
+fn running_median<'py>(
+    py: Python<'py>,
+    values: RowMajor1<'_, f64>,
+    half: usize,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let values = values.as_slice()?;
+    Ok(py.detach(|| medians(values, half)).into_pyarray(py))
+}
+
+/// span_hashes(samples: NDArray[np.float64], span: int) -> NDArray[np.uint64]
+///
+/// Hashes of all spans of `span` samples (a power of two) that move.
+#[pyfunction]
+fn span_hashes<'py>(
+    py: Python<'py>,
+    samples: RowMajor1<'_, f64>,
+    span: usize,
+) -> PyResult<Bound<'py, PyArray1<u64>>> {
+    let samples = samples.as_slice()?;
+    Ok(py.detach(|| hashes(samples, span)).into_pyarray(py))
+}
+
 /// Add this file's names to the module.
 ///
 /// # Errors
@@ -118,5 +146,7 @@ fn windowed_sinc<'py>(
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(cubic_spline, module)?)?;
     module.add_function(wrap_pyfunction!(windowed_sinc, module)?)?;
+    module.add_function(wrap_pyfunction!(running_median, module)?)?;
+    module.add_function(wrap_pyfunction!(span_hashes, module)?)?;
     module.add_class::<LookupTable>()
 }

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -213,16 +212,16 @@ def _groups(
     edges = np.append(longest.omega[::stride], np.inf)
     inside_band = int(np.searchsorted(edges, BEYOND_BAND * highest_rad_s))
     edges = edges[: max(inside_band + 1, 2)]
-    groups: list[list[slice]] = []
-    for low, high in pairwise(edges):
-        places = [
-            slice(*np.searchsorted(bins.omega, [low * (1 - 1e-12), high * (1 - 1e-12)]))
-            for bins in records
-        ]
+    # Records of one length share their bins.
+    cuts = {len(bins.omega): np.searchsorted(bins.omega, edges * (1 - 1e-12)) for bins in records}
+    ends = [cuts[len(bins.omega)].tolist() for bins in records]
+    groups = []
+    for number in range(len(edges) - 1):
+        places = [slice(*end[number : number + 2]) for end in ends]
         if sum(place.stop - place.start for place in places) >= 0.9 * count * len(records):
             groups.append(places)
     alike = [group[0] for group in groups if group[0].stop - group[0].start == count]
-    if len({len(bins.omega) for bins in records}) > 1:
+    if len(cuts) > 1:
         alike = []
     at_once = dict(enumerate(local_residuals(records, alike, n_regressors)))
     for number, places in enumerate(groups):
