@@ -14,6 +14,7 @@ import flightid as fid
 from flightid.control.autopilots import axis_loop, axis_loop_of
 from flightid.control.tuning.axis_tuning import Setting, noise_limit
 from flightid.control.tuning.controller_paths import ControllerPaths
+from flightid.control.tuning.evidence import _towards_errors
 from flightid.control.tuning.gain_search import _report
 from flightid.control.tuning.loop_problem import LoopProblem, highest_crossover
 from flightid.control.tuning.order_statistics import content_of_worst, least_share
@@ -162,6 +163,13 @@ def test_models_without_errors_are_refused_or_taken_as_they_are(fit: fid.Fit) ->
     assert "no-uncertainty" in {finding.code for finding in design.findings}
     assert design.content == 0.0
     assert "errors are not known" in str(design.worst_case_table())
+
+
+def test_what_took_the_errors_says_how_to_have_them() -> None:
+    took = Finding("root-at-circle", Light.AMBER, "a root of C: no intervals", "lower the order")
+    source = SimpleNamespace(findings=(Finding("seen", Light.GREEN, "16 starts"), took))
+    assert _towards_errors(source, "a root of C") == "lower the order"
+    assert _towards_errors(source, "given alone").startswith("fit a measured response")
 
 
 PLAIN = {"controller": fid.ControllerOptions(controller="p", controller_rate_hz=400.0), "draws": 5}

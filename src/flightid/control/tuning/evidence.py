@@ -208,14 +208,15 @@ def _refusals(
             "gains for a model whose errors are not known would promise nothing",
             found=uncertain.reason,
             needed="a fit with a covariance",
-            action=_towards_errors(source),
+            action=_towards_errors(source, uncertain.reason),
         )
 
 
-def _towards_errors(source: object) -> str:
+def _towards_errors(source: object, reason: str) -> str:
     """What gives a fit its covariance: what the finding that took it says, where one did."""
     for finding in getattr(source, "findings", ()):
-        if finding.code in WITHHOLDING and finding.action:
+        took = finding.code in WITHHOLDING or finding.message.startswith(reason)
+        if took and finding.action:
             return str(finding.action)
     return "fit a measured response or records; or take nominal=True and keep margins"
 
