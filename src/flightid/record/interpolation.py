@@ -209,8 +209,8 @@ def windowed_sinc(
 ) -> NDArray[np.float64]:
     """Evaluate uniform samples at fractional positions under a Kaiser-windowed sinc.
 
-    The ends are continued by odd reflection, which carries a line on exactly. A constant comes out
-    exactly: each row of weights is divided by its sum. Positions count to 1e-9 of a sample.
+    The ends are continued by odd reflection, which carries a line on. A line comes out exactly:
+    each row of weights sums to one about its position. Positions count to 1e-9 of a sample.
 
     Parameters
     ----------
