@@ -87,7 +87,7 @@ def search(objective: Objective, start: Array) -> SearchOutcome:
     Raises
     ------
     FitError
-        The model cannot be followed over the records at the start.
+        The model cannot be followed over the records at the start, or has no slopes on the way.
 
     Reference
     ---------
@@ -230,7 +230,14 @@ def _learned(
 def _jacobian(objective: Objective, here: _SearchPoint, extra: Curves) -> Array:
     own = objective.model_slopes(here.x)
     slopes = [a + b for a, b in zip(own, extra, strict=True)]
-    return objective.jacobian(here.estimates, slopes)
+    found = objective.jacobian(here.estimates, slopes)
+    if not np.all(np.isfinite(found)):
+        raise FitError(
+            "the responses have no finite slope where the search went",
+            needed="a simulation that stays near the measured outputs",
+            action="check start values and bounds, or fit shorter records",
+        )
+    return found
 
 
 def _size(jacobian: Array, step: Array, place: _SearchPoint) -> float:
