@@ -35,7 +35,7 @@ def test_the_truth_predicts_itself_with_every_shift_recovered() -> None:
     decay = shifts.initial_state[0] - shifts.state_bias[0] / 2.0
     assert_close(at_rest, 0.25 + 0.2, rtol=1e-9, why="the constant part is unique")
     assert_close(decay, 0.7 - 0.2, rtol=1e-9, why="the decaying part is unique")
-    assert "verification-shifts-not-unique" in {finding.code for finding in result.findings}
+    assert "verification-start-untold" not in {finding.code for finding in result.findings}
 
 
 def test_bias_and_reference_alone_are_unique() -> None:

@@ -9,9 +9,10 @@ import numpy as np
 
 from flightid.errors import OptionError, UnknownNameError
 from flightid.identification.prediction.equations import predict_equations
+from flightid.identification.prediction.free_run import growth
 from flightid.identification.prediction.linear import Freedom, predict_linear
 from flightid.identification.prediction.remembered import WORDS
-from flightid.identification.prediction.request import FREE_RUN, Request
+from flightid.identification.prediction.request import FREE_RUN, LEAST_PER_STATE, Request
 from flightid.identification.prediction.result import Prediction, Shifts
 from flightid.identification.prediction.weights import guide_weights
 from flightid.models import StateSpaceModel
@@ -19,6 +20,15 @@ from flightid.models.model import LinearModel
 from flightid.models.state_space.first_sample import measured_start
 from flightid.record import Channel, Record, Step
 from flightid.simulation.simulate import with_constants
+
+TOLD_BY = 3
+"""A third of a record tells its start and biases, the whole is scored. Right models (noise 5 %, 20
+and 60 s, in trim or off it) then stay green in 100 % of runs, with 3 % error in all modes too; a
+spiral that grows with 0.1 1/s where the true one decays falls from a fit of 71 to 92 % to 76 to
+-1052 %; from a tenth, right models start too poorly (80 % green)."""
+TOLD_BY_ALL = 4.6
+"""Growth, in e-folds over a record, from which its start is solved for over all of it: growth by a
+hundred would lift what is left of the start's error above the motion."""
 
 
 def predict_continuous(
@@ -42,10 +52,9 @@ def predict_continuous(
             needed="horizon='free_run'",
             action="identify an ARX … Box–Jenkins or innovations model to predict some steps ahead",
         )
-    settle = request.settle_samples(record.n_samples, record.sample_time_s)
-    whole = is_whole(model)
-    freedom = replace(_freedom(model, record, request), stretch=settle or _least(model, request))
-    if whole and isinstance(model, StateSpaceModel):
+    freedom = _freedom(model, record, request)
+    freedom = replace(freedom, stretch=_stretch(model, record, request))
+    if is_whole(model) and isinstance(model, StateSpaceModel):
         return _of_equations(model, record, outputs, request, freedom)
     return _of_matrices(model, record, outputs, request, freedom)
 
@@ -114,11 +123,25 @@ def _states(model: LinearModel) -> list[str]:
     return names
 
 
-def _least(model: LinearModel, request: Request) -> int | None:
-    """Samples that tell a measured state without a name: as many as it has numbers."""
-    if request.initial_state != "measured" or isinstance(model, StateSpaceModel):
+def _stretch(model: LinearModel, record: Record, request: Request) -> int | None:
+    """First samples that tell what is solved for; None where growing modes need the record.
+
+    A third by default: the slow or growing mode of a wrong model, set by the whole record, explains
+    it; set by the first third it has to predict the rest.
+    """
+    settle = request.settle_samples(record.n_samples, record.sample_time_s)
+    if settle is not None:
+        return settle or None
+    if isinstance(model, StateSpaceModel):
+        n_states = len(model.states)
+    else:
+        n_states = len(model.state_space()[0])
+        if request.initial_state == "measured":
+            return max(n_states, 1)
+    if not is_whole(model) and growth(model.state_space()[0], record.duration_s) >= TOLD_BY_ALL:
         return None
-    return max(len(model.state_space()[0]), 1)
+    n_free = 2 * n_states + len(model.outputs)
+    return min(max(record.n_samples // TOLD_BY, LEAST_PER_STATE * n_free), record.n_samples)
 
 
 def _of_equations(
@@ -186,9 +209,10 @@ def _prediction(
         channels=channels,
         step=Step("predict", {"hold": request.hold}),
     )
-    start = freedom.stretch or 0
     named = isinstance(model, StateSpaceModel)
-    words = start_words(request, start, record.sample_time_s, named=named)
+    words = start_words(request, freedom.stretch or 0, record.sample_time_s, named=named)
+    counted = request.settle_s is None and (named or request.initial_state != "measured")
+    start = 0 if counted else freedom.stretch or 0
     return Prediction(record, predicted, outputs, request.horizon, words, start, shifts)
 
 

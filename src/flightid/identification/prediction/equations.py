@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from flightid import _native
 from flightid.identification.multistart import DenseEnd
-from flightid.identification.prediction.linear import RANK_TOLERANCE, Freedom
+from flightid.identification.prediction.linear import Freedom, column_rank
 from flightid.identification.prediction.result import Shifts
 from flightid.identification.records.setup import OwnNumbers
 from flightid.identification.records.slopes_at_start import require_slopes
@@ -160,8 +160,8 @@ def predict_equations(
 
         open_ = np.full(n_free, np.inf)
         end = DenseEnd.searched(residuals, jacobian, start, -open_, open_, size, MOST_STEPS)
-        best, rank = run.start.filled(end.x), _rank(end.jacobian)
-    predicted, _ = run.outputs(best)
+        best, rank = run.start.filled(end.x), column_rank(end.jacobian)
+    predicted, slopes = run.outputs(best)
     shifts = Shifts(
         np.zeros(len(model.states)),
         best.bias[rows],
@@ -169,6 +169,8 @@ def predict_equations(
         n_free,
         rank,
         input_bias=best.shift,
+        told_s=None if freedom.stretch is None else freedom.stretch * sample_time_s,
+        is_open=rank < n_free and rank < column_rank(slopes.reshape(-1, n_free)),
     )
     return predicted, shifts
 
@@ -180,10 +182,3 @@ def _places(own: OwnNumbers) -> Array:
         own.bias[own.free_bias],
     )
     return np.concatenate(parts)
-
-
-def _rank(jacobian: Array) -> int:
-    length = np.linalg.norm(jacobian, axis=0)
-    scaled = jacobian / np.where(length > 0.0, length, 1.0)
-    values = np.linalg.svd(scaled, compute_uv=False)
-    return int(np.sum(values > RANK_TOLERANCE * values.max(initial=0.0)))

@@ -41,6 +41,17 @@ class Answer:
     start: Array
 
 
+def growth(a: Array, duration_s: float) -> float:
+    """How often the fastest growing mode of A grows by e; 0 where none grows.
+
+    Example
+    -------
+    >>> growth(np.diag([-1.0, 0.5]), 4.0)
+    2.0
+    """
+    return max(float(np.max(np.linalg.eigvals(a).real, initial=-np.inf)) * duration_s, 0.0)
+
+
 @dataclass(frozen=True, eq=False)
 class FreeRun:
     """Answers of a model to its inputs, to its free states and to constant biases.
@@ -86,8 +97,7 @@ class FreeRun:
     @property
     def e_folds(self) -> float:
         """How often the fastest growing mode grows by e over the record."""
-        rates = np.linalg.eigvals(self.matrices[0]).real
-        return max(float(np.max(rates, initial=-np.inf)) * self.duration_s, 0.0)
+        return growth(self.matrices[0], self.duration_s)
 
     def driven(self, inputs: Array) -> Answer:
         """Answer to the inputs, shape (n_inputs, n_samples), with every free state at zero."""

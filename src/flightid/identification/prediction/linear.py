@@ -117,6 +117,8 @@ def predict_linear(
         solution.size,
         rank,
         run.e_folds,
+        told_s=None if stretch is None else stretch * sample_time_s,
+        is_open=rank < solution.size and rank < column_rank(design.reshape(-1, len(answers))),
     )
     return plain.outputs + design @ solution, shifts
 
@@ -128,6 +130,19 @@ def _begun(plain: Answer, states: list[Answer], given: Mapping[int, float]) -> A
         outputs = outputs + value * states[place].outputs
         start = start + value * states[place].start
     return Answer(outputs, start)
+
+
+def column_rank(design: NDArray[np.float64]) -> int:
+    """How many columns differ, whatever their lengths.
+
+    Example
+    -------
+    >>> column_rank(np.array([[1.0, 1e6], [1.0, 1e6], [0.0, 0.0]]))
+    1
+    """
+    length = np.linalg.norm(design, axis=0)
+    scaled = design / np.where(length > 0.0, length, 1.0)
+    return int(np.linalg.matrix_rank(scaled, rtol=RANK_TOLERANCE))
 
 
 def _output_biases(n_outputs: int, n_samples: int, n_states: int) -> list[Answer]:

@@ -99,7 +99,8 @@ def predict(
     settle_s : float, optional
         First stretch, s, on which the start and the biases are solved for and which no score
         counts. Default: a tenth of the record for polynomial and innovations models; for those in
-        continuous time the whole record is used, and all of it counts.
+        continuous time the first third (the whole record where a mode grows a hundredfold, or where
+        0 is given), and all of the record counts.
     state_bias, output_bias : bool
         Solve for a constant on each state derivative (of a nonlinear model: on each input), and on
         each output.
@@ -126,8 +127,7 @@ def predict(
 
     Assumes
     -------
-    Records that took no part in the fit. Where the whole record tells the initial state, a slow
-    mode can be explained rather than predicted: give `settle_s`.
+    Records that took no part in the fit, whose first third tells the slowest mode's start.
 
     Reference
     ---------

@@ -29,11 +29,15 @@ class Shifts:
         Numbers that were free.
     rank : int
         How many of them the record tells apart; fewer than `n_free` means that their values are
-        one choice among many, while the prediction is not touched.
+        one choice among many.
     e_folds : float
         How often the model's fastest growing mode grows by e over the record; 0 where none grows.
     input_bias : ndarray, shape (n_inputs,), or None
         Of a nonlinear model, whose equations were integrated: constant added to the inputs.
+    told_s : float or None
+        Length of the first stretch that tells them, s; None where the whole record does.
+    is_open : bool
+        Whether what that stretch does not tell apart moves the prediction after it.
 
     Example
     -------
@@ -48,6 +52,8 @@ class Shifts:
     rank: int
     e_folds: float = 0.0
     input_bias: NDArray[np.float64] | None = None
+    told_s: float | None = None
+    is_open: bool = False
 
 
 NOTHING = Shifts(np.zeros(0), np.zeros(0), np.zeros(0), 0, 0)
@@ -89,7 +95,7 @@ class Prediction(
     >>> lag = fid.LinearSystem([[-2.0]], [[2.0]], [[1.0]], [[0.0]], ("u",), ("y",))
     >>> flown = fid.Record.from_arrays(time_s, inputs={"u": np.sin(time_s)})
     >>> fid.predict(lag, fid.simulate(lag, flown))  # doctest: +NORMALIZE_WHITESPACE
-    Prediction(free run from an initial state solved for over the whole record, 300 samples, fit y
+    Prediction(free run from an initial state solved for over the first 2 s, 300 samples, fit y
     100.0 %)
     """
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -20,9 +20,6 @@ THEIL_GUIDE = (0.25, 0.30)
 THEIL = "verification-theil"
 J_RMS_GUIDE = (1.0, 2.0)
 
-GROWTH_E_FOLDS = 4.6
-"""Growth by a factor of 100 over a record: less leaves its beginning in command of its end."""
-
 
 def judge(
     predictions: tuple[Prediction, ...],
@@ -38,7 +35,6 @@ def judge(
     numbers: dict[str, dict[str, float]] = {
         key: {} for key in ("theil", "rms_error", "mse", "fit_percent", "vaf", "r_squared")
     }
-    power = []
     for name in compared:
         pairs = [each.scored(name) for each in predictions]
         y, y_hat = (np.concatenate([pair[side] for pair in pairs]) for side in (0, 1))
@@ -48,7 +44,6 @@ def judge(
         numbers["fit_percent"][name] = float(metrics.fit_percent(y, y_hat))
         numbers["vaf"][name] = float(metrics.vaf_percent(y, y_hat))
         numbers["r_squared"][name] = float(metrics.r_squared(y, y_hat))
-        power.append([np.mean(np.square(signal)) for signal in (y - y_hat, y, y_hat)])
     first = predictions[0].measured
     factors = [guide_factor(first.unit(name)) for name in compared]
     j_rms = None
@@ -59,9 +54,7 @@ def judge(
             if factor is not None
         ]
         j_rms = float(np.sqrt(np.mean(np.square(errors))))
-    # One number for all outputs, each counted in the guide's units: the verdict of the reference.
-    error, seen, said = np.sqrt(guide_weights(first, compared) @ np.array(power))
-    overall = float(error / (seen + said))
+    overall = overall_theil(predictions, compared)
     guided = j_rms if is_vehicle([first.unit(name) for name in compared]) else None
     verdicts = _findings(overall, numbers["theil"], guided, predictions)
     verdicts = weighed(verdicts, THEIL, numbers["rms_error"], own)
@@ -84,17 +77,34 @@ def judge(
     )
 
 
+def overall_theil(predictions: Sequence[Prediction], compared: tuple[str, ...]) -> float:
+    """One coefficient for all outputs, each counted in the guide's units, over all records.
+
+    Reference
+    ---------
+    Tischler & Remple, *Aircraft and Rotorcraft System Identification*, 2nd ed., eq. 14.8.
+    """
+    power = []
+    for name in compared:
+        pairs = [each.scored(name) for each in predictions]
+        y, y_hat = (np.concatenate([pair[side] for pair in pairs]) for side in (0, 1))
+        power.append([np.mean(np.square(signal)) for signal in (y - y_hat, y, y_hat)])
+    weights = guide_weights(predictions[0].measured, compared)
+    error, seen, said = np.sqrt(weights @ np.array(power))
+    return float(error / (seen + said))
+
+
 def _theil_findings(overall: float, theil: dict[str, float]) -> list[Finding]:
     """All outputs together, then each; a poor one is no red by itself where all together agree.
 
     An output that these inputs hardly move is mostly gust and noise, and no model predicts that.
     """
-    verdict = _light(overall, THEIL_GUIDE)
+    verdict = light_of(overall, THEIL_GUIDE)
     several = len(theil) > 1
     values = {"all outputs together": overall, **theil} if several else theil
     found = []
     for name, value in values.items():
-        light = _light(value, THEIL_GUIDE)
+        light = light_of(value, THEIL_GUIDE)
         if light is Light.RED and verdict is not Light.RED:
             light = Light.AMBER
         action = "" if light is Light.GREEN else "look where the prediction parts from the record"
@@ -149,17 +159,18 @@ def _findings(
         )
         for each in held
     ]
-    short = [each for each in predictions if each.shifts.rank < each.shifts.n_free]
-    if short:
+    untold = [each for each in predictions if each.shifts.is_open]
+    if untold:
         found.append(
             Finding(
-                "verification-shifts-not-unique",
-                Light.UNKNOWN,
-                f"{len(short)} of {len(predictions)} records cannot tell all shifts apart; the "
-                "smallest were taken, and the prediction does not depend on the choice",
+                "verification-start-untold",
+                Light.AMBER,
+                f"the beginning of {len(untold)} of {len(predictions)} records does not tell where "
+                "all states of the model start, and the run depends on it",
+                "settle_s with a longer first stretch, or initial_state='trim'",
             )
         )
-    return (*found, *_growth(predictions))
+    return tuple(found)
 
 
 def _shifted_inputs(predictions: tuple[Prediction, ...]) -> list[Finding]:
@@ -181,24 +192,13 @@ def _shifted_inputs(predictions: tuple[Prediction, ...]) -> list[Finding]:
     ]
 
 
-def _growth(predictions: tuple[Prediction, ...]) -> tuple[Finding, ...]:
-    longest = max(
-        (each.shifts.e_folds for each in predictions if np.any(each.shifts.initial_state)),
-        default=0.0,
-    )
-    if longest < GROWTH_E_FOLDS:
-        return ()
-    return (
-        Finding(
-            "verification-growth",
-            Light.UNKNOWN,
-            f"a mode grows by exp({longest:.3g}) over a record, so its part of the free run is "
-            "set by the whole record, not by its beginning: it is explained rather than predicted",
-            "cut the record into shorter ones to see it predicted",
-        ),
-    )
+def light_of(value: float, guide: tuple[float, float]) -> Light:
+    """Green, amber or red by the two numbers of a guide.
 
-
-def _light(value: float, guide: tuple[float, float]) -> Light:
+    Example
+    -------
+    >>> str(light_of(0.27, THEIL_GUIDE))
+    'amber'
+    """
     good, poor = guide
     return Light.GREEN if value <= good else Light.AMBER if value <= poor else Light.RED

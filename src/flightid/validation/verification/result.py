@@ -97,7 +97,9 @@ class Verification(Result, schema="flightid.verification/1"):
             )
             if is_free
         ]
-        shifts = f"; {' and '.join(solved)} solved for in each record" if solved else ""
+        told_s = self.predictions[0].shifts.told_s
+        on = "" if told_s is None else f", on its first {told_s:.3g} s"
+        shifts = f"; {' and '.join(solved)} solved for in each record{on}" if solved else ""
         if self.horizon != "free_run":
             ahead = "1 sample" if self.horizon == 1 else f"{self.horizon} samples"
             return f"Prediction {ahead} ahead from the measured past."

@@ -35,6 +35,7 @@ from flightid.validation.verification.held_otherwise import hold_findings
 from flightid.validation.verification.judgement import THEIL_GUIDE, judge
 from flightid.validation.verification.muad import mismatch
 from flightid.validation.verification.of_the_fit import own_errors, seen_findings
+from flightid.validation.verification.pieces import growth_findings
 from flightid.validation.verification.result import Verification
 
 
@@ -100,10 +101,10 @@ def verify(
 
     Assumes: records that were not used in the fit, and that start in trim where
     ``initial_state="trim"`` holds the initial state there; a nonlinear model that does not explode
-    within a record. Biased when the record is short against the slowest mode: a free initial state
-    can then imitate a response. Growing modes of an unstable model are run backward from the end of
-    the record where the initial state is solved for, which is exact for records of any length, and
-    a finding says where that explains rather than predicts.
+    within a record. Start and biases are solved for on the first third of a record: over the whole
+    of it they would imitate slow modes. Modes that grow a hundredfold over a record are run
+    backward from its end, which is exact for records of any length; that explains rather than
+    predicts, and the light comes from pieces of the record.
 
     Parameters
     ----------
@@ -119,7 +120,8 @@ def verify(
     initial_state : {"trim", "zero", "measured", "estimate"} or mapping, optional
         Where runs start; default: one rule for all methods, see `flightid.predict`.
     settle_s : float, optional
-        First stretch, s, on which start and biases are solved for and which no score counts.
+        First stretch, s, on which start and biases are solved for and which no score counts; 0 is
+        the whole record, scored. Default: a third, scored.
     state_bias, output_bias : bool, optional
         Solve for state biases b and output biases y_ref; default: as the fit was told of
         `input_bias` and `output_bias`, else for models in continuous time (b: linear ones).
@@ -187,10 +189,10 @@ def verify(
         for record in flown:
             require_units(model, record, chosen)
     ways = [
-        partial(_run, each, model, way, flown, chosen)
+        partial(_run, each, model, way, chosen)
         for each, (model, way) in zip(several, models, strict=True)
     ]
-    runs = [run(request) for run, request in zip(ways, requests, strict=True)]
+    runs = [run(request, flown) for run, request in zip(ways, requests, strict=True)]
     results = []
     for each, (model, way), run, request, made, held in zip(
         several, models, ways, requests, _scored_alike(runs), holds, strict=True
@@ -201,10 +203,12 @@ def verify(
         beside = (
             *baseline_findings(each, made, request),
             *contradictions(each, way, made, request),
+            *growth_findings(made, partial(run, request)),
         )
         in_time = way is predict_continuous
         taken = remembered(each).assumed_hold
-        said = hold_findings(held, judged, request, taken, run) if in_time else ()
+        again = partial(run, records=flown)
+        said = hold_findings(held, judged, request, taken, again) if in_time else ()
         said = (*seen_findings(each, flown, chosen), *said, *_at_mean(each, flown))
         between = judged.hold if in_time else None
         results.append(replace(judged, hold=between, findings=(*judged.findings, *beside, *said)))
@@ -217,9 +221,9 @@ def _run(
     source: object,
     model: object,
     way: Predictor,
-    records: tuple[Record, ...],
     outputs: tuple[str, ...],
     request: Request,
+    records: tuple[Record, ...],
 ) -> list[Prediction]:
     return [way(of_record(source, model, each), each, outputs, request) for each in records]
 
