@@ -12,6 +12,7 @@ from scipy.integrate import solve_ivp
 
 import flightid as fid
 from flightid.errors import ExportError, OptionError
+from flightid.export import c_compiler
 from flightid.export import fmu as fmu_module
 from flightid.export.fmu_description import base_unit
 from tests.closeness import assert_close
@@ -93,6 +94,13 @@ def compare(found, wanted: fid.Record, names, tolerance: float, why: str) -> Non
         scale = np.abs(wanted[name]).max()
         assert scale > 1e-4
         assert_close(found[name] / scale, wanted[name] / scale, atol=tolerance, why=why)
+
+
+@pytest.fixture(autouse=True)
+def quickly(plane: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Compile all but the first as quickly as may be; that one as users get it."""
+    quick = ("-O0" if each == "-O2" else each for each in c_compiler._FLAGS)
+    monkeypatch.setattr(c_compiler, "_FLAGS", tuple(quick))
 
 
 @pytest.fixture(scope="module")

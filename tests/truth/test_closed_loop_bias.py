@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 import flightid as fid
-from flightid.vehicles import Autopilot, RateGains, SidActivation, Turbulence, fly
+from flightid.vehicles import Autopilot, Flight, RateGains, SidActivation, Turbulence, fly
 from tests.strangers import loop_shifts
 
 OMEGA = np.geomspace(1.5, 12.0, 8)
@@ -17,11 +19,16 @@ TIGHT = Autopilot(rate=(RateGains(p=0.14, i=0.14), RateGains(), RateGains(p=0.25
 N_FLIGHTS = 8
 
 
+@cache
+def _flight(seed: int) -> Flight:
+    return fly(runs=[RUN], turbulence=GUSTY, autopilot=TIGHT, log_every=4, seed=seed)
+
+
 def _errors(method: str) -> NDArray[np.complex128]:
     """Relative errors of the roll response, shape (n_flights, n_frequencies)."""
     errors = []
     for seed in range(N_FLIGHTS):
-        flight = fly(runs=[RUN], turbulence=GUSTY, autopilot=TIGHT, log_every=4, seed=seed)
+        flight = _flight(seed)
         response = fid.estimate_response(
             flight.record((3.0, 72.0)),
             inputs="tau_phi",

@@ -141,12 +141,12 @@ def test_feedback_is_seen_and_its_absence_too():
     rng = np.random.default_rng(4)
     found = []
     for gain in (0.0, 0.6):
-        y, u = np.zeros(600), np.zeros(600)
-        e, r = rng.standard_normal((2, 600))
-        for t in range(1, 600):
+        y, u = np.zeros(400), np.zeros(400)
+        e, r = rng.standard_normal((2, 400))
+        for t in range(1, 400):
             y[t] = 0.7 * y[t - 1] + 0.5 * u[t - 1] + e[t]
             u[t] = r[t] - gain * y[t]
-        record = fid.Record.from_arrays(np.arange(600) / 10, inputs={"u": u}, outputs={"y": y})
+        record = fid.Record.from_arrays(np.arange(400) / 10, inputs={"u": u}, outputs={"y": y})
         found.append("feedback" in _codes(fid.advise(record)))
     assert found == [False, True]
     assert "feedback" not in _codes(fid.advise(record, loop="open"))

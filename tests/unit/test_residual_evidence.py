@@ -82,7 +82,9 @@ def test_noise_alone_has_no_bars(method: str | None) -> None:
 
 
 def test_what_stays_mostly_unexplained_has_no_bars() -> None:
-    flown, *beside = (closed_loops.record(k, feedback=closed_loops.PILOT) for k in range(2))
+    flown, *beside = (
+        closed_loops.record(k, feedback=closed_loops.PILOT, duration_s=60.0) for k in range(2)
+    )
     response = fid.estimate_response(flown, estimator="prewhitened", band_rad_s=(0.5, 10.0))
     fit = fid.identify(closed_loops.model(), [response, *beside[0]])
     assert str(fit.evidence.light) == "red"

@@ -48,9 +48,9 @@ def test_the_rate_is_ten_times_the_bandwidth(
 
 
 def test_advice_says_it_before_a_fit() -> None:
-    codes = [each.code for each in fid.advise(flown(0.1, 0.5, n=800)).findings]
+    codes = [each.code for each in fid.advise(flown(0.1, 0.5, n=500)).findings]
     assert "sampling-rate" in codes
-    assert "sampled-slowly" in [each.code for each in fid.advise(flown(1.0, 0.2, n=800)).findings]
+    assert "sampled-slowly" in [each.code for each in fid.advise(flown(1.0, 0.2, n=500)).findings]
 
 
 def test_poles_that_fit_noise_do_not_move_the_bandwidth() -> None:

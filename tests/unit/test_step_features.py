@@ -25,7 +25,7 @@ def test_a_small_overshoot_is_not_lifted_by_its_errors() -> None:
     assert 0.9 < truth < 1.1
     values, held = [], []
     for _ in range(150):
-        errors = lfilter([0.004], [1.0, -0.8], random.standard_normal((201, 70)), axis=1)[:, 20:]
+        errors = lfilter([0.004], [1.0, -0.8], random.standard_normal((121, 70)), axis=1)[:, 20:]
         errors[1:] += errors[0]
         found = {each.name: each for each in step_features(clean + errors, TIME_S)}["overshoot"]
         if found.interval95 is not None:

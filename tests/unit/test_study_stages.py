@@ -79,14 +79,20 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def cache(folder: Path) -> dict[str, Any]:
+def ran(folder: Path) -> tuple[fid.Study, dict[str, Any]]:
+    """The study run for the first time, and what it left in the cache."""
     made: dict[str, Any] = {}
     path = folder / "study.toml"
     path.write_text(STUDY, encoding="utf-8")
     first = fid.run_study(path, output=folder / "out", cache=made)
     # Both models fly the same inputs in the same band: the response is estimated once.
     assert set(first.carried_out) == RECORDS | LAG | BLACK - {"response: Black, auto"}
-    return made
+    return first, made
+
+
+@pytest.fixture
+def cache(ran: tuple[fid.Study, dict[str, Any]]) -> dict[str, Any]:
+    return ran[1]
 
 
 def run(folder: Path, text: str, cache: dict[str, Any]) -> fid.Study:
@@ -95,12 +101,9 @@ def run(folder: Path, text: str, cache: dict[str, Any]) -> fid.Study:
     return fid.run_study(path, output=folder / "out", cache=dict(cache))
 
 
-def test_nothing_changed_runs_nothing(folder: Path, cache: dict[str, Any]) -> None:
-    path = folder / "study.toml"
-    path.write_text(STUDY, encoding="utf-8")
-    known: dict[str, Any] = {}
-    first = fid.run_study(path, output=folder / "out", cache=known)
-    again = fid.run_study(path, output=folder / "out", cache=known)
+def test_nothing_changed_runs_nothing(folder: Path, ran: tuple[fid.Study, dict[str, Any]]) -> None:
+    first, known = ran
+    again = run(folder, STUDY, known)
     assert again.carried_out == ()
     assert set(again.from_cache) == RECORDS | LAG | BLACK
     assert again.identified[0].fit.model is first.identified[0].fit.model
