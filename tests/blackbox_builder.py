@@ -151,20 +151,18 @@ def _halved(total: int) -> int:
     return int(total / 2)
 
 
+MOTOR = next(i for i, known in enumerate(FIELDS) if known.name == "motor[0]")
+
+
 def _guess(predictor: int, place: int, rows: Sequence[Sequence[int]]) -> int:
     now, last, older = rows
-    motor = next(i for i, known in enumerate(FIELDS) if known.name == "motor[0]")
-    return {
-        0: lambda: 0,
-        1: lambda: last[place],
-        2: lambda: 2 * last[place] - older[place],
-        3: lambda: _halved(last[place] + older[place]),
-        4: lambda: 1070,
-        5: lambda: now[motor],
-        6: lambda: now[place],
-        9: lambda: 1620,
-        11: lambda: 158,
-    }[predictor]()
+    if predictor in (0, 4, 9, 11):
+        return {0: 0, 4: 1070, 9: 1620, 11: 158}[predictor]
+    if predictor in (5, 6):
+        return now[MOTOR if predictor == 5 else place]
+    if predictor == 1:
+        return last[place]
+    return 2 * last[place] - older[place] if predictor == 2 else _halved(last[place] + older[place])
 
 
 def frame(letter: str, rows: Sequence[Sequence[int]]) -> bytes:

@@ -79,11 +79,16 @@ def flight(
     step = linalg.expm(generator * DT)
     total = n + SETTLING
     r, v = reference(kind, total, rng), noise(pole, size, total, rng)
-    u, y, state, sum_y = np.zeros(total), np.zeros(total), np.zeros(2), 0.0
-    for t in range(total):
-        late = y[t - 1] if t else 0.0
+    (one, two, in_one), (three, four, in_two), _ = step.tolist()
+    rows, place, rate, late, sum_y = [], 0.0, 0.0, 0.0, 0.0
+    for asked, error in zip(r.tolist(), v.tolist(), strict=True):
         sum_y += DT * late
-        y[t] = state[0] + v[t]
-        u[t] = r[t] - gain * late - integral * sum_y
-        state = step[:2, :2] @ state + step[:2, 2] * u[t]
-    return u[SETTLING:], y[SETTLING:]
+        u = asked - gain * late - integral * sum_y
+        late = place + error
+        rows.append((u, late))
+        place, rate = (
+            one * place + two * rate + in_one * u,
+            three * place + four * rate + in_two * u,
+        )
+    u, y = np.array(rows[SETTLING:]).T
+    return u, y

@@ -38,12 +38,17 @@ def record(seed: int, *, feedback: float, duration_s: float = 90.0) -> list[fid.
         decay = np.exp(np.array([TRUTH["Lp"], TRUTH["Zw"]]) * STEP_S)
         push = (decay - 1.0) / np.array([TRUTH["Lp"], TRUTH["Zw"]])
         gains = np.array([TRUTH["Llat"], TRUTH["Zcol"]])
-        x, y, u, held = np.zeros(2), np.zeros((2, n)), np.zeros((2, n)), 0.0
-        for k in range(n):
-            y[:, k] = x + [0.005, 0.02] * random.standard_normal(2)
-            held += STEP_S / 0.1 * (feedback * y[1, k] - held)
-            u[:, k] = drive[0][k], drive[1][k] + held
-            x = decay * x + push * (gains * u[:, k] + gust[k])
+        noise = ([0.005, 0.02] * random.standard_normal((n, 2))).tolist()
+        (kept_p, kept_w), (push_p, push_w) = decay.tolist(), push.tolist()
+        (gain_p, gain_w), rows, p, w, held = gains.tolist(), [], 0.0, 0.0, 0.0
+        for lat, col, (of_p, of_w), (gust_p, gust_w) in zip(
+            *(each.tolist() for each in drive), noise, gust.tolist(), strict=True
+        ):
+            held += STEP_S / 0.1 * (feedback * (w + of_w) - held)
+            rows.append((p + of_p, w + of_w, lat, col + held))
+            p = kept_p * p + push_p * (gain_p * lat + gust_p)
+            w = kept_w * w + push_w * (gain_w * (col + held) + gust_w)
+        y, u = np.split(np.array(rows).T, 2)
         found.append(
             fid.Record.from_arrays(
                 np.arange(n) * STEP_S,

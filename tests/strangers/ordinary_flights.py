@@ -71,7 +71,7 @@ def fly(
 ) -> Flown:
     """Run the loops: from attitudes wanted, or from rates wanted where attitude is left alone."""
     n, h = gust.size, 1.0 / axis.loop_hz
-    out = np.zeros((4, n))
+    out = []
     wanted = rate_wanted.tolist() if rate_wanted is not None else [0.0] * n
     angles = angle_wanted.tolist() if angle_wanted is not None else None
     gusts, noisy = gust.tolist(), noise.tolist()
@@ -97,7 +97,7 @@ def fly(
         slope += ad * ((moved - before) / h - slope)
         before = moved
         u = axis.p * error + total + axis.d * slope
-        out[:, k] = angle, asked, seen, u
+        out.append((angle, asked, seen, u))
         queue.append(u)
         lag += motor * (queue.pop(0) - lag)
         accel = axis.effectiveness * lag - axis.damping * rate + gusts[k]
@@ -106,7 +106,7 @@ def fly(
     return Flown(
         np.arange(n) * h,
         np.zeros(n) if angle_wanted is None else angle_wanted,
-        *out,
+        *np.array(out).T.copy(),
     )
 
 

@@ -46,10 +46,10 @@ def yaw_loop() -> AxisLoop:
 def flown(stick: float, seed: int = 0) -> fid.Record:
     """A minute of yaw under its rate and attitude loops, gusts and a noisy gyro: Euler's steps."""
     random = np.random.default_rng(seed)
-    rows = np.zeros((round(60.0 / STEP_S), 3))
+    rows: list[tuple[float, float, float]] = []
     motor = rate = angle = error = held = wanted = gust = asked = 0.0
     late, share = [0.0] * DELAY, STEP_S / (STEP_S + 1.0 / (math.tau * ERROR_HZ))
-    for k in range(len(rows)):
+    for k in range(round(60.0 / STEP_S)):
         if k % 200 == 0:
             asked = stick * float(random.uniform(-0.7, 0.7))
         wanted += asked * STEP_S
@@ -57,7 +57,7 @@ def flown(stick: float, seed: int = 0) -> fid.Record:
         error += share * (asked + 4.5 * (wanted - angle) - seen - error)
         held += I_GAIN * error * STEP_S
         command = P_GAIN * error + held
-        rows[k] = command, seen, wanted
+        rows.append((command, seen, wanted))
         late.append(command)
         motor += STEP_S / LAG_S * (late.pop(0) - motor)
         gust += -gust * STEP_S / 0.3 + 0.6 * math.sqrt(2.0 * STEP_S / 0.3) * float(
@@ -65,10 +65,11 @@ def flown(stick: float, seed: int = 0) -> fid.Record:
         )
         rate += STEP_S * (GAIN * motor - DAMPING * rate + gust)
         angle += STEP_S * rate
+    commands, rates, angles = np.array(rows).T
     return fid.Record.from_arrays(
         np.arange(len(rows)) * STEP_S,
-        inputs={"tau_psi": rows[:, 0]},
-        outputs={"r": rows[:, 1], "psi_ref": rows[:, 2]},
+        inputs={"tau_psi": commands},
+        outputs={"r": rates, "psi_ref": angles},
     )
 
 
