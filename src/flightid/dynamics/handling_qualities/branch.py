@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,7 +101,15 @@ def _phase_of_gain(logs: Array, gain: Array) -> Array:
     before = gain[0] - (gain[1] - gain[0]) * reach[::-1] / width
     after = gain[-1] + (gain[-1] - gain[-2]) * reach / width
     slope = np.diff(np.concatenate([before, gain, after])) / width
-    centres = logs[0] + width * (np.arange(len(slope)) - len(logs) + 0.5)
-    away = np.maximum(np.abs(centres[None] - logs[:, None]), NEAREST)
+    return np.asarray(0.5 * np.pi * _weights(len(logs), float(width)) @ slope)
+
+
+@lru_cache(maxsize=4)
+def _weights(count: int, width: float) -> Array:
+    """Of the slopes between points that reach as far again to both sides, rows of sum one."""
+    middles = np.arange(3 * count - 1) - count + 0.5
+    away = np.maximum(width * np.abs(middles - np.arange(count)[:, None]), NEAREST)
     weights = -np.log(np.tanh(0.5 * away))
-    return np.asarray(0.5 * np.pi * weights @ slope / weights.sum(axis=1))
+    weights /= weights.sum(axis=1, keepdims=True)
+    weights.setflags(write=False)
+    return np.asarray(weights)
