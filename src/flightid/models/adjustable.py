@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import replace
 from typing import Any, Self, cast
 
@@ -18,9 +19,6 @@ class Adjustable:
         # Every model is a dataclass; this base alone is not.
         return cast("Self", replace(cast("Any", self), parameters=parameters, estimated=None))
 
-    def _with_new_values(self, parameters: Parameters) -> Self:
-        return self._with_parameters(parameters)
-
     def with_values(self, values: Mapping[str, float]) -> Self:
         """Copy with other parameter values.
 
@@ -31,7 +29,11 @@ class Adjustable:
         ModelError
             A parameter is tied, or a value lies outside its bounds.
         """
-        return self._with_new_values(self.parameters.with_values(values))
+        # Equations and formulas hold names alone: they stay checked and compiled.
+        made = copy(self)
+        object.__setattr__(made, "parameters", self.parameters.with_values(values))
+        object.__setattr__(made, "estimated", None)
+        return made
 
     def with_fixed(self, **values: float) -> Self:
         """Copy with parameters fixed at values, given as ``name=value``."""

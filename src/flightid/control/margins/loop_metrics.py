@@ -272,10 +272,12 @@ def _encirclements(passes: Crossings, starts: Crossings, n_rows: int) -> Array:
 def _worst(found: Crossings, size: Array, n_rows: int) -> tuple[Array, Array]:
     """Of each row the crossing of least size: its size and frequency; NaN for none."""
     order = np.lexsort((size, found.row))
-    rows, place = np.unique(found.row[order], return_index=True)
-    chosen = order[place]
+    rows = found.row[order]
+    first = np.ones(rows.size, dtype=np.bool_)
+    np.not_equal(rows[1:], rows[:-1], out=first[1:])
+    chosen = order[first]
     least, at = np.full(n_rows, np.nan), np.full(n_rows, np.nan)
-    least[rows], at[rows] = size[chosen], found.omega[chosen]
+    least[rows[first]], at[rows[first]] = size[chosen], found.omega[chosen]
     return least, at
 
 

@@ -7,9 +7,7 @@ and need not be linear: the matrices are then those of the linearisation at the 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from copy import copy
 from dataclasses import dataclass, field, replace
-from typing import Self
 
 from flightid import _native
 from flightid.errors import ModelError, UnknownNameError
@@ -135,13 +133,6 @@ class StateSpaceModel(Linearisation, TableView):
         check_model(self)
         object.__setattr__(self, "pairs", tuple(self.pairs) or self._every_pair)
         object.__setattr__(self, "native", self._compiled(self.pairs))
-
-    def _with_new_values(self, parameters: Parameters) -> Self:
-        # Equations hold names alone: they stay checked and compiled.
-        made = copy(self)
-        object.__setattr__(made, "parameters", parameters)
-        object.__setattr__(made, "estimated", None)
-        return made
 
     @property
     def units(self) -> dict[str, str]:
