@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import replace
 from typing import Any
 
@@ -136,7 +137,10 @@ def _of_response(
 
     def make(numbers: Array) -> FrequencyResponse:
         real, imaginary = numbers.reshape(2, *shape)
-        return replace(chosen, response=(real + 1j * imaginary)[None])
+        # Draws and steps of one response: what else it holds was looked at when it was made.
+        made = copy(chosen)
+        object.__setattr__(made, "response", (real + 1j * imaginary)[None])
+        return made
 
     centre = np.concatenate([values.real.ravel(), values.imag.ravel()])
     covariance, reason = _errors(chosen)

@@ -151,9 +151,12 @@ class Parameters(Mapping[str, Parameter], TableView):
                 raise ModelError(f"parameter {parameter.name} is given twice")
             self._items[parameter.name] = parameter
         self._check_ties()
-        values = self.tape(self.names).evaluate(self.independent_values())
-        for name, value in zip(self.names, values, strict=True):
-            self._items[name] = replace(self._items[name], value=float(value))
+        known: Iterable[float | None] = (each.value for each in self.values())
+        if self.tied:
+            known = self.tape(self.names).evaluate(self.independent_values())
+        for each, value in zip([*self.values()], known, strict=True):
+            if type(each.value) is not float or each.value != value:
+                self._items[each.name] = replace(each, value=float(value or 0.0))
 
     def _check_ties(self) -> None:
         units = self.units
