@@ -11,11 +11,14 @@ from tests.contract.source import PACKAGE, ROOT, nodes, python_files, rust_files
 
 FORBIDDEN_STEMS = {"utils", "util", "helpers", "common", "misc", "base", "core"}
 OPEN_ENDS = re.compile(r"\b(TODO|FIXME|XXX|HACK)\b|todo!\(|unimplemented!\(|NotImplementedError")
+OPEN_WORDS = ("TODO", "FIXME", "XXX", "HACK", "todo!", "unimplemented!", "NotImplementedError")
 SUSPECT = re.compile(r"\b(eval|exec|print)\s*\(|except\s*:")  # worth a look at the tree
 PANICS = re.compile(r"\.unwrap\(\)|\.expect\(|panic!\(|unreachable!\(")
 
 
 def _open_ends(text: str) -> list[str]:
+    if not any(word in text for word in OPEN_WORDS):
+        return []  # the expression is slow
     return [
         f"{1 + text.count(chr(10), 0, match.start())}: open end {match[0]!r}"
         for match in OPEN_ENDS.finditer(text)
@@ -109,7 +112,16 @@ def test_a_command_may_print() -> None:
 
 
 @pytest.mark.parametrize(
-    "planted", ["# TODO: later", "// FIXME", "todo!()", "unimplemented!()", "NotImplementedError"]
+    "planted",
+    [
+        "# TODO: later",
+        "# HACK",
+        "# XXX",
+        "// FIXME",
+        "todo!()",
+        "unimplemented!()",
+        "NotImplementedError",
+    ],
 )
 def test_open_ends_can_fail(planted: str) -> None:
     assert len(_open_ends(f"fine\n{planted}")) == 1

@@ -118,12 +118,15 @@ def test_motors_and_vibration_out_of_order_are_said(tmp_path: Path) -> None:
     assert review.verdict is Light.RED
 
 
-def test_the_command_prints_text_values_and_a_page(log: Path, tmp_path: Path) -> None:
+def test_the_command_prints_text_values_and_a_page(
+    log: Path, review: fid.FlightReview, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     page = tmp_path / "flight.html"
     done = CliRunner().invoke(command, [str(log), "--html", str(page)])
     assert done.exit_code == 0, done.output
     assert "Steps, from ordinary flying" in done.output
     assert "roll attitude" in page.read_text("utf-8")
+    monkeypatch.setattr(fid, "review_flight", lambda *_, **__: review, raising=False)
     values = json.loads(CliRunner().invoke(command, [str(log), "--json"]).stdout)
     assert values["schema"] == "flightid.flight_review/1"
     assert [loop["step"] == [] for loop in values["loops"]].count(False) == 2
