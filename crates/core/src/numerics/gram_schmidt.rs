@@ -1,12 +1,22 @@
 //! Inner products and orthogonalisation of long vectors.
 //! (Python side: identification/narx/fit.py)
 
+use super::widest::widest;
+
 /// Columns that one reading of the candidates is multiplied by: with four, reading from memory and
 /// multiplying take about equally long.
 pub const AT_ONCE: usize = 4;
 
 /// Inner product in eight partial sums, so that the compiler can use vector registers.
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+    widest(
+        #[inline(always)]
+        || sum_of_products(a, b),
+    )
+}
+
+#[inline(always)]
+fn sum_of_products(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 8];
     let (a8, b8) = (a.chunks_exact(8), b.chunks_exact(8));
     let tail: f64 = a8.remainder().iter().zip(b8.remainder()).map(|(x, y)| x * y).sum();
@@ -18,30 +28,17 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     sums.iter().sum::<f64>() + tail
 }
 
-/// Inner products of `a` with several vectors of its length while it is read once.
+/// Inner products of `a`, which the nearest cache holds, with several vectors of its length.
 pub fn dots(a: &[f64], vectors: [&[f64]; AT_ONCE]) -> [f64; AT_ONCE] {
-    let mut sums = [[0.0; 4]; AT_ONCE];
-    let (whole, rest) = a.as_chunks::<4>();
-    let [b0, b1, b2, b3] = vectors.map(|b| b.as_chunks::<4>().0);
-    let rows = whole.iter().zip(b0).zip(b1).zip(b2).zip(b3);
-    for ((((x, y0), y1), y2), y3) in rows {
-        for (sum, y) in sums.iter_mut().zip([y0, y1, y2, y3]) {
-            for lane in 0..4 {
-                sum[lane] += x[lane] * y[lane];
-            }
-        }
-    }
-    let mut found = [0.0; AT_ONCE];
-    for ((value, sum), vector) in found.iter_mut().zip(sums).zip(vectors) {
-        let tail = rest.iter().zip(&vector[4 * whole.len()..]);
-        *value = sum.iter().sum::<f64>() + tail.map(|(x, y)| x * y).sum::<f64>();
-    }
-    found
+    vectors.map(|vector| dot(a, vector))
 }
 
 /// w − factor · q.
 pub fn subtract(w: &mut [f64], factor: f64, q: &[f64]) {
-    w.iter_mut().zip(q).for_each(|(entry, direction)| *entry -= factor * direction);
+    widest(
+        #[inline(always)]
+        || w.iter_mut().zip(q).for_each(|(entry, direction)| *entry -= factor * direction),
+    );
 }
 
 /// Take the directions out of `w`, twice (one pass of Gram–Schmidt loses orthogonality); returns
