@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -89,23 +91,32 @@ BAD_CASES = [
 ]
 
 
+@pytest.fixture(scope="module")
+def inspected(tmp_path_factory: pytest.TempPathFactory) -> Callable[[SweepFlight], Inspection]:
+    """What the inspection finds in a flight, each of which is inspected once."""
+    return cache(lambda flight: fid.inspect_log(flight.write(tmp_path_factory.mktemp("flight"))))
+
+
 @pytest.mark.parametrize(("code", "light", "flight"), BAD_CASES, ids=[c for c, _, _ in BAD_CASES])
 def test_each_shortcoming_has_its_code(
-    code: str, light: Light, flight: SweepFlight, tmp_path: Path
+    code: str,
+    light: Light,
+    flight: SweepFlight,
+    inspected: Callable[[SweepFlight], Inspection],
 ) -> None:
-    inspection = fid.inspect_log(flight.write(tmp_path))
+    inspection = inspected(flight)
     assert code in codes(inspection, light), [str(finding) for finding in inspection.findings]
     assert inspection.verdict is not Light.GREEN
 
 
-def test_a_fall_ends_the_flight(tmp_path: Path) -> None:
-    inspection = fid.inspect_log(SweepFlight(tips_over=True, sweep_s=20.0).write(tmp_path))
+def test_a_fall_ends_the_flight(inspected: Callable[[SweepFlight], Inspection]) -> None:
+    inspection = inspected(SweepFlight(tips_over=True, sweep_s=20.0))
     assert inspection.phases.tipped_s == pytest.approx(75.3, abs=0.2)
     assert inspection.phases.airborne[-1][1] <= 75.4
 
 
-def test_skew_is_measured(tmp_path: Path) -> None:
-    inspection = fid.inspect_log(SweepFlight(imu_late_s=0.02, sweep_s=20.0).write(tmp_path))
+def test_skew_is_measured(inspected: Callable[[SweepFlight], Inspection]) -> None:
+    inspection = inspected(SweepFlight(imu_late_s=0.02, sweep_s=20.0))
     lags = {skew.quantity: skew.lag_s for skew in inspection.skews}
     assert lags["p"] == pytest.approx(0.02, abs=0.002)
 
