@@ -90,9 +90,9 @@ def test_costs_of_independent_errors_have_the_mean_that_is_foretold() -> None:
     assert 0.85 * expected < np.mean(costs) < 1.05 * expected
 
 
-@pytest.mark.parametrize(("mode", "tried"), [(0.0, [1]), (0.5, [1, search.NEARBY])])
-def test_starts_around_a_fit_are_tried_where_noise_does_not_explain_its_cost(
-    mode: float, tried: list[int], monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("mode", [0.0, 0.5])
+def test_starts_around_a_fit_are_tried_whatever_noise_explains(
+    mode: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     drawn: list[int] = []
 
@@ -115,4 +115,4 @@ def test_starts_around_a_fit_are_tried_where_noise_does_not_explain_its_cost(
     )
     fit = fid.identify(truth, data, correct_bias=False)
     assert fit.average_cost > search.LEAVES
-    assert drawn == tried
+    assert drawn == [1, search.NEARBY]

@@ -8,8 +8,6 @@ import numpy as np
 
 from flightid.identification.fit_findings import EXCELLENT_COST
 from flightid.identification.frequency_domain.error_model import ErrorModel, whitening
-from flightid.identification.frequency_domain.model_curves import curves_of
-from flightid.identification.frequency_domain.noise_cost import noise_costs
 from flightid.identification.frequency_domain.selection import SelectedResponse
 from flightid.identification.multistart import DenseEnd, collect, draw_starts
 from flightid.models import GreyBoxModel
@@ -21,8 +19,9 @@ NEARBY = 9
 """Starts around the model's values that are tried beside those asked for, where a fit leaves
 something: without the estimator inside they take next to no time."""
 LEAVES, LOWER = 1.0, 1e-3
-"""Average cost from which on a fit leaves something, where random errors do not explain as much,
-and the share that makes a lower minimum."""
+"""Average cost from which on a fit leaves something, and the share that makes a lower minimum. That
+random errors explain as much says nothing: of 150 fits of two modes within 25 s, 43 had a lower
+minimum then, which these starts found."""
 
 
 def minimise(
@@ -85,7 +84,7 @@ def minimise(
     known = [end for end in outcomes if not isinstance(end, str)]
     best = min((end.cost for end in known), default=np.inf)
     settled = [end for end in known if end.cost == best and end.is_converged]
-    if settled and cost != "likelihood" and _leaves(model, selected, errors, settled[0]):
+    if settled and cost != "likelihood" and best > LEAVES * len(selected):
         around = follow(draw_starts(free, NEARBY, seed)[1:], 1.0, maximum_iterations)
         lower = [e for e in around if not isinstance(e, str) and e.cost < best * (1.0 - LOWER)]
         if lower:
@@ -97,15 +96,3 @@ def minimise(
     if led:
         outcomes = [*outcomes, *follow(np.ascontiguousarray(led), 1.0, maximum_iterations)]
     return collect(outcomes)
-
-
-def _leaves(
-    model: GreyBoxModel, selected: Sequence[SelectedResponse], errors: ErrorModel, end: DenseEnd
-) -> bool:
-    """Whether an end leaves more than random errors make of the cost of a model that is right."""
-    if end.cost <= LEAVES * len(selected):
-        return False
-    curves = curves_of(model, [each.omega_rad_s for each in selected], end.x)
-    noise = noise_costs(selected, curves, errors).values()
-    spread = np.sqrt(sum(each.deviation**2 for each in noise))
-    return end.cost > sum(each.mean for each in noise) + float(spread)
