@@ -56,6 +56,16 @@ def test_estimates_that_rest_on_a_word_say_so() -> None:
     assert "tau would be 140 standard errors away" in said
 
 
+def test_bars_of_smooth_samples_told_as_steps_reach_the_rival() -> None:
+    fit = fid.identify(holds.model(), holds.flight(20, "smooth", told="zero"))
+    assert str(fit.evidence.light) == "green"
+    assert any(line.endswith("which the intervals reach.") for line in fit.evidence.lines)
+    low, high = fit.parameters["tau"].interval95
+    assert low < holds.TRUTH["tau"] < high
+    assert OtherHold("zero", "tau", 9.0, -2.0, expected=1.0).is_ruled_out
+    assert not OtherHold("zero", "tau", 9.0, -1.5, expected=1.0).is_ruled_out
+
+
 @pytest.mark.parametrize(
     ("gain", "expected", "doubts"),
     [(1.6, 0.1, True), (1.4, 1.5, False), (0.5, 8.0, True), (-0.1, 8.0, False)],

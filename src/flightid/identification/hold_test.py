@@ -98,7 +98,11 @@ def _told(fit: Fit, held: ChosenHold, rivals: Rivals) -> tuple[Fit, ChosenHold]:
     fit = _noted(fit, known)
     if finding is None:
         return fit, held
-    fit = fit if finding.light is Light.GREEN else _widened(fit, rivals.as_fitted(known))
+    if finding.light is not Light.GREEN:
+        fit = _widened(fit, rivals.as_fitted(known))
+    elif held.hold == "zero" and _are_smooth(rivals) and not known[0].is_ruled_out:
+        fit = _widened(fit, rivals.as_fitted(known))
+        finding = replace(finding, message=f"{finding.message}, which the intervals reach")
     return fit, replace(held, findings=(*held.findings, finding))
 
 
@@ -131,6 +135,13 @@ def _steps_told_otherwise(steps: OtherHold, rivals: Rivals, whose: str) -> Findi
                     "declare hold='zero' if the vehicle got these steps",
                 )
     return None
+
+
+def _are_smooth(rivals: Rivals) -> bool:
+    """Whether no input told as steps looks like a device's; none of a log, which is its loop's."""
+    samples = [record[name] for record in rivals.records for name in rivals.fit.model.inputs]
+    stairs = any(found_staircase(each) is not None or is_rough(each) for each in samples)
+    return not (rivals.logged or stairs)
 
 
 def _asked(fit: Fit, held: ChosenHold, rivals: Rivals) -> tuple[Fit, ChosenHold]:

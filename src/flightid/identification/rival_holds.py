@@ -32,6 +32,8 @@ DECISIVE = 6.0
 DOUBTFUL, CHANCE = 1.5, 1.73
 """The same for a hold that was told, and standard deviations of a gain that chance alone exceeds
 in 1 of 24 fits: with 1.5 such a fit is doubted no oftener, however far the two lie apart."""
+RARE = 2.05
+"""Standard deviations below its mean at which a gain is found in 1 of 50 fits."""
 STEPS = 25
 """Most steps of a fit under another hold: it starts half a sample from its end."""
 _STARTED = {"starts": 1, "start_from": "model", "maximum_iterations": STEPS, "correct_bias": False}
@@ -71,6 +73,12 @@ class OtherHold:
         if self.expected > DOUBTFUL:
             least = max(CHANCE * math.sqrt(2.0 * self.expected) - self.expected, 0.0)
         return (self.gain or 0.0) > least
+
+    @property
+    def is_ruled_out(self) -> bool:
+        """Whether the data would look as they do in 1 of 50 fits at most, were it true."""
+        least = self.expected - RARE * math.sqrt(2.0 * self.expected)
+        return self.gain is not None and self.gain < min(least, 0.0)
 
     @property
     def is_likely(self) -> bool:
