@@ -2,15 +2,44 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 
 from flightid import _native
+from flightid.errors import ModelError
 
 FUNCTIONS = frozenset(
     ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "sqrt")
 ) | {"abs", "sign", "atan2", "min", "max"}
 FUNCTIONS |= {"where", "if", "clip", "saturation", "deadband", "and", "or", "not"}
 RESERVED = FUNCTIONS | {"pi", "s"}
+NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+
+
+def require_name(name: str, subject: str) -> None:
+    """Refuse what a formula cannot name.
+
+    Parameters
+    ----------
+    name : str
+    subject : str
+        What bears it, such as "a parameter".
+
+    Raises
+    ------
+    ModelError
+        No name, or that of a function or constant.
+
+    Example
+    -------
+    >>> require_name("zeta_1", "a parameter")
+    """
+    if not NAME.fullmatch(name) or name in RESERVED:
+        raise ModelError(
+            f"name of {subject} cannot stand in a formula",
+            found=repr(name),
+            needed="letters, digits and underscores, not a function, 'pi' or 's'",
+        )
 
 
 def formula_names(text: str, tables: Iterable[str] = ()) -> list[str]:

@@ -190,7 +190,7 @@ AXES = WING["tables"]["CL"]["axes"]  # type: ignore[index]
         (_bad_table(size=3), "table CL has an unknown key"),
         ({"tables": {"CL": {"values": [1, 2]}}}, "table CL lacks 'axes'"),
         ({"tables": {"CL": 3}}, "table CL must be a table"),
-        ({"tables": {"min": WING["tables"]["CL"]}}, "name of a table cannot be called"),
+        ({"tables": {"min": WING["tables"]["CL"]}}, "name of a table cannot stand"),
         ({"tables": {"V": WING["tables"]["CL"]}}, "name 'V' is given twice"),
         ({"equations": {"m*V'": "CL(V, V/a)*T"}}, "calls table CL with 'm/s'"),
         ({"equations": {"m*V'": "CL(alpha)*T"}}, "with 1 values for 2 axes"),

@@ -161,7 +161,7 @@ def test_plain_values_make_the_same_model_again(name: str) -> None:
         ({"equations": {"theta'": "(" * 100}}, r"outside the grammar.*deeper"),
         ({"equations": {"theta'": "speed"}}, r"equation \"theta'\" names what is not defined"),
         ({"equations": {"0": "q"}}, "one equation for each state: found 4 equations"),
-        ({"states": {"sin": "1"}}, "a name among the states cannot stand in a formula"),
+        ({"states": {"sin": "1"}}, "name of one of the states cannot stand in a formula"),
         ({"inputs": {"q": "1"}}, "name 'q' is given twice: found among the states and the inputs"),
         ({"outputs": {"u": "q"}}, "an output cannot have this name"),
         ({"trim": {"theta": float("nan")}}, "trim value of theta is not finite"),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
@@ -13,12 +12,10 @@ from numpy.typing import NDArray
 from flightid import _native
 from flightid.dimensions import require_unit
 from flightid.errors import ModelError, UnknownNameError
-from flightid.formula import RESERVED, formula_names
+from flightid.formula import formula_names, require_name
 from flightid.result import TableView
 from flightid.table import Column, Table
 from flightid.units import canonical
-
-_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 
 @dataclass(frozen=True)
@@ -66,12 +63,7 @@ class Parameter:
         self._check_numbers()
 
     def _check_name(self) -> None:
-        if not _NAME.fullmatch(self.name) or self.name in RESERVED:
-            raise ModelError(
-                "name of a parameter cannot stand in a formula",
-                found=repr(self.name),
-                needed="letters, digits and underscores, not a function, 'pi' or 's'",
-            )
+        require_name(self.name, "a parameter")
 
     def _check_numbers(self) -> None:
         if self.value is None or not math.isfinite(self.value):

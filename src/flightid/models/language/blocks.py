@@ -7,7 +7,6 @@ of the model's parameters, so that its states have the unit of the signal and nu
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -15,12 +14,11 @@ from typing import Any
 import numpy as np
 
 from flightid.errors import ModelError
-from flightid.formula import RESERVED
+from flightid.formula import NAME, require_name
 from flightid.models.language.reading import read_text, require_keys
 
 MAXIMUM_ORDER = 10
 MAXIMUM_BLOCKS = 50
-_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _PADE_HIGHEST = 5
 
 
@@ -92,12 +90,7 @@ class ModelBlock:
     note: str = ""
 
     def __post_init__(self) -> None:
-        if not _NAME.fullmatch(self.name) or self.name in RESERVED:
-            raise ModelError(
-                "name of a block cannot stand in a formula",
-                found=repr(self.name),
-                needed="letters, digits and underscores, not a function, 'pi' or 's'",
-            )
+        require_name(self.name, "a block")
         if self.kind not in KINDS:
             raise ModelError(
                 f"kind of block {self.name} is not known",
@@ -194,7 +187,7 @@ def wrapped(value: object) -> str:
     ('T', '(a + b)')
     """
     text = str(value)
-    return text if _NAME.fullmatch(text) else f"({text})"
+    return text if NAME.fullmatch(text) else f"({text})"
 
 
 def _fixed(coefficients: Iterable[float]) -> tuple[str, ...]:

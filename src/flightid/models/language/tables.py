@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -11,14 +10,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from flightid import _native
 from flightid.errors import FlightidError, ModelError
-from flightid.formula import RESERVED
+from flightid.formula import require_name
 from flightid.models.language.reading import read_number, read_text, require_keys
 from flightid.units import canonical
 
 MAXIMUM_TABLES = 100
 INTERPOLATIONS = ("linear", "pchip", "cubic")
 OUTSIDE = ("hold", "linear", "refuse")
-_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _KEYS = {"axes", "values", "unit", "interpolation", "outside", "note"}
 
 
@@ -207,9 +205,4 @@ def check_tables(tables: Mapping[str, TableFunction]) -> None:
     if len(tables) > MAXIMUM_TABLES:
         raise ModelError("too many tables", found=len(tables), needed=f"at most {MAXIMUM_TABLES}")
     for name in tables:
-        if not _NAME.fullmatch(name) or name in RESERVED:
-            raise ModelError(
-                "name of a table cannot be called in a formula",
-                found=repr(name),
-                needed="letters, digits and underscores, not a function, 'pi' or 's'",
-            )
+        require_name(name, "a table")

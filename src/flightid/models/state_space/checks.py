@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping
 
 from flightid.dimensions import require_balance, require_unit
 from flightid.errors import ModelError
-from flightid.formula import RESERVED, formula_names
+from flightid.formula import NAME, formula_names, require_name
 from flightid.models.language.tables import check_tables
 from flightid.models.state_space.linear import Linearisation
 from flightid.models.state_space.parts import derivative
@@ -16,7 +15,6 @@ from flightid.models.state_space.parts import derivative
 MAXIMUM_STATES = 200
 MAXIMUM_CHANNELS = 100
 MAXIMUM_DEFINITIONS = 1_000
-_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 
 def check_model(model: Linearisation) -> None:
@@ -99,19 +97,14 @@ def _check_names(model: Linearisation) -> None:
     seen: dict[str, str] = {}
     for kind in ("states", "inputs", "parameters", "definitions", "tables"):
         for name in getattr(model, kind):
-            if not _NAME.fullmatch(name) or name in RESERVED:
-                raise ModelError(
-                    f"a name among the {kind} cannot stand in a formula",
-                    found=repr(name),
-                    needed="letters, digits and underscores, not a function, 'pi' or 's'",
-                )
+            require_name(name, f"one of the {kind}")
             if name in seen:
                 raise ModelError(
                     f"name {name!r} is given twice", found=f"among the {seen[name]} and the {kind}"
                 )
             seen[name] = kind
     for name in model.outputs:
-        if not _NAME.fullmatch(name) or name in model.inputs:
+        if not NAME.fullmatch(name) or name in model.inputs:
             raise ModelError(
                 "an output cannot have this name",
                 found=repr(name),
