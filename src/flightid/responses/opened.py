@@ -12,7 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import ShapeError, SingularError
-from flightid.responses.errors.random_error import CovarianceSource, Points, combined
+from flightid.responses.errors.random_error import (
+    CovarianceSource,
+    JointErrors,
+    Points,
+    combined,
+)
 from flightid.responses.response import FrequencyResponse
 
 Complex = NDArray[np.complex128]
@@ -21,7 +26,7 @@ SINGULAR = 1e-9
 
 
 @dataclass(frozen=True)
-class OpenedErrors:
+class OpenedErrors(JointErrors):
     """Errors of H: δH = L δT R at each frequency.
 
     Attributes
@@ -35,15 +40,6 @@ class OpenedErrors:
     errors: CovarianceSource
     left: Complex
     right: Complex
-
-    def covariance(
-        self,
-        outputs: NDArray[np.intp],
-        inputs: NDArray[np.intp],
-        frequencies: NDArray[np.intp],
-    ) -> NDArray[np.float64]:
-        """See `CovarianceSource`."""
-        return np.array(self.covariances([Points(int(o), inputs, frequencies) for o in outputs]))
 
     def covariances(self, wanted: Sequence[Points]) -> list[NDArray[np.float64]]:
         """See `JointErrors`."""

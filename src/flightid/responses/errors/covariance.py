@@ -19,7 +19,7 @@ import scipy
 from numpy.typing import NDArray
 
 from flightid.responses.errors.noise import NoiseSpectrum
-from flightid.responses.errors.random_error import Points, union
+from flightid.responses.errors.random_error import JointErrors, Points, union
 from flightid.responses.windows.window_weights import WindowShare, WindowWeights
 
 KEPT = 256
@@ -37,7 +37,7 @@ Places = NDArray[np.intp]
 
 
 @dataclass(frozen=True)
-class WindowedErrors:
+class WindowedErrors(JointErrors):
     """Errors of a composite (or single-window) estimate; the covariance is made when asked for.
 
     Attributes
@@ -53,14 +53,6 @@ class WindowedErrors:
     sample_time_s: float
     sensitivity: Real
     noise: NoiseSpectrum
-
-    def covariance(
-        self, outputs: NDArray[np.intp], inputs: NDArray[np.intp], frequencies: NDArray[np.intp]
-    ) -> Real:
-        """See `CovarianceSource`."""
-        return np.stack(
-            self.covariances([Points(int(output), inputs, frequencies) for output in outputs])
-        )
 
     def covariances(self, wanted: Sequence[Points]) -> list[Real]:
         """See `JointErrors`: the kernels of the noise do not depend on the output."""

@@ -9,13 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.responses.errors.noise import NoiseSpectrum
-from flightid.responses.errors.random_error import Points, union
+from flightid.responses.errors.random_error import JointErrors, Points, union
 from flightid.responses.windows.local_fit import LocalFit
 
 
 @dataclass(frozen=True)
-class LocalErrors:
+class LocalErrors(JointErrors):
     """Errors of local polynomial estimates: two frequencies share the bins that both fits use.
+
+    Bins of noise are circular, so there is no pseudo-covariance.
 
     Attributes
     ----------
@@ -26,17 +28,6 @@ class LocalErrors:
 
     fits: tuple[LocalFit, ...]
     noise: NoiseSpectrum
-
-    def covariance(
-        self,
-        outputs: NDArray[np.intp],
-        inputs: NDArray[np.intp],
-        frequencies: NDArray[np.intp],
-    ) -> NDArray[np.float64]:
-        """See `CovarianceSource`; bins of noise are circular, so there is no pseudo-covariance."""
-        return np.stack(
-            self.covariances([Points(int(output), inputs, frequencies) for output in outputs])
-        )
 
     def covariances(self, wanted: Sequence[Points]) -> list[NDArray[np.float64]]:
         """See `JointErrors`: shares of bins do not depend on the output."""

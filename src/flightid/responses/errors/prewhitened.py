@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from flightid.errors import DataError
 from flightid.responses.errors.functional import Functional
-from flightid.responses.errors.random_error import CovarianceSource, Points
+from flightid.responses.errors.random_error import CovarianceSource, JointErrors, Points
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -210,7 +210,7 @@ def _causes(rows: Real, blocks: Sequence[tuple[int, int]], first: int, *, direct
 
 
 @dataclass(frozen=True)
-class PrewhitenedErrors:
+class PrewhitenedErrors(JointErrors):
     """Errors of a response by way of a model of the noise, across outputs and frequencies.
 
     Attributes
@@ -221,12 +221,6 @@ class PrewhitenedErrors:
 
     model: NoiseModel
     omega_rad_s: Real
-
-    def covariance(self, outputs: Places, inputs: Places, frequencies: Places) -> Real:
-        """See `CovarianceSource`."""
-        return np.stack(
-            self.covariances([Points(int(output), inputs, frequencies) for output in outputs])
-        )
 
     def covariances(self, wanted: Sequence[Points]) -> list[Real]:
         """See `JointErrors`."""

@@ -35,8 +35,18 @@ class Points(NamedTuple):
 
 
 @runtime_checkable
-class JointErrors(Protocol):
+class JointErrors(CovarianceSource, Protocol):
     """A source that knows how the errors of different outputs hang together."""
+
+    def covariance(
+        self,
+        outputs: NDArray[np.intp],
+        inputs: NDArray[np.intp],
+        frequencies: NDArray[np.intp],
+    ) -> NDArray[np.float64]:
+        """See `CovarianceSource`."""
+        wanted = [Points(int(output), inputs, frequencies) for output in outputs]
+        return np.stack(self.covariances(wanted))
 
     def covariances(self, wanted: Sequence[Points]) -> list[NDArray[np.float64]]:
         """One matrix for each output, shaped as by `CovarianceSource.covariance`."""
