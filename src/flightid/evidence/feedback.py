@@ -10,14 +10,12 @@ from flightid.record.hold import common_loop
 from flightid.record.repeats import found_period
 from flightid.record.several import as_records
 from flightid.uncertainty.feedback import (
+    MAXIMUM_SAMPLES,
     FeedbackTest,
     declared_loop,
     find_feedback,
     unless_spread,
 )
-
-MAXIMUM_SAMPLES = 20_000
-"""Of all records together."""
 
 
 def feedback_test(

@@ -46,6 +46,7 @@ from flightid.uncertainty.feedback import FeedbackTest, declared_loop
 LEADS = "residuals-lead-input"
 """Of a residual that goes with inputs to come, beyond chance: feedback, or dynamics missing."""
 CONVERGED = frozenset({"gradient", "step", "cost", "zero", "bounds"})
+MORE_STEPS = "raise maximum_iterations, use more starts, or simplify the model"
 STRAIGHT = frozenset({"", "regression", "instruments", "kernel", "subspace"})
 """Ends of methods that search nothing: linear equations solve them."""
 # Which check a finding of a fit belongs to; all others are guidelines.
@@ -201,8 +202,7 @@ def _ended(findings: Sequence[Finding], termination: str) -> Check | None:
         return Check(SETTLED, Light.GREEN, f"solved without a search{corrected}")
     if termination in STOPS:
         return Check(SETTLED, Light.GREEN, f"terms were chosen until {termination!r} said enough")
-    action = "raise maximum_iterations, use more starts, or simplify the model"
-    return Check(SETTLED, Light.AMBER, f"the search ended by {termination!r}", action)
+    return Check(SETTLED, Light.AMBER, f"the search ended by {termination!r}", MORE_STEPS)
 
 
 def worse(one: Check | None, other: Check) -> Check:

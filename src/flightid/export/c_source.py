@@ -23,8 +23,8 @@ from flightid.export.names import (
     number_literal,
     text_literal,
 )
-from flightid.export.options import Hold
 from flightid.models import StateSpaceModel
+from flightid.models.linear.hold_equivalent import Hold
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.models.state_space.integration_steps import STEP_RADIUS, steps_per_sample
 from flightid.version import VERSION

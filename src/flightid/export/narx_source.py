@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from flightid.errors import OptionError
 from flightid.export.c_source import CSource, Entry, Tables, rendered, step_of_samples
-from flightid.export.options import Hold
 from flightid.models import NarxModel
+from flightid.models.linear.hold_equivalent import Hold
 
 
 def narx_source(

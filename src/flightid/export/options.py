@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from flightid.models.linear.hold_equivalent import Hold
 from flightid.options import Options, option
 
-Hold = Literal["zero", "first"]
 Interface = Literal["model-exchange", "co-simulation"]
 
 

@@ -11,9 +11,9 @@ import scipy
 from numpy.typing import NDArray
 
 from flightid.conventions import Light
-from flightid.evidence.gather import CORRELATED, CRAMER_RAO, INSENSITIVE
+from flightid.evidence.gather import CONVERGED, CORRELATED, CRAMER_RAO, INSENSITIVE, MORE_STEPS
 from flightid.findings import Finding
-from flightid.identification.multistart import CONVERGED, End
+from flightid.identification.multistart import End
 from flightid.uncertainty.estimate import Estimate
 from flightid.uncertainty.influence import NEXT
 
@@ -254,7 +254,7 @@ def judge_search(groups: Sequence[Sequence[End]], near: float | None = None) -> 
                 "not-converged",
                 Light.RED,
                 f"the iteration ended by {best.termination!r} after {best.iterations} steps",
-                "raise maximum_iterations, use more starts, or simplify the model",
+                MORE_STEPS,
             )
         )
     near = _NEAR_COST * best.cost if near is None else near

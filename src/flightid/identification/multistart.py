@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from flightid import _native
 from flightid.errors import FitError, OptionError
+from flightid.evidence.gather import CONVERGED
 from flightid.identification.local_minimum import LocalMinimum
-from flightid.models import Parameter
+from flightid.models import GreyBoxModel, Parameter
 
 Array = NDArray[np.float64]
 NativeEnd = tuple[Array, float, Array, Array, int, str]
 
-CONVERGED = frozenset({"gradient", "step", "cost", "zero", "bounds"})
 _SAME_COST = 1e-6
 _SAME_VALUE = 1e-3
 _DECADES = 1.0
@@ -25,6 +25,21 @@ _NEAR, _WIDE = 0.3, 0.6
 """Shares of a value by which starts differ from it where a bound is open: the first, and more."""
 _MANY = 8
 """Starts from which on the wider share counts."""
+
+
+def require_free(model: GreyBoxModel) -> None:
+    """Refuse a model that has nothing to search.
+
+    Raises
+    ------
+    FitError
+    """
+    if not model.parameters.free:
+        raise FitError(
+            "the model has no free parameter",
+            needed="at least one",
+            action="free a parameter with model.with_free(name)",
+        )
 
 
 @dataclass(frozen=True)

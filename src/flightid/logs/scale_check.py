@@ -19,7 +19,7 @@ from flightid.findings import Finding
 from flightid.logs.channels.channel_map import ChannelMap
 from flightid.logs.contents import LogContents
 from flightid.logs.extraction import extract
-from flightid.record.angle_units import DEGREES, spread_ratio
+from flightid.record.angle_units import CORRELATION, DEGREES, spread_ratio
 
 Array = NDArray[np.float64]
 Stream = tuple[Array, Array]
@@ -27,7 +27,6 @@ AXES = ("p", "q", "r")
 ANGLES = ("phi", "theta", "psi")
 WINDOW_S, SAMPLES_IN_WINDOW, MOST_WINDOWS = 0.3, 10, 5000
 FEWEST_WINDOWS = 25
-CORRELATION = 0.9
 TOLERANCE = 0.05
 DEVIATIONS = 3.0
 """Standard errors of the factor, by the noise between the streams, that are allowed for."""

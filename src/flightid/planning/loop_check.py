@@ -19,6 +19,7 @@ from flightid.responses import estimate_response
 LARGEST_ERROR, LEAST_ERROR, FEWEST_POINTS = 0.2, 0.04, 6
 """A frequency counts as measured up to this random error; none weighs more than one of the least;
 so many make a check."""
+CAREFULLY = "begin with a third of the amplitude, look at the log, then fly the whole"
 LARGEST_MISS = 0.25
 """Root mean square of the logarithm, beyond what noise explains: a quarter of the loop."""
 
@@ -57,7 +58,7 @@ class LoopCheck:
             "loop-not-as-flown",
             Light.AMBER,
             f"{axis}: what the plan expects is {self.miss:.0%} away from {flown}",
-            "begin with a third of the amplitude, look at the log, then fly the whole",
+            CAREFULLY,
         )
 
 

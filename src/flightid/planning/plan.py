@@ -24,6 +24,7 @@ from flightid.planning.axis_guess import guess_axis
 from flightid.planning.flight_findings import flight_findings
 from flightid.planning.flight_time import flight_time
 from flightid.planning.flown_axis import FlownAxis
+from flightid.planning.loop_check import CAREFULLY
 from flightid.planning.options import PlanOptions
 from flightid.planning.procedures import PROCEDURES, Procedure, procedure_of
 from flightid.planning.result import AxisSweep, SweepPlan
@@ -349,7 +350,7 @@ def _expected(sweeps: tuple[AxisSweep, ...]) -> list[Finding]:
                 "axis-typical",
                 Light.AMBER,
                 f"{named}: a typical vehicle under these gains stands for yours ({reason})",
-                "begin with a third of the amplitude, look at the log, then fly the whole",
+                CAREFULLY,
             )
         )
     return found

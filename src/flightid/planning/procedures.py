@@ -53,11 +53,13 @@ class Procedure:
         return "rate" if self.how == "stick" and axis == "yaw" else self.enters
 
 
+_SAVE = "Save all parameters of the vehicle to a file first: that is the last way back."
 _LOAD = (
-    "Save all parameters of the vehicle to a file first: that is the last way back.",
+    _SAVE,
     "Load the file of the axis, write it, refresh the list, load and write it once more: settings "
     "of the sweep show only after SID_AXIS is set.",
 )
+_LOAD_PX4 = (_SAVE, "Load the file and restart: SDLOG_PROFILE is read once.")
 _AFTER = (
     "Load the rollback file, or what you saved first, and write it: it takes every setting back.",
     "Copy the log, then: flightid tune LOG.",
@@ -111,7 +113,7 @@ PROCEDURES = {
         Procedure(
             "arduplane", "ArduPlane", "arduplane", "aeroplane", "stick", "angle", ".param",
             (
-                "Save all parameters of the vehicle to a file first: that is the last way back.",
+                _SAVE,
                 "Load the file: it makes the log fast enough. Stable firmware injects no sweep on "
                 "fixed wings: fly it by stick in FBWA.",
             ),
@@ -122,8 +124,7 @@ PROCEDURES = {
             "px4_multicopter", "PX4 multicopter", "px4_multicopter", "multirotor", "stick",
             "angle", ".params",
             (
-                "Save all parameters to a file first: that is the last way back.",
-                "Load the file and restart: SDLOG_PROFILE is read once.",
+                *_LOAD_PX4,
                 "PX4 injects only its autotune's steps on multicopters: fly the sweep by stick in "
                 "Stabilized.",
             ),
@@ -133,8 +134,7 @@ PROCEDURES = {
             "px4_fixed_wing", "PX4 fixed wing", "px4_fixed_wing", "aeroplane", "autotune", "rate",
             ".params",
             (
-                "Save all parameters to a file first: that is the last way back.",
-                "Load the file and restart: SDLOG_PROFILE is read once.",
+                *_LOAD_PX4,
                 "Gains that the autotune finds are logged and not applied (FW_AT_APPLY 0).",
             ),
             (

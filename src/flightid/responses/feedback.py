@@ -16,6 +16,7 @@ from flightid.responses.response import FrequencyResponse
 from flightid.responses.windows.samples import Samples
 from flightid.uncertainty.fed_noise import fed_noise_spectrum
 from flightid.uncertainty.feedback import (
+    MAXIMUM_SAMPLES,
     FeedbackTest,
     declared_loop,
     find_feedback,
@@ -26,8 +27,6 @@ SAMPLES_A_CYCLE = 8.0
 """Samples kept in a cycle of the highest frequency of interest."""
 SAMPLES_FOR_BIAS = 16.0
 """As many for the size of a bias: what is fed back within one seems the vehicle's own."""
-MAXIMUM_SAMPLES = 20000
-"""Of all records together."""
 
 
 def feedback_of(

@@ -22,6 +22,7 @@ FAST_GYRO = {
     "betaflight": "set blackbox_sample_rate 1/1, and log the unfiltered gyroscope",
     "mavlink": LOGGING["mavlink"],
 }
+SHAKEN = "balance propellers, damp the autopilot's mount, look for loose parts"
 
 
 def judge_flight(review: FlightReview) -> tuple[Finding, ...]:
@@ -187,12 +188,12 @@ def _vibration(found: Vibration) -> Iterator[Finding]:
             light,
             f"{found.name}: median {found.median:.3g}, 99th percentile {found.high:.3g} m/s^2, "
             f"where {found.good.value:g} is fine and {found.bad.value:g} is trouble",
-            "balance propellers, damp the autopilot's mount, look for loose parts",
+            SHAKEN,
         )
     if found.clipped:
         yield Finding(
             "accelerometer-clips",
             Light.AMBER,
             f"{found.name}: the accelerometer was at its range {found.clipped} times",
-            "balance propellers, damp the autopilot's mount, look for loose parts",
+            SHAKEN,
         )

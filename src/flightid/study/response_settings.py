@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from flightid.logs.to_record import EXCITATION
 from flightid.options import option
 from flightid.record.hold import LOOPS, Loop
 from flightid.responses.options import ESTIMATORS, ResponseOptions
 
-EXCITATION = "excitation"
 TEST = "test"
 """Word of the key ``loop`` where nobody declares it."""
 

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from flightid.errors import StudyError
+from flightid.logs.to_record import EXCITATION
 from flightid.option_forms import NOTHING, SPAN
 from flightid.options import Options, option
 from flightid.reading import read_toml
@@ -26,7 +27,7 @@ from flightid.study.reading import TOP, TableReader, read_table
 from flightid.study.record_files import RecordFile, ShapeOptions, read_record_file
 from flightid.study.reducing import ReduceSettings, read_reduce
 from flightid.study.references import require_conditions, require_references
-from flightid.study.response_settings import EXCITATION, ResponseSettings
+from flightid.study.response_settings import ResponseSettings
 from flightid.study.tuning import TuneSettings, read_tune
 from flightid.study.uses_settings import UsesSettings, read_uses
 from flightid.uncertainty.quantiles import LEVEL

@@ -15,11 +15,11 @@ from flightid.errors import StudyError
 from flightid.inspection import Inspection, inspect_log
 from flightid.logs import Log, read_log
 from flightid.logs.dataflash.sid_runs import SidRun
+from flightid.logs.to_record import EXCITATION
 from flightid.record import Channel, Record, Step
 from flightid.study.conditioning import Conditioning, condition, outliers_first
 from flightid.study.flight import FlightPlan
 from flightid.study.record_files import declared, load_records
-from flightid.study.response_settings import EXCITATION
 from flightid.study.settings import Segment, Settings
 from flightid.study.stage_runner import StageResult, StageRunner
 from flightid.study.task import Task

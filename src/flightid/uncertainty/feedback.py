@@ -41,6 +41,8 @@ LEVEL = 0.01
 """Share of open loops that are called closed."""
 LARGEST_ORDER = 20
 """Past samples of every channel in the model of the outputs, and of an input in that of its own."""
+MAXIMUM_SAMPLES = 20_000
+"""Of all records together that a test looks at."""
 LAGS = 12
 """Past samples of noise that may move an input."""
 SAMPLES_PER_NUMBER = 10

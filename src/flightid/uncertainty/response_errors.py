@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from flightid.uncertainty.influence import require_apart, require_influence
 
 Array = NDArray[np.float64]
-_DECIBEL = 20.0 / np.log(10.0)
-_DEGREE = 180.0 / np.pi
+DECIBEL, DEGREE = 20.0 / np.log(10.0), 180.0 / np.pi
+"""Of a relative change of a response: its real part in dB, its imaginary part in deg."""
 
 
 @dataclass(frozen=True)
@@ -145,7 +145,7 @@ def decibel_phase_sensitivity(
     inverse = 1.0 / response
     result = np.zeros((2 * n, 2 * n))
     rows = np.arange(n)
-    db, deg = -_DECIBEL * weight_db, -_DEGREE * weight_deg
+    db, deg = -DECIBEL * weight_db, -DEGREE * weight_deg
     result[2 * rows, rows] = db * inverse.real
     result[2 * rows, n + rows] = -db * inverse.imag
     result[2 * rows + 1, rows] = deg * inverse.imag

@@ -27,12 +27,11 @@ from flightid.conventions import Light
 from flightid.errors import OptionError, UnknownNameError
 from flightid.findings import Finding
 from flightid.models.linear.hold_equivalent import Hold as InputHold
-from flightid.models.linear.linear_system import LinearSystem
+from flightid.models.linear.linear_system import DEFAULT_PADE_ORDER, LinearSystem
 from flightid.record import Record
 from flightid.result import Result
 from flightid.table import Column, Table
 
-DEFAULT_PADE_ORDER = 3
 STABILITY_ORDER = 6
 
 

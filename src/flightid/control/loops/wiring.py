@@ -90,17 +90,11 @@ def _sources(blocks: tuple[Block, ...], inputs: tuple[str, ...]) -> dict[str, in
     found: dict[str, int] = {}
     for place, block in enumerate(blocks):
         for name in block.outputs:
-            if name in found:
+            other = repr(blocks[found[name]]) if name in found else "an input from outside"
+            if name in found or name in inputs:
                 raise ModelError(
                     f"signal {name!r} has two sources",
-                    found=f"{blocks[found[name]]!r} and {block!r}",
-                    needed="one block that gives it",
-                    action="rename one of them and add the two with sum_of",
-                )
-            if name in inputs:
-                raise ModelError(
-                    f"signal {name!r} has two sources",
-                    found=f"an input from outside and {block!r}",
+                    found=f"{other} and {block!r}",
                     needed="one of the two",
                     action="rename one of them and add the two with sum_of",
                 )

@@ -251,20 +251,13 @@ def _judge(
         text = f"the gain sets the bandwidth: {gain:.3g} rad/s, below {margin:.3g} of the phase"
         action = "a pilot who presses loses stability at once: look at the gain near ω_180"
         found.append(Finding("gain-limited", Light.AMBER, text, action))
+    higher = "widen the band, or excite higher frequencies"
     if np.isnan(delay):
         text = f"twice ω_180, {2 * crossing:.3g} rad/s, lies beyond the band"
-        found.append(
-            Finding(
-                "phase-delay", Light.UNKNOWN, text, "widen the band, or excite higher frequencies"
-            )
-        )
+        found.append(Finding("phase-delay", Light.UNKNOWN, text, higher))
     if np.isnan(slope):
         text = f"the band ends at {curve.omega[-1]:.3g} rad/s, too near ω_180 for a slope"
-        found.append(
-            Finding(
-                "phase-slope", Light.UNKNOWN, text, "widen the band, or excite higher frequencies"
-            )
-        )
+        found.append(Finding("phase-slope", Light.UNKNOWN, text, higher))
     if nonlinear:
         text = (
             f"the phase beyond ω_180 is no line: phase delay {delay:.3g} s by two points, "

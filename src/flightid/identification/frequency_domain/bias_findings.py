@@ -16,6 +16,7 @@ from flightid.identification.frequency_domain.error_model import ErrorModel
 from flightid.identification.frequency_domain.selection import SelectedResponse
 from flightid.models import GreyBoxModel
 from flightid.responses import FrequencyResponse
+from flightid.uncertainty.response_errors import DECIBEL, DEGREE
 
 Array = NDArray[np.float64]
 
@@ -27,8 +28,6 @@ DIES_OUT = 3.0
 """Time constants after which a mode has."""
 LESS = 0.8
 """Of the window that is wanted and that records have room for, below which one is short."""
-_DECIBEL = 20.0 / np.log(10.0)
-_DEGREE = 180.0 / np.pi
 
 
 @dataclass(frozen=True)
@@ -193,8 +192,8 @@ def sizes(
         if variance is not None and np.all(variance > 0.0):
             share = float(np.sqrt(np.mean(distance**2 / variance)))
         result[one.name] = Size(
-            float(np.sqrt(np.mean((_DECIBEL * ratio.real) ** 2))),
-            float(np.sqrt(np.mean((_DEGREE * ratio.imag) ** 2))),
+            float(np.sqrt(np.mean((DECIBEL * ratio.real) ** 2))),
+            float(np.sqrt(np.mean((DEGREE * ratio.imag) ** 2))),
             share,
         )
     return result

@@ -17,12 +17,10 @@ from flightid.identification.frequency_domain.estimator_bias import Correction
 from flightid.identification.frequency_domain.model_curves import slopes_of
 from flightid.identification.frequency_domain.selection import SelectedResponse
 from flightid.models import GreyBoxModel
+from flightid.uncertainty.response_errors import DECIBEL, DEGREE
 
 Array = NDArray[np.float64]
 Curves = list[NDArray[np.complex128]]
-
-_DECIBEL = 20.0 / np.log(10.0)
-_DEGREE = 180.0 / np.pi
 
 
 @dataclass(frozen=True)
@@ -107,8 +105,8 @@ class Objective:
         parts = []
         for each, log in zip(self.selected, logs, strict=True):
             both = np.empty((*log.shape[:-1], 2 * log.shape[-1]))
-            both[..., 0::2] = _DECIBEL * np.sqrt(each.weight_db) * log.real
-            both[..., 1::2] = _DEGREE * np.sqrt(each.weight_deg) * log.imag
+            both[..., 0::2] = DECIBEL * np.sqrt(each.weight_db) * log.real
+            both[..., 1::2] = DEGREE * np.sqrt(each.weight_deg) * log.imag
             parts.append(both)
         return np.concatenate(parts, axis=-1)
 

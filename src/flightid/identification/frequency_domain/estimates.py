@@ -25,12 +25,10 @@ from flightid.uncertainty import (
 from flightid.uncertainty.agreement import Agreement, AgreementTest
 from flightid.uncertainty.cramer_rao import inverse_hessian
 from flightid.uncertainty.estimate import Estimate
-from flightid.uncertainty.response_errors import PointSensitivity
+from flightid.uncertainty.response_errors import DECIBEL, DEGREE, PointSensitivity
 
 Array = NDArray[np.float64]
 Compare = Callable[[Array, NDArray[np.bool_]], AgreementTest]
-_DECIBEL = 20.0 / np.log(10.0)
-_DEGREE = 180.0 / np.pi
 _AT_BOUND = 1e-9
 _SHARE = 0.1
 UNSEEN = "no influence on what was fitted: its value is where it started"
@@ -171,8 +169,8 @@ def coherence_jacobian(fitted: GreyBoxModel, selected: Sequence[SelectedResponse
     rows = []
     for each, slope in zip(selected, slopes, strict=True):
         both = np.empty((2 * len(slope), slope.shape[1]))
-        both[0::2] = _DECIBEL * np.sqrt(each.weight_db)[:, None] * slope.real
-        both[1::2] = _DEGREE * np.sqrt(each.weight_deg)[:, None] * slope.imag
+        both[0::2] = DECIBEL * np.sqrt(each.weight_db)[:, None] * slope.real
+        both[1::2] = DEGREE * np.sqrt(each.weight_deg)[:, None] * slope.imag
         rows.append(both)
     return np.vstack(rows)
 

@@ -52,17 +52,15 @@ from flightid.identification.frequency_domain.selection import (
 )
 from flightid.identification.frequency_domain.setup_checks import check_setup
 from flightid.identification.frequency_domain.without_bias import far_from_best, take_out
-from flightid.identification.multistart import DenseEnd, cluster, local_minima
+from flightid.identification.multistart import DenseEnd, cluster, local_minima, require_free
 from flightid.identification.withheld_intervals import without_intervals
 from flightid.models import GreyBoxModel
 from flightid.responses import FrequencyResponse
-from flightid.uncertainty.response_errors import PointSensitivity
+from flightid.uncertainty.response_errors import DECIBEL, DEGREE, PointSensitivity
 from flightid.units import require_match
 from flightid.version import VERSION
 
 Array = NDArray[np.float64]
-_DECIBEL = 20.0 / np.log(10.0)
-_DEGREE = 180.0 / np.pi
 
 
 def fit_responses(
@@ -169,12 +167,7 @@ def check_channels(model: GreyBoxModel, data: FrequencyResponse) -> None:
     UnitError
         Data and model disagree on a unit.
     """
-    if not model.parameters.free:
-        raise FitError(
-            "the model has no free parameter",
-            needed="at least one",
-            action="free a parameter with model.with_free(name)",
-        )
+    require_free(model)
     for response in model.responses:
         data.pair(response.output, response.input)
     # Outputs of a model that no fitted response needs may be missing from the data.
@@ -256,8 +249,8 @@ def compare_responses(
         ratio = curve[each.places] / each.response
         cost = float(
             np.sum(
-                each.weight_db * (_DECIBEL * np.log(np.abs(ratio))) ** 2
-                + each.weight_deg * (_DEGREE * np.angle(ratio)) ** 2
+                each.weight_db * (DECIBEL * np.log(np.abs(ratio))) ** 2
+                + each.weight_deg * (DEGREE * np.angle(ratio)) ** 2
             )
         )
         result.append(FittedResponse(each.name, cost, each.measured, each.omega_rad_s, curve))

@@ -9,9 +9,10 @@ from flightid.errors import ModelError, OptionError, UnknownNameError
 from flightid.identification.prediction.continuous import predict_continuous
 from flightid.identification.prediction.narx import predict_narx
 from flightid.identification.prediction.remembered import of_record, remembered, start_of_runs
-from flightid.identification.prediction.request import FREE_RUN, InitialState, Request
+from flightid.identification.prediction.request import FREE_RUN, Request
 from flightid.identification.prediction.result import Prediction
 from flightid.identification.prediction.sampled import predict_sampled
+from flightid.identification.records.options import InitialState
 from flightid.models import InnovationsModel, LinearSystem, NarxModel, PolynomialModel
 from flightid.models.model import LinearModel, Model, model_of
 from flightid.record import Record

@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from flightid.identification.prediction.request import InitialState
-from flightid.identification.records.options import ESTIMATE, MEASURED, TRIM
+from flightid.identification.records.options import ESTIMATE, MEASURED, TRIM, InitialState
 from flightid.identification.records.record_parameters import with_record_values
 from flightid.models import StateSpaceModel
 from flightid.models.model import model_of

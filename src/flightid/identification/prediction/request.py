@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 from flightid.errors import OptionError
+from flightid.identification.records.options import InitialState
 from flightid.options import Options, option
 from flightid.record.hold import HOLDS, InputHold
 
@@ -15,8 +15,6 @@ SHARE = 10
 """A tenth of a record tells the state of a sampled model at its beginning."""
 LEAST_PER_STATE = 3
 """Samples for each number of the initial state: fewer would follow the noise."""
-
-InitialState = str | Mapping[str, float | str]
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.errors import DataError, FitError
+from flightid.errors import DataError
+from flightid.identification.multistart import require_free
 from flightid.identification.records.declared_numbers import declared_numbers, with_declared
 from flightid.identification.records.options import (
     RecordOptions,
@@ -156,12 +157,7 @@ def prepare_records(
         Record and model disagree on a unit.
     """
     records = as_records(data)
-    if not model.parameters.free:
-        raise FitError(
-            "the model has no free parameter",
-            needed="at least one",
-            action="free a parameter with model.with_free(name)",
-        )
+    require_free(model)
     states = state_names(model)
     # A nonlinear model takes its channels whole: no point stands for another.
     whole = isinstance(model, StateSpaceModel) and not model.is_linear

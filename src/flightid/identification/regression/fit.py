@@ -19,7 +19,7 @@ from flightid.identification.frequency_domain.estimates import (
     fitted_parameters,
     require_identifiable,
 )
-from flightid.identification.multistart import DenseEnd, local_minima
+from flightid.identification.multistart import DenseEnd, local_minima, require_free
 from flightid.identification.records.findings import judge_fit
 from flightid.identification.regression.options import RegressionOptions
 from flightid.identification.regression.rounds import Rows, SearchBounds, stack
@@ -100,12 +100,7 @@ def check_records(model: StateSpaceModel, data: Record | Sequence[Record]) -> tu
     records = as_records(data)
     if not records:
         raise DataError("there is no record", needed="at least one")
-    if not model.parameters.free:
-        raise FitError(
-            "the model has no free parameter",
-            needed="at least one",
-            action="free a parameter with model.with_free(name)",
-        )
+    require_free(model)
     for record in records:
         for name in (*model.inputs, *model.outputs):
             require_match(name, record.unit(name), model.units[name], record=str(record.name))

@@ -15,10 +15,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.errors import ModelError, SingularError
+from flightid.errors import ModelError
 from flightid.identification.records.delayed_inputs import DelayedInputs, lagrange
 from flightid.identification.regression.sampled_equations import Reconstruction, StateMeasurements
 from flightid.models import StateSpaceModel
+from flightid.models.state_space.linear import solved_rates
 
 Array = NDArray[np.float64]
 _GAUSS = 0.5 / np.sqrt(3.0)
@@ -223,16 +224,9 @@ class Bends:
 
 def _solve(matrix: Array, right: Array) -> Array:
     """M⁻¹ of each sample times its right side; one factorisation where M never changes."""
-    try:
-        if np.array_equal(matrix, np.broadcast_to(matrix[:1], matrix.shape)):
-            return np.asarray(np.linalg.inv(matrix[0]) @ right)
-        return np.asarray(np.linalg.solve(matrix, right))
-    except np.linalg.LinAlgError as error:
-        raise SingularError(
-            "the equations do not give every state derivative",
-            found="a singular matrix M of their factors",
-            needed="one independent equation for each state derivative",
-        ) from error
+    if np.array_equal(matrix, np.broadcast_to(matrix[:1], matrix.shape)):
+        return np.asarray(solved_rates(matrix[0], np.eye(len(matrix[0]))) @ right)
+    return solved_rates(matrix, right)
 
 
 def _require_affine(residuals: Array, factors: Array, moving: Array) -> None:

@@ -252,6 +252,17 @@ class RowSpaceFactor:
         return np.asarray(np.linalg.lstsq(gamma, weights.T @ past, rcond=None)[0])
 
 
+def require_columns(columns: int, needed: int, horizon: int) -> None:
+    """Refuse records that are too short for the horizon."""
+    if columns < needed:
+        raise DataError(
+            "the records are too short for the horizon",
+            found=f"{columns} columns with {horizon} block rows of past and future",
+            needed=f"at least {needed}",
+            action="give longer records, a shorter horizon or a smaller maximum_order",
+        )
+
+
 def compress(data: SubspaceData, horizon: int) -> RowSpaceFactor:
     """One QR of the Hankel matrices of all records, folded block by block.
 
@@ -263,13 +274,7 @@ def compress(data: SubspaceData, horizon: int) -> RowSpaceFactor:
     p, m = data.n_outputs, data.n_inputs
     needed = 2 * horizon * (p + m)
     columns = sum(max(0, y.shape[1] - 2 * horizon + 1) for y in data.outputs)
-    if columns < needed:
-        raise DataError(
-            "the records are too short for the horizon",
-            found=f"{columns} columns with {horizon} block rows of past and future",
-            needed=f"at least {needed}",
-            action="give longer records, a shorter horizon or a smaller maximum_order",
-        )
+    require_columns(columns, needed, horizon)
     places = np.arange(2 * horizon * (m + p)).reshape(2 * horizon, m + p)
     ordered = places[horizon:, :m], places[:horizon, :m], places[:, m:]
     triangle = data.hankel_factor(2 * horizon, np.concatenate([each.ravel() for each in ordered]))

@@ -8,7 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError
-from flightid.identification.subspace.data import RowSpaceFactor, SubspaceData, compress
+from flightid.identification.subspace.data import (
+    RowSpaceFactor,
+    SubspaceData,
+    compress,
+    require_columns,
+)
 from flightid.identification.subspace.matrices import (
     STABLE,
     feedthrough,
@@ -174,14 +179,3 @@ def _from_states(
         b, d = feedthrough(data, a, c, k, direct=bool(structure.direct))
         return a, b, c, d, k
     return a, b, c, d, steady_gain(a, c, k, errors @ errors.T / errors.shape[1])
-
-
-def require_columns(columns: int, needed: int, horizon: int) -> None:
-    """Refuse records that are too short for the horizon."""
-    if columns < needed:
-        raise DataError(
-            "the records are too short for the horizon",
-            found=f"{columns} columns with {horizon} block rows of past and future",
-            needed=f"at least {needed}",
-            action="give longer records, a shorter horizon or a smaller maximum_order",
-        )

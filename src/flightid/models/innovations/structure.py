@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from typing import TypedDict
 
 from flightid.errors import OptionError
+from flightid.models.polynomial.structure import INITIAL_STATES
 from flightid.models.sampled.channels import OFFSETS
 from flightid.options import Options, option
 
 METHODS = ("moesp", "n4sid", "cva", "pbsid")
-INITIAL_STATES = ("estimate", "zero")
 LARGEST_ORDER = 50
 LARGEST_HORIZON = 500
 

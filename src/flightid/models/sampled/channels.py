@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from flightid.errors import DataError, OptionError
 from flightid.record import Record
+from flightid.record.hold import SAME_SAMPLE_TIME
 from flightid.units import clash, match
 
 Array = NDArray[np.float64]
-SAME_SAMPLE_TIME = 1e-6
 OFFSETS = ("mean", "mean_as_trim", "trim", "none")
 LARGEST = 1e100
 """A run beyond this is held at the last sample before it: its squares still are numbers."""

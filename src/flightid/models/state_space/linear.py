@@ -26,6 +26,24 @@ from flightid.models.state_space.parts import (
 Array = NDArray[np.float64]
 
 
+def solved_rates(m: Array, right: Array) -> Array:
+    """State derivatives of M ẋ = right.
+
+    Raises
+    ------
+    SingularError
+        M is singular.
+    """
+    try:
+        return np.asarray(np.linalg.solve(m, right), dtype=np.float64)
+    except np.linalg.LinAlgError as error:
+        raise SingularError(
+            "the equations do not give every state derivative",
+            found="a singular matrix M of their factors",
+            needed="one independent equation for each state derivative",
+        ) from error
+
+
 class Linearisation(Adjustable):
     """What follows from the linearisation of a state-space model; its base."""
 
@@ -205,15 +223,7 @@ class Linearisation(Adjustable):
             A negative delay.
         """
         found = self.matrices(values, at)
-        try:
-            forced = np.hstack([found.f, found.g])
-            rates: Array = np.asarray(np.linalg.solve(found.m, forced), dtype=np.float64)
-        except np.linalg.LinAlgError as error:
-            raise SingularError(
-                "the equations do not give every state derivative",
-                found="a singular matrix M of their factors",
-                needed="one independent equation for each state derivative",
-            ) from error
+        rates = solved_rates(found.m, np.hstack([found.f, found.g]))
         a, b = rates[:, : len(rates)], rates[:, len(rates) :]
         columns = range(len(self.inputs))
         delays = one_delay_for_each_input(columns, list(found.delays_s), list(self.inputs))

@@ -12,11 +12,9 @@ from flightid.errors import DataError, OptionError
 from flightid.record import Record
 from flightid.record.checks import CHECK, checked_history
 from flightid.record.history import Step
+from flightid.record.hold import SAME_SAMPLE_TIME
 from flightid.record.several import as_records
 from flightid.units import clash
-
-SAME_SAMPLE_TIME = 1e-6
-"""Largest relative difference of sample times that still counts as the same."""
 
 
 @dataclass(frozen=True)

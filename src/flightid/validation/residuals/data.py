@@ -12,6 +12,7 @@ from flightid.errors import DataError, OptionError, ShapeError
 from flightid.identification import Fit
 from flightid.models import Model
 from flightid.record import Record
+from flightid.record.hold import SAME_SAMPLE_TIME
 from flightid.uncertainty.fitted_correlation import FittedCorrelation
 from flightid.uncertainty.residual_correlation import Series
 from flightid.validation.residuals.correlation_result import Horizon
@@ -27,8 +28,6 @@ Residuals = (
     | ArrayLike
 )
 Inputs = Iterable[str] | Mapping[str, ArrayLike] | ArrayLike
-SAME_SAMPLE_TIME = 1e-6
-"""Largest relative difference of sample times that still counts as the same."""
 
 _ONE_STEP = "Residuals of the one-step-ahead predictor: a good model leaves them white."
 _FREE_RUN = (

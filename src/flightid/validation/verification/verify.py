@@ -21,8 +21,9 @@ from flightid.identification.prediction.predict import (
     require_units,
 )
 from flightid.identification.prediction.remembered import of_record, remembered, start_of_runs
-from flightid.identification.prediction.request import FREE_RUN, InitialState, Request
+from flightid.identification.prediction.request import FREE_RUN, Request
 from flightid.identification.prediction.result import Prediction
+from flightid.identification.records.options import InitialState
 from flightid.record import Record
 from flightid.record.chosen_hold import chosen_hold
 from flightid.record.hold import HOLDS, InputHold
