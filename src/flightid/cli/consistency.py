@@ -8,14 +8,20 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from flightid.cli.option_fields import OptionsCommand, parted
-from flightid.cli.output import all_option, emit, json_option, leave_by_verdict, level_option, note
+from flightid.cli.output import (
+    WRITTEN,
+    all_option,
+    emit,
+    json_option,
+    leave_by_verdict,
+    level_option,
+    note,
+)
 from flightid.cli.pages import html_option, write_page
 from flightid.cli.records import FILES, read_files, reading
 
 if TYPE_CHECKING:
     from flightid.options import Options
-
-FILE = click.Path(dir_okay=False, path_type=Path)
 
 
 def _fields() -> dict[str, type[Options]]:
@@ -26,7 +32,7 @@ def _fields() -> dict[str, type[Options]]:
 @click.argument("files", type=FILES, nargs=-1, required=True)
 @click.option("--estimate", help="Instrument errors, with commas: bias_p,scale_q,delay_phi.")
 @click.option(
-    "--write", type=FILE, help="Write the corrected records to this file (*.parquet, *.nc)."
+    "--write", type=WRITTEN, help="Write the corrected records to this file (*.parquet, *.nc)."
 )
 @level_option
 @html_option

@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from flightid.cli.option_fields import OptionsCommand, parted
-from flightid.cli.output import emit, json_option, leave_by_verdict, note
+from flightid.cli.output import WRITTEN, emit, json_option, leave_by_verdict, note
+from flightid.cli.pages import html_option
 
 if TYPE_CHECKING:
     from flightid.excitation import Plan
     from flightid.options import Options
-
-FILE = click.Path(dir_okay=False, path_type=Path)
 
 
 def _fields() -> dict[str, type[Options]]:
@@ -41,8 +40,8 @@ class Kinds(click.Choice[str]):
 
 @click.command(cls=OptionsCommand, fields_of=_fields)
 @click.argument("kind", type=Kinds())
-@click.option("--csv", "csv_file", type=FILE, help="Write the samples to this file.")
-@click.option("--html", type=FILE, help="Write a page with pictures to this file.")
+@click.option("--csv", "csv_file", type=WRITTEN, help="Write the samples to this file.")
+@html_option
 @json_option
 def command(
     kind: str,

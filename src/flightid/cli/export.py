@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from flightid.cli.option_fields import OptionsCommand, given_options
-from flightid.cli.output import emit, json_option
+from flightid.cli.output import WRITTEN, emit, json_option
 from flightid.cli.sources import load_source, model_argument, model_options
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ def _fields() -> dict[str, type[Options]]:
 
 @click.command(cls=OptionsCommand, fields_of=_fields)
 @model_argument
-@click.argument("file", type=click.Path(dir_okay=False, path_type=Path))
+@click.argument("file", type=WRITTEN)
 @click.option("--format", help="Left out: by the suffix of FILE.")
 @click.option("--name", help="Of the model in FILE; left out: the file's name.")
 @model_options

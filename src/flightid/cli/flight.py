@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from flightid.cli.output import json_option, leave_by_verdict, level_option, note
+from flightid.cli.output import WRITTEN, json_option, leave_by_verdict, level_option, note
 from flightid.cli.pages import html_option, show_review
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 @click.option(
     "--write",
     "target",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=WRITTEN,
     help="Parameter file for the filters that would serve better, with the way back.",
 )
 @click.option("--overwrite", is_flag=True, help="Replace parameter files that exist.")

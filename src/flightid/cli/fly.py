@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from flightid.cli.option_fields import OptionsCommand, given_options
-from flightid.cli.output import emit, json_option, note
+from flightid.cli.output import WRITTEN, emit, json_option, note
 from flightid.cli.records import FILES
 from flightid.cli.sources import load_source, model_argument, model_options
 
@@ -43,7 +43,7 @@ def _fields() -> dict[str, type[Options]]:
 )
 @click.option(
     "--output",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=WRITTEN,
     help="Write the flight: .parquet or .nc.",
 )
 @json_option

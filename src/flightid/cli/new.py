@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from flightid.cli.option_fields import OptionsCommand, parted
-from flightid.cli.output import note
+from flightid.cli.output import WRITTEN, note
 from flightid.cli.proposals import note_of, of_data, propose, study_path
 from flightid.cli.records import FILES
 
@@ -23,7 +23,7 @@ from flightid.cli.records import FILES
 @click.option(
     "--write",
     "target",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=WRITTEN,
     help="Study file to write; default: <log>-study.toml beside the log.",
 )
 def command(

@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from enum import IntEnum
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import click
@@ -14,6 +15,8 @@ if TYPE_CHECKING:
     from flightid.findings import Finding
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+WRITTEN = click.Path(dir_okay=False, path_type=Path)
+"""A file that a command writes."""
 
 
 class Exit(IntEnum):

@@ -4,25 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from flightid.cli.output import emit, emit_values, leave_by_verdict, note
+from flightid.cli.output import WRITTEN, Function, emit, emit_values, leave_by_verdict, note
 
 if TYPE_CHECKING:
     from flightid.report.content import Document
     from flightid.result import Result
     from flightid.review import AutotuneReview, FlightReview
 
-Function = TypeVar("Function", bound=Callable[..., Any])
-
 
 def html_option(function: Function) -> Function:
     """Add ``--html`` to a command whose result has a picture; its argument is ``html``."""
     decorate = click.option(
         "--html",
-        type=click.Path(dir_okay=False, path_type=Path),
+        type=WRITTEN,
         help="Write a page with numbers and pictures to this file.",
     )
     return decorate(function)
@@ -33,7 +31,7 @@ def model_file_option(function: Function) -> Function:
     decorate = click.option(
         "--write",
         "written",
-        type=click.Path(dir_okay=False, path_type=Path),
+        type=WRITTEN,
         help="Model file (.toml) to write: estimates with covariance and evidence.",
     )
     return decorate(function)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from flightid.cli.option_fields import OptionsCommand, parted
-from flightid.cli.output import all_option, json_option, note
+from flightid.cli.output import WRITTEN, all_option, json_option, note
 from flightid.cli.pages import html_option, show
 from flightid.cli.records import FILES, read_files, reading, write_out
 from flightid.cli.sources import load_source, model_argument, model_options
@@ -32,7 +32,7 @@ def _fields() -> dict[str, type[Options]]:
 @model_options
 @click.option(
     "--write",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=WRITTEN,
     help="Write the predicted records to this file (*.parquet, *.nc; one also as *.csv).",
 )
 @html_option

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import click
 
-from flightid.cli.output import emit_values, json_option, leave_by_verdict, note
+from flightid.cli.output import WRITTEN, emit_values, json_option, leave_by_verdict, note
 
 
 @click.command()
 @click.argument("results", type=click.Path(exists=True, path_type=Path))
 @click.option(
     "--html",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=WRITTEN,
     help="Write the page to this file instead of printing text.",
 )
 @click.option(

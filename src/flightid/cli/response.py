@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from flightid.cli.option_fields import OptionsCommand, parted
-from flightid.cli.output import all_option, emit, json_option, leave_by_verdict, level_option, note
+from flightid.cli.output import (
+    WRITTEN,
+    all_option,
+    emit,
+    json_option,
+    leave_by_verdict,
+    level_option,
+    note,
+)
 from flightid.cli.pages import html_option
 from flightid.cli.records import FILES, read_files, reading
 
@@ -18,7 +26,7 @@ if TYPE_CHECKING:
 
 netcdf_option = click.option(
     "--netcdf",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=WRITTEN,
     help="Write the response to this file, which response-arithmetic takes.",
 )
 

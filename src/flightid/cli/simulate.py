@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from flightid.cli.option_fields import OptionsCommand, flags_of, parted
-from flightid.cli.output import emit, json_option, note
+from flightid.cli.output import WRITTEN, emit, json_option, note
 from flightid.cli.records import FILES, read_files, reading, write_out
 from flightid.cli.sources import load_source, model_argument, model_options
 
@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from flightid.models import Model
     from flightid.options import Options
     from flightid.record import Record
-
-FILE = click.Path(dir_okay=False, path_type=Path)
 
 
 @click.group()
@@ -29,7 +27,7 @@ def command() -> None:
 @click.option(
     "--output",
     required=True,
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=WRITTEN,
     help="DataFlash log to write, for example flight.BIN.",
 )
 @click.option(
@@ -82,8 +80,8 @@ def _fields() -> dict[str, type[Options]]:
 @model_argument
 @click.argument("records", nargs=-1, type=FILES)
 @model_options
-@click.option("--output", "written", type=FILE, help="Write .csv, .parquet or .nc.")
-@click.option("--html", type=FILE, help="Write a page with time histories.")
+@click.option("--output", "written", type=WRITTEN, help="Write .csv, .parquet or .nc.")
+@click.option("--html", type=WRITTEN, help="Write a page with time histories.")
 @json_option
 def model(
     model: str,

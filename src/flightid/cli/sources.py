@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, Any, TypeVar
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 import click
 
+from flightid.cli.output import Function
 from flightid.cli.pairs import numbers
 
 if TYPE_CHECKING:
@@ -14,7 +15,6 @@ if TYPE_CHECKING:
 
     from flightid.models import Model
 
-Function = TypeVar("Function", bound=Callable[..., Any])
 AXES = click.Choice(["roll", "pitch", "yaw"])
 
 

@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from flightid.cli.option_fields import OptionsCommand, parted
-from flightid.cli.output import emit_values, json_option, leave_by_verdict, level_option, note
+from flightid.cli.output import (
+    WRITTEN,
+    emit_values,
+    json_option,
+    leave_by_verdict,
+    level_option,
+    note,
+)
 from flightid.cli.proposals import of_data, show_answer, taken_study
 
 if TYPE_CHECKING:
@@ -44,7 +51,7 @@ def _fields() -> dict[str, type[Options]]:
 @click.option(
     "--write",
     "target",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=WRITTEN,
     help="Parameter file to write, for example gains.param; every step with its way back.",
 )
 @click.option("--overwrite", is_flag=True, help="Replace parameter files that exist.")

@@ -9,6 +9,7 @@ import click
 
 from flightid.cli.option_fields import OptionsCommand, parted
 from flightid.cli.output import all_option, emit, emit_values, json_option, leave_by_verdict, note
+from flightid.cli.pages import html_option
 from flightid.cli.records import FILES, read_files, reading
 from flightid.cli.sources import load_source, model_argument, model_options
 
@@ -47,11 +48,7 @@ def _fields() -> dict[str, type[Options]]:
     is_flag=True,
     help="Test measured minus predicted for independence of the inputs, or of what was injected.",
 )
-@click.option(
-    "--html",
-    type=click.Path(dir_okay=False, path_type=Path),
-    help="Write a page with pictures to this file.",
-)
+@html_option
 @all_option
 @json_option
 def command(

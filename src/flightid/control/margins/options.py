@@ -11,7 +11,22 @@ from flightid.options import Options, option
 
 
 @dataclass(frozen=True)
-class MarginOptions(Options):
+class LoopOptions(Options):
+    """Which single loop, and what the model is of it."""
+
+    inputs: str | None = option(None, doc="Input of the loop, where there are several.")
+    outputs: str | None = option(None, doc="Output of the loop, where there are several.")
+    given: Given = option("broken", choices=GIVEN, doc="What the model is of the loop.")
+    band_rad_s: tuple[float, float] | None = option(
+        None, unit="rad/s", above=0.0, doc="Frequencies to look at; default: by the model."
+    )
+    unstable_poles: int | None = option(
+        None, minimum=0, doc="Of the broken loop, where a response cannot tell; default: counted."
+    )
+
+
+@dataclass(frozen=True)
+class MarginOptions(LoopOptions):
     """Which loop, what it is, and what is asked of it.
 
     Example
@@ -20,15 +35,6 @@ class MarginOptions(Options):
     45.0
     """
 
-    inputs: str | None = option(None, doc="Input of the loop, where there are several.")
-    outputs: str | None = option(None, doc="Output of the loop, where there are several.")
-    given: Given = option("broken", choices=GIVEN, doc="What the model is of the loop.")
-    band_rad_s: tuple[float, float] | None = option(
-        None, unit="rad/s", above=0.0, doc="Where crossings are looked for; default: by the model."
-    )
-    unstable_poles: int | None = option(
-        None, minimum=0, doc="Of the broken loop, where a response cannot tell; default: counted."
-    )
     phase_guide_deg: float = option(45.0, unit="deg", minimum=0.0, doc="Least phase margin.")
     gain_guide_db: float = option(6.0, unit="dB", minimum=0.0, doc="Least gain margin.")
 
@@ -56,7 +62,7 @@ class DiskMarginOptions(Options):
 
 
 @dataclass(frozen=True)
-class DisturbanceOptions(Options):
+class DisturbanceOptions(LoopOptions):
     """Which loop, and what is asked of it; see `flightid.disturbance_rejection`.
 
     Example
@@ -65,15 +71,6 @@ class DisturbanceOptions(Options):
     5.0
     """
 
-    inputs: str | None = option(None, doc="Input of the loop, where there are several.")
-    outputs: str | None = option(None, doc="Output of the loop, where there are several.")
-    given: Given = option("broken", choices=GIVEN, doc="What the model is of the loop.")
-    band_rad_s: tuple[float, float] | None = option(
-        None, unit="rad/s", above=0.0, doc="Frequencies to look at; default: by the model."
-    )
-    unstable_poles: int | None = option(
-        None, minimum=0, doc="Of the broken loop, where a response cannot tell; default: counted."
-    )
     bandwidth_guide_rad_s: float | None = option(
         None, unit="rad/s", above=0.0, doc="Least bandwidth; default: none, it depends on the task."
     )

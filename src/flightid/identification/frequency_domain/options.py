@@ -10,31 +10,38 @@ from flightid.options import Options, option
 from flightid.simulation.model_outputs import HOLDS
 
 Band = tuple[float, float]
+Bands = Band | Mapping[str, Band] | None
 COSTS = ("coherence", "likelihood")
 
 
 @dataclass(frozen=True)
-class FrequencyDomainOptions(Options):
-    """Options of a frequency-domain fit; see `flightid.identify`."""
+class PointOptions(Options):
+    """Which points of responses are fitted, and whether their estimator is taken along."""
 
-    starts: int = option(
-        1, minimum=1, doc="Number of starts: the model's values, then a Latin hypercube."
-    )
-    seed: int = option(0, minimum=0, doc="Seed of the hypercube.")
-    band_rad_s: Band | Mapping[str, Band] | None = option(
+    band_rad_s: Bands = option(
         None, unit="rad/s", doc="Band of all responses, or by name; default: the coherent one."
     )
     n_omega: int = option(20, minimum=3, doc="Frequencies of each response.")
     minimum_coherence: float | None = option(
         0.6, minimum=0.0, maximum=1.0, doc="Points with less coherence are left out."
     )
+    correct_bias: bool = option(True, doc="Take the estimator's leakage and resolution out.")
+
+
+@dataclass(frozen=True)
+class FrequencyDomainOptions(PointOptions):
+    """Options of a frequency-domain fit; see `flightid.identify`."""
+
+    starts: int = option(
+        1, minimum=1, doc="Number of starts: the model's values, then a Latin hypercube."
+    )
+    seed: int = option(0, minimum=0, doc="Seed of the hypercube.")
     weight_gain: float = option(1.0, minimum=0.0, doc="Weight of a squared decibel.")
     weight_phase: float = option(0.01745, minimum=0.0, doc="Weight of a squared degree.")
     cost: str = option(
         "coherence", choices=COSTS, doc="Coherence-weighted squares, or the likelihood."
     )
     maximum_iterations: int = option(200, minimum=1, doc="Most steps of each start.")
-    correct_bias: bool = option(True, doc="Take the estimator's leakage and resolution out.")
     hold: str = option(
         "band_limited", choices=HOLDS, doc="What inputs do between samples, for that correction."
     )

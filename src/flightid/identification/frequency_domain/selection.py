@@ -9,11 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flightid.errors import DataError, OptionError, UnknownNameError
+from flightid.identification.frequency_domain.options import Band, Bands
 from flightid.responses import FrequencyResponse, PairResponse
 from flightid.responses.bands import nearest
-
-Band = tuple[float, float]
-Bands = Band | Mapping[str, Band] | None
 
 COST_POINTS = 20.0
 """The cost is scaled as if 20 frequencies were fitted, whatever their number."""
