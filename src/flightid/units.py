@@ -230,10 +230,9 @@ def is_convertible(source: str, target: str) -> bool:
     known, other = common_unit(source), common_unit(target)
     if known is not None and other is not None:
         return DIMENSIONLESS not in (source, target) and known.powers == other.powers
-    one, two = (f"{each:~C}" for each in _pair(source, target))
-    if DIMENSIONLESS in (canonical(one), canonical(two)):
-        return False
-    return si_base(one)[1] == si_base(two)[1]
+    one, two = _pair(source, target)
+    plain = _registry().dimensionless
+    return plain not in (one, two) and _in_base(one)[1] == _in_base(two)[1]
 
 
 def clash(channel: str, found: str, needed: str, *, where: str, record: str = "") -> UnitError:
@@ -360,7 +359,11 @@ def si_base(unit: str) -> tuple[float, dict[str, float]]:
     """
     if (known := common_unit(unit)) is not None:
         return round_off(known.factor), {name: float(n) for name, n in known.powers.items()}
-    found = _registry().Quantity(1.0, _parse(unit)).to_base_units()
+    return _in_base(_parse(unit))
+
+
+def _in_base(unit: pint.Unit) -> tuple[float, dict[str, float]]:
+    found = _registry().Quantity(1.0, unit).to_base_units()
     powers = {str(name): float(str(power)) for name, power in found.unit_items()}
     return round_off(float(found.magnitude)), powers
 
