@@ -47,7 +47,7 @@ STRUCTURES = {
     "grey nonlinear": lambda: _equations("Lp*p*(1 + (p/p0)^2) + Ltphi*tau_phi"),
     "transfer": lambda: ROLL,
     "ARX": lambda: fid.PolynomialModel.arx("tau_phi", "p", na=2, nb=2),
-    "OE": lambda: fid.PolynomialModel.oe("tau_phi", "p", nb=2, nf=2),
+    "OE": lambda: fid.PolynomialModel.oe("tau_phi", "p", nb=2, nf=1),
     "BJ": lambda: fid.PolynomialModel.bj("tau_phi", "p", nb=2, nc=1, nd=1, nf=2),
     "innovations": lambda: fid.InnovationsModel.subspace("tau_phi", "p", 2),
     "NARX": lambda: fid.NarxStructure(("tau_phi",), "p", 1, 2, kernel=None, degree=2, stop="bic"),
