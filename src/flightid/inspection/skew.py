@@ -86,9 +86,17 @@ def _skew(
     every = max(1, stamps.size // ENOUGH)
     stamps, values = stamps[::every], values[::every]
 
+    middle_off = values - values.mean()
+    size = float(np.linalg.norm(middle_off))
+
+    def correlation_at(lag: float) -> float:
+        moved = np.interp(stamps + lag, fast.time_s, fast.values)
+        moved -= moved.mean()
+        spread = size * float(np.linalg.norm(moved))
+        return float(middle_off @ moved) / spread if spread > 0 else 0.0
+
     def correlations_at(lags: NDArray[np.float64]) -> NDArray[np.float64]:
-        late = (np.interp(stamps + lag, fast.time_s, fast.values) for lag in lags)
-        return np.array([_correlation(values, moved) for moved in late])
+        return np.array([correlation_at(lag) for lag in lags.tolist()])
 
     coarse = np.linspace(-LONGEST_LAG_S, LONGEST_LAG_S, COARSE)
     near = float(coarse[int(np.argmax(correlations_at(coarse)))])
@@ -136,8 +144,3 @@ def _half_width_s(
     lags = np.array([delay / gain for gain, delay in left])
     spread = np.sqrt((PARTS - 1) / PARTS * np.sum((lags - lags.mean()) ** 2))
     return float(half_width(freedom=PARTS - 1) * spread)
-
-
-def _correlation(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
-    spread = float(np.std(a) * np.std(b))
-    return float(np.mean((a - a.mean()) * (b - b.mean()))) / spread if spread > 0 else 0.0
