@@ -32,7 +32,7 @@ def test_help_and_version_load_no_numbers(flag: str) -> None:
 
 
 def test_inspect_loads_what_it_uses(tmp_path: Path) -> None:
-    path = SweepFlight(sweep_s=20.0).write(tmp_path)
+    path = SweepFlight(sweep_s=8.0).write(tmp_path)
     found = loaded("--quiet", "inspect", str(path))
     assert "flightid.inspection.usable_band" in found
     assert not found & HEAVY

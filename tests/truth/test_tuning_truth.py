@@ -8,13 +8,21 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.optimize import brentq, differential_evolution
+from scipy.optimize import brentq, differential_evolution, linprog
 
 import flightid as fid
 from flightid.control.autopilots import axis_loop
 from flightid.control.margins.stability_count import unstable_poles
 from flightid.control.tuning.controller_paths import ControllerPaths
-from flightid.control.tuning.gain_search import HEADROOM, GainSearchResult, search
+from flightid.control.tuning.gain_search import (
+    HEADROOM,
+    PENALTY,
+    GainSearchResult,
+    _linear_step,
+    _lowest,
+    _merit,
+    search,
+)
 from flightid.control.tuning.loop_problem import LoopProblem
 from flightid.control.tuning.responses import responses
 from flightid.control.tuning.sampled_plants import loop_grid, sample_plants
@@ -271,3 +279,27 @@ def test_designs_are_stable_for_every_plant_or_there_are_none(
     for row in range(len(plants)):
         for angle in (False, True):
             assert largest_pole(plants, row, design.loop, angle=angle) < 1.0
+
+
+def test_a_step_is_the_best_of_all_rows_though_few_are_asked() -> None:
+    random = np.random.default_rng(1)
+    asked = []
+    for size in (0.01, 0.1, 0.5):
+        limits, levels = random.uniform(-0.02, 0.3, (2, 40))
+        slopes = random.standard_normal((2, 40, 3))
+        low, high = -size * np.ones(3), size * np.ones(3)
+        step = _linear_step((limits, levels, *slopes), low, high)
+        assert step is not None
+        rows = np.vstack([
+            np.column_stack([-slopes[0], np.zeros(40), -np.ones(40)]),
+            np.column_stack([-slopes[1], np.ones(40), np.zeros(40)]),
+        ])  # fmt: skip
+        whole = linprog(
+            [0.0, 0.0, 0.0, -1.0, PENALTY], A_ub=rows, b_ub=np.concatenate([limits, levels]),
+            bounds=[*zip(low, high, strict=True), (None, None), (0.0, None)],
+        )  # fmt: skip
+        found = _merit((limits + slopes[0] @ step)[None], (levels + slopes[1] @ step)[None])
+        asked.append(np.sum(_lowest(limits, slopes[0], low, high) < 0.0))
+        assert_close(found[0], -whole.fun, rtol=1e-9, atol=1e-9, why="the same linear programme")
+    assert asked == sorted(asked)
+    assert asked[0] < 10
