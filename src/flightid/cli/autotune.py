@@ -8,10 +8,11 @@ import click
 
 from flightid.cli.output import json_option, leave_by_verdict, level_option
 from flightid.cli.pages import html_option, show_review
+from flightid.cli.records import FILES
 
 
 @click.command("autotune", short_help="A second opinion on an autotune: margins, why it failed.")
-@click.argument("log", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.argument("log", type=FILES)
 @level_option
 @html_option
 @json_option

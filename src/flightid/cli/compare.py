@@ -71,9 +71,11 @@ def command(
 
 def _is_flight(name: str) -> bool:
     from flightid.logs import is_log
+    from flightid.record.formats.sniff import is_bag
 
     path = Path(PART.sub(r"\1", name))
-    return path.is_file() and path.suffix not in (".toml", ".json") and is_log(path)
+    there = path.is_file() or (path.is_dir() and is_bag(path))
+    return there and path.suffix not in (".toml", ".json") and is_log(path)
 
 
 def _reviewed(name: str) -> FlightReview:

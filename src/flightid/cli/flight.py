@@ -9,13 +9,14 @@ import click
 
 from flightid.cli.output import WRITTEN, json_option, leave_by_verdict, level_option, note
 from flightid.cli.pages import html_option, show_review
+from flightid.cli.records import FILES
 
 if TYPE_CHECKING:
     from flightid.review import FlightReview
 
 
 @click.command("flight", short_help="Say what a flight tells: steps of the loops, motors, noise.")
-@click.argument("log", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.argument("log", type=FILES)
 @click.option(
     "--write",
     "target",

@@ -16,8 +16,9 @@ from flightid.cli.records import FILES
 def command(log: Path, as_json: bool) -> None:
     """Say what LOG holds, whether it can support identification, and what to do instead.
 
-    Reads logs of ArduPilot, PX4, Betaflight and INAV, and telemetry. Leaves with exit code 1 where
-    a verdict is red. Of RECORDS (tables, ROS bags) the columns are listed.
+    Reads logs of ArduPilot, PX4, Betaflight and INAV, telemetry, and ROS bags of PX4 or MAVROS.
+    Leaves with exit code 1 where a verdict is red. Of RECORDS (tables, other ROS bags) the columns
+    are listed.
     """
     from flightid.inspection import inspect_log
     from flightid.logs import is_log

@@ -9,6 +9,7 @@ import click
 
 from flightid.cli.option_fields import OptionsCommand, parted
 from flightid.cli.output import emit_values, json_option, leave_by_verdict, note
+from flightid.cli.records import FILES
 
 if TYPE_CHECKING:
     from flightid.options import Options
@@ -25,7 +26,7 @@ def _fields() -> dict[str, type[Options]]:
     fields_of=_fields,
     short_help="Say what to fly next: sweeps, settings with the way back, a card.",
 )
-@click.argument("log", required=False, type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.argument("log", required=False, type=FILES)
 @click.option(
     "--output",
     type=click.Path(file_okay=False, path_type=Path),

@@ -75,16 +75,26 @@ def read_files(
     """
     from flightid.logs import is_log
     from flightid.progress import track
+    from flightid.record.formats.sniff import is_bag
 
     found: list[Record] = []
     for file in track(list(files), "Reading"):
-        if is_log(file):
+        if is_log(file) and not (_names_topics(of_tables, inputs, outputs) and is_bag(file)):
             _refuse(of_tables, f"tables, and {file.name} is a log")
             found.append(_from_log(file, of_logs, inputs, outputs, excitations))
             continue
         _refuse({"sid_run": None} if "sid_run" in of_logs else {}, "logs")
         found += _from_table(file, of_tables, of_logs, inputs, outputs, excitations)
     return [_in_units(record, units or {}) for record in found]
+
+
+def _names_topics(
+    of_tables: Mapping[str, Any], inputs: Sequence[str] | None, outputs: Sequence[str] | None
+) -> bool:
+    """Whether columns of a table are meant: of a bag, those of its topics."""
+    return bool(of_tables) or any(
+        name.startswith("/") for name in (*(inputs or ()), *(outputs or ()))
+    )
 
 
 def _refuse(given: Mapping[str, Any], owner: str) -> None:

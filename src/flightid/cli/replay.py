@@ -10,11 +10,12 @@ import click
 from flightid.cli.option_fields import flags_of
 from flightid.cli.output import all_option, json_option
 from flightid.cli.pages import html_option, show
+from flightid.cli.records import FILES
 from flightid.cli.sources import AXES
 
 
 @click.command(short_help="Run an autopilot's controller on its log's own signals.")
-@click.argument("log", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.argument("log", type=FILES)
 @click.option("--axis", type=AXES, required=True, help="Axis of the controller.")
 @click.option(*flags_of("span_s"), "span_s", nargs=2, type=float, help="Part of the log, s.")
 @html_option

@@ -26,7 +26,7 @@ from flightid.cli.records import FILES
 )
 @click.option(
     "--log",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    type=FILES,
     help="Log to read instead of the one that the study names.",
 )
 @click.option("--all", "whole", is_flag=True, help="Print the whole report, not one screen of it.")

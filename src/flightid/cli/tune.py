@@ -17,6 +17,7 @@ from flightid.cli.output import (
     note,
 )
 from flightid.cli.proposals import of_data, show_answer, taken_study
+from flightid.cli.records import FILES
 
 if TYPE_CHECKING:
     from flightid.control.tuning.result import Tuning
@@ -40,7 +41,7 @@ def _fields() -> dict[str, type[Options]]:
 )
 @click.option(
     "--log",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    type=FILES,
     help="Log to read instead of the one that the study names; of models: their flight.",
 )
 @click.option(
@@ -133,7 +134,9 @@ def _write(tuning: Tuning, target: Path, overwrite: bool, *, accept_red: bool) -
 
 def _holds_models(files: tuple[Path, ...]) -> bool:
     """Whether models are meant: folders, JSON of fits, TOML with what every model file has."""
-    if any(file.is_dir() or file.suffix == ".json" for file in files):
+    from flightid.record.formats.sniff import is_bag
+
+    if any((file.is_dir() and not is_bag(file)) or file.suffix == ".json" for file in files):
         return True
     if any(file.suffix != ".toml" for file in files):
         return False

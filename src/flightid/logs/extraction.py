@@ -13,6 +13,9 @@ from flightid.logs.contents import LogContents
 from flightid.logs.log_table import LogTable
 from flightid.units import DIMENSIONLESS, convert, same_dimension
 
+TURNED = {"roll": lambda a: a, "pitch": lambda a: -a, "yaw": lambda a: 0.5 * np.pi - a}
+"""Angles of an aircraft's axes to north, east, down, from those of ROS (REP 103)."""
+
 
 @dataclass(frozen=True)
 class ChannelSamples:
@@ -117,7 +120,8 @@ def _stamps(table: LogTable, source: ChannelSource) -> NDArray[np.float64]:
 def _values(table: LogTable, source: ChannelSource) -> NDArray[np.float64]:
     fields = [*table.arrays(source.fields).values()]
     if source.angle is not None:
-        return _euler(source.angle, *fields)
+        turned = _euler(source.angle, *fields)
+        return TURNED[source.angle](turned) if source.frame == "enu" else turned
     total = np.asarray(np.sum(fields, axis=0), np.float64)
     if source.phase_scale is not None:
         return np.where(total == 0.0, 0.0, np.cos(total / source.phase_scale))

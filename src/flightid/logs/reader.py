@@ -13,6 +13,7 @@ from flightid.logs.dataflash.printed import open_printed
 from flightid.logs.dataflash.sdlog2 import open_binary
 from flightid.logs.log import Log
 from flightid.logs.mavlink.reader import open_telemetry
+from flightid.logs.ros.reader import is_vehicle_bag, open_bag
 from flightid.logs.source import LogSource
 from flightid.logs.ulog.reader import UlogSource
 from flightid.reading import require_file
@@ -60,7 +61,8 @@ def read_log(path: str | Path) -> Log:
     """Open a flight log, whose format its content tells.
 
     ArduPilot DataFlash (binary and text), PX4 ULog and its forerunner sdlog2, blackbox logs of
-    Betaflight and INAV, and telemetry that ground stations record (``.tlog``).
+    Betaflight and INAV, telemetry that ground stations record (``.tlog``), and bags of ROS with
+    messages of px4_msgs or topics of MAVROS.
 
     The file is indexed once; columns are extracted when they are asked for. Damaged places are
     skipped and reported in `Log.skipped`.
@@ -91,6 +93,8 @@ def read_log(path: str | Path) -> Log:
     """
     path = Path(path)
     head = _head(path)
+    if is_vehicle_bag(path, head):
+        return Log(path, open_bag(path))
     for holds, _, open_source in _FORMATS:
         if holds(head):
             return Log(path, open_source(path))
@@ -115,7 +119,7 @@ def is_log(path: str | Path) -> bool:
     strange = foreign(head)
     if strange is None and head.startswith(signs):
         return True
-    if any(holds(head) for holds, _, _ in _FORMATS):
+    if any(holds(head) for holds, _, _ in _FORMATS) or is_vehicle_bag(path, head):
         return True
     if strange is not None:
         return False
@@ -148,5 +152,6 @@ def _not_a_log(path: Path, head: bytes) -> LogFormatError:
         else:
             found = f"records ({kind})"
             action = f"flightid inspect {path.name} lists its columns, flightid run identifies"
-    formats = " or ".join(name for _, name, _ in (*_FORMATS, _BY_CHANCE))
+    names = [name for _, name, _ in (*_FORMATS, _BY_CHANCE)]
+    formats = " or ".join([*names, "a bag of PX4 or MAVROS"])
     return LogFormatError(f"{path.name} is not a log", found=found, needed=formats, action=action)

@@ -30,17 +30,20 @@ class MessageRows:
         Stamps, s.
     words : mapping of str to list of str
         Fields that hold text.
+    instances : tuple of int
+        Number of the only instance, where messages of the kind have one.
     """
 
     units: Mapping[str, str]
     read: Callable[[str], Array]
     time_s: Array
     words: Mapping[str, list[str]] = field(default_factory=dict)
+    instances: tuple[int, ...] = ()
 
     def info(self, name: str) -> MessageInfo:
         """What a listing says of the rows."""
         return MessageInfo.of_stamps(
-            name, self.time_s.size, (), self.units, tuple(self.words), self.time_s
+            name, self.time_s.size, self.instances, self.units, tuple(self.words), self.time_s
         )
 
 

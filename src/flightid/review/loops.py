@@ -37,6 +37,9 @@ WINDOW_S = {"rate": 0.5, "attitude": 1.5}
 SLOWEST_HZ = {"rate": 2.0, "attitude": 0.5}
 PACE = {"rate": 1.0, "attitude": 2.5}
 STRETCHES = 10
+FINER = 4.0
+"""Times the usual samples, of a log that has them, where a step rises within too few."""
+TOO_SLOW = "too slowly for a step"
 EVEN = 0.7
 """Least share of rows that may be there, of those that the median interval promises."""
 CHANNELS = {
@@ -97,20 +100,30 @@ def _loop(log: Log, spans: tuple[Span, ...], axis: str, loop: str) -> LoopRespon
     pieces = _pieces(pair, spans)
     if not pieces:
         return replace(blank, reason="no span in the air of 2 s holds both", action=logging(log))
-    samples = _samples(pieces, FASTEST[loop].value)
-    moved = float(np.std(samples.set_point))
-    unit = "rad/s" if loop == "rate" else "rad"
     begun = replace(
         blank,
+        pieces=len(pieces),
+        tracking=_tracking(pieces, "rad/s" if loop == "rate" else "rad"),
+    )
+    tick_s = 1.0 / loop_rate_hz(log) if loop_rate_hz(log) else 0.0
+    made = _stepped(begun, pieces, FASTEST[loop].value, tick_s, logging(log))
+    if TOO_SLOW in made.reason and made.rate_hz < 0.7 * pieces[0].sample_rate_hz:
+        made = _stepped(begun, pieces, FINER * FASTEST[loop].value, tick_s, logging(log))
+    return made
+
+
+def _stepped(
+    begun: LoopResponse, pieces: list[Record], fastest_hz: float, tick_s: float, advised: str
+) -> LoopResponse:
+    """The step of samples no faster than that."""
+    samples = _samples(pieces, fastest_hz)
+    known = replace(
+        begun,
         rate_hz=1.0 / samples.sample_time_s,
         used_s=samples.duration_s,
-        pieces=len(pieces),
-        moved=moved,
-        tracking=_tracking(pieces, unit),
+        moved=float(np.std(samples.set_point)),
     )
-    return _step(
-        begun, samples, 1.0 / loop_rate_hz(log) if loop_rate_hz(log) else 0.0, logging(log)
-    )
+    return _step(known, samples, tick_s, advised)
 
 
 def loop_rate_hz(log: Log) -> float:
@@ -232,7 +245,7 @@ def _refusal(
     if steep or (not told and begun.loop == "rate" and begun.rate_hz < RATE_LEAST.value):
         return replace(
             begun,
-            reason=f"logged at {begun.rate_hz:.3g} Hz, too slowly for a step that rises in less "
+            reason=f"logged at {begun.rate_hz:.3g} Hz, {TOO_SLOW} that rises in less "
             f"than {SAMPLES_IN_RISE.value * sample_time_s:.2g} s",
             action=advised,
         )

@@ -13,6 +13,7 @@ import numpy as np
 
 from flightid.files import sha256_of_file
 from flightid.models.kinds import KINDS, model_to_description
+from flightid.record.formats.sniff import BAG_SUFFIXES
 from flightid.version import VERSION
 
 Value = TypeVar("Value")
@@ -135,6 +136,10 @@ def _parts(item: object) -> Iterable[str]:
         yield item.key
     elif isinstance(item, Path):
         yield sha256_of_file(item) if item.is_file() else str(item)
+        if item.is_dir():
+            # The folder of a bag: its files are its content.
+            files = sorted(each for each in item.iterdir() if each.suffix in BAG_SUFFIXES)
+            yield from map(sha256_of_file, files)
     elif isinstance(item, Enum):
         yield str(item.value)
     elif item is None or isinstance(item, bool | int | float | str):

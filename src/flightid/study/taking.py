@@ -156,11 +156,11 @@ def _obtain_log(
 
 
 def _required(path: Path | None) -> Path:
-    if path is None or not path.is_file():
+    if path is None or not path.exists():
         raise StudyError(
             "the log of the study is not there",
             found=None if path is None else str(path),
-            needed="a file",
+            needed="a file, or the folder of a bag",
             action="correct [log] path, or name a log with --log",
         )
     return path

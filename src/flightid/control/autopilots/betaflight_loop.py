@@ -242,10 +242,7 @@ def _unknown(known: Mapping[str, float], motors_hz: list[float]) -> list[str]:
 
 def _said(known: Mapping[str, float], axis: str, throttle: float) -> list[str]:
     """What a view of small signals at one throttle leaves out."""
-    said = [
-        "output limits, mixer, thrust linearisation, dynamic idle and battery compensation act "
-        "behind the PID sum: the plant is that of the flight's throttle and battery"
-    ]
+    said = []
     shares = _throttle_shares(known, throttle)
     if known.get("tpa_rate"):
         said.append(

@@ -124,6 +124,14 @@ def axis_loop_of(
     AxisLoop(arducopter roll, 400 Hz, P 0.09, I 0.09, D 0.0024, FF 0)
     """
     autopilot = autopilot_of(log)
+    if not log.parameters:
+        raise DataError(
+            "the log holds no parameters, so its gains are not known",
+            found=log.path.name,
+            needed="the autopilot's own log of such a flight",
+            action="identify from this one (flightid run), then tune its models with that log: "
+            "flightid tune MODEL --log LOG",
+        )
     parameters = _chosen_parameters(log, autopilot, axis, at_s)
     rate_hz = loop_rate_hz or _loop_rate(log, parameters)
     options: dict[str, Any] = {"gyro_rate_hz": _gyro_rate(log, rate_hz)}

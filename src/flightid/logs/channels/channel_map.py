@@ -23,11 +23,12 @@ DEFAULTS = {
     ("betaflight", "copter"): "betaflight",
     ("mavlink", "copter"): "mavlink",
     ("mavlink", "plane"): "mavlink",
+    ("mavros", ""): "mavros",
 }
 ANGLES = ("roll", "pitch", "yaw")
 _SOURCE_KEYS = {
     "message", "field", "instance", "unit", "factor", "stamp", "quaternion", "angle", "phase_scale",
-    "note",
+    "frame", "note",
 }  # fmt: skip
 _CHANNEL_KEYS = {"unit", "role", "unwrap", "sets_rate", "on_request", "sources"}
 
@@ -52,6 +53,9 @@ class ChannelSource:
         Field with a better stamp than the message's own, in µs; used where it exists.
     angle : str or None
         ``"roll"``, ``"pitch"`` or ``"yaw"`` of a quaternion; None for plain numbers.
+    frame : str or None
+        ``"enu"`` where a quaternion turns axes of ROS (x forward, y left, z up) to east, north, up;
+        the angle is then that of an aircraft's axes to north, east, down. None: it is already.
     phase_scale : float or None
         Counts of a radian where the field is a phase, whose cosine is the channel: zero where the
         field is. None for plain numbers.
@@ -71,6 +75,7 @@ class ChannelSource:
     factor: float = 1.0
     stamp: str | None = None
     angle: str | None = None
+    frame: str | None = None
     phase_scale: float | None = None
     note: str = ""
 
@@ -204,7 +209,8 @@ def channel_map(name: str | Path) -> ChannelMap:
     ----------
     name : str or Path
         Shipped map (``"arducopter"``, ``"arduplane"``, ``"px4_multicopter"``,
-        ``"px4_fixed_wing"``, ``"betaflight"``, ``"mavlink"``), or a TOML file of the same form.
+        ``"px4_fixed_wing"``, ``"betaflight"``, ``"mavlink"``, ``"mavros"``), or a TOML file of the
+        same form.
 
     Raises
     ------
@@ -262,7 +268,9 @@ def _source(name: str, item: dict[str, Any]) -> ChannelSource:
     angle = item.get("angle")
     if angle is not None:
         ANGLES.index(angle)
-        fields = tuple(f"{item['quaternion']}[{i}]" for i in range(4))
+        named = item["quaternion"]
+        whole = isinstance(named, str)
+        fields = tuple(f"{named}[{i}]" for i in range(4)) if whole else tuple(named)
     else:
         fields = (item["field"],) if isinstance(item["field"], str) else tuple(item["field"])
     return ChannelSource(
@@ -273,6 +281,7 @@ def _source(name: str, item: dict[str, Any]) -> ChannelSource:
         float(item.get("factor", 1.0)),
         item.get("stamp"),
         angle,
+        item.get("frame"),
         item.get("phase_scale"),
         item.get("note", ""),
     )

@@ -2,6 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.logs.source import Event
+
 LEVELS = {
     0: "emergency",
     1: "alert",
@@ -51,3 +58,27 @@ AIRFRAMES = {
     15: "copter",
 }
 """MAV_TYPE of MAVLink."""
+
+
+def changes_of(
+    values: NDArray[np.int64],
+    time_s: NDArray[np.float64],
+    field: str,
+    kind: str,
+    names: Mapping[int, str],
+) -> list[Event]:
+    """An event for each value that differs from the one before, the first included.
+
+    Parameters
+    ----------
+    values, time_s : ndarray, shape (n,)
+    field, kind : str
+        Field of the message, and kind of the events.
+    names : mapping of int to str
+        Words of the values.
+    """
+    starts = np.flatnonzero(np.diff(values, prepend=values[0] - 1)) if values.size else ()
+    return [
+        Event(float(time_s[at]), kind, names.get(int(values[at]), f"{field} {values[at]}"))
+        for at in starts
+    ]

@@ -17,7 +17,7 @@ from flightid import _native
 from flightid.conventions import Light
 from flightid.findings import Finding, counted
 from flightid.logs.source import ByteRange, Event, Gap, MessageInfo, ParameterChange
-from flightid.logs.ulog.names import AIRFRAMES, ARMED, LEVELS, MODES, VEHICLE_TYPES
+from flightid.logs.ulog.names import AIRFRAMES, ARMED, LEVELS, MODES, VEHICLE_TYPES, changes_of
 
 STAMP = "timestamp"
 MICROSECONDS = "µs"
@@ -254,12 +254,7 @@ class UlogSource:
             return []
         instance = self.messages[message].instances[0]
         values = self.numbers(message, field, instance).astype(np.int64)
-        starts = np.flatnonzero(np.diff(values, prepend=values[0] - 1))
-        stamps = self.time_s(message, instance)
-        return [
-            Event(float(stamps[at]), kind, names.get(int(values[at]), f"{field} {values[at]}"))
-            for at in starts
-        ]
+        return changes_of(values, self.time_s(message, instance), field, kind, names)
 
 
 def _base(column: str) -> str:

@@ -15,6 +15,8 @@ SNIFFED = 4096
 OTHERS = "read autopilot logs with read_log; export other data as CSV or Parquet"
 MCAP, ROSBAG, SQLITE = b"\x89MCAP0\r\n", b"#ROSBAG V2.0\n", b"SQLite format 3\x00"
 """First bytes of bags."""
+BAG_SUFFIXES = (".mcap", ".db3")
+"""Of the files in the folder of a bag."""
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
@@ -93,3 +95,16 @@ def _by_content(head: bytes, suffix: str) -> FileFormat | None:
         (suffix in TEXT_SUFFIXES and _is_text(head), FileFormat.CSV),
     )
     return next((kind for is_met, kind in signs if is_met), None)
+
+
+def is_bag(path: Path) -> bool:
+    """Whether a file or folder is a bag of ROS.
+
+    Parameters
+    ----------
+    path : Path
+    """
+    if path.is_dir():
+        return any(each.suffix in BAG_SUFFIXES for each in path.iterdir())
+    with path.open("rb") as stream:
+        return stream.read(len(SQLITE)).startswith((MCAP, ROSBAG, SQLITE))

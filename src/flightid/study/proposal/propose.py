@@ -9,6 +9,7 @@ from typing import Any
 from flightid.errors import OptionError
 from flightid.logs import is_log
 from flightid.options import checked
+from flightid.record.formats.sniff import is_bag
 from flightid.study.proposal.of_log import study_of_log
 from flightid.study.proposal.of_records import study_of_records
 from flightid.study.proposal.options import DataOptions, told
@@ -60,7 +61,9 @@ def propose_study(
     """
     paths = [Path(file) for file in files]
     asked = checked(DataOptions, reading, "a study of records")
-    logs = [path for path in paths if is_log(path)]
+    # Columns that are named are those of the topics of a bag, whoever published them.
+    named = bool(inputs or outputs or told(asked) != asked.declared)
+    logs = [path for path in paths if is_log(path) and not (named and is_bag(path))]
     if not logs:
         return study_of_records(
             paths,

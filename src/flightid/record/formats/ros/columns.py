@@ -17,7 +17,7 @@ from flightid.record.formats.ros.content import BagContent, Topic
 from flightid.record.formats.ros.definitions import parsed, shipped
 from flightid.record.formats.ros.layouts import FieldLayout, layout_of
 from flightid.record.formats.ros.payloads import decoded, leading_columns
-from flightid.record.formats.sniff import MCAP, ROSBAG, SQLITE
+from flightid.record.formats.sniff import BAG_SUFFIXES, MCAP, ROSBAG, SQLITE
 
 CONTAINERS: dict[bytes, tuple[Callable[[Path, BagContent], None], str]] = {
     MCAP: (mcap.gather, "copy it again; `mcap recover {0}` keeps what is whole"),
@@ -63,7 +63,7 @@ def bag_files(path: Path) -> list[Path]:
     if not path.is_dir():
         return [path]
     files = sorted(
-        (each for each in path.iterdir() if each.suffix in (".mcap", ".db3") and each.is_file()),
+        (each for each in path.iterdir() if each.suffix in BAG_SUFFIXES and each.is_file()),
         key=lambda each: (len(each.name), each.name),
     )
     about = path / METADATA
@@ -97,6 +97,32 @@ def read_columns(path: Path) -> ColumnTable:
     OptionError
         What unpacks it, or knows its messages, is not installed (extra ``ros``).
     """
+    return _table(path, _gathered(path))
+
+
+def read_topics(path: Path) -> tuple[list[NumberTopic], list[str]]:
+    """Topics of a bag whose messages are numbers, and what is said of the others.
+
+    Parameters
+    ----------
+    path : Path
+        File, or folder of a ROS 2 bag.
+
+    Raises
+    ------
+    FileFormatError
+        The bag is damaged, or is more than the memory budget.
+    OptionError
+        What unpacks it, or knows its messages, is not installed (extra ``ros``).
+    """
+    content = _gathered(path)
+    topics, left_out, missing = _topics(content)
+    if missing is not None and not topics:
+        raise missing
+    return topics, _said(content, left_out)
+
+
+def _gathered(path: Path) -> BagContent:
     content = BagContent(path.name)
     for file in bag_files(path):
         with file.open("rb") as stream:
@@ -107,10 +133,13 @@ def read_columns(path: Path) -> ColumnTable:
         gather, recovery = known
         with decoding(file.name, "a whole bag", recovery.format(file.name)):
             gather(file, content)
-    return _table(path, content)
+    return content
 
 
-def _table(path: Path, content: BagContent) -> ColumnTable:
+def _topics(
+    content: BagContent,
+) -> tuple[list[NumberTopic], dict[str, str], OptionError | None]:
+    """Topics of numbers, why others are left out, and what is not installed for some."""
     topics: dict[str, Topic] = {}
     for topic in content.topics.values():
         known = topics.setdefault(topic.name, topic)
@@ -119,18 +148,29 @@ def _table(path: Path, content: BagContent) -> ColumnTable:
             known.payloads += topic.payloads
             known.is_long = known.is_long or topic.is_long
     stamps = [topic.received_ns[0] for topic in topics.values() if topic.received_ns]
-    of_column: dict[str, tuple[_NumberTopic, str]] = {}
+    made: list[NumberTopic] = []
     left_out: dict[str, str] = {}
     missing: OptionError | None = None
     for topic in topics.values():
         try:
-            numbers = _NumberTopic(content, topic, _layout(topic), min(stamps, default=0))
-            of_column |= numbers.columns
+            made.append(NumberTopic(content, topic, _layout(topic), min(stamps, default=0)))
         except FlightidError as fault:
             missing = fault if isinstance(fault, OptionError) else missing
             left_out[topic.name] = f"{fault.problem}, {fault.found}"
+    return made, left_out, missing
+
+
+def _said(content: BagContent, left_out: dict[str, str]) -> list[str]:
     said = [f"{name} left out: {why}" for name, why in left_out.items()]
-    said += [f"{content.cut} ends within a message: it was cut"] if content.cut else []
+    return [*said, f"{content.cut} ends within a message: it was cut"] if content.cut else said
+
+
+def _table(path: Path, content: BagContent) -> ColumnTable:
+    topics, left_out, missing = _topics(content)
+    of_column = {
+        f"{each.name.rstrip('/')}/{key}": (each, key) for each in topics for key in each.keys
+    }
+    said = _said(content, left_out)
     if missing is not None and not of_column:
         raise missing
     if not of_column:
@@ -170,21 +210,29 @@ def _layout(topic: Topic) -> FieldLayout:
     return layout_of(topic.type, known)
 
 
-class _NumberTopic:
-    """A topic whose numbers are columns, decoded when one is asked for."""
+class NumberTopic:
+    """A topic whose numbers are columns, decoded when one is asked for.
+
+    Attributes
+    ----------
+    name, type : str
+        Such as "/imu" and "sensor_msgs/Imu".
+    n_messages : int
+    keys : list of str
+        Fields that are columns: all but stamps and what else a header holds.
+    """
 
     def __init__(
         self, content: BagContent, topic: Topic, layout: FieldLayout, origin_ns: int
     ) -> None:
         self.content, self.topic, self.layout, self.origin_ns = content, topic, layout, origin_ns
-        self.n_messages = len(topic.payloads)
-        prefix = topic.name.rstrip("/")
-        self.columns = {
-            f"{prefix}/{key}": (self, key)
+        self.name, self.type, self.n_messages = topic.name, topic.type, len(topic.payloads)
+        self.keys = [
+            key
             for key in leading_columns(topic, layout, content.name)
             if key in layout.origins or key.rpartition("[")[0] in layout.origins
             if not key.startswith("header.") and key not in layout.stamp
-        }
+        ]
 
     def unit(self, key: str) -> str | None:
         """Unit of a field by the message that it belongs to."""

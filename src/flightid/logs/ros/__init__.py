@@ -1,0 +1,1 @@
+"""Bags of ROS that hold what an autopilot publishes, as logs."""
