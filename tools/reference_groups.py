@@ -59,6 +59,8 @@ GROUPS = {
             "compare_flights",
             "compare_with_promise",
             "FlightComparison",
+            "compare_margins",
+            "MarginComparison",
             "plan_flight",
             "SweepPlan",
         ),

@@ -16,7 +16,8 @@ from flightid.conventions import Light
 from flightid.dynamics.conditions.ratios import difference_of
 from flightid.errors import DataError
 from flightid.plot.flight import compared_steps
-from flightid.review.comparison import BY_FREQUENCY, TRACKING, _change, compare_loops
+from flightid.review.changes import BY_FREQUENCY, TRACKING, change_of
+from flightid.review.comparison import compare_loops
 from flightid.review.next_step import flown_step
 from flightid.review.promised import promised_loops
 from flightid.uncertainty.estimate import Estimate
@@ -149,7 +150,7 @@ def test_gains_filters_and_other_vehicles_are_said(
 def test_a_tenth_or_five_points_of_overshoot_are_felt(
     name: str, old: float, new: float, *, material: bool, worse: bool
 ) -> None:
-    found = _change("roll rate", *(Estimate(name, value, "1", 1e-3) for value in (old, new)))
+    found = change_of("roll rate", *(Estimate(name, value, "1", 1e-3) for value in (old, new)))
     assert found.is_material is material
     assert found.is_worse is worse
 

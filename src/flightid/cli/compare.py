@@ -4,27 +4,48 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
+from flightid.cli.compared_loops import compared_loops, short_names
+from flightid.cli.lists import ListOption, ListsCommand
+from flightid.cli.model_commands import feedback_option
 from flightid.cli.output import all_option, json_option, level_option
 from flightid.cli.pages import html_option, show
 from flightid.cli.sources import AXES, known_models, load_source
 
 if TYPE_CHECKING:
+    from flightid.dynamics.conditions.result import ConditionComparison
     from flightid.models import Model
+    from flightid.result import Result
     from flightid.review import FlightComparison, FlightReview
 
 PART = re.compile(r"(.+)@([\d.]*):([\d.]*)")
 """A log and a part of it, s: ``flight.BIN@20:80``."""
 
 
-@click.command(short_help="Put flights, models, or a promise and its flight side by side.")
+@click.command(
+    cls=ListsCommand,
+    short_help="Put flights, models, gains, or a promise and its flight side by side.",
+)
 @click.argument("files", nargs=-1, required=True, metavar="A B...", shell_complete=known_models)
 @click.option("--axis", type=AXES, help="Of a library model.")
+@click.option(
+    "--gains",
+    cls=ListOption,
+    multiple=True,
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    help="Compare margins under these gains: a parameter file of an autopilot or the TOML of a "
+    "PID, as tune writes them; one for both models, one for each, or two for one model.",
+)
+@feedback_option
+@click.option(
+    "--loop-rate-hz",
+    type=click.FloatRange(min=0.0, min_open=True),
+    help="Rate of the controllers of --gains, where nothing tells it.",
+)
 @level_option
 @html_option
 @all_option
@@ -32,6 +53,9 @@ PART = re.compile(r"(.+)@([\d.]*):([\d.]*)")
 def command(
     files: tuple[str, ...],
     axis: str | None,
+    gains: tuple[Path, ...],
+    feedback: tuple[str, ...],
+    loop_rate_hz: float | None,
     level: float | None,
     html: Path | None,
     as_json: bool,
@@ -42,21 +66,25 @@ def command(
     the loops, gains and filters that differ, and whether vehicle, firmware or battery do. Models,
     then a log: what they promise of the gains that it flew beside what it shows; where `flightid
     tune --write` left its files beside either, the next step to fly or the file that takes this one
-    back. Models alone: parameters and modes with their ratios, the first as base. A model is a
-    .toml file, the folder of a study, the JSON of a fit, or a library name. To see which predicts
-    better: `flightid verify MODEL RECORDS --against MODEL`.
+    back. Models alone: parameters and modes with their ratios, the first as base; with --gains or
+    --feedback, and of studies that tuned a PID, margins with intervals of the difference too; one
+    model and two files of --gains: what the gains change. A model is a .toml file, the folder of a
+    study, the JSON of a fit, or a library name. To see which predicts better: `flightid verify
+    MODEL RECORDS --against MODEL`.
     """
-    from flightid import compare_conditions
     from flightid.uncertainty.quantiles import showing
 
     if len(set(files)) < len(files):
         raise click.UsageError("a file is named twice: parts of a log are flight.BIN@20:80")
     flights = [file for file in files if _is_flight(file)]
     if not flights:
-        named = zip(short_names(files), files, strict=True)
-        sources = {name: load_source(model, axis) for name, model in named}
-        show(compare_conditions(sources), "Comparison", as_json=as_json, level=level)
+        loops = compared_loops(files, axis, gains, feedback, loop_rate_hz)
+        results: list[Result] = [*_conditions(files, axis, needed=not loops), *loops]
+        first, *beside = results
+        show(first, "Comparison", *beside, as_json=as_json, html=html, level=level)
         return
+    if gains or feedback:
+        raise click.UsageError("--gains and --feedback are closed around models; a log has its own")
     if (len(flights) > 1 and len(files) != len(flights)) or files[-1] not in flights:
         raise click.UsageError("name two logs, or models and then the log that flew their gains")
     if len(flights) > 2:
@@ -67,6 +95,24 @@ def command(
             for table in made.settings_tables():
                 click.echo(f"{table}\n")
         show(made, "Comparison", as_json=as_json, html=html, level=level)
+
+
+def _conditions(
+    files: Sequence[str], axis: str | None, *, needed: bool
+) -> list[ConditionComparison]:
+    """Parameters and modes; none of models that have no names for them, where margins are there."""
+    from flightid import compare_conditions
+    from flightid.errors import ModelError
+
+    if len(files) == 1 and not needed:
+        return []
+    try:
+        named = zip(short_names(files), files, strict=True)
+        return [compare_conditions({name: load_source(model, axis) for name, model in named})]
+    except ModelError:
+        if needed:
+            raise
+        return []
 
 
 def _is_flight(name: str) -> bool:
@@ -126,38 +172,3 @@ def _models(name: str) -> list[Model]:
     if Path(name).is_dir():
         return [load_source(str(path)) for path in models_of(Path(name))]
     return [load_source(name)]
-
-
-def short_names(paths: Sequence[str]) -> list[str]:
-    """Stems of files, or, of files with one stem, what tells their paths apart.
-
-    Example
-    -------
-    >>> short_names(["/log/monday/models/roll.toml", "/log/tuesday/models/roll.toml"])
-    ['monday', 'tuesday']
-    """
-    whole = [Path(path).parts for path in paths]
-    bare = [(*Path(path).parts[:-1], Path(path).stem) for path in paths]
-    for parts in ([row[-1:] for row in bare], _without_common(bare), _after_common(bare)):
-        if all(parts) and len(set(parts)) == len(parts):
-            return [str(Path(*row)) for row in parts]
-    return [str(Path(*row)) for row in _after_common(whole)]
-
-
-def _after_common(rows: Sequence[tuple[str, ...]]) -> list[tuple[str, ...]]:
-    """Parts of paths after the folders that all share."""
-    same = _shared([row[:-1] for row in rows])
-    return [row[same:] for row in rows]
-
-
-def _without_common(rows: Sequence[tuple[str, ...]]) -> list[tuple[str, ...]]:
-    """Parts of paths between what all share before and behind."""
-    same = _shared([row[::-1] for row in rows])
-    cut = [row[: len(row) - same] for row in rows]
-    return _after_common(cut)
-
-
-def _shared(rows: Sequence[tuple[str, ...]]) -> int:
-    """How many parts all begin with."""
-    alike = (len(set(column)) == 1 for column in zip(*rows, strict=False))
-    return sum(1 for _ in takewhile(bool, alike))

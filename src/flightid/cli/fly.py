@@ -94,17 +94,13 @@ def command(
 
 
 def _gains(file: Path, model: Model, rate_hz: float) -> GainController:
-    from flightid.control.autopilots import read_parameters
-    from flightid.control.stepped.gain_controller import gain_controller, pid_controller
-    from flightid.reading import read_toml
+    from flightid.cli.gain_files import controller_of
 
     note(f"Controllers run at {rate_hz:g} Hz; --rate takes another")
-    if file.suffix == ".toml":
-        tables = read_toml(file, "a file of gains").get("controller", [])
-        return pid_controller(tables, model, rate_hz)
-    made = gain_controller(read_parameters(file), model, rate_hz)
-    for loop in made.loops.values():
-        note(repr(loop))
+    made = controller_of(file, model, rate_hz)
+    if file.suffix != ".toml":
+        for loop in made.loops.values():
+            note(repr(loop))
     return made
 
 

@@ -72,7 +72,7 @@ def model_command(
         if around is None or not feedback:
             first, *others = (getattr(flightid, verb)(source, **asked),)
         else:
-            first, *others = around(source, _gains(feedback), asked)
+            first, *others = around(source, gains_of(feedback), asked)
         show(first, title, *others, as_json=as_json, html=html, level=level)
 
     call.__doc__ = f"{text}\n\n    {KINDS_OF_FILE}"
@@ -88,7 +88,8 @@ def model_command(
     return click.command(cls=OptionsCommand, fields_of=lambda: {title.lower(): made()})(function)
 
 
-def _gains(feedback: tuple[str, ...]) -> dict[str, dict[str, float]]:
+def gains_of(feedback: tuple[str, ...]) -> dict[str, dict[str, float]]:
+    """Gains by input and output, as ``--feedback`` says them."""
     from flightid.simulation.fly_options import FlyOptions
 
     return FlyOptions(**given_options(FlyOptions, {"feedback": feedback}, "feedback")).gains

@@ -101,15 +101,17 @@ def write_page(result: Result, title: str, path: Path, *beside: Result) -> Path:
     from flightid.report.figures import figure_block
     from flightid.report.html import to_html
 
-    sections = []
+    sections, missing = [], []
     for one in (result, *beside):
         blocks: list[Block] = [*result_blocks(one)]
         blocks += [TableBlock(each) for each in one.settings_tables()]
         try:
             blocks.append(figure_block(one.plot(), one.summary().title))
         except (OptionError, DataError) as reason:
-            note(f"No picture: {reason}")
+            missing.append(reason.reason)
         sections.append(Section(one.summary().title, tuple(blocks)))
+    if len(missing) == len(sections):
+        note(f"No picture: {'; '.join(missing)}")
     return write_atomically(
         path, to_html(Document(title, getattr(result, "in_short", ""), tuple(sections)))
     )

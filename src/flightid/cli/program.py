@@ -49,7 +49,9 @@ NOT_VERBS = frozenset(
     {
         "bar",
         "black_boxes",
+        "compared_loops",
         "equations",
+        "gain_files",
         "lists",
         "model_commands",
         "option_fields",

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.control.margins.disk_geometry import gain_limits
 from flightid.control.margins.disk_margin import DiskMargin
 from flightid.control.margins.disturbance_rejection import DisturbanceRejection
 from flightid.control.margins.loop_metrics import DISTURBANCE_LEVEL_DB
@@ -44,12 +43,12 @@ def loop_bode(margins: Margins) -> go.PlotFigure:
     'PlotFigure'
     """
     made = look.figure(rows=2, row_heights=(1.0, 1.0), height_px=500)
-    omega, decibel, degrees = _curve(margins.curve, margins.crossover)
+    omega, decibel, degrees = drawn_curve(margins.curve, margins.crossover)
     for row, values, stderr in (
         (1, decibel, margins.curve.stderr_db),
         (2, degrees, margins.curve.stderr_deg),
     ):
-        _add_band(made, omega, values, stderr, row)
+        add_band(made, omega, values, stderr, row)
         made.add_trace(
             look.line(NAME, omega, values, colour=look.MODEL, legend=False), row=row, col=1
         )
@@ -61,8 +60,8 @@ def loop_bode(margins: Margins) -> go.PlotFigure:
     _mark(made, margins.phase_margin, margins.crossover, omega, degrees, 2, -180.0, look.TRUTH)
     titles = (look.axis_title("gain", "dB"), look.axis_title("phase", "deg"))
     look.label_axes(made, x="frequency [rad/s]", y=titles, log_x=True)
-    made.update_yaxes(range=_limits(decibel, SEEN_DB), row=1, col=1)
-    made.update_yaxes(range=_limits(degrees, SEEN_DEG), dtick=90, row=2, col=1)
+    made.update_yaxes(range=seen_limits(decibel, SEEN_DB), row=1, col=1)
+    made.update_yaxes(range=seen_limits(degrees, SEEN_DEG), dtick=90, row=2, col=1)
     return made
 
 
@@ -147,7 +146,7 @@ def loop_nichols(
     'PlotFigure'
     """
     made = look.figure(height_px=500)
-    _, decibel, degrees = _curve(margins.curve, margins.crossover)
+    _, decibel, degrees = drawn_curve(margins.curve, margins.crossover)
     angle = np.radians(ROUND_DEG)
     made.add_trace(
         go.Scatter(
@@ -173,8 +172,8 @@ def loop_nichols(
         made.add_trace(
             _points("gain margin", [-180.0], [-gain.value], look.RIVAL, "square", _half(gain))
         )
-    made.update_xaxes(title_text="phase [deg]", range=_limits(degrees, SEEN_DEG), dtick=45)
-    made.update_yaxes(title_text="gain [dB]", range=_limits(decibel, SEEN_DB))
+    made.update_xaxes(title_text="phase [deg]", range=seen_limits(degrees, SEEN_DEG), dtick=45)
+    made.update_yaxes(title_text="gain [dB]", range=seen_limits(decibel, SEEN_DB))
     made.update_layout(hovermode="closest")
     return made
 
@@ -193,7 +192,7 @@ def disturbance_figure(found: DisturbanceRejection) -> go.PlotFigure:
     made = look.figure(height_px=340)
     curve = found.curve
     decibel = 20.0 * np.log10(np.abs(curve.response))
-    _add_band(made, curve.omega_rad_s, decibel, curve.stderr_db, 1)
+    add_band(made, curve.omega_rad_s, decibel, curve.stderr_db, 1)
     made.add_trace(look.line("|S|", curve.omega_rad_s, decibel, colour=look.MODEL, legend=False))
     made.add_hline(DISTURBANCE_LEVEL_DB, line=GUIDE)
     made.add_hline(0.0, line=GUIDE)
@@ -220,7 +219,7 @@ def disturbance_figure(found: DisturbanceRejection) -> go.PlotFigure:
             )
         )
     look.label_axes(made, x="frequency [rad/s]", y=("disturbance response [dB]",), log_x=True)
-    made.update_yaxes(range=_limits(decibel, (-40.0, 20.0)))
+    made.update_yaxes(range=seen_limits(decibel, (-40.0, 20.0)))
     made.update_layout(hovermode="closest")
     return made
 
@@ -254,7 +253,7 @@ def disk_figure(found: DiskMargin) -> go.PlotFigure:
     return made
 
 
-def _curve(curve: LoopCurve, crossover: Reading) -> tuple[Array, Array, Array]:
+def drawn_curve(curve: LoopCurve, crossover: Reading) -> tuple[Array, Array, Array]:
     """Frequencies, dB, and degrees on the turn that has the crossover within ±180° of −180°."""
     omega = curve.omega_rad_s
     degrees = np.degrees(np.unwrap(np.angle(curve.response)))
@@ -265,13 +264,19 @@ def _curve(curve: LoopCurve, crossover: Reading) -> tuple[Array, Array, Array]:
     return omega, 20.0 * np.log10(np.abs(curve.response)), degrees
 
 
-def _add_band(
-    made: go.PlotFigure, omega: Array, values: Array, stderr: Array | None, row: int
+def add_band(
+    made: go.PlotFigure,
+    omega: Array,
+    values: Array,
+    errors: Array | None,
+    row: int,
+    named: tuple[str, str] = (NAME, look.MODEL),
 ) -> None:
-    if stderr is None:
+    """Draw the band of a curve in a row; its name and colour are those of the line."""
+    if errors is None:
         return
-    wide = np.minimum(half_width(shown()) * np.nan_to_num(stderr, nan=WIDEST_DEG), WIDEST_DEG)
-    edges = look.band(NAME, omega, values - wide, values + wide, colour=look.MODEL)
+    wide = np.minimum(half_width(shown()) * np.nan_to_num(errors, nan=WIDEST_DEG), WIDEST_DEG)
+    edges = look.band(named[0], omega, values - wide, values + wide, colour=named[1])
     made.add_traces(edges, rows=row, cols=1)
 
 
@@ -381,7 +386,7 @@ def _points(
     return go.Scatter(x=x, y=y, name=name, mode="markers", marker=marker, **errors)
 
 
-def _limits(values: Array, seen: tuple[float, float]) -> list[float]:
+def seen_limits(values: Array, seen: tuple[float, float]) -> list[float]:
     """A little more than the values, but not beyond what is worth seeing."""
     low, high = float(np.min(values)), float(np.max(values))
     room = 0.05 * max(high - low, 1.0)

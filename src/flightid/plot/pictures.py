@@ -13,6 +13,7 @@ from flightid.identification import Advice, Fit
 from flightid.plot import graph_objects as go
 from flightid.plot import look
 from flightid.plot.autopilots import controller, replay
+from flightid.plot.compared_loops import compared_loops
 from flightid.plot.consistency import consistency
 from flightid.plot.excitation import excitation_history, plan_spectrum
 from flightid.plot.fit import fit_figure
@@ -169,6 +170,7 @@ PICTURES: Mapping[str, Callable[..., Any]] = {
     "ImpulseResponse": impulse_response,
     "Interconnection": diagram,
     "LowerOrder": lower_order_curves,
+    "MarginComparison": compared_loops,
     "Margins": loop_bode,
     "Mismatch": mismatch_envelopes,
     "Modes": pole_map,

@@ -7,6 +7,7 @@ from flightid.review.comparison import FlightComparison
 from flightid.review.flight import review_flight
 from flightid.review.gyro_noise import GyroNoise, NoisePeak
 from flightid.review.loop_response import LoopResponse
+from flightid.review.margin_comparison import MarginComparison, compare_margins
 from flightid.review.result import FlightReview
 
 __all__ = [
@@ -15,8 +16,10 @@ __all__ = [
     "FlightReview",
     "GyroNoise",
     "LoopResponse",
+    "MarginComparison",
     "NoisePeak",
     "compare_flights",
+    "compare_margins",
     "compare_with_promise",
     "review_autotune",
     "review_flight",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -45,6 +46,7 @@ QUANTITIES = (
     ("sensitivity peak", "sensitivity_peak", "1"),
 )
 NO_CROSSOVER = "the gain does not pass one in the band"
+GAIN_MARGINS = (*GAIN_LIMITS, *GAIN_LIMITS.values())
 MISSING = {
     "crossover_rad_s": NO_CROSSOVER,
     "phase_margin_deg": NO_CROSSOVER,
@@ -266,6 +268,16 @@ def margins(
         band_rad_s=band_rad_s,
         unstable_poles=unstable_poles,
     )
+    return margins_of(loop, phase_guide_deg=phase_guide_deg, gain_guide_db=gain_guide_db)
+
+
+def margins_of(
+    loop: BrokenLoop,
+    *,
+    phase_guide_deg: float = PHASE_GUIDE_DEG,
+    gain_guide_db: float = GAIN_GUIDE_DB,
+) -> Margins:
+    """Margins of a loop that was read; see `margins`."""
     omega, metrics = measured_up(loop)
     estimate = loop.of(loop.uncertain.value, omega)
     quantities, curve = _carried(loop, omega)
@@ -301,21 +313,29 @@ def drawn_points(loop: BrokenLoop, omega: Array) -> Array:
     return np.asarray(omega[np.linspace(0, len(omega) - 1, DRAWN_POINTS).astype(int)])
 
 
+def loop_numbers(
+    loop: BrokenLoop, omega: Array, things: Sequence[Any], names: Sequence[str]
+) -> tuple[Array, Complex]:
+    """Numbers of loops by name of `LoopMetrics`, shape (n, n_names), and the loops, (n, n_f)."""
+    values = np.array([loop.of(each, omega) for each in things])
+    found, whole = loop.metrics(omega, values), everywhere(loop, omega)
+    numbers = {name: np.array(getattr(found, name)) for name in (*GAIN_MARGINS, *names)}
+    for place, each in enumerate(things if whole is not None else ()):
+        assert whole is not None
+        own = {name: float(row[place]) for name, row in numbers.items()}
+        for name, value in gain_limits(own, loop, whole, loop.of(each, whole)).items():
+            numbers[name][place] = value
+    return np.array([numbers[name] for name in names]).T, values
+
+
 def _carried(loop: BrokenLoop, omega: Array) -> tuple[list[tuple[Any, Reading]], LoopCurve]:
     """Every number with its interval, and the curve with its standard errors."""
     names = [name for _, name, _ in QUANTITIES]
-    whole = everywhere(loop, omega)
     drawn = drawn_points(loop, omega)
     centre = loop.of(loop.uncertain.value, drawn)
 
     def all_of(things: list[Any]) -> Array:
-        values = np.array([loop.of(each, omega) for each in things])
-        found = loop.metrics(omega, values)
-        numbers = np.array([getattr(found, name) for name in names]).T
-        if whole is not None:
-            for row, each in zip(numbers, things, strict=True):
-                own = dict(zip(names, row.tolist(), strict=True))
-                row[:] = list((own | gain_limits(own, loop, whole, loop.of(each, whole))).values())
+        numbers, values = loop_numbers(loop, omega, things, names)
         at_drawn = values if drawn is omega else np.array([loop.of(each, drawn) for each in things])
         ratio = at_drawn / centre
         return np.hstack([numbers, 20.0 * np.log10(np.abs(ratio)), np.degrees(np.angle(ratio))])

@@ -40,7 +40,7 @@ class GainController:
     def __init__(
         self, loops: Mapping[str, AxisLoop], measured: Mapping[str, tuple[str, str | None]]
     ) -> None:
-        self.loops, self._measured = dict(loops), dict(measured)
+        self.loops, self.measured = dict(loops), dict(measured)
         self._runners = {name: loop.runner() for name, loop in loops.items()}
         self.commands = tuple(f"{angle or rate}_command" for rate, angle in measured.values())
 
@@ -48,7 +48,7 @@ class GainController:
         """What each controller gives, from the pilot's commands and the model's last outputs."""
         found = {}
         for name, loop in self.loops.items():
-            rate, angle = self._measured[name]
+            rate, angle = self.measured[name]
             wanted = given.get(f"{angle or rate}_command", 0.0)
             if angle is not None:
                 wanted = loop.angle_gain_1_s * (wanted - outputs[angle])

@@ -147,7 +147,7 @@ def gather(
         tuple(plants[:draws]),
         tuple(plants[draws:]),
         band,
-        _hold_in_model(source),
+        hold_in_model(source),
         tuple(findings),
         {
             each.name: (each.measured.omega_rad_s, each.measured.coherence)
@@ -253,7 +253,7 @@ def _red(what: str, finding: Finding) -> DataError:
     )
 
 
-def _hold_in_model(source: object) -> bool:
+def hold_in_model(source: object) -> bool:
     """A fit that was told of held inputs keeps the half sample out of its delay."""
     provenance = getattr(getattr(source, "estimated", source), "provenance", {})
     options = provenance.get("options", provenance) if isinstance(provenance, Mapping) else {}

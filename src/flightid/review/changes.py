@@ -1,0 +1,183 @@
+"""Numbers of loops before and after: their difference with an interval, and what it says."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+from flightid.conventions import Light
+from flightid.dynamics.conditions.ratios import chance_of, difference_of, holm
+from flightid.findings import Finding
+from flightid.review.tables import cell
+from flightid.table import Cell, Column, Table
+from flightid.uncertainty.estimate import Reading
+from flightid.uncertainty.quantiles import interval_words, shown
+
+BY_FREQUENCY, TRACKING = "bandwidth at -3 dB", "tracking error of set-point"
+FREQUENCIES = ("crossover", "disturbance bandwidth")
+WORSE = {
+    "delay to half": 1.0,
+    "rise time": 1.0,
+    "overshoot": 1.0,
+    BY_FREQUENCY: -1.0,
+    TRACKING: 1.0,
+    "crossover": -1.0,
+    "phase margin": -1.0,
+    "gain margin": -1.0,
+    "gain-reduction margin": 1.0,
+    "delay margin": -1.0,
+    "sensitivity peak": 1.0,
+    "disturbance bandwidth": -1.0,
+}
+"""Which way a number of a loop gets worse."""
+MATERIAL_SHARE, MATERIAL_OVERSHOOT = 0.1, 5.0
+"""A tenth of what was promised, or five points of overshoot: what no pilot feels is no miss. A
+model's simplification alone moves numbers by a few percent, which its covariance does not hold."""
+IN_MILLISECONDS = 1e3
+
+
+@dataclass(frozen=True)
+class LoopChange:
+    """One number of one loop, before and after.
+
+    Attributes
+    ----------
+    loop, name : str
+        ``"roll rate"``; ``"rise time"``.
+    before, after, difference : Estimate
+        The last has an interval where both have.
+    chance : float or None
+        Of so large a difference between equal truths.
+    """
+
+    loop: str
+    name: str
+    before: Reading
+    after: Reading
+    difference: Reading
+    chance: float | None
+
+    @property
+    def key(self) -> str:
+        """Loop and name: ``"roll rate, rise time"``."""
+        return f"{self.loop}, {self.name}"
+
+    @property
+    def shown_unit(self) -> tuple[float, str]:
+        """What numbers are multiplied by for the reader, and the unit that they have then."""
+        unit = self.before.unit
+        if unit in ("rad", "rad/s") and self.name not in FREQUENCIES:
+            return math.degrees(1.0), unit.replace("rad", "deg")
+        return (IN_MILLISECONDS, "ms") if unit == "s" else (1.0, "" if unit == "1" else unit)
+
+    @property
+    def words(self) -> str:
+        """Name and both numbers."""
+        factor, unit = self.shown_unit
+        old, new = (factor * (each.value or 0.0) for each in (self.before, self.after))
+        return f"{self.name} {old:.3g} → {new:.3g}{unit and ' ' + unit}"
+
+    @property
+    def is_material(self) -> bool:
+        """Whether a pilot would feel it."""
+        old, apart = self.before.value or 0.0, abs(self.difference.value or 0.0)
+        if self.name == "overshoot":
+            return apart >= MATERIAL_OVERSHOOT
+        return apart >= MATERIAL_SHARE * abs(old)
+
+    @property
+    def is_worse(self) -> bool:
+        """Whether a pilot would feel it, and would rather not: slower, or less true."""
+        if self.name == "level":
+            old, new = (abs((each.value or 0.0) - 1.0) for each in (self.before, self.after))
+            return self.is_material and new > old
+        return self.is_material and WORSE[self.name] * (self.difference.value or 0.0) > 0.0
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values."""
+        pairs = {key: getattr(self, key).to_dict() for key in ("before", "after", "difference")}
+        return {"loop": self.loop, "name": self.name, **pairs, "chance": self.chance}
+
+
+def change_of(loop: str, before: Reading, after: Reading) -> LoopChange:
+    """The change of two independent numbers."""
+    apart = difference_of(after, before, f"{before.name}, difference")
+    return LoopChange(loop, before.name, before, after, apart, chance_of(after, before))
+
+
+def significant_of(changes: Iterable[LoopChange]) -> tuple[str, ...]:
+    """What changed beyond chance, all judged together by Holm's rule."""
+    chances = {c.key: c.chance for c in changes if c.chance is not None}
+    kept = holm(chances)
+    return tuple(name for name in chances if name in kept)
+
+
+def change_table(
+    title: str,
+    names: tuple[str, str],
+    changes: Iterable[LoopChange],
+    significant: Sequence[str],
+    notes: Iterable[str],
+    level: float | None,
+) -> Table:
+    """Each number before and after, with the interval of the difference."""
+    chosen = shown(level)
+    columns = (
+        *(Column("loop"), Column("quantity"), Column("unit"), *map(Column, names)),
+        *(Column("difference"), Column("changed")),
+    )
+    rows: list[tuple[Cell, ...]] = []
+    for each in changes:
+        factor, unit = each.shown_unit
+        told = (cell(number, factor) for number in (each.before, each.after, each.difference))
+        rows.append((each.loop, each.name, unit, *told, "yes" if each.key in significant else ""))
+    brackets = (
+        f"In brackets: {interval_words(chosen)} intervals. Changed: beyond chance, one false "
+        "“yes” in 20 such tables."
+    )
+    return Table(title, columns, tuple(rows), (brackets, *notes))
+
+
+def verdicts(
+    changes: Sequence[LoopChange], significant: Sequence[str], *, promised: bool = False
+) -> Iterator[Finding]:
+    """One verdict for each loop that changed, or that none did."""
+    by_loop: dict[str, list[LoopChange]] = {}
+    for each in changes:
+        if each.key in significant and (each.is_material or not promised):
+            by_loop.setdefault(each.loop, []).append(each)
+    for loop, found in by_loop.items():
+        said = "; ".join(each.words for each in found)
+        if promised:
+            yield Finding(
+                "promise-missed", Light.AMBER, f"{loop}, promised → flown: {said}",
+                "look at the steps before you fly more",
+            )  # fmt: skip
+        else:
+            yield _changed(f"{loop}, before → after: {said}", found)
+    if not any(each.chance is not None for each in changes):
+        yield Finding(
+            "loops-not-judged", Light.UNKNOWN,
+            "no difference has an interval, so nothing says which of them are chance",
+            "compare fits or models that know their covariance",
+        )  # fmt: skip
+    elif not by_loop:
+        count = len({c.loop for c in changes})
+        said = f"{len(changes)} numbers of {count} loop{'' if count == 1 else 's'}"
+        yield Finding(
+            "promise-kept" if promised else "loops-unchanged", Light.GREEN,
+            f"{said}: {'flown as promised' if promised else 'no change beyond chance'}",
+        )  # fmt: skip
+
+
+def _changed(said: str, found: list[LoopChange]) -> Finding:
+    """Amber where something got worse; not judged where the tracking error alone did."""
+    worse = [each.name for each in found if each.is_worse]
+    if not worse:
+        return Finding("loop-changed", Light.GREEN, said)
+    if worse == [TRACKING]:
+        action = "compare flights whose sticks moved alike: quicker sticks are tracked worse"
+        return Finding("loop-changed", Light.UNKNOWN, said, action)
+    action = f"worse: {', '.join(worse)}; look at the loops and at what was set otherwise, and go "
+    return Finding("loop-changed", Light.AMBER, said, action + "back unless you wanted it")
