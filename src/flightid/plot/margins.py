@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.control.margins.disk_geometry import gain_limits
 from flightid.control.margins.disk_margin import DiskMargin
 from flightid.control.margins.disturbance_rejection import DisturbanceRejection
 from flightid.control.margins.loop_metrics import DISTURBANCE_LEVEL_DB
