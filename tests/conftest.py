@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 from _pytest.doctest import DoctestModule
-from hypothesis import settings
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from tests.examples import PROFILE
 
@@ -35,6 +36,12 @@ def pytest_configure() -> None:
     """
     gc.set_threshold(100_000, 20, 100)
     os.fsync = lambda _: None
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection() -> None:
+    """Draw once while there is little: the first draw of a process looks at all its objects."""
+    given(st.none())(lambda _: None)()
 
 
 def pytest_collection_finish() -> None:
