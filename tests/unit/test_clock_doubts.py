@@ -47,6 +47,13 @@ def test_edges_of_a_held_signal_are_known_within_its_spacings() -> None:
     assert np.max(error) <= found.half_width_s
 
 
+def test_values_that_a_log_repeats_count_where_they_are_new() -> None:
+    held_s = np.floor(TIME_S / 0.1 + 1e-9) * 0.1
+    found = clock_offset((TIME_S, smooth(TIME_S)), (TIME_S + 2.0, smooth(held_s)), "x")
+    assert found.half_width_s is not None
+    assert abs(found.offset_s + 2.0) <= found.half_width_s <= 0.01
+
+
 def test_an_opposite_sign_and_an_offset_of_unix_stamps_are_said() -> None:
     first, (stamps, values) = pair(0.0)
     with pytest.raises(DataError, match="opposite signs"):

@@ -28,6 +28,8 @@ FASTEST_DRIFT = 5e-4
 """Difference of rates that is looked for: clocks of cheap crystals differ by 100 ppm."""
 STEP, STEP_LEVEL = 0.25, 1e-3
 """Least step of a clock that is looked for, in samples, and the chance of seeing one in none."""
+REGULAR = 0.9
+"""Share of runs of one length, give or take a row, from which a log repeats a slower signal."""
 SMOOTHED = 9
 """Samples of the window under which signals are matched."""
 SETTLED = 32
@@ -44,7 +46,7 @@ class ClockOffset:
     ----------
     offset_s, drift : float
     half_width_s : float or None
-        Half of the 95 % interval of the relation at the ends of the files' overlap, where an error
+        Half of the 95 % interval of the relation at both ends of the files' overlap, where an error
         of the drift counts most; None: nothing tells it.
     correlation : float or None
         Of the shared signal; None where the offset was told.
@@ -107,8 +109,9 @@ def clock_offset(first: Signal, second: Signal, name: str) -> ClockOffset:
 
     The offset with the largest correlation over the overlap is found at the coarser spacing; then
     each of some stretches is matched by itself, between samples. A line through them is offset and
-    drift, their scatter about it the interval (Student's t). A lag between both sensors, such as a
-    filter of one, is part of the offset.
+    drift, their scatter about it the interval (Student's t). Values that a log repeats, since their
+    source is slower, count where they are new; the interval then has half a row more. A lag between
+    both sensors, such as a filter of one, is part of the offset.
 
     Parameters
     ----------
@@ -126,6 +129,10 @@ def clock_offset(first: Signal, second: Signal, name: str) -> ClockOffset:
     ---------
     Knapp & Carter, *IEEE Trans. ASSP* 24 (1976): delay by the maximum of a correlation.
     """
+    late_s = 0.0
+    for signal in (first, second):
+        late_s += 0.5 * mean_spacing_s(signal[0]) if _repeats(signal[1]) else 0.0
+    first, second = _fresh(first), _fresh(second)
     sample_s = max(mean_spacing_s(first[0]), mean_spacing_s(second[0]))
     one, two = (_gridded(*pair, sample_s) for pair in (first, second))
     correlation = _correlations(one, two)
@@ -163,9 +170,35 @@ def clock_offset(first: Signal, second: Signal, name: str) -> ClockOffset:
         (first, one), (second, two)
     )]  # fmt: skip
     held = all(_is_held(values) for _, values in (first, second))
-    spacings = sum(mean_spacing_s(time_s) for time_s, _ in (first, second))
-    floor_s = spacings / 2 if held else 0.0
+    floor_s = (sample_s if held else 0.0) + late_s
     return _of_stretches(smooth[0], smooth[1], start, sample_s, found, floor_s)
+
+
+def _repeats(values: Array) -> bool:
+    """Whether a log writes each value of a slower signal several times over.
+
+    Its runs are of one length, give or take a row: those of a signal that stands still are not.
+
+    Example
+    -------
+    >>> _repeats(np.repeat(np.arange(20.0), 3)), _repeats(np.arange(60.0))
+    (True, False)
+    """
+    changes = np.flatnonzero(np.diff(values))
+    runs = np.diff(changes)
+    if runs.size < FEWEST or np.median(runs) < 2:
+        return False
+    # Two values that are alike by chance make one run of two.
+    return float(np.mean(np.abs(runs - np.median(runs)) <= 1)) >= REGULAR
+
+
+def _fresh(signal: Signal) -> Signal:
+    """A signal whose repeated values are left out: each stands half a row before its first one."""
+    time_s, values = signal
+    if not _repeats(values):
+        return signal
+    new = np.flatnonzero(np.diff(values)) + 1
+    return time_s[new] - 0.5 * mean_spacing_s(time_s), values[new]
 
 
 def _is_held(values: Array) -> bool:
@@ -252,8 +285,9 @@ def _of_stretches(
     error = float(np.sqrt(np.sum((offsets_s - design @ line) ** 2) / (time_s.size - 2)))
     slope_error = error / np.sqrt(spread)
     ends_s = float(np.hypot(error / np.sqrt(time_s.size), slope_error * span_s / 2))
-    # Edges of held signals lie anywhere within the spacing before the sample that shows them.
-    half = max(float(student.ppf(0.975, time_s.size - 2)) * ends_s, floor_s)
+    # Edges of held signals lie anywhere between two samples of the common grid, for many stretches
+    # alike where clocks drift little: that is added. Both ends are to hold.
+    half = float(student.ppf(1.0 - 0.05 / 4.0, time_s.size - 2)) * ends_s + floor_s
     step_s = _step(design, offsets_s, max(STEP * sample_s, 2 * floor_s))
     # Stamps t of the first and s of the second: t - s = offset + slope (t - centre).
     drift = float(line[1] / (1 - line[1]))
