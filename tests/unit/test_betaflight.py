@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import flightid as fid
 from flightid.control.autopilots import (
@@ -23,6 +24,7 @@ from flightid.errors import DataError, OptionError
 from flightid.inspection.betaflight_chirps import chirps
 from flightid.inspection.excitation_found import injected_spans
 from flightid.logs.blackbox.settings import settings_of
+from flightid.review.loops import loop_responses
 from tests import betaflight_flight as betaflight
 from tests.blackbox_builder import SETTINGS, blackbox
 from tests.closeness import assert_close
@@ -80,6 +82,27 @@ def test_terms_are_those_of_the_firmware() -> None:
         assert_close(
             [found[0], found[1]], [told.real, told.imag], why="settled", atol=2e-4 * abs(told)
         )
+
+
+def test_fast_set_points_hold_the_integral_back_as_in_the_firmware() -> None:
+    quads, gains = betaflight.Quads.of(1, seed=1), betaflight.default_gains(1)
+    run = 2.0 * np.pi * np.cumsum(np.linspace(5.0, 60.0, 600)) * betaflight.STEP
+    flown = betaflight.fly(
+        quads, gains, run, np.zeros(600, int), noise=0.0, d_max=np.zeros(3), every=1
+    ).columns
+    loop = axis_loop("betaflight", "roll", _settings())
+    signals = [np.radians(flown[name][:, 0, 0]) for name in ("set", "gyro")]
+    logged = flown["I"][:, 0, 0]
+    assert_close(1e3 * loop.run(*signals).terms["I"], logged, why="single", atol=1e-4)
+    free = axis_loop("betaflight", "roll", _settings() | {"iterm_relax": 0.0})
+    assert np.abs(1e3 * free.run(*signals).terms["I"] - logged).max() > 1.0
+    # By hand: 100 deg/s at once is fast, so that nothing is counted but what goes back.
+    rising = axis_loop("betaflight", "roll", _settings() | {"iterm_relax": 3.0})
+    wanted = np.radians([-10.0] * 400 + [100.0] * 2)
+    both = (each.run(wanted, np.zeros(402)).terms["I"] for each in (loop, rising))
+    held, back = (term[-1] - term[-3] for term in both)
+    assert_close(held, 0.0, why="stands", atol=1e-12)
+    assert_close(back, 2 * 4.88762e-4, why="two loops of 100 deg/s", rtol=1e-12)
 
 
 def _log(folder: Path, **changes: str) -> fid.Log:
@@ -193,3 +216,28 @@ def test_a_log_of_every_loop_tells_its_hold(tmp_path: Path) -> None:
     for denominator, hold in (("2", "zero"), ("1", None)):
         path.write_bytes(blackbox(columns, {**SETTINGS, "pid_process_denom": denominator}))
         assert fid.read_log(path).record().hold == hold
+
+
+def test_steps_of_fast_loops_are_read_of_finer_samples(tmp_path: Path) -> None:
+    """A loop of 30 Hz that rises within 12 ms: three samples of 100 Hz do not tell it."""
+    n, step_s = 40_000, betaflight.STEP * betaflight.LOGGED
+    rng = np.random.default_rng(5)
+    wanted = np.repeat(rng.choice([-60.0, 60.0], n // 400), 400)
+    turn, zeta = 2.0 * np.pi * 30.0 * step_s, 0.7
+    a = [1.0, -2.0 * np.exp(-zeta * turn) * np.cos(turn * np.sqrt(1 - zeta**2)),
+         np.exp(-2.0 * zeta * turn)]  # fmt: skip
+    rate = lfilter([0.0, sum(a)], a, wanted) + 0.5 * rng.standard_normal(n)
+    columns = {name: np.zeros((n, 1, 3)) for name in ("P", "I", "D", "gyro", "set", "sum")}
+    columns["set"][:, 0, 0], columns["gyro"][:, 0, 0] = wanted, rate
+    flown = betaflight.Blackbox(columns, betaflight.default_gains(1))
+    loops = np.zeros(n * betaflight.LOGGED)
+    path = tmp_path / "a.bfl"
+    content = betaflight.blackbox_of(flown, betaflight.Quads.of(1), loops, loops.astype(int) - 1, 0)
+    path.write_bytes(content)
+    log = fid.read_log(path)
+    made = {each.name: each for each in loop_responses(log, ((5.0, 24.9),))}["roll rate"]
+    assert made.rate_hz == pytest.approx(400.0)
+    step = np.cumsum(lfilter([0.0, sum(a)], a, np.eye(1, 400)[0]))
+    rise = step_s * (np.argmax(step > 0.9) - np.argmax(step > 0.1))
+    assert rise < 0.013
+    assert_close(made["rise time"].value, rise, why="samples of 2.5 ms", rtol=0.1)

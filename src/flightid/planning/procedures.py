@@ -163,7 +163,7 @@ PROCEDURES = {
             ),
             (
                 "Paste your saved `diff all` into the CLI.",
-                "Copy the blackbox log: flightid inspect LOG says what it holds.",
+                "Copy the blackbox log: flightid tune LOG --write gains.txt makes gains of it.",
             ),
             "Betaflight pull request 13105; pichim/bf_controller_tuning",
         ),

@@ -34,9 +34,32 @@ YAW_I = 2.5
 MIXER = 1000.0
 """PID sum of a full command."""
 SUM_LIMIT, I_SHARE = 500.0, 85.0
+RELAX_HZ, RELAX_DEG_S = 15.0, 40.0
+"""iterm_relax_cutoff as it comes, and the fast part of a set-point at which I stands still."""
+RELAX_YAW, RELAX_RISING = (2, 4), (3, 4)
+"""Numbers of iterm_relax that hold in yaw too, and that let I go back."""
 TPA_OF_D = 1.0
 """`tpa_mode` D: throttle takes from D alone, else from P and D."""
 SLIDERS = "simplified_pids_mode"
+
+
+@dataclass(frozen=True)
+class IntegralRelax:
+    """Betaflight's iterm_relax.
+
+    Attributes
+    ----------
+    cutoff_hz : float
+        Of the low-pass that tells a fast set-point from a slow one.
+    by_setpoint : bool
+        True: the error counts less; False: what the slow set-point leaves of it.
+    rising_only : bool
+        Whether I may always go back towards zero.
+    """
+
+    cutoff_hz: float
+    by_setpoint: bool = True
+    rising_only: bool = False
 
 
 @dataclass(frozen=True, repr=False)
@@ -55,6 +78,8 @@ class BetaflightLoop(AxisLoop):
         What TPA leaves of P and of D at the throttle of the flight.
     integral_limit : float
         Of I, in `output_unit`.
+    relax : IntegralRelax or None
+        How fast set-points hold I back in `run`; the linear view is of small signals.
 
     Reference
     ---------
@@ -70,6 +95,7 @@ class BetaflightLoop(AxisLoop):
     stages: tuple[FilterStage, ...] = ()
     throttle_shares: tuple[float, float] = (1.0, 1.0)
     integral_limit: float = math.inf
+    relax: IntegralRelax | None = None
     autopilot: ClassVar[str] = "betaflight"
     full_output: ClassVar[float] = SUM_LIMIT / MIXER
     gains_are_whole: ClassVar[bool] = True
@@ -135,6 +161,21 @@ class BetaflightLoop(AxisLoop):
     def _forward_terms(self, omega: Omega) -> dict[str, Response]:
         return self._error_terms(omega)
 
+    def _integrated(self, setpoint: np.ndarray, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Error that I counts away from zero and towards it: fast set-points hold it back."""
+        error = setpoint - rate
+        if self.relax is None:
+            return error, error
+        weight = one_pole_weight(self.relax.cutoff_hz, self.loop_rate_hz)
+        slow = lfilter([weight], [1.0, weight - 1.0], setpoint)
+        fast = np.abs(setpoint - slow)
+        if self.relax.by_setpoint:
+            relaxed = error * np.maximum(0.0, 1.0 - fast / math.radians(RELAX_DEG_S))
+        else:
+            left = slow - rate
+            relaxed = np.sign(left) * np.maximum(np.abs(left) - fast, 0.0)
+        return relaxed, error if self.relax.rising_only else relaxed
+
     def run(
         self,
         setpoint_rad_s: ArrayLike,
@@ -163,21 +204,23 @@ class BetaflightLoop(AxisLoop):
                     smooth = lfilter([b0, b1, b2], [1.0, a1, a2], smooth)
         slope = np.diff(smooth, prepend=0.0) * rate_hz
         step = self.unit_of("i") * self.values["i"] / rate_hz
+        counted, freely = self._integrated(setpoint, rate)
         terms = {
             "P": lfilter([weight], [1.0, weight - 1.0], gain * error),
-            "I": _clamped_sum(step * error, self.integral_limit),
+            "I": _clamped_sum(step * counted, step * freely, self.integral_limit),
             "D": -self.unit_of("d") * self.values["d"] * self.throttle_shares[1] * slope,
         }
         return LoopRun(sum(terms.values(), np.zeros(rate.size)), terms, rate)
 
 
-def _clamped_sum(steps: np.ndarray, limit: float) -> np.ndarray:
+def _clamped_sum(steps: np.ndarray, freely: np.ndarray, limit: float) -> np.ndarray:
+    """Sum within a limit; towards zero it goes by the second kind of steps."""
     total = np.cumsum(steps)
-    if np.abs(total).max(initial=0.0) <= limit:
+    if freely is steps and np.abs(total).max(initial=0.0) <= limit:
         return np.asarray(total)
     made, held = np.empty_like(steps), 0.0
-    for place, step in enumerate(steps):
-        held = min(max(held + step, -limit), limit)
+    for place, (relaxed, free) in enumerate(zip(steps.tolist(), freely.tolist(), strict=True)):
+        held = min(max(held + (free if held * free < 0.0 else relaxed), -limit), limit)
         made[place] = held
     return made
 
@@ -217,7 +260,19 @@ def betaflight_loop(
         stages=stages,
         throttle_shares=_throttle_shares(known, throttle),
         integral_limit=limit * known.get("iterm_windup", I_SHARE) / 100.0 / MIXER,
+        relax=_relax(known, axis),
         beside_gains=tuple(_beside(known, axis)),
+    )
+
+
+def _relax(known: Mapping[str, float], axis: str) -> IntegralRelax | None:
+    mode = round(known.get("iterm_relax", 0.0))
+    if not mode or (axis == "yaw" and mode not in RELAX_YAW):
+        return None
+    return IntegralRelax(
+        known.get("iterm_relax_cutoff", RELAX_HZ),
+        bool(known.get("iterm_relax_type", 1.0)),
+        mode in RELAX_RISING,
     )
 
 
@@ -249,7 +304,7 @@ def _said(known: Mapping[str, float], axis: str, throttle: float) -> list[str]:
             f"TPA leaves {shares[0]:.0%} of P and {shares[1]:.0%} of D at the flight's throttle "
             f"of {throttle:.0%}: this view stays there"
         )
-    if known.get("iterm_relax"):
+    if _relax(known, axis) is not None:
         said.append("iterm_relax holds I back in fast set-points: steps are without it")
     if known.get("anti_gravity_gain"):
         said.append("anti_gravity raises P and I while the throttle moves: not in this view")

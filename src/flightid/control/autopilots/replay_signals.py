@@ -104,6 +104,8 @@ def read_signals(log: Log, loop: AxisLoop, span_s: tuple[float, float] | None) -
     """
     if log.kind == "px4":
         return _px4(log, loop, span_s)
+    if log.kind == "betaflight":
+        return _betaflight(log, loop, span_s)
     return _ardupilot(log, loop, span_s)
 
 
@@ -260,6 +262,36 @@ def _px4(log: Log, loop: AxisLoop, span_s: tuple[float, float] | None) -> AxisSi
         unallocated=_unallocated(log, place),
         extra=extra,
     )
+
+
+def _betaflight(log: Log, loop: AxisLoop, span_s: tuple[float, float] | None) -> AxisSignals:
+    """Set-point, filtered gyro and PID terms of a blackbox, in the axes of the firmware."""
+    place = _place(loop)
+    names = {f"axis{term}[{place}]": term for term in "PID"}
+    both = [f"setpoint[{place}]", f"gyroADC[{place}]"]
+    table = log.table("main")
+    missing = [name for name in (*both, *list(names)[:2]) if name not in table]
+    if missing:
+        raise DataError(
+            "the log does not hold the controller's terms",
+            found="no " + ", ".join(missing),
+            needed="set-point, gyro and PID terms in the blackbox",
+            action="set blackbox_disable_pids, blackbox_disable_setpoint and "
+            "blackbox_disable_gyro to OFF",
+        )
+    rows = _rows(table, span_s)
+    time_s = table.time_s[rows]
+    terms = {
+        term: LoggedSignal(time_s, table[name][rows] / 1e3, f"main.{name}")
+        for name, term in names.items()
+        if name in table
+    }
+    total = np.sum([each.values for each in terms.values()], axis=0)
+    wanted, measured = (
+        LoggedSignal(time_s, np.radians(table[name][rows]), f"main.{name}") for name in both
+    )
+    terms["output"] = LoggedSignal(time_s, total, "sum of the terms")
+    return AxisSignals(wanted, measured, terms, paired=True)
 
 
 def _unallocated(log: Log, place: int) -> LoggedSignal | None:
