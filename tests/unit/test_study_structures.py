@@ -151,10 +151,10 @@ def _once(fitted: Callable[..., OrderTrial]) -> Callable[..., OrderTrial]:
 
 
 def test_of_any_kind_the_one_that_is_taken_goes_on(monkeypatch) -> None:
-    whole = third_order()
+    whole = third_order(800)
     orders = {"na": 1, "nb": (1, 2), "nc": 1, "nd": 1, "nf": (1, 2), "nk": (4, 5)}
     settings = StructureSettings(structure="any", inputs=("u",), outputs=("y",), **orders)
-    parts = [whole.segment(0.0, 39.9)], [whole.segment(39.9, 60.0)]
+    parts = [whole.segment(0.0, 26.6)], [whole.segment(26.6, 40.0)]
     monkeypatch.setattr(trials, "_fitted_trial", _once(trials._fitted_trial))
     fit, scan = fit_structure(settings, ("u",), *parts)
     kinds = {each.kind for each in scan.trials}
