@@ -13,6 +13,7 @@ pub mod interrupt;
 pub mod logs;
 pub mod models;
 pub mod row_major;
+pub mod series;
 pub mod simulation;
 #[cfg(unix)]
 pub mod taken_pages;
@@ -56,5 +57,6 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     models::transfer::register(module)?;
     vehicles::twin_rotor::register(module)?;
     models::state_space::register(module)?;
+    series::register(module)?;
     Ok(())
 }

@@ -9,8 +9,6 @@ one, the recursion over the orders meets no reflection of one or more, and the m
 
 from __future__ import annotations
 
-import math
-import operator
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -18,14 +16,13 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from flightid._native import autoregression_weights
 from flightid.uncertainty.slow_drift import Drift, apart
 
 Array = NDArray[np.float64]
 LARGEST_ORDER = 20
 SEPARATIONS = 20
 RESTORATIONS = 2
-TONE = 1.0 - 1e-9
-"""Reflection above which a residual predicts itself to rounding, as a pure tone does."""
 SHARPEST = 1e6
 """Power of one line over the whole power that no sound model reaches."""
 VALLEY = 0.02
@@ -204,10 +201,10 @@ def _fitted(power: Array, n: int, length: int) -> Autoregression:
     """
     largest = min(LARGEST_ORDER, n // 20)
     lags = _lags(power, length, largest)
-    weights, sound = _weights(lags, n)
+    weights, sound = autoregression_weights(lags, n)
     if not sound:
         lags = _lags(np.maximum(power, 0.0), length, largest)
-        weights, _ = _weights(lags, n)
+        weights, _ = autoregression_weights(lags, n)
     return Autoregression(lags, weights, n, length)
 
 
@@ -240,36 +237,6 @@ def _leaking(spectrum: Array, lengths: Sequence[int], length: int) -> Array:
 def _lags(power: Array, length: int, largest: int) -> Array:
     """Autocovariance at lags 0 to `largest` from a zero-padded periodogram."""
     return np.asarray(scipy.fft.irfft(power, length)[: largest + 1])
-
-
-def _weights(sample: Array, n: int) -> tuple[Array, bool]:
-    """Weights of the best autoregression by Levinson's recursion over the orders.
-
-    And whether the sample is an autocovariance: a reflection of one or more says that it is none.
-    """
-    lags = sample.tolist()
-    # At these orders plain numbers are faster than arrays.
-    trial: list[float] = []
-    best = trial
-    innovation = lags[0]
-    criterion = n * math.log(innovation) if innovation > 0 else -math.inf
-    for order in range(1, len(lags)):
-        # A residual that predicts itself to rounding has no further order.
-        if not innovation > 1e-12 * lags[0]:
-            break
-        told = sum(map(operator.mul, trial, lags[order - 1 : 0 : -1]))
-        reflection = (lags[order] - told) / innovation
-        if abs(reflection) >= 1.0:
-            return np.array(best), False
-        if abs(reflection) > TONE:
-            break
-        trial = [a - reflection * b for a, b in zip(trial, reversed(trial), strict=True)]
-        trial.append(reflection)
-        innovation *= 1 - reflection**2
-        worth = n * math.log(max(innovation, 1e-300)) + order * math.log(n)
-        if worth < criterion:
-            criterion, best = worth, trial
-    return np.array(best), lags[0] >= 0.0
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ pub mod complex_lu;
 pub mod dual;
 pub(crate) mod gram_schmidt;
 pub mod householder;
+pub mod levinson;
 pub mod matrix_exponential;
 pub mod polynomial_roots;
 pub mod random;
