@@ -200,3 +200,10 @@ def test_the_quick_response_spans_from_cycles_in_its_window_to_the_samples() -> 
         low = CYCLES_AT_LOWEST * 2.0 * np.pi / (longest_s / 3.0)
         wanted = [longest_s / 3.0, longest_s / 15.0, low, HIGHEST_FRACTION * 200.0 * np.pi]
         assert_close(found, np.array(wanted), rtol=1e-12, why="30 s at 100 Hz")
+
+
+def test_an_input_that_moves_at_its_end_is_tested() -> None:
+    random = np.random.default_rng(3)
+    u, e = np.zeros(400), random.standard_normal(400)
+    u[-3:] = random.standard_normal((2, 3))[0]
+    assert find_feedback([u[None] - u.mean()], [e[None]], ["u"]).loop == "open"
