@@ -151,9 +151,7 @@ def chance_share(row: Array) -> float:
     >>> round(chance_share(white), 1), round(chance_share(smooth), 2)
     (0.9, 0.03)
     """
-    lags = scipy.signal.correlate(row, row, method="fft")[row.size - 1 :][
-        : max(row.size // LONGEST, 2)
-    ]
+    lags = _own_lags(row, max(row.size // LONGEST, 2) - 1)
     return 1.0 / (2.0 * float(lags @ lags) / float(lags[0]) ** 2 - 1.0) if lags[0] > 0.0 else 1.0
 
 
@@ -174,13 +172,19 @@ def independent_samples(rows: Sequence[Array]) -> float:
 
 def _independent(row: Array) -> float:
     n = row.size
-    power = np.abs(scipy.fft.rfft(row, scipy.fft.next_fast_len(2 * n, real=True))) ** 2
-    lags = scipy.fft.irfft(power, scipy.fft.next_fast_len(2 * n, real=True))[: n // 4 + 1]
+    lags = _own_lags(row, n // 4)
     if not lags[0] > 0.0:
         return float(n)
     # What chance leaves of lags without correlation counts for none.
     rho = np.square(lags[1:] / lags[0])
     return n / (1.0 + 2.0 * float(np.sum(np.maximum(rho - 1.0 / n, 0.0))))
+
+
+def _own_lags(row: Array, last: int) -> Array:
+    """Sums of products with itself at lags 0 to `last`."""
+    length = scipy.fft.next_fast_len(row.size + last, real=True)
+    power = np.abs(scipy.fft.rfft(row, length)) ** 2
+    return np.asarray(scipy.fft.irfft(power, length)[: last + 1])
 
 
 def likelihood_gain(

@@ -22,6 +22,8 @@ Array = NDArray[np.float64]
 Series = tuple[Array, ...]
 
 LEVEL = 0.95
+FEW = 128
+"""Lags up to which sums of products take less than transforms."""
 SMALLEST_EIGENVALUE = 1e-3
 """Directions of lags with a smaller share of the largest variance carry no evidence."""
 
@@ -86,6 +88,9 @@ def cross_correlation(a: Series, b: Series, maximum_lag: int) -> Array:
         raise DataError("a series does not change", needed="a correlation needs variation")
     total = np.zeros(2 * maximum_lag + 1)
     for x, y in zip(first, second, strict=True):
+        if total.size <= FEW:
+            total += np.correlate(np.pad(y, maximum_lag), x, mode="valid")
+            continue
         length = scipy.fft.next_fast_len(x.size + maximum_lag, real=True)
         ring = scipy.fft.irfft(
             np.conj(scipy.fft.rfft(x, length)) * scipy.fft.rfft(y, length), length
@@ -138,16 +143,17 @@ def lag_covariance(a: Series, b: Series, n_lags: int) -> Array:
     array([1., 0.])
     """
     reach = min(record.size for record in a) - 1
-    of_a = cross_correlation(a, a, reach)
     whole = np.concatenate(centred(b))[:, None]
     model = autoregression(periodogram(whole), whole.size)
+    if model.is_white:
+        return autocorrelation(a, n_lags)
+    of_a = cross_correlation(a, a, reach)
     # Records may be shorter than the model's order, whose own lags it always gives.
     modelled = model.autocovariance(max(reach, LARGEST_ORDER) + 1)[: reach + 1]
     # Scaled by its own first value, so that a white b leaves the autocorrelation of a untouched.
     of_b = np.concatenate((modelled[:0:-1], modelled)) / modelled[0]
-    both = scipy.signal.fftconvolve(of_a, of_b)
-    middle = both.size // 2
-    return np.asarray(both[middle : middle + n_lags])
+    found = [of_a[lag:] @ of_b[: of_b.size - lag] for lag in range(min(n_lags, of_a.size))]
+    return np.pad(found, (0, n_lags - len(found)))
 
 
 def white_portmanteau(values: Array, n_samples: int, fitted: int) -> tuple[float, int, float]:
