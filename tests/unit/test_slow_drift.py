@@ -6,10 +6,11 @@ from functools import partial
 
 import numpy as np
 import pytest
+from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 
 import flightid as fid
-from flightid.uncertainty.residual_noise import _lags, autoregression, periodogram
+from flightid.uncertainty.residual_noise import Autoregression, _lags, autoregression, periodogram
 from flightid.uncertainty.slow_drift import Drift, _is_slow
 from tests.closeness import assert_close
 from tests.strangers import noises, output_error
@@ -21,6 +22,15 @@ def test_a_drifts_spectrum_is_that_of_its_autocovariance() -> None:
     drift = Drift(2.0, 0.05)
     found = np.fft.irfft(drift.spectrum(4096), 4096)[:40]
     assert_close(found, drift.autocovariance(40), why="poles fade over 4096", rtol=1e-9)
+
+
+def test_columns_are_squared_by_the_covariance_of_recursion_and_drift() -> None:
+    weights = np.array([1.6, -0.8])
+    lags = np.array([1.0, 1.6 / 1.8, 1.6 * 1.6 / 1.8 - 0.8])
+    noise = Autoregression(lags, weights, 60, 128, Drift(2.0, 0.05))
+    columns = np.random.default_rng(0).standard_normal((60, 3))
+    exact = columns.T @ toeplitz(noise.autocovariance(60)) @ columns
+    assert_close(noise.squared(columns), exact, why="the same sums", rtol=1e-11)
 
 
 def test_what_a_drift_leaves_unknown_is_by_the_slopes_of_its_level() -> None:

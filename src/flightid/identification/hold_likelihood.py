@@ -234,7 +234,9 @@ def _steps(
         rests.append((rest * weights[:, None]).ravel())
         blocks.append(RecordBlock.of(white[:, :, :n_free], white[:, :, n_free:], rest))
     projected = np.vstack([block.projected for block in blocks])
-    shared = np.linalg.lstsq(projected, np.concatenate(rests))[0]
+    # The triangle holds all that least squares ask, of as many rows as there are numbers.
+    triangle = np.linalg.qr(np.column_stack([projected, np.concatenate(rests)]), mode="r")
+    shared = np.linalg.lstsq(triangle[:, :-1], triangle[:, -1])[0]
     found = []
     for block, rest in zip(blocks, rests, strict=True):
         inner = block.basis.T @ rest - block.shared_on_own @ shared

@@ -101,9 +101,7 @@ class FitResponse:
         moving = [j for j in range(len(inputs[0])) if any(np.ptp(each[j]) > 0.0 for each in inputs)]
         if not moving or lags.size < 2:
             return ()
-        lagged = [
-            np.concatenate([_lagged(each[j], lags) for j in moving], axis=1) for each in inputs
-        ]
+        lagged = [np.concatenate([_lagged(each[j], lags) for j in moving]).T for each in inputs]
         squares = [u.T @ u for u in lagged]
         plain, found = np.asarray(sum(squares)), []
         for output, noise in enumerate(self.models):
@@ -153,7 +151,7 @@ class FitResponse:
         ):
             taken = np.vstack([own[: len(own) - n], through])
             if not noise.is_white:
-                whole = noise.squared(np.concatenate([u, x], axis=1))
+                whole = noise.squared(np.concatenate([u.T, x.T]).T)
                 k = u.shape[1]
                 heard, cross = whole[:k, :k], whole[:k, k:] @ taken
             else:
@@ -218,10 +216,10 @@ def _parts(block: RecordBlock, output: int) -> Array:
 
 
 def _lagged(samples: Array, lags: NDArray[np.int64]) -> Array:
-    """The centred samples at each lag, zero before the record, means taken out; (n, n_lags)."""
+    """The centred samples at each lag, zero before the record, means taken out; (n_lags, n)."""
     n = samples.size
     about = samples - samples.mean()
-    columns = np.zeros((n, lags.size))
-    for place, lag in enumerate(lags):
-        columns[lag:, place] = about[: n - lag]
-    return np.asarray(columns - columns.mean(axis=0))
+    rows = np.zeros((lags.size, n))
+    for row, lag in zip(rows, lags, strict=True):
+        row[lag:] = about[: n - lag]
+    return np.asarray(rows - rows.mean(axis=1, keepdims=True))

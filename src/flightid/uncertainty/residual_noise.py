@@ -17,6 +17,7 @@ import scipy
 from numpy.typing import NDArray
 
 from flightid._native import autoregression_weights
+from flightid.uncertainty.driven_noise import driven_products
 from flightid.uncertainty.slow_drift import Drift, apart
 
 Array = NDArray[np.float64]
@@ -87,12 +88,22 @@ class Autoregression:
 
     def squared(self, columns: Array) -> Array:
         """Columns' covariance by this noise: XᵀΩX, shape (k, k)."""
-        if self.is_white:
-            return np.asarray(self.lags[0] * (columns.T @ columns))
-        n, length = len(columns), _length(len(columns))
-        spectrum = scipy.fft.rfft(_ring(self.autocovariance(n), length)).real
-        moved = _transform(columns, length)
-        return np.asarray((moved * _both(_twice(length) * spectrum / length)) @ moved.T)
+        if not self.weights.size:
+            fast = np.asarray(self.lags[0] * (columns.T @ columns))
+        else:
+            fast = self._innovation * driven_products(
+                columns, np.concatenate(([1.0], -self.weights))
+            )
+        if self.drift is None:
+            return fast
+        pole = 1.0 - self.drift.corner
+        drive = self.drift.variance * (1.0 - pole**2)
+        return np.asarray(fast + drive * driven_products(columns, np.array([1.0, -pole])))
+
+    @property
+    def _innovation(self) -> float:
+        """Variance of what the recursion does not foretell."""
+        return max(float(self.lags[0] - self.weights @ self.lags[1 : self.weights.size + 1]), 0.0)
 
     def freedom(self, levels: Array | None = None) -> Array | float:
         """Degrees of freedom of the model's level at zero frequency, where slow sensitivities look.
@@ -130,8 +141,11 @@ class Autoregression:
         """
         spectrum = self.spectrum()
         level = np.maximum(spectrum, VALLEY * np.mean(spectrum))
-        parts = scipy.fft.rfft(columns, self.length, axis=0) / level[:, None]
-        return np.asarray(scipy.fft.irfft(parts, self.length, axis=0)[: len(columns)])
+        rows = np.empty(columns.shape[::-1])
+        for row, column in zip(rows, columns.T, strict=True):
+            part = scipy.fft.rfft(column, self.length) / level
+            row[:] = scipy.fft.irfft(part, self.length)[: len(row)]
+        return rows.T
 
     def spectrum(self) -> Array:
         """Spectrum at the frequencies of `periodogram`."""
@@ -140,7 +154,7 @@ class Autoregression:
 
     def _fast_spectrum(self) -> Array:
         order = self.weights.size
-        innovation = max(float(self.lags[0] - self.weights @ self.lags[1 : order + 1]), 0.0)
+        innovation = self._innovation
         if not order:
             return np.full(self.length // 2 + 1, innovation)
         gain = scipy.fft.rfft(np.concatenate(([1.0], -self.weights)), self.length)
@@ -301,8 +315,10 @@ def noise_models(
             break
         lost = _lost(models, directions, lengths, [each.own.shape[2] for each in taken])
         for o, model in enumerate(models):
-            spectrum = model.spectrum()
-            lost[o] += spectrum - _leaking(spectrum, lengths, length)
+            # White noise has one lag, which ends with no record.
+            if not model.is_white:
+                spectrum = model.spectrum()
+                lost[o] += spectrum - _leaking(spectrum, lengths, length)
     return models
 
 
@@ -356,12 +372,3 @@ def _twice(length: int) -> Array:
     if length % 2 == 0:
         twice[-1] = 1.0
     return twice
-
-
-def _ring(first: Array, length: int) -> Array:
-    """First column of a circulant that holds a symmetric Toeplitz matrix."""
-    n = first.size
-    ring = np.zeros(length)
-    ring[:n] = first
-    ring[length - n + 1 :] = first[:0:-1]
-    return ring

@@ -1,0 +1,61 @@
+"""Forms in the covariance of an autoregression, by sending columns through its recursion."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+AT_ONCE = 1 << 14
+"""Samples that are sent through a recursion together."""
+DOUBLINGS = 60
+"""Of the time that a recursion rings on."""
+
+
+def driven_products(columns: Array, denominator: Array) -> Array:
+    """Products of columns by the covariance of a recursion that unit white noise drives.
+
+    A form in it is the power of the columns sent through the recursion, what rings on behind their
+    ends with them.
+
+    Parameters
+    ----------
+    columns : ndarray, shape (n, k)
+    denominator : ndarray, shape (order + 1,)
+        Of the recursion, stable, with a leading one.
+
+    Returns
+    -------
+    ndarray, shape (k, k)
+
+    Reference
+    ---------
+    Brockwell & Davis, *Time Series: Theory and Methods*, 2nd ed., section 4.4.
+
+    Example
+    -------
+    >>> driven_products(np.ones((1, 1)), np.array([1.0, -0.5])).round(6)
+    array([[1.333333]])
+    """
+    count, order = columns.shape[1], denominator.size - 1
+    state, found = np.zeros((count, order)), np.zeros((count, count))
+    for begin in range(0, len(columns), AT_ONCE):
+        rows = np.ascontiguousarray(columns[begin : begin + AT_ONCE].T)
+        made, state = scipy.signal.lfilter([1.0], denominator, rows, zi=state)
+        found += made @ made.T
+    return np.asarray(found + state @ _ringing(denominator) @ state.T)
+
+
+def _ringing(denominator: Array) -> Array:
+    """Power that each state of a recursion's filter sends out without an input, by doubling."""
+    turn = np.eye(denominator.size - 1, k=1)
+    turn[:, 0] -= denominator[1:]
+    found = np.zeros_like(turn)
+    found[0, 0] = 1.0
+    for _ in range(DOUBLINGS):
+        found = found + turn.T @ found @ turn
+        turn = turn @ turn
+        if np.max(np.abs(turn)) < np.finfo(float).eps ** 2:
+            break
+    return found
