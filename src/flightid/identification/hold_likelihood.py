@@ -235,7 +235,8 @@ def _steps(
         blocks.append(RecordBlock.of(white[:, :, :n_free], white[:, :, n_free:], rest))
     projected = np.vstack([block.projected for block in blocks])
     # The triangle holds all that least squares ask, of as many rows as there are numbers.
-    triangle = np.linalg.qr(np.column_stack([projected, np.concatenate(rests)]), mode="r")
+    columns = np.column_stack([projected, np.concatenate(rests)])
+    triangle = np.asarray(np.linalg.qr(columns, mode="r"))
     shared = np.linalg.lstsq(triangle[:, :-1], triangle[:, -1])[0]
     found = []
     for block, rest in zip(blocks, rests, strict=True):
