@@ -107,13 +107,26 @@ def _response_fit(n_omega: int) -> Work:
     return lambda: fid.identify(model, data, n_omega=n_omega)
 
 
-def _refit() -> Work:
-    """One of a thousand: the same structure, other data, from the fit at hand."""
+def _redrawn() -> tuple[fid.StateSpaceModel, list[fid.FrequencyResponse]]:
+    """A fitted model, and other data of the same structure."""
     case = state_space_fit.make_case(state_space_fit.NOISE, seed=0, spread=0.2)
     model = fid.identify(case.begun, case.responses).model
-    drawn = [state_space_fit.make_case(state_space_fit.NOISE, k, 0.2).responses for k in range(20)]
+    return model, [
+        state_space_fit.make_case(state_space_fit.NOISE, k, 0.2).responses for k in range(20)
+    ]
+
+
+def _refit() -> Work:
+    """The same structure, other data, from the fit at hand."""
+    model, drawn = _redrawn()
     data = cycle(drawn)
     return lambda: fid.identify(model, next(data))
+
+
+def _refits() -> Work:
+    """Many of them in one call; a thousand take ten times as long."""
+    model, drawn = _redrawn()
+    return lambda: fid.identify_each(model, 5 * drawn)
 
 
 def _live(*, with_fit: bool) -> Work:
@@ -138,6 +151,7 @@ LINES: dict[str, Callable[[], Work]] = {
     "responses 4 × 9, 12 records": _responses,
     "response fit, 13 states, 40 parameters": lambda: _response_fit(20),
     "refit of that to other data": _refit,
+    "100 such refits in one call": _refits,
     "response fit, all 60 frequencies": lambda: _response_fit(60),
     "band moved, response": lambda: _live(with_fit=False),
     "band moved, response and fit": lambda: _live(with_fit=True),

@@ -106,6 +106,7 @@ GROUPS = {
         "identify.md",
         (
             "identify",
+            "identify_each",
             "Fit",
             "Estimate",
             "Uncertain",

@@ -76,6 +76,7 @@ if TYPE_CHECKING:
     from flightid.identification.advice.advice import advise
     from flightid.identification.advice.impulse_response import impulse_response
     from flightid.identification.identify import identify
+    from flightid.identification.identify_each import identify_each
     from flightid.identification.prediction.predict import predict
     from flightid.identification.prediction.result import Prediction
     from flightid.identification.reduction.reduce import reduce
@@ -237,6 +238,7 @@ _HOMES = {
     "loops": "flightid.control",
     "excitation": "flightid.excitation",
     "identify": "flightid.identification.identify",
+    "identify_each": "flightid.identification.identify_each",
     "inspect_log": "flightid.inspection",
     **dict.fromkeys(
         ["Check", "Evidence", "FeedbackTest", "feedback_test"],
@@ -288,11 +290,11 @@ __all__ = [
     "derivatives",
     "disk_margin", "disturbance_rejection", "estimate_response", "excitation", "export",
     "feedback_test", "from_control", "from_scipy", "handling_qualities", "identify",
-    "impulse_response", "inspect_log", "interpret", "library_names", "load_model", "loops",
-    "lower_order", "margins", "modes", "open_loop", "pilot_cutoff", "plan_flight", "plot",
-    "predict", "px4_autotune_gains", "read_log", "read_parameters", "read_records",
-    "read_system", "reduce", "replay", "residual_tests", "response_band", "review_autotune",
-    "review_flight", "rotor_physics", "run_study", "scan_orders", "simulate",
+    "identify_each", "impulse_response", "inspect_log", "interpret", "library_names",
+    "load_model", "loops", "lower_order", "margins", "modes", "open_loop", "pilot_cutoff",
+    "plan_flight", "plot", "predict", "px4_autotune_gains", "read_log", "read_parameters",
+    "read_records", "read_system", "reduce", "replay", "residual_tests", "response_band",
+    "review_autotune", "review_flight", "rotor_physics", "run_study", "scan_orders", "simulate",
     "to_continuous", "to_control",
     "to_discrete", "to_scipy", "tune", "tune_controller", "tune_pid", "validation", "verify",
     "without_bias", "write_ardupilot_parameters", "write_betaflight_settings", "write_model",

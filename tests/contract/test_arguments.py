@@ -135,8 +135,8 @@ OWN = {
     ),
     "export": ("the target's word", "format"),
     "identification": (
-        "limits of a reduction; lags of an impulse response",
-        "after_rise drop keep kernel maximum_correlation maximum_cost_rise_percent "
+        "limits of a reduction; lags of an impulse response; data of many fits",
+        "after_rise data_sets drop keep kernel maximum_correlation maximum_cost_rise_percent "
         "maximum_total_cost_rise_percent negligible_cost "
         "maximum_cramer_rao_percent maximum_insensitivity_percent n_lags negative_lags step",
     ),

@@ -62,7 +62,7 @@ def test_an_unknown_name_is_an_attribute_error() -> None:
         flightid.nonsense  # noqa: B018
     with pytest.raises(AttributeError, match="nearest: inspect_log"):
         flightid.inspect  # noqa: B018
-    with pytest.raises(AttributeError, match=r"nearest: identify$"):
+    with pytest.raises(AttributeError, match=r"nearest: identify, identify_each$"):
         flightid.identfy  # noqa: B018
 
 

@@ -25,11 +25,13 @@ from flightid.record.hold import Loop
 from flightid.responses import FrequencyResponse
 
 JointData = tuple[FrequencyResponse, Record | Sequence[Record]]
+Data = FrequencyResponse | Record | Sequence[Record] | JointData
+Structure = GreyBoxModel | NarxStructure | PolynomialStructure | SubspaceStructure
 
 
 def identify(
-    model: GreyBoxModel | NarxStructure | PolynomialStructure | SubspaceStructure,
-    data: FrequencyResponse | Record | Sequence[Record] | JointData,
+    model: Structure,
+    data: Data,
     *,
     method: str | None = None,
     loop: Loop | None = None,

@@ -143,14 +143,15 @@ def decibel_phase_sensitivity(
     """
     n = len(response)
     inverse = 1.0 / response
-    result = np.zeros((2 * n, 2 * n))
-    rows = np.arange(n)
+    result = np.zeros(4 * n * n)
     db, deg = -DECIBEL * weight_db, -DEGREE * weight_deg
-    result[2 * rows, rows] = db * inverse.real
-    result[2 * rows, n + rows] = -db * inverse.imag
-    result[2 * rows + 1, rows] = deg * inverse.imag
-    result[2 * rows + 1, n + rows] = deg * inverse.real
-    return result
+    # Two rows further down a frequency's columns stand one further right.
+    step = 4 * n + 1
+    result[0::step] = db * inverse.real
+    result[n::step] = -db * inverse.imag
+    result[2 * n :: step] = deg * inverse.imag
+    result[3 * n :: step] = deg * inverse.real
+    return result.reshape(2 * n, 2 * n)
 
 
 def window_covariance(
@@ -195,10 +196,11 @@ def window_covariance(
     array([[0.04, 0.  ],
            [0.  , 0.04]])
     """
-    correlation = np.eye(len(response))
-    if window_s is not None:
-        bins = np.subtract.outer(omega_rad_s, omega_rad_s) * window_s / (2.0 * np.pi)
-        correlation = _squared_hann(bins)
+    if window_s is None:
+        power = (response * response.conj()).real * (random_error * random_error)
+        return np.diag(np.concatenate([power, power]))
+    bins = np.subtract.outer(omega_rad_s, omega_rad_s) * window_s / (2.0 * np.pi)
+    correlation = _squared_hann(bins)
     shared = correlation * np.outer(random_error, random_error)
     # Errors of log H are circular: real and imaginary parts alike, uncorrelated.
     turn = np.outer(response, response.conj()) * shared

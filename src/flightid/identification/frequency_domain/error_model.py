@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from flightid.errors import FitError
 from flightid.identification.fit_findings import APPROXIMATE, UNKNOWN
 from flightid.identification.frequency_domain.selection import SelectedResponse
+from flightid.identification.shared_work import shared
 from flightid.responses import FrequencyResponse
 from flightid.responses.errors.random_error import (
     CovarianceSource,
@@ -125,8 +126,11 @@ def error_model(data: FrequencyResponse, selected: Sequence[SelectedResponse]) -
         return ErrorModel(UNKNOWN, ())
     groups = [list(group) for _, group in groupby(selected, lambda each: each.measured.output)]
     starts = np.cumsum([0, *map(len, groups)])
-    runs = tuple(
-        _run(data, int(first), group) for first, group in zip(starts, groups, strict=False)
+    runs = shared(
+        lambda: (data.inputs, data.outputs, *((s.name, s.places.tobytes()) for s in selected)),
+        lambda: tuple(
+            _run(data, int(first), group) for first, group in zip(starts, groups, strict=False)
+        ),
     )
     if data.errors is None:
         return ErrorModel(APPROXIMATE, runs, None, tuple(_approximate(data, g) for g in groups))

@@ -51,9 +51,9 @@ def noise_costs(
     sensitivity = coherence_sensitivity(selected, curves, errors)
     blocks = zip(sensitivity.blocks, sensitivity.columns, strict=True)
     found, first = {}, 0
-    for run, covariance in zip(errors.runs, errors.covariances, strict=True):
+    shares = _believed(errors.covariances, curves)
+    for run, covariance, believed in zip(errors.runs, errors.covariances, shares, strict=True):
         group = range(run.first, run.first + run.count)
-        believed = _believed(covariance, [curves[k] for k in group])
         for place, (block, columns) in zip(group, blocks, strict=False):
             own = columns - first
             turned = block * believed[own]
@@ -65,8 +65,15 @@ def noise_costs(
     return found
 
 
-def _believed(covariance: Array, curves: Sequence[Complex]) -> Array:
-    """Shares of the errors of a run's real and imaginary parts that its logarithms can hold."""
-    real, imaginary = np.split(np.diag(covariance), 2)
-    error = np.sqrt(0.5 * (real + imaginary)) / np.abs(np.concatenate(list(curves)))
-    return np.tile(LARGEST_ERROR / np.maximum(error, LARGEST_ERROR), 2)
+def _believed(covariances: Sequence[Array], curves: Sequence[Complex]) -> list[Array]:
+    """Shares of the errors of each run's real and imaginary parts that its logarithms can hold."""
+    halves = [len(each) // 2 for each in covariances]
+    powers = [np.diagonal(each) for each in covariances]
+    both = [power[:half] + power[half:] for power, half in zip(powers, halves, strict=True)]
+    error = np.sqrt(0.5 * np.concatenate(both)) / np.abs(np.concatenate(list(curves)))
+    shares = LARGEST_ERROR / np.maximum(error, LARGEST_ERROR)
+    ends = np.cumsum(halves)
+    return [
+        np.concatenate(2 * [shares[end - half : end]])
+        for end, half in zip(ends, halves, strict=True)
+    ]

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from flightid.errors import DataError, OptionError, UnknownNameError
 from flightid.identification.frequency_domain.options import Band, Bands
+from flightid.identification.shared_work import shared
 from flightid.responses import FrequencyResponse, PairResponse
 from flightid.responses.bands import nearest
 
@@ -113,17 +114,28 @@ def select_points(
                 found=", ".join(sorted(stray)),
                 needed=", ".join(names),
             )
-    chosen = []
-    for name in names:
-        output, _, source = name.partition("/")
-        pair = data.pair(output, source)
-        band = bands.get(name) if isinstance(bands, Mapping) else bands
-        places = _places(pair, name, band, n_omega, minimum_coherence)
-        weight = COST_POINTS / len(places) * coherence_weight(pair.coherence[places])
-        chosen.append(
-            SelectedResponse(name, pair, places, weight_gain * weight, weight_phase * weight)
-        )
-    return chosen
+    pairs = [data.pair(*name.split("/", 1)) for name in names]
+
+    def choose() -> list[tuple[NDArray[np.intp], NDArray[np.float64]]]:
+        chosen = []
+        for name, pair in zip(names, pairs, strict=True):
+            band = bands.get(name) if isinstance(bands, Mapping) else bands
+            places = _places(pair, name, band, n_omega, minimum_coherence)
+            weight = COST_POINTS / len(places) * coherence_weight(pair.coherence[places])
+            chosen.append((places, weight))
+        return chosen
+
+    # All that places and weights depend on.
+    options = repr((bands, n_omega, minimum_coherence))
+    arrays = data.omega_rad_s, data.coherence, np.abs(data.response) > 0.0
+    chosen = shared(
+        lambda: (names, data.inputs, data.outputs, options, *(each.tobytes() for each in arrays)),
+        choose,
+    )
+    return [
+        SelectedResponse(name, pair, places, weight_gain * weight, weight_phase * weight)
+        for name, pair, (places, weight) in zip(names, pairs, chosen, strict=True)
+    ]
 
 
 def _places(
