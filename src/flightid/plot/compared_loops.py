@@ -40,8 +40,14 @@ def compared_loops(result: MarginComparison) -> go.PlotFigure:
         ):  # fmt: skip
             curve = side[loop].curve
             omega, *curves = drawn_curve(curve, side[loop].crossover)
+            # Far below the crossover an integral leaves the picture, and nothing else is there.
+            shown = curves[0] <= SEEN_DB[1]
+            omega, curves = omega[shown], [each[shown] for each in curves]
             seen.append(curves)
-            errors = (curve.stderr_db, curve.stderr_deg)
+            errors = [
+                None if each is None else each[shown]
+                for each in (curve.stderr_db, curve.stderr_deg)
+            ]
             for row, values, stderr in zip(rows, curves, errors, strict=True):
                 add_band(made, omega, values, stderr, row, (name, colour))
                 first = not place and row == rows[0]
