@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +14,8 @@ from flightid.findings import Finding
 from flightid.record.checks import record_findings
 from flightid.study.stages import NOT_TESTED, examine_residuals
 from flightid.validation.order_scan.result import OrderTrial, rank_of
-from flightid.validation.verification.of_the_fit import weighed
+from flightid.validation.verification.of_the_fit import gust_errors, weighed
+from tests.closeness import assert_close
 
 TIME_S = np.arange(600) / 50.0
 
@@ -59,3 +61,21 @@ def test_too_few_samples_for_residual_tests_end_no_study() -> None:
     found = examine_residuals(fit)
     assert isinstance(found, Finding)
     assert (found.code, found.light) == (NOT_TESTED, Light.UNKNOWN)
+
+
+def test_process_noise_of_a_fit_is_known_to_its_free_runs() -> None:
+    lag = fid.StateSpaceModel(
+        states={"p": "rad/s"},
+        input_units={"u": "rad"},
+        measurements={"p": fid.Output("p", "rad/s")},
+        equations={"p'": "Lp*p + Lu*u"},
+        parameters=fid.Parameters(
+            [fid.Parameter("Lp", -2.0, "1/s"), fid.Parameter("Lu", 1.0, "1/s^2")]
+        ),
+    )
+    fit = SimpleNamespace(provenance={"process_noise": {"p": 0.3}, "gust": None})
+    # dp = -2 p dt + 0.3 dw: the variance 0.0225 (1 - exp(-4 t)), averaged over 5 s.
+    mean = 0.0225 * (1.0 - (1.0 - np.exp(-20.0)) / 20.0)
+    found = gust_errors(fit, lag, 5.0)["p"]
+    assert_close(found, np.sqrt(mean), rtol=5e-3, why="a hundred steps")
+    assert gust_errors(SimpleNamespace(provenance={}), lag, 5.0) == {}

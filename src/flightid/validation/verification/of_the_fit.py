@@ -12,12 +12,17 @@ from flightid.findings import Finding
 from flightid.identification.fit import Fit
 from flightid.identification.prediction.remembered import provenance_entry
 from flightid.identification.training import TRAINING
+from flightid.models import StateSpaceModel
 from flightid.record import Record
 from flightid.record.digest import RecordDigest
 from flightid.simulation import metrics
+from flightid.simulation.noise import sampled_noise
 
 SEEN = "training-data"
 """Of a record, or a part of one, that the model was fitted to."""
+GUST_STEPS = 100
+"""Parts of a run over which the variance that process noise makes is averaged."""
+GUSTS = "what the fit's process noise makes of any free run, which no input tells"
 AS_MUCH = 1.2
 """Largest ratio of two errors that a few hundred coloured samples do not tell apart."""
 
@@ -49,8 +54,49 @@ def own_errors(source: object, explained: float) -> dict[str, float]:
     return found
 
 
+def gust_errors(source: object, model: object, duration_s: float) -> dict[str, float]:
+    """What the process noise that a fit found makes of a free run from a known start, by output.
+
+    Parameters
+    ----------
+    source : object
+        A fit by filter error, or the model in its file; others have no process noise.
+    model : object
+        Its model, linear.
+    duration_s : float
+        Length of the run, s, over which the variance is averaged.
+
+    Returns
+    -------
+    dict of str to float
+        Root mean square in the output's unit.
+
+    Reference
+    ---------
+    Jategaonkar, *Flight Vehicle System Identification*, 2nd ed., section 5.2.
+    """
+    found, gust = (provenance_entry(source, key) for key in ("process_noise", "gust"))
+    if not isinstance(found, Mapping) or gust or not isinstance(model, StateSpaceModel):
+        return {}
+    if not model.is_linear:
+        return {}
+    a, _, c, _, _ = model.state_space()
+    step_s = duration_s / GUST_STEPS
+    density = np.diag([float(found.get(name, 0.0)) ** 2 for name in model.states])
+    phi, pushed = sampled_noise(a, density, step_s)
+    covariance, power = np.zeros_like(density), np.zeros(len(c))
+    for _ in range(GUST_STEPS):
+        covariance = phi @ covariance @ phi.T + pushed
+        power += np.diag(c @ covariance @ c.T) / GUST_STEPS
+    return dict(zip(model.outputs, map(float, np.sqrt(power)), strict=True))
+
+
 def weighed(
-    findings: Sequence[Finding], code: str, errors: Mapping[str, float], own: Mapping[str, float]
+    findings: Sequence[Finding],
+    code: str,
+    errors: Mapping[str, float],
+    own: Mapping[str, float],
+    said: str = "in the records of the fit: little here rises above it",
 ) -> tuple[Finding, ...]:
     """Verdicts on a prediction, none red for an error that the fit itself shows.
 
@@ -65,10 +111,12 @@ def weighed(
         Of the findings that weigh errors by the motion.
     errors, own : mapping of str to float
         Error by output: of the prediction, and of the fit in its own records.
+    said : str
+        Where the latter stands.
     """
     if not errors or any(error > AS_MUCH * own.get(name, 0.0) for name, error in errors.items()):
         return tuple(findings)
-    said = "; the error is no larger than in the records of the fit: little here rises above it"
+    said = f"; the error is no larger than {said}"
     action = "verify on a record that moves the output more"
     return tuple(
         replace(each, light=Light.AMBER, message=each.message + said, action=action)
