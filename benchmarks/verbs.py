@@ -124,9 +124,9 @@ def _refit() -> Work:
 
 
 def _refits() -> Work:
-    """Many of them in one call; a thousand take ten times as long."""
+    """Twenty of them in one call; a thousand take fifty times as long."""
     model, drawn = _redrawn()
-    return lambda: fid.identify_each(model, 5 * drawn)
+    return lambda: fid.identify_each(model, drawn)
 
 
 def _live(*, with_fit: bool) -> Work:
@@ -151,7 +151,7 @@ LINES: dict[str, Callable[[], Work]] = {
     "responses 4 × 9, 12 records": _responses,
     "response fit, 13 states, 40 parameters": lambda: _response_fit(20),
     "refit of that to other data": _refit,
-    "100 such refits in one call": _refits,
+    "20 such refits in one call": _refits,
     "response fit, all 60 frequencies": lambda: _response_fit(60),
     "band moved, response": lambda: _live(with_fit=False),
     "band moved, response and fit": lambda: _live(with_fit=True),
