@@ -18,6 +18,9 @@ LEADING_ITERATIONS = 10
 NEARBY = 9
 """Starts around the model's values that are tried beside those asked for, where a fit leaves
 something: without the estimator inside they take next to no time."""
+EARLY_ITERATIONS, PROMISING = 8, 4.0
+"""Steps after which a nearby start is given up, where its cost is still so many times the best: of
+110 fits 24 had a lower minimum, and all 24 were found so, 13 states 20 times sooner."""
 LEAVES, LOWER = 1.0, 1e-3
 """Average cost from which on a fit leaves something, and the share that makes a lower minimum. That
 random errors explain as much says nothing: of 150 fits of two modes within 25 s, 43 had a lower
@@ -85,7 +88,9 @@ def minimise(
     best = min((end.cost for end in known), default=np.inf)
     settled = [end for end in known if end.cost == best and end.is_converged]
     if settled and cost != "likelihood" and best > LEAVES * len(selected):
-        around = follow(draw_starts(free, NEARBY, seed)[1:], 1.0, maximum_iterations)
+        near = follow(draw_starts(free, NEARBY, seed)[1:], 1.0, EARLY_ITERATIONS)
+        worth = [e.x for e in near if not isinstance(e, str) and e.cost < PROMISING * best]
+        around = follow(np.ascontiguousarray(worth), 1.0, maximum_iterations) if worth else []
         lower = [e for e in around if not isinstance(e, str) and e.cost < best * (1.0 - LOWER)]
         if lower:
             lowest = min(lower, key=lambda end: end.cost)
