@@ -2,8 +2,9 @@
 
 Processes that `pytest -n` starts import and collect everything again, each for itself, and tell of
 every phase of every test by itself. Forked ones share what was imported and collected once, take
-whole files of tests from one queue, and tell of a file at once. Where there is no fork (Windows),
-or it is not safe (macOS' own libraries), `pytest -n` runs the same tests.
+whole files of tests from one queue, and tell of a file at once. While one process collects, another
+runs what hardly needs the libraries that the others import. Where there is no fork (Windows), or it
+is not safe (macOS' own libraries), `pytest -n` runs the same tests.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import selectors
 import signal
 import struct
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from itertools import groupby
 from pathlib import Path
@@ -29,7 +30,23 @@ if TYPE_CHECKING:
 
 PLACE = struct.Struct("=I")
 AT_ONCE = 1 << 20
+AHEAD = tuple(  # they read sources, and start processes that import for themselves
+    Path(__file__).parent / "contract" / f"test_{name}.py"
+    for name in (
+        "new_method",
+        "start_up",
+        "habits",
+        "imports",
+        "options",
+        "public_surface",
+        "rust_rooms",
+    )
+    + ("size", "surface", "words")
+)
 SHARING = {"contract", "guide"}  # trees of all sources and a fit of every kind; the demo's flight
+
+
+STARTED = pytest.StashKey["_Fork"]()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -49,20 +66,36 @@ def _together(item: pytest.Item) -> Path:
 
 
 @pytest.hookimpl(tryfirst=True)
+def pytest_collection(session: pytest.Session) -> None:
+    """Start with what runs ahead, where all of it is asked for."""
+    config = session.config
+    asked = [config.invocation_params.dir / each for each in config.args]
+    if _count(config) > 1 and all(any(map(path.is_relative_to, asked)) for path in AHEAD):
+        config._tmp_path_factory.getbasetemp()  # type: ignore[attr-defined] - one for all
+        config.stash[STARTED] = _Fork.start(lambda writer: _run_ahead(session, writer))
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """End what runs ahead of a collection that failed."""
+    if fork := session.config.stash.get(STARTED, None):
+        fork.end()
+
+
+@pytest.hookimpl(tryfirst=True)
 def pytest_runtestloop(session: pytest.Session) -> bool | None:
     """Run the tests in forks where more than one is asked for; else pytest's own loop does."""
     count = _count(session.config)
     if count < 2 or session.testsfailed:
         return None
-    groups = [list(items) for _, items in groupby(session.items, key=_together)]
+    ahead = session.config.stash.get(STARTED, None)
+    groups = _groups([item for item in session.items if not (ahead and item.path in AHEAD)])
     session.config._tmp_path_factory.getbasetemp()  # type: ignore[attr-defined] - one for all
-    sys.stdout.flush()
-    queue, fill = os.pipe()
-    os.set_blocking(fill, False)
-    os.write(fill, b"".join(PLACE.pack(place) for place in range(len(groups))))
-    os.close(fill)
-    forks = [_Fork.start(session, groups, queue) for _ in range(count)]
+    queue = _queue(len(groups))
+    forks = [_Fork.start(lambda writer: _run(session, groups, queue, writer)) for _ in range(count)]
     os.close(queue)
+    if ahead:
+        forks.append(ahead)
+        del session.config.stash[STARTED]
     told = _listen(session, forks)
     lost = [item.nodeid for item in session.items if item.nodeid not in told]
     if lost:
@@ -70,9 +103,23 @@ def pytest_runtestloop(session: pytest.Session) -> bool | None:
     return True
 
 
+def _groups(items: list[pytest.Item]) -> Groups:
+    return [list(group) for _, group in groupby(items, key=_together)]
+
+
+def _queue(count: int) -> int:
+    """A pipe that hands out each place once."""
+    queue, fill = os.pipe()
+    os.set_blocking(fill, False)
+    os.write(fill, b"".join(PLACE.pack(place) for place in range(count)))
+    os.close(fill)
+    return queue
+
+
 def _listen(session: pytest.Session, forks: list[_Fork]) -> set[str]:
     """Hand on what forks report until they are done, and reap them; tests that were told of."""
     hook, told = session.config.hook, set()
+    asked = {item.nodeid for item in session.items}
     with selectors.DefaultSelector() as ready:
         for fork in forks:
             ready.register(fork.reader, selectors.EVENT_READ, fork)
@@ -87,6 +134,8 @@ def _listen(session: pytest.Session, forks: list[_Fork]) -> set[str]:
                         report = hook.pytest_report_from_serializable(
                             config=session.config, data=data
                         )
+                        if report.nodeid not in asked:
+                            continue
                         told.add(report.nodeid)
                         hook.pytest_runtest_logreport(report=report)
                     if session.shouldfail:
@@ -106,15 +155,16 @@ class _Fork:
     held: bytearray = field(default_factory=bytearray)
 
     @classmethod
-    def start(cls, session: pytest.Session, groups: Groups, queue: int) -> _Fork:
+    def start(cls, work: Callable[[int], None]) -> _Fork:
         reader, writer = os.pipe()
+        sys.stdout.flush()
         pid = os.fork()
         if pid:
             os.close(writer)
             return cls(pid, reader)
         done = 1
         try:
-            _run(session, groups, queue, writer)
+            work(writer)
             done = 0
         finally:
             os._exit(done)
@@ -141,22 +191,39 @@ class _Fork:
         os.waitpid(self.pid, 0)
 
 
+def _run_ahead(session: pytest.Session, writer: int) -> None:
+    """Collect what runs ahead and run it, in the fork."""
+    teller = _silenced(session.config)
+    session.perform_collect([str(path) for path in AHEAD])
+    groups = _groups(session.items)
+    _run_each(session, _taken(groups, _queue(len(groups))), teller, writer)
+
+
 def _run(session: pytest.Session, groups: Groups, queue: int, writer: int) -> None:
     """Run files from the queue, in the fork."""
-    config = session.config
+    _run_each(session, _taken(groups, queue), _silenced(session.config), writer)
+
+
+def _silenced(config: pytest.Config) -> _Teller:
+    """What keeps reports in a fork, where nothing is printed."""
     capture: CaptureManager = config.pluginmanager.get_plugin("capturemanager")
     capture.stop_global_capturing()  # its files are those of the parent
     capture.start_global_capturing()
     config.pluginmanager.unregister(name="terminalreporter")
     teller = _Teller(config)
     config.pluginmanager.register(teller)
-    taken = _taken(groups, queue)
+    return teller
+
+
+def _run_each(
+    session: pytest.Session, taken: Iterator[list[pytest.Item]], teller: _Teller, writer: int
+) -> None:
     group = next(taken, None)
     while group:
         following = next(taken, None)
         after = [*group[1:], following[0] if following else None]
         for item, later in zip(group, after, strict=True):
-            config.hook.pytest_runtest_protocol(item=item, nextitem=later)
+            session.config.hook.pytest_runtest_protocol(item=item, nextitem=later)
         teller.send(writer)
         group = following
 
