@@ -49,6 +49,8 @@ SAMPLES_PER_NUMBER = 10
 FEWEST_FREE = 30
 SMALLEST_NOISE = 1e-8
 """Share of an output's power below which its noise is rounding, or cannot bias anything."""
+SMALLEST_NEWS = 10.0 * RIDGE
+"""Share of an input's power below which what is new in it is what the ridge leaves of its past."""
 NEARLY = 0.999
 """Share of what is new in an input from which outputs leave nothing else that moves it."""
 
@@ -291,7 +293,10 @@ def _noise(pairs: Sequence[Pair], news: Sequence[Array], n_in: int) -> list[Arra
 
 
 def _shares(pairs: Sequence[Pair], noise: Sequence[Array], order: int) -> list[tuple[float, float]]:
-    """By input: share of what its past leaves that past noise explains, and its F probability."""
+    """By input: share of what its past leaves that past noise explains, and its F probability.
+
+    What a ridge leaves of a smooth input is as smooth: beside it no noise is white enough.
+    """
     n_in, longest = len(pairs[0][0]), max(order, LAGS)
     padded = [np.pad(e, ((0, 0), (order, 0))) for e in noise]
     rows = [np.concatenate([u, e]) for (u, _), e in zip(pairs, padded, strict=True)]
@@ -313,7 +318,8 @@ def _shares(pairs: Sequence[Pair], noise: Sequence[Array], order: int) -> list[t
     shares = explained(among, aims[moved] - of_noise.T @ aims[own]) / whole
     shares = np.clip(shares, 0.0, 1.0)
     f = shares / moved.size / np.maximum((1.0 - shares) / free, tiny)
-    chances = scipy.special.fdtrc(moved.size, free, f)
+    floor = SMALLEST_NEWS * sum(np.sum(u**2, axis=1) for u, _ in pairs)
+    chances = np.where(whole > floor, scipy.special.fdtrc(moved.size, free, f), 1.0)
     return list(zip(shares.tolist(), chances.tolist(), strict=True))
 
 
