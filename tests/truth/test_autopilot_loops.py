@@ -10,6 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flightid.control.autopilots import AUTOPILOTS, AXES, AxisLoop, axis_loop
+from flightid.control.autopilots.axis_loop import Gyro
+from flightid.control.autopilots.filter_stages import pole_stage
 from flightid.control.autopilots.gyro_notches import ardupilot_notches, px4_notches
 from tests.closeness import assert_close
 from tests.examples import examples
@@ -43,6 +45,11 @@ def _random_loop(autopilot: str, axis: str, rng: np.random.Generator, per_loop: 
     if "ilmi" in values and rng.random() < 0.5:
         values["ilmi"] = 0.0
     changes: dict[str, object] = {"values": values}
+    if autopilot == "betaflight":
+        values |= {key: rng.uniform(20.0, 150.0) for key in ("p_filter",) if key in values}
+        stage = pole_stage("D", rng.uniform(30, 90), "derivative", LOOP_HZ, order=2)
+        shares = (rng.uniform(0.5, 1.0), rng.uniform(0.5, 1.0))
+        return replace(loop, values=values, stages=(stage,), throttle_shares=shares)
     notch = (rng.uniform(20, 90), rng.uniform(0.7, 4.0), rng.uniform(5, 45))
     if autopilot.startswith("ardu"):
         changes |= {"target_notch": notch, "error_notch": (rng.uniform(20, 90), 2.0, 30.0)}
@@ -71,7 +78,9 @@ def _harmonic_notch(rng: np.random.Generator) -> dict[str, float]:
     }
 
 
-def _measured(loop: AxisLoop, omega: np.ndarray, *, of: str, per_loop: int) -> np.ndarray:
+def _measured(
+    loop: AxisLoop, omega: np.ndarray, *, of: str, per_loop: int, gyro: Gyro
+) -> np.ndarray:
     """Response from the impulse response of the exact recursion in double precision.
 
     The integrator keeps the impulse for ever, so the difference of the response is transformed, and
@@ -88,7 +97,7 @@ def _measured(loop: AxisLoop, omega: np.ndarray, *, of: str, per_loop: int) -> n
             rate[AT * per_loop + place] = size
         else:
             setpoint[AT] = size
-        output = loop.run(setpoint, rate, gyro="raw", single_precision=False).output
+        output = loop.run(setpoint, rate, gyro=gyro, single_precision=False).output
         steps = np.diff(output, prepend=0.0) / size
         kernel = np.exp(-1j * np.outer(omega, k - AT) / LOOP_HZ) @ steps
         # A loop takes the last gyro sample of its group.
@@ -104,13 +113,16 @@ def test_feedback_and_forward_are_the_recursions_own(
     autopilot: str, seed: int, axis: str, per_loop: int
 ) -> None:
     rng = np.random.default_rng(seed)
+    gyro: Gyro = "raw"
+    if autopilot == "betaflight":  # its gyro filters are the firmware's own
+        gyro, per_loop = "filtered", 1
     loop = _random_loop(autopilot, axis, rng, per_loop)
     omega = np.geomspace(2.0, 0.95 * np.pi * LOOP_HZ, 9)
     for of, linear in (
-        ("rate", -loop.feedback(omega, with_hold=False)),
+        ("rate", -loop.feedback(omega, gyro=gyro, with_hold=False)),
         ("setpoint", loop.forward(omega, with_hold=False)),
     ):
-        exact = _measured(loop, omega, of=of, per_loop=per_loop)
+        exact = _measured(loop, omega, of=of, per_loop=per_loop, gyro=gyro)
         why = f"{of} of {loop}: one is the transform of the other"
         assert_close(exact, linear, atol=1e-9 * np.abs(exact).max(), why=why)
 
@@ -149,7 +161,9 @@ def test_basis_carries_the_gains(autopilot: str) -> None:
     found = loop.with_gains(changed).feedback(omega)
     assert_close(found, total, rtol=1e-12, why="feedback is linear in these gains")
     terms, names = loop.forward_basis(omega)
-    assert set(names) > set(loop.basis(omega)[1]) - {loop.names["d"]}
+    shared = set(loop.basis(omega)[1]) - {loop.names["d"]}
+    assert set(names) >= shared
+    assert (set(names) == shared) is (autopilot == "betaflight"), "whose feed-forward is on sticks"
     gains = loop.gains
     total = sum(gains[name] * term for name, term in zip(names, terms, strict=True))
     assert_close(loop.forward(omega), total, rtol=1e-12, why="and so is the forward path")

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.signal import lfilter
 
 from flightid.control.autopilots.axis_loop import AxisLoop, Gyro
 from flightid.control.autopilots.betaflight_filters import betaflight_filters
@@ -167,7 +167,7 @@ class BetaflightLoop(AxisLoop):
         if self.relax is None:
             return error, error
         weight = one_pole_weight(self.relax.cutoff_hz, self.loop_rate_hz)
-        slow = lfilter([weight], [1.0, weight - 1.0], setpoint)
+        slow = scipy.signal.lfilter([weight], [1.0, weight - 1.0], setpoint)
         fast = np.abs(setpoint - slow)
         if self.relax.by_setpoint:
             relaxed = error * np.maximum(0.0, 1.0 - fast / math.radians(RELAX_DEG_S))
@@ -201,12 +201,12 @@ class BetaflightLoop(AxisLoop):
         for stage in self.stages:
             if stage.path == "derivative":
                 for b0, b1, b2, a1, a2 in stage.sections:
-                    smooth = lfilter([b0, b1, b2], [1.0, a1, a2], smooth)
+                    smooth = scipy.signal.lfilter([b0, b1, b2], [1.0, a1, a2], smooth)
         slope = np.diff(smooth, prepend=0.0) * rate_hz
         step = self.unit_of("i") * self.values["i"] / rate_hz
         counted, freely = self._integrated(setpoint, rate)
         terms = {
-            "P": lfilter([weight], [1.0, weight - 1.0], gain * error),
+            "P": scipy.signal.lfilter([weight], [1.0, weight - 1.0], gain * error),
             "I": _clamped_sum(step * counted, step * freely, self.integral_limit),
             "D": -self.unit_of("d") * self.values["d"] * self.throttle_shares[1] * slope,
         }
