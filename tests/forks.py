@@ -33,15 +33,9 @@ AT_ONCE = 1 << 20
 AHEAD = tuple(  # they read sources, and start processes that import for themselves
     Path(__file__).parent / "contract" / f"test_{name}.py"
     for name in (
-        "new_method",
-        "start_up",
-        "habits",
-        "imports",
-        "options",
-        "public_surface",
-        "rust_rooms",
+        *("new_method", "start_up", "habits", "imports", "options", "public_surface"),
+        *("rust_rooms", "size", "surface", "words"),
     )
-    + ("size", "surface", "words")
 )
 SHARING = {"contract", "guide"}  # trees of all sources and a fit of every kind; the demo's flight
 
