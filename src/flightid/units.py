@@ -47,7 +47,9 @@ SPELLINGS = {
     "fpm": "ft/min",
     "mps": "m/s",
     "nd": "1",
+    "pct": "%",
     "psf": "lbf/ft^2",
+    "pu": "1",
 }
 """Spellings of logs and test reports that pint does not read, or reads as something else."""
 LONGEST = 100

@@ -142,10 +142,11 @@ def test_the_command_line_names_and_derives(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     told = ["--columns", "time,u,y", "--derive", "v=2*u", "--time-unit", "ms"]
-    code = run(["response", str(_bare(tmp_path)), "--input", "v", "--outputs", "y", *told])
+    told[1] = "time,u (%),y (deg/s)"
+    code = run(["response", str(_bare(tmp_path)), "--input", "v", "--outputs", "y (deg/s)", *told])
     shown = capsys.readouterr()
     assert code == 0, shown.err
-    assert "y       v " in shown.out
+    assert "y       v      (deg/s)/%" in shown.out
 
 
 def test_a_study_names_derives_and_globs(tmp_path: Path) -> None:

@@ -79,3 +79,21 @@ def test_a_time_has_to_rise_and_to_be_the_only_one(tmp_path: Path) -> None:
         write(tmp_path, "t [degC],t_s,y", (0.0, 1.0, 3.0, 4.0), (0.0, 0.3, 0.6, 0.9), y)
     )
     assert list(degrees.channels) == ["t", "y"]
+
+
+def test_round_brackets_hold_units_as_square_ones_do(tmp_path: Path) -> None:
+    heading = "Time (ms),p (deg/s),wind(kt),aileron (L),u (min),h (ft),h (m),v (%)"
+    columns = [(0.0, 300.0, 600.0), *[(1.0, 2.0, 5.0)] * 7]
+    path = write(tmp_path, heading, *columns)
+    (record,) = read_records(path)
+    assert {name: record.unit(name) for name in record.channels} == {
+        "p": "deg/s", "wind": "kn", "aileron (L)": "1", "u (min)": "1", "h (ft)": "ft",
+        "h (m)": "m", "v": "%",
+    }  # fmt: skip
+    assert_close(record.time_s, [0.0, 0.3, 0.6], rtol=1e-12, why="of its heading")
+    told = {"p (deg/s)": "rad/s", "h (m)": "km", "Time (ms)": "s"}
+    both = read_records(
+        path, "v (%)", ["p", "wind (kt)", "h (m)"], units=told, time_column="Time (ms)"
+    )[0]
+    assert [both.unit(name) for name in ("v", "p", "wind", "h (m)")] == ["%", "rad/s", "kn", "km"]
+    assert_close(both.time_s, [0.0, 300.0, 600.0], rtol=1e-12, why="what is told goes first")

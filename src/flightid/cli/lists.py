@@ -13,6 +13,9 @@ NEXT_NAME = re.compile(r",(?=[^,=()<>!]+=(?!=))")
 """A comma between two of NAME=VALUE, and none within the brackets of a formula."""
 OWN_COMMAS = ("column_names",)
 """Lists that quotes may stand in; they are parted where they are read."""
+CHANNELS = ("inputs", "outputs", "excitations")
+SPECIAL = ({","}, {*",)]"})
+"""Letters of a text that is more than one name, and of one that may be a heading."""
 
 
 class ListOption(click.Option):
@@ -34,15 +37,29 @@ class ListsCommand(click.Command):
 
 
 def _part_lists(ctx: click.Context) -> None:
-    """Part the texts of lists at their commas; a column of that very name stays whole."""
+    """Part the texts of lists at their commas; a column of that very name stays whole.
+
+    Names of channels may be headings with their units.
+    """
     columns: set[str] | None = None
     for one in ctx.command.get_params(ctx):
         if not (isinstance(one, click.Option) and one.multiple) or one.name in OWN_COMMAS:
             continue
         given = ctx.params.get(str(one.name)) or ()
-        if any(isinstance(text, str) and "," in text for text in given):
+        is_channels = one.name in CHANNELS
+        if any(isinstance(text, str) and (SPECIAL[is_channels] & {*text}) for text in given):
             columns = set(_columns(ctx.params.values())) if columns is None else columns
-            ctx.params[str(one.name)] = tuple(p for text in given for p in _parts(text, columns))
+            parts = [part for text in given for part in _parts(text, columns)]
+            ctx.params[str(one.name)] = tuple(
+                _channel(part, columns) if is_channels else part for part in parts
+            )
+
+
+def _channel(name: str, columns: Container[str]) -> str:
+    """The channel that a heading names; a topic of a bag keeps its slashes."""
+    from flightid.record.formats.columns import channel_name
+
+    return name if name.startswith("/") else channel_name(name, columns)
 
 
 def _parts(text: str, whole: Container[str] = ()) -> list[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -77,8 +77,8 @@ def read_records(
     history says which was taken. Rows fall into several records where the column `record_column`
     changes, where time starts again, or where it has a gap (a spacing above 2.5 median spacings).
     Text with semicolons or tabs may have decimal commas. Units come from
-    headings such as ``p [rad/s]``, from a second row of units in CSV, or from the file's metadata;
-    `units` declares them and must not contradict the file. Values are not converted.
+    headings such as ``p [rad/s]`` or ``p (deg/s)``, from a second row of units in CSV, or from the
+    file's metadata; `units` declares them, over a heading too. Values are not converted.
 
     Columns of a bag (ROS 1 ``.bag``, ROS 2 ``.mcap``, ``.db3`` or their folder) are the numbers of
     its messages, ``/imu/angular_velocity.x``, each topic on its own stamps: those of the headers
@@ -188,10 +188,10 @@ def read_records(
     if stored is not None:
         refuse_columns(source, column_names, derive)
         return [_declared(item, InputShape(hold, period_s, loop)) for item in stored]
-    taken = {column for names in roles.values() for _, column in pairs_of(names)}
+    taken = {each for names in roles.values() for pair in pairs_of(names) for each in pair}
     table = read_table(source, kind, column_names)
     table, time_column = with_time(table, asked, taken, record=record_column)
-    units = _named_units(units, time_column, time_unit)
+    units = _named_units(units, time_column, time_unit, table.lengths)
     table = with_files(
         table, join, join_on=join_on, clock_offset_s=clock_offset_s, time_column=time_column,
         join_time_column=join_time_column, join_time_unit=join_time_unit, units=units,
@@ -248,10 +248,14 @@ def _roles(
 
 
 def _named_units(
-    units: Mapping[str, str] | None, time_column: str, time_unit: str | None
+    units: Mapping[str, str] | None,
+    time_column: str,
+    time_unit: str | None,
+    columns: Container[str] = (),
 ) -> Mapping[str, str]:
     """Declared units by name of channel, and that of the time by its column."""
-    names = {k if k == time_column else channel_name(k): u for k, u in (units or {}).items()}
+    given = (units or {}).items()
+    names = {k if k == time_column else channel_name(k, columns): unit for k, unit in given}
     return with_time_unit(names, time_column, time_unit)
 
 
@@ -301,10 +305,12 @@ def _wanted(
     n_samples: int,
     sources: set[str],
 ) -> list[ChannelColumn]:
-    pairs = [(role, *pair) for role, names in roles.items() for pair in pairs_of(names)]
+    pairs = [
+        (role, *pair) for role, names in roles.items() for pair in pairs_of(names, table.lengths)
+    ]
     if not pairs:
         pairs = [
-            (Role.OTHER, channel_name(key), key)
+            (Role.OTHER, channel_name(key, table.lengths), key)
             for key, length in table.lengths.items()
             if key not in (time, record)
             and (length == n_samples if table.clock is None else moves(table, key))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from pathlib import Path
 
 from flightid.conventions import Role
@@ -35,13 +35,13 @@ def selected_records(
     return [_selected(item, roles, units) for item in stored]
 
 
-def pairs_of(names: Names | None) -> list[tuple[str, str]]:
+def pairs_of(names: Names | None, columns: Container[str] = ()) -> list[tuple[str, str]]:
     """Names of channels with the columns that they come from."""
     if names is None:
         return []
     if isinstance(names, Mapping):
         return list(names.items())
-    return [(channel_name(name), name) for name in names]
+    return [(channel_name(name, columns), name) for name in names]
 
 
 def refuse_columns(path: Path, names: Sequence[str], derive: Mapping[str, str]) -> None:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from flightid.errors import OptionError, UnitError
 from flightid.record.formats import ColumnTable
-from flightid.record.formats.columns import is_unit
+from flightid.record.formats.columns import channel_name, is_unit
 from flightid.record.rows import column_unit, manoeuvres
 from flightid.record.stamps import mean_spacing_s
 from flightid.units import canonical, convert, same_dimension
@@ -93,6 +93,8 @@ def with_time(
     """
     if table.clock is not None:
         return table, asked or USUAL
+    if asked and asked not in table.lengths and channel_name(asked) in table.lengths:
+        asked = channel_name(asked)
     name = asked or (USUAL if USUAL in table.lengths else _found(table, taken, record, option))
     unit = unit_in_name(name) if name in table.lengths and name not in table.units else None
     return (replace(table, units={**table.units, name: unit}) if unit else table), name

@@ -207,7 +207,8 @@ def _reading(file: RecordFile, roles: Mapping[str, Role]) -> dict[str, Any]:
     """How the file is read: one study may use it in several ways, of other channels each."""
     asked = {each.name: getattr(file, each.name) for each in fields(TableOptions)}
     asked["join"] = joinable(file.join)
-    known = {*roles, file.time_column, *map(channel_name, sources_of(file.derive))}
+    times = (file.time_column,) if file.time_column else ()
+    known = {*map(channel_name, (*roles, *times, *sources_of(file.derive)))}
     asked["units"] = {
         key: unit
         for key, unit in file.units.items()

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
@@ -15,13 +16,15 @@ from numpy.typing import NDArray
 from flightid.errors import DataError, FileFormatError, OptionError, UnitError, UnknownNameError
 from flightid.findings import Finding
 from flightid.reading import require_memory
-from flightid.units import canonical
+from flightid.units import SPELLINGS, canonical
 
 VALUE_BYTES = 3 * 8
 """What a sample takes on its way into a record: as it was read, as a double, in the record."""
 SHOWN = 30
 """Columns that an error names; of more the nearest."""
-HEADING = re.compile(r"^(?P<name>.*\S)\s*\[(?P<unit>[^\[\]]*)\]$")
+HEADING = re.compile(r"^(?P<name>.*\S)\s*(?:\[(?P<unit>[^\[\]]*)\]|\((?P<round>[^()]*)\))$")
+NO_UNIT = re.compile(r"[^AVNWJKsmgh%°]|1|-|min|[A-Z]{2,}|")
+"""What round brackets hold beside units: left (L), motor 1, u (min) and u (max)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +111,8 @@ class ColumnTable:
         """
         found = name
         if name not in self.lengths:
-            found = next((each for each in self.lengths if channel_name(each) == name), "")
+            channels = {channel_name(each, self.lengths): each for each in self.lengths}
+            found = channels.get(name) or channels.get(channel_name(name), "")
         if not found:
             names = list(self.lengths)
             near = get_close_matches(name, names, SHOWN, 0.0) if len(names) > SHOWN else names
@@ -146,15 +150,16 @@ class ColumnTable:
         return np.asarray(values, dtype=np.float64)
 
 
-def channel_name(column: str) -> str:
-    """Name of the channel that a column becomes: a slash parts output and input of a response.
+def channel_name(column: str, columns: Container[str] = ()) -> str:
+    """Name of the channel that a column becomes, by its heading too where no column has that name.
 
     Example
     -------
-    >>> channel_name("/imu/rate.x"), channel_name("p")
-    ('imu.rate.x', 'p')
+    >>> channel_name("/imu/rate.x"), channel_name("p"), channel_name("p (deg/s)")
+    ('imu.rate.x', 'p', 'p')
     """
-    return column.strip("/").replace("/", ".")
+    name = column if column in columns else _parted(column)[0]
+    return name.strip("/").replace("/", ".")  # a slash parts output and input of a response
 
 
 def require_readable_size(path: Path, n_values: int) -> None:
@@ -180,21 +185,36 @@ def is_unit(text: str) -> bool:
 def split_headings(headings: Iterable[str]) -> tuple[list[str], dict[str, str]]:
     """Names and units of headings such as ``"p [rad/s]"``; brackets must hold a known unit.
 
+    Round brackets that tell columns apart stay in their names.
+
     Example
     -------
-    >>> split_headings(["t [s]", "p", "y [1st]"])
-    (['t', 'p', 'y [1st]'], {'t': 's'})
+    >>> split_headings(["t [s]", "p", "y [1st]", "q (deg/s)", "roll (L)", "h (ft)", "h (m)"])[0]
+    ['t', 'p', 'y [1st]', 'q', 'roll (L)', 'h (ft)', 'h (m)']
     """
+    whole = [heading.strip() for heading in headings]
+    parted = [_parted(heading) for heading in whole]
+    times = Counter(heading.partition("(")[0].strip() for heading in whole)
     names: list[str] = []
     units: dict[str, str] = {}
-    for heading in headings:
-        match = HEADING.match(heading.strip())
-        name = heading.strip()
-        if match and is_unit(match["unit"]):
-            name = match["name"]
-            units[name] = match["unit"]
-        names.append(name)
+    for heading, (stem, unit) in zip(whole, parted, strict=True):
+        is_shared = heading.endswith(")") and times[stem] > 1
+        names.append(heading if is_shared else stem)
+        if unit is not None:
+            units[names[-1]] = unit
     return names, units
+
+
+def _parted(heading: str) -> tuple[str, str | None]:
+    """Name and unit of a heading, None where it states none."""
+    match = HEADING.match(heading.strip())
+    if match is None:
+        return heading.strip(), None
+    square, unit = match["unit"], match["round"]
+    if square is None and NO_UNIT.fullmatch(unit) and unit not in SPELLINGS:
+        return heading.strip(), None
+    unit = unit if square is None else square
+    return (match["name"], unit) if is_unit(unit) else (heading.strip(), None)
 
 
 def require_one_each(path: Path, headings: Sequence[str], columns: Sequence[str]) -> None:

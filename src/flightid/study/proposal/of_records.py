@@ -110,10 +110,13 @@ def study_of_records(
         No column can be told for an input or output.
     """
     reading = reading or DataOptions()
-    inputs, outputs = (tuple(map(channel_name, names)) for names in (inputs, outputs))
     # What is named alone is read, so that no other column's gaps part its manoeuvres.
     named = {"inputs": inputs, "outputs": outputs} if inputs and outputs else {}
     read = [part for path in paths for part in _parts(path, {**vars(reading), **named})]
+    inputs, outputs = (
+        tuple(channel_name(name, read[0].record.channels) for name in names)
+        for names in (inputs, outputs)
+    )
     columns = columns_of([part.record for part in read], inputs, outputs)
     keys = _keys(reading, folder)
     groups, missed = _groups(read, columns)
