@@ -32,6 +32,7 @@ from flightid.record.hold import InputHold
 from flightid.responses import FrequencyResponse
 from flightid.uncertainty.blocks import RecordBlock
 from flightid.uncertainty.foretold import expected_gain, likelihood_gain
+from flightid.uncertainty.triangle import triangle_of_rows
 
 Array = NDArray[np.float64]
 RIDGE = 1e-9
@@ -233,10 +234,11 @@ def _steps(
         white = slope * weights[:, None, None]
         rests.append((rest * weights[:, None]).ravel())
         blocks.append(RecordBlock.of(white[:, :, :n_free], white[:, :, n_free:], rest))
-    projected = np.vstack([block.projected for block in blocks])
     # The triangle holds all that least squares ask, of as many rows as there are numbers.
-    columns = np.column_stack([projected, np.concatenate(rests)])
-    triangle = np.asarray(np.linalg.qr(columns, mode="r"))
+    columns = np.vstack(
+        [np.column_stack([each.projected, rest]) for each, rest in zip(blocks, rests, strict=True)]
+    )
+    triangle = triangle_of_rows(columns)
     shared = np.linalg.lstsq(triangle[:, :-1], triangle[:, -1])[0]
     found = []
     for block, rest in zip(blocks, rests, strict=True):

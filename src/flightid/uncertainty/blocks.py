@@ -60,7 +60,8 @@ class RecordBlock:
         shared, own = shared.reshape(rows, -1), own.reshape(rows, -1)
         basis, triangle = np.linalg.qr(own)
         on_own = basis.T @ shared
-        return cls(shared - basis @ on_own, on_own, basis, triangle, residual)
+        projected = shared - basis @ on_own if own.size else shared
+        return cls(projected, on_own, basis, triangle, residual)
 
     def along(self, directions: Array) -> RecordBlock:
         """The same by combinations of the parameters, one a column."""

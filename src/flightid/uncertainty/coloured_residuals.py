@@ -38,6 +38,7 @@ from flightid.uncertainty.residual_noise import (
     noise_models,
     periodogram,
 )
+from flightid.uncertainty.triangle import triangle_of_rows
 
 Array = NDArray[np.float64]
 ROUNDING = 1e-9
@@ -307,7 +308,7 @@ def _white_models(errors: Sequence[Array]) -> list[Autoregression]:
 
 def triangle_of(blocks: Sequence[RecordBlock], beside: Array | None = None) -> Array:
     """Triangle of the sensitivities of all records, and of what is fitted beside them."""
-    parts = [np.asarray(np.linalg.qr(block.projected, mode="r")) for block in blocks]
+    parts = [triangle_of_rows(block.projected) for block in blocks]
     if beside is not None:
         parts.append(beside)
     return np.asarray(np.linalg.qr(np.vstack(parts), mode="r"))

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.uncertainty.influence import require_apart, require_influence
+from flightid.uncertainty.triangle import triangle_of_rows
 
 Array = NDArray[np.float64]
 
@@ -55,7 +56,7 @@ def inverse_hessian(jacobian: Array, names: Sequence[str] = ()) -> Array:
     """
     scale = np.linalg.norm(jacobian, axis=0)
     require_influence(scale, names)
-    triangle = np.linalg.qr(jacobian / scale, mode="r")
+    triangle = triangle_of_rows(jacobian / scale)
     lacking = np.zeros(max(len(scale) - len(jacobian), 0))
     require_apart(np.concatenate([np.diag(triangle), lacking]), names)
     root = np.linalg.solve(triangle, np.eye(len(scale))) / scale[:, None]

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.uncertainty.influence import require_influence
+from flightid.uncertainty.triangle import triangle_of_rows
 
 Array = NDArray[np.float64]
 
@@ -76,7 +77,7 @@ def null_combination(jacobian: Array, *, tolerance: float = 1e-9) -> Array | Non
         return np.asarray((size == 0.0).astype(np.float64))
     n = len(size)
     # The triangle has the same singular values, without a left basis of thousands of rows.
-    triangle = np.linalg.qr(jacobian / size, mode="r")
+    triangle = triangle_of_rows(jacobian / size)
     _, values, right = np.linalg.svd(triangle, full_matrices=True)
     if len(values) == n and values[-1] > tolerance * values[0]:
         return None

@@ -16,6 +16,7 @@ from flightid.identification.output_error.equation_records import EquationRuns
 from flightid.identification.records.setup import OwnNumbers, RecordSet
 from flightid.identification.records.slopes_at_start import require_slopes
 from flightid.models import GreyBoxModel
+from flightid.uncertainty.triangle import triangle_of_rows
 
 Array = NDArray[np.float64]
 TOLERANCE = 1e-9
@@ -121,7 +122,7 @@ def _alike(
     shared = [each / size for each in shared]
     bases = [_basis(each) for each in own]
     left = [each - basis @ (basis.T @ each) for each, basis in zip(shared, bases, strict=True)]
-    triangle = np.linalg.qr(np.vstack(left), mode="r")
+    triangle = triangle_of_rows(np.vstack(left))
     _, values, right = np.linalg.svd(triangle, full_matrices=True)
     if len(values) == n and values[-1] > TOLERANCE:
         return None

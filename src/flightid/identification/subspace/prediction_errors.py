@@ -21,6 +21,7 @@ from flightid.progress import progress
 from flightid.uncertainty.agreement import Agreement
 from flightid.uncertainty.blocks import RecordBlock
 from flightid.uncertainty.coloured_residuals import white_covariance
+from flightid.uncertainty.triangle import triangle_of_rows
 
 Array = NDArray[np.float64]
 Matrices = tuple[Array, Array, Array, Array, Array]
@@ -364,7 +365,7 @@ def _covariance(
     basis = _tangent(predictor, matrices)
     whiten = whitener(errors, degrees)
     jacobian = predictor.jacobian(matrices, whiten, basis)
-    triangle = np.linalg.qr(jacobian, mode="r")
+    triangle = triangle_of_rows(jacobian)
     lengths = np.linalg.norm(triangle, axis=0)
     if np.any(np.abs(np.diag(triangle)) <= 1e-11 * np.maximum(lengths, 1e-300)):
         return None, None
