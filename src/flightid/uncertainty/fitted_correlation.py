@@ -17,6 +17,7 @@ import scipy
 from numpy.typing import NDArray
 
 from flightid.uncertainty.blocks import RecordBlock, levels
+from flightid.uncertainty.lagged_inputs import LaggedInputs
 from flightid.uncertainty.residual_noise import Autoregression
 
 Array = NDArray[np.float64]
@@ -101,16 +102,30 @@ class FitResponse:
         moving = [j for j in range(len(inputs[0])) if any(np.ptp(each[j]) > 0.0 for each in inputs)]
         if not moving or lags.size < 2:
             return ()
-        lagged = [np.concatenate([_lagged(each[j], lags) for j in moving]).T for each in inputs]
-        squares = [u.T @ u for u in lagged]
+        coloured = not all(noise.is_white for noise in self.models)
+        lagged = [
+            LaggedInputs(u[moving] - u[moving].mean(axis=1, keepdims=True), lags.size, coloured)
+            for u in inputs
+        ]
+        squares = [u.squares for u in lagged]
         plain, found = np.asarray(sum(squares)), []
         for output, noise in enumerate(self.models):
-            raw, covariance = self._of_output(output, lagged, squares)
-            score, scale = (raw, covariance), np.diag(plain)
-            if not noise.is_white:
-                sharp = [noise.unshaped(u) for u in lagged]
+            heard = [
+                np.column_stack([_parts(block, output), block.residual[output]])
+                for block in self.blocks
+            ]
+            met = [u.products(x) for u, x in zip(lagged, heard, strict=True)]
+            scale = np.diag(plain)
+            if noise.is_white:
+                raw, covariance = score = self._of_output(output, met, squares)
+            else:
+                columns = [u.columns for u in lagged]
+                raw, covariance = self._of_output(output, met, squares, columns)
+                sharp = [noise.unshaped(u) for u in columns]
+                met = [x.T @ u for x, u in zip(heard, sharp, strict=True)]
                 own = [u.T @ u for u in sharp]
-                score, scale = self._of_output(output, sharp, own), np.diag(np.asarray(sum(own)))
+                score = self._of_output(output, met, own, sharp)
+                scale = np.diag(np.asarray(sum(own)))
             power = sum(
                 float(block.residual[output] @ block.residual[output]) for block in self.blocks
             )
@@ -128,35 +143,32 @@ class FitResponse:
         return tuple(found)
 
     def _of_output(
-        self, output: int, lagged: Sequence[Array], squares: Sequence[Array]
+        self,
+        output: int,
+        met: Sequence[Array],
+        squares: Sequence[Array],
+        columns: Sequence[Array] = (),
     ) -> tuple[Array, Array]:
-        """Uᵀe and its covariance; `squares` are UᵀU by record."""
+        """Uᵀe and its covariance; by record `met` is [X, e]ᵀU, `squares` UᵀU, `columns` U.
+
+        White noise does not ask for U itself.
+        """
         n = len(self.gain)
-        parts = [_parts(block, output) for block in self.blocks]
-        raw = sum(
-            u.T @ block.residual[output] for u, block in zip(lagged, self.blocks, strict=True)
-        )
-        met = [x.T @ u for x, u in zip(parts, lagged, strict=True)]
-        through = self.gain.T @ sum(each[len(each) - n :] for each in met)
+        raw = sum(each[-1] for each in met)
+        through = self.gain.T @ sum(each[len(each) - 1 - n : -1] for each in met)
         covariance = through.T @ self.beside @ through
         noise = self.models[output]
-        for x, u, own, square, answer, level in zip(
-            parts,
-            lagged,
-            met,
-            squares,
-            self.answers,
-            levels(self.blocks)[:, output],
-            strict=True,
-        ):
-            taken = np.vstack([own[: len(own) - n], through])
+        level = levels(self.blocks)[:, output]
+        for place, (own, square, answer) in enumerate(zip(met, squares, self.answers, strict=True)):
+            taken = np.vstack([own[: len(own) - 1 - n], through])
             if not noise.is_white:
+                u, x = columns[place], _parts(self.blocks[place], output)
                 whole = noise.squared(np.concatenate([u.T, x.T]).T)
                 k = u.shape[1]
                 heard, cross = whole[:k, :k], whole[:k, k:] @ taken
             else:
-                heard, cross = noise.lags[0] * square, noise.lags[0] * (own.T @ taken)
-            around = level * (heard - cross - cross.T)
+                heard, cross = noise.lags[0] * square, noise.lags[0] * (own[:-1].T @ taken)
+            around = level[place] * (heard - cross - cross.T)
             covariance = covariance + around + taken.T @ answer @ taken
         return np.asarray(raw), np.asarray(covariance)
 
@@ -213,13 +225,3 @@ def _parts(block: RecordBlock, output: int) -> Array:
     """Rows of one output: basis of the own numbers, then projected sensitivities."""
     whole = np.concatenate([block.basis, block.projected], axis=1)
     return np.asarray(whole.reshape(*block.residual.shape, -1)[output])
-
-
-def _lagged(samples: Array, lags: NDArray[np.int64]) -> Array:
-    """The centred samples at each lag, zero before the record, means taken out; (n_lags, n)."""
-    n = samples.size
-    about = samples - samples.mean()
-    rows = np.zeros((lags.size, n))
-    for row, lag in zip(rows, lags, strict=True):
-        row[lag:] = about[: n - lag]
-    return np.asarray(rows - rows.mean(axis=1, keepdims=True))

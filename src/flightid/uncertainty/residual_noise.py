@@ -337,7 +337,10 @@ def _lost(
     spectra = [model.spectrum() for model in models]
     weights = [_both(_twice(length) * spectrum / length) for spectrum in spectra]
     inner = [
-        np.sum([(e * w) @ e.T for e, w in zip(parts, weights, strict=True)], axis=0)
+        np.sum(
+            [_squared(e, w, m.is_white) for e, w, m in zip(parts, weights, models, strict=True)],
+            axis=0,
+        )
         for parts in directions
     ]
     shared = sum(each[m:, m:] for each, m in zip(inner, n_own, strict=True))
@@ -345,14 +348,27 @@ def _lost(
     for parts, each, m, n in zip(directions, inner, n_own, lengths, strict=True):
         each[m:, m:] = shared
         for o, (part, spectrum, model) in enumerate(zip(parts, spectra, models, strict=True)):
-            shaped = part * _both(spectrum)
-            if not model.is_white:
+            if model.is_white:
+                left = (2.0 * spectrum[0] * np.eye(len(part)) - each) @ part
+            else:
                 # Noise ends with the record.
+                shaped = part * _both(spectrum)
                 ended = scipy.fft.irfft(shaped.view(np.complex128), length)[:, :n]
-                shaped = scipy.fft.rfft(ended, length).view(np.float64)
-            power = np.einsum("kb,kb->b", 2.0 * shaped - each @ part, part)
+                left = 2.0 * scipy.fft.rfft(ended, length).view(np.float64) - each @ part
+            power = np.einsum("kb,kb->b", left, part)
             lost[o] += power[::2] + power[1::2]
     return lost / sum(lengths)
+
+
+def _squared(part: Array, weights: Array, is_white: bool) -> Array:
+    """Products of transforms with the weights of their bins; of white noise, twice the middle's."""
+    if not is_white:
+        return np.asarray((part * weights) @ part.T)
+    ends = [place for place in (0, 1, -2, -1) if weights[place] != weights[2]]
+    return np.asarray(
+        weights[2] * (part @ part.T)
+        + (part[:, ends] * (weights[ends] - weights[2])) @ part[:, ends].T
+    )
 
 
 def _transform(columns: Array, length: int) -> Array:

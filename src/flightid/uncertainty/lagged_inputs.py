@@ -1,0 +1,82 @@
+"""Inputs of a record at neighbouring lags, zero before it, means taken out.
+
+Their columns repeat each other, one sample on, so that products with them are sums over the inputs
+themselves.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.uncertainty.lagged_products import lagged_products, products_with_past
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class LaggedInputs:
+    """Columns U of one record, lags of the first input first.
+
+    Attributes
+    ----------
+    centred : ndarray, shape (n_inputs, n)
+        Means taken out.
+    n_lags : int
+        Lags 0 to ``n_lags - 1``.
+    formed : bool
+        The columns are asked for by themselves: products are then theirs.
+
+    Example
+    -------
+    >>> lagged = LaggedInputs(np.array([[1.0, -2.0, 1.0]]), 2)
+    >>> lagged.columns.T
+    array([[ 1.        , -2.        ,  1.        ],
+           [ 0.33333333,  1.33333333, -1.66666667]])
+    """
+
+    centred: Array
+    n_lags: int
+    formed: bool = False
+
+    @cached_property
+    def columns(self) -> Array:
+        """U, shape (n, n_inputs · n_lags)."""
+        count, n = self.centred.shape
+        rows = np.zeros((count, self.n_lags, n))
+        for lag in range(self.n_lags):
+            rows[:, lag, lag:] = self.centred[:, : n - lag]
+        rows -= rows.mean(axis=2, keepdims=True)
+        return np.asarray(rows.reshape(-1, n).T)
+
+    @cached_property
+    def squares(self) -> Array:
+        """UᵀU."""
+        if self.formed:
+            return np.asarray(self.columns.T @ self.columns)
+        longest, size = self.n_lags - 1, len(self._totals)
+        found = lagged_products([self._padded], longest, longest)
+        found = found.transpose(1, 0, 3, 2).reshape(size, size)
+        return np.asarray(found - np.outer(self._totals, self._totals) / self.centred.shape[1])
+
+    def products(self, columns: Array) -> Array:
+        """XᵀU for columns X (n, k)."""
+        if self.formed:
+            return np.asarray(columns.T @ self.columns)
+        return self._with_lags(columns) - np.outer(columns.mean(axis=0), self._totals)
+
+    @cached_property
+    def _totals(self) -> Array:
+        """Sums of inputs at their lags, before means are taken out."""
+        return np.asarray(self._with_lags(np.ones((self.centred.shape[1], 1)))[0])
+
+    @cached_property
+    def _padded(self) -> Array:
+        return np.concatenate([np.zeros((len(self.centred), self.n_lags - 1)), self.centred], 1)
+
+    def _with_lags(self, columns: Array) -> Array:
+        found = products_with_past([columns.T], [self._padded], self.n_lags - 1)
+        return np.asarray(found.transpose(2, 1, 0).reshape(columns.shape[1], -1))

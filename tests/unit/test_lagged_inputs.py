@@ -1,0 +1,32 @@
+"""Products with lagged inputs, and triangles of many rows, against those of whole columns."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flightid.uncertainty.lagged_inputs import LaggedInputs
+from flightid.uncertainty.triangle import ROWS, triangle_of_rows
+from tests.closeness import assert_close
+
+
+def test_products_are_those_of_the_columns() -> None:
+    random = np.random.default_rng(0)
+    inputs = np.cumsum(random.standard_normal((2, 300)), axis=1)
+    inputs[1, :290] = 0.0
+    heard = 1.0 + random.standard_normal((300, 3))
+    lagged = LaggedInputs(inputs - inputs.mean(axis=1, keepdims=True), 9)
+    columns, size = lagged.columns, np.linalg.norm(lagged.columns, axis=0)
+    squares = lagged.squares / np.outer(size, size)
+    expected = (columns / size).T @ (columns / size)
+    assert_close(squares, expected, atol=1e-13, why="sums of 300 products")
+    expected = heard.T @ columns / size
+    assert_close(lagged.products(heard) / size, expected, atol=1e-12, why="sums of 300 products")
+
+
+def test_a_triangle_holds_all_rows() -> None:
+    columns = np.random.default_rng(0).standard_normal((5 * ROWS + 7, 3)) * [1.0, 1e6, 1e-6]
+    columns[:, 2] += 1e-6 * columns[:, 0]
+    size = np.linalg.norm(columns, axis=0)
+    found, known = triangle_of_rows(columns), np.linalg.qr(columns, mode="r")
+    assert_close(np.abs(found) / size, np.abs(known) / size, atol=1e-14, why="rounding")
+    assert triangle_of_rows(np.zeros((2 * ROWS, 0))).shape == (0, 0)
