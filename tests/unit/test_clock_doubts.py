@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy
 
 from flightid.conventions import Light
 from flightid.errors import DataError
+from flightid.record import clocks
 from flightid.record.clocks import Signal, clock_offset
+from tests.closeness import assert_close
 
 TIME_S = 0.01 * np.arange(12_000)
 
@@ -47,8 +50,22 @@ def test_edges_of_a_held_signal_are_known_within_its_spacings() -> None:
     assert np.max(error) <= found.half_width_s
 
 
-def test_values_that_a_log_repeats_count_where_they_are_new() -> None:
-    held_s = np.floor(TIME_S / 0.1 + 1e-9) * 0.1
+def test_the_interval_holds_at_the_end_that_is_farther_from_what_moves() -> None:
+    own = 5.0 + 1e-3 * np.array([1.0, -1.0, -1.0, 1.0, 0.0])
+    given = iter(own)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(clocks, "_matched", lambda *_: next(given))
+        moving = smooth(TIME_S) * (TIME_S < 50.0)
+        found = clock_offset((TIME_S, moving), (TIME_S - 5.0, moving), "x")
+    line = scipy.stats.linregress(5.0 + 10.0 * np.arange(5), own)
+    at_end_s = np.hypot(line.stderr * np.sqrt(200.0), line.stderr * (119.99 - 25.0))
+    half_s = scipy.stats.t.ppf(1.0 - 0.05 / 4.0, 3) * at_end_s
+    assert_close(found.half_width_s, half_s, rtol=1e-3, why="stretches begin and end at samples")
+
+
+@pytest.mark.parametrize("hz", [10.0, 80.0])
+def test_values_that_a_log_repeats_count_where_they_are_new(hz: float) -> None:
+    held_s = np.floor(TIME_S * hz + 1e-9) / hz
     found = clock_offset((TIME_S, smooth(TIME_S)), (TIME_S + 2.0, smooth(held_s)), "x")
     assert found.half_width_s is not None
     assert abs(found.offset_s + 2.0) <= found.half_width_s <= 0.01

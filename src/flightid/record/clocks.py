@@ -30,6 +30,8 @@ STEP, STEP_LEVEL = 0.25, 1e-3
 """Least step of a clock that is looked for, in samples, and the chance of seeing one in none."""
 REGULAR = 0.9
 """Share of runs of one length, give or take a row, from which a log repeats a slower signal."""
+RAREST = 0.01
+"""Share of repeated rows above which they are no accidents: of 59 values a second in 60 rows."""
 SMOOTHED = 9
 """Samples of the window under which signals are matched."""
 SETTLED = 32
@@ -177,15 +179,26 @@ def clock_offset(first: Signal, second: Signal, name: str) -> ClockOffset:
 def _repeats(values: Array) -> bool:
     """Whether a log writes each value of a slower signal several times over.
 
-    Its runs are of one length, give or take a row: those of a signal that stands still are not.
+    Of few new values the runs are of one length, give or take a row: those of a signal that stands
+    still are not. Of few repeats most stand alone, and there are more than quantisation makes: by
+    chance as many moves are 0 as +1 or as -1 quantum.
 
     Example
     -------
     >>> _repeats(np.repeat(np.arange(20.0), 3)), _repeats(np.arange(60.0))
     (True, False)
+    >>> _repeats(np.sin(np.floor(np.arange(90) * 2 / 3)))
+    True
     """
-    changes = np.flatnonzero(np.diff(values))
-    runs = np.diff(changes)
+    moves = np.abs(np.diff(values))
+    same = moves == 0.0
+    repeats = np.count_nonzero(same)
+    if 2 * repeats < same.size:
+        by_chance = np.count_nonzero(moves[~same] < 1.5 * np.min(moves[~same]))
+        together = np.count_nonzero(same[1:] & same[:-1])
+        enough = max(FEWEST, by_chance, RAREST * same.size)
+        return bool(repeats > enough and 2 * together < repeats)
+    runs = np.diff(np.flatnonzero(~same))
     if runs.size < FEWEST or np.median(runs) < 2:
         return False
     # Two values that are alike by chance make one run of two.
@@ -284,7 +297,8 @@ def _of_stretches(
     spread = float(np.sum((time_s - centre_s) ** 2))
     error = float(np.sqrt(np.sum((offsets_s - design @ line) ** 2) / (time_s.size - 2)))
     slope_error = error / np.sqrt(spread)
-    ends_s = float(np.hypot(error / np.sqrt(time_s.size), slope_error * span_s / 2))
+    farther_s = float(np.max(np.abs(first[0][inside][[0, -1]] - centre_s)))
+    ends_s = float(np.hypot(error / np.sqrt(time_s.size), slope_error * farther_s))
     # Edges of held signals lie anywhere between two samples of the common grid, for many stretches
     # alike where clocks drift little: that is added. Both ends are to hold.
     half = float(student.ppf(1.0 - 0.05 / 4.0, time_s.size - 2)) * ends_s + floor_s
