@@ -10,6 +10,7 @@ from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 
 import flightid as fid
+from flightid.uncertainty.driven_noise import driven_products
 from flightid.uncertainty.residual_noise import Autoregression, _lags, autoregression, periodogram
 from flightid.uncertainty.slow_drift import Drift, _is_slow
 from tests.closeness import assert_close
@@ -31,6 +32,21 @@ def test_columns_are_squared_by_the_covariance_of_recursion_and_drift() -> None:
     columns = np.random.default_rng(0).standard_normal((60, 3))
     exact = columns.T @ toeplitz(noise.autocovariance(60)) @ columns
     assert_close(noise.squared(columns), exact, why="the same sums", rtol=1e-11)
+
+
+def test_a_recursion_of_poles_that_lie_together_rings_on_as_long_as_it_does() -> None:
+    """Squares of its matrix lose all digits; the impulse response of equal poles is binomial."""
+    order, pole = 10, 0.9
+    above = np.arange(4000)[:, None] + np.arange(1, order)
+    response = np.prod(above / np.arange(1, order), axis=1) * pole ** np.arange(4000)
+    impulse = np.array([[1.0]])
+    found = driven_products(impulse, np.poly([pole] * order))
+    assert_close(
+        found[0, 0],
+        response @ response,
+        why="roundings of the coefficients move poles by 1e-2",
+        rtol=1e-3,
+    )
 
 
 def test_what_a_drift_leaves_unknown_is_by_the_slopes_of_its_level() -> None:
