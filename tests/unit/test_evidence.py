@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import pickle
 from dataclasses import replace
 from pathlib import Path
 
@@ -148,7 +149,11 @@ def test_a_loop_declared_to_the_fit_is_its_evidence() -> None:
     )
     asked = fid.PolynomialModel.arx(("u",), "y", na=1, nb=2)
     for loop, light in (("open", "green"), ("closed", "amber")):
-        check = fid.identify(asked, record, loop=loop).evidence.check("loop")
+        fit = fid.identify(asked, record, loop=loop)
+        assert not isinstance(vars(fit)["evidence"], Evidence), "gathered once it is asked for"
+        assert pickle.loads(pickle.dumps(fit)).evidence == fit.evidence
+        assert vars(fit)["evidence"] is fit.evidence
+        check = fit.evidence.check("loop")
         assert check is not None
         assert (check.what, check.light) == (f"loop {loop}, as declared", light)
     with pytest.raises(OptionError, match="loop is not known"):

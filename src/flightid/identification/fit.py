@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -41,6 +41,21 @@ WHITE_BOUND = (
 
 WITHHOLDING = ("errors-not-white", "inputs-in-errors", "order-too-high")
 """Findings that say why a fit has no covariance."""
+
+
+class _OnDemand:
+    """Evidence that is gathered once it is asked for: coherence takes a response of the records."""
+
+    def __get__(self, fit: object, kind: type) -> object:
+        if fit is None:
+            return self
+        kept = vars(fit)
+        if not isinstance(kept["evidence"], Evidence):
+            kept["evidence"] = kept["evidence"]()
+        return kept["evidence"]
+
+    def __set__(self, fit: object, value: Evidence | Callable[[], Evidence]) -> None:
+        vars(fit)["evidence"] = value
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -149,6 +164,9 @@ class Fit(
     evidence: Evidence = field(default_factory=Evidence)
     agreement: Agreement | None = None
     input_correlations: tuple[FittedCorrelation, ...] = ()
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**vars(self), "evidence": self.evidence}
 
     @property
     def residuals(self) -> tuple[Record, ...]:
@@ -354,3 +372,6 @@ def uncertain_model(
     stable = held_stable(model)
     allowed = None if stable is None else lambda values: stable(make(values))
     return Uncertain(numbers, covariance, make, bounds, allowed=allowed)
+
+
+Fit.evidence = _OnDemand()  # type: ignore[assignment]

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextvars import copy_context
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from flightid.conventions import Role
@@ -23,6 +25,7 @@ from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.record import Record
 from flightid.record.hold import Loop
 from flightid.responses import FrequencyResponse
+from flightid.uncertainty.feedback import declared_loop
 
 JointData = tuple[FrequencyResponse, Record | Sequence[Record]]
 Data = FrequencyResponse | Record | Sequence[Record] | JointData
@@ -182,6 +185,8 @@ def identify(
     >>> round(fit.parameters["Lp"].value, 6), round(fit.parameters["Ltphi"].value, 6)
     (-6.0, 180.0)
     """
+    if loop is not None:
+        declared_loop(loop)
     chosen = method_of(model, data, method)
     _require_roles(model, flat(data))
     held = hold_for(chosen.options, flat(data), options)
@@ -198,7 +203,9 @@ def identify(
     if not in_doubt(fit.findings):
         fit = with_residuals_judged(fit)
     fit = replace(fit, provenance={**fit.provenance, LEFT: left_by_fit(fit)})
-    return replace(fit, evidence=evidence_of(fit, flat(data), loop))
+    # Gathered once somebody asks for it, in the words of who asked for the fit.
+    gathered: Any = partial(copy_context().run, evidence_of, fit, flat(data), loop)
+    return replace(fit, evidence=gathered)
 
 
 def _require_roles(model: Any, data: Sequence[object]) -> None:  # noqa: ANN401 - any kind
