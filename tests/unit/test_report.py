@@ -247,13 +247,22 @@ def test_long_plots_are_compressed_and_hold_the_same_values() -> None:
 
 def test_a_plot_shown_twice_is_stored_once() -> None:
     drawn = Figure({"data": [{"type": "scatter", "y": [1, 2]}], "layout": {}}, "answer")
-    other = Figure({"data": [{"type": "scatter", "y": [1, 3]}], "layout": {}}, "other")
+    samples = np.array([0.1, -3.0, np.nan, *range(20)], "<f4")
+    held = {"dtype": "f4", "bdata": base64.b64encode(samples.tobytes()).decode()}
+    other = Figure({"data": [{"type": "scatter", "x": held, "y": held}], "layout": {}}, "other")
     parts = (Section("Result", (drawn,)), Section("Roll", (other, replace(drawn, caption="again"))))
     page = to_html(Document("Twice", "", parts))
     assert sum("data-plot" in attributes for attributes, _ in _parsed(page).scripts) == 2
     assert re.findall(r'id="(plot-\d)" data-spec="(plot-\d)"', page) == [
         ("plot-1", "plot-1"), ("plot-2", "plot-2"), ("plot-3", "plot-1"),
     ]  # fmt: skip
+    assert page.count('"stored":[0,92]') == 2
+    packed = next(
+        text for attributes, text in _parsed(page).scripts if attributes.get("id") == "arrays"
+    )
+    ranks = np.frombuffer(gzip.decompress(base64.b64decode(packed)), np.uint8).reshape(4, -1)
+    steps = np.ascontiguousarray(ranks.T).view("<u4").ravel()
+    assert np.cumsum(steps, dtype="<u4").tobytes() == samples.tobytes()
 
 
 def test_headings_tell_their_meaning_on_hover() -> None:

@@ -22,11 +22,12 @@ from flightid.plot.graph_objects import plotting_library
 from flightid.report.content import Document, Figure
 from flightid.report.glossary import GLOSSARY
 from flightid.report.json import to_dict
+from flightid.report.shared_arrays import SharedArrays
 from flightid.table import Column, Table
 from flightid.version import VERSION
 
 DEFAULT_HEIGHT_PX = 420
-LONG_PAYLOAD = 8192
+LONG_PAYLOAD = 2048
 """Letters of a plot above which it is compressed."""
 MANY_PLOTS = 8
 """Plots of a picture above which a phone scrolls it."""
@@ -71,6 +72,7 @@ def to_html(document: Document, *, packed: bool = True) -> str:
             script=Markup(script),
             packed="gzip" if packed else "no",
             library=Markup(_packed(library) if packed else library),
+            arrays=Markup(_gzipped(numbers.arrays.stored())),
         )
     )
 
@@ -80,6 +82,7 @@ class _Numbering:
 
     def __init__(self, packed: bool) -> None:
         self._packed = packed
+        self.arrays = SharedArrays()
         self._sections = 0
         self._plots = 0
         self._first: dict[str, str] = {}
@@ -103,7 +106,7 @@ class _Numbering:
             case "figure":
                 self._plots += 1
                 spec = values["spec"]
-                text = _script_json(spec)
+                text = _script_json(self.arrays.referred(spec) if self._packed else spec)
                 small = self._packed and len(text) > LONG_PAYLOAD
                 place = f"plot-{self._plots}"
                 return {
@@ -116,7 +119,7 @@ class _Numbering:
                     if "layout" in spec
                     else False,
                     "packed": "gzip" if small else "no",
-                    "payload": Markup(_gzipped(text) if small else text),
+                    "payload": Markup(_gzipped(text.encode()) if small else text),
                 }
         return values
 
@@ -152,11 +155,11 @@ def _script_hash(text: str) -> str:
 
 @cache
 def _packed(text: str) -> str:
-    return _gzipped(text)
+    return _gzipped(text.encode())
 
 
-def _gzipped(text: str) -> str:
-    return base64.b64encode(gzip.compress(text.encode(), 9, mtime=0)).decode()
+def _gzipped(content: bytes) -> str:
+    return base64.b64encode(gzip.compress(content, 9, mtime=0)).decode()
 
 
 @cache
