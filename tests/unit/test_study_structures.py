@@ -45,6 +45,28 @@ def test_an_offset_of_the_means_asks_for_no_pole() -> None:
     assert (fit.structure.nb, fit.structure.nf) == ((2,), (2,))
 
 
+def test_a_richer_structure_must_be_clearly_better() -> None:
+    def trial(n_parameters: int, aicc: float, rms: float = 1.0) -> SimpleNamespace:
+        criteria = SimpleNamespace(aicc=aicc)
+        return SimpleNamespace(
+            structure=None,
+            criteria=criteria,
+            settled=True,
+            free_run_rms=rms,
+            n_parameters=n_parameters,
+        )
+
+    trials = [
+        trial(9, 100.0),
+        trial(4, 105.0),
+        trial(5, 104.0),
+        trial(3, 107.0),
+        trial(2, 99.0, 2.0),
+    ]
+    taken = ranked(SimpleNamespace(trials=trials), "balanced")
+    assert [each.n_parameters for each in taken] == [4, 5, 9, 3]
+
+
 def third_order(n: int = 1200) -> fid.Record:
     """A lightly damped mode behind a lag and four samples of delay, white noise."""
     rng = np.random.default_rng(3)

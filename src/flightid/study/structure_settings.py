@@ -59,8 +59,9 @@ class StructureSettings(OrderOptions):
     choose: str | None = option(
         None,
         choices=CHOICES,
-        doc="balanced: smallest AICc among free-run errors within 10 % of the smallest; free_run: "
-        "that one; simplest: fewest coefficients within 2 % of it; default: what fits the kind.",
+        doc="balanced: fewest coefficients within 6 of the smallest AICc, of free-run errors "
+        "within 10 % of the smallest; free_run: that one; simplest: fewest coefficients within "
+        "2 % of it; default: what fits the kind.",
     )
     options: Mapping[str, Any] = field(default_factory=dict)
 

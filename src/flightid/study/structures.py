@@ -14,7 +14,7 @@ from flightid.models import InnovationsModel, NarxStructure, PolynomialModel, Su
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.record import Record
 from flightid.study.structure_settings import NARX, SUBSPACE, StructureSettings
-from flightid.study.widened_scan import doubted, widened
+from flightid.study.widened_scan import CLEAR, doubted, widened
 from flightid.validation import NarxSearch, OrderScan, scan_orders, search_narx
 from flightid.validation.order_scan.edges import Structure
 from flightid.validation.order_scan.narx_search import search_further
@@ -147,8 +147,26 @@ def ranked(scan: OrderScan, how: str) -> list[OrderTrial]:
         and trial.free_run_rms is not None
         and trial.free_run_rms <= limit
     ]
-    order = sorted(alike) if how == "balanced" else alike
+    order = _by_evidence(scan, alike) if how == "balanced" else alike
     return [scan.trials[each[-1]] for each in order] or [first]
+
+
+def _by_evidence(
+    scan: OrderScan, alike: list[tuple[bool, float, int]]
+) -> list[tuple[bool, float, int]]:
+    """First those that no other is clearly better than, the one with fewest coefficients first.
+
+    Of dozens of structures some that are too rich win by chance, with a pole that is none and a
+    delay that is none (Burnham & Anderson (2002), Model Selection and Multimodel Inference, 2.6).
+    """
+    least = min(alike, default=(False, 0.0, 0))[1]
+
+    def key(each: tuple[bool, float, int]) -> tuple[bool, bool, int, float, int]:
+        lacking, aicc, place = each
+        clear = aicc > least + CLEAR
+        return lacking, clear, 0 if clear else scan.trials[place].n_parameters or 0, aicc, place
+
+    return sorted(alike, key=key)
 
 
 def _has_zeros_of_sampling(structure: Structure) -> bool:

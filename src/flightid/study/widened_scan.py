@@ -20,7 +20,7 @@ Scan = TypeVar("Scan")
 ROUNDS = 4
 """Of neighbours beyond the edges; each fits two to the number of edges, the taken one again."""
 CLEAR = 6.0
-"""Gain of BIC that says a model is better: odds of 1 to 20."""
+"""Gain of BIC or AICc that says a model is better: odds of 1 to 20."""
 
 
 def widened(
