@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
+
 import pytest
 
 import flightid as fid
-from flightid.identification.frequency_domain.bias_findings import judge_windows
+from flightid.cli.program import run
+from flightid.identification.frequency_domain.longer_windows import judge_windows
 from tests.strangers.response_bands import oscillator_record
 from tests.strangers.responses import oscillator
 
@@ -38,3 +42,47 @@ def test_a_delay_below_zero_ends_no_fit() -> None:
     model = fid.TransferFunctionModel((path,), known)
     assert judge_windows(model, response)
     assert judge_windows(model.with_values({"tau": -0.01}), response) == []
+
+
+STUDY = """
+[study]
+title = "A light mode"
+[[record]]
+name = "sweep"
+path = "flight.nc"
+[[model]]
+name = "light"
+template = "light.toml"
+identify = ["sweep"]
+band_rad_s = [1.0, 12.0]
+"""
+
+
+def test_where_nobody_chose_windows_a_second_pass_takes_longer_ones(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """By the damping of the first fit, on the command line and in studies; said in both."""
+    record = oscillator_record(0, zeta=0.05, duration_s=60.0, colour=0.0)
+    flight = str(fid.write_records(record, tmp_path / "flight.nc"))
+    model = str(fid.write_model(oscillator(0.05), tmp_path / "light.toml"))
+    assert run(["identify", flight, "--model", model, "--json"]) == 0
+    made = json.loads(capsys.readouterr().out)
+    low, high = made["parameters"]["w2"]["interval95"]
+    assert low < 4.09 < high < low + 0.1
+    assert (
+        "windows_from_damping(mode_rad_s=2.0, dies_out_s=27.2)"
+        in made["provenance"]["data_history"][-1]
+    )
+    said = [each["message"] for each in made["findings"] if each["code"] == "windows-lengthened"]
+    assert [each[:41] for each in said] == ["windows of up to 27.2 s, by default 12 s:"]
+    assert run(["identify", flight, "--model", model, "--json", "--window-s", "12"]) == 0
+    chosen = json.loads(capsys.readouterr().out)
+    assert {each["code"] for each in chosen["findings"]} >= {"windows-short"}
+    (tmp_path / "study.toml").write_text(STUDY, encoding="utf-8")
+    (item,) = fid.run_study(tmp_path / "study.toml", output=tmp_path / "out").identified
+    assert item.response is not None
+    assert max(item.response.window_s) > 25.0
+    assert any(each.code == "windows-lengthened" for each in item.response.findings)
+    assert item.fit is not None
+    low, high = item.fit.parameters["w2"].interval95 or (0.0, 0.0)
+    assert low < 4.09 < high < low + 0.3

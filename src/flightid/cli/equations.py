@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     from flightid.identification import Fit
     from flightid.models import Model
     from flightid.options import Options
+    from flightid.record import Record
 
 USUAL, JOINT = "frequency_domain", "joint"
 
@@ -69,8 +71,10 @@ def fits_of(
     click.UsageError
         Models of other channels, or records beside a response where the method takes none.
     """
-    from flightid import identify
+    from flightid import estimate_response, identify
+    from flightid.identification.frequency_domain.longer_windows import second_pass
     from flightid.models import load_structure
+    from flightid.responses.options import AUTOMATIC
 
     way, loop = method or USUAL, options.pop("loop", None)
     of_response, of_method, *of_files = _divided(way, options)
@@ -83,32 +87,35 @@ def fits_of(
             f"--method {JOINT} and --records belong together: the response comes from FILES, "
             "the records stand beside it"
         )
-    data = _data(files, first, (way, of_response, of_files), loop)
+    injected = of_response.get("excitations")
+    read = read_files(files, *of_files, **channels, units=first.units, excitations=injected)
+    more: list[Record] = []
     if way == JOINT:
         span = {} if beside_span_s is None else {"span_s": beside_span_s}
         more = read_files(beside, of_files[0], span, **channels, units=first.units)
-        data = [data, *more]
-    return {
-        name: identify(model, data, method=way, loop=loop, **of_method)
-        for name, model in models.items()
-    }, data
 
+    def fitted(data: Any) -> tuple[dict[str, Fit], Any]:  # noqa: ANN401 — records, or a response
+        whole = [data, *more] if more else data
+        fits = {
+            name: identify(model, whole, method=way, loop=loop, **of_method)
+            for name, model in models.items()
+        }
+        return fits, whole
 
-def _data(
-    files: Sequence[Path],
-    model: Model,
-    asked: tuple[str, dict[str, Any], Sequence[dict[str, Any]]],
-    loop: Any,  # noqa: ANN401 — open or closed, as the parser has checked
-) -> Any:  # noqa: ANN401 — records, or their response
-    from flightid import estimate_response
-
-    way, of_response, of_files = asked
-    channels: dict[str, Any] = {"inputs": model.inputs, "outputs": model.outputs}
-    injected = of_response.get("excitations")
-    read = read_files(files, *of_files, **channels, units=model.units, excitations=injected)
     if not _on_responses(way):
-        return read
-    return estimate_response(read, **channels, **of_response, loop=loop)
+        return fitted(read)
+    estimate = partial(estimate_response, read, **channels, loop=loop)
+    response = estimate(**of_response)
+    found = fitted(response)
+    if of_response.get("window_s", AUTOMATIC) != AUTOMATIC:
+        return found
+    return second_pass(
+        found,
+        [fit.model for fit in found[0].values()],
+        response,
+        lambda longer: fitted(longer.estimate(estimate, of_response)),
+        banded="band_rad_s" in of_response,
+    )
 
 
 def _require_same_channels(models: Mapping[str, Model]) -> None:

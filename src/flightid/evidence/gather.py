@@ -57,12 +57,15 @@ ON_A_WORD = "hold-told"
 """A hold that estimates rest on and that the data neither bear out nor contradict."""
 WINDOWS_SHORT = "windows-short"
 """Of a response whose windows a mode outlasts: its leakage is corrected, its coherence is lost."""
-LIMITS = (ON_A_WORD, WINDOWS_SHORT)
+WINDOWS_LENGTHENED = "windows-lengthened"
+"""Of a response whose windows come from the damping that a first fit found."""
+LIMITS = (ON_A_WORD, WINDOWS_SHORT, WINDOWS_LENGTHENED)
 OVERFIT = "overfit"
 """An order that may be one too high: intervals hold what it costs."""
 BELONGS = {
     "estimator-bias": SETTLED,
     WINDOWS_SHORT: SETTLED,
+    WINDOWS_LENGTHENED: SETTLED,
     "estimator-bias-not-corrected": SETTLED,
     "not-converged": SETTLED,
     "not-refined": SETTLED,

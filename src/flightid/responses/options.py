@@ -11,6 +11,8 @@ from flightid.responses.windows.defaults import DEFAULT_FREQUENCIES, DEFAULT_OVE
 
 ESTIMATORS = ("auto", "composite", "instrument", "local_polynomial", "periodic", "prewhitened")
 DETRENDS = ("none", "mean", "line")
+AUTOMATIC = "auto"
+"""Word for windows that nobody chose."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +39,7 @@ class ResponseOptions(Options):
     )
     n_omega: int = option(DEFAULT_FREQUENCIES, minimum=2, doc="Log-spaced frequencies in the band.")
     window_s: str | float | Sequence[float] = option(
-        "auto", unit="s", above=0.0, choices=("auto",), doc="Window lengths."
+        AUTOMATIC, unit="s", above=0.0, choices=(AUTOMATIC,), doc="Window lengths."
     )
     overlap: float = option(
         DEFAULT_OVERLAP, minimum=0.0, below=1.0, doc="Overlap of neighbouring windows."

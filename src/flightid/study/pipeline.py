@@ -9,9 +9,12 @@ from typing import Any
 from flightid.conventions import Light
 from flightid.errors import DataError, FitError, FlightidError, StudyError
 from flightid.findings import Finding
+from flightid.identification.frequency_domain.longer_windows import LongerWindows, second_pass
 from flightid.inspection import Inspection
+from flightid.models import GreyBoxModel
 from flightid.record import Record
 from flightid.responses import CoherentPairs, FrequencyResponse
+from flightid.responses.options import AUTOMATIC
 from flightid.study.evidence import examined
 from flightid.study.identified import ModelFits, ModelResults
 from flightid.study.model_settings import UNBROKEN
@@ -89,8 +92,7 @@ def identify_models(
     for asked in tasks:
         task = start_from(asked, parts)
         try:
-            responses = _responses(task, records, runner)
-            parts.append(_fit(task, responses, records, reducing, runner))
+            parts.append(_identified(task, records, reducing, runner))
         except (DataError, FitError) as error:
             errors.append(error)
             parts.append(_refused(task, error))
@@ -154,8 +156,26 @@ def _examined(item: ModelResults, inspection: Inspection | None) -> ModelResults
     return replace(item, fitted=replace(item.fitted, fits=fits))
 
 
+def _identified(
+    task: Task, records: Records, reducing: ReduceSettings | None, runner: StageRunner
+) -> Part:
+    """Responses and fits; once more where a light mode asks for windows that nobody chose."""
+
+    def made(longer: LongerWindows | None = None) -> Part:
+        responses = _responses(task, records, runner, longer)
+        return _fit(task, responses, records, reducing, runner)
+
+    first = made()
+    fit = first.fitted.value.fit
+    if fit is None or not first.responses or task.settings.response.window_s != AUTOMATIC:
+        return first
+    counts = next(iter(first.responses.values())).value
+    models = [fit.model] if isinstance(fit.model, GreyBoxModel) else []
+    return second_pass(first, models, counts, made, banded=True)
+
+
 def _responses(
-    task: Task, records: Records, runner: StageRunner
+    task: Task, records: Records, runner: StageRunner, longer: LongerWindows | None = None
 ) -> dict[str, StageResult[FrequencyResponse]]:
     """By what made them, what counts first."""
     settings = task.settings
@@ -175,6 +195,7 @@ def _responses(
             settings.band_rad_s,
             estimator,
             asked.of_estimates,
+            *(() if longer is None else (longer,)),
         )
         found.setdefault(made.value.estimator, made)
     return found

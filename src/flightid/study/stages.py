@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from flightid.conventions import Light
 from flightid.errors import DataError, FlightidError
 from flightid.findings import Finding
 from flightid.identification import Fit, Reduction, identify, reduce
+from flightid.identification.frequency_domain.longer_windows import LongerWindows
 from flightid.identification.prediction.predict import output_names
 from flightid.identification.reduction.rules import TOTAL_COST_RISE_PERCENT
 from flightid.models import GreyBoxModel, Model
@@ -57,17 +59,14 @@ def estimate(
     band_rad_s: tuple[float, float],
     estimator: str,
     settings: ResponseSettings,
+    longer: LongerWindows | None = None,
 ) -> FrequencyResponse:
     """Frequency responses of one model's records by one estimator."""
     flown = flat(records)
     held = [name for name in outputs if all(name in record for record in flown)]
-    return estimate_response(
-        flown,
-        inputs=inputs,
-        outputs=held,
-        band_rad_s=band_rad_s,
-        **settings.of_verb(estimator),
-    )
+    asked = {**settings.of_verb(estimator), "band_rad_s": band_rad_s}
+    made = partial(estimate_response, flown, inputs=inputs, outputs=held)
+    return made(**asked) if longer is None else longer.estimate(made, asked)
 
 
 def select_coherent(

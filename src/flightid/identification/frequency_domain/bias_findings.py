@@ -9,13 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.conventions import Light
-from flightid.errors import ModelError, SingularError
-from flightid.evidence.gather import WINDOWS_SHORT
 from flightid.findings import Finding
 from flightid.identification.frequency_domain.error_model import ErrorModel
 from flightid.identification.frequency_domain.selection import SelectedResponse
-from flightid.models import GreyBoxModel
-from flightid.responses import FrequencyResponse
 from flightid.uncertainty.response_errors import DECIBEL, DEGREE
 
 Array = NDArray[np.float64]
@@ -24,10 +20,6 @@ ENOUGH = 1e-2
 """Last step over the scatter of the residuals at which a correction has settled."""
 TOLERABLE = 0.1
 """Such a step at which a correction that ran out of steps is still kept."""
-DIES_OUT = 3.0
-"""Time constants after which a mode has."""
-LESS = 0.8
-"""Of the window that is wanted and that records have room for, below which one is short."""
 
 
 @dataclass(frozen=True)
@@ -137,47 +129,6 @@ class BiasOutcome:
             "converged": self.converged,
             "responses": {name: vars(size).copy() for name, size in self.sizes.items()},
         }
-
-
-def judge_windows(model: GreyBoxModel, data: FrequencyResponse) -> list[Finding]:
-    """Windows that are short beside what a mode of the fit needs to die out, and what to do.
-
-    Leakage is taken out all the same; coherence, and with it the band, is lost to it.
-
-    Parameters
-    ----------
-    model : GreyBoxModel
-        With the estimates.
-    data : FrequencyResponse
-        As it was estimated.
-    """
-    if data.linear is None or not data.window_s:
-        return []
-    try:
-        poles = model.linear_system().poles()
-    except (ModelError, SingularError):
-        # A fit may end at a delay below zero, or where equations do not give every derivative: that
-        # is said elsewhere, and there is no mode to speak of here.
-        return []
-    seen = (poles.imag > 0.0) & (poles.real < 0.0) & (np.abs(poles) < data.omega_rad_s[-1])
-    if not seen.any():
-        return []
-    slowest = poles[seen][np.argmax(poles[seen].real)]
-    needed, longest = DIES_OUT / -float(slowest.real), max(data.window_s)
-    record_s = max(u.shape[1] for u in data.linear.input_records) * data.linear.sample_time_s
-    if longest >= LESS * min(needed, 0.5 * record_s):
-        return []
-    takes, longer = f"takes {needed:.2g} s to die out", f"window_s={needed:.3g} or "
-    if needed > 0.5 * record_s:
-        takes, longer = "outlasts half the record", ""
-    return [
-        Finding(
-            WINDOWS_SHORT,
-            Light.GREEN,
-            f"the mode at {abs(slowest):.3g} rad/s {takes}, the longest window has {longest:.3g} s:"
-            f" {longer}a fit of the records themselves (output_error) would tell it better",
-        )
-    ]
 
 
 def sizes(

@@ -25,7 +25,6 @@ from flightid.identification.fit_findings import (
     why_misfit,
 )
 from flightid.identification.fitted_response import FittedResponse
-from flightid.identification.frequency_domain.bias_findings import judge_windows
 from flightid.identification.frequency_domain.bias_objective import Curves, Objective
 from flightid.identification.frequency_domain.error_model import (
     ErrorModel,
@@ -40,6 +39,7 @@ from flightid.identification.frequency_domain.feedback_findings import (
     judge_feedback,
     why_bent,
 )
+from flightid.identification.frequency_domain.longer_windows import judge_windows
 from flightid.identification.frequency_domain.model_curves import curves_of
 from flightid.identification.frequency_domain.noise_cost import noise_costs
 from flightid.identification.frequency_domain.opened import opened

@@ -16,14 +16,18 @@ from numpy.typing import NDArray
 
 from flightid.identification.frequency_domain.error_model import ErrorModel
 from flightid.identification.frequency_domain.estimator_bias import Correction
+from flightid.identification.frequency_domain.longer_windows import slowest_mode
 from flightid.identification.frequency_domain.selection import SelectedResponse
 from flightid.models import GreyBoxModel
+from flightid.responses.windows.defaults import WINDOWS_IN_RECORDS
 from flightid.uncertainty.agreement import AgreementTest, compare_parts
 from flightid.uncertainty.parts import RecordParts
 
 Array = NDArray[np.float64]
 FAIR = 0.4
 """Least share of a part in the median point, over that of equal parts."""
+ROUNDED = 0.95
+"""Windows are whole hops long: of the room that they are given, what they may take too much."""
 Complex = NDArray[np.complex128]
 
 
@@ -61,7 +65,8 @@ class PartComparison:
         -------
         Noise as strong in all parts; at each frequency a part counts by its share of the power,
         and so does its noise. That fails where parts hold other frequencies, as the halves of one
-        sweep or sweeps of different inputs do: such parts are not compared.
+        sweep or sweeps of different inputs do, or halves that a light mode rings across: such parts
+        are not compared.
         """
         left, modelled = self.correction.halves(self.fitted, self._places)
         whole = self._points(modelled.sum(axis=(0, 1)))
@@ -78,7 +83,9 @@ class PartComparison:
             weighed.append(gain * np.sqrt(share))
         parts = np.array(shares)
         compared = partial(
-            compare_parts, by_halves=_fair(parts), by_records=_fair(parts[0::2] + parts[1::2])
+            compare_parts,
+            by_halves=_fair(parts) and not self._rings_across,
+            by_records=_fair(parts[0::2] + parts[1::2]),
         )
         total = np.sum(information, axis=0)
         # Nobody asks for the noise of parts that are not compared.
@@ -94,6 +101,16 @@ class PartComparison:
             part = np.array(information[both]) @ np.linalg.inv(total)
             flights.append(RecordParts(np.array(scores[both]), part, noise))
         return compared(flights, np.eye(n), known[0, :, 0], np.full(n, np.inf))
+
+    @property
+    def _rings_across(self) -> bool:
+        """Whether a mode outlasts a half, in windows of which few lie within one."""
+        data, linear = self.correction.data, self.correction.data.linear
+        mode = slowest_mode(self.fitted, data)
+        if mode is None or linear is None or not mode.outlasts:
+            return False
+        total_s = sum(u.shape[1] for u in linear.input_records) * linear.sample_time_s
+        return bool(total_s < ROUNDED * WINDOWS_IN_RECORDS * mode.before_s)
 
     @property
     def _places(self) -> NDArray[np.intp]:

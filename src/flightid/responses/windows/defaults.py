@@ -97,11 +97,15 @@ def automatic_windows(durations_s: Sequence[float], omega_max: float) -> tuple[f
     >>> automatic_windows([100.0, 100.0], 40.0)
     (40.0, 21.1..., 11.2..., 5.9..., 3.1...)
     """
-    longest = longest_window(durations_s)
-    shortest = min(longest, CYCLES_AT_HIGHEST * 2.0 * math.pi / omega_max)
-    if shortest > 0.8 * longest:
-        return (longest,)
-    return tuple(float(t) for t in np.geomspace(longest, shortest, AUTOMATIC_LENGTHS))
+    return windows_up_to(longest_window(durations_s), omega_max)
+
+
+def windows_up_to(longest_s: float, omega_max: float) -> tuple[float, ...]:
+    """Five window lengths as by `automatic_windows`, below a longest one, s."""
+    shortest = min(longest_s, CYCLES_AT_HIGHEST * 2.0 * math.pi / omega_max)
+    if shortest > 0.8 * longest_s:
+        return (longest_s,)
+    return tuple(float(t) for t in np.geomspace(longest_s, shortest, AUTOMATIC_LENGTHS))
 
 
 def longest_window(durations_s: Sequence[float]) -> float:
