@@ -173,7 +173,11 @@ def test_a_command_names_what_is_wrong_with_a_joined_file(
     rig, mocap = write_both(tmp_path)
     asked = ["run", str(rig), "--inputs", "u", "--outputs", "angle", "--join-on", "gyro=angle"]
     assert run([*asked, "--join", "nope.csv"]) == 2
-    assert "not there: found --join nope.csv; needed a table" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "not there: found --join nope.csv; needed a table" in said
+    assert "Next: check name and folder" in said
+    assert run([*asked, "--join", f"{rig}x"]) == 2
+    assert f"Next: {rig.name} is there" in capsys.readouterr().err
     text = mocap.read_text().replace("t,", "x,", 1)
     (tmp_path / "bare.csv").write_text(text)
     assert run([*asked, "--join", str(tmp_path / "bare.csv")]) == 2

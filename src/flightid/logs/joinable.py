@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from difflib import get_close_matches
 from pathlib import Path
 
 from flightid.errors import OptionError
@@ -23,9 +24,12 @@ def joinable(files: Iterable[str | Path]) -> list[Path | Record]:
     paths = list(map(Path, files))
     for path in paths:
         if not path.exists():
+            beside = [each.name for each in path.parent.glob("*")]
+            near = get_close_matches(path.name, beside, 1)
             raise OptionError(
                 "a file that is to join is not there",
                 found=f"join={str(path)!r}",
                 needed="a table, a bag or a flight log",
+                action=f"{near[0]} is there: join it" if near else "check name and folder",
             )
     return [read_log(path).record() if is_log(path) else path for path in paths]
