@@ -148,7 +148,7 @@ def chance_share(row: Array) -> float:
     -------
     >>> white = np.random.default_rng(0).standard_normal(4000)
     >>> smooth = scipy.signal.lfilter([1.0], np.poly([0.9, 0.9]), white)
-    >>> round(chance_share(white), 1), round(chance_share(smooth), 2)
+    >>> round(chance_share(white), 1), round(chance_share(1e200 * smooth), 2)
     (0.9, 0.03)
     """
     lags = _own_lags(row, max(row.size // LONGEST, 2) - 1)
@@ -181,7 +181,8 @@ def _independent(row: Array) -> float:
 
 
 def _own_lags(row: Array, last: int) -> Array:
-    """Sums of products with itself at lags 0 to `last`."""
+    """Sums of products with itself at lags 0 to `last`, over the square of the largest value."""
+    row = row / (np.max(np.abs(row), initial=0.0) or 1.0)
     length = scipy.fft.next_fast_len(row.size + last, real=True)
     power = np.abs(scipy.fft.rfft(row, length)) ** 2
     return np.asarray(scipy.fft.irfft(power, length)[: last + 1])

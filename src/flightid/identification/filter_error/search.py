@@ -21,6 +21,8 @@ TRIAL_ITERATIONS = 12
 """Of each candidate's search, before the best one goes on."""
 CALM = -3.0
 """Logarithm of all process noise, over its first guess, below which there may be none."""
+STILL = 0.7
+"""Part of its reach by which all process noise is lowered where a gust is tried in its place."""
 NEAR = 0.01
 """Gain of a last step in −2 ln p before gusts are tried or left: far less than they must gain."""
 
@@ -86,11 +88,12 @@ def with_gust(
 ) -> tuple[InnovationsProblem, list[list[DenseEnd]]]:
     """The problem and its ends, with a gust state where the likelihood asks for one.
 
-    Each candidate continues from the best end for a few iterations; the likeliest goes on until it
-    is `NEAR` its end, and to that end if it gains more than its two unknowns may by chance (BIC):
-    it replaces all others then. A test
-    of the innovations alone would not do: a gust as long as the vehicle's own motion bends its
-    derivatives and leaves hardly any colour. Nothing is tried where no state has process noise.
+    Each candidate continues from the best end for a few iterations, and begins anew with hardly any
+    white noise: at the former it explains the gust, and where it has run to its reach nothing moves
+    it, so that half of that is the most. The likeliest goes on until it is `NEAR` its end, and to
+    that end if it gains more than its two unknowns may by chance (BIC): it replaces all others
+    then. A test of the innovations alone would not do: a gust as long as the vehicle's own motion
+    bends its derivatives and leaves hardly any colour. Nothing is tried where no state has noise.
     An end that is only `NEAR` is followed to its end where no gust replaces it.
 
     Reference
@@ -109,12 +112,19 @@ def with_gust(
     states = np.sqrt(np.mean([np.var(each.states, axis=0) for each in filtered], axis=0))
     step = min(each.sample_time_s for each in problem.data)
     longest = max(each.outputs.shape[1] * each.sample_time_s for each in problem.data)
-    start = np.concatenate([end.x, np.zeros(GUST_UNKNOWNS)])
+    here = end.x.copy()
+    here[noisy] = np.minimum(here[noisy], 0.5 * problem.reach[: len(problem.noisy)])
+    calm = here.copy()
+    calm[: problem.n_free] = [each.value for each in problem.model.parameters.free]
+    calm[noisy] = -STILL * problem.reach[: len(problem.noisy)]
     trials = []
     for gust in candidates(LinearPoint.of(problem.model, values), states, step, longest):
         tried = replace(problem, gust=gust)
-        first = minimise(tried, start, limits, iterations=TRIAL_ITERATIONS, enough=NEAR)
-        trials.append((tried, first))
+        for x in (here, calm):
+            start = np.concatenate([x, np.zeros(GUST_UNKNOWNS)])
+            if np.all(np.isfinite(tried.residuals(start, with_slopes=False)[0])):
+                first = minimise(tried, start, limits, iterations=TRIAL_ITERATIONS, enough=NEAR)
+                trials.append((tried, first))
     if not trials:
         return problem, _followed(problem, groups, limits)
     tried, begun = min(trials, key=lambda trial: trial[1].cost)
