@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
+import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 import flightid as fid
 from flightid.cli.program import run
@@ -13,6 +16,8 @@ from flightid.control.margins.margins import margins
 from flightid.conventions import Light
 from flightid.errors import DataError
 from flightid.plot.compared_loops import compared_loops
+from flightid.review.margin_comparison import BEYOND
+from flightid.uncertainty.uncertain import Uncertain
 from tests.closeness import assert_close
 from tests.strangers.margin_changes import Gains, Rig, compared, fitted, truths
 
@@ -43,6 +48,25 @@ def test_margins_before_and_after_are_those_of_the_sampled_loop() -> None:
                  rtol=1e-9, why="one gain closes the same loop")  # fmt: skip
 
 
+def test_what_is_read_above_the_band_of_the_fit_is_not_judged() -> None:
+    plant = fid.LinearSystem(
+        [[-4.0]], [[40.0]], [[1.0]], [[0.0]], ("tau_phi",), ("p",), [0.035]
+    )  # fmt: skip
+    band = Uncertain(np.array([40.0, -4.0]), np.diag([0.2, 0.02]), partial(_roll, plant),
+                     valid_rad_s=(0.5, 20.0))  # fmt: skip
+    above = fid.compare_margins((band, {"tau_phi": {"p": 0.3}}), (band, {"tau_phi": {"p": 0.6}}))
+    judged = {change.name: change.chance is not None for change in above.changes}
+    assert judged == {
+        "crossover": False, "phase margin": False, "gain margin": False, "delay margin": False,
+        "sensitivity peak": False, "disturbance bandwidth": True,
+    }  # fmt: skip
+    assert above["tau_phi, gain margin"].after.reason == BEYOND
+    assert above["tau_phi, disturbance bandwidth"].before.half_width95
+    assert [each.light for each in above.findings if each.code == "margin-beyond-band"] == [
+        Light.AMBER, Light.AMBER,
+    ]  # fmt: skip
+
+
 def test_a_command_compares_two_files_of_gains(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -64,6 +88,10 @@ def test_a_command_compares_two_files_of_gains(
     assert "give one of them" in capsys.readouterr().err
 
 
+def _roll(plant: fid.LinearSystem, numbers: NDArray[np.float64]) -> fid.LinearSystem:
+    return replace(plant, a=[[numbers[1]]], b=[[numbers[0]]])
+
+
 @pytest.mark.slow
 def test_one_model_shares_its_errors_and_two_do_not() -> None:
     fit = fitted(Rig(), 3)
@@ -75,7 +103,11 @@ def test_one_model_shares_its_errors_and_two_do_not() -> None:
     assert width < 1e-6, "what a gain changes no error of the plant does"
     assert twice.chance is not None
     assert twice.chance < 1e-9
-    apart = compared((fit, SLOW), (replace(fit), QUICK))["p / tau_phi, loop, gain margin"]
+    again = compared((fit, SLOW), (replace(fit), QUICK))
+    assert again.one_record
+    assert all(change.chance is None for change in again.changes)
+    other = fitted(Rig(), 4)
+    apart = compared((fit, SLOW), (other, QUICK))["p / tau_phi, loop, crossover"]
     before, after = (each.half_width95 or 0.0 for each in (apart.before, apart.after))
     assert_close(apart.difference.half_width95, (before**2 + after**2) ** 0.5, rtol=1e-6,
                  why="independent errors add as squares")  # fmt: skip

@@ -9,11 +9,8 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from flightid.record import Record
-from flightid.record.digest import digest_of
+from flightid.record.digest import TRAINING, digest_of
 from flightid.responses import FrequencyResponse
-
-TRAINING = "training_records"
-"""Where provenance keeps digests of the records behind a fit."""
 
 
 @dataclass(frozen=True)

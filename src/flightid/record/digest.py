@@ -18,6 +18,8 @@ SPAN = 16
 """Samples of one mark: so many equal ones in a row are no chance in a measured channel."""
 MARKS = 64
 """Marks of a channel: a tenth of its record holds some six of them."""
+TRAINING = "training_records"
+"""Where the provenance of a fit keeps digests of its records."""
 FEWEST = 3
 """Marks in common that say that samples are the same."""
 
@@ -70,6 +72,13 @@ class RecordDigest:
             return 1.0
         shares = [_share(self.marks[name], record[name]) for name in known]
         return min((share for share in shares if share is not None), default=0.0)
+
+    def overlaps(self, other: RecordDigest) -> bool:
+        """Whether both hold samples of one record, in every channel that both hold."""
+        names = self.marks.keys() & other.marks.keys()
+        pairs = [(_numbers(self.marks[name]), _numbers(other.marks[name])) for name in names]
+        common = [np.intersect1d(*pair).size for pair in pairs]
+        return self.sha256 == other.sha256 or min(common, default=0) >= FEWEST
 
     def to_dict(self) -> dict[str, object]:
         """Plain values."""

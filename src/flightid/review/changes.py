@@ -131,10 +131,11 @@ def change_table(
     for each in changes:
         factor, unit = each.shown_unit
         told = (cell(number, factor) for number in (each.before, each.after, each.difference))
-        rows.append((each.loop, each.name, unit, *told, "yes" if each.key in significant else ""))
+        said = "yes" if each.key in significant else "" if each.chance is not None else None
+        rows.append((each.loop, each.name, unit, *told, said))
     brackets = (
         f"In brackets: {interval_words(chosen)} intervals. Changed: beyond chance, one false "
-        "“yes” in 20 such tables."
+        "“yes” in 20 such tables; –: not judged."
     )
     return Table(title, columns, tuple(rows), (brackets, *notes))
 
@@ -163,8 +164,9 @@ def verdicts(
             "compare fits or models that know their covariance",
         )  # fmt: skip
     elif not by_loop:
-        count = len({c.loop for c in changes})
-        said = f"{len(changes)} numbers of {count} loop{'' if count == 1 else 's'}"
+        judged = [c for c in changes if c.chance is not None]
+        count = len({c.loop for c in judged})
+        said = f"{len(judged)} numbers of {count} loop{'' if count == 1 else 's'}"
         yield Finding(
             "promise-kept" if promised else "loops-unchanged", Light.GREEN,
             f"{said}: {'flown as promised' if promised else 'no change beyond chance'}",

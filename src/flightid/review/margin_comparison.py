@@ -13,19 +13,22 @@ from numpy.typing import NDArray
 from flightid.control.closed_loop.close_loop import close_loop
 from flightid.control.loops.interconnection import Interconnection
 from flightid.control.margins.gain_limits import measured_up
+from flightid.control.margins.loop_metrics import READ_AT
 from flightid.control.margins.loop_source import BrokenLoop, read_loop
 from flightid.control.margins.margins import MISSING, Margins, loop_numbers, margins_of
 from flightid.control.stepped.gain_controller import GainController
 from flightid.control.stepped.gain_loops import UncertainPlant, gain_loops
+from flightid.control.tuning.margins_beyond import MarginBeyond, beyond_findings, room_above
 from flightid.conventions import Light
 from flightid.dynamics.conditions.ratios import even_error
 from flightid.errors import DataError
 from flightid.findings import Finding
+from flightid.identification.prediction.remembered import training_digests
 from flightid.identification.uncertain_of import source_findings
 from flightid.result import Result
 from flightid.review.changes import LoopChange, change_of, change_table, significant_of, verdicts
 from flightid.table import Table
-from flightid.uncertainty.estimate import Reading
+from flightid.uncertainty.estimate import Estimate, Reading
 from flightid.uncertainty.quantiles import two_sided_chance
 from flightid.uncertainty.uncertain import Uncertain
 
@@ -43,6 +46,12 @@ COMPARED = (
 FIELDS = [field for _, field, _ in COMPARED]
 ONE_MODEL = "Both are of one model, whose errors are common to them: differences hold that."
 TWO_MODELS = "Differences take the models' errors as independent: of different flights or records."
+ONE_RECORD = (
+    "Both models are fitted to one record, whose noise moves both: differences have no interval, "
+    "and nothing says which of them are chance."
+)
+SHARED_ERRORS = "both models are of one record, and their errors hang together"
+BEYOND = "read above the band to which the model was shown to hold"
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -60,6 +69,8 @@ class MarginComparison(Result, schema="flightid.margin_comparison/1"):
         By loop.
     one_model : bool
         Whether both are of one model, so that its errors are common to them.
+    one_record : bool
+        Whether they are of two models that were fitted to the same samples.
     significant : tuple of str
         ``"loop, name"`` of what changed beyond chance.
     findings : tuple of Finding
@@ -78,6 +89,7 @@ class MarginComparison(Result, schema="flightid.margin_comparison/1"):
     before: Mapping[str, Margins]
     after: Mapping[str, Margins]
     one_model: bool
+    one_record: bool
     significant: tuple[str, ...]
     findings: tuple[Finding, ...]
 
@@ -102,7 +114,8 @@ class MarginComparison(Result, schema="flightid.margin_comparison/1"):
         level : float, optional
             Of the intervals.
         """
-        notes = (ONE_MODEL if self.one_model else TWO_MODELS, *map(str, self.findings))
+        apart = ONE_RECORD if self.one_record else TWO_MODELS
+        notes = (ONE_MODEL if self.one_model else apart, *map(str, self.findings))
         title = f"Margins, {self.names[0]} and {self.names[1]}"
         return change_table(title, self.names, self.changes, self.significant, notes, level)
 
@@ -143,7 +156,9 @@ def compare_margins(
 
     Assumes
     -------
-    Two models have independent errors. Intervals are those of `flightid.margins`: of the estimate's
+    Two models have independent errors, unless their files say that both were fitted to the same
+    samples: there is then no interval of a difference. Nor is there one of a number that is read
+    above the band of either fit. Intervals are those of `flightid.margins`: of the estimate's
     covariance, by first order; what a model lacks is not in them. A change is called one by Holm's
     rule: one false verdict in 5 % of comparisons.
 
@@ -170,15 +185,32 @@ def compare_margins(
             found=f"{', '.join(old)} and {', '.join(new)}",
             needed="gains around one input of both",
         )
+    one_record = not one_model and _share_samples(before[0], after[0])
     changes = tuple(
-        change
+        _shared_errors(change) if one_record else change
         for name in shared
         for change in _changes(name, old[name], new[name], one_model=one_model)
     )
     significant = significant_of(changes)
     told = [{name: margins_of(loops[name]) for name in shared} for loops in (old, new)]
-    findings = (*verdicts(changes, significant), *_doubts(names, (before[0], after[0]), told))
-    return MarginComparison(names, changes, told[0], told[1], one_model, significant, findings)
+    findings = (
+        *verdicts(changes, significant),
+        *_doubts(names, (before[0], after[0]), told),
+        *_above(names, [{name: loops[name] for name in shared} for loops in (old, new)]),
+    )
+    return MarginComparison(
+        names, changes, told[0], told[1], one_model, one_record, significant, findings
+    )
+
+
+def _share_samples(before: object, after: object) -> bool:
+    known = training_digests(after)
+    return any(one.overlaps(other) for one in training_digests(before) for other in known)
+
+
+def _shared_errors(change: LoopChange) -> LoopChange:
+    bare = Estimate(change.difference.name, change.difference.value, change.difference.unit)
+    return replace(change, difference=replace(bare, reason=SHARED_ERRORS), chance=None)
 
 
 def _loops(source: object, law: Law, plant: UncertainPlant) -> Mapping[str, BrokenLoop]:
@@ -212,6 +244,7 @@ def _changes(
         apart = both.carried_together(
             lambda pairs: new_rows([b for _, b in pairs]) - old_rows([a for a, _ in pairs])
         )
+    above = [_read_above(loop) for loop in (old, new)]
     for place, (quantity, field, unit) in enumerate(COMPARED):
         one, two = (
             carried.number(place, quantity, unit, MISSING.get(field, "there is none"))
@@ -219,7 +252,12 @@ def _changes(
         )
         if one.value is None and two.value is None:
             continue
-        if apart is None or one.value is None or two.value is None:
+        one, two = (
+            Estimate(quantity, each.value, unit, None, BEYOND) if field in found else each
+            for each, found in zip((one, two), above, strict=True)
+        )
+        beyond = any(field in found for found in above)
+        if apart is None or beyond or one.value is None or two.value is None:
             yield change_of(name, one, two)
         else:
             difference = apart.number(place, f"{quantity}, difference", unit)
@@ -229,6 +267,29 @@ def _changes(
 def _rows(loop: BrokenLoop) -> Callable[[list[Any]], NDArray[np.float64]]:
     omega = measured_up(loop)[0]
     return lambda things: loop_numbers(loop, omega, things, FIELDS)[0]
+
+
+def _read_above(loop: BrokenLoop) -> dict[str, float]:
+    """Numbers that are read above the band of the fit, and where, rad/s."""
+    band = loop.uncertain.valid_rad_s
+    if band is None:
+        return {}
+    omega = measured_up(loop)[0]
+    places = loop_numbers(loop, omega, [loop.uncertain.value], [*READ_AT.values()])[0][0]
+    return {name: float(at) for name, at in zip(READ_AT, places, strict=True) if at > band[1]}
+
+
+def _above(names: Sequence[str], sides: Sequence[Mapping[str, BrokenLoop]]) -> Iterator[Finding]:
+    """What `tune` says of such numbers, of each model by its name."""
+    for name, loops in zip(names, sides, strict=True):
+        for key, loop in loops.items():
+            found, band = _read_above(loop), loop.uncertain.valid_rad_s
+            if found and band is not None:
+                omega = measured_up(loop)[0]
+                beyond = loop.of(loop.uncertain.value, omega[omega > band[1]])
+                each = MarginBeyond(key, max(found.values()), room_above(beyond))
+                for told in beyond_findings([each], band):
+                    yield replace(told, message=f"{name}, {told.message}")
 
 
 def _chance(difference: Reading) -> float | None:

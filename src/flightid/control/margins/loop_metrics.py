@@ -29,6 +29,16 @@ ON_AXIS = 1e-9
 """Share of the imaginary part below which the last point counts as real."""
 OCTAVE = 2.0
 """The gain's slope at the lowest frequencies is taken over this ratio."""
+READ_AT = {
+    "crossover_rad_s": "crossover_rad_s",
+    "phase_margin_deg": "crossover_rad_s",
+    "gain_margin_db": "phase_crossover_rad_s",
+    "gain_reduction_margin_db": "gain_reduction_rad_s",
+    "delay_margin_s": "delay_crossover_rad_s",
+    "sensitivity_peak": "sensitivity_peak_rad_s",
+    "disturbance_bandwidth_rad_s": "disturbance_bandwidth_rad_s",
+}
+"""Numbers of a loop, and the fields that say at which frequency each is read."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +63,8 @@ class LoopMetrics:
         Where that is taken, rad/s.
     delay_margin_s : ndarray
         Delay to spare, s; negative for an unstable loop.
+    delay_crossover_rad_s : ndarray
+        Where that is taken, rad/s.
     sensitivity_peak, complementary_peak : ndarray
         Greatest ``|1/(1+L)|`` and ``|L/(1+L)|``.
     sensitivity_peak_rad_s, complementary_peak_rad_s : ndarray
@@ -79,6 +91,7 @@ class LoopMetrics:
     gain_reduction_margin_db: Array
     gain_reduction_rad_s: Array
     delay_margin_s: Array
+    delay_crossover_rad_s: Array
     sensitivity_peak: Array
     sensitivity_peak_rad_s: Array
     complementary_peak: Array
@@ -285,11 +298,12 @@ def _phase_margins(found: Crossings, sign: Array) -> dict[str, Array]:
     margin, crossover = _worst(found, np.abs(found.value), len(sign))
     # Delay only lags: a phase that has lead to spare has all of the other way round.
     lag = np.where(sign[found.row] > 0.0, np.mod(found.value, 2.0 * np.pi), np.abs(found.value))
-    delay, _ = _worst(found, lag / found.omega, len(sign))
+    delay, where = _worst(found, lag / found.omega, len(sign))
     return {
         "crossover_rad_s": crossover,
         "phase_margin_deg": sign * np.degrees(margin),
         "delay_margin_s": sign * delay,
+        "delay_crossover_rad_s": where,
     }
 
 

@@ -37,6 +37,16 @@ class MarginBeyond:
     omega_rad_s: float
     room_db: float
 
+    @property
+    def words(self) -> str:
+        """What may go wrong there."""
+        if self.room_db <= 0.0:
+            return f"there the loop passes one again, by {-self.room_db:.2g} dB in the model alone"
+        return (
+            f"a resonance there that raises the response by {self.room_db:.2g} dB may make it "
+            "unstable"
+        )
+
 
 def margins_beyond(
     problem: LoopProblem, gains: Array, band_rad_s: tuple[float, float] | None
@@ -64,9 +74,19 @@ def margins_beyond(
         )
         highest = float(np.nanmax(places))
         if name != ANGLE and highest > band_rad_s[1]:
-            room = -20.0 * np.log10(float(np.max(np.abs(loop[..., above]))))
-            found.append(MarginBeyond(name, highest, room))
+            found.append(MarginBeyond(name, highest, room_above(loop[..., above])))
     return tuple(found)
+
+
+def room_above(loop: NDArray[np.complex128]) -> float:
+    """By how much a resonance may raise a loop's response, of any shape, before it passes one, dB.
+
+    Example
+    -------
+    >>> room_above(np.array([0.1j, 0.01]))
+    20.0
+    """
+    return float(-20.0 * np.log10(np.max(np.abs(loop))))
 
 
 def beyond_findings(
@@ -79,8 +99,7 @@ def beyond_findings(
             "margin-beyond-band",
             Light.AMBER if each.room_db < MOST_RAISED_DB else Light.GREEN,
             f"{each.loop}: margins are read up to {each.omega_rad_s:.3g} rad/s, above the "
-            f"{top_rad_s:.3g} rad/s to which the model was shown to hold: a resonance there that "
-            f"raises the response by {each.room_db:.2g} dB may make it unstable, and "
+            f"{top_rad_s:.3g} rad/s to which the model was shown to hold: {each.words}, and "
             "nothing is promised of those margins",
             f"identify up to {TO_SEE_IT * each.omega_rad_s:.3g} rad/s, and sweep that far",
         )

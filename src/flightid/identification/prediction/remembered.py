@@ -12,6 +12,7 @@ from flightid.models import StateSpaceModel
 from flightid.models.model import model_of
 from flightid.record import Record
 from flightid.record.chosen_hold import DECLARED, RECORDED, SEEN
+from flightid.record.digest import TRAINING, RecordDigest
 from flightid.record.hold import HOLDS, InputHold
 
 WORDS = (ESTIMATE, MEASURED, TRIM)
@@ -117,6 +118,12 @@ def of_record(source: object, model: object, record: Record) -> object:
     if not names or not isinstance(model, StateSpaceModel):
         return model
     return with_record_values(model, record, names)
+
+
+def training_digests(source: object) -> list[RecordDigest]:
+    """Of the records behind a fit, or behind the model in its file; none where nothing tells."""
+    entry = provenance_entry(source, TRAINING)
+    return [RecordDigest.from_dict(each) for each in entry] if isinstance(entry, list) else []
 
 
 def provenance_entry(source: object, key: str) -> object:

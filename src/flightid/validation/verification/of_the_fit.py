@@ -10,11 +10,9 @@ import numpy as np
 from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.identification.fit import Fit
-from flightid.identification.prediction.remembered import provenance_entry
-from flightid.identification.training import TRAINING
+from flightid.identification.prediction.remembered import provenance_entry, training_digests
 from flightid.models import StateSpaceModel
 from flightid.record import Record
-from flightid.record.digest import RecordDigest
 from flightid.simulation import metrics
 from flightid.simulation.noise import sampled_noise
 
@@ -142,8 +140,7 @@ def seen_findings(
     outputs : sequence of str
         What is compared.
     """
-    entry = provenance_entry(source, TRAINING)
-    known = [RecordDigest.from_dict(each) for each in entry] if isinstance(entry, list) else []
+    known = training_digests(source)
     findings = []
     for record in records:
         shares = {each.name: each.shared(record, outputs) for each in known}
