@@ -76,6 +76,9 @@ def command(
 
     if len(set(files)) < len(files):
         raise click.UsageError("a file is named twice: parts of a log are flight.BIN@20:80")
+    if laws := [file for file in files if file.endswith(".toml") and _holds_gains(Path(file))]:
+        told = f"MODEL --gains {','.join(laws)}"
+        raise click.UsageError(f"{laws[0]} holds gains, no model: flightid compare {told}")
     flights = [file for file in files if _is_flight(file)]
     if not flights:
         loops = compared_loops(files, axis, gains, feedback, loop_rate_hz)
@@ -113,6 +116,12 @@ def _conditions(
         if needed:
             raise
         return []
+
+
+def _holds_gains(path: Path) -> bool:
+    from flightid.reading import read_toml
+
+    return path.is_file() and "controller" in read_toml(path, "a file")
 
 
 def _is_flight(name: str) -> bool:

@@ -218,7 +218,7 @@ class Evidence(Result, schema="flightid.evidence/1"):
         first = "" if predicted is None else f"{predicted.what}; "
         if self.light is Light.GREEN or reason is None:
             what = f"{first}every check that is needed was made and holds"
-            what = "; ".join((what, *self.limits))
+            what = "; ".join((what, *(limit[:1].lower() + limit[1:] for limit in self.limits)))
             return Finding("evidence", self.light, what)
         if predicted is not None and reason == predicted.finding:
             return Finding("evidence", self.light, reason.message, reason.action)

@@ -84,22 +84,28 @@ def load_model(path: str | Path, *, axis: str | None = None) -> Model:
     if isinstance(path, Path) or name.endswith(".toml"):
         return _build(read_toml(Path(path), "a model file"), axis, name)
     if not _LIBRARY_NAME.fullmatch(name):
-        raise UnknownNameError(
-            "there is no such library model",
-            found=repr(name),
-            needed=f"a .toml file, or one of {', '.join(library_names())}",
-        )
+        raise _no_model(name)
     stem, _, tail = name.rpartition("_")
     if name not in library_names() and stem in library_names():
         name, axis = stem, axis or tail
     if name not in library_names():
-        raise UnknownNameError(
-            "there is no such library model",
-            found=repr(name),
-            needed=f"a .toml file, or one of {', '.join(library_names())}",
-        )
+        raise _no_model(name)
     text = (files("flightid.models") / "library" / f"{name}.toml").read_text(encoding="utf-8")
     return _build(parse_toml(text, "a model file", name), axis, name)
+
+
+def _no_model(name: str) -> UnknownNameError:
+    """Of data in place of a model, the way to one."""
+    if Path(name).is_file():
+        return UnknownNameError(
+            "this file holds no model", found=name, needed="a model's .toml, or a study's folder",
+            action=f"make its model first: flightid run {name}",
+        )  # fmt: skip
+    return UnknownNameError(
+        "there is no such library model",
+        found=repr(name),
+        needed=f"a .toml file, or one of {', '.join(library_names())}",
+    )
 
 
 def load_structure(source: str | Path, *, axis: str | None = None) -> GreyBoxModel:

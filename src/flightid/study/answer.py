@@ -166,7 +166,11 @@ def _next(study: StudyResults, source: str) -> str:
         return f"for gains: flightid tune {source}"
     if all(item.fit is None or item.fit.covariance is None for item in study.identified):
         return "gains of a PID need a model whose errors are known: mend first what is named above"
-    return f"for gains of a PID: flightid tune {source} --controller pi_d"
+    models = [item.fit.model for item in study.identified if item.fit is not None]
+    loop = ""
+    if all(len(each.inputs) + len(each.outputs) > 2 for each in models):
+        loop = f" --loops {models[0].outputs[0]}/{models[0].inputs[0]}"
+    return f"for gains of a PID: flightid tune {source} --controller pi_d{loop}"
 
 
 def _gains(tuning: Tuning) -> Finding:

@@ -208,9 +208,15 @@ def _controllers(
             "no model has the loop that is to be closed",
             found=", ".join(missing) or "models with several inputs or outputs, and no loops named",
             needed="loops as output/input of fitted models",
+            action=f"name one: --loops {_first_loop(known)}",
         )
     refused = tuple(RefusedAxis.by(name, error) for name, error in errors.items())
     return Tuning(tuple(designs.values()), (), refused)
+
+
+def _first_loop(known: Sequence[tuple[Any, object]]) -> str:
+    model = cast(Model, model_of(known[0][0])) if known else None
+    return "OUTPUT/INPUT" if model is None else f"{model.outputs[0]}/{model.inputs[0]}"
 
 
 def _only_loop(model: Model) -> tuple[str, ...]:

@@ -72,12 +72,20 @@ def columns_of(
                 f"the columns do not tell which are {role}",
                 found=columns or "no column that all records have",
                 needed=f"{role} by name",
-                action=f"name them: --{role} {shared[0] if shared else 'NAME'}",
+                action=_name_them(role, [c for c in shared if c not in (*drives, *answers)]),
             )
     left = [name for name in shared if name not in (*drives, *answers)]
     said = [f"Inputs {', '.join(drives)} ({how_in}), outputs {', '.join(answers)} ({how_out})"]
     said += [f"Not used: {', '.join(left)}"] if left else []
     return Columns(drives, answers, tuple(said))
+
+
+def _name_them(role: str, free: Sequence[str]) -> str:
+    """What to do where nothing tells a role: of columns that no role has taken."""
+    if free:
+        return f"name them: --{role} {free[0]}"
+    other = "inputs" if role == "outputs" else "outputs"
+    return f"no column is left for them: name fewer --{other}"
 
 
 def _told(
