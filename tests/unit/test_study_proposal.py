@@ -127,6 +127,8 @@ def test_columns_are_told_by_name_then_unit_or_refused() -> None:
     bare = Record.from_arrays(stamps, others=channels, units={"a": "1", "b": "1"})
     with pytest.raises(StudyError, match="do not tell which are inputs"):
         columns_of([bare], (), ())
+    with pytest.raises(StudyError, match="no column is left for them: name fewer --inputs"):
+        columns_of([bare], ("a", "b"), ())
     with pytest.raises(UnknownNameError, match="no such column"):
         columns_of([bare], ("c",), ())
 
