@@ -76,6 +76,18 @@ def test_process_noise_of_a_fit_is_known_to_its_free_runs() -> None:
     fit = SimpleNamespace(provenance={"process_noise": {"p": 0.3}, "gust": None})
     # dp = -2 p dt + 0.3 dw: the variance 0.0225 (1 - exp(-4 t)), averaged over 5 s.
     mean = 0.0225 * (1.0 - (1.0 - np.exp(-20.0)) / 20.0)
-    found = gust_errors(fit, lag, 5.0)["p"]
+    found = gust_errors(fit, lag, [5.0, 5.0])["p"]
     assert_close(found, np.sqrt(mean), rtol=5e-3, why="a hundred steps")
-    assert gust_errors(SimpleNamespace(provenance={}), lag, 5.0) == {}
+    assert gust_errors(SimpleNamespace(provenance={}), lag, [5.0]) == {}
+    # Each run counts by its own length: that of 1 ms has no time to leave its start.
+    both = gust_errors(fit, lag, [5.0, 0.001])["p"]
+    assert_close(both, found, rtol=1e-3, why="by time")
+    # A run that grows is excused as one that grows by e: 0.09 (exp(0.4 t) - 1)/0.4 over 5 s.
+    grown = gust_errors(fit, lag.with_values({"Lp": 0.5}), [5.0])["p"]
+    mean = 0.225 * ((np.exp(2.0) - 1.0) / 2.0 - 1.0)
+    assert_close(grown, np.sqrt(mean), rtol=2e-2, why="a hundred steps")
+    # A gust of 0.5 rad/s and 2 s, felt as p is: variance 0.25 * 2 / (2 + 1/2).
+    gust = {"state": "p", "deviation": 0.5, "time_s": 2.0, "outputs": []}
+    fit.provenance.update(process_noise={}, gust=gust)
+    felt = gust_errors(fit, lag, [1000.0])["p"]
+    assert_close(felt, np.sqrt(0.2), rtol=1e-3, why="the start's transient")

@@ -4,18 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flightid.conventions import Light
 from flightid.findings import Finding
+from flightid.identification.filter_error.gusts import candidates
 from flightid.identification.fit import Fit
 from flightid.identification.prediction.remembered import provenance_entry, training_digests
+from flightid.identification.records.held_model import LinearPoint
 from flightid.models import StateSpaceModel
 from flightid.record import Record
 from flightid.simulation import metrics
 from flightid.simulation.noise import sampled_noise
 
+Array = NDArray[np.float64]
 SEEN = "training-data"
 """Of a record, or a part of one, that the model was fitted to."""
 GUST_STEPS = 100
@@ -52,8 +57,11 @@ def own_errors(source: object, explained: float) -> dict[str, float]:
     return found
 
 
-def gust_errors(source: object, model: object, duration_s: float) -> dict[str, float]:
-    """What the process noise that a fit found makes of a free run from a known start, by output.
+def gust_errors(source: object, model: object, durations_s: Sequence[float]) -> dict[str, float]:
+    """What the process noise and the gust that a fit found make of free runs, by output.
+
+    A run starts where it is known, the gust at its own variance. A fit whose run would grow is not
+    excused by that: its roots are moved left until none grows by more than e over the run.
 
     Parameters
     ----------
@@ -61,32 +69,62 @@ def gust_errors(source: object, model: object, duration_s: float) -> dict[str, f
         A fit by filter error, or the model in its file; others have no process noise.
     model : object
         Its model, linear.
-    duration_s : float
-        Length of the run, s, over which the variance is averaged.
+    durations_s : sequence of float
+        Length of each run, s, over which the variance is averaged.
 
     Returns
     -------
     dict of str to float
-        Root mean square in the output's unit.
+        Root mean square in the output's unit, of all runs together.
 
     Reference
     ---------
     Jategaonkar, *Flight Vehicle System Identification*, 2nd ed., section 5.2.
     """
     found, gust = (provenance_entry(source, key) for key in ("process_noise", "gust"))
-    if not isinstance(found, Mapping) or gust or not isinstance(model, StateSpaceModel):
+    if not isinstance(found, Mapping) or not isinstance(model, StateSpaceModel):
         return {}
     if not model.is_linear:
         return {}
     a, _, c, _, _ = model.state_space()
-    step_s = duration_s / GUST_STEPS
-    density = np.diag([float(found.get(name, 0.0)) ** 2 for name in model.states])
-    phi, pushed = sampled_noise(a, density, step_s)
-    covariance, power = np.zeros_like(density), np.zeros(len(c))
+    density = np.array([float(found.get(name, 0.0)) ** 2 for name in model.states])
+    start = np.zeros(density.size)
+    if isinstance(gust, Mapping):
+        felt = _with_gust(model, gust, density)
+        if felt is None:
+            return {}
+        (a, c, density), start = felt, np.append(start, float(gust["deviation"]) ** 2)
+    power = sum(t * _power(a, c, np.diag(density), np.diag(start), t) for t in durations_s)
+    errors = np.sqrt(power / sum(durations_s))
+    return dict(zip(model.outputs, map(float, errors), strict=True))
+
+
+def _with_gust(
+    model: StateSpaceModel, gust: Mapping[str, Any], white: Array
+) -> tuple[Array, Array, Array] | None:
+    """A, C and densities of a model with the gust of its fit; None where nothing feels it."""
+    point = LinearPoint.of(model, model.parameters.independent_values())
+    scales, time_s = np.ones(len(model.states)), float(gust["time_s"])
+    seen = [name in gust["outputs"] for name in model.outputs]
+    for each in candidates(point, scales, time_s, time_s):
+        if list(model.states)[each.state] == gust["state"] and list(each.seen) == seen:
+            sizes = [gust["deviation"] / each.deviation_scale, time_s / each.time_scale_s]
+            logs = np.log(np.maximum(sizes, np.finfo(float).tiny))
+            whole = each.added(point, logs)
+            return whole.a[0], whole.c[0], each.process(white, logs)
+    return None
+
+
+def _power(a: Array, c: Array, density: Array, start: Array, duration_s: float) -> Array:
+    """Mean variance of outputs over a run, shape (n_outputs,)."""
+    fastest = float(np.max(np.linalg.eigvals(a).real, initial=0.0))
+    a = a - max(fastest - 1.0 / duration_s, 0.0) * np.eye(len(a))
+    phi, pushed = sampled_noise(a, density, duration_s / GUST_STEPS)
+    covariance, power = start, np.zeros(len(c))
     for _ in range(GUST_STEPS):
         covariance = phi @ covariance @ phi.T + pushed
         power += np.diag(c @ covariance @ c.T) / GUST_STEPS
-    return dict(zip(model.outputs, map(float, np.sqrt(power)), strict=True))
+    return power
 
 
 def weighed(

@@ -207,7 +207,7 @@ def verify(
         seen = None if responses is None else mismatch(model, responses)
         own = own_errors(each, THEIL_GUIDE[0])
         judged = judge(tuple(made), chosen, request, seen, own)
-        gusts = gust_errors(each, model, max(record.duration_s for record in flown))
+        gusts = gust_errors(each, model, [record.duration_s for record in flown])
         verdicts = weighed(judged.findings, THEIL, judged.rms_error, gusts, GUSTS)
         judged = replace(judged, findings=verdicts)
         beside = (
