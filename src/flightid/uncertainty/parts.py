@@ -72,7 +72,7 @@ def chance_alike(flights: Sequence[RecordParts], freedom: float) -> float | None
     Returns
     -------
     float or None
-        None where no parameter is seen by two parts.
+        None where no parameter is seen by two parts, or a part's noise has no finite size.
 
     Reference
     ---------
@@ -95,6 +95,8 @@ def chance_alike(flights: Sequence[RecordParts], freedom: float) -> float | None
     for each in flights:
         m, p = each.scores.shape
         noise = (each.noise / scale[:, None, None] / scale).reshape(m * p, m * p)
+        if not np.isfinite(noise).all():
+            return None
         sizes, turned = np.linalg.eigh(0.5 * (noise + noise.T))
         kept = sizes > LEAST_INFORMATION
         whiten = turned[:, kept].T / np.sqrt(sizes[kept])[:, None]

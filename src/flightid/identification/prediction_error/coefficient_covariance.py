@@ -233,8 +233,11 @@ def _by_colour(
         return found
     known = output_error_covariance(structure, data, found.theta, errors, found.skip)
     block = np.ix_(places, places)
-    apart = np.linalg.inv(np.linalg.inv(found.covariance)[block])
     covariance, freedom = found.covariance.copy(), np.full(places.size, float(found.degrees))
+    across = covariance[np.ix_(~places, places)]
+    # As if C and D were known; what they share may be singular where a root of both cancels.
+    noise = np.linalg.pinv(covariance[np.ix_(~places, ~places)], hermitian=True)
+    apart = covariance[block] - across.T @ noise @ across
     covariance[block] += known.covariance - apart
     freedom[places] = known.freedom
     of_noise = np.ix_(~places, ~places)
