@@ -65,6 +65,14 @@ def test_what_is_read_above_the_band_of_the_fit_is_not_judged() -> None:
     assert [each.light for each in above.findings if each.code == "margin-beyond-band"] == [
         Light.AMBER, Light.AMBER,
     ]  # fmt: skip
+    wide = replace(band, valid_rad_s=(0.5, 1e3))
+    found = fid.compare_margins((wide, {"tau_phi": {"p": 0.3}}), (wide, {"tau_phi": {"p": 0.6}}))
+    twice = found["tau_phi, gain margin"]
+    width = twice.difference.half_width95
+    assert width is not None
+    assert width < 1e-6, "what a gain changes no error of the plant does"
+    assert twice.chance is not None
+    assert twice.chance < 1e-9
 
 
 def test_a_command_compares_two_files_of_gains(
@@ -98,11 +106,7 @@ def test_one_model_shares_its_errors_and_two_do_not() -> None:
     found = compared((fit, SLOW), (fit, QUICK))
     twice = found["p / tau_phi, loop, gain margin"]
     assert_close(twice.difference.value, -20.0 * 0.30103, atol=1e-3, why="all gains are doubled")
-    width = twice.difference.half_width95
-    assert width is not None
-    assert width < 1e-6, "what a gain changes no error of the plant does"
-    assert twice.chance is not None
-    assert twice.chance < 1e-9
+    assert twice.after.reason == BEYOND
     again = compared((fit, SLOW), (replace(fit), QUICK))
     assert again.one_record
     assert all(change.chance is None for change in again.changes)

@@ -112,7 +112,7 @@ def test_one_record_says_that_it_cannot_know() -> None:
     assert "One record does not tell how far flights differ" in found.limit
     evidence = Evidence((found,), ())
     assert evidence.lines == ("Light: green.", f"{found.limit}.")
-    assert evidence.verdict.message.endswith(found.limit)
+    assert evidence.verdict.message.endswith(f"; {found.limit[0].lower()}{found.limit[1:]}")
     assert Check.from_dict(found.to_dict()) == found
 
 
