@@ -100,7 +100,7 @@ def _told(fit: Fit, held: ChosenHold, rivals: Rivals) -> tuple[Fit, ChosenHold]:
         return fit, held
     if finding.light is not Light.GREEN:
         fit = _widened(fit, rivals.as_fitted(known))
-    elif held.hold != "band_limited" and _are_smooth(rivals) and not known[0].is_ruled_out:
+    elif held.hold == "zero" and _are_smooth(rivals) and not known[0].is_ruled_out:
         fit = _widened(fit, rivals.as_fitted(known))
         finding = replace(finding, message=f"{finding.message}, which the intervals reach")
     return fit, replace(held, findings=(*held.findings, finding))
@@ -138,7 +138,7 @@ def _steps_told_otherwise(steps: OtherHold, rivals: Rivals, whose: str) -> Findi
 
 
 def _are_smooth(rivals: Rivals) -> bool:
-    """Whether no input looks like a device's steps; none of a log, which is its loop's."""
+    """Whether no input told as steps looks like a device's; none of a log, which is its loop's."""
     samples = [record[name] for record in rivals.records for name in rivals.fit.model.inputs]
     stairs = any(found_staircase(each) is not None or is_rough(each) for each in samples)
     return not (rivals.logged or stairs)
