@@ -1,0 +1,1 @@
+"""Fleets: thousands of logs through one study, and one catalogue of what came of them."""

@@ -1,0 +1,1 @@
+"""The catalogue: a small file a log, compacted into tables that SQL reads."""
