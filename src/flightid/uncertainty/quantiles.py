@@ -7,7 +7,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 
+import numpy as np
 import scipy
+from numpy.typing import ArrayLike, NDArray
 
 from flightid.errors import OptionError
 
@@ -132,6 +134,40 @@ def tails(level: float = LEVEL) -> tuple[float, float]:
     # Rounded, so that a quantile of draws falls on the draw that the level says.
     outside = round(0.5 * (1.0 - checked_level(level)), 12)
     return outside, 1.0 - outside
+
+
+def student_quantiles(shares: ArrayLike, freedom: float) -> NDArray[np.float64]:
+    """Quantiles of Student's distribution.
+
+    Parameters
+    ----------
+    shares : array_like, shape (n,)
+        Probabilities below, above 0 and below 1.
+    freedom : float
+        Degrees of freedom.
+
+    Example
+    -------
+    >>> student_quantiles([0.5, 0.975], 10.0).round(4).tolist()
+    [0.0, 2.2281]
+    """
+    return np.asarray(scipy.special.stdtrit(freedom, np.asarray(shares, dtype=np.float64)))
+
+
+def normal_quantiles(shares: ArrayLike) -> NDArray[np.float64]:
+    """Quantiles of the normal distribution.
+
+    Parameters
+    ----------
+    shares : array_like, shape (n,)
+        Probabilities below, above 0 and below 1.
+
+    Example
+    -------
+    >>> normal_quantiles([0.5, 0.975]).round(4).tolist()
+    [0.0, 1.96]
+    """
+    return np.asarray(scipy.special.ndtri(np.asarray(shares, dtype=np.float64)))
 
 
 def two_sided_chance(deviations: float) -> float:

@@ -1,0 +1,1 @@
+"""What a fleet's estimates say together: the type, its odd vehicles, and what changed when."""

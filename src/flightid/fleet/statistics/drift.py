@@ -1,0 +1,310 @@
+"""What changed on each vehicle and when: covariates first, then known events, steps and drift."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.fleet.statistics.covariates import (
+    Covariate,
+    CovariateDesign,
+    CovariateSlopes,
+    design_covariates,
+    fit_covariates,
+)
+from flightid.fleet.statistics.events import EventEffect, FleetEvent, event_effect
+from flightid.fleet.statistics.flight_estimates import FlightEstimates
+from flightid.fleet.statistics.largest_step import FEWEST, StepScan, scan_steps
+from flightid.fleet.statistics.local_level import LocalLevel, follow_level
+from flightid.fleet.statistics.multiple_testing import FALSE_SHARE, corrected
+from flightid.fleet.statistics.repeats import RepeatScatter, repeat_scatter
+from flightid.fleet.statistics.wandering import wandering_chance
+from flightid.result import Result
+from flightid.table import Cell, Column, Table
+from flightid.uncertainty.estimate import Estimate, Reading
+from flightid.uncertainty.quantiles import interval_words, shown
+
+Array = NDArray[np.float64]
+TESTS = 2
+"""Tests of a series, a step and a walk, of which the less likely counts times this."""
+TOO_FEW = f"fewer than {FEWEST} flights"
+
+
+@dataclass(frozen=True)
+class StepEnds:
+    """Ends of the interval of a step whose place is not known, percent of the level before."""
+
+    scan: StepScan
+
+    def __call__(self, level: float) -> tuple[float, float]:
+        """Lower and upper end at a level."""
+        return self.scan.percent_ends(level)
+
+
+@dataclass(frozen=True, eq=False)
+class ParameterHistory:
+    """One parameter of one vehicle over time, what covariates explain taken out.
+
+    Attributes
+    ----------
+    vehicle, name, unit : str
+    time_s : ndarray, shape (n,)
+    values, variances : ndarray, shape (n,)
+        What covariates explain is out, by the slopes of all flights; errors as repeats show them.
+    track : LocalLevel
+        The level behind them.
+    step_chance, walk_chance : float or None
+        Chance of a largest step, and of wandering, as large were there none; None with too few
+        flights.
+    change_percent : Estimate
+        Largest step, percent of the level before it, with its interval over all places it may have.
+    changed_s : tuple of float or None
+        Last flight before the step and first behind it at the earliest and latest place, s.
+    false_share : float or None
+        Benjamini–Hochberg over all vehicles and parameters; an alarm at 0.05 or less.
+    events : tuple of EventEffect
+    """
+
+    vehicle: str
+    name: str
+    unit: str
+    time_s: Array
+    values: Array
+    variances: Array
+    track: LocalLevel
+    step_chance: float | None
+    walk_chance: float | None
+    change_percent: Reading
+    changed_s: tuple[float, float] | None
+    false_share: float | None = None
+    events: tuple[EventEffect, ...] = ()
+
+    @property
+    def chance(self) -> float | None:
+        """Chance of either were there neither; None with too few flights."""
+        if self.step_chance is None or self.walk_chance is None:
+            return None
+        return min(1.0, TESTS * min(self.step_chance, self.walk_chance))
+
+    @property
+    def is_alarm(self) -> bool:
+        """Whether it changed, false alarms of the whole fleet accounted for."""
+        return self.false_share is not None and self.false_share <= FALSE_SHARE
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FleetDrift(Result, schema="flightid.fleet_drift/1"):
+    """Histories of every parameter of every vehicle, with what changed.
+
+    Attributes
+    ----------
+    histories : tuple of ParameterHistory
+    repeats : tuple of RepeatScatter
+        Whether flights of one day scatter as their errors say.
+    slopes : mapping of str to tuple of Estimate
+        By parameter: what covariates do.
+    covariates_missing : mapping of str to int
+        Flights that do not tell a covariate.
+
+    Example
+    -------
+    >>> rng = np.random.default_rng(2)
+    >>> values = 10.0 + 0.3 * rng.normal(size=60)
+    >>> values[45:] += 2.0
+    >>> data = FlightEstimates.of(["gain"], ["a"] * 30 + ["b"] * 30, values[:, None],
+    ...                           np.full((60, 1, 1), 0.09), time_s=86400.0 * np.arange(60.0))
+    >>> found = find_drift(data)
+    >>> found, [each.vehicle for each in found.alarms]
+    (FleetDrift(2 histories, 1 changed), ['b'])
+    """
+
+    histories: tuple[ParameterHistory, ...]
+    repeats: tuple[RepeatScatter, ...]
+    slopes: Mapping[str, tuple[Reading, ...]]
+    covariates_missing: Mapping[str, int]
+
+    @property
+    def alarms(self) -> tuple[ParameterHistory, ...]:
+        """Histories that changed, the surest first."""
+        found = [each for each in self.histories if each.is_alarm]
+        return tuple(sorted(found, key=lambda each: each.chance or 0.0))
+
+    def __repr__(self) -> str:
+        """Histories and alarms."""
+        return f"FleetDrift({len(self.histories)} histories, {len(self.alarms)} changed)"
+
+    def summary(self, *, level: float | None = None) -> Table:
+        """One row an alarm."""
+        level = shown(level)
+        words = interval_words(level)
+        columns = (
+            Column("vehicle"),
+            Column("parameter"),
+            Column("change", "%", digits=3),
+            Column(f"{words} low", "%", digits=3),
+            Column(f"{words} high", "%", digits=3),
+            Column("share of false alarms", digits=2),
+            Column("by"),
+        )
+        rows: list[tuple[Cell, ...]] = []
+        for each in self.alarms:
+            low, high = each.change_percent.interval(level) or (None, None)
+            by = "a step" if (each.step_chance or 0.0) <= (each.walk_chance or 0.0) else "drift"
+            rows.append(
+                (
+                    each.vehicle,
+                    each.name,
+                    each.change_percent.value,
+                    low,
+                    high,
+                    each.false_share,
+                    by,
+                )
+            )
+        asked = sum(each.chance is not None for each in self.histories)
+        note = (
+            f"{asked} histories asked, at most {FALSE_SHARE:.0%} of the alarms false "
+            "(Benjamini and Hochberg)."
+        )
+        return Table("What changed", columns, tuple(rows), (note,))
+
+
+def find_drift(
+    data: FlightEstimates,
+    covariates: Mapping[str, Covariate] | None = None,
+    events: Sequence[FleetEvent] = (),
+) -> FleetDrift:
+    """Find what changed: steps and drift at unknown times, and events at known ones.
+
+    Parameters
+    ----------
+    data : FlightEstimates
+        Flights of one type.
+    covariates : mapping of str to sequence, optional
+        One value a flight: number, word or None.
+    events : sequence of FleetEvent
+
+    Returns
+    -------
+    FleetDrift
+
+    Raises
+    ------
+    ShapeError
+        Covariates of another number of flights.
+
+    Assumes
+    -------
+    Errors of flights are independent and normal, with the variances that are given times what
+    repeats within a day show. Biased where no vehicle flew twice a day and errors are understated:
+    scatter then counts as change.
+
+    Reference
+    ---------
+    The modules of `flightid.fleet.statistics` name those of each test.
+    """
+    design = design_covariates(covariates or {})
+    histories: list[ParameterHistory] = []
+    slopes: dict[str, tuple[Reading, ...]] = {}
+    bare = [fit_covariates(data, i, design, _variances(data, i)) for i in range(len(data.names))]
+    repeats = repeat_scatter(_explained(data, design, bare))
+    for i, name in enumerate(data.names):
+        factor = repeats[i].variance_factor
+        fitted = fit_covariates(data, i, design, factor * _variances(data, i))
+        slopes[name] = fitted.effects
+        for vehicle in data.members:
+            found = _history(data, i, vehicle, design, fitted, factor, events)
+            if found is not None:
+                histories.append(found)
+    return FleetDrift(_judged(histories), repeats, slopes, design.missing)
+
+
+def _variances(data: FlightEstimates, i: int) -> Array:
+    return np.where(data.known[:, i], data.covariances[:, i, i], 1.0)
+
+
+def _explained(
+    data: FlightEstimates, design: CovariateDesign, fitted: Sequence[CovariateSlopes]
+) -> FlightEstimates:
+    """Estimates without what covariates explain."""
+    if not design.names:
+        return data
+    moved = np.column_stack([design.columns @ each.slopes for each in fitted])
+    return replace(data, values=np.where(data.known, data.values - moved, 0.0))
+
+
+def _history(
+    data: FlightEstimates,
+    i: int,
+    vehicle: str,
+    design: CovariateDesign,
+    fitted: CovariateSlopes,
+    factor: float,
+    events: Sequence[FleetEvent],
+) -> ParameterHistory | None:
+    rows = np.flatnonzero((data.member_of == data.members.index(vehicle)) & data.known[:, i])
+    if not len(rows):
+        return None
+    rows = rows[np.argsort(data.time_s[rows], kind="stable")]
+    name, unit, time_s = data.names[i], data.units[i], data.time_s[rows]
+    values, variances = data.values[rows, i], factor * data.covariances[rows, i, i]
+    covariance, tested = np.diag(variances), values
+    if design.names:
+        slope, error = fitted.without[vehicle]
+        x = design.columns[rows]
+        # An error of the slopes that is common to all flights moves the level alone.
+        apart = x - x.mean(axis=0)
+        covariance = covariance + apart @ error @ apart.T
+        own = _own_slopes(values, variances, apart, slope, error)
+        tested, values = values - apart @ slope, values - apart @ own
+    track = follow_level(values, variances, time_s)
+    bare = ParameterHistory(
+        *(vehicle, name, unit, time_s, values, variances, track, None, None),
+        Estimate(name, None, "%", reason=TOO_FEW),
+        None,
+        events=tuple(
+            event_effect(event, name, unit, tested, covariance, time_s)
+            for event in events
+            if event.concerns(vehicle)
+        ),
+    )
+    return bare if len(rows) < FEWEST else _tested(bare, tested, covariance)
+
+
+def _own_slopes(values: Array, variances: Array, x: Array, slope: Array, error: Array) -> Array:
+    """Slopes of the other vehicles and of this one's flights together."""
+    weights = 1.0 / variances
+    flat = x - np.average(x, axis=0, weights=weights)
+    information = np.linalg.inv(error)
+    total = information + (flat.T * weights) @ flat
+    return np.asarray(np.linalg.solve(total, information @ slope + (flat.T * weights) @ values))
+
+
+def _tested(history: ParameterHistory, values: Array, covariance: Array) -> ParameterHistory:
+    scan = scan_steps(values, covariance)
+    first, last = scan.place_ends()
+    base = scan.level
+    change: Reading = Estimate(history.name, None, "%", reason="the level before it may be zero")
+    if np.all(np.abs(scan.before) > 3.0 * np.sqrt(scan.before_variances)):
+        percent = 100.0 * scan.size / abs(base)
+        change = Estimate(history.name, percent, "%", ends=StepEnds(scan))
+    return replace(
+        history,
+        step_chance=scan.chance,
+        walk_chance=wandering_chance(values, covariance, history.time_s),
+        change_percent=change,
+        changed_s=(float(history.time_s[first]), float(history.time_s[last + 1])),
+    )
+
+
+def _judged(histories: Sequence[ParameterHistory]) -> tuple[ParameterHistory, ...]:
+    """Every history with its share of false alarms among all."""
+    chances = [each.chance for each in histories]
+    shares = iter(corrected([chance for chance in chances if chance is not None]))
+    return tuple(
+        each if chance is None else replace(each, false_share=float(next(shares)))
+        for each, chance in zip(histories, chances, strict=True)
+    )

@@ -1,0 +1,110 @@
+"""Events at known times, such as a new motor: what each changed, with its interval."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.uncertainty.estimate import Estimate, Reading
+from flightid.uncertainty.quantiles import two_sided_chance
+
+Array = NDArray[np.float64]
+FEW = "no flight before the event, or none behind it"
+
+
+@dataclass(frozen=True)
+class FleetEvent:
+    """Something that was done to vehicles.
+
+    Attributes
+    ----------
+    what : str
+        In words, such as ``"motor replaced"``.
+    time_s : float
+        When, on the clock of the flights.
+    vehicles : tuple of str
+        To which; empty: to all.
+
+    Example
+    -------
+    >>> FleetEvent("motor replaced", 0.0, ("a",)).concerns("b")
+    False
+    """
+
+    what: str
+    time_s: float
+    vehicles: tuple[str, ...] = ()
+
+    def concerns(self, vehicle: str) -> bool:
+        """Whether it was done to a vehicle."""
+        return not self.vehicles or vehicle in self.vehicles
+
+
+@dataclass(frozen=True)
+class EventEffect:
+    """What one event did to one parameter of one vehicle.
+
+    Attributes
+    ----------
+    event : FleetEvent
+    change : Estimate
+        Level behind it less the level before, in the parameter's unit.
+    percent : Estimate
+        The same of the level before; the error of that level is in its interval.
+    chance : float or None
+        Chance of a change as large were there none.
+    """
+
+    event: FleetEvent
+    change: Reading
+    percent: Reading
+    chance: float | None
+
+
+def event_effect(
+    event: FleetEvent, name: str, unit: str, values: Array, covariance: Array, time_s: Array
+) -> EventEffect:
+    """Estimate the step of a series at a known time, by generalised least squares.
+
+    Parameters
+    ----------
+    event : FleetEvent
+    name, unit : str
+        Of the parameter.
+    values : ndarray, shape (n,)
+    covariance : ndarray, shape (n, n)
+    time_s : ndarray, shape (n,)
+
+    Returns
+    -------
+    EventEffect
+
+    Assumes
+    -------
+    The level before stays, and so does the one behind. Percent to first order (delta method).
+
+    Example
+    -------
+    >>> motor = FleetEvent("motor replaced", 1.5)
+    >>> event_effect(motor, "gain", "1", np.array([2.0, 2.0, 3.0, 3.0]), 0.01 * np.eye(4),
+    ...              np.arange(4.0)).percent
+    Estimate(gain = 50 (37.51 to 62.49) %)
+    """
+    behind = time_s >= event.time_s
+    if behind.all() or not behind.any():
+        none: Reading = Estimate(name, None, unit, reason=FEW)
+        return EventEffect(event, none, Estimate(name, None, "%", reason=FEW), None)
+    design = np.column_stack([np.ones(len(values)), behind])
+    weighed = np.linalg.solve(covariance, design)
+    errors = np.linalg.inv(design.T @ weighed)
+    level, step = errors @ (weighed.T @ values)
+    stderr = float(np.sqrt(errors[1, 1]))
+    percent: Reading = Estimate(name, None, "%", reason="the level before may be zero")
+    if abs(level) > 3.0 * np.sqrt(errors[0, 0]):
+        slope = np.array([-step / level, 1.0]) / abs(level)
+        spread = float(np.sqrt(slope @ errors @ slope))
+        percent = Estimate(name, float(100.0 * step / abs(level)), "%", 100.0 * spread)
+    change = Estimate(name, float(step), unit, stderr)
+    return EventEffect(event, change, percent, two_sided_chance(step / stderr))

@@ -1,0 +1,149 @@
+"""One parameter over vehicles: how far they differ beyond their errors, and where the next lies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtrc, chdtri, ndtr
+
+from flightid.errors import DataError
+from flightid.uncertainty.quantiles import LEVEL, student_quantiles, tails
+
+Array = NDArray[np.float64]
+FEWEST = 3
+"""Vehicles without which nothing is said of the next one."""
+SPREADS, MEANS = 200, 60
+"""Quantiles of the spread's confidence distribution, and of Student's about each mean."""
+HALVINGS = 60
+
+
+@dataclass(frozen=True, eq=False)
+class VehicleEstimates:
+    """A parameter of several vehicles, one number with one variance each.
+
+    Attributes
+    ----------
+    values : ndarray, shape (k,)
+    variances : ndarray, shape (k,)
+        Of the errors of `values`, the spread between vehicles not counted.
+
+    Raises
+    ------
+    DataError
+        Fewer than two vehicles.
+
+    References
+    ----------
+    Viechtbauer, *Statistics in Medicine* 26 (2007), 37–52 (interval of the spread by its profile);
+    Higgins & Thompson, *Statistics in Medicine* 21 (2002), 1539–1558 (I²); IntHout, Ioannidis &
+    Borm, *BMC Med. Res. Methodol.* 14:25 (2014) (Hartung–Knapp); Nagashima, Noma & Furukawa,
+    *Stat. Methods Med. Res.* 28 (2019), 1689–1702 (interval of the next).
+
+    Example
+    -------
+    >>> found = VehicleEstimates(np.array([1.0, 2.0, 3.0, 4.0]), np.full(4, 0.01))
+    >>> round(found.inconsistency(5.0 / 3.0 - 0.01), 3), round(found.chance_alike, 6)
+    (0.994, 0.0)
+    """
+
+    values: Array
+    variances: Array
+
+    def __post_init__(self) -> None:
+        if len(self.values) < 2 or self.values.shape != self.variances.shape:
+            raise DataError(
+                "a spread needs several vehicles", found=self.values.shape, needed="2 or more"
+            )
+
+    @property
+    def freedom(self) -> int:
+        """Vehicles beyond the mean."""
+        return len(self.values) - 1
+
+    def weighed(self, spread_variance: Array) -> tuple[Array, Array, Array]:
+        """Mean, sum of weights and weighed squares at variances between vehicles, shapes (m,)."""
+        weights = 1.0 / (self.variances + np.asarray(spread_variance)[:, None])
+        total = weights.sum(axis=1)
+        mean = weights @ self.values / total
+        squares = np.sum(weights * (self.values - mean[:, None]) ** 2, axis=1)
+        return mean, total, squares
+
+    @cached_property
+    def chance_alike(self) -> float:
+        """Chance of differences as large were all vehicles the same (Cochran's Q)."""
+        return float(chdtrc(self.freedom, self.weighed(np.zeros(1))[2][0]))
+
+    def hartung_knapp(self, spread_variance: float) -> float:
+        """Factor of the mean's variance by the scatter that is seen about it."""
+        return float(self.weighed(np.array([spread_variance]))[2][0] / self.freedom)
+
+    def inconsistency(self, spread_variance: float) -> float:
+        """I²: share of the variance of estimates that is between vehicles."""
+        weights = 1.0 / self.variances
+        total = weights.sum()
+        typical = self.freedom * total / (total**2 - np.sum(weights**2))
+        return float(spread_variance / (spread_variance + typical))
+
+    def spread_quantiles(self, shares: Array) -> Array:
+        """Quantiles of the confidence distribution of the variance between vehicles.
+
+        At the true variance the weighed squares are χ² with k − 1 degrees of freedom, exactly so
+        for normal errors, and they fall as it grows: P(variance ≤ v) = P(χ² ≥ Q(v)).
+        """
+        target = chdtri(self.freedom, np.asarray(shares))
+        scale = float(np.var(self.values) + self.variances.mean())
+        low = np.full(len(target), np.log(1e-12 * scale))
+        high = np.full(len(target), np.log(1e12 * scale))
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + high)
+            below = self.weighed(np.exp(middle))[2] > target
+            low, high = np.where(below, middle, low), np.where(below, high, middle)
+        return np.where(self.weighed(np.zeros(1))[2] <= target, 0.0, np.exp(high))
+
+    def spread_ends(self, level: float = LEVEL) -> tuple[float, float]:
+        """Interval of the standard deviation between vehicles, in the values' unit."""
+        low, high = np.sqrt(self.spread_quantiles(np.array(tails(level))))
+        return float(low), float(high)
+
+    @cached_property
+    def _mixture(self) -> tuple[Array, Array, Array]:
+        """Centres (m, j), standard deviations (m, 1) and weights (m, j) of the next one."""
+        shares, weights = _shares(SPREADS)
+        variance = self.spread_quantiles(shares)
+        mean, total, squares = self.weighed(variance)
+        error = np.sqrt(squares / self.freedom / total)
+        places, more = _shares(MEANS)
+        turn = student_quantiles(places, self.freedom)
+        centre = mean[:, None] + error[:, None] * turn
+        return centre, np.sqrt(variance)[:, None], np.outer(weights, more)
+
+    def next_ends(self, level: float = LEVEL) -> tuple[float, float] | None:
+        """Interval that holds the parameter of the next vehicle; None with fewer than three.
+
+        The next vehicle is normal about the mean; mean and spread are as uncertain as their
+        confidence distributions say. No random numbers.
+        """
+        if len(self.values) < FEWEST:
+            return None
+        centre, deviation, weights = self._mixture
+        reach = float(np.max(np.abs(centre - self.values.mean())) + 9.0 * np.max(deviation))
+        found = []
+        for share in tails(level):
+            low, high = self.values.mean() - reach, self.values.mean() + reach
+            for _ in range(HALVINGS // 2):
+                middle = 0.5 * (low + high)
+                inside = ndtr((middle - centre) / np.maximum(deviation, 1e-12 * reach))
+                below = float(np.sum(weights * inside))
+                low, high = (middle, high) if below < share else (low, middle)
+            found.append(float(0.5 * (low + high)))
+        return found[0], found[1]
+
+
+def _shares(count: int) -> tuple[Array, Array]:
+    """Probabilities that lie closer towards 0 and 1, and what each stands for."""
+    even = (np.arange(count) + 0.5) / count
+    weights = even * (1.0 - even)
+    return even**2 * (3.0 - 2.0 * even), weights / weights.sum()

@@ -1,0 +1,277 @@
+"""A step at an unknown time: the largest one, its exact chance, its size and when.
+
+The standardised step at every place where it may stand is a Gaussian Markov chain where errors are
+independent, so the chance that the largest of them exceeds a limit is a chain of one-dimensional
+integrals: no simulation, and exact in the tail where thousands of series are corrected for.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+from scipy.special import ndtr
+
+from flightid.errors import DataError, ShapeError
+from flightid.uncertainty.quantiles import LEVEL, tails
+
+Array = NDArray[np.float64]
+SHORTEST = 3
+"""Flights on either side of a step: a lone odd flight is none."""
+FEWEST = 2 * SHORTEST
+"""Flights without which no step is looked for."""
+NODES = 24
+"""Least number of nodes of each integral."""
+NODES_A_STEP = 5.0
+"""Nodes over the width that the chain moves by in one step."""
+MOST_NODES = 400
+FAR = 8.0
+"""Standard errors from which chances, some 1e-13, are bounded instead of computed."""
+
+
+@dataclass(frozen=True, eq=False)
+class StepScan:
+    """Steps of a series at every place where one may stand: `SHORTEST` flights to either side.
+
+    Attributes
+    ----------
+    sizes : ndarray, shape (m,)
+        Estimated change between the flights before and behind each place.
+    variances : ndarray, shape (m,)
+        Of `sizes`.
+    correlations : ndarray, shape (m − 1,)
+        Between neighbouring steps.
+    before : ndarray, shape (m,)
+        Level before each place.
+    before_variances : ndarray, shape (m,)
+    with_before : ndarray, shape (m,)
+        Covariance of each step with the level before it.
+
+    Example
+    -------
+    >>> scan = scan_steps(np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0]), 0.01 * np.eye(7))
+    >>> scan.place, round(scan.statistic, 1), round(scan.size, 2)
+    (2, 171.4, 1.0)
+    """
+
+    sizes: Array
+    variances: Array
+    correlations: Array
+    before: Array
+    before_variances: Array
+    with_before: Array
+
+    @property
+    def deviations(self) -> Array:
+        """Steps in their standard errors, shape (m,)."""
+        return np.asarray(self.sizes / np.sqrt(self.variances))
+
+    @property
+    def place(self) -> int:
+        """Last flight before the largest step, from 0."""
+        return SHORTEST - 1 + int(np.argmax(np.abs(self.deviations)))
+
+    @property
+    def size(self) -> float:
+        """The largest step."""
+        return float(self.sizes[self.place - SHORTEST + 1])
+
+    @property
+    def level(self) -> float:
+        """Level before the largest step."""
+        return float(self.before[self.place - SHORTEST + 1])
+
+    @property
+    def statistic(self) -> float:
+        """Square of the largest step in standard errors."""
+        return float(np.max(self.deviations**2))
+
+    @cached_property
+    def chance(self) -> float:
+        """Chance of a largest step as large were there none."""
+        return largest_step_chance(self.statistic, self.correlations)
+
+    @cached_property
+    def _shares(self) -> Array:
+        """Posterior of the place under a step of unknown size, shape (m,)."""
+        log = 0.5 * self.deviations**2 + 0.5 * np.log(self.variances)
+        shares = np.exp(log - log.max())
+        return np.asarray(shares / shares.sum())
+
+    def size_ends(self, level: float = LEVEL) -> tuple[float, float]:
+        """Interval of the step's size, over the places where it may have been.
+
+        Of a flat prior on size and place: normal at each place, mixed by how likely each is.
+        """
+        return _mixture_ends(self._shares, self.sizes, np.sqrt(self.variances), level)
+
+    def percent_ends(self, level: float = LEVEL) -> tuple[float, float]:
+        """The same in percent of the level before, whose error counts (delta method)."""
+        share = self.sizes / self.before
+        variance = self.variances - 2.0 * share * self.with_before
+        variance = variance + share**2 * self.before_variances
+        size = np.abs(self.before)
+        sign = np.sign(self.before)
+        ends = _mixture_ends(self._shares, share * sign, np.sqrt(variance) / size, level)
+        return 100.0 * ends[0], 100.0 * ends[1]
+
+    def place_ends(self, level: float = LEVEL) -> tuple[int, int]:
+        """Last flight before the step at the earliest and at the latest."""
+        order = np.argsort(self._shares)[::-1]
+        count = int(np.searchsorted(np.cumsum(self._shares[order]), level)) + 1
+        places = order[:count] + SHORTEST - 1
+        return int(places.min()), int(places.max())
+
+
+def scan_steps(values: Array, covariance: Array) -> StepScan:
+    """Estimate a step at every place of a series, by generalised least squares.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        In order of time.
+    covariance : ndarray, shape (n, n)
+        Of their errors.
+
+    Returns
+    -------
+    StepScan
+
+    Raises
+    ------
+    ShapeError
+        Shapes that do not agree.
+    DataError
+        Fewer than six values, or a covariance that is not positive definite.
+
+    Reference
+    ---------
+    Hawkins, *J. Am. Stat. Assoc.* 72 (1977), 180–186; Worsley, *J. Am. Stat. Assoc.* 74 (1979),
+    365–367.
+    """
+    n = len(values)
+    if covariance.shape != (n, n):
+        raise ShapeError("a covariance of the series", found=covariance.shape, needed=(n, n))
+    if n < FEWEST:
+        raise DataError("a step needs several flights", found=n, needed=f"{FEWEST} or more")
+    # Column by column: the flights behind each place.
+    behind = np.tri(n, n - 1, -1)[:, SHORTEST - 1 : n - SHORTEST]
+    try:
+        root = np.linalg.cholesky(covariance)
+    except np.linalg.LinAlgError as error:
+        raise DataError(
+            "the errors of a series have no positive covariance", needed="a positive definite one"
+        ) from error
+    whitened = np.linalg.solve(root, np.column_stack([np.ones(n), values, behind]))
+    one, y, steps = whitened[:, 0], whitened[:, 1], whitened[:, 2:]
+    total = one @ one
+    steps_alone = steps - np.outer(one, one @ steps) / total
+    information = np.sum(steps_alone**2, axis=0)
+    sizes = steps_alone.T @ y / information
+    neighbours = np.sum(steps_alone[:, :-1] * steps_alone[:, 1:], axis=0)
+    correlations = neighbours / np.sqrt(information[:-1] * information[1:])
+    before = (one @ y - sizes * (one @ steps)) / total
+    variances, shared = 1.0 / information, (one @ steps) / total
+    return StepScan(
+        *(sizes, variances, correlations, before),
+        before_variances=1.0 / total + shared**2 * variances,
+        with_before=-shared * variances,
+    )
+
+
+def _mixture_ends(
+    shares: Array, centres: Array, deviations: Array, level: float
+) -> tuple[float, float]:
+    """Quantiles of a mixture of normals."""
+    reach = 12.0 * float(deviations.max())
+    found = []
+    for share in tails(level):
+        low, high = float(centres.min()) - reach, float(centres.max()) + reach
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            below = float(shares @ ndtr((middle - centres) / deviations))
+            low, high = (middle, high) if below < share else (low, middle)
+        found.append(0.5 * (low + high))
+    return found[0], found[1]
+
+
+def largest_step_chance(statistic: float, correlations: Array) -> float:
+    """Chance that the square of the largest standardised step is above a number were there none.
+
+    Parameters
+    ----------
+    statistic : float
+    correlations : ndarray, shape (m − 1,)
+        Between neighbours of the m standardised steps.
+
+    Returns
+    -------
+    float
+        From 0 to 1, to a relative 1e-6 for independent errors. An approximation where they hang
+        together, as by the error of a covariate: then neighbours alone are accounted for.
+
+    Example
+    -------
+    >>> round(largest_step_chance(3.841458820694, np.zeros(0)), 6)
+    0.05
+    """
+    limit = float(np.sqrt(max(statistic, 0.0)))
+    if limit == 0.0:
+        return 1.0
+    if limit > FAR:  # Bonferroni: what it adds to itself is of no account there
+        return float(min(1.0, 2.0 * (len(correlations) + 1) * ndtr(-limit)))
+    moves = np.sqrt(np.maximum(1.0 - correlations**2, 1e-12))
+    least = float(moves.min(initial=1.0))
+    count = int(min(max(NODES, NODES_A_STEP * limit / least), MOST_NODES))
+    nodes, weights = np.polynomial.legendre.leggauss(count)
+    nodes, weights = 0.5 * limit * (nodes + 1.0), 0.5 * limit * weights
+    # Of the absolute value: what goes to −x comes from x as what goes to x comes from −x.
+    density = 2.0 * _normal(nodes)
+    outside = 2.0 * float(ndtr(-limit))
+    for correlation, move in zip(correlations, moves, strict=True):
+        mass = weights * density
+        leaving = ndtr((correlation * nodes - limit) / move)
+        leaving += ndtr((-correlation * nodes - limit) / move)
+        outside += float(mass @ leaving)
+        shifted = correlation * nodes
+        kernel = _normal((nodes[:, None] - shifted) / move)
+        kernel += _normal((nodes[:, None] + shifted) / move)
+        density = kernel @ mass / move
+    return float(min(outside, 1.0))
+
+
+def _normal(x: Array) -> Array:
+    return np.asarray(np.exp(-0.5 * x**2) / np.sqrt(2.0 * np.pi))
+
+
+def largest_step_limit(n: int, chance: float = 1.0 - LEVEL) -> float:
+    """Square of the largest step that n flights without one exceed with a chance.
+
+    Parameters
+    ----------
+    n : int
+        Flights with equal independent errors.
+    chance : float
+
+    Returns
+    -------
+    float
+        In squared standard errors.
+
+    Raises
+    ------
+    DataError
+        Fewer than six flights.
+
+    Example
+    -------
+    >>> [round(largest_step_limit(n), 1) for n in (20, 60, 200)]
+    [7.3, 8.7, 9.7]
+    """
+    correlations = scan_steps(np.zeros(n), np.eye(n)).correlations
+    return float(
+        brentq(lambda s: largest_step_chance(s, correlations) - chance, 0.01, 400.0, xtol=1e-8)
+    )

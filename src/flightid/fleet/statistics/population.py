@@ -1,0 +1,251 @@
+"""The type: mean, spread between vehicles, and where the next vehicle lies, by parameter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.fleet.statistics.flight_estimates import FlightEstimates
+from flightid.fleet.statistics.heterogeneity import FEWEST, VehicleEstimates
+from flightid.fleet.statistics.spread_search import SpreadFit, search_spreads
+from flightid.result import Result
+from flightid.table import Cell, Column, Table
+from flightid.uncertainty.estimate import Estimate, Reading
+from flightid.uncertainty.quantiles import LEVEL, half_width, interval_words, shown
+
+Array = NDArray[np.float64]
+NO_NEXT = f"fewer than {FEWEST} vehicles say nothing of the next"
+
+
+@dataclass(frozen=True)
+class NextVehicleEnds:
+    """Ends of the interval that holds the next vehicle."""
+
+    vehicles: VehicleEstimates
+
+    def __call__(self, level: float) -> tuple[float, float] | None:
+        """Lower and upper end at a level."""
+        return self.vehicles.next_ends(level)
+
+
+@dataclass(frozen=True)
+class SpreadEnds:
+    """Ends of the interval of a standard deviation between vehicles."""
+
+    vehicles: VehicleEstimates
+
+    def __call__(self, level: float) -> tuple[float, float]:
+        """Lower and upper end at a level."""
+        return self.vehicles.spread_ends(level)
+
+
+@dataclass(frozen=True)
+class TypeParameter:
+    """One parameter of a type.
+
+    Attributes
+    ----------
+    mean : Estimate
+        Of the type; Hartung–Knapp, Student's t with one degree of freedom less than vehicles.
+    spread : Estimate
+        Standard deviation between vehicles.
+    next_vehicle : Estimate
+        The mean with the interval that holds the parameter of the next vehicle.
+    flight_spread : Estimate
+        Standard deviation between flights of one vehicle beyond the errors of the fits.
+    inconsistency_percent : float
+        I²: share of the scatter of vehicles that is no error of estimates.
+    chance_alike : float
+        Chance of differences as large were all vehicles the same.
+    n_vehicles : int
+    """
+
+    mean: Estimate
+    spread: Estimate
+    next_vehicle: Estimate
+    flight_spread: Reading
+    inconsistency_percent: float
+    chance_alike: float
+    n_vehicles: int
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Population(
+    Result,
+    schema="flightid.population/1",
+    untold={"data": "the catalogue keeps the estimates of every flight"},
+):
+    """What the vehicles of a type have in common, and how far they differ.
+
+    Attributes
+    ----------
+    type_name : str
+    parameters : mapping of str to TypeParameter
+    spreads : SpreadFit
+        Mean and covariances of all parameters together.
+    data : FlightEstimates
+
+    Example
+    -------
+    >>> rng = np.random.default_rng(1)
+    >>> truth = -5.0 + 0.5 * rng.normal(size=12)
+    >>> values = np.repeat(truth, 4) + 0.1 * rng.normal(size=48)
+    >>> data = FlightEstimates.of(["Lp"], np.repeat([*"abcdefghijkl"], 4), values[:, None],
+    ...                           np.full((48, 1, 1), 0.01), units=["1/s"])
+    >>> estimate_population(data, "quad")
+    Population('quad', 12 vehicles, 48 flights, 1 parameter, I² 98 % at most)
+    """
+
+    type_name: str
+    parameters: dict[str, TypeParameter]
+    spreads: SpreadFit
+    data: FlightEstimates
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Parameters, in the order of the covariances."""
+        return self.data.names
+
+    @property
+    def next_covariance(self) -> Array:
+        """Covariance of the next vehicle about the mean, for what takes it as normal; shape (p, p).
+
+        Spread and error of the mean, each parameter widened so that its normal 95 % interval is as
+        long as the one that `TypeParameter.next_vehicle` prints: few vehicles tell a spread badly.
+        """
+        plain = self.spreads.between + self.spreads.mean_covariance
+        widened = np.ones(len(self.names))
+        for i, name in enumerate(self.names):
+            half = self.parameters[name].next_vehicle.half()
+            if half is not None:
+                widened[i] = max(half / (half_width(LEVEL) * np.sqrt(plain[i, i])), 1.0)
+        return np.asarray(plain * np.outer(widened, widened))
+
+    def __repr__(self) -> str:
+        """Size and the largest share that is between vehicles."""
+        p, most = len(self.names), max(x.inconsistency_percent for x in self.parameters.values())
+        return (
+            f"Population({self.type_name!r}, {len(self.data.members)} vehicles, "
+            f"{len(self.data.vehicles)} flights, {p} parameter{'s' * (p != 1)}, "
+            f"I² {most:.0f} % at most)"
+        )
+
+    def summary(self, *, level: float | None = None) -> Table:
+        """One row a parameter: mean, spread, next vehicle."""
+        level = shown(level)
+        words = interval_words(level)
+        columns = (
+            Column("parameter"),
+            Column("unit"),
+            Column("mean"),
+            Column(f"mean, {words} low"),
+            Column(f"mean, {words} high"),
+            Column("between vehicles", digits=3),
+            Column("next vehicle low"),
+            Column("next vehicle high"),
+            Column("between flights", digits=3),
+            Column("I²", "%", digits=3),
+            Column("vehicles"),
+        )
+        rows: list[tuple[Cell, ...]] = []
+        for name, found in self.parameters.items():
+            mean = found.mean.interval(level) or (None, None)
+            following = found.next_vehicle.interval(level) or (None, None)
+            unit = "" if found.mean.unit == "1" else found.mean.unit
+            rows.append(
+                (
+                    *(name, unit, found.mean.value, *mean, found.spread.value, *following),
+                    *(found.flight_spread.value, found.inconsistency_percent, found.n_vehicles),
+                )
+            )
+        note = (
+            f"Restricted likelihood, spread between vehicles {self.spreads.structure}, "
+            f"between flights {self.spreads.within_structure}. The next vehicle lies between its "
+            f"two columns with {words}."
+        )
+        return Table(f"Type “{self.type_name}”", columns, tuple(rows), (note,))
+
+
+def estimate_population(
+    data: FlightEstimates,
+    type_name: str = "",
+    *,
+    structure: str | None = None,
+    within_structure: str | None = None,
+) -> Population:
+    """Estimate what the vehicles of a type have in common.
+
+    Parameters
+    ----------
+    data : FlightEstimates
+        Flights of one type.
+    type_name : str
+        For words.
+    structure, within_structure : str, optional
+        Of the spread between vehicles, and between flights of one: ``"diagonal"``, ``"factor"``,
+        ``"full"``; default: what the numbers of vehicles and flights support.
+
+    Returns
+    -------
+    Population
+
+    Raises
+    ------
+    DataError
+        A parameter that fewer than two vehicles tell.
+    FitError
+        No search ended in finite numbers.
+
+    Assumes
+    -------
+    Vehicles are independent draws of one normal population, errors are normal with the covariance
+    that is given. Biased where errors are understated and no vehicle flew twice: they then count as
+    spread between vehicles.
+
+    Reference
+    ---------
+    Jackson, Riley & White, *Statistics in Medicine* 30 (2011), 2481–2498; intervals as in
+    `flightid.fleet.statistics.heterogeneity.VehicleEstimates`.
+    """
+    spreads = search_spreads(data, structure=structure, within_structure=within_structure)
+    own = [spreads.vehicle(place) for place in range(len(data.members))]
+    parameters = {}
+    for i, name in enumerate(data.names):
+        there = [each for each in own if each[2][i]]
+        vehicles = VehicleEstimates(
+            np.array([value[i] for value, _, _ in there]),
+            np.array([covariance[i, i] for _, covariance, _ in there]),
+        )
+        parameters[name] = _parameter(name, data.units[i], i, spreads, vehicles)
+    return Population(type_name, parameters, spreads, data)
+
+
+def _parameter(
+    name: str, unit: str, i: int, spreads: SpreadFit, vehicles: VehicleEstimates
+) -> TypeParameter:
+    variance = float(spreads.between[i, i])
+    mean = float(spreads.mean[i])
+    scatter = vehicles.hartung_knapp(variance)
+    stderr = float(np.sqrt(spreads.mean_covariance[i, i] * scatter))
+    few = len(vehicles.values) < FEWEST
+    within = spreads.within
+    flights: Reading = Estimate(name, None, unit, None, "no vehicle flew twice")
+    if within is not None:
+        flights = Estimate(name, float(np.sqrt(within[i, i])), unit, None, "a spread of its own")
+    return TypeParameter(
+        Estimate(name, mean, unit, stderr, freedom=float(vehicles.freedom)),
+        Estimate(name, float(np.sqrt(variance)), unit, ends=SpreadEnds(vehicles)),
+        Estimate(
+            name,
+            mean,
+            unit,
+            reason=NO_NEXT if few else "",
+            ends=None if few else NextVehicleEnds(vehicles),
+        ),
+        flights,
+        100.0 * vehicles.inconsistency(variance),
+        vehicles.chance_alike,
+        len(vehicles.values),
+    )

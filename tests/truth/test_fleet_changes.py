@@ -1,0 +1,211 @@
+"""What changed on a vehicle: exact chances against simulation, false alarms and power counted."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from flightid.fleet.statistics.drift import FleetDrift, find_drift
+from flightid.fleet.statistics.events import FleetEvent
+from flightid.fleet.statistics.flight_estimates import FlightEstimates
+from flightid.fleet.statistics.largest_step import (
+    largest_step_chance,
+    largest_step_limit,
+    scan_steps,
+)
+from flightid.fleet.statistics.local_level import follow_level
+from flightid.fleet.statistics.multiple_testing import corrected
+from flightid.fleet.statistics.repeats import repeat_scatter
+from flightid.fleet.statistics.wandering import squares_chance, wandering_chance
+
+DAY_S = 86400.0
+
+
+@pytest.mark.parametrize(("n", "limit"), [(20, 7.29), (60, 8.65), (200, 9.66)])
+def test_limits_of_the_largest_step_are_those_of_a_simulation(n: int, limit: float) -> None:
+    found = largest_step_limit(n)
+    assert found == pytest.approx(limit, abs=0.01)
+    draws = np.random.default_rng(n).normal(size=(20_000, n))
+    sums = np.cumsum(draws - draws.mean(axis=1, keepdims=True), axis=1)[:, 2 : n - 3]
+    places = np.arange(3, n - 2)
+    largest = np.max(sums**2 / (places * (n - places) / n), axis=1)
+    # Three standard errors of a share of 20,000.
+    assert np.mean(largest > found) == pytest.approx(0.05, abs=0.0047)
+
+
+def test_chances_of_unequal_errors_are_even_and_bounded_in_the_tail() -> None:
+    rng = np.random.default_rng(3)
+    errors = rng.uniform(0.5, 2.0, 30)
+    covariance = np.diag(errors**2)
+    chances = np.array(
+        [scan_steps(errors * rng.normal(size=30), covariance).chance for _ in range(600)]
+    )
+    for share in (0.05, 0.2, 0.5):
+        assert np.mean(chances < share) == pytest.approx(
+            share, abs=3.3 * np.sqrt(share * (1 - share) / 600)
+        )
+    correlations = scan_steps(np.zeros(30), covariance).correlations
+    near, far = (largest_step_chance(s, correlations) for s in (63.9, 64.1))
+    assert 0.3 < far / near * np.exp(0.1) < 3.0  # exact below 8 standard errors, a bound above
+
+
+def test_the_filter_is_the_regression_that_it_stands_for() -> None:
+    """Level and likelihood of a random walk with an unknown start, by one matrix."""
+    rng = np.random.default_rng(5)
+    n, rate = 12, 0.4
+    time_s = np.sort(rng.uniform(0.0, 10.0, n))
+    variances = rng.uniform(0.2, 1.0, n)
+    values = rng.normal(size=n)
+    found = follow_level(values, variances, time_s, rate)
+    since = time_s - time_s[0]
+    walk = rate * np.minimum(since[:, None], since)
+    total, one = walk + np.diag(variances), np.ones(n)
+    inverse = np.linalg.inv(total)
+    mean = one @ inverse @ values / (one @ inverse @ one)
+    gain = walk @ inverse
+    level = mean + gain @ (values - mean)
+    left = one - gain @ one
+    spread = np.diag(walk - gain @ walk) + left**2 / (one @ inverse @ one)
+    np.testing.assert_allclose(found.level, level, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(found.variance, spread, rtol=0.0, atol=1e-12)
+    cost = np.linalg.slogdet(total)[1] + (values - mean) @ inverse @ (values - mean)
+    cost += np.log(one @ inverse @ one) + (n - 1) * np.log(2.0 * np.pi)
+    assert found.log_likelihood == pytest.approx(-0.5 * cost, rel=1e-12)
+
+
+def test_chances_of_wandering_are_even() -> None:
+    assert squares_chance(18.307038, np.ones(10)) == pytest.approx(0.05, rel=0.01)
+    rng = np.random.default_rng(6)
+    time_s, errors = np.sort(rng.uniform(0.0, 1.0, 25)), rng.uniform(0.5, 2.0, 25)
+    covariance = np.diag(errors**2)
+    chances = np.array(
+        [wandering_chance(errors * rng.normal(size=25), covariance, time_s) for _ in range(2000)]
+    )
+    for share in (0.05, 0.2, 0.5):
+        assert np.mean(chances < share) == pytest.approx(
+            share, abs=3.3 * np.sqrt(share * (1 - share) / 2000) + 0.02 * share
+        )
+
+
+def test_corrected_chances_are_the_published_ones() -> None:
+    """Benjamini & Hochberg (1995), section 3.2: four of fifteen at 5 %."""
+    chances = [
+        *(0.0001, 0.0004, 0.0019, 0.0095, 0.0201, 0.0278, 0.0298, 0.0344, 0.0459, 0.3240),
+        *(0.4262, 0.5719, 0.6528, 0.7590, 1.0),
+    ]
+    found = corrected(chances)
+    assert np.count_nonzero(found <= 0.05) == 4
+    assert found[0] == pytest.approx(0.0015)
+
+
+def _fleet(
+    seed: int,
+    vehicles: int,
+    *,
+    change: float = 0.0,
+    changed: int = 0,
+    understated: float = 1.0,
+    explained: bool = False,
+) -> tuple[FlightEstimates, dict[str, list[float | str | None]]]:
+    """Two flights a day for 20 days, errors of 2 to 5 %; a step behind flight 26 of some."""
+    rng = np.random.default_rng(seed)
+    n = 40
+    days = np.tile(DAY_S * np.repeat(np.arange(20), 2) + np.tile([0.0, 3600.0], 20), vehicles)
+    errors = rng.uniform(0.02, 0.05, vehicles * n)
+    values = np.repeat(1.0 + 0.1 * rng.normal(size=vehicles), n)
+    hit = np.repeat(np.arange(vehicles) < changed, n) & np.tile(np.arange(n) > 25, vehicles)
+    values *= np.where(hit, 1.0 + change, 1.0)
+    values += understated * errors * rng.normal(size=vehicles * n)
+    covariates: dict[str, list[float | str | None]] = {}
+    if explained:
+        battery = rng.uniform(14.0, 17.0, vehicles * n)
+        firmware = np.where(days > 10 * DAY_S, "4.6", "4.5")
+        values += 0.02 * (battery - 15.5) + 0.08 * (firmware == "4.6")
+        covariates = {"battery": battery.tolist(), "firmware": firmware.tolist()}
+    data = FlightEstimates.of(
+        ["gain"],
+        np.repeat([f"{i:03}" for i in range(vehicles)], n).tolist(),
+        values[:, None],
+        (errors**2)[:, None, None],
+        time_s=days,
+    )
+    return data, covariates
+
+
+def _alarms(found: FleetDrift, changed: int) -> tuple[float, float | None]:
+    """Share of vehicles with a false alarm, and of changed ones found."""
+    named = {int(each.vehicle) for each in found.alarms}
+    vehicles = {int(each.vehicle) for each in found.histories}
+    sound = {each for each in vehicles if each >= changed}
+    power = len(named - sound) / changed if changed else None
+    return len(named & sound) / len(sound), power
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("understated", [1.0, 2.0])
+@pytest.mark.parametrize("explained", [False, True])
+def test_500_vehicles_without_change_raise_hardly_an_alarm(
+    understated: float, explained: bool
+) -> None:
+    found = find_drift(*_fleet(11, 500, understated=understated, explained=explained))
+    assert _alarms(found, 0)[0] <= 0.01
+    assert found.repeats[0].understated == pytest.approx(understated, rel=0.05)
+    for test in ("step_chance", "walk_chance"):
+        chances = np.array([getattr(each, test) for each in found.histories])
+        assert np.mean(chances < 0.05) == pytest.approx(0.05, abs=0.03)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("change", "power"), [(0.05, 0.75), (0.1, 0.99), (0.2, 1.0)])
+def test_changes_are_found_with_their_size(change: float, power: float) -> None:
+    found = find_drift(*_fleet(12, 500, change=change, changed=200))
+    false, share = _alarms(found, 200)
+    assert false <= 0.05
+    assert share is not None
+    assert share >= power
+    held = [
+        low <= 100.0 * change <= high
+        for each in found.alarms
+        if int(each.vehicle) < 200
+        for low, high in [each.change_percent.interval95 or (0.0, 0.0)]
+    ]
+    assert 0.91 <= np.mean(held) <= 0.99
+
+
+@pytest.mark.slow
+def test_a_change_of_many_beside_a_new_firmware_is_not_laid_on_the_others() -> None:
+    found = find_drift(*_fleet(13, 500, change=0.1, changed=200, explained=True))
+    false, share = _alarms(found, 200)
+    assert false <= 0.05
+    assert share is not None
+    assert share >= 0.9
+
+
+def test_a_changed_vehicle_is_found_and_a_battery_is_none() -> None:
+    data, covariates = _fleet(14, 12, change=0.2, changed=1, explained=True)
+    found = find_drift(data, covariates, [FleetEvent("motor replaced", 13 * DAY_S, ("000",))])
+    assert [each.vehicle for each in found.alarms] == ["000"]
+    one = found.alarms[0]
+    low, high = one.change_percent.interval95 or (0.0, 0.0)
+    assert low < 20.0 < high
+    assert high - low < 8.0
+    assert one.changed_s is not None
+    assert one.changed_s[0] <= 12.05 * DAY_S <= one.changed_s[1]
+    event = one.events[0]
+    assert event.chance is not None
+    assert event.chance < 1e-6
+    assert not found.histories[5].events
+    slope = next(each for each in found.slopes["gain"] if each.name == "battery")
+    assert slope.value == pytest.approx(0.02, abs=0.003)
+    # Without the covariates their effect is a step on every vehicle.
+    assert len(find_drift(data).alarms) == 12
+
+
+def test_understated_errors_show_in_repeats_and_raise_no_alarm() -> None:
+    data, _ = _fleet(15, 30, understated=2.0)
+    scatter = repeat_scatter(data)[0]
+    assert scatter.freedom == 600
+    assert not scatter.errors_hold
+    low, high = scatter.understated_ends() or (0.0, 0.0)
+    assert low < 2.0 < high
+    assert not find_drift(data).alarms
