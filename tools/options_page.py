@@ -26,6 +26,13 @@ from flightid.dynamics.rotor.options import RotorOptions
 from flightid.excitation import Limits, RateAxis
 from flightid.excitation.options import DesignOptions
 from flightid.export.options import FORMATS
+from flightid.fleet.settings import (
+    EventSettings,
+    FleetQuestions,
+    FleetWords,
+    RunLimits,
+    VehicleRules,
+)
 from flightid.identification.methods import METHODS
 from flightid.identification.reduction.rules import ReductionLimits
 from flightid.logs.options import PartOptions
@@ -108,6 +115,15 @@ STUDY: dict[str, type[Options]] = {
 }
 """Tables of a study that are no verb's alone."""
 
+FLEET: dict[str, type[Options]] = {
+    "[fleet]": FleetWords,
+    "[vehicles]": VehicleRules,
+    "[limits]": RunLimits,
+    "[questions]": FleetQuestions,
+    "[[event]]": EventSettings,
+}
+"""Tables of a fleet file."""
+
 
 def sections() -> dict[str, type[Options]]:
     """Dataclasses by the heading that they stand under."""
@@ -150,6 +166,7 @@ def sections() -> dict[str, type[Options]]:
         "Channels": ChannelOptions,
         "Studies of a log or records (run, new, tune)": ProposalOptions,
         **{f"{table} of a study": options for table, options in STUDY.items()},
+        **{f"{table} of a fleet file": options for table, options in FLEET.items()},
         "A file of published figures": PublishedFigures,
         "[mean_square_error] of such a file": MeanSquareErrors,
         "[[remark]] of such a file": Remark,

@@ -184,6 +184,7 @@ GROUPS = {
         "study.md",
         ("run_study", "Study", "Table", "Finding", "FlightidError"),
     ),
+    "fleet": Group("Fleets", "fleet.md", ("fleet",)),
     "gains": Group(
         "Gains",
         "tuning.md",

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from flightid.version import VERSION as __version__
 
 if TYPE_CHECKING:
-    from flightid import conditioning, excitation, plot, validation
+    from flightid import conditioning, excitation, fleet, plot, validation
     from flightid.control import loops
     from flightid.control.autopilots.axis_loop import AxisLoop
     from flightid.control.autopilots.from_log import axis_loop_of
@@ -237,6 +237,7 @@ _HOMES = {
     "connect": "flightid.control.loops.connect",
     "loops": "flightid.control",
     "excitation": "flightid.excitation",
+    "fleet": "flightid.fleet",
     "identify": "flightid.identification.identify",
     "identify_each": "flightid.identification.identify_each",
     "inspect_log": "flightid.inspection",
@@ -289,7 +290,7 @@ __all__ = [
     "compare_margins", "compare_structures", "compare_with_promise", "conditioning", "connect",
     "derivatives",
     "disk_margin", "disturbance_rejection", "estimate_response", "excitation", "export",
-    "feedback_test", "from_control", "from_scipy", "handling_qualities", "identify",
+    "feedback_test", "fleet", "from_control", "from_scipy", "handling_qualities", "identify",
     "identify_each", "impulse_response", "inspect_log", "interpret", "library_names",
     "load_model", "loops", "lower_order", "margins", "modes", "open_loop", "pilot_cutoff",
     "plan_flight", "plot", "predict", "px4_autotune_gains", "read_log", "read_parameters",

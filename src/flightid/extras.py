@@ -9,6 +9,7 @@ from flightid.errors import OptionError
 
 EXTRAS = {"pandas": "tables", "pyarrow": "parquet", "xarray": "tables"}
 EXTRAS |= dict.fromkeys(("lz4", "rosbags", "zstandard"), "ros")
+EXTRAS |= dict.fromkeys(("dask", "distributed", "duckdb", "fsspec"), "fleet")
 """Extra of the package that installs a library."""
 
 

@@ -134,6 +134,10 @@ OWN = {
         "step_s stop_hz tail_s whole_run widths",
     ),
     "export": ("the target's word", "format"),
+    "fleet": (
+        "a catalogue, and the machines that fill it",
+        "place retry scheduler sql text workers",
+    ),
     "identification": (
         "limits of a reduction; lags of an impulse response; data of many fits",
         "after_rise data_sets drop keep kernel maximum_correlation maximum_cost_rise_percent "

@@ -70,8 +70,10 @@ OF_COMMANDS = {
     "records_span_s": "part of those records",
     "reduce": "drop what the data do not determine",
     "residual_tests": "test residuals",
+    "retry": "take failed logs again",
     "scan": "try several orders",
     "parameters": "file of an autopilot's parameters to fly",
+    "scheduler": "address of a cluster",
     "scenario": "flight to simulate",
     "seed": "seed of random numbers",
     "tune": "gains at the end",
@@ -79,6 +81,7 @@ OF_COMMANDS = {
     "validation": "records that a fit has not seen",
     "value": "another parameter value",
     "version": "this version",
+    "workers": "processes of this machine",
     "write": "file of the result, for other commands",
     "write_no_go": "whether a no-go plan leaves settings",
 }

@@ -27,6 +27,7 @@ WITHOUT_PICTURE = {
     "ExportFiles": "files",
     "SweepPlan": "a card to print",
     "FleetDrift": "the page of the fleet draws the histories of its vehicles",
+    "FleetStatus": "numbers of logs",
     "Flight": "a simulated log, drawn from its records",
     "FilterChoice": "a table; the spectrum behind it is drawn by the flight review",
     "FlownSession": "its record draws itself",

@@ -7,7 +7,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from tools.options_page import STUDY
+from tools.options_page import FLEET, STUDY
 
 from flightid.options import options_of
 
@@ -40,3 +40,10 @@ def test_every_key_of_a_study_is_on_the_page() -> None:
     assert len(keys) > 100
     words = set(re.findall(r"\w+", (ROOT / "docs" / "study.md").read_text(encoding="utf-8")))
     assert sorted(keys - words) == [], "tell these keys in docs/study.md"
+
+
+def test_every_key_of_a_fleet_file_is_on_its_page() -> None:
+    keys = {each.name for table in FLEET.values() for each in options_of(table)}
+    assert len(keys) > 20
+    words = set(re.findall(r"\w+", (ROOT / "docs" / "fleet.md").read_text(encoding="utf-8")))
+    assert sorted(keys - words) == [], "tell these keys in docs/fleet.md"

@@ -1,1 +1,22 @@
 """Fleets: thousands of logs through one study, and one catalogue of what came of them."""
+
+from flightid.fleet.catalogue.catalogue import Catalogue
+from flightid.fleet.opening import open_catalogue as open
+from flightid.fleet.run import FleetRun, run_fleet
+from flightid.fleet.settings import FleetSettings, read_fleet
+from flightid.fleet.status import FleetStatus, fleet_status
+
+__all__ = [
+    "Catalogue",
+    "FleetRun",
+    "FleetSettings",
+    "FleetStatus",
+    "fleet_status",
+    "open",
+    "read_fleet",
+    "run_fleet",
+]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

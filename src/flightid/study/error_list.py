@@ -60,8 +60,13 @@ class ErrorList:
         made = [self.read(read, None, part, *inputs) for part in parts]
         return tuple(item for item in made if item is not None)
 
-    def finish(self) -> None:
+    def finish(self, subject: str = "study file") -> None:
         """Raise what was found: one error as it is, several as one that lists them.
+
+        Parameters
+        ----------
+        subject : str
+            What messages call the file.
 
         Raises
         ------
@@ -74,7 +79,7 @@ class ErrorList:
             raise self.errors[0]
         if self.errors:
             # The same fault in what several parts share is told once.
-            each = (str(error).removeprefix("study file, ") for error in self.errors)
+            each = (str(error).removeprefix(f"{subject}, ") for error in self.errors)
             told = list(dict.fromkeys(each))
             lines = "".join(f"\n- {line}" for line in told)
-            raise StudyError(f"the study file has {len(told)} errors:{lines}")
+            raise StudyError(f"the {subject} has {len(told)} errors:{lines}")

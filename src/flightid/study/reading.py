@@ -25,11 +25,14 @@ class TableReader:
         The parsed table.
     where : str
         How the study file names it, for example ``"[response]"``.
+    subject : str
+        What messages call the file.
     """
 
-    def __init__(self, values: Mapping[str, Any], where: str) -> None:
+    def __init__(self, values: Mapping[str, Any], where: str, subject: str = "study file") -> None:
         self._values = dict(values)
         self._where = where
+        self._subject = subject
         self._known: list[str] = []
 
     def __contains__(self, key: str) -> bool:
@@ -44,7 +47,7 @@ class TableReader:
     @property
     def told(self) -> str:
         """How a message names the table."""
-        return f"study file, {self._where}"
+        return f"{self._subject}, {self._where}"
 
     def options(self, kind: type[Options]) -> dict[str, Any]:
         """What the table gives of a dataclass's options; those that are dataclasses are read."""
@@ -79,7 +82,7 @@ class TableReader:
 
     def table(self, key: str) -> TableReader:
         """A table below; empty where it is absent."""
-        return TableReader(self.values(key), self._heading(key))
+        return TableReader(self.values(key), self._heading(key), self._subject)
 
     def rows(self, key: str) -> list[tuple[str, dict[str, Any]]]:
         """A list of tables below, each with its place in words; empty where it is absent."""
@@ -92,7 +95,7 @@ class TableReader:
 
     def tables(self, key: str) -> list[TableReader]:
         """Readers of a list of tables below; empty where it is absent."""
-        return [TableReader(item, where) for where, item in self.rows(key)]
+        return [TableReader(item, where, self._subject) for where, item in self.rows(key)]
 
     def _heading(self, key: str) -> str:
         """How a table below is named: under one of several by its place."""

@@ -106,7 +106,7 @@ def _run(
     if level is not None:
         settings = replace(settings, level=checked_level(level))
     final = Path(output) if output is not None else source.with_name(f"{source.stem}-output")
-    reads = (source, *_paths(settings), *(() if log is None else (Path(log),)))
+    reads = (source, *named_paths(settings), *(() if log is None else (Path(log),)))
     require_replaceable(final, reads)
     names = tuple(model.name for model in settings.models)
     collected = ErrorList()
@@ -191,19 +191,19 @@ def _write_gains(tuning: Tuning, folder: Path) -> None:
         write_gains(tuning, folder / "controller.c")
 
 
-def _paths(settings: object) -> Iterator[Path]:
-    """Every path that the settings name."""
+def named_paths(settings: object) -> Iterator[Path]:
+    """Every path that the settings of a study name."""
     if isinstance(settings, Path):
         yield settings
     elif isinstance(settings, str):
         yield from [Path(settings)] if settings.endswith(".toml") else []
     elif isinstance(settings, Mapping):
-        yield from (path for value in settings.values() for path in _paths(value))
+        yield from (path for value in settings.values() for path in named_paths(value))
     elif isinstance(settings, tuple | list):
-        yield from (path for value in settings for path in _paths(value))
+        yield from (path for value in settings for path in named_paths(value))
     elif is_dataclass(settings) and not isinstance(settings, type):
         named = (getattr(settings, field.name) for field in fields(settings))
-        yield from (path for value in named for path in _paths(value))
+        yield from (path for value in named for path in named_paths(value))
 
 
 def _write(study: Study, folder: Path) -> None:

@@ -91,6 +91,9 @@ LOGS = _table(
     "Every log that was looked at, refused and failed ones too: one row each.",
     FleetColumn("address", TEXT, "Path or address at which it was found first."),
     FleetColumn("bytes", WHOLE, "Size of the log.", "B"),
+    FleetColumn("stamp", TEXT, "Time of change or ETag where it was found: unread if unchanged."),
+    FleetColumn("id", TEXT, "Of the vehicle, before the table of vehicles gave it a name."),
+    FleetColumn("told", TEXT, "Digest of what the tables of vehicles and flights say of it."),
     FleetColumn("outcome", TEXT, "fitted, refused or failed."),
     FleetColumn("reason", TEXT, "Code of what refused it, or class of the error; else null."),
     FleetColumn("message", TEXT, "The same in words; else null."),
@@ -114,6 +117,7 @@ PARAMETERS = _table(
     FleetColumn("name", TEXT, "Of the parameter."),
     FleetColumn("value", NUMBER, "Estimate; the held value where it is not free.", "unit"),
     FleetColumn("stderr", NUMBER, "Standard error; null where the fit gives no interval.", "unit"),
+    FleetColumn("freedom", NUMBER, "Degrees of freedom behind stderr; null: normal.", "1"),
     FleetColumn("unit", TEXT, "Of value and stderr."),
     FleetColumn("status", TEXT, "free, fixed, at bound or another word of the fit."),
     FleetColumn(
@@ -147,7 +151,7 @@ MARGINS = _table(
     FleetColumn("name", TEXT, "Quantity, such as phase margin."),
     FleetColumn("value", NUMBER, "", "unit"),
     FleetColumn("stderr", NUMBER, "Standard error; null where there is no interval.", "unit"),
-    FleetColumn("low", NUMBER, "Lower end of the 95 % interval; else null.", "unit"),
+    FleetColumn("low", NUMBER, "Lower end of the interval, level 0.95; else null.", "unit"),
     FleetColumn("high", NUMBER, "Upper end; else null.", "unit"),
     FleetColumn("unit", TEXT, "Of all four."),
 )

@@ -1,0 +1,81 @@
+"""``flightid fleet``: thousands of logs through one study, and questions to their catalogue."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from flightid.cli.output import emit, emit_values, json_option, leave_by_verdict, note
+
+FLEET_FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
+
+
+@click.group(short_help="From thousands of logs to one catalogue, and what it tells of vehicles.")
+def command() -> None:
+    """Take all logs of a fleet file through its study, and ask the catalogue of the results.
+
+    docs/fleet.md describes the fleet file and the tables.
+    """
+
+
+@command.command("run", short_help="Take every log that the catalogue lacks.")
+@click.argument("fleet", type=FLEET_FILE)
+@click.option("--workers", type=click.IntRange(min=1), help="Processes; default: one a processor.")
+@click.option(
+    "--scheduler",
+    metavar="ADDRESS",
+    help="Dask scheduler whose workers take the logs, such as tls://host:8786.",
+)
+@click.option("--retry", is_flag=True, help="Take logs again that failed.")
+@json_option
+def run(
+    fleet: Path, workers: int | None, scheduler: str | None, retry: bool, as_json: bool
+) -> None:
+    """Take every log of FLEET that its catalogue lacks, and compact the catalogue.
+
+    A log that fails costs itself alone. Interrupt a run at any time: the next one takes what is
+    missing. The exit code is 1 where no log was found.
+    """
+    from flightid.fleet import run_fleet
+
+    done = run_fleet(fleet, workers=workers, scheduler=scheduler, retry=retry)
+    if as_json:
+        emit_values(done.to_dict())
+    else:
+        click.echo(f"{done.found} logs, {done.kept} of them in the catalogue before")
+        for outcome, number in sorted(done.outcomes.items()):
+            click.echo(f"{number} {outcome}")
+        note(f"Wrote {done.catalogue}")
+    for finding in done.findings:
+        note(str(finding))
+    leave_by_verdict(done.findings)
+
+
+@command.command("status", short_help="Count what is done, refused, failed and missing.")
+@click.argument("place", metavar="FLEET | CATALOGUE")
+@json_option
+def status(place: str, as_json: bool) -> None:
+    """Count the logs of a fleet file, or of a catalogue by its folder or address."""
+    from flightid.fleet import fleet_status
+
+    emit(fleet_status(place), as_json=as_json)
+
+
+@command.command("query", short_help="Answer one SELECT over the tables of the catalogue.")
+@click.argument("place", metavar="FLEET | CATALOGUE")
+@click.argument("sql")
+@json_option
+def query(place: str, sql: str, as_json: bool) -> None:
+    """Answer SQL, one SELECT in DuckDB's dialect, over the tables of the catalogue.
+
+    Nothing but the catalogue can be read, and nothing can be changed.
+    """
+    from flightid import fleet
+
+    with fleet.open(place) as catalogue:
+        answer = catalogue.answer(sql)
+    if as_json:
+        emit_values(answer.to_dict()["rows"])
+    else:
+        click.echo(answer)

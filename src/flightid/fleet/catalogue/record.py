@@ -1,0 +1,127 @@
+"""The record of one log: all its rows in one small JSON document, checked when it is read."""
+
+from __future__ import annotations
+
+import datetime
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from flightid.errors import DataError, FlightidError
+from flightid.fleet.catalogue.schema import (
+    INSTANT,
+    NUMBER,
+    NUMBERS,
+    SCHEMA,
+    TABLES,
+    TEXT,
+    TEXTS,
+    WHOLE,
+    FleetTable,
+)
+
+KEY_LENGTH = 64
+Rows = Mapping[str, Sequence[Mapping[str, Any]]]
+
+
+@dataclass(frozen=True)
+class LogRecord:
+    """All rows of one log.
+
+    Attributes
+    ----------
+    log : str
+        SHA-256 of the log's bytes; of address and stamp, where nobody could read them.
+    rows : mapping of str to sequence of mapping
+        By table, each row by column.
+
+    Example
+    -------
+    >>> record = LogRecord("0" * 64, {"logs": [{"log": "0" * 64, "outcome": "fitted"}]})
+    >>> LogRecord.from_bytes(record.to_bytes()).outcome
+    'fitted'
+    """
+
+    log: str
+    rows: Rows
+
+    @property
+    def outcome(self) -> str:
+        """What became of the log: fitted, refused or failed."""
+        return str(self.rows["logs"][0]["outcome"])
+
+    @property
+    def reason(self) -> str | None:
+        """Code or class of what refused it."""
+        found = self.rows["logs"][0].get("reason")
+        return None if found is None else str(found)
+
+    def to_bytes(self) -> bytes:
+        """The document: columns by name once a table, then bare rows; the same for equal rows."""
+        tables = {
+            name: [table.row(row) for row in self.rows.get(name, ())]
+            for name, table in TABLES.items()
+        }
+        columns = {name: list(TABLES[name].names) for name in tables}
+        values = {"schema": SCHEMA, "log": self.log, "columns": columns, "tables": tables}
+        text = json.dumps(values, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
+        return text.encode()
+
+    @classmethod
+    def from_bytes(cls, content: bytes) -> LogRecord:
+        """A record from its document, every value of the type that its column has.
+
+        Raises
+        ------
+        DataError
+            It is cut short, of another version, or holds what a column cannot.
+        """
+        try:
+            values = json.loads(content)
+            if values["schema"] != SCHEMA:
+                raise DataError("a record of another version", found=values["schema"])
+            if values["columns"] != {name: list(t.names) for name, t in TABLES.items()}:
+                raise DataError("a record with other columns")
+            rows = {name: _rows(table, values["tables"][name]) for name, table in TABLES.items()}
+            log = values["log"]
+            if len(rows["logs"]) != 1 or len(log) != KEY_LENGTH:
+                raise DataError("a record of no log")
+            if any(row["log"] != log for part in rows.values() for row in part):
+                raise DataError("a record of several logs")
+        except FlightidError:
+            raise
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+            raise DataError(
+                "these bytes are no record of a log",
+                found=f"{type(error).__name__}: {error}"[:200],
+                needed=f"a document of {SCHEMA}",
+            ) from error
+        return cls(log, rows)
+
+
+def _rows(table: FleetTable, given: list[list[Any]]) -> list[dict[str, Any]]:
+    kinds = [column.kind for column in table.columns]
+    made = []
+    for row in given:
+        if len(row) != len(kinds):
+            raise ValueError(f"a row of {table.name} has {len(row)} values, not {len(kinds)}")
+        for value, kind in zip(row, kinds, strict=True):
+            if value is not None and not _fits(value, kind):
+                raise ValueError(f"{table.name}: {value!r} is no {kind}")
+        made.append(dict(zip(table.names, row, strict=True)))
+    return made
+
+
+def _fits(value: object, kind: str) -> bool:
+    if kind == TEXT:
+        return isinstance(value, str)
+    if kind == NUMBER:
+        return isinstance(value, int | float) and not isinstance(value, bool)
+    if kind == WHOLE:
+        return isinstance(value, int) and not isinstance(value, bool)
+    if kind == INSTANT:
+        return isinstance(value, str) and bool(datetime.datetime.fromisoformat(value))
+    assert kind in (TEXTS, NUMBERS)
+    inner = TEXT if kind == TEXTS else NUMBER
+    return isinstance(value, list) and all(_fits(item, inner) for item in value)

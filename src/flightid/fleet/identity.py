@@ -1,0 +1,227 @@
+"""Who flew, when, and under which circumstances: from the log, its place, or tables beside it."""
+
+from __future__ import annotations
+
+import csv
+import datetime
+import hashlib
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path, PurePosixPath
+
+import numpy as np
+
+from flightid.errors import FlightidError, StudyError
+from flightid.fleet.settings import FleetSettings, VehicleRules, instant_of
+from flightid.logs import Log
+from flightid.reading import DOCUMENT_BYTES
+
+BOARD = re.compile(r"\b([0-9A-F]{8} [0-9A-F]{8} [0-9A-F]{8})$")
+"""The unique number of the processor, as ArduPilot writes it at the start of a log."""
+SERIAL = "BRD_SERIAL_NUM"
+GPS_EPOCH = datetime.datetime(1980, 1, 6)
+LEAP_S = 18
+"""GPS time before UTC since 2017, s."""
+DATES = re.compile(r"(20\d\d)[-_]?(0[1-9]|1[0-2])[-_]?(0[1-9]|[12]\d|3[01])")
+UNIX_GPS = (("vehicle_gps_position", "time_utc_usec"), ("sensor_gps", "time_utc_usec"))
+OWN = {"id", "vehicle", "type", "log", "flown_at"}
+TABLE_ROWS = 1_000_000
+
+
+@dataclass(frozen=True)
+class FleetTables:
+    """What tables beside the fleet file say, by id of the vehicle and by file name of the log.
+
+    Attributes
+    ----------
+    vehicles, flights : mapping of str to mapping of str to str
+    """
+
+    vehicles: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    flights: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+
+    def of(self, vehicle: str | None, address: str) -> tuple[dict[str, str], dict[str, str]]:
+        """Lines of a vehicle and of a flight; empty where a table has none."""
+        name = PurePosixPath(address).name
+        return dict(self.vehicles.get(vehicle or "", {})), dict(self.flights.get(name, {}))
+
+    def told(self, vehicle: str | None, address: str) -> str:
+        """Digest of both lines: where it changes, the log is taken again."""
+        lines = [sorted(line.items()) for line in self.of(vehicle, address)]
+        return hashlib.sha256(repr(lines).encode()).hexdigest()[:16] if any(lines) else ""
+
+
+@dataclass(frozen=True)
+class LogIdentity:
+    """Who flew a log and when.
+
+    Attributes
+    ----------
+    vehicle, type : str or None
+    flown_at : datetime or None
+        UTC, without zone.
+    flown_at_from : str or None
+        ``"table"``, ``"log"``, ``"name"`` or ``"file"``.
+    covariates : mapping of str to str
+        Other columns of the tables.
+    own : str or None
+        Id as the rules tell it, before a table gave it a name.
+    told : str
+        Digest of what the tables say; empty where they say nothing.
+    """
+
+    vehicle: str | None
+    type: str | None
+    flown_at: datetime.datetime | None
+    flown_at_from: str | None
+    covariates: Mapping[str, str] = field(default_factory=dict)
+    own: str | None = None
+    told: str = ""
+
+
+def read_tables(settings: FleetSettings) -> FleetTables:
+    """Tables of vehicles and flights that the fleet file names.
+
+    Raises
+    ------
+    StudyError
+        A table lacks its first column, names a line twice, or holds a date that is none.
+    """
+    folder, rules = settings.path.parent, settings.vehicles
+    vehicles = _table(folder, rules.table, "id")
+    flights = _table(folder, rules.flight_table, "log")
+    for name, row in flights.items():
+        if row.get("flown_at"):
+            try:
+                instant_of(row["flown_at"])
+            except ValueError as error:
+                raise StudyError(
+                    f"{rules.flight_table}: flown_at of {name} has no meaning",
+                    found=repr(row["flown_at"]),
+                    needed="a day or an instant, such as 2026-03-01T09:30",
+                ) from error
+    return FleetTables(vehicles, flights)
+
+
+def _table(folder: Path, name: str | None, key: str) -> dict[str, dict[str, str]]:
+    """Lines of a CSV by one of its columns."""
+    if name is None:
+        return {}
+    path, found = folder / name, dict[str, dict[str, str]]()
+    if path.stat().st_size > 256 * DOCUMENT_BYTES:
+        raise StudyError(f"{name} is too long for a table of a fleet", needed="at most 256 MiB")
+    with path.open(newline="", encoding="utf-8-sig", errors="replace") as stream:
+        reader = csv.DictReader(stream)
+        if key not in (reader.fieldnames or ()):
+            raise StudyError(
+                f"{name}: its first line names no column {key!r}",
+                found=", ".join(reader.fieldnames or ()) or "nothing",
+            )
+        for row in reader:
+            own = row.pop(key) or ""
+            if own in found:
+                raise StudyError(f"{name}: two lines have one {key}", found=own)
+            found[own] = {column: text for column, text in row.items() if column and text}
+    return found
+
+
+def identify_log(
+    log: Log | None, address: str, changed_s: float | None, rules: VehicleRules, tables: FleetTables
+) -> LogIdentity:
+    """Who flew a log and when, as the rules of the fleet tell.
+
+    Parameters
+    ----------
+    log : Log or None
+        None where it cannot be read: its place may tell all the same.
+    address : str
+    changed_s : float or None
+        Time of the file's last change, s since 1970.
+    rules : VehicleRules
+    tables : FleetTables
+    """
+    own = _own_id(log, address, rules)
+    of_vehicle, of_flight = tables.of(own, address)
+    kind = of_vehicle.get("type") or rules.type or _type(log)
+    flown_at, source = _flown_at(log, address, changed_s, of_flight.get("flown_at"))
+    others = {k: v for k, v in (of_vehicle | of_flight).items() if k not in OWN}
+    name = of_flight.get("vehicle") or of_vehicle.get("vehicle") or own
+    told = tables.told(own, address)
+    return LogIdentity(name, kind, flown_at, source, others, own, told)
+
+
+def _own_id(log: Log | None, address: str, rules: VehicleRules) -> str | None:
+    path = PurePosixPath(address)
+    if rules.by == "folder":
+        return path.parent.name or None
+    if rules.by == "name":
+        found = re.search(rules.pattern or "(.*)", path.name)
+        return None if found is None else found.group(1)
+    return None if log is None else _id_in(log, rules.parameter)
+
+
+def _id_in(log: Log, parameter: str | None) -> str | None:
+    if parameter is not None:
+        value = log.parameters.get(parameter)
+        return None if value is None else f"{value:.10g}"
+    serial = log.parameters.get(SERIAL, 0.0)
+    if serial:
+        return f"{serial:.10g}"
+    texts = (event.text for event in log.events if event.kind == "text")
+    boards = (match.group(1) for text in texts if (match := BOARD.search(text)))
+    return next(boards, None)
+
+
+def _type(log: Log | None) -> str | None:
+    return None if log is None else " ".join(filter(None, (log.kind, log.vehicle)))
+
+
+def _flown_at(
+    log: Log | None, address: str, changed_s: float | None, said: str | None
+) -> tuple[datetime.datetime | None, str | None]:
+    if said:
+        return instant_of(said), "table"
+    if log is not None and (found := _gps_start(log)) is not None:
+        return found, "log"
+    named = DATES.search(PurePosixPath(address).name)
+    if named is not None:
+        year, month, day = map(int, named.groups())
+        try:
+            return datetime.datetime(year, month, day), "name"
+        except ValueError:
+            pass
+    if changed_s is None:
+        return None, None
+    at = datetime.datetime.fromtimestamp(changed_s, datetime.UTC)
+    return at.replace(tzinfo=None, microsecond=0), "file"
+
+
+def _gps_start(log: Log) -> datetime.datetime | None:
+    """Start of the log by its first fix with a date."""
+    try:
+        at_s, fix = _fix(log)
+    except (FlightidError, IndexError):
+        return None
+    if fix is None or log.first_s is None:
+        return None
+    return (fix - datetime.timedelta(seconds=at_s - log.first_s)).replace(microsecond=0)
+
+
+def _fix(log: Log) -> tuple[float, datetime.datetime | None]:
+    if "GPS" in log and {"GWk", "GMS"} <= set(log.messages["GPS"].fields):
+        table = log.table("GPS")
+        row = int(np.argmax(table["GWk"] > 0))
+        week, ms = float(table["GWk"][row]), float(table["GMS"][row])
+        since = datetime.timedelta(weeks=week, milliseconds=ms, seconds=-LEAP_S)
+        return float(table.time_s[row]), GPS_EPOCH + since if 0 < week < 1e5 else None
+    for topic, column in UNIX_GPS:
+        if topic in log and column in log.messages[topic].fields:
+            table = log.table(topic)
+            row = int(np.argmax(table[column] > 0))
+            at = float(table[column][row])
+            begin = datetime.datetime(1970, 1, 1)
+            good = 0 < at < 1e17
+            fix = begin + datetime.timedelta(microseconds=at) if good else None
+            return float(table.time_s[row]), fix
+    return 0.0, None

@@ -1,0 +1,82 @@
+"""Opening a catalogue by its place, or by the fleet file that it belongs to."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from flightid.errors import DataError
+from flightid.fleet.catalogue.catalogue import Catalogue
+from flightid.fleet.catalogue.store import Store, store_at
+from flightid.fleet.engine.order import recipe
+from flightid.fleet.settings import FleetSettings, read_fleet
+
+CURRENT = "fleet.json"
+FLEET_SCHEMA = "flightid.fleet_place/1"
+
+
+def open_catalogue(place: str | Path) -> Catalogue:
+    """Open the catalogue of a fleet for questions.
+
+    Parameters
+    ----------
+    place : str or Path
+        Folder or address of the catalogue, or the fleet file (``*.toml``).
+
+    Returns
+    -------
+    Catalogue
+        Relations of DuckDB and frames of pandas; nothing in it can be changed.
+
+    Raises
+    ------
+    DataError
+        There is no catalogue.
+    OptionError
+        The extra ``fleet`` is not installed.
+
+    Example
+    -------
+    >>> import flightid as fid
+    >>> catalogue = fid.fleet.open("fleet.toml")                     # doctest: +SKIP
+    >>> catalogue.query("select vehicle, count(*) from logs group by all").df()  # doctest: +SKIP
+    """
+    return Catalogue(opened_store(catalogue_place(place)))
+
+
+def catalogue_place(place: str | Path) -> str:
+    """Folder or address of a catalogue, which a fleet file names."""
+    text = str(place)
+    return read_fleet(text).catalogue if text.endswith(".toml") else text
+
+
+def current_store(settings: FleetSettings) -> Store:
+    """The store of a fleet's records for its present study, noted as the one to be opened."""
+    own = recipe(settings)
+    outer = store_at(settings.catalogue)
+    note = {"schema": FLEET_SCHEMA, "current": own, "title": settings.words.title}
+    content = json.dumps(note, indent=1).encode()
+    if not (outer.exists(CURRENT) and outer.read(CURRENT) == content):
+        outer.write(CURRENT, content)
+    return store_at(f"{settings.catalogue.rstrip('/')}/{own}")
+
+
+def opened_store(place: str) -> Store:
+    """The store of a catalogue that a run has noted as the one to be opened.
+
+    Raises
+    ------
+    DataError
+        There is no catalogue at this place.
+    """
+    try:
+        note = json.loads(store_at(place).read(CURRENT))
+        own = str(note["current"])
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise DataError(
+            "there is no catalogue of a fleet here",
+            found=place,
+            needed=f"a folder with {CURRENT}",
+            action="flightid fleet run writes one",
+        ) from error
+    return store_at(f"{place.rstrip('/')}/{own}")

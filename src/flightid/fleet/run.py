@@ -1,0 +1,302 @@
+"""The verb: every log of a fleet file that the catalogue lacks, through the study."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, fields
+from importlib.util import find_spec
+from pathlib import Path
+
+from flightid.conventions import Light
+from flightid.errors import DataError, OptionError
+from flightid.findings import Finding
+from flightid.fleet.addresses import LogAddress, find_logs
+from flightid.fleet.catalogue.compaction import compact, merge, read_columns, rewrite
+from flightid.fleet.catalogue.loose import (
+    BROKEN,
+    loose_logs,
+    loose_name,
+    read_loose,
+    write_loose,
+)
+from flightid.fleet.catalogue.parts import KnownLogs, read_parts
+from flightid.fleet.catalogue.schema import FAILED
+from flightid.fleet.catalogue.store import Store
+from flightid.fleet.engine.cluster import require_address, run_cluster, scheduler_finding
+from flightid.fleet.engine.order import (
+    KILLED,
+    KNOWN,
+    STORAGE,
+    LogOrder,
+    LogOutcome,
+    RunOrder,
+    orders,
+    run_order,
+)
+from flightid.fleet.engine.plain import run_plain
+from flightid.fleet.identity import FleetTables, identify_log, read_tables
+from flightid.fleet.opening import current_store
+from flightid.fleet.run_one import made_record
+from flightid.fleet.settings import FleetSettings, read_fleet
+from flightid.progress import progress
+
+
+@dataclass(frozen=True)
+class FleetRun:
+    """What one run of a fleet did.
+
+    Attributes
+    ----------
+    catalogue : str
+        Folder or address.
+    found : int
+        Logs at the places of the fleet file.
+    kept : int
+        Of these, in the catalogue before.
+    outcomes : mapping of str to int
+        Those that were taken, by outcome.
+    findings : tuple of Finding
+
+    Example
+    -------
+    >>> FleetRun("catalogue", 3, 1, {"fitted": 2})
+    FleetRun(3 logs, 1 kept, 2 fitted)
+    """
+
+    catalogue: str
+    found: int
+    kept: int
+    outcomes: dict[str, int]
+    findings: tuple[Finding, ...] = ()
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values."""
+        return {
+            "catalogue": self.catalogue,
+            "found": self.found,
+            "kept": self.kept,
+            "outcomes": dict(self.outcomes),
+            "findings": [finding.to_dict() for finding in self.findings],
+        }
+
+    def __repr__(self) -> str:
+        """Numbers of logs on one line."""
+        told = ", ".join(f"{n} {name}" for name, n in sorted(self.outcomes.items())) or "none taken"
+        return f"FleetRun({self.found} logs, {self.kept} kept, {told})"
+
+
+def run_fleet(
+    path: str | Path,
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    retry: bool = False,
+) -> FleetRun:
+    """Take every log of a fleet file that its catalogue lacks.
+
+    A log that fails costs itself alone, and is in the catalogue with the reason. Whatever ends a
+    run, the next one takes what is missing; several may run at once.
+
+    Parameters
+    ----------
+    path : str or Path
+        Fleet file; docs/fleet.md describes it.
+    workers : int, optional
+        Processes on this machine; default: one a processor.
+    scheduler : str, optional
+        Address of a Dask scheduler whose workers take the logs: ``"tls://host:8786"``.
+    retry : bool
+        Take logs again that failed: out of time or memory, or by a fault.
+
+    Returns
+    -------
+    FleetRun
+
+    Raises
+    ------
+    StudyError
+        Fleet file or study cannot be carried out as written.
+    OptionError
+        No scheduler answers, or a library is missing.
+    DataError
+        The cluster is gone, or the catalogue cannot be written any more.
+
+    Example
+    -------
+    >>> import flightid as fid
+    >>> fid.fleet.run_fleet("fleet.toml")                            # doctest: +SKIP
+    FleetRun(200 logs, 0 kept, 188 fitted, 12 refused)
+    """
+    settings = read_fleet(path)
+    tables = read_tables(settings)
+    if scheduler is not None:
+        require_address(scheduler)
+    store = current_store(settings)
+    order = run_order(settings, tables, store.root)
+    addresses = find_logs([settings.place(place) for place in settings.words.logs])
+    missing = _missing(store, addresses, tables, retry=retry)
+    counts, findings = Counter[str](), list(_findings(scheduler, addresses))
+    run = _Run(settings, tables, store, order, workers, scheduler)
+    with progress(len(missing), settings.path.stem) as advance:
+        for outcome in run.outcomes(orders(missing, tables)):
+            counts[outcome.outcome] += 1
+            advance()
+    run.tidy(1)
+    kept = len(addresses) - len(missing) + counts.pop(KNOWN, 0)
+    return FleetRun(settings.catalogue, len(addresses), kept, dict(counts), tuple(findings))
+
+
+@dataclass(frozen=True)
+class LogEntry:
+    """What tells whether a record still stands for its log.
+
+    Attributes
+    ----------
+    log, address, stamp, outcome, reason, id, told : str
+        Columns of the table of logs; empty for null.
+    """
+
+    log: str
+    address: str
+    stamp: str
+    outcome: str
+    reason: str
+    id: str
+    told: str
+
+
+def _missing(
+    store: Store, addresses: list[LogAddress], tables: FleetTables, *, retry: bool
+) -> list[LogAddress]:
+    """Logs that no record stands for, by address and stamp alone: nothing is read for it.
+
+    Records of which the tables of vehicles and flights say something else by now are forgotten, and
+    so are broken ones and, where that is asked, those that failed.
+    """
+    done, again = set[tuple[str, str]](), set[str]()
+    for entry in _entries(store):
+        is_stale = entry.told != tables.told(entry.id or None, entry.address)
+        if entry.reason == BROKEN or is_stale or (retry and entry.outcome == FAILED):
+            again.add(entry.log)
+        else:
+            done.add((entry.address, entry.stamp))
+    _forget(store, again)
+    return [each for each in addresses if (each.address, each.stamp) not in done]
+
+
+def _entries(store: Store) -> Iterator[LogEntry]:
+    """Of every record."""
+    names = [each.name for each in fields(LogEntry)]
+    parts, _ = read_parts(store)
+    if parts:
+        yield from (LogEntry(*row) for row in read_columns(store, parts, "logs", names))
+    for record in read_loose(store, loose_logs(store)):
+        entry = record.rows["logs"][0]
+        yield LogEntry(*(str(entry.get(name) or "") for name in names))
+
+
+def _forget(store: Store, logs: set[str]) -> None:
+    """Take logs out of the catalogue."""
+    for log in logs:
+        store.remove(loose_name(log))
+    if not logs:
+        return
+    for part in read_parts(store)[0]:
+        known = KnownLogs(store, [part])
+        if any(map(known.in_parts, logs)):
+            rewrite(store, [part], frozenset(logs))
+
+
+def _findings(scheduler: str | None, addresses: list[LogAddress]) -> Iterator[Finding]:
+    if scheduler is not None and (found := scheduler_finding(scheduler)) is not None:
+        yield found
+    if not addresses:
+        yield Finding(
+            "no-logs",
+            Light.RED,
+            "there is no log at the places of the fleet file",
+            "name folders, globs or addresses in [fleet] logs",
+        )
+
+
+class _Run:
+    """One run: its engine, its second tries, its compactions."""
+
+    def __init__(
+        self,
+        settings: FleetSettings,
+        tables: FleetTables,
+        store: Store,
+        order: RunOrder,
+        workers: int | None,
+        scheduler: str | None,
+    ) -> None:
+        self.settings, self.tables, self.store, self.order = settings, tables, store, order
+        self.workers, self.scheduler = workers, scheduler
+        self.written = 0
+
+    def outcomes(self, logs: list[LogOrder]) -> Iterator[LogOutcome]:
+        """Outcomes of all logs; those that killed their process are tried once more, alone."""
+        again: list[LogOrder] = []
+        for outcome in self._taken(logs, self.workers):
+            if outcome.outcome == KILLED:
+                again.append(LogOrder(outcome.order.address, outcome.order.flight, 2))
+            else:
+                yield self._counted(outcome)
+        for log in again:
+            for outcome in self._taken([log], 1):
+                yield self._counted(self._failed(outcome) if outcome.outcome == KILLED else outcome)
+
+    def _taken(self, logs: list[LogOrder], workers: int | None) -> Iterable[LogOutcome]:
+        if self.scheduler is not None or (find_spec("distributed") and len(logs) > 1):
+            return run_cluster(self.order, logs, workers, self.scheduler)
+        return run_plain(self.order, logs, workers)
+
+    def _counted(self, outcome: LogOutcome) -> LogOutcome:
+        if outcome.outcome == STORAGE:
+            raise DataError(
+                "nothing can be written any more",
+                found=outcome.message,
+                needed="space where the catalogue and temporary files lie",
+                action="make room and run the fleet again: only what is missing is taken",
+            )
+        self.written += 1
+        if self.written % self.settings.limits.compact_every == 0:
+            self.tidy(self.settings.limits.compact_every // 2)
+        return outcome
+
+    def _failed(self, outcome: LogOutcome) -> LogOutcome:
+        """The record of a log that killed its process twice."""
+        address = outcome.order.address
+        identity = identify_log(
+            None, address.address, address.changed_s, self.settings.vehicles, self.tables
+        )
+        entry = {
+            "address": address.address,
+            "bytes": address.n_bytes,
+            "stamp": address.stamp,
+            "outcome": FAILED,
+            "reason": outcome.reason,
+            "message": outcome.message,
+            "models": 0,
+            "attempts": outcome.order.attempts,
+        }
+        failure = {
+            "kind": outcome.reason,
+            "message": outcome.message,
+            "stage": outcome.stage,
+            "signal": outcome.signal,
+            "elapsed_s": outcome.elapsed_s,
+        }
+        rows = {"failures": [failure]}
+        write_loose(self.store, made_record(outcome.log, identity, entry, rows))
+        return LogOutcome(outcome.order, FAILED, outcome.log, outcome.reason, outcome.message)
+
+    def tidy(self, at_least: int) -> None:
+        """Compact where the libraries for it are installed; loose files count all the same."""
+        try:
+            compact(self.store, at_least=at_least)
+            merge(self.store)
+        except OptionError:
+            return

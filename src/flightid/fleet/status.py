@@ -1,0 +1,115 @@
+"""How far a fleet is, from names and manifests alone: no query, and no library of the extra."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from flightid.fleet.addresses import find_logs
+from flightid.fleet.catalogue.loose import QUARANTINE, loose_logs, read_loose
+from flightid.fleet.catalogue.parts import PARTS, KnownLogs, read_parts
+from flightid.fleet.catalogue.store import Store
+from flightid.fleet.opening import catalogue_place, opened_store
+from flightid.fleet.settings import read_fleet
+from flightid.result import Result
+from flightid.table import Column, Table
+
+
+@dataclass(frozen=True)
+class FleetStatus(Result, schema="flightid.fleet_status/1"):
+    """How far a fleet is.
+
+    Attributes
+    ----------
+    catalogue : str
+        Folder or address.
+    found : int or None
+        Logs at the places of the fleet file; None where the catalogue alone was named.
+    outcomes : mapping of str to int
+        Logs in the catalogue by outcome.
+    parts, loose : int
+        Compacted tables, and files that are not compacted yet.
+    quarantine : tuple of str
+        Records and parts that could not be read.
+    n_bytes : int
+        Size of parts and loose files, B.
+
+    Example
+    -------
+    >>> FleetStatus("catalogue", None, {"fitted": 2}, 1, 0)
+    FleetStatus(2 fitted)
+    """
+
+    catalogue: str
+    found: int | None
+    outcomes: Mapping[str, int]
+    parts: int
+    loose: int
+    quarantine: tuple[str, ...] = ()
+    n_bytes: int = 0
+
+    @property
+    def n_logs(self) -> int:
+        """Logs in the catalogue."""
+        return sum(self.outcomes.values())
+
+    def summary(self) -> Table:
+        """Table of the numbers."""
+        rows: list[tuple[str, int | str | None]] = [("logs found", self.found)]
+        rows += [(f"{name} logs", n) for name, n in sorted(self.outcomes.items())]
+        rows += [("parts", self.parts), ("loose files", self.loose)]
+        rows += [
+            ("in quarantine", len(self.quarantine)),
+            ("size [MB]", f"{self.n_bytes / 1e6:.2f}"),
+        ]
+        return Table(f"Catalogue {self.catalogue}", (Column("what"), Column("number")), tuple(rows))
+
+    def __repr__(self) -> str:
+        """Numbers of logs on one line."""
+        told = ", ".join(f"{n} {name}" for name, n in sorted(self.outcomes.items())) or "no logs"
+        return f"FleetStatus({told})"
+
+
+def fleet_status(place: str | Path) -> FleetStatus:
+    """Count what is in a catalogue.
+
+    Parameters
+    ----------
+    place : str or Path
+        Fleet file (``*.toml``), whose places are counted too, or the catalogue's folder or address.
+
+    Raises
+    ------
+    DataError
+        There is no catalogue.
+
+    Example
+    -------
+    >>> import flightid as fid
+    >>> fid.fleet.fleet_status("fleet.toml")                         # doctest: +SKIP
+    FleetStatus(188 fitted, 12 refused)
+    """
+    where = catalogue_place(place)
+    found = None
+    if str(place).endswith(".toml"):
+        settings = read_fleet(place)
+        found = len(find_logs([settings.place(each) for each in settings.words.logs]))
+    return _counted(opened_store(where), where, found)
+
+
+def _counted(store: Store, where: str, found: int | None) -> FleetStatus:
+    parts, broken = read_parts(store)
+    known = KnownLogs(store, parts)
+    loose = [log for log in loose_logs(store) if not known.in_parts(log)]
+    counts = Counter[str]()
+    for part in parts:
+        counts.update(part.outcomes)
+    n_bytes = sum(size for part in parts for size in part.sizes.values())
+    for record in read_loose(store, loose):
+        counts[record.outcome] += 1
+        n_bytes += len(record.to_bytes())
+    kept = (f"{QUARANTINE}/{name}" for name in sorted(store.names(QUARANTINE)))
+    unusable = (*kept, *(f"{PARTS}/{name}" for name in broken))
+    return FleetStatus(where, found, dict(counts), len(parts), len(loose), unusable, n_bytes)
