@@ -18,9 +18,13 @@ class Details:
     ----------
     spent : tuple of int
         Parameters that shaped the residuals' own past, and their relation to one input.
+    undetermined : str
+        Why some numbers of the vehicle have no errors while others have: nothing computed from all
+        of them has an interval then. Empty where all are known.
     """
 
     spent: tuple[int, int] = field(default=(0, 0), kw_only=True)
+    undetermined: str = field(default="", kw_only=True)
 
     @property
     def words(self) -> str:

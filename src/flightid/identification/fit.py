@@ -228,8 +228,10 @@ class Fit(
     @property
     def withheld(self) -> str:
         """Why there is no covariance, as findings or else the parameters say it; may be empty."""
-        if self.covariance is not None:
+        if self.carried is not None:
             return ""
+        if self.details is not None and self.details.undetermined:
+            return str(self.details.undetermined)
         said = [each.message for each in self.findings if each.code in WITHHOLDING]
         # Of a black box only coefficients with intervals are named.
         names = [name for name in self.names or self.parameters if name in self.parameters]
@@ -241,8 +243,11 @@ class Fit(
         """Covariance as it goes on to other numbers, whose intervals are normal: shape (n, n).
 
         Where few records tell how far vehicles lie apart, it is larger than `covariance` by what
-        Student's distribution adds to a 95 % interval.
+        Student's distribution adds to a 95 % interval. None where some numbers of the vehicle have
+        no errors: taken for exact they would make what is computed look known.
         """
+        if self.details is not None and self.details.undetermined:
+            return None
         apart = self.agreement is not None and self.agreement.freedom is not None
         if self.covariance is None or not apart:
             return self.covariance

@@ -15,8 +15,9 @@ from flightid.dynamics.continuous import to_continuous
 from flightid.errors import DataError, FlightidError
 from flightid.evidence.evidence import LOOP
 from flightid.findings import Finding
-from flightid.identification.fit import WITHHOLDING
+from flightid.identification.fit import WITHHOLDING, Fit
 from flightid.identification.model_error import ModelErrorBound
+from flightid.identification.simpler_structure import simpler_fit
 from flightid.identification.uncertain_of import evidence_behind, uncertain_of
 from flightid.models import InnovationsModel, PolynomialModel
 from flightid.models.linear.linear_system import LinearSystem
@@ -27,6 +28,8 @@ CORNER = 2.0
 """Standard deviations from the estimate to the corners that a search begins with."""
 UNEXPLAINED_PERCENT = 20.0
 """Of an output's variance: beyond it no gains, whatever the residuals are."""
+SIMPLER = "simpler-structure"
+"""Code of gains for a simpler structure than the one that was asked for."""
 Array = NDArray[np.float64]
 
 
@@ -123,6 +126,7 @@ def gather(
         No covariance, no identified band, a fit or a verification that is red, too much that the
         model does not explain.
     """
+    source, choice = (source, ()) if nominal else _with_errors(source)
     uncertain: Uncertain[Any] = uncertain_of(source)
     errors = errors_of(source)
     band = identified_band(source, errors, pairs, band_rad_s)
@@ -130,7 +134,7 @@ def gather(
     if band is None and needs_band:
         refusals.append(no_band(errors, pairs))
     findings = [_accepted(each, accept_red=accept_red) for each in refusals]
-    findings += _judged(source)
+    findings += [*choice, *_judged(source)]
     if not uncertain.known and nominal:
         findings.append(
             Finding(
@@ -156,6 +160,16 @@ def gather(
         },
         errors,
     )
+
+
+def _with_errors(source: object) -> tuple[object, tuple[Finding, ...]]:
+    """The source, or the simpler fit for one whose orders are too high for errors."""
+    simpler = simpler_fit(source) if isinstance(source, Fit) else None
+    if simpler is None:
+        return source, ()
+    action = "identify with these orders, so that the model of the gains is the one you keep"
+    text = f"gains rest on {simpler.reason}"
+    return simpler.fit, (Finding(SIMPLER, Light.AMBER, text, action),)
 
 
 def _accepted(refusal: DataError, *, accept_red: bool) -> Finding:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -148,6 +148,7 @@ def _assemble(
             model.difference_equation(),
             model.factored(),
             spent=spent(structure),
+            undetermined=_undetermined(found, parameters),
         ),
     )
 
@@ -173,6 +174,12 @@ def _parameters(
         degrees = found.degrees if found.freedom is None else float(found.freedom[place])
         made[name] = Estimate(name, value, unit, stderr, freedom=degrees, status="free")
     return made
+
+
+def _undetermined(found: SearchResult, parameters: Mapping[str, Estimate]) -> str:
+    """Why coefficients of the vehicle have no errors, where the others keep theirs."""
+    bare = found.covariance is not None and any(p.reason == CANCELS for p in parameters.values())
+    return CANCELS if bare else ""
 
 
 def _free_runs(model: PolynomialModel, data: SampledChannels) -> list[Array]:

@@ -13,6 +13,9 @@ from flightid.models.innovations.structure import SubspaceStructure
 from flightid.models.sampled.recursion import spectral_radius
 
 AT_CIRCLE = 1e-3
+PREDICTOR_AT_CIRCLE = (
+    "a pole of the predictor may lie on the unit circle, where errors to first order do not hold"
+)
 
 
 def judge_innovations(
@@ -64,8 +67,7 @@ def _predictor(*, at_circle: bool) -> list[Finding]:
         Finding(
             "root-at-circle",
             Light.AMBER,
-            "a pole of the predictor may lie on the unit circle, where errors to first order do "
-            "not hold: poles, zeros and gains have no intervals",
+            f"{PREDICTOR_AT_CIRCLE}: poles, zeros and gains have no intervals",
             "difference or detrend the data less, or lower the order",
         )
     ]

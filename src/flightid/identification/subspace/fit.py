@@ -25,7 +25,7 @@ from flightid.identification.subspace.data import SubspaceData, acts_at_once, ga
 from flightid.identification.subspace.details import SubspaceDetails
 from flightid.identification.subspace.determinant import log_determinant
 from flightid.identification.subspace.estimate import Matrices, decompose, realise
-from flightid.identification.subspace.findings import judge_innovations
+from flightid.identification.subspace.findings import PREDICTOR_AT_CIRCLE, judge_innovations
 from flightid.identification.subspace.order import OrderChoice, choose_order, determinant_criteria
 from flightid.identification.subspace.prediction_errors import (
     Predictor,
@@ -211,6 +211,7 @@ def _assemble(
             repr(choice),
             # Poles and gains of the predictor shape each correlation; input matrices the other.
             spent=spent,
+            undetermined=PREDICTOR_AT_CIRCLE if at_circle else "",
             order=choice,
         ),
     )
