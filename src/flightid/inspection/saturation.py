@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flightid.inspection.actuators import Actuators
 from flightid.inspection.axes import axes_of
@@ -35,60 +37,96 @@ class Saturation:
     share: float
 
 
+@dataclass(frozen=True, eq=False)
+class LimitContact:
+    """When something was at a limit in the air.
+
+    Attributes
+    ----------
+    what, limit : str
+        As in `Saturation`.
+    time_s : ndarray, shape (n,)
+        Stamps in the air, s.
+    touched : ndarray of bool, shape (n,)
+        Whether it was at the limit.
+    """
+
+    what: str
+    limit: str
+    time_s: NDArray[np.float64]
+    touched: NDArray[np.bool_]
+
+    def spans(self, apart_s: float) -> list[Span]:
+        """Spans at the limit, s; those closer than `apart_s` are one."""
+        stamps = self.time_s[self.touched]
+        if stamps.size == 0:
+            return []
+        ends = np.flatnonzero(np.diff(stamps) > apart_s)
+        firsts, lasts = np.r_[0, ends + 1], np.r_[ends, stamps.size - 1]
+        return [(float(stamps[i]), float(stamps[k])) for i, k in zip(firsts, lasts, strict=True)]
+
+
 def saturations(
     log: Log, spans: tuple[Span, ...], actuators: Actuators | None
 ) -> tuple[Saturation, ...]:
     """Everything that was at a limit for part of the flight, most first."""
     found = [
-        *_motors(actuators, spans),
-        *_commands(log, spans),
-        *_gyroscopes(log, spans),
+        Saturation(each.what, each.limit, float(np.mean(each.touched)))
+        for each in limit_contacts(log, spans, actuators)
     ]
     return tuple(
         sorted((one for one in found if one.share > 0), key=lambda one: one.share, reverse=True)
     )
 
 
-def _motors(actuators: Actuators | None, spans: tuple[Span, ...]) -> list[Saturation]:
+def limit_contacts(
+    log: Log, spans: tuple[Span, ...], actuators: Actuators | None
+) -> Iterator[LimitContact]:
+    """Whatever can be at a limit, with the samples at which it was."""
+    yield from _motors(actuators, spans)
+    yield from _commands(log, spans)
+    yield from _gyroscopes(log, spans)
+
+
+def _motors(actuators: Actuators | None, spans: tuple[Span, ...]) -> Iterator[LimitContact]:
     if actuators is None:
-        return []
+        return
     mask = inside(actuators.time_s, spans)
     if not np.any(mask):
-        return []
-    slack = EDGE * (actuators.high - actuators.low)
-    found = []
+        return
+    slack, time_s = EDGE * (actuators.high - actuators.low), actuators.time_s[mask]
+    low, high = f"lower limit {actuators.low:.4g}", f"upper limit {actuators.high:.4g}"
     for name, values in zip(actuators.names, actuators.values[:, mask], strict=True):
         label = f"{actuators.message}.{name}"
-        at_low = float(np.mean(values <= actuators.low + slack))
-        at_high = float(np.mean(values >= actuators.high - slack))
-        found.append(Saturation(label, f"lower limit {actuators.low:.4g}", at_low))
-        found.append(Saturation(label, f"upper limit {actuators.high:.4g}", at_high))
-    return found
+        yield LimitContact(label, low, time_s, values <= actuators.low + slack)
+        yield LimitContact(label, high, time_s, values >= actuators.high - slack)
 
 
-def _commands(log: Log, spans: tuple[Span, ...]) -> list[Saturation]:
-    found = []
+def _commands(log: Log, spans: tuple[Span, ...]) -> Iterator[LimitContact]:
     for axis in axes_of(log.vehicle).values():
         signal = find(log, axis.command)
-        values = signal.within(spans) if signal is not None else np.empty(0)
-        if signal is not None and signal.unit == "1" and values.size:
-            share = float(np.mean(np.abs(values) >= 1.0 - EDGE))
-            found.append(Saturation(signal.label, "mixer limit 1", share))
-    return found
+        if signal is None or signal.unit != "1":
+            continue
+        mask = inside(signal.time_s, spans)
+        touched = np.abs(signal.values[mask]) >= 1.0 - EDGE
+        if touched.size:
+            yield LimitContact(signal.label, "mixer limit 1", signal.time_s[mask], touched)
 
 
-def _gyroscopes(log: Log, spans: tuple[Span, ...]) -> list[Saturation]:
-    found = []
+def _gyroscopes(log: Log, spans: tuple[Span, ...]) -> Iterator[LimitContact]:
     for axis in axes_of(log.vehicle).values():
         signal = find(log, axis.rate)
-        values = signal.within(spans) if signal is not None else np.empty(0)
-        if signal is not None and values.size:
-            share = float(np.mean(np.abs(values) >= GYRO_RANGE.value))
-            found.append(Saturation(signal.label, "gyroscope range 2000 deg/s", share))
+        if signal is None:
+            continue
+        mask = inside(signal.time_s, spans)
+        touched = np.abs(signal.values[mask]) >= GYRO_RANGE.value
+        if touched.size:
+            limit = "gyroscope range 2000 deg/s"
+            yield LimitContact(signal.label, limit, signal.time_s[mask], touched)
     if "VIBE" in log and "Clip" in log.messages["VIBE"].fields:
         table = log.table("VIBE", (log.messages["VIBE"].instances or (None,))[0])
         mask = inside(table.time_s, spans)
         if np.count_nonzero(mask) > 1:
-            share = float(np.mean(np.diff(table["Clip"][mask]) > 0))
-            found.append(Saturation("VIBE.Clip", "accelerometer range", share))
-    return found
+            clipped = np.diff(table["Clip"][mask]) > 0
+            limit = "accelerometer range"
+            yield LimitContact("VIBE.Clip", limit, table.time_s[mask][1:], clipped)

@@ -90,7 +90,7 @@ def flight_identity(log: Log, phases: FlightPhases) -> FlightIdentity:
     known = {name for values in gains.values() for name in values}
     changed = {c.name for c in log.parameter_changes if c.name in known and c.old != c.new}
     return FlightIdentity(
-        _frame(log), _modes(log), _battery(log, phases.airborne), gains, tuple(sorted(changed))
+        _frame(log), mode_spans(log), _battery(log, phases.airborne), gains, tuple(sorted(changed))
     )
 
 
@@ -117,7 +117,8 @@ def _frame(log: Log) -> str:
     return ", ".join(told)
 
 
-def _modes(log: Log) -> tuple[ModeSpan, ...]:
+def mode_spans(log: Log) -> tuple[ModeSpan, ...]:
+    """Flight modes in order, each from its event to the next."""
     told = [(e.time_s, re.split(r" \(|, ", e.text)[0]) for e in log.events if e.kind == "mode"]
     begun = [(time_s, mode) for time_s, mode in told if time_s is not None]
     ends = [*(time_s for time_s, _ in begun[1:]), log_span(log)[1]]
