@@ -162,7 +162,7 @@ def _identified(
     """Responses and fits; once more where a light mode asks for windows that nobody chose."""
 
     def made(longer: LongerWindows | None = None) -> Part:
-        responses = _responses(task, records, runner, longer)
+        responses = responses_of(task, records, runner, longer)
         return _fit(task, responses, records, reducing, runner)
 
     first = made()
@@ -174,7 +174,7 @@ def _identified(
     return second_pass(first, models, counts, made, banded=True)
 
 
-def _responses(
+def responses_of(
     task: Task, records: Records, runner: StageRunner, longer: LongerWindows | None = None
 ) -> dict[str, StageResult[FrequencyResponse]]:
     """By what made them, what counts first."""

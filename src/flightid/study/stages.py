@@ -56,12 +56,12 @@ def estimate(
     records: Sequence[Group],
     inputs: Sequence[str],
     outputs: Sequence[str],
-    band_rad_s: tuple[float, float],
+    band_rad_s: tuple[float, float] | None,
     estimator: str,
     settings: ResponseSettings,
     longer: LongerWindows | None = None,
 ) -> FrequencyResponse:
-    """Frequency responses of one model's records by one estimator."""
+    """Frequency responses of one model's records by one estimator; without a band, in all of it."""
     flown = flat(records)
     held = [name for name in outputs if all(name in record for record in flown)]
     asked = {**settings.of_verb(estimator), "band_rad_s": band_rad_s}

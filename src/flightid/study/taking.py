@@ -60,8 +60,12 @@ def take(
     given: Path | None,
     folder: Path,
     runner: StageRunner,
+    *,
+    inspects: bool = True,
 ) -> StudyRecords:
     """Records from files, from the log given or named, or from one that is flown now.
+
+    Without `inspects` a log is not inspected: what is cut from it does not depend on that.
 
     Raises
     ------
@@ -111,7 +115,7 @@ def take(
         for segment in settings.segments
         if segment.name in needed
     }
-    inspection = runner.stage("inspection", inspect_log, opened)
+    inspection = runner.stage("inspection", inspect_log, opened) if inspects else None
     made = _conditioned(cut, settings, runner, checks)
     return StudyRecords(made, (flown,), inspection, truth, opened, checks)
 
