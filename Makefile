@@ -6,6 +6,7 @@ WHEELS := dist
 STAMP  := $(VENV)/.installed
 # One worker a core; a linear-algebra library that starts threads of its own would only get in the way.
 JOBS   ?= auto
+FOLDER ?= .
 FUZZ_RUNS ?= 1000000
 FUZZ_TARGETS = $(basename $(notdir $(wildcard fuzz/fuzz_targets/*.rs)))
 
@@ -15,7 +16,7 @@ STARTED = -n $(JOBS) --dist worksteal
 # Forked processes share what one of them collected; where a fork is not safe, each is started.
 SPREAD := $(if $(filter Linux,$(shell uname -s)),-p tests.forks --forks $(JOBS),$(STARTED))
 
-.PHONY: demo test test-slow test-nightly docs fuzz fuzz-files kills same-wheel bench lint hooks format stubs develop wheel constraints clean help
+.PHONY: demo app test test-slow test-nightly docs fuzz fuzz-files kills same-wheel bench lint hooks format stubs develop wheel constraints clean help
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/ —/'
@@ -24,7 +25,7 @@ $(STAMP): pyproject.toml constraints.txt
 	$(PYTHON) tools/check_machine.py
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade pip
-	$(BIN)/python tools/install_dependencies.py dev docs
+	$(BIN)/python tools/install_dependencies.py app dev docs
 	touch $@
 
 develop: $(STAMP)  ## build the native half in place, for working on the code
@@ -32,12 +33,17 @@ develop: $(STAMP)  ## build the native half in place, for working on the code
 
 wheel: $(STAMP)  ## build the wheel and install exactly that wheel
 	rm -rf $(WHEELS)
+	$(BIN)/python tools/build_page.py
 	$(BIN)/maturin build --release --quiet --out $(WHEELS)
+	$(BIN)/python tools/build_page.py --in $(WHEELS)/*.whl
 	rm -f src/flightid/_native*.so
 	$(BIN)/python -m pip install --quiet --force-reinstall --no-deps $(WHEELS)/*.whl
 
 demo: wheel  ## fly a simulated quadrotor, identify it from its log, write a report to look at
 	$(BIN)/flightid run examples/quadrotor_rig/study.toml --output demo-output
+
+app: wheel  ## open the local page on FOLDER (default: here): drop a log, look, identify
+	$(BIN)/flightid app $(FOLDER)
 
 lint: $(STAMP)  ## formatting, lints and types of both halves
 	$(BIN)/ruff format --check .

@@ -22,6 +22,8 @@ HEAD = """# Software of others
 Made by `python tools/licences.py --write`. The crates are inside the wheel, whose
 `dist-info/sboms` lists them with versions and checksums; the packages are installed beside it.
 Reports draw with plotly.js 4.1.1 (MIT, Copyright 2012-2026, Plotly, Inc.), which the wheel holds.
+The page of `flightid app` is made of Svelte 5.57.3 (MIT, Copyright 2016-2025, Svelte
+Contributors) and uPlot 1.6.32 (MIT, Copyright 2022, Leon Sorokin), which the wheel holds too.
 """
 
 

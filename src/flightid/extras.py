@@ -10,6 +10,7 @@ from flightid.errors import OptionError
 EXTRAS = {"pandas": "tables", "pyarrow": "parquet", "xarray": "tables"}
 EXTRAS |= dict.fromkeys(("lz4", "rosbags", "zstandard"), "ros")
 EXTRAS |= dict.fromkeys(("dask", "distributed", "duckdb", "fsspec"), "fleet")
+EXTRAS |= dict.fromkeys(("fastapi", "pebble", "tomlkit", "uvicorn", "websockets"), "app")
 """Extra of the package that installs a library."""
 
 

@@ -32,4 +32,4 @@ def test_its_table_has_every_room_in_the_order_of_the_import_rule() -> None:
     ]
     table = [name for name in rooms if name in {*ORDER, *SHOW, *ENDS}]
     assert table[: len(ORDER)] == ORDER
-    assert set(table[len(ORDER) :]) == {*SHOW, "study", "fleet", "cli"}
+    assert set(table[len(ORDER) :]) == {*SHOW, "study", "fleet", "app", "cli"}

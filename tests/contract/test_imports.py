@@ -51,7 +51,7 @@ ORDER = [
 SHOW = {"plot", "report"}
 ENDS = {"study", "fleet", "cli", "app", "__init__", "__main__"}
 # Of the ends, what each leaves alone.
-BEHIND = {"study": {"fleet", "cli"}, "fleet": {"cli"}}
+BEHIND = {"study": {"fleet", "app", "cli"}, "fleet": {"app", "cli"}, "app": {"cli"}}
 PLOTTING = {"plotly", "matplotlib"}
 
 

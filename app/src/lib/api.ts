@@ -1,0 +1,96 @@
+import type { Edit, FieldGroup, FlightScreen, Job, Listing, LogItem, StudyText } from "./types";
+
+/** A refusal of the server, in its own words. */
+export class Refusal extends Error {
+  constructor(
+    readonly status: number,
+    message: string,
+    readonly detail: unknown = null,
+  ) {
+    super(message);
+  }
+}
+
+async function refused(answer: Response): Promise<never> {
+  const text = await answer.text();
+  try {
+    const told = JSON.parse(text);
+    const words = told.error ?? told.detail ?? text;
+    throw new Refusal(answer.status, typeof words === "string" ? words : text, told.detail);
+  } catch (error) {
+    if (error instanceof Refusal) throw error;
+    throw new Refusal(answer.status, text.trim() || `The server answered ${answer.status}.`);
+  }
+}
+
+async function ask(path: string, options: RequestInit = {}): Promise<Response> {
+  let answer: Response;
+  try {
+    answer = await fetch(path, { credentials: "same-origin", ...options });
+  } catch {
+    throw new Refusal(0, "flightid does not answer. Is `flightid app` still running?");
+  }
+  return answer.ok ? answer : refused(answer);
+}
+
+async function json<T>(path: string, options: RequestInit = {}): Promise<T> {
+  return (await ask(path, options)).json();
+}
+
+const sent = (method: string, body: unknown, headers: Record<string, string> = {}) => ({
+  method,
+  headers: { "content-type": "application/json", ...headers },
+  body: JSON.stringify(body),
+});
+
+export const workspace = () => json<Listing>("/api/workspace");
+export const flight = (log: string) => json<FlightScreen>(`/api/logs/${log}`);
+export const fields = (log: string) => json<FieldGroup[]>(`/api/logs/${log}/fields`);
+export const study = (log: string) => json<StudyText | null>(`/api/studies/${log}`);
+export const jobs = () => json<Job[]>("/api/jobs");
+export const cancel = (id: string) => json<Job[]>(`/api/jobs/${id}`, { method: "DELETE" });
+export const again = (job: Job) => json<Job[]>("/api/jobs", sent("POST", job));
+export const change = (log: string, etag: string, edits: Edit[]) =>
+  json<StudyText>(`/api/studies/${log}`, sent("PATCH", { edits }, { "if-match": etag }));
+export const replace = (log: string, etag: string, text: string) =>
+  json<StudyText>(`/api/studies/${log}`, sent("POST", { text }, { "if-match": etag }));
+
+/** Send a file as it lies on the disk; `seen` hears how much of it has gone. */
+export function upload(file: File, seen: (share: number) => void): Promise<LogItem> {
+  return new Promise((resolve, reject) => {
+    const request = new XMLHttpRequest();
+    request.open("PUT", `/api/logs?name=${encodeURIComponent(file.name)}`);
+    request.setRequestHeader("content-type", "application/octet-stream");
+    request.upload.onprogress = (event) => seen(event.loaded / Math.max(1, event.total));
+    request.onerror = () => reject(new Refusal(0, "The file could not be sent."));
+    request.onload = () => {
+      if (request.status === 200) return resolve(JSON.parse(request.responseText));
+      let words = request.responseText;
+      try {
+        const told = JSON.parse(words);
+        words = told.error ?? told.detail ?? words;
+      } catch {
+        // the words are the answer
+      }
+      reject(new Refusal(request.status, words));
+    };
+    request.send(file);
+  });
+}
+
+/** Series over a span: time, then a row each; NaN breaks a line, infinity says "no sample here". */
+export async function view(
+  log: string,
+  series: string[],
+  span: [number, number],
+  columns: number,
+): Promise<Float64Array[]> {
+  const query = new URLSearchParams();
+  for (const name of series) query.append("series", name);
+  query.set("start_s", String(span[0]));
+  query.set("stop_s", String(span[1]));
+  query.set("columns", String(Math.max(10, Math.round(columns))));
+  const bytes = await (await ask(`/api/logs/${log}/view?${query}`)).arrayBuffer();
+  const [points, rows] = new Float64Array(bytes, 0, 2);
+  return Array.from({ length: rows }, (_, row) => new Float64Array(bytes, 16 + row * points * 8, points));
+}

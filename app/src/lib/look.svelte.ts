@@ -1,0 +1,49 @@
+import uPlot from "uplot";
+
+/** Light or dark: what was chosen, else what the system says. */
+class Look {
+  theme: "light" | "dark" = $state("light");
+
+  constructor() {
+    const dark = matchMedia("(prefers-color-scheme: dark)");
+    const kept = () => localStorage.getItem("flightid-theme");
+    const apply = () => this.#apply((kept() ?? (dark.matches ? "dark" : "light")) as "light" | "dark");
+    dark.addEventListener("change", apply);
+    apply();
+  }
+
+  toggle() {
+    const other = this.theme === "dark" ? "light" : "dark";
+    localStorage.setItem("flightid-theme", other);
+    this.#apply(other);
+  }
+
+  #apply(theme: "light" | "dark") {
+    document.documentElement.dataset.theme = theme;
+    this.theme = theme;
+  }
+}
+
+export const look = new Look();
+export const colour = (name: string) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+export const SERIES = ["c0", "c1", "c2", "c3", "c4", "c5"];
+const FONT = "12px system-ui, -apple-system, 'Segoe UI', Roboto, sans-serif";
+
+/** An axis in the colours of the page. */
+export const axis = (more: uPlot.Axis = {}): uPlot.Axis => ({
+  stroke: colour("soft"),
+  font: FONT,
+  labelFont: FONT,
+  labelSize: 16,
+  labelGap: 2,
+  grid: { stroke: colour("grid"), width: 1 },
+  ticks: { stroke: colour("grid"), width: 1, size: 4 },
+  ...more,
+});
+
+/** Numbers of the server as uPlot wants them: null breaks a line, undefined lets it go on. */
+export const plotted = (row: Float64Array): (number | null | undefined)[] =>
+  Array.from(row, (each) => (Number.isNaN(each) ? null : each === Infinity ? undefined : each));
+
+export const three = (value: number) => String(Number(value.toPrecision(3)));
+export const seconds = (value: number) => `${Number(value.toFixed(1))} s`;

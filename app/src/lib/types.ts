@@ -1,0 +1,209 @@
+// Made by tools/page_types.py from src/flightid/app/schemas.py; not to be edited.
+
+/** The best that a log gives of one axis. */
+export interface AxisCard {
+  axis: string;
+  kind: "model" | "step" | "nothing";
+  light: "green" | "amber" | "red" | "unknown";
+  headline: string;
+  detail: string;
+  action: string;
+  model: string | null;
+  band_rad_s: [number, number] | null;
+  coherence: number | null;
+}
+
+/** One key and its value; None takes it out. */
+export interface Edit {
+  path: (string | number)[];
+  value: unknown;
+}
+
+/** Edits that are made together. */
+export interface Edits {
+  edits: Edit[];
+}
+
+/** Fields of a message with their units. */
+export interface FieldGroup {
+  message: string;
+  instances: number[];
+  rate_hz: number | null;
+  fields: Record<string, string>;
+}
+
+/** Everything known of a log; parts that are being made are None. */
+export interface FlightScreen {
+  id: string;
+  name: string;
+  path: string;
+  overview: Overview | null;
+  review: ReviewPart | null;
+  jobs: Job[];
+}
+
+/** Long work: its state, and where it can be asked for again. */
+export interface Job {
+  id: string;
+  kind: "overview" | "review";
+  log: string;
+  state: "waiting" | "done" | "failed" | "cancelled" | "interrupted";
+  reason: string;
+}
+
+/** A job has changed. */
+export interface JobNews {
+  job: Job;
+}
+
+/** The workspace. */
+export interface Listing {
+  folder: string;
+  version: string;
+  logs: LogItem[];
+}
+
+/** A log of the workspace; what an overview tells is there once it was made. */
+export interface LogItem {
+  id: string;
+  name: string;
+  path: string;
+  size: number;
+  changed: string;
+  vehicle: string | null;
+  firmware: string | null;
+  duration_s: number | null;
+  sweeps: number | null;
+  light: "green" | "amber" | "red" | "unknown" | null;
+}
+
+/** What an inspection finds, laid out for the page. */
+export interface Overview {
+  name: string;
+  vehicle: string;
+  firmware: string;
+  duration_s: number;
+  airborne: string;
+  light: "green" | "amber" | "red" | "unknown";
+  sentence: string;
+  verdicts: ShownFinding[];
+  cards: AxisCard[];
+  span_s: [number, number];
+  lines: StripLine[];
+  blocks: StripBlock[];
+  events: StripEvent[];
+  has_study: boolean;
+}
+
+/** Its answer, or why there is none. */
+export interface ResponseAnswer {
+  request: number;
+  response: ResponsePart | null;
+  error: string | null;
+  seconds: number;
+}
+
+/** One response of one estimator. */
+export interface ResponseCurve {
+  estimator: string;
+  output: string;
+  input: string;
+  unit: string;
+  omega_rad_s: number[];
+  gain: number[];
+  phase_rad: number[];
+  coherence: number[];
+  random_error: number[];
+  gain_low: number[] | null;
+  gain_high: number[] | null;
+  phase_low_rad: number[] | null;
+  phase_high_rad: number[] | null;
+  reason: string;
+}
+
+/** Responses of one model, as its study says. */
+export interface ResponsePart {
+  model: string;
+  band_rad_s: [number, number] | null;
+  minimum_coherence: number;
+  estimators: string[];
+  curves: ResponseCurve[];
+  around: ResponseCurve[];
+  findings: ShownFinding[];
+}
+
+/** A request on the socket: responses of a model under edits that are not written yet. */
+export interface ResponseQuestion {
+  request: number;
+  log: string;
+  model: string;
+  edits: Edit[];
+  around: boolean;
+  intervals: boolean;
+}
+
+/** What the review of the flight adds: steps of its loops, and its verdicts. */
+export interface ReviewPart {
+  light: "green" | "amber" | "red" | "unknown";
+  steps: StepCurve[];
+  verdicts: ShownFinding[];
+  untold: Record<string, [string, string]>;
+}
+
+/** A finding, with the spans of the flight that it speaks of. */
+export interface ShownFinding {
+  code: string;
+  light: "green" | "amber" | "red" | "unknown";
+  message: string;
+  action: string;
+  spans_s: [number, number][];
+}
+
+/** The closed rate loop of an axis from ordinary flying. */
+export interface StepCurve {
+  axis: string;
+  loop: string;
+  time_s: number[];
+  step: number[];
+  low: number[];
+  high: number[];
+  readings: [string, string][];
+}
+
+/** Something that lasted. */
+export interface StripBlock {
+  kind: string;
+  axis: string;
+  text: string;
+  start_s: number;
+  stop_s: number;
+}
+
+/** An instant with words. */
+export interface StripEvent {
+  time_s: number;
+  kind: string;
+  text: string;
+}
+
+/** A channel over the whole flight: extremes by column, None where silent. */
+export interface StripLine {
+  name: string;
+  label: string;
+  unit: string;
+  low: (number | null)[];
+  high: (number | null)[];
+}
+
+/** A study file, its tag, and what the page reads off it. */
+export interface StudyText {
+  text: string;
+  etag: string;
+  settings: Record<string, unknown>;
+  python: string;
+}
+
+/** A study file to put in place of another. */
+export interface WholeText {
+  text: string;
+}

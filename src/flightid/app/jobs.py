@@ -1,0 +1,151 @@
+"""Long work in processes beside the server: started once, cancelled for good, found again.
+
+Two pools. One process keeps logs open for what a hand waits for; others take what lasts seconds.
+What is running stands in a file, so that a killed server offers it again.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import multiprocessing
+import os
+from collections.abc import Callable
+from concurrent.futures import CancelledError, Future
+from pathlib import Path
+from typing import Any
+
+from pebble import ProcessExpired, ProcessPool
+
+from flightid.app import work
+from flightid.app.schemas import Job
+from flightid.app.workspace import Workspace
+from flightid.files import write_atomically
+
+LONGEST_S = 900.0
+"""Of a job; a hand's request may take `PATIENCE_S`."""
+PATIENCE_S = 60.0
+KINDS = ("overview", "review")
+Listener = Callable[[Job], None]
+
+
+class Workers:
+    """Both pools.
+
+    Parameters
+    ----------
+    workspace : Workspace
+    """
+
+    def __init__(self, workspace: Workspace) -> None:
+        self._workspace = workspace
+        self._jobs: dict[str, Job] = {}
+        self._futures: dict[str, Future[Any]] = {}
+        self._listeners: list[Listener] = []
+        self._loop: asyncio.AbstractEventLoop | None = None
+        # A process of its own state: a fork of one with threads may hold a lock for good.
+        context = multiprocessing.get_context("spawn")
+        made: dict[str, Any] = {"context": context, "initializer": work.limit_memory}
+        self._live = ProcessPool(max_workers=1, **made)
+        self._long = ProcessPool(max_workers=max(1, (os.cpu_count() or 2) - 1), **made)
+        self._folder = workspace.folder / ".flightid" / "jobs"
+        self._folder.mkdir(exist_ok=True)
+        for path in sorted(self._folder.glob("*.json")):
+            job = Job(**json.loads(path.read_text(encoding="utf-8")))
+            self._jobs[job.id] = job.model_copy(update={"state": "interrupted"})
+
+    def start(self) -> None:
+        """Load the workers before anybody waits for them; call it inside the event loop."""
+        self._loop = asyncio.get_running_loop()
+        for pool in (self._live, self._long):
+            pool.schedule(work.warm)
+
+    def stop(self) -> None:
+        """End all processes."""
+        for pool in (self._live, self._long):
+            pool.stop()
+        for pool in (self._live, self._long):
+            pool.join()
+
+    def listen(self, listener: Listener) -> Callable[[], None]:
+        """Hear of every change of a job; returns what ends it."""
+        self._listeners.append(listener)
+        return lambda: self._listeners.remove(listener)
+
+    def of_log(self, log: str) -> list[Job]:
+        """Jobs of a log that are not done."""
+        return [job for job in self._jobs.values() if job.log == log and job.state != "done"]
+
+    def all(self) -> list[Job]:
+        """Every job that is not done."""
+        return [job for job in self._jobs.values() if job.state != "done"]
+
+    def ensure(self, kind: str, log: str, path: Path, *, again: bool = False) -> None:
+        """Begin a job, unless its result is there, it runs, or it failed and nobody asks again."""
+        name = f"{kind}-{log}"
+        known = self._jobs.get(name)
+        if self._workspace.result(log, kind) is not None:
+            return
+        if known is not None and known.state == "waiting":
+            return
+        if known is not None and known.state in ("failed", "cancelled") and not again:
+            return
+        job = Job(id=name, kind=kind, log=log, state="waiting")  # type: ignore[arg-type]
+        result = self._workspace.result_path(log, f"{kind}.json")
+        inputs: tuple[object, ...] = (work.make_review, path, result)
+        if kind == "overview":
+            inputs = (work.make_overview, path, self._workspace.study_path(log), result)
+        write_atomically(self._folder / f"{name}.json", job.model_dump_json())
+        self._jobs[name] = job
+        future = self._long.schedule(work.answered, args=inputs, timeout=LONGEST_S)
+        self._futures[name] = future
+        self._tell(job)
+        future.add_done_callback(lambda done: self._soon(self._ended, name, done))
+
+    def cancel(self, name: str) -> bool:
+        """End a job; its process too, where it runs."""
+        job = self._jobs.get(name)
+        if job is None or job.state == "done":
+            return False
+        future = self._futures.get(name)
+        if future is not None:
+            future.cancel()
+        self._change(name, "cancelled", "")
+        return True
+
+    async def live(self, call: Callable[..., Any], *inputs: object) -> tuple[Any, str, float]:
+        """Result of a hand's request, or the sentence of its refusal."""
+        future = self._live.schedule(work.answered, args=(call, *inputs), timeout=PATIENCE_S)
+        try:
+            made: tuple[Any, str, float] = await asyncio.wrap_future(future)
+        except TimeoutError:
+            return None, f"This took more than {PATIENCE_S:.0f} s and was ended.", PATIENCE_S
+        except ProcessExpired:
+            return None, "The worker ended; the file may need more memory than is allowed.", 0.0
+        return made
+
+    def _soon(self, call: Callable[..., None], *inputs: object) -> None:
+        if self._loop is not None and not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(call, *inputs)
+
+    def _ended(self, name: str, future: Future[tuple[Any, str, float]]) -> None:
+        if self._futures.get(name) is not future or self._jobs[name].state == "cancelled":
+            return
+        try:
+            _, refusal, _ = future.result()
+        except (CancelledError, TimeoutError, ProcessExpired) as error:
+            refusal = f"the work ended early: {type(error).__name__}"
+        except Exception as error:
+            refusal = f"a fault in flightid: {type(error).__name__}: {error}"
+        self._change(name, "failed" if refusal else "done", refusal)
+
+    def _change(self, name: str, state: str, reason: str) -> None:
+        job = self._jobs[name].model_copy(update={"state": state, "reason": reason})
+        self._jobs[name] = job
+        self._futures.pop(name, None)
+        (self._folder / f"{name}.json").unlink(missing_ok=True)
+        self._tell(job)
+
+    def _tell(self, job: Job) -> None:
+        for listener in list(self._listeners):
+            listener(job)

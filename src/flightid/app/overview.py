@@ -1,0 +1,235 @@
+"""An inspection and a review, laid out for the page: one sentence, three cards, one time strip."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.app.schemas import (
+    AxisCard,
+    Light,
+    Overview,
+    ReviewPart,
+    ShownFinding,
+    StepCurve,
+    StripBlock,
+    StripEvent,
+    StripLine,
+)
+from flightid.findings import Finding
+from flightid.inspection import Inspection
+from flightid.logs import Log
+from flightid.review import FlightReview
+from flightid.review.loop_response import LoopResponse
+from flightid.review.timeline import FlightTimeline, TimelineBlock
+from flightid.study.settings import Settings
+
+AXES = ("roll", "pitch", "yaw")
+MOST_EVENTS = 500
+READINGS = ("rise time", "overshoot", "settling time", "-3 dB bandwidth")
+PLACES = {
+    "airborne": "air",
+    "excitation-found": "sid autotune chirp sweep steps",
+    "saturation": "limit",
+    "gap": "gap",
+    "dropout": "gap",
+}
+"""Beginning of a finding's code, and the kinds of blocks that show it."""
+
+
+def overview_of(
+    log: Log,
+    inspection: Inspection,
+    timeline: FlightTimeline,
+    missed: Sequence[Finding],
+    settings: Settings | None,
+) -> Overview:
+    """Lay out what an inspection found.
+
+    Parameters
+    ----------
+    log : Log
+    inspection : Inspection
+    timeline : FlightTimeline
+    missed : sequence of Finding
+        Why axes have no model.
+    settings : Settings or None
+        The study that the log asks for.
+    """
+    cards = [_card(axis, inspection, missed, settings) for axis in AXES]
+    return Overview(
+        name=inspection.name,
+        vehicle=" ".join(filter(None, (inspection.kind, inspection.vehicle))),
+        firmware=inspection.firmware,
+        duration_s=inspection.duration_s,
+        airborne=inspection.phases.airborne_words,
+        light=light_of(inspection.verdict),
+        sentence=sentence_of(inspection, cards),
+        verdicts=_verdicts(inspection.findings, timeline.blocks),
+        cards=cards,
+        span_s=timeline.span_s,
+        lines=[
+            StripLine(
+                name=line.name,
+                label=line.label,
+                unit=line.unit,
+                low=_finite(line.low),
+                high=_finite(line.high),
+            )
+            for line in timeline.lines
+        ],
+        blocks=[
+            StripBlock(kind=b.kind, axis=b.axis, text=b.text, start_s=b.start_s, stop_s=b.stop_s)
+            for b in timeline.blocks
+        ],
+        events=_events(log),
+        has_study=settings is not None,
+    )
+
+
+def sentence_of(inspection: Inspection, cards: Iterable[AxisCard]) -> str:
+    """What the log can carry, in one sentence."""
+    able = [card.axis for card in cards if card.kind == "model"]
+    if able:
+        listed = able[0] if len(able) == 1 else f"{', '.join(able[:-1])} and {able[-1]}"
+        said = f"This log can carry a model of {listed}"
+        doubt = str(inspection.verdict) == "amber"
+        return f"{said}, with reservations." if doubt else f"{said}."
+    airborne = inspection.phases
+    if airborne.is_known and not airborne.airborne:
+        return "This log holds no flight, so it can carry no model."
+    return "This log can carry no model: nothing in it excited the vehicle widely enough."
+
+
+def review_of(review: FlightReview) -> ReviewPart:
+    """Lay out what a review adds: the steps of rate loops, and its verdicts."""
+    told = [each for each in review.loops if each.loop == "rate" and each.is_told]
+    untold = {
+        each.axis: (each.reason, each.action)
+        for each in review.loops
+        if each.loop == "rate" and not each.is_told
+    }
+    return ReviewPart(
+        light=light_of(review.verdict),
+        steps=[_step(each) for each in told],
+        verdicts=_verdicts(review.findings, ()),
+        untold=untold,
+    )
+
+
+def light_of(light: object) -> Light:
+    """A light as the page is told it."""
+    return cast("Light", str(light))
+
+
+def hertz(band_rad_s: tuple[float, float]) -> str:
+    """A band as people say it.
+
+    Example
+    -------
+    >>> hertz((1.35, 23.6))
+    '0.215 to 3.76 Hz'
+    """
+    low, high = (each / math.tau for each in band_rad_s)
+    return f"{low:.3g} to {high:.3g} Hz"
+
+
+def _card(
+    axis: str, inspection: Inspection, missed: Sequence[Finding], settings: Settings | None
+) -> AxisCard:
+    band = next((each for each in inspection.bands if each.axis == axis), None)
+    finding = next((f for f in inspection.findings if f.code == f"band-{axis}"), None)
+    model = next((m for m in (settings.models if settings else ()) if m.axis == axis), None)
+    if model is not None and model.band_rad_s is not None:
+        light: Light = "green" if finding is None else light_of(finding.light)
+        coherence = None if band is None or band.coherence is None else band.coherence
+        said = "" if coherence is None else f"mean coherence {coherence:.2f}"
+        swept = [each for each in inspection.excitations if each.axis == axis]
+        told = "; ".join(dict.fromkeys(f"{each.kind}: {each.detail}" for each in swept))
+        return AxisCard(
+            axis=axis,
+            kind="model",
+            light=light,
+            headline=f"Can be identified {hertz(model.band_rad_s)}",
+            detail=". ".join(filter(None, (said, told))),
+            action="" if finding is None else finding.action,
+            model=model.name,
+            band_rad_s=model.band_rad_s,
+            coherence=coherence,
+        )
+    why = next((f for f in missed if f.message.startswith(f"{axis}:")), None)
+    reason = "" if band is None else band.reason
+    said = reason if why is None else why.message.partition("no model, ")[2]
+    action = next((f.action for f in (why, finding) if f is not None and f.action), "")
+    return AxisCard(
+        axis=axis,
+        kind="nothing",
+        light="red",
+        headline="No model from this log",
+        detail=said or "its command or its rate is not logged",
+        action=action,
+    )
+
+
+def _verdicts(findings: Iterable[Finding], blocks: Iterable[TimelineBlock]) -> list[ShownFinding]:
+    listed, given = list(blocks), set[str]()
+    made = []
+    for finding in findings:
+        action = "" if finding.action in given else finding.action
+        given.add(finding.action)
+        made.append(
+            ShownFinding(
+                code=finding.code,
+                light=light_of(finding.light),
+                message=finding.message,
+                action=action,
+                spans_s=[(b.start_s, b.stop_s) for b in listed if _shows(b, finding.code)][:50],
+            )
+        )
+    return made
+
+
+def _shows(block: TimelineBlock, code: str) -> bool:
+    """Whether a block is where a finding points."""
+    axis = code.rpartition("-")[2]
+    if axis in AXES and code.startswith("band"):
+        return block.axis == axis
+    kinds = next((kinds for start, kinds in PLACES.items() if code.startswith(start)), "")
+    return block.kind in kinds.split()
+
+
+def _step(loop: LoopResponse) -> StepCurve:
+    low, high = loop.band()
+    known: Mapping[str, str] = {each.name: each.text for each in loop.readings}
+    return StepCurve(
+        axis=loop.axis,
+        loop=loop.loop,
+        time_s=loop.time_s.tolist(),
+        step=loop.step.tolist(),
+        low=low.tolist(),
+        high=high.tolist(),
+        readings=[(name, known[name]) for name in READINGS if name in known],
+    )
+
+
+def _events(log: Log) -> list[StripEvent]:
+    kinds = ("error", "event", "arming", "text")
+    told = [
+        StripEvent(time_s=each.time_s, kind=each.kind, text=each.text[:200])
+        for each in log.events
+        if each.time_s is not None and each.kind in kinds
+    ]
+    changed = [
+        StripEvent(time_s=each.time_s, kind="parameter", text=f"{each.name} = {each.new:g}")
+        for each in log.parameter_changes
+        if each.time_s is not None and each.old != each.new
+    ]
+    return sorted([*told, *changed], key=lambda each: each.time_s)[:MOST_EVENTS]
+
+
+def _finite(values: NDArray[np.float64]) -> list[float | None]:
+    return [float(f"{each:.6g}") if math.isfinite(each) else None for each in values.tolist()]

@@ -1,0 +1,245 @@
+"""What the page and the server tell each other; the page's types are made from these."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Light = Literal["green", "amber", "red", "unknown"]
+
+
+class Message(BaseModel):
+    """Base: unknown keys are an error, and numbers are finite."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+
+class ShownFinding(Message):
+    """A finding, with the spans of the flight that it speaks of."""
+
+    code: str
+    light: Light
+    message: str
+    action: str
+    spans_s: list[tuple[float, float]]
+
+
+class AxisCard(Message):
+    """The best that a log gives of one axis."""
+
+    axis: str
+    kind: Literal["model", "step", "nothing"]
+    light: Light
+    headline: str
+    detail: str
+    action: str
+    model: str | None = None
+    band_rad_s: tuple[float, float] | None = None
+    coherence: float | None = None
+
+
+class StepCurve(Message):
+    """The closed rate loop of an axis from ordinary flying."""
+
+    axis: str
+    loop: str
+    time_s: list[float]
+    step: list[float]
+    low: list[float]
+    high: list[float]
+    readings: list[tuple[str, str]]
+
+
+class StripLine(Message):
+    """A channel over the whole flight: extremes by column, None where silent."""
+
+    name: str
+    label: str
+    unit: str
+    low: list[float | None]
+    high: list[float | None]
+
+
+class StripBlock(Message):
+    """Something that lasted."""
+
+    kind: str
+    axis: str
+    text: str
+    start_s: float
+    stop_s: float
+
+
+class StripEvent(Message):
+    """An instant with words."""
+
+    time_s: float
+    kind: str
+    text: str
+
+
+class Overview(Message):
+    """What an inspection finds, laid out for the page."""
+
+    name: str
+    vehicle: str
+    firmware: str
+    duration_s: float
+    airborne: str
+    light: Light
+    sentence: str
+    verdicts: list[ShownFinding]
+    cards: list[AxisCard]
+    span_s: tuple[float, float]
+    lines: list[StripLine]
+    blocks: list[StripBlock]
+    events: list[StripEvent]
+    has_study: bool
+
+
+class ReviewPart(Message):
+    """What the review of the flight adds: steps of its loops, and its verdicts."""
+
+    light: Light
+    steps: list[StepCurve]
+    verdicts: list[ShownFinding]
+    untold: dict[str, tuple[str, str]]
+
+
+class Job(Message):
+    """Long work: its state, and where it can be asked for again."""
+
+    id: str
+    kind: Literal["overview", "review"]
+    log: str
+    state: Literal["waiting", "done", "failed", "cancelled", "interrupted"]
+    reason: str = ""
+
+
+class LogItem(Message):
+    """A log of the workspace; what an overview tells is there once it was made."""
+
+    id: str
+    name: str
+    path: str
+    size: int
+    changed: str
+    vehicle: str | None = None
+    firmware: str | None = None
+    duration_s: float | None = None
+    sweeps: int | None = None
+    light: Light | None = None
+
+
+class Listing(Message):
+    """The workspace."""
+
+    folder: str
+    version: str
+    logs: list[LogItem]
+
+
+class FlightScreen(Message):
+    """Everything known of a log; parts that are being made are None."""
+
+    id: str
+    name: str
+    path: str
+    overview: Overview | None
+    review: ReviewPart | None
+    jobs: list[Job]
+
+
+class FieldGroup(Message):
+    """Fields of a message with their units."""
+
+    message: str
+    instances: list[int]
+    rate_hz: float | None
+    fields: dict[str, str]
+
+
+class StudyText(Message):
+    """A study file, its tag, and what the page reads off it."""
+
+    text: str
+    etag: str
+    settings: dict[str, Any]
+    python: str
+
+
+class Edit(Message):
+    """One key and its value; None takes it out."""
+
+    path: list[str | int] = Field(min_length=1, max_length=8)
+    value: Any
+
+
+class Edits(Message):
+    """Edits that are made together."""
+
+    edits: list[Edit] = Field(min_length=1, max_length=32)
+
+
+class WholeText(Message):
+    """A study file to put in place of another."""
+
+    text: str
+
+
+class ResponseCurve(Message):
+    """One response of one estimator."""
+
+    estimator: str
+    output: str
+    input: str
+    unit: str
+    omega_rad_s: list[float]
+    gain: list[float]
+    phase_rad: list[float]
+    coherence: list[float]
+    random_error: list[float]
+    gain_low: list[float] | None = None
+    gain_high: list[float] | None = None
+    phase_low_rad: list[float] | None = None
+    phase_high_rad: list[float] | None = None
+    reason: str = ""
+
+
+class ResponsePart(Message):
+    """Responses of one model, as its study says."""
+
+    model: str
+    band_rad_s: tuple[float, float] | None
+    minimum_coherence: float
+    estimators: list[str]
+    curves: list[ResponseCurve]
+    around: list[ResponseCurve]
+    findings: list[ShownFinding]
+
+
+class ResponseQuestion(Message):
+    """A request on the socket: responses of a model under edits that are not written yet."""
+
+    request: int
+    log: str
+    model: str
+    edits: list[Edit] = Field(default_factory=list, max_length=32)
+    around: bool = False
+    intervals: bool = False
+
+
+class ResponseAnswer(Message):
+    """Its answer, or why there is none."""
+
+    request: int
+    response: ResponsePart | None = None
+    error: str | None = None
+    seconds: float = 0.0
+
+
+class JobNews(Message):
+    """A job has changed."""
+
+    job: Job

@@ -1,0 +1,92 @@
+"""The server on the loopback, from its port to its end."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+import threading
+import webbrowser
+from collections.abc import Callable
+from pathlib import Path
+
+import uvicorn
+
+from flightid.app.guard import DOCUMENT_BYTES, Guard, Session
+from flightid.app.page import page_files
+from flightid.app.server import make_server
+from flightid.app.workspace import Workspace
+from flightid.errors import OptionError
+
+LOOPBACK = "127.0.0.1"
+
+
+def serve(folder: Path, port: int, *, say: Callable[[str], None], opens: bool) -> None:
+    """Serve the page until somebody ends it.
+
+    Parameters
+    ----------
+    folder : Path
+        Workspace.
+    port : int
+        0: a free one.
+    say : callable
+        Takes the address.
+    opens : bool
+        Whether to open the browser.
+
+    Raises
+    ------
+    OptionError
+        The port is taken, the page is not in this installation, or the folder is none.
+    """
+    page = page_files()
+    workspace = Workspace(folder)
+    bound = bound_socket(port)
+    session = Session(bound.getsockname()[1])
+    server = server_of(workspace, page, session)
+    say(f"flightid serves {workspace.folder} to this machine alone; Ctrl-C ends it.")
+    say(session.address)
+    if opens:
+        threading.Timer(0.3, webbrowser.open, (session.address,)).start()
+    asyncio.run(server.serve(sockets=[bound]))
+
+
+def server_of(
+    workspace: Workspace, page: dict[str, tuple[str, bytes]], session: Session
+) -> uvicorn.Server:
+    """The server behind its guard, not started yet."""
+    config = uvicorn.Config(
+        Guard(make_server(workspace, page), session),
+        log_level="error",
+        access_log=False,
+        server_header=False,
+        proxy_headers=False,
+        ws="websockets-sansio",
+        ws_max_size=DOCUMENT_BYTES,
+        timeout_graceful_shutdown=3,
+    )
+    return uvicorn.Server(config)
+
+
+def bound_socket(port: int) -> socket.socket:
+    """A socket on the loopback.
+
+    Raises
+    ------
+    OptionError
+        The port is taken.
+    """
+    bound = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        bound.bind((LOOPBACK, port))
+        bound.listen()
+    except OSError as error:
+        bound.close()
+        raise OptionError(
+            "the port cannot be taken",
+            found=f"{port}: {error.strerror}",
+            needed="a port that is free",
+            action="leave out port=… for any free one",
+        ) from error
+    return bound

@@ -1,0 +1,83 @@
+"""Study files of the workspace: read, edited by one who has seen the last version, else refused."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+from typing import Any
+
+from fastapi import HTTPException
+
+from flightid.app.python_lines import python_lines
+from flightid.app.schemas import Edits, StudyText, WholeText
+from flightid.app.study_edits import KeyEdit, edited, etag_of, write_study
+from flightid.app.workspace import Workspace
+from flightid.errors import FlightidError
+from flightid.reading import read_toml
+from flightid.study.settings import read_settings
+
+
+class Studies:
+    """The study of each log.
+
+    Parameters
+    ----------
+    workspace : Workspace
+    """
+
+    def __init__(self, workspace: Workspace) -> None:
+        self._workspace = workspace
+        self._lock = threading.Lock()
+
+    def path(self, log: str) -> Path | None:
+        """Study file of a log; None where there is none."""
+        path = self._workspace.study_path(log)
+        return path if path.is_file() else None
+
+    def read(self, log: str) -> StudyText | None:
+        """The study file with what the page reads off it; None where there is none."""
+        path = self.path(log)
+        if path is None:
+            return None
+        text = path.read_text(encoding="utf-8")
+        return StudyText(
+            text=text, etag=etag_of(text), settings=_tables(path), python=_python(path)
+        )
+
+    def change(self, log: str, edits: Edits, tag: str) -> StudyText | None:
+        """Change keys of the version that `tag` names; another version is a conflict (409)."""
+        made = [KeyEdit(tuple(each.path), each.value) for each in edits.edits]
+        return self._put(log, tag, lambda text: edited(text, made))
+
+    def replace(self, log: str, whole: WholeText, tag: str) -> StudyText | None:
+        """Put a text in place of the version that `tag` names; another is a conflict (409)."""
+        return self._put(log, tag, lambda _: whole.text)
+
+    def _put(self, log: str, tag: str, made: Any) -> StudyText | None:  # noqa: ANN401
+        path = self.path(log)
+        if path is None:
+            return None
+        with self._lock:
+            text = path.read_text(encoding="utf-8")
+            if etag_of(text) != tag:
+                raise HTTPException(409, {"text": text, "etag": etag_of(text)})
+            write_study(path, made(text))
+            return self.read(log)
+
+
+def _tables(path: Path) -> dict[str, Any]:
+    return read_toml(path, "the study file")
+
+
+def _python(path: Path) -> str:
+    """Python lines of every model, one after the other; why there are none, where it is so."""
+    try:
+        settings = read_settings(path)
+        folder = path.parent
+        parts = [
+            f"# {model.name}\n{python_lines(settings, model.name, folder)}"
+            for model in settings.models
+        ]
+    except FlightidError as error:
+        return f"# {error}\n"
+    return "\n".join(parts)

@@ -1,0 +1,126 @@
+"""Edits of a study file: one key at a time, comments and order kept, never over another's edit."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import tomlkit
+from tomlkit.exceptions import TOMLKitError
+
+from flightid.errors import StudyError
+from flightid.files import write_atomically
+from flightid.reading import DOCUMENT_BYTES
+from flightid.study.settings import read_settings
+
+DRAFT = ".draft-"
+
+
+@dataclass(frozen=True)
+class KeyEdit:
+    """One key of a study, and what it shall say.
+
+    Attributes
+    ----------
+    path : tuple of str or int
+        Keys from the top; a number counts the tables of a list, and one behind the last adds one.
+    value : object
+        Plain value; None takes the key out.
+    """
+
+    path: tuple[str | int, ...]
+    value: Any
+
+
+def etag_of(text: str) -> str:
+    """What a version of a study file is known by.
+
+    Example
+    -------
+    >>> etag_of("") == etag_of(""), etag_of("a = 1") == etag_of("a = 2")
+    (True, False)
+    """
+    return f'"{hashlib.sha256(text.encode()).hexdigest()[:32]}"'
+
+
+def edited(text: str, edits: Sequence[KeyEdit]) -> str:
+    r"""A study file with some keys changed.
+
+    Raises
+    ------
+    StudyError
+        The text is no TOML, or a path leads nowhere.
+
+    Example
+    -------
+    >>> text = "[[model]]\nname = 'Roll' # mine\n"
+    >>> print(edited(text, [KeyEdit(("model", 0, "band_rad_s"), [1.0, 20.0])]))
+    [[model]]
+    name = 'Roll' # mine
+    band_rad_s = [1.0, 20.0]
+    <BLANKLINE>
+    """
+    try:
+        document: Any = tomlkit.parse(text)
+        for edit in edits:
+            _apply(document, edit)
+        return str(tomlkit.dumps(document))
+    except (TOMLKitError, KeyError, IndexError, TypeError, ValueError) as error:
+        raise StudyError(
+            "the study file cannot be changed there",
+            found=f"{type(error).__name__}: {error}",
+            needed="a key of docs/study.md",
+        ) from error
+
+
+def _apply(document: Any, edit: KeyEdit) -> None:  # noqa: ANN401 - a parsed document
+    *parents, last = edit.path
+    place = document
+    for number, key in enumerate(parents):
+        following = edit.path[number + 1]
+        if isinstance(key, str) and key not in place:
+            place.append(key, tomlkit.aot() if isinstance(following, int) else tomlkit.table())
+        elif isinstance(key, int) and key == len(place):
+            place.append(tomlkit.table())
+        place = place[key]
+    if edit.value is None:
+        if last in place:
+            del place[last]
+    elif isinstance(last, int) and last == len(place):
+        place.append(tomlkit.item(edit.value))
+    else:
+        place[last] = edit.value
+
+
+def require_study(path: Path, text: str) -> None:
+    """Refuse what `flightid run` would refuse; paths are those beside `path`.
+
+    Raises
+    ------
+    StudyError
+        Names every key that does not fit.
+    """
+    if len(text.encode()) > DOCUMENT_BYTES:
+        raise StudyError("the study file is too long", needed=f"{DOCUMENT_BYTES} bytes at most")
+    draft = path.with_name(f"{DRAFT}{path.name}")
+    try:
+        draft.write_text(text, encoding="utf-8")
+        read_settings(draft)
+    finally:
+        draft.unlink(missing_ok=True)
+
+
+def write_study(path: Path, text: str) -> str:
+    """Check a study file, write it whole, and return its tag.
+
+    Raises
+    ------
+    StudyError
+        It cannot be carried out as written.
+    """
+    require_study(path, text)
+    write_atomically(path, text)
+    return etag_of(text)

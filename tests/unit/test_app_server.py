@@ -1,0 +1,291 @@
+"""The local page's server on a socket: studies by their tags, jobs, numbers of a run."""
+
+from __future__ import annotations
+
+import asyncio
+import http.client
+import json
+import shutil
+import threading
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("fastapi", reason="the extra app is not installed")
+
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
+
+from flightid import FrequencyResponse, run_study
+from flightid.app import work
+from flightid.app.guard import POLICY, Session
+from flightid.app.jobs import Workers
+from flightid.app.schemas import Job
+from flightid.app.serving import bound_socket, server_of
+from flightid.app.study_edits import KeyEdit, edited
+from flightid.app.workspace import Workspace
+from flightid.errors import OptionError
+from tests.sweep_log import SweepFlight
+
+Answer = tuple[int, Any, dict[str, str]]
+
+
+@dataclass
+class Browser:
+    """Asks as the page does."""
+
+    session: Session
+    workspace: Workspace
+
+    def ask(self, path: str, method: str = "GET", body: object = None, **headers: str) -> Answer:
+        given = {
+            "Cookie": f"{self.session.cookie}={self.session.secret}",
+            "Sec-Fetch-Site": "same-origin",
+            "Origin": f"http://127.0.0.1:{self.session.port}",
+        }
+        sent: bytes | None = None
+        if body is not None:
+            sent = body if isinstance(body, bytes) else json.dumps(body).encode()
+            binary = isinstance(body, bytes)
+            given["Content-Type"] = "application/octet-stream" if binary else "application/json"
+        given |= {name.replace("_", "-"): value for name, value in headers.items()}
+        line = http.client.HTTPConnection("127.0.0.1", self.session.port, timeout=60)
+        line.request(method, path, body=sent, headers=given)
+        answer = line.getresponse()
+        content = answer.read()
+        told = {name.lower(): value for name, value in answer.getheaders()}
+        line.close()
+        plain = "json" in told.get("content-type", "")
+        return answer.status, json.loads(content) if plain else content, told
+
+    def socket(self, **more: Any) -> Any:
+        given = {"Cookie": f"{self.session.cookie}={self.session.secret}"}
+        address = f"ws://127.0.0.1:{self.session.port}/api/live"
+        options = {"origin": f"http://127.0.0.1:{self.session.port}", **more}
+        return connect(address, additional_headers=given, **options)
+
+
+@dataclass
+class Flown:
+    """A workspace whose log has been inspected."""
+
+    folder: Path
+    log: str
+    study: Path
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory: pytest.TempPathFactory) -> Flown:
+    folder = tmp_path_factory.mktemp("workspace")
+    path = SweepFlight(sweep_s=20.0, rate_hz=100.0).write(folder)
+    workspace = Workspace(folder)
+    workspace.scan()
+    (entry,) = workspace.index.entries()
+    study = workspace.study_path(entry.id)
+    _, refusal, _ = work.answered(
+        work.make_overview, path, study, workspace.result_path(entry.id, "overview.json")
+    )
+    assert not refusal
+    work.make_review(path, workspace.result_path(entry.id, "review.json"))
+    workspace.index.close()
+    return Flown(folder, entry.id, study)
+
+
+@pytest.fixture(scope="module")
+def browser(flown: Flown) -> Iterator[Browser]:
+    workspace = Workspace(flown.folder)
+    workspace.scan()
+    bound = bound_socket(0)
+    session = Session(bound.getsockname()[1])
+    page = {"index.html": ("text/html", b"<p>page</p>"), "icon.svg": ("image/svg+xml", b"<svg/>")}
+    server = server_of(workspace, page, session)
+    thread = threading.Thread(target=lambda: asyncio.run(server.serve(sockets=[bound])))
+    thread.start()
+    yield Browser(session, workspace)
+    server.should_exit = True
+    thread.join()
+
+
+def test_a_flight_is_one_sentence_three_cards_and_a_strip(browser: Browser, flown: Flown) -> None:
+    status, flight, headers = browser.ask(f"/api/logs/{flown.log}")
+    assert status == 200
+    assert headers["content-security-policy"] == POLICY
+    shown = flight["overview"]
+    assert shown["sentence"].startswith("This log can carry a model of roll, pitch and yaw")
+    assert [card["axis"] for card in shown["cards"]] == ["roll", "pitch", "yaw"]
+    bands = {each["name"]: each["band_rad_s"] for each in _models(browser, flown)}
+    assert {card["model"]: card["band_rad_s"] for card in shown["cards"]} == bands
+    sweeps = [block for block in shown["blocks"] if block["kind"] == "sid"]
+    assert [block["axis"] for block in sweeps] == ["roll", "pitch", "yaw"]
+    by_code = {verdict["code"]: verdict for verdict in shown["verdicts"]}
+    roll = sweeps[0]
+    assert by_code["band-roll"]["spans_s"] == [[roll["start_s"], roll["stop_s"]]]
+    (rates,) = [line for line in shown["lines"] if line["name"] == "p"]
+    assert len(rates["low"]) == len(rates["high"]) == 900
+    _, listing, _ = browser.ask("/api/workspace")
+    assert [(log["id"], log["sweeps"]) for log in listing["logs"]] == [(flown.log, 3)]
+
+
+def _models(browser: Browser, flown: Flown) -> list[dict[str, Any]]:
+    found: list[dict[str, Any]] = browser.ask(f"/api/studies/{flown.log}")[1]["settings"]["model"]
+    return found
+
+
+def test_who_has_not_seen_the_last_version_changes_nothing(browser: Browser, flown: Flown) -> None:
+    place, before = f"/api/studies/{flown.log}", flown.study.read_text()
+    _, seen, headers = browser.ask(place)
+    assert headers["etag"] == seen["etag"]
+    edit = {"edits": [{"path": ["model", 0, "band_rad_s"], "value": [2.0, 15.0]}]}
+    assert browser.ask(place, "PATCH", edit)[0] == 428
+    status, changed, _ = browser.ask(place, "PATCH", edit, If_Match=seen["etag"])
+    assert (status, changed["settings"]["model"][0]["band_rad_s"]) == (200, [2.0, 15.0])
+    status, told, _ = browser.ask(place, "PATCH", edit, If_Match=seen["etag"])
+    assert status == 409
+    assert told["detail"] == {"text": changed["text"], "etag": changed["etag"]}
+    wrong = {"edits": [{"path": ["model", 0, "band"], "value": 1}]}
+    status, told, _ = browser.ask(place, "PATCH", wrong, If_Match=changed["etag"])
+    assert status == 422
+    assert "band_rad_s" in told["error"]
+    whole = {"text": before}
+    assert browser.ask(place, "POST", whole, If_Match=changed["etag"])[0] == 200
+    assert flown.study.read_text() == before
+
+
+def test_requests_that_a_stranger_makes_on_the_wire(browser: Browser, flown: Flown) -> None:
+    place = f"/api/studies/{flown.log}"
+    assert browser.ask(place, Origin="http://127.0.0.1:1")[0] == 403
+    assert browser.ask(place, Host="evil.example")[0] == 421
+    assert browser.ask(place, Cookie="")[0] == 401
+    paths = ("/../../etc/passwd", "/%2e%2e/%2e%2e/etc/passwd", "/api/logs/..%2f..", "/api/logs/x")
+    assert {browser.ask(path)[0] for path in paths} == {404}
+    assert browser.ask("/api/logs?name=x.bin", "PUT", b"<script>")[0] == 422
+    for origin in (None, "http://127.0.0.1:1"):
+        with pytest.raises(InvalidStatus), browser.socket(origin=origin):
+            pass
+
+
+def test_any_field_is_drawn_at_any_zoom(browser: Browser, flown: Flown) -> None:
+    _, groups, _ = browser.ask(f"/api/logs/{flown.log}/fields")
+    (rate,) = [group for group in groups if group["message"] == "RATE"]
+    assert rate["fields"]["R"] == "deg/s"
+    place = f"/api/logs/{flown.log}/view?series=RATE.R&series=RATE.ROut"
+    _, content, _ = browser.ask(f"{place}&start_s=20&stop_s=20.05&columns=100")
+    points, rows = (int(each) for each in np.frombuffer(content, count=2))
+    table = np.frombuffer(content, offset=16).reshape(rows, points)
+    assert rows == 3
+    assert points == 8  # six samples in the span, and one on each side
+    np.testing.assert_allclose(np.diff(table[0]), 0.01, rtol=1e-6)
+    for bad in ("series=RATE", "series=RATE.Nothing", "series=X.Y"):
+        query = f"/api/logs/{flown.log}/view?{bad}&start_s=0&stop_s=1&columns=100"
+        assert browser.ask(query)[0] == 422
+    assert browser.ask(f"{place}&start_s=1&stop_s=nan&columns=100")[0] == 422
+
+
+def test_only_the_newest_question_of_a_hand_is_answered(browser: Browser, flown: Flown) -> None:
+    model = _models(browser, flown)[0]["name"]
+    with browser.socket() as line:
+        for number in range(20):
+            band = [2.0, 10.0 + 0.1 * number]
+            edits = [{"path": ["model", 0, "band_rad_s"], "value": band}]
+            question = {"request": number, "log": flown.log, "model": model, "edits": edits}
+            line.send(json.dumps(question))
+        answers = []
+        while not answers or answers[-1]["request"] < 19:
+            answers.append(json.loads(line.recv(timeout=60)))
+        assert len(answers) < 20
+        assert answers[-1]["response"]["curves"][0]["omega_rad_s"][-1] == 11.9
+        line.send(json.dumps({"request": 20, "log": "../x", "model": model}))
+        assert "no study" in json.loads(line.recv(timeout=60))["error"]
+
+
+def test_jobs_that_a_killed_server_left_are_offered_again(tmp_path: Path) -> None:
+    Workers(Workspace(tmp_path)).stop()
+    job = Job(id="review-x", kind="review", log="x", state="waiting")
+    (tmp_path / ".flightid" / "jobs" / "review-x.json").write_text(job.model_dump_json())
+    left = Workers(Workspace(tmp_path))
+    assert [each.state for each in left.all()] == ["interrupted"]
+    left.stop()
+
+
+def test_a_cancelled_job_leaves_nothing_and_can_be_begun_again(
+    browser: Browser, flown: Flown
+) -> None:
+    browser.workspace.forget(flown.log)
+    flight = browser.ask(f"/api/logs/{flown.log}")[1]
+    waiting = [job["id"] for job in flight["jobs"] if job["state"] == "waiting"]
+    assert waiting == [f"overview-{flown.log}", f"review-{flown.log}"]
+    marks = flown.folder / ".flightid" / "jobs"
+    assert {path.stem for path in marks.iterdir()} == set(waiting)
+    for name in waiting:
+        assert browser.ask(f"/api/jobs/{name}", "DELETE")[0] == 200
+    states = {job["state"] for job in browser.ask("/api/jobs")[1]}
+    assert states == {"cancelled"}
+    assert not list(marks.iterdir())
+    assert browser.ask("/api/jobs/nothing", "DELETE")[0] == 404
+    for job in browser.ask("/api/jobs")[1]:
+        browser.ask("/api/jobs", "POST", job)
+    until = time.monotonic() + 60.0
+    while time.monotonic() < until:
+        begun = time.perf_counter()
+        flight = browser.ask(f"/api/logs/{flown.log}")[1]
+        assert time.perf_counter() - begun < 5.0  # the page answers while they run
+        if flight["overview"] and flight["review"]:
+            break
+        time.sleep(0.05)
+    assert flight["overview"]["sentence"].startswith("This log can carry")
+
+
+def test_the_page_shows_the_numbers_of_a_run_to_the_last_digit(
+    flown: Flown, tmp_path: Path
+) -> None:
+    """Clicks on the page, the study file that they leave behind, and its Python lines."""
+    shutil.copy(next(flown.folder.glob("*.bin")), tmp_path)
+    text = flown.study.read_text().replace("../", "")
+    clicks = [
+        KeyEdit(("model", 0, "band_rad_s"), [4.3, 17.1]),
+        KeyEdit(("model", 0, "response", "n_omega"), 23),
+        KeyEdit(("model", 0, "response", "compare"), ["composite"]),
+        KeyEdit(("fit", "starts"), 1),
+    ]
+    study = tmp_path / "study.toml"
+    study.write_text(text)
+    shown = work.make_responses(study, text, "Roll rate", clicks, True, True)
+    study.write_text(edited(text, clicks))
+    ran = run_study(study, output=tmp_path / "out").identified[0].responses
+    assert list(ran) == shown["estimators"] == ["instrument", "composite"]
+    for curve, response in zip(shown["curves"], ran.values(), strict=True):
+        pair = response.pair("p", "tau_phi")
+        assert curve["omega_rad_s"] == pair.omega_rad_s.tolist()
+        assert curve["gain"] == [abs(each) for each in pair.response.tolist()]
+        assert curve["phase_rad"] == pair.phase_rad.tolist()
+        assert curve["coherence"] == pair.coherence.tolist()
+        assert all(
+            low <= high for low, high in zip(curve["gain_low"], curve["gain_high"], strict=True)
+        )
+    (around,) = shown["around"]
+    assert around["omega_rad_s"][0] < 4.3 < 17.1 < around["omega_rad_s"][-1]
+    _lines_give(study, tmp_path, next(iter(ran.values())))
+
+
+def _lines_give(study: Path, folder: Path, expected: FrequencyResponse) -> None:
+    from flightid.app.python_lines import python_lines  # noqa: PLC0415
+    from flightid.study.settings import read_settings  # noqa: PLC0415
+
+    lines = python_lines(read_settings(study), "Roll rate", folder)
+    scope: dict[str, Any] = {}
+    lines = lines.replace("read_log('", f"read_log('{folder}/").replace("print(", "str(")
+    exec(lines, scope)
+    np.testing.assert_array_equal(scope["response"].response, expected.response)
+
+
+def test_the_loopback_alone_is_bound_and_a_taken_port_is_told() -> None:
+    bound = bound_socket(0)
+    assert bound.getsockname()[0] == "127.0.0.1"
+    with pytest.raises(OptionError, match="the port cannot be taken"):
+        bound_socket(bound.getsockname()[1])
+    bound.close()

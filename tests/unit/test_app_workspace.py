@@ -1,0 +1,165 @@
+"""The folder that the page works in: found by content, never left, never lost with its index."""
+
+from __future__ import annotations
+
+import asyncio
+import zipfile
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("fastapi", reason="the extra app is not installed")
+
+from tools.build_page import is_built, require_in
+from tools.page_types import TARGET, page_types
+
+from flightid.app.study_edits import KeyEdit, edited, etag_of, write_study
+from flightid.app.workspace import Workspace
+from flightid.errors import OptionError, StudyError
+from tests.sweep_log import SweepFlight
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return SweepFlight(sweep_s=4.0, rate_hz=50.0).write(tmp_path_factory.mktemp("log"))
+
+
+async def _pieces(content: bytes) -> AsyncIterator[bytes]:
+    for start in range(0, len(content), 10_000):
+        yield content[start : start + 10_000]
+
+
+def test_a_log_is_kept_once_by_its_content_inside_the_folder(tmp_path: Path, log: Path) -> None:
+    workspace = Workspace(tmp_path)
+    content = log.read_bytes()
+    names = ("../../../evil flight.bin", "C:\\logs\\again.bin", "/etc/passwd.bin")
+    taken = {asyncio.run(workspace.take(name, _pieces(content))) for name in names}
+    assert len(taken) == 1
+    (known,) = taken
+    path = workspace.log_path(known)
+    assert path == tmp_path.resolve() / "logs" / known / "evil flight.bin"
+    assert path.read_bytes() == content
+    assert [entry.id for entry in workspace.index.entries()] == [known]
+    for name in ("", "..", "///"):
+        with pytest.raises(OptionError, match="needs a name"):
+            asyncio.run(workspace.take(name, _pieces(content)))
+    with pytest.raises(OptionError, match="no log that flightid reads"):
+        asyncio.run(workspace.take("page.bin", _pieces(b"<html><script>")))
+    assert not list((tmp_path / ".flightid" / "uploads").iterdir())
+
+
+def test_no_identifier_leads_out_of_the_folder(tmp_path: Path, log: Path) -> None:
+    outside = tmp_path / "outside.bin"
+    outside.write_bytes(log.read_bytes())
+    folder = tmp_path / "workspace"
+    folder.mkdir()
+    (folder / "link.bin").symlink_to(outside)
+    workspace = Workspace(folder)
+    workspace.scan()
+    assert not workspace.index.entries()
+    for name in (
+        "../outside",
+        "..%2foutside",
+        "0" * 15,
+        "0" * 16 + "/",
+        "g" * 16,
+        "../" + "0" * 16,
+    ):
+        assert workspace.log_path(name) is None
+        for place in (workspace.study_path, lambda each: workspace.result_path(each, "x")):
+            with pytest.raises(OptionError, match="no log of the workspace"):
+                place(name)
+
+
+@pytest.mark.parametrize("damage", ["gone", "garbage"])
+def test_the_index_can_be_made_again(tmp_path: Path, log: Path, damage: str) -> None:
+    (tmp_path / "mine.bin").write_bytes(log.read_bytes())
+    (tmp_path / "notes.log").write_text("no log of an autopilot\n")
+    first = Workspace(tmp_path)
+    first.scan()
+    entries = first.index.entries()
+    assert [entry.path for entry in entries] == ["mine.bin"]
+    first.keep_result(entries[0].id, "overview", {"a": 1})
+    first.index.close()
+    for path in (tmp_path / ".flightid").glob("index.sqlite*"):
+        path.unlink()
+        if damage == "garbage" and path.suffix == ".sqlite":
+            path.write_bytes(b"\0garbage" * 1000)
+    again = Workspace(tmp_path)
+    again.scan()
+    assert again.index.entries() == entries
+    assert again.result(entries[0].id, "overview") == {"a": 1}
+    (tmp_path / "mine.bin").unlink()
+    again.scan()
+    assert again.log_path(entries[0].id) is None
+
+
+STUDY = """# mine
+[study]
+title = "A" # of the flight
+
+[log]
+path = "flight.bin"
+
+[[segment]]
+name = "sweep"
+span_s = [1.0, 2.0]
+
+[[model]]
+name = "Roll rate"
+template = "rate_motor_lag"
+axis = "roll"
+identify = ["sweep"]
+band_rad_s = [1.0, 20.0] # by hand
+"""
+
+
+def test_an_edit_changes_its_key_and_nothing_else(tmp_path: Path) -> None:
+    band = KeyEdit(("model", 0, "band_rad_s"), [2.5, 31.4])
+    assert edited(STUDY, [band]) == STUDY.replace("[1.0, 20.0]", "[2.5, 31.4]")
+    more = edited(
+        STUDY,
+        [
+            KeyEdit(("segment", 1), {"name": "brush", "span_s": [3.0, 4.0]}),
+            KeyEdit(("model", 0, "identify"), ["brush"]),
+            KeyEdit(("model", 0, "response", "estimator"), "composite"),
+        ],
+    )
+    path = tmp_path / "study.toml"
+    assert write_study(path, more) == etag_of(more)
+    assert "# of the flight" in more
+    assert "# by hand" in more
+    with pytest.raises(StudyError, match="band_rads"):
+        write_study(path, edited(more, [KeyEdit(("model", 0, "band_rads"), [1.0, 2.0])]))
+    with pytest.raises(StudyError, match="cannot be changed there"):
+        edited(STUDY, [KeyEdit(("model", 7, "name"), "x")])
+    assert path.read_text() == more
+    assert [each.name for each in tmp_path.iterdir()] == ["study.toml"]
+
+
+def test_the_page_has_the_types_of_the_server() -> None:
+    assert TARGET.read_text(encoding="utf-8") == page_types()
+
+
+def test_a_wheel_without_the_page_fails(tmp_path: Path) -> None:
+    wheel = tmp_path / "flightid-0-py3-none-any.whl"
+    names = ["index.html", "page.js", "sources.sha256"]
+    for kept in (names[1:], names[:1], []):
+        with zipfile.ZipFile(wheel, "w") as made:
+            for name in kept:
+                made.writestr(f"flightid/app/page/{name}", "x")
+        with pytest.raises(SystemExit, match="lacks the page"):
+            require_in(wheel)
+    with zipfile.ZipFile(wheel, "w") as made:
+        for name in names:
+            made.writestr(f"flightid/app/page/{name}", "x")
+    require_in(wheel)
+    page, sources = tmp_path / "page", tmp_path / "app"
+    page.mkdir()
+    sources.mkdir()
+    for name in names:
+        (page / name).write_text("x")
+    assert is_built(page, sources)  # an sdist: the page, and no sources of it
+    (sources / "package.json").write_text("{}")
+    assert not is_built(page, sources)

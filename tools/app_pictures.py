@@ -1,0 +1,83 @@
+"""Photograph the local page for its documentation.
+
+    python tools/app_pictures.py demo-output/flight.bin
+
+Needs Chromium, the built page and the extra app. Writes PNG files to docs/pictures.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import shutil
+import sys
+import tempfile
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from pictures import MAXIMUM_BYTES, PICTURES
+from PIL import Image
+from playwright.sync_api import Page, sync_playwright
+
+from flightid.app.guard import Session
+from flightid.app.page import page_files
+from flightid.app.serving import bound_socket, server_of
+from flightid.app.workspace import Workspace
+
+SIZE = (1280, 860)
+ARGUMENTS = ["--no-sandbox", "--disable-gpu"]
+COLOURS = 96
+
+
+@contextmanager
+def served(folder: Path) -> Iterator[Session]:
+    """The page on a workspace, as `flightid app` serves it."""
+    bound = bound_socket(0)
+    session = Session(bound.getsockname()[1])
+    server = server_of(Workspace(folder), page_files(), session)
+    thread = threading.Thread(target=lambda: asyncio.run(server.serve(sockets=[bound])))
+    thread.start()
+    try:
+        yield session
+    finally:
+        server.should_exit = True
+        thread.join()
+
+
+def photograph(page: Page, name: str) -> None:
+    """One picture, small enough for a repository."""
+    target = PICTURES / name
+    page.wait_for_timeout(1500)  # for plots to be drawn
+    page.screenshot(path=target)
+    with Image.open(target) as taken:
+        taken.convert("RGB").quantize(COLOURS).save(target, optimize=True)
+    if target.stat().st_size > MAXIMUM_BYTES:
+        sys.exit(f"{target.name} takes {target.stat().st_size} bytes, at most {MAXIMUM_BYTES}")
+
+
+def flight(page: Page) -> None:
+    """The screen of a flight, its three cards filled."""
+    page.click("tbody a")
+    page.locator(".step").nth(2).wait_for(timeout=120_000)
+    photograph(page, "app-flight.png")
+
+
+def main(log: Path) -> None:
+    """Take all pictures."""
+    with tempfile.TemporaryDirectory() as folder, sync_playwright() as tools:
+        shutil.copy(log, Path(folder) / "flight.bin")
+        with served(Path(folder)) as session:
+            browser = tools.chromium.launch(
+                executable_path=shutil.which("chromium"), args=ARGUMENTS
+            )
+            width, height = SIZE
+            page = browser.new_page(viewport={"width": width, "height": height})
+            page.goto(session.address)
+            page.wait_for_selector("tbody a")
+            flight(page)
+            browser.close()
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
