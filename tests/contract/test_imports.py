@@ -25,6 +25,7 @@ BASE = {
     "table",
     "units",
     "version",
+    "wrapping",
 }
 # Left to right: a room may import base files and the rooms before it.
 ORDER = [

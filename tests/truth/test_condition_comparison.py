@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import flightid as fid
 from flightid import errors
+from flightid.cli.program import run
 from flightid.dynamics.conditions.ratios import chance_of, holm, ratio_of
 from flightid.uncertainty.estimate import Estimate
 from tests.closeness import assert_close
@@ -148,6 +150,29 @@ def test_refused(compared: fid.ConditionComparison) -> None:
         fid.compare_conditions({"a": fid.load_model("r50_hover"), "b": box})
     with pytest.raises(errors.UnknownNameError, match="there is no such common parameter"):
         compared["Zw"]
+
+
+def test_black_boxes_are_compared_by_their_modes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    boxes = {}
+    for name, hertz in (("before", 1.6), ("after", 2.0)):
+        # Roots of a pair damped by 0.2, of a lag, and delays of a sample, which are no modes.
+        pair = 2.0 * np.pi * hertz * (-0.2 + 1j * np.sqrt(0.96))
+        a = np.real(np.poly([*np.exp(0.01 * np.array([pair, pair.conjugate(), -2.0])), 0.0]))
+        boxes[name] = fid.PolynomialModel(("u",), "y", 0.01, a=a, b=[[0.0, 1.0]])
+    found = fid.compare_conditions(boxes)
+    assert found.parameters == ()
+    assert [mode.name for mode in found.modes] == ["y at 0.318 Hz", "y at 1.6 Hz"]
+    ratios = [mode.numbers[0].ratios["after"].value for mode in found.modes]
+    assert_close(ratios, [1.0, 1.25], rtol=1e-9, why="by the roots that were put in")
+    assert found.summary().title == "Modes, before and after"
+    files = [str(fid.write_model(box, tmp_path / f"{name}.toml")) for name, box in boxes.items()]
+    assert run(["compare", *files]) == 0
+    shown = capsys.readouterr()
+    assert "y at 1.6 Hz, natural frequency" in shown.out
+    assert "--gains FILE" in shown.err
+    assert f"flightid verify {files[0]} RECORDS --against {files[1]}" in shown.err
 
 
 def test_modes_without_common_states_do_not_answer_to_each_other() -> None:

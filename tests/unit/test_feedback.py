@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -91,6 +92,12 @@ def test_a_response_carries_the_answer_and_a_file_keeps_it(tmp_path: Path) -> No
     assert "loop-closed" in {finding.code for finding in response.findings}
     again = read_response(write_response(response, tmp_path / "a.nc"))
     assert (again.loop, again.input_shape) == (response.loop, response.input_shape)
+
+
+def test_an_open_loop_is_said_without_the_share_of_chance() -> None:
+    response = fid.estimate_response(_record("white"), window_s=10.0)
+    said = "no loop seen: past noise of the outputs explains no more of the inputs than chance may"
+    assert re.fullmatch(rf"{said} \(p = [\d.]+\)", str(response.loop))
 
 
 def test_a_declared_loop_overrides_the_test() -> None:

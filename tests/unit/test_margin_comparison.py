@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 import flightid as fid
 from flightid.cli.program import run
 from flightid.control.margins.margins import margins
+from flightid.control.margins.outside_band import BEYOND
 from flightid.conventions import Light
 from flightid.errors import DataError
 from flightid.plot.compared_loops import compared_loops
-from flightid.review.margin_comparison import BEYOND
 from flightid.uncertainty.uncertain import Uncertain
 from tests.closeness import assert_close
 from tests.strangers.margin_changes import Gains, Rig, compared, fitted, truths
@@ -65,7 +65,20 @@ def test_what_is_read_above_the_band_of_the_fit_is_not_judged() -> None:
     assert [each.light for each in above.findings if each.code == "margin-beyond-band"] == [
         Light.AMBER, Light.AMBER,
     ]  # fmt: skip
+    alone = margins(band, controller=0.3)
+    assert (alone.gain_margin.interval95, alone.gain_margin.reason) == (None, BEYOND)
+    assert alone.gain_margin.value == pytest.approx(above["tau_phi, gain margin"].before.value)
+    assert BEYOND not in (alone.crossover.reason, alone.phase_margin.reason)
+    (said,) = (each for each in alone.findings if each.code == "margin-beyond-band")
+    assert "above the 20 rad/s to which" in said.message
+    within = margins(replace(band, valid_rad_s=(15.0, 1e3)), controller=0.3)
+    assert within.gain_margin.interval95 is not None
+    (low,) = (each for each in within.findings if each.code == "margin-below-band")
+    assert "phase margin, delay margin down to 11.3 rad/s, below the 15 rad/s" in low.message
     wide = replace(band, valid_rad_s=(0.5, 1e3))
+    assert {each.code for each in margins(wide, controller=0.3).findings}.isdisjoint(
+        ("margin-beyond-band", "margin-below-band")
+    )
     found = fid.compare_margins((wide, {"tau_phi": {"p": 0.3}}), (wide, {"tau_phi": {"p": 0.6}}))
     twice = found["tau_phi, gain margin"]
     width = twice.difference.half_width95

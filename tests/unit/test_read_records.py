@@ -17,7 +17,9 @@ import xarray as xr
 from flightid.errors import DataError, FileFormatError, OptionError, UnitError, UnknownNameError
 from flightid.evidence.gather import FitFacts, gather_evidence
 from flightid.record import read_records
+from flightid.record.contents import table_contents
 from flightid.record.time_question import time_question, time_said
+from flightid.surface import as_key, speaking
 from flightid.units import canonical
 from tests.closeness import assert_close
 
@@ -164,7 +166,10 @@ def test_milliseconds_are_asked_about_and_never_taken_for_seconds(tmp_path: Path
     for unit, step_s in (("s", 100.0), ("ms", 0.1)):
         (sure,) = read_records(path, **asked, units={"t": unit}, resample_to_s=step_s)
         assert time_question(sure) is None
-    assert "--time-unit ms" in time_said(doubtful)
+    assert "declare time_unit='ms', or 's'" in time_said(doubtful)
+    with speaking(as_key):
+        assert 'declare time_unit = "ms", or' in time_said(doubtful)
+    assert any(f"is it ms? — {question.action}." in said for said in table_contents(path).notes)
     for step, unit, rows, asked_about in ((0.5, "2 kHz", 1300, True), (0.5, "2 Hz", 200, False)):
         lines = [f"{step * k},{k % 7}" for k in range(rows)]
         (read,) = read_records(_csv(tmp_path, "\n".join(["t,y", *lines])), outputs=["y"])

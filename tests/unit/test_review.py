@@ -25,7 +25,7 @@ from flightid.plot.glance import flight_glance
 from flightid.review.apart import gains_between
 from flightid.review.deconvolution import LoopSamples, closed_loop
 from flightid.review.gyro_noise import GyroNoise
-from flightid.review.loops import _pair
+from flightid.review.loops import _pair, tracking_error
 from flightid.review.motors import motor_use, turning, yaw_trim
 from flightid.review.verdicts import judge_flight
 from flightid.uncertainty.estimate import Estimate
@@ -96,6 +96,19 @@ def test_a_slow_log_says_what_to_log(tmp_path: Path) -> None:
     assert "logged at 10 Hz, too slowly" in loop.reason
     assert "LOG_BITMASK" in loop.action
     assert loop.tracking is not None
+
+
+def test_a_tracking_error_of_one_wild_stretch_is_no_number() -> None:
+    random = np.random.default_rng(4)
+    still, wild = random.standard_normal((2, 4000))
+    time_s = np.arange(4000) * 0.01
+    for errors, told in ((still, True), (np.where(time_s < 36.0, 1e-3 * still, wild), False)):
+        flown = fid.Record.from_arrays(
+            time_s, outputs={"set_point": np.zeros(4000), "measured": errors}
+        )
+        found = tracking_error([flown], "rad/s")
+        assert (found.value is not None) is told, found
+        assert (found.reason == "") is told
 
 
 def test_a_healthy_flight_has_no_complaint(review: fid.FlightReview) -> None:

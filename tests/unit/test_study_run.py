@@ -238,3 +238,27 @@ def test_the_next_step_names_the_study_as_it_was_given(
     asked = str(study.output.with_name("study.toml"))
     assert asked in re.sub(r"\s", "", to_text(answer.short_document(study, study.document)))
     assert answer.answer_of(study).findings[0].message == "study.toml"
+
+
+def test_the_next_step_of_a_model_with_two_inputs_can_be_taken(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    random = np.random.default_rng(3)
+    u, w = np.repeat(random.choice([-1.0, 1.0], (2, 160)), 5, axis=1)
+    y = np.zeros(800)
+    for k in range(1, 800):
+        y[k] = 0.9 * y[k - 1] + 0.2 * u[k - 1] + 0.1 * w[k - 1] + 0.01 * random.standard_normal()
+    rows = [f"{0.05 * k:.2f},{u[k]},{w[k]},{y[k]:.6f}" for k in range(800)]
+    (tmp_path / "short.csv").write_text("\n".join(["time,u,w,y", *rows]))
+    study = tmp_path / "two.toml"
+    told = 'path = "short.csv"\nhold = "zero"\nloop = "open"'
+    text = SHORT.replace('path = "short.csv"', told).replace('inputs = "u"', 'inputs = ["u", "w"]')
+    study.write_text(text)
+    assert run(["run", str(study)]) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    said = re.search(r"flightid (tune \S+ --controller pi_d --loops y/u)", shown)
+    assert said is not None
+    assert run([*said[1].split(), "--controller-rate-hz", "20", "--draws", "6"]) == 0
+    assert "gains of y" in capsys.readouterr().out
+    assert run([*said[1].split()[:-1], "y/v"]) == 1
+    assert "name one: --loops y/u" in capsys.readouterr().err

@@ -12,7 +12,7 @@ import click
 from flightid.cli.compared_loops import compared_loops, short_names
 from flightid.cli.lists import ListOption, ListsCommand
 from flightid.cli.model_commands import feedback_option
-from flightid.cli.output import all_option, json_option, level_option
+from flightid.cli.output import all_option, json_option, level_option, note
 from flightid.cli.pages import html_option, show
 from flightid.cli.sources import AXES, known_models, load_source
 
@@ -84,6 +84,10 @@ def command(
         loops = compared_loops(files, axis, gains, feedback, loop_rate_hz)
         results: list[Result] = [*_conditions(files, axis, needed=not loops), *loops]
         first, *beside = results
+        if not loops:
+            note(f"Next: {_after_models(files)}")
+        if not as_json:
+            _show_modes(results, level)
         show(first, "Comparison", *beside, as_json=as_json, html=html, level=level)
         return
     if gains or feedback:
@@ -116,6 +120,26 @@ def _conditions(
         if needed:
             raise
         return []
+
+
+def _show_modes(results: Sequence[Result], level: float | None) -> None:
+    """Modes of models with named parameters, ahead of those; of others they are the summary."""
+    from flightid.dynamics.conditions.result import ConditionComparison
+    from flightid.uncertainty.quantiles import showing
+
+    for result in results:
+        if isinstance(result, ConditionComparison) and result.parameters and result.modes:
+            with showing(level):
+                click.echo(f"{result.modes_table()}\n")
+
+
+def _after_models(files: Sequence[str]) -> str:
+    """What can be asked of models that no controller was closed around."""
+    named = " ".join(files)
+    margins = f"flightid compare {named} --gains FILE compares margins under gains of `tune`"
+    if len(files) != 2:
+        return margins
+    return f"{margins}; flightid verify {files[0]} RECORDS --against {files[1]}: which errs less"
 
 
 def _holds_gains(path: Path) -> bool:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from textwrap import fill
 
 from flightid.findings import Finding
+from flightid.wrapping import wrapped
 
 WIDTH = 100
 
@@ -15,15 +15,8 @@ def verdict_lines(findings: Iterable[Finding]) -> str:
     given: set[str] = set()
     lines = []
     for finding in findings:
-        lines.append(fill(f"{finding.light}: {finding.message}", WIDTH, subsequent_indent="    "))
+        lines += wrapped(f"{finding.light}: {finding.message}", WIDTH, later="    ")
         if finding.action and finding.action not in given:
             given.add(finding.action)
-            lines.append(
-                fill(
-                    f"do: {finding.action}",
-                    WIDTH,
-                    initial_indent="    ",
-                    subsequent_indent="        ",
-                )
-            )
+            lines += wrapped(f"do: {finding.action}", WIDTH, first="    ", later="        ")
     return "\n".join(lines)

@@ -7,9 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from flightid.errors import OptionError
+from flightid.findings import Finding
 from flightid.record.formats import ColumnTable, file_format
 from flightid.record.tables import read_table
 from flightid.record.time_columns import near_times, told_time, with_time
+from flightid.record.time_question import slow_stamps
 from flightid.table import Cell, Column, Table
 
 
@@ -64,7 +66,21 @@ def _time(table: ColumnTable) -> list[str]:
         near = near_times(table) or "no column is named as one"
         return [f"No time: {near}; say --time COLUMN or --sample-time-s SECONDS."]
     told = told_time(timed, name)
-    return [f"{table.path.name}: {told}."] if told else []
+    said = [f"{table.path.name}: {told}."] if told else []
+    question = _question(timed, name)
+    return [*said, f"{question.message} — {question.action}."] if question else said
+
+
+def _question(table: ColumnTable, name: str) -> Finding | None:
+    """Whether stamps whose unit nobody stated are seconds; None of those that have one."""
+    if name not in table.lengths or table.clock is not None or table.units.get(name):
+        return None
+    stamps = table.raw(name)
+    steps = np.diff(stamps[np.isfinite(stamps)]) if stamps.dtype.kind in "fiu" else np.empty(0)
+    steps = steps[steps > 0]
+    if not steps.size:
+        return None
+    return slow_stamps(table.path.name, name, float(np.median(steps)), float(steps.sum()))
 
 
 def _row(table: ColumnTable, name: str) -> tuple[Cell, ...]:

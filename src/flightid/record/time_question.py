@@ -33,7 +33,7 @@ def time_said(record: Record) -> str:
     ''
     """
     question = time_question(record)
-    asked = f"{question.message}; {question.action}" if question else ""
+    asked = f"{question.message} — {question.action}" if question else ""
     if asked or not (column := time_column(record)):
         return asked
     read = next(step for step in record.history if step.operation == READ)
@@ -61,15 +61,27 @@ def time_question(record: Record) -> Finding | None:
     read = next((step for step in record.history if step.operation == READ), None)
     if read is None or read.options.get("time_unit", "stated") is not None:
         return None
-    spacing = float(read.options["row_spacing_s"] or 0.0)
-    is_long = record.time_s[-1] - record.time_s[0] >= LONG_S
-    if spacing < (SLOW_S if is_long else SLOWEST_S):
+    spacing_s = float(read.options["row_spacing_s"] or 0.0)
+    length_s = float(record.time_s[-1] - record.time_s[0])
+    return slow_stamps(str(read.options["file"]), str(read.options["time"]), spacing_s, length_s)
+
+
+def slow_stamps(file: str, column: str, spacing_s: float, length_s: float) -> Finding | None:
+    """The same question of stamps whose unit nobody stated, taken for seconds.
+
+    Example
+    -------
+    >>> slow_stamps("rig.csv", "t", 0.01, 60.0)
+    >>> print(slow_stamps("rig.csv", "t", 0.5, 650.0))  # doctest: +ELLIPSIS
+    [amber] rows of rig.csv are 0.5 s apart (2 Hz), and nobody stated ... time_unit='ms', or 's' ...
+    """
+    if spacing_s < (SLOW_S if length_s >= LONG_S else SLOWEST_S):
         return None
-    guess = "ms" if spacing < IN_MS_S else "us"
+    guess = "ms" if spacing_s < IN_MS_S else "us"
     return Finding(
         "time-unit-not-stated",
         Light.AMBER,
-        f"rows of {read.options['file']} are {spacing:.6g} s apart ({1 / spacing:.3g} Hz), and "
-        f"nobody stated the unit of column {read.options['time']!r}: is it {guess}?",
-        f"declare it: --time-unit {guess}, or s if it is seconds (time_unit in a study)",
+        f"rows of {file} are {spacing_s:.6g} s apart ({1 / spacing_s:.3g} Hz), and "
+        f"nobody stated the unit of column {column!r}: is it {guess}?",
+        f"declare time_unit={guess!r}, or 's' if it is seconds",
     )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import textwrap
 from typing import assert_never
 
 from flightid.report.content import (
@@ -17,6 +16,7 @@ from flightid.report.content import (
     TableBlock,
 )
 from flightid.table import Column, Table
+from flightid.wrapping import wrapped
 
 WIDTH = 100
 _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
@@ -65,17 +65,17 @@ def _section(section: Section, level: int) -> list[str]:
 def _block(block: Block) -> list[str]:
     match block:
         case Paragraph(text):
-            return textwrap.wrap(text, WIDTH) or [""]
+            return wrapped(text, WIDTH) or [""]
         case Lights():
             return _lights(block)
         case TableBlock(table):
             bare = Table(table.title, table.columns, table.rows).to_text().split("\n")
-            return [*bare, *(line for note in table.notes for line in textwrap.wrap(note, WIDTH))]
+            return [*bare, *(line for note in table.notes for line in wrapped(note, WIDTH))]
         case KeyValues():
             return _key_values(block)
         case Figure(caption=caption):
             shown = f" ({', '.join(block.series)})" if block.series else ""
-            return textwrap.wrap(f"[Figure: {caption}{shown}]", WIDTH)
+            return wrapped(f"[Figure: {caption}{shown}]", WIDTH)
         case _:
             assert_never(block)
 
@@ -85,7 +85,7 @@ def _lights(block: Lights) -> list[str]:
     for finding in block.findings:
         head = f"{f'[{finding.light}]':<10} "
         body = finding.message + (f" — {finding.action}" if finding.action else "")
-        lines += textwrap.wrap(body, WIDTH, initial_indent=head, subsequent_indent=" " * len(head))
+        lines += wrapped(body, WIDTH, first=head, later=" " * len(head))
     return lines or ["Nothing was judged."]
 
 

@@ -135,7 +135,7 @@ def change_table(
         rows.append((each.loop, each.name, unit, *told, said))
     brackets = (
         f"In brackets: {interval_words(chosen)} intervals. Changed: beyond chance, one false "
-        "“yes” in 20 such tables; –: not judged."
+        "“yes” in 20 such tables; –: not told, or not judged."
     )
     return Table(title, columns, tuple(rows), (brackets, *notes))
 

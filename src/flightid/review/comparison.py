@@ -188,12 +188,15 @@ def compare_loops(
 
 
 def _pairs(before: LoopResponse, after: LoopResponse) -> Iterator[tuple[Reading, Reading]]:
-    """The same number of both, steps read over the time that both show: where they end counts."""
+    """The same number of both, steps read over the time that both show: where they end counts.
+
+    Where one flight does not tell it, the other's stands beside a gap.
+    """
     end_s = min(before.time_s[-1], after.time_s[-1])
     old, new = _readings(before, end_s), _readings(after, end_s)
     for name, reading in old.items():
         answer = new.get(name)
-        if answer is not None and reading.value is not None and answer.value is not None:
+        if answer is not None and (reading.value is not None or answer.value is not None):
             yield reading, answer
 
 
@@ -202,7 +205,7 @@ def _readings(loop: LoopResponse, end_s: float) -> dict[str, Reading]:
     steps = np.vstack([loop.step, loop.draws])[:, kept]
     found = {r.name: r for r in step_features(steps, loop.time_s[kept]) if r.name in SHOWN}
     found |= {r.name: r for r in loop.readings if r.name == BY_FREQUENCY}
-    if loop.tracking is not None and loop.tracking.value is not None and loop.moved:
+    if loop.tracking is not None and loop.moved:
         found[TRACKING] = loop.tracking.scaled(100.0 / loop.moved, name=TRACKING, unit="%")
     return found
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,8 +26,10 @@ from flightid.review.thresholds import (
     LIVELY_RATE,
     SAMPLES_IN_RISE,
     WIDEST_LEVEL,
+    WIDEST_TRACKING,
 )
 from flightid.uncertainty.estimate import Estimate, Reading
+from flightid.uncertainty.quantiles import LEVEL
 from flightid.uncertainty.uneven import LogarithmicEnds
 
 Array = NDArray[np.float64]
@@ -37,6 +40,7 @@ WINDOW_S = {"rate": 0.5, "attitude": 1.5}
 SLOWEST_HZ = {"rate": 2.0, "attitude": 0.5}
 PACE = {"rate": 1.0, "attitude": 2.5}
 STRETCHES = 10
+TRACKING = "tracking error, rms"
 FINER = 4.0
 """Times the usual samples, of a log that has them, where a step rises within too few."""
 TOO_SLOW = "too slowly for a step"
@@ -103,7 +107,7 @@ def _loop(log: Log, spans: tuple[Span, ...], axis: str, loop: str) -> LoopRespon
     begun = replace(
         blank,
         pieces=len(pieces),
-        tracking=_tracking(pieces, "rad/s" if loop == "rate" else "rad"),
+        tracking=tracking_error(pieces, "rad/s" if loop == "rate" else "rad"),
     )
     tick_s = 1.0 / loop_rate_hz(log) if loop_rate_hz(log) else 0.0
     made = _stepped(begun, pieces, FASTEST[loop].value, tick_s, logging(log))
@@ -190,8 +194,11 @@ def _samples(pieces: list[Record], fastest_hz: float) -> LoopSamples:
     return LoopSamples(joined("set_point"), joined("measured"), ahead, lengths, step_s)
 
 
-def _tracking(pieces: list[Record], unit: str) -> Reading:
-    """Root mean square error, with an interval by the scatter between ten stretches."""
+def tracking_error(pieces: Sequence[Record], unit: str) -> Reading:
+    """Root mean square error, with an interval by the scatter between ten stretches; or no number.
+
+    One stretch that differs from all others leaves none: its size is that of chance.
+    """
     error = np.concatenate([np.asarray(p["measured"]) - np.asarray(p["set_point"]) for p in pieces])
     if unit == "rad":
         error = (error + np.pi) % (2.0 * np.pi) - np.pi
@@ -200,7 +207,9 @@ def _tracking(pieces: list[Record], unit: str) -> Reading:
     spread = math.sqrt((STRETCHES - 1) * float(np.var(left_out)))
     value = math.sqrt(float(squares.mean()))
     ends = LogarithmicEnds(value, spread / value) if value > 0.0 else None
-    return Estimate("tracking error, rms", value, unit, ends=ends)
+    if ends is not None and (high := ends(LEVEL)) and high[1] > WIDEST_TRACKING.value * value:
+        return Estimate(TRACKING, None, unit, reason="its stretches differ too much to tell one")
+    return Estimate(TRACKING, value, unit, ends=ends)
 
 
 def _step(begun: LoopResponse, samples: LoopSamples, tick_s: float, advised: str) -> LoopResponse:

@@ -12,13 +12,12 @@ from numpy.typing import NDArray
 
 from flightid.control.closed_loop.close_loop import close_loop
 from flightid.control.loops.interconnection import Interconnection
-from flightid.control.margins.gain_limits import measured_up
-from flightid.control.margins.loop_metrics import READ_AT
+from flightid.control.margins.gain_limits import loop_numbers, measured_up
 from flightid.control.margins.loop_source import BrokenLoop, read_loop
-from flightid.control.margins.margins import MISSING, Margins, loop_numbers, margins_of
+from flightid.control.margins.margins import MISSING, Margins, margins_of
+from flightid.control.margins.outside_band import BEYOND, outside_band
 from flightid.control.stepped.gain_controller import GainController
 from flightid.control.stepped.gain_loops import UncertainPlant, gain_loops
-from flightid.control.tuning.margins_beyond import MarginBeyond, beyond_findings, room_above
 from flightid.conventions import Light
 from flightid.dynamics.conditions.ratios import even_error
 from flightid.errors import DataError
@@ -51,7 +50,6 @@ ONE_RECORD = (
     "and nothing says which of them are chance."
 )
 SHARED_ERRORS = "both models are of one record, and their errors hang together"
-BEYOND = "read above the band to which the model was shown to hold"
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -196,7 +194,6 @@ def compare_margins(
     findings = (
         *verdicts(changes, significant),
         *_doubts(names, (before[0], after[0]), told),
-        *_above(names, [{name: loops[name] for name in shared} for loops in (old, new)]),
     )
     return MarginComparison(
         names, changes, told[0], told[1], one_model, one_record, significant, findings
@@ -244,7 +241,7 @@ def _changes(
         apart = both.carried_together(
             lambda pairs: new_rows([b for _, b in pairs]) - old_rows([a for a, _ in pairs])
         )
-    above = [_read_above(loop) for loop in (old, new)]
+    above = [outside_band(loop).above for loop in (old, new)]
     for place, (quantity, field, unit) in enumerate(COMPARED):
         one, two = (
             carried.number(place, quantity, unit, MISSING.get(field, "there is none"))
@@ -267,29 +264,6 @@ def _changes(
 def _rows(loop: BrokenLoop) -> Callable[[list[Any]], NDArray[np.float64]]:
     omega = measured_up(loop)[0]
     return lambda things: loop_numbers(loop, omega, things, FIELDS)[0]
-
-
-def _read_above(loop: BrokenLoop) -> dict[str, float]:
-    """Numbers that are read above the band of the fit, and where, rad/s."""
-    band = loop.uncertain.valid_rad_s
-    if band is None:
-        return {}
-    omega = measured_up(loop)[0]
-    places = loop_numbers(loop, omega, [loop.uncertain.value], [*READ_AT.values()])[0][0]
-    return {name: float(at) for name, at in zip(READ_AT, places, strict=True) if at > band[1]}
-
-
-def _above(names: Sequence[str], sides: Sequence[Mapping[str, BrokenLoop]]) -> Iterator[Finding]:
-    """What `tune` says of such numbers, of each model by its name."""
-    for name, loops in zip(names, sides, strict=True):
-        for key, loop in loops.items():
-            found, band = _read_above(loop), loop.uncertain.valid_rad_s
-            if found and band is not None:
-                omega = measured_up(loop)[0]
-                beyond = loop.of(loop.uncertain.value, omega[omega > band[1]])
-                each = MarginBeyond(key, max(found.values()), room_above(beyond))
-                for told in beyond_findings([each], band):
-                    yield replace(told, message=f"{name}, {told.message}")
 
 
 def _chance(difference: Reading) -> float | None:

@@ -88,7 +88,8 @@ def frequencies(loops: Iterable[LoopResponse]) -> Table:
             )
         )
     note = "Phase delay at 2 Hz of rate loops, at 0.5 Hz of attitude loops."
-    return Table("Closed loops by frequency, and tracking", columns, tuple(rows), (note,))
+    title = "Closed loops by frequency, and tracking"
+    return Table(title, columns, tuple(rows), (note, "–: not told by this flight."))
 
 
 def motors(used: Iterable[MotorUse]) -> Table:
@@ -160,7 +161,7 @@ def cell(reading: Reading | Estimate | None, factor: float = 1.0) -> str | None:
 
 
 def _in_degrees(tracking: Reading | None) -> str | None:
-    if tracking is None:
+    if tracking is None or tracking.value is None:
         return None
     unit = "deg/s" if tracking.unit == "rad/s" else "deg"
     return f"{cell(tracking, math.degrees(1.0))} {unit}"

@@ -20,6 +20,9 @@ SAMPLES_IN_RISE = Threshold(
 WIDEST_LEVEL = Threshold(
     0.5, "1", "half of the step either way: such a step tells nothing about gains"
 )
+WIDEST_TRACKING = Threshold(
+    3, "1", "a tracking error that may be a third or three times its value tells no loop (ours)"
+)
 OVERSHOOT = Threshold(
     31, "%", "a pair of poles damped by 0.35, the least of level 1: MIL-F-8785C, 3.2.2.1.2"
 )

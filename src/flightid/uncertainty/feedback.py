@@ -127,11 +127,11 @@ class FeedbackTest:
         }
         if self.source in words:
             return words[self.source]
-        said = "loop closed" if self.loop == "closed" else "no loop seen"
-        return (
-            f"{said}: past noise of the outputs explains {_percent(self.share)} % of what is new "
-            f"in input {self.input} (p = {self.p_value:.2g})"
-        )
+        seen, chance = "past noise of the outputs explains", f"(p = {self.p_value:.2g})"
+        if self.loop == "closed":
+            share = f"{_percent(self.share)} % of what is new in input {self.input}"
+            return f"loop closed: {seen} {share} {chance}"
+        return f"no loop seen: {seen} no more of the inputs than chance may {chance}"
 
     def to_dict(self) -> dict[str, object]:
         """Plain values."""

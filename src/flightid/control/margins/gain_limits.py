@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,7 @@ GAIN_LIMITS = {
     "gain_reduction_margin_db": "gain_reduction_rad_s",
 }
 """How far the gain may go, and where."""
+GAIN_MARGINS = (*GAIN_LIMITS, *GAIN_LIMITS.values())
 
 
 def measured_up(loop: BrokenLoop) -> tuple[Array, LoopMetrics]:
@@ -102,6 +104,21 @@ def gain_limits(
         chosen[margin], at = float(source[margin]), float(source[place])
         chosen[place] = 0.0 if at <= whole[1] else at
     return chosen
+
+
+def loop_numbers(
+    loop: BrokenLoop, omega: Array, things: Sequence[Any], names: Sequence[str]
+) -> tuple[Array, Complex]:
+    """Numbers of loops by name of `LoopMetrics`, shape (n, n_names), and the loops, (n, n_f)."""
+    values = np.array([loop.of(each, omega) for each in things])
+    found, whole = loop.metrics(omega, values), everywhere(loop, omega)
+    numbers = {name: np.array(getattr(found, name)) for name in (*GAIN_MARGINS, *names)}
+    for place, each in enumerate(things if whole is not None else ()):
+        assert whole is not None
+        own = {name: float(row[place]) for name, row in numbers.items()}
+        for name, value in gain_limits(own, loop, whole, loop.of(each, whole)).items():
+            numbers[name][place] = value
+    return np.array([numbers[name] for name in names]).T, values
 
 
 def outside_findings(loop: BrokenLoop, made: Mapping[str, Reading]) -> tuple[Finding, ...]:

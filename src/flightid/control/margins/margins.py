@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -14,16 +13,16 @@ from flightid.control.margins.findings import margin_findings
 from flightid.control.margins.gain_limits import (
     GAIN_LIMITS,
     UNSEEN,
-    everywhere,
-    gain_limits,
+    loop_numbers,
     measured_up,
     outside_findings,
 )
 from flightid.control.margins.loop_source import BrokenLoop, Controller, Given, read_loop
+from flightid.control.margins.outside_band import BEYOND, outside_band, outside_band_findings
 from flightid.findings import Finding
 from flightid.result import Result
 from flightid.table import Column, Table
-from flightid.uncertainty.estimate import Reading, estimate_table
+from flightid.uncertainty.estimate import Estimate, Reading, estimate_table
 from flightid.uncertainty.quantiles import shown
 
 Array = NDArray[np.float64]
@@ -46,7 +45,6 @@ QUANTITIES = (
     ("sensitivity peak", "sensitivity_peak", "1"),
 )
 NO_CROSSOVER = "the gain does not pass one in the band"
-GAIN_MARGINS = (*GAIN_LIMITS, *GAIN_LIMITS.values())
 MISSING = {
     "crossover_rad_s": NO_CROSSOVER,
     "phase_margin_deg": NO_CROSSOVER,
@@ -240,7 +238,8 @@ def margins(
     Assumes
     -------
     A linear loop. Intervals are those of the estimate's covariance carried by first order, by draws
-    where a margin hangs on two crossings that change places, and leave out what a model lacks. The
+    where a margin hangs on two crossings that change places, and leave out what a model lacks.
+    Numbers that are read above the band to which a fit was shown to hold have none. The
     sensitivity peak of a noisy measurement is biased upwards: it is the highest of many points. A
     measurement should begin below and end above the crossings; joint input and output
     with a known excitation (``estimate_response(estimator="instrument")`` from error to feedback)
@@ -284,7 +283,11 @@ def margins_of(
     rows, logs = estimate[None, :], np.log(omega)
     gains, phases = gain_crossings(logs, rows), phase_crossings(logs, rows)
     phases = phases.kept(np.abs(phases.value) < np.log(10.0) / 20.0 * FAR_DB)
-    made = {name.replace("-", "_").replace(" ", "_"): each for (name, *_), each in quantities}
+    outside = outside_band(loop)
+    made = {
+        name.replace("-", "_").replace(" ", "_"): _unpromised(each, field in outside.above)
+        for (name, field, _), each in quantities
+    }
     findings = margin_findings(
         loop,
         metrics,
@@ -292,7 +295,7 @@ def margins_of(
         phase_guide_deg=phase_guide_deg,
         gain_guide_db=gain_guide_db,
     )
-    findings += outside_findings(loop, made)
+    findings += (*outside_findings(loop, made), *outside_band_findings(loop, outside))
     return Margins(
         loop.name,
         **made,
@@ -306,26 +309,18 @@ def margins_of(
     )
 
 
+def _unpromised(number: Reading, is_above: bool) -> Reading:
+    """A number without an interval where it is read above the band of the fit."""
+    if not is_above or number.value is None:
+        return number
+    return Estimate(number.name, number.value, number.unit, None, BEYOND)
+
+
 def drawn_points(loop: BrokenLoop, omega: Array) -> Array:
     """Frequencies for a picture: of a model some, of a measurement all."""
     if loop.measured or len(omega) <= DRAWN_POINTS:
         return omega
     return np.asarray(omega[np.linspace(0, len(omega) - 1, DRAWN_POINTS).astype(int)])
-
-
-def loop_numbers(
-    loop: BrokenLoop, omega: Array, things: Sequence[Any], names: Sequence[str]
-) -> tuple[Array, Complex]:
-    """Numbers of loops by name of `LoopMetrics`, shape (n, n_names), and the loops, (n, n_f)."""
-    values = np.array([loop.of(each, omega) for each in things])
-    found, whole = loop.metrics(omega, values), everywhere(loop, omega)
-    numbers = {name: np.array(getattr(found, name)) for name in (*GAIN_MARGINS, *names)}
-    for place, each in enumerate(things if whole is not None else ()):
-        assert whole is not None
-        own = {name: float(row[place]) for name, row in numbers.items()}
-        for name, value in gain_limits(own, loop, whole, loop.of(each, whole)).items():
-            numbers[name][place] = value
-    return np.array([numbers[name] for name in names]).T, values
 
 
 def _carried(loop: BrokenLoop, omega: Array) -> tuple[list[tuple[Any, Reading]], LoopCurve]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from flightid.control.autopilots import AxisLoop
 from flightid.control.autopilots.axis_loop import Gyro
+from flightid.control.margins.outside_band import MarginBeyond
 from flightid.control.tuning.controller_paths import ControllerPaths, loop_responses, standing
 from flightid.control.tuning.evidence import TuningEvidence
 from flightid.control.tuning.gain_search import GainSearchResult, search
@@ -17,7 +18,7 @@ from flightid.control.tuning.gain_search import steps as search_steps
 from flightid.control.tuning.gain_steps import Stage, TunedGain
 from flightid.control.tuning.limits import ANGLE
 from flightid.control.tuning.loop_problem import LoopAssessment, LoopProblem, Plants
-from flightid.control.tuning.margins_beyond import MarginBeyond, margins_beyond
+from flightid.control.tuning.margins_beyond import margins_beyond
 from flightid.control.tuning.requirements import TuningRequirements
 from flightid.control.tuning.sampled_plants import (
     AxisLoops,

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from flightid.control.autopilots import AxisLoop
 from flightid.control.autopilots.axis_loop import Gyro
+from flightid.control.margins.outside_band import beyond_findings
 from flightid.control.tuning.axis_tuning import (
     JUDGED_POINTS,
     SEARCH_POINTS,
@@ -26,7 +27,6 @@ from flightid.control.tuning.evidence import TuningEvidence, Verdicts, gather
 from flightid.control.tuning.filter_choice import FilterChoice
 from flightid.control.tuning.findings import low_coherence, remarks, verdict
 from flightid.control.tuning.flown_gains import Gains, flown_loop
-from flightid.control.tuning.margins_beyond import beyond_findings
 from flightid.control.tuning.order_statistics import least_share
 from flightid.control.tuning.pid_design import PidDesign
 from flightid.control.tuning.requirements import TuningRequirements

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -46,7 +47,7 @@ def compare_conditions(sources: Mapping[str, object]) -> ConditionComparison:
     ----------
     sources : mapping of str to Fit or model
         Two or more by name of the condition, such as hover and cruise; the first is the base of all
-        ratios.
+        ratios. Black boxes have modes only, and are compared with each other.
 
     Returns
     -------
@@ -59,7 +60,7 @@ def compare_conditions(sources: Mapping[str, object]) -> ConditionComparison:
     OptionError
         Fewer than two conditions.
     ModelError
-        A source without named parameters.
+        A source without named parameters beside one that has them, or without modes.
 
     Assumes
     -------
@@ -86,7 +87,11 @@ def compare_conditions(sources: Mapping[str, object]) -> ConditionComparison:
         raise OptionError(
             "a comparison needs two conditions", found=", ".join(sources) or "none", needed="2"
         )
-    conditions = [_condition(name, source) for name, source in sources.items()]
+    black_boxes = not any(_is_named(source) for source in sources.values())
+    conditions = [
+        _Condition(name, {}, modes(source)) if black_boxes else _condition(name, source)
+        for name, source in sources.items()
+    ]
     numbers = tuple(_numbers(conditions))
     matched, alone = _match(conditions)
     alone_parameters = {
@@ -116,13 +121,19 @@ def compare_conditions(sources: Mapping[str, object]) -> ConditionComparison:
     )
 
 
-def _condition(name: str, source: object) -> _Condition:
+def _is_named(source: object) -> bool:
+    """Whether parameters have names that mean the same in another model."""
     model = source.model if isinstance(source, Fit) else source
-    if not isinstance(model, StateSpaceModel | TransferFunctionModel):
+    return isinstance(model, StateSpaceModel | TransferFunctionModel)
+
+
+def _condition(name: str, source: object) -> _Condition:
+    if not _is_named(source):
         raise ModelError(
             f"condition {name} has no named parameters",
-            found=type(model).__name__,
+            found=type(source.model if isinstance(source, Fit) else source).__name__,
             needed="a fit or model of transfer functions or equations",
+            action="compare black boxes with each other, by their modes",
         )
     values: dict[str, Reading] = {
         key: p.as_reading() for key, p in parameter_estimates(source).items()
@@ -150,6 +161,7 @@ def _match(
     conditions: Sequence[_Condition],
 ) -> tuple[list[ComparedMode], dict[str, tuple[str, ...]]]:
     """Modes of later conditions that answer to those of the first, and the rest."""
+    conditions = [_Condition(c.name, c.values, _without_delays(c.modes)) for c in conditions]
     base, *others = conditions
     answers: dict[int, dict[str, Mode]] = {k: {base.name: m} for k, m in enumerate(base.modes)}
     alone: dict[str, tuple[str, ...]] = {}
@@ -163,13 +175,23 @@ def _match(
                 taken.add(column)
         alone[other.name] = tuple(m.name for k, m in enumerate(other.modes.modes) if k not in taken)
     alone[base.name] = tuple(found[base.name].name for found in answers.values() if len(found) == 1)
-    matched = [_compared_mode(found, base.name) for found in answers.values() if len(found) > 1]
+    names = [mode.name for mode in base.modes]
+    matched = [
+        _compared_mode(found, base.name, names.count(found[base.name].name) == 1)
+        for found in answers.values()
+        if len(found) > 1
+    ]
     return matched, alone
+
+
+def _without_delays(found: Modes) -> Modes:
+    """Modes with a counterpart in the s plane: delays of one sample have none."""
+    return replace(found, modes=tuple(mode for mode in found if mode.eigenvalue is not None))
 
 
 def _distance(first: Mode, second: Mode) -> float:
     """From common participation and place; `FAR` for modes that cannot be the same."""
-    if first.is_pair != second.is_pair or not (first.root and second.root):
+    if first.is_pair != second.is_pair or not (first.eigenvalue and second.eigenvalue):
         return FAR
     if first.participations and second.participations:
         states = {p.state for p in first.participations}
@@ -178,13 +200,17 @@ def _distance(first: Mode, second: Mode) -> float:
             return FAR
     else:
         common = 1.0
-    apart = abs(first.root - second.root) / max(abs(first.root), abs(second.root))
+    one, other = first.eigenvalue, second.eigenvalue
+    apart = abs(one - other) / max(abs(one), abs(other))
     return (1.0 - common) + apart
 
 
-def _compared_mode(found: dict[str, Mode], base: str) -> ComparedMode:
+def _compared_mode(found: dict[str, Mode], base: str, is_alone: bool) -> ComparedMode:
+    """A mode's numbers side by side; its frequency tells it from others of its name."""
     numbers = []
-    pair = found[base].is_pair
+    pair, mode_name = found[base].is_pair, found[base].name
+    if not is_alone and (root := found[base].eigenvalue) is not None:
+        mode_name = f"{mode_name} at {abs(root) / (2.0 * math.pi):.3g} Hz"
     for name in NUMBERS:
         if pair == (name == "real"):
             continue
@@ -192,8 +218,8 @@ def _compared_mode(found: dict[str, Mode], base: str) -> ComparedMode:
         for condition, mode in found.items():
             number = {q.name: q for q in mode.quantities}[name]
             there[condition] = number
-        numbers.append(_compared(f"{found[base].name}, {name}", there))
-    return ComparedMode(found[base].name, found, tuple(numbers))
+        numbers.append(_compared(f"{mode_name}, {name}", there))
+    return ComparedMode(mode_name, found, tuple(numbers))
 
 
 def _changes(numbers: Sequence[ComparedNumber], significant: set[str]) -> Iterator[Finding]:
@@ -215,7 +241,7 @@ def _changes(numbers: Sequence[ComparedNumber], significant: set[str]) -> Iterat
 
 def _turned(conditions: Sequence[_Condition], matched: Sequence[ComparedMode]) -> Iterator[Finding]:
     for mode in matched:
-        grows = {name: m.root.real > 0.0 for name, m in mode.modes.items()}
+        grows = {name: (m.eigenvalue or 0.0).real > 0.0 for name, m in mode.modes.items()}
         if len(set(grows.values())) > 1:
             unstable = ", ".join(name for name, growing in grows.items() if growing)
             yield Finding(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from flightid.conventions import Light
 from flightid.dynamics.modes.result import Mode
@@ -127,6 +127,8 @@ class ConditionComparison(Result, schema="flightid.condition_comparison/1"):
     def summary(self, *, level: float | None = None) -> Table:
         """Table of the common parameters, ratios to the first condition and findings.
 
+        Of black boxes, whose parameters have no names, that of the modes.
+
         Parameters
         ----------
         level : float, optional
@@ -138,6 +140,9 @@ class ConditionComparison(Result, schema="flightid.condition_comparison/1"):
             for name, alone in self.only_parameters.items()
             if alone
         ]
+        if not self._is_named:
+            modes = self.modes_table(level=level)
+            return replace(modes, notes=(*modes.notes, *self.verdicts))
         title = "Parameters, " + " and ".join(self.conditions)
         return self._table(title, self.parameters, (*notes, *self.verdicts), level)
 
@@ -208,7 +213,11 @@ class ConditionComparison(Result, schema="flightid.condition_comparison/1"):
         return {"parameters": {number.name: number for number in self.parameters}}
 
     def _tables(self) -> tuple[Table, ...]:
-        return (self.summary(), self.modes_table())
+        return (self.summary(), self.modes_table()) if self._is_named else (self.summary(),)
+
+    @property
+    def _is_named(self) -> bool:
+        return bool(self.parameters or any(self.only_parameters.values()))
 
 
 def _value(quantity: Reading | None, level: float) -> list[Cell]:

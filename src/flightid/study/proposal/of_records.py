@@ -26,6 +26,7 @@ from flightid.study.proposal.columns import Columns, columns_of
 from flightid.study.proposal.options import DataOptions, told
 from flightid.study.proposal.proposal import Proposal
 from flightid.study.structures import ranked
+from flightid.surface import as_key, speaking
 from flightid.validation import scan_orders
 
 KINDS = ("arx", "armax", "bj", "oe")
@@ -141,10 +142,16 @@ def study_of_records(
                 missed.append(Finding("no-model", Light.RED, said, error.action or ""))
                 continue
             names.append(name)
-    times = filter(None, dict.fromkeys(time_said(part.record) for part in read))
-    told_of = (*columns.said, *times, *_stamps(read))
-    head = _head(paths, told_of, missed)
+    with speaking(as_key):
+        keyed = _times(read)
+    told_of = (*columns.said, *_times(read), *_stamps(read))
+    head = _head(paths, (*columns.said, *keyed, *_stamps(read)), missed)
     return Proposal((*head, *body), tuple(names), tuple(missed), said=told_of)
+
+
+def _times(read: Sequence[_Stretch]) -> list[str]:
+    """What is to be said of the stamps, in the words of where it is said."""
+    return [*filter(None, dict.fromkeys(time_said(part.record) for part in read))]
 
 
 def _parts(path: Path, reading: Mapping[str, Any]) -> list[_Stretch]:

@@ -6,13 +6,13 @@ import hashlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from textwrap import wrap
 
 from flightid.conventions import Light
 from flightid.errors import StudyError
 from flightid.files import write_atomically
 from flightid.findings import Finding
 from flightid.inspection import Inspection
+from flightid.wrapping import wrapped
 
 WIDTH = 100
 STAMP = "# Written by flightid, which replaces this file as long as nobody changes it: "
@@ -105,7 +105,7 @@ class Proposal:
 
 
 def _wrapped(text: str) -> list[str]:
-    return wrap(text, WIDTH, subsequent_indent="  ")
+    return wrapped(text, WIDTH, later="  ")
 
 
 def _hash(body: str) -> str:
