@@ -222,6 +222,10 @@ def test_rounding_noise_and_still_channels_are_not_testable() -> None:
     e, _ = _pair(7)
     still = fid.residual_tests(e, np.full(e.size, 0.1), horizon=STEP)
     assert still.test("uε", "e1", "u1").reason == "the input does not change"
+    # A browser draws paths of NaN on axes that no trace has.
+    drawn = correlations(still, "e1", "u1")
+    held = {trace.xaxis for trace in drawn.data}
+    assert len(held) == len({test.kind for test in still.tests})
     signs = fid.residual_tests(np.sign(e), _pair(8)[1], horizon=STEP)
     assert "residual has two levels" in signs.test("u²ε²", "e1", "u1").reason
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
+from scipy.signal import cont2discrete, lfilter
 
 import flightid as fid
 from flightid.conventions import Light
@@ -44,6 +44,34 @@ def test_the_rate_is_ten_times_the_bandwidth(
     fit = fid.identify(STRUCTURES[kind], flown(step_s, lag_s))
     (found,) = [each for each in fit.findings if each.code.startswith("sampl")]
     assert (found.code, found.light) == (code, light)
+    assert words in str(found)
+
+
+@pytest.mark.parametrize(
+    ("rate_hz", "code", "words"),
+    [
+        (250.0, "sampled-fast", "resample to about 16 Hz (resample_to_s=0.062)"),
+        (50.0, "sampling-rate", "fastest mode, at 1.6 Hz, is kept by ten times that"),
+    ],
+)
+def test_advice_keeps_a_mode_beyond_the_bandwidth(rate_hz: float, code: str, words: str) -> None:
+    """A lag of 0.23 Hz ahead of a pair at 1.6 Hz: ten times the bandwidth, 2.3 Hz, loses it."""
+    random, omega = np.random.default_rng(8), 2.0 * np.pi * 1.6
+    n, clock = round(120.0 * rate_hz), round(0.15 * rate_hz)
+    u = np.repeat(random.choice([-1.0, 1.0], n // clock + 1), clock)[:n]
+    lag = 2.0 * np.pi * 0.23
+    plant = cont2discrete(
+        ([lag * omega**2], np.polymul([1.0, lag], [1.0, 0.3 * omega, omega**2])), 1.0 / rate_hz
+    )
+    y = lfilter(plant[0].ravel(), plant[1], u)
+    structure = fid.PolynomialModel.general(("u",), "y", nb=3, nf=3, nk=1)
+    record = fid.Record.from_arrays(
+        np.arange(n) / rate_hz, inputs={"u": u}, hold="zero",
+        outputs={"y": y + 1e-4 * random.standard_normal(n)},
+    )  # fmt: skip
+    fit = fid.identify(structure, record)
+    (found,) = [each for each in fit.findings if each.code.startswith("sampl")]
+    assert found.code == code
     assert words in str(found)
 
 

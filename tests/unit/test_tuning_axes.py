@@ -13,7 +13,7 @@ from flightid.control.autopilots import AxisLoop, axis_loop, read_parameters
 from flightid.control.tuning.sampled_plants import SampledPlants, sample_plants
 from flightid.conventions import Light
 from flightid.errors import DataError, ModelError, OptionError, UnknownNameError
-from flightid.plot.gains import overlaid_steps, promised_margins
+from flightid.plot.gains import overlaid_steps, promised_margins, steps_caption
 from flightid.plot.tuning import gain_map, nichols, time_responses
 from flightid.report.content import Document
 from flightid.report.html import to_html
@@ -300,6 +300,18 @@ def test_pictures_and_report_show_every_loop(tuning: fid.Tuning) -> None:
     worst = [each.worst for each in design.worst_cases if each.name == "phase margin"]
     assert set(worst) <= set(bars[0].x)
     assert set(promise.data[2].x) == {45.0, 60.0}
+    assert steps_caption(tuning.designs).startswith("Steps with the new gains, dashed as flown")
+    bare = dataclasses.replace(
+        design,
+        worst_cases=tuple(
+            dataclasses.replace(each, flown_worst=None) for each in design.worst_cases
+        ),
+        responses=tuple(dataclasses.replace(each, flown=None) for each in design.responses),
+    )
+    alone = promised_margins([bare])
+    assert {trace.name for trace in alone.data} == {"worst vehicle, new gains", "required"}
+    assert all(len(trace.x) for trace in alone.data if trace.name == "required")
+    assert "flown" not in steps_caption([bare])
     drawn = gain_map(design)
     line = next(trace for trace in drawn.data if trace.name == "all requirements met")
     assert np.nanmax(line.z) > 0.0

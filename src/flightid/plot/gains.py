@@ -60,6 +60,18 @@ def overlaid_steps(designs: Sequence[PidDesign]) -> go.PlotFigure:
     return made
 
 
+def steps_caption(designs: Sequence[PidDesign]) -> str:
+    """What `overlaid_steps` shows, by what there is."""
+    curves = [each for design in designs for each in design.responses if each.name in STEPS]
+    flown = any(each.flown is not None for each in curves)
+    shaded = any((each.high > each.low).any() for each in curves)
+    parts = [
+        "Steps with the new gains" + (", dashed as flown" if flown else ""),
+        *(["shaded: all that the data allow"] if shaded else []),
+    ]
+    return "; ".join(parts) + "."
+
+
 def promised_margins(designs: Sequence[PidDesign]) -> go.PlotFigure:
     """Draw the margins of the worst vehicle as bars, with what was required and what was flown.
 
@@ -81,6 +93,7 @@ def promised_margins(designs: Sequence[PidDesign]) -> go.PlotFigure:
     }
     rows = list(dict.fromkeys(_label(*each) for cases in found.values() for each in cases))
     made = look.figure(1, 2, shared_x=False, height_px=look.MARGIN_PX + ROW_PX * len(rows))
+    named: set[str] = set()
     for column, (name, unit) in enumerate(panels.items(), 1):
         cases = [each for each in found[name] if each[1].worst is not None]
         required = [
@@ -98,27 +111,30 @@ def promised_margins(designs: Sequence[PidDesign]) -> go.PlotFigure:
             insidetextanchor="start",
         )  # fmt: skip
         made.add_trace(bars, 1, column)
-        flown = [(label, each) for label, (_, each) in zip(labels, cases, strict=True)]
-        marks = {
-            "worst vehicle, flown gains": (
-                [each.flown_worst for _, each in flown],
-                {"color": look.RIVAL, "symbol": "circle-open", "size": 9, "line": {"width": 2}},
-            ),
-            "required": (
-                required,
-                {
-                    "color": look.BLACK,
-                    "symbol": "line-ns-open",
-                    "size": 18,
-                    "line": {"width": 3, "color": look.BLACK},
-                },
-            ),
+        flown = [
+            (label, each.flown_worst)
+            for label, (_, each) in zip(labels, cases, strict=True)
+            if each.flown_worst is not None
+        ]
+        upright = {"color": look.BLACK, "symbol": "line-ns-open", "size": 18,
+                   "line": {"width": 3, "color": look.BLACK}}  # fmt: skip
+        open_circle = {
+            "color": look.RIVAL,
+            "symbol": "circle-open",
+            "size": 9,
+            "line": {"width": 2},
         }
-        for words, (values, marker) in marks.items():
+        for words, marker, points in (
+            ("worst vehicle, flown gains", open_circle, flown),
+            ("required", upright, list(zip(labels, required, strict=True))),
+        ):
+            if not points:
+                continue
             drawn = go.Scatter(
-                x=values, y=labels, name=words, mode="markers", marker=marker,
-                legendgroup=words, showlegend=column == 1,
+                x=[value for _, value in points], y=[label for label, _ in points], name=words,
+                mode="markers", marker=marker, legendgroup=words, showlegend=words not in named,
             )  # fmt: skip
+            named.add(words)
             made.add_trace(drawn, 1, column)
         made.update_xaxes(
             title_text=look.axis_title(name, unit), rangemode="tozero", row=1, col=column

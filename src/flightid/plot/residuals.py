@@ -38,6 +38,14 @@ def correlations(tests: ResidualTests, output: str, input: str | None = None) ->
             made.add_annotation(
                 text=f"not testable: {test.reason}", x=0.0, y=0.0, showarrow=False, row=row, col=1
             )
+            # Axes without a trace have no place, and paths on them no numbers.
+            unseen = go.Scatter(
+                x=[-1.0, 1.0], y=[-1.0, 1.0], mode="markers", showlegend=False, hoverinfo="skip",
+                name="not testable", marker={"opacity": 0.0},
+            )  # fmt: skip
+            made.add_trace(unseen, row=row, col=1)
+            made.update_xaxes(showticklabels=False, row=row, col=1)
+            made.update_yaxes(showticklabels=False, row=row, col=1)
         else:
             _draw(made, test, row)
     look.label_axes(made, x="lag [samples]", y=[str(test.kind) for test in shown])

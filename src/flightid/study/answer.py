@@ -255,5 +255,8 @@ def _margin_table(designs: tuple[PidDesign, ...]) -> Table:
     angled = any(each.loop == ANGLE for design in designs for each in design.worst_cases)
     angle = f" ({asked.angle_phase_margin_deg:g} deg of the angle loop)" if angled else ""
     note = f"Required: {asked.phase_margin_deg:g} deg{angle} and {asked.gain_margin_db:g} dB."
+    notes = [note]
+    if any(f.code == "margin-beyond-band" for each in designs for f in each.findings):
+        notes.append("–: read above the band to which the model was shown to hold; not promised.")
     title = "Margins of the worst vehicle that the data allow"
-    return Table(title, tuple(columns), tuple(rows), (note,)).without_empty_columns()
+    return Table(title, tuple(columns), tuple(rows), tuple(notes)).without_empty_columns()

@@ -19,6 +19,7 @@ from flightid.plot.gains import (
     measured_and_predicted,
     overlaid_steps,
     promised_margins,
+    steps_caption,
 )
 from flightid.plot.glance import flight_glance, has_glance
 from flightid.report.blocks import provenance, result_blocks
@@ -226,8 +227,7 @@ def _pictures(study: StudyResults) -> Iterator[Figure]:
     designs = () if study.tuning is None else study.tuning.designs
     made = [each for each in designs if each.exists]
     if made:
-        shown = "Steps with the new gains, dashed as flown; shaded: all that the data allow."
-        yield figure_block(overlaid_steps(made), shown)
+        yield figure_block(overlaid_steps(made), steps_caption(made))
         shown = "Margins of the worst vehicle that the data allow; upright: what was required."
         yield figure_block(promised_margins(made), shown)
         return

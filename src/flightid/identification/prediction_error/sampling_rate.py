@@ -18,6 +18,10 @@ TIMES_BANDWIDTH = 10.0
 """Sampling rate over bandwidth that suits an identification."""
 MANY = 100.0
 """Sampling rate over bandwidth above which poles crowd at z = 1."""
+TOLERATED = 1.5
+"""Ratio of a mode's frequency to the bandwidth up to which both ask for the same rate."""
+SURE = 0.1
+"""Largest half of an interval, over the distance from z = 1, of a pole that is no fit of noise."""
 POINTS = 400
 """Frequencies at which a response is looked at, from one cycle of the record to Nyquist."""
 NEAR_ORIGIN = 0.2
@@ -48,6 +52,7 @@ def sampling_findings(
     read off the fitted response, where it leaves its peak by 3 dB: poles that only fit noise hardly
     move that. The fastest response counts; nothing is said where one keeps its gain to the Nyquist
     frequency, leaves its peak twice, or does so within two cycles of the record (an integrator).
+    A mode beyond the bandwidth is not to be lost: the faster of both times ten is advised.
 
     Parameters
     ----------
@@ -95,16 +100,23 @@ def sampling_findings(
     bandwidth_hz = _bandwidth_hz(model, duration_s)
     if bandwidth_hz is None:
         return ()
-    advised_hz, times = TIMES_BANDWIDTH * bandwidth_hz, rate_hz / bandwidth_hz
+    times = rate_hz / bandwidth_hz
     # Poles that only fit noise are fast: where there are any, coefficients do not hang together.
     if times > MANY and max(abs(np.log(z)) for z in poles) < math.tau / MANY:
         message = (
             f"sampled too fast: plant poles crowd at z = 1, {rate_hz:.4g} Hz is about {times:.2g} "
             "times the bandwidth: coefficients hang together, zeros of sampling appear"
         )
+        fastest_hz = rate_hz * max(abs(np.log(z)) for z in poles) / math.tau
+        advised_hz = TIMES_BANDWIDTH * max(bandwidth_hz, fastest_hz)
         action = f"resample to about {advised_hz:.2g} Hz (resample_to_s={1 / advised_hz:.2g})"
+        if fastest_hz > TOLERATED * bandwidth_hz:
+            action += f", ten times the fastest mode, at {fastest_hz:.2g} Hz"
         return (Finding(FAST, Light.GREEN, message, action),)
     message = f"sampled at about {times:.2g} times the bandwidth of {bandwidth_hz:.2g} Hz, ten suit"
+    told = [rate_hz * abs(np.log(z)) / math.tau for z, root in poles.items() if _is_told(root)]
+    if told and max(told) > TOLERATED * bandwidth_hz:
+        message += f"; its fastest mode, at {max(told):.2g} Hz, is kept by ten times that"
     return (Finding(TOLD, Light.GREEN, message),)
 
 
@@ -124,6 +136,13 @@ def _bandwidth_hz(model: ResponseModel, duration_s: float) -> float | None:
             return None
         edges.append(float(omega[last]) / math.tau)
     return max(edges)
+
+
+def _is_told(root: FittedRoot) -> bool:
+    """Whether errors leave a pole where it is: those that fit noise are anywhere."""
+    if root.stderr is None or abs(root.z) <= NEAR_ORIGIN:
+        return False
+    return half_width(LEVEL) * math.hypot(*root.stderr) < SURE * abs(root.z - 1.0)
 
 
 def _is_near_origin(root: FittedRoot) -> bool:
