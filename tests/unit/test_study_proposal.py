@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.signal import chirp, lfilter
 
 from flightid import Record, inspect_log, run_study
 from flightid.cli.program import run
@@ -189,3 +190,35 @@ def test_a_folder_for_gains_is_asked_for_before_the_work(
     assert run(words) == 2
     assert "there is no folder" in capsys.readouterr().err
     assert not (tmp_path / "rig-study.toml").exists()
+
+
+def test_an_injected_channel_is_the_instrument_of_a_closed_loop(tmp_path: Path) -> None:
+    """SciPy's loop: direct fits of it are biased, the injected signal finds it again."""
+    random, rate_hz, n = np.random.default_rng(5), 50.0, 6000
+    time_s = np.arange(n) / rate_hz
+    injected = 0.3 * chirp(time_s % 60.0, 0.1, 60.0, 10.0, method="logarithmic")
+    gust = 0.8 * lfilter([0.1], [1.0, -0.98], random.standard_normal(n))
+    decay, state = np.exp(-4.0 / rate_hz), 0.0
+    u, y = np.zeros(n), np.zeros(n)
+    for k in range(n):
+        y[k] = state + gust[k]
+        u[k] = injected[k] - 0.15 * y[k]
+        state = decay * state + 10.0 * (1.0 - decay) * u[k]
+    head = "time,tau_phi [1],p [rad/s],chirp [1]"
+    table = np.column_stack([time_s, u, y, injected])
+    rows = [",".join(f"{value:.6f}" for value in row) for row in table]
+    (tmp_path / "closed.csv").write_text("\n".join([head, *rows]))
+    asked = {"folder": tmp_path, "model": "rate_first_order", "hold": "zero"}
+    plain = propose_study([tmp_path / "closed.csv"], **asked)
+    assert 'method = "output_error"' in plain.text
+    made = propose_study([tmp_path / "closed.csv"], excitations=["chirp"], **asked)
+    assert "Injected: chirp (as named)" in made.said
+    assert 'response = { estimator = "instrument", excitations = ["chirp"] }' in made.text
+    study = run_study(made.write(tmp_path / "closed.toml"))
+    assert study.identified[0].fit is not None
+    assert list(study.identified[0].fits) == ["instrument"]
+    for name, truth in (("Ltphi", 40.0), ("Lp", -4.0)):
+        found = study.identified[0].fit.parameters[name]
+        assert found.interval95[0] < truth < found.interval95[1], found
+    with pytest.raises(UnknownNameError, match="no such column"):
+        propose_study([tmp_path / "closed.csv"], excitations=["sweep"], **asked)

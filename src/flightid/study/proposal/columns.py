@@ -43,7 +43,10 @@ class Columns:
 
 
 def columns_of(
-    records: Sequence[Record], inputs: tuple[str, ...], outputs: tuple[str, ...]
+    records: Sequence[Record],
+    inputs: tuple[str, ...],
+    outputs: tuple[str, ...],
+    injected: tuple[str, ...] = (),
 ) -> Columns:
     """Tell the inputs and outputs that all records have.
 
@@ -58,11 +61,12 @@ def columns_of(
     """
     first = records[0]
     shared = [name for name in first.channels if all(name in record for record in records)]
-    for name in (*inputs, *outputs):
+    for name in (*inputs, *outputs, *injected):
         if name not in shared:
             raise UnknownNameError(
                 "the records have no such column", found=name, needed=", ".join(shared)
             )
+    shared = [name for name in shared if name not in injected]
     drives, how_in = _told(first, shared, Role.INPUT, inputs, outputs)
     answers, how_out = _told(first, shared, Role.OUTPUT, outputs, drives)
     for role, found in (("inputs", drives), ("outputs", answers)):
@@ -76,6 +80,7 @@ def columns_of(
             )
     left = [name for name in shared if name not in (*drives, *answers)]
     said = [f"Inputs {', '.join(drives)} ({how_in}), outputs {', '.join(answers)} ({how_out})"]
+    said += [f"Injected: {', '.join(injected)} (as named)"] if injected else []
     said += [f"Not used: {', '.join(left)}"] if left else []
     return Columns(drives, answers, tuple(said))
 

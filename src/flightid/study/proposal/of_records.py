@@ -88,6 +88,7 @@ def study_of_records(
     model: str | None,
     inputs: tuple[str, ...],
     outputs: tuple[str, ...],
+    excitations: tuple[str, ...] = (),
     reading: DataOptions | None = None,
 ) -> Proposal:
     """Study file for records.
@@ -102,6 +103,8 @@ def study_of_records(
         Equations in place of a structure that is looked for.
     inputs, outputs : tuple of str
         Columns, where their names do not tell.
+    excitations : tuple of str
+        Columns that were injected ahead of a controller: responses are estimated by way of them.
     reading : DataOptions, optional
         How the files are read.
 
@@ -113,12 +116,13 @@ def study_of_records(
     reading = reading or DataOptions()
     # What is named alone is read, so that no other column's gaps part its manoeuvres.
     named = {"inputs": inputs, "outputs": outputs} if inputs and outputs else {}
+    named |= {"excitations": excitations} if excitations and named else {}
     read = [part for path in paths for part in _parts(path, {**vars(reading), **named})]
-    inputs, outputs = (
+    inputs, outputs, injected = (
         tuple(channel_name(name, read[0].record.channels) for name in names)
-        for names in (inputs, outputs)
+        for names in (inputs, outputs, excitations)
     )
-    columns = columns_of([part.record for part in read], inputs, outputs)
+    columns = columns_of([part.record for part in read], inputs, outputs, injected)
     keys = _keys(reading, folder)
     groups, missed = _groups(read, columns)
     body: list[str] = []
@@ -135,7 +139,7 @@ def study_of_records(
                 f"{output} from {' and '.join(group.inputs)}" if model is None else Path(model).stem
             )
             try:
-                body += list(_model(name, group, segments, output, model))
+                body += list(_model(name, group, segments, output, model, injected))
             except FlightidError as error:
                 why = str(error).partition(". Next: ")[0]
                 said = f"{name}: no model, {why}"
@@ -262,18 +266,31 @@ def _ends_richer(record: Record, inputs: tuple[str, ...]) -> bool:
 
 
 def _model(
-    name: str, group: _Group, segments: _Segments, output: str, model: str | None
+    name: str,
+    group: _Group,
+    segments: _Segments,
+    output: str,
+    model: str | None,
+    injected: tuple[str, ...] = (),
 ) -> Iterator[str]:
     lines = [f"identify = {toml_value(segments.fitted)}"]
     lines += [f"verify = {toml_value(list(segments.unseen))}"]
-    if model is not None:
-        template = [f"template = {toml_value(model)}", 'fit = { method = "output_error" }']
-        return iter(["", "[[model]]", f"name = {toml_value(name)}", *template, *lines])
     record = group.parts[0].record
-    kind, found, orders_of = _structure(record, group.inputs, output, segments)
     span_s = record.duration_s * FITTED
     low = CYCLES * math.tau / span_s
     high = math.tau * record.sample_rate_hz / SAMPLES_PER_CYCLE
+    by_injection = (
+        "# By way of what was injected, so a controller in the loop does not bias the estimate.",
+        f'response = {{ estimator = "instrument", excitations = {toml_value(list(injected))} }}',
+    )
+    if model is not None:
+        template = [f"template = {toml_value(model)}"]
+        if not injected:
+            template += ['fit = { method = "output_error" }']
+        elif high > 2 * low:
+            template += [f"band_rad_s = {toml_value([_round(low), _round(high)])}", *by_injection]
+        return iter(["", "[[model]]", f"name = {toml_value(name)}", *template, *lines])
+    kind, found, orders_of = _structure(record, group.inputs, output, segments)
     orders = [f"{order} = {toml_value(list(orders_of[order]))}" for order in USED[kind]]
     coherent = (
         (f"band_rad_s = {toml_value([_round(low), _round(high)])}",) if high > 2 * low else ()
@@ -285,6 +302,7 @@ def _model(
             f"structure = {toml_value(kind)}",
             f"inputs = {toml_value(list(group.inputs))}", f"outputs = {toml_value(output)}",
             *lines, f"select = {toml_value(segments.choice)}", *coherent, *orders,
+            *(by_injection if injected else ()),
         ]
     )  # fmt: skip
 

@@ -45,3 +45,6 @@ class ProposalOptions(DataOptions):
     model: str | None = option(None, doc="Library model or model file in place of the usual one.")
     inputs: tuple[str, ...] = option((), doc="Columns of records that drive.")
     outputs: tuple[str, ...] = option((), doc="Columns of records that answer.")
+    excitations: tuple[str, ...] = option(
+        (), doc="Columns that were injected ahead of a controller: instruments in a closed loop."
+    )

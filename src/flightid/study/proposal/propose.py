@@ -23,6 +23,7 @@ def propose_study(
     model: str | None = None,
     inputs: Sequence[str] = (),
     outputs: Sequence[str] = (),
+    excitations: Sequence[str] = (),
     tune: bool = False,
     cache: MutableMapping[str, Any] | None = None,
     **reading: Any,  # noqa: ANN401 — fields of DataOptions
@@ -40,6 +41,8 @@ def propose_study(
         in place of a structure that is looked for.
     inputs, outputs : sequence of str
         Columns of records, where their names do not tell.
+    excitations : sequence of str
+        Columns of records that were injected ahead of a controller: instruments in a closed loop.
     tune : bool
         Let the study end in gains of the autopilot that flew.
     cache : mutable mapping of str to object, optional
@@ -62,7 +65,7 @@ def propose_study(
     paths = [Path(file) for file in files]
     asked = checked(DataOptions, reading, "a study of records")
     # Columns that are named are those of the topics of a bag, whoever published them.
-    named = bool(inputs or outputs or told(asked) != asked.declared)
+    named = bool(inputs or outputs or excitations or told(asked) != asked.declared)
     logs = [path for path in paths if is_log(path) and not (named and is_bag(path))]
     if not logs:
         return study_of_records(
@@ -71,9 +74,10 @@ def propose_study(
             model=model,
             inputs=tuple(inputs),
             outputs=tuple(outputs),
+            excitations=tuple(excitations),
             reading=asked,
         )
-    if len(paths) > 1 or inputs or outputs or told(asked) != asked.declared:
+    if len(paths) > 1 or named:
         raise OptionError(
             "a log is taken alone, and its channels have names, units and stamps",
             found=", ".join(path.name for path in paths),
