@@ -47,7 +47,6 @@ OF_COMMANDS = {
     "against": "another model beside the one on trial",
     "blocks": "file of a law made of blocks",
     "axis": "roll, pitch or yaw, or an autopilot's number of it",
-    "csv": "file of samples",
     "debug": "traceback of an error",
     "format": "tool that an export is for",
     "gains": "file of tuned gains to fly",
@@ -62,8 +61,7 @@ OF_COMMANDS = {
     "model": "a model by name or file",
     "name": "name of what is made",
     "no_browser": "print the address of the page and open nothing",
-    "netcdf": "file of a response",
-    "output": "file or folder that is written",
+    "output": "folder that is written",
     "pair": "output and input of a saved response",
     "overwrite": "whether a file may be replaced",
     "quiet": "no progress",
@@ -73,7 +71,6 @@ OF_COMMANDS = {
     "residual_tests": "test residuals",
     "retry": "take failed logs again",
     "scan": "try several orders",
-    "parameters": "file of an autopilot's parameters to fly",
     "scheduler": "address of a cluster",
     "port": "where the page is served on this machine",
     "scenario": "flight to simulate",
@@ -84,7 +81,7 @@ OF_COMMANDS = {
     "value": "another parameter value",
     "version": "this version",
     "workers": "processes of this machine",
-    "write": "file of the result, for other commands",
+    "write": "file that is written",
     "write_no_go": "whether a no-go plan leaves settings",
 }
 # Files of published figures keep the words of papers.
@@ -221,6 +218,19 @@ def test_commands_with_options_of_fields_read_them_all() -> None:
                 name,
                 by_hand,
             )
+
+
+def test_a_file_is_written_by_one_option_and_a_folder_by_another() -> None:
+    named = {
+        (name, option, bool(getattr(param.type, "file_okay", False)))
+        for name, found in _commands()
+        for param in found.params
+        for option in param.opts
+        if option in ("--write", "--output")
+    }
+    assert {option for _, option, is_file in named if is_file} == {"--write"}
+    assert {name for name, option, is_file in named if not is_file} == {"run", "tune", "plan"}
+    assert len(named) == 16
 
 
 def test_a_word_of_the_dictionary_has_one_name_in_all_places() -> None:

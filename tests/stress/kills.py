@@ -35,7 +35,7 @@ def commands(folder: Path) -> dict[str, tuple[list[str], Path]]:
     write_ardupilot(tuned, Axis(), most=12)
     words: dict[str, tuple[list[object], str]] = {
         "export": (["export", *MODEL], "model.toml"),
-        "fly": (["fly", *MODEL, "--duration", 0.5, "--output"], "flown.nc"),
+        "fly": (["fly", *MODEL, "--duration", 0.5, "--write"], "flown.nc"),
         "run": (["run", STUDY, "--output"], "out"),
         "tune": (["tune", swept, "--output"], "tuned"),
         "plan": (["plan", swept, "--overwrite", "--output"], "planned"),

@@ -18,7 +18,7 @@ from tests.closeness import assert_close
 
 def test_a_step_as_the_library_has_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "step.csv"
-    words = ["simulate", "model", "short_period", "--input", "elevator=step:0.02", "--output"]
+    words = ["simulate", "model", "short_period", "--input", "elevator=step:0.02", "--write"]
     words += [str(path), "--value", "Mq=-3", "--duration", "4", "--rate", "50", "--json"]
     assert run(words) == 0
     said = capsys.readouterr()
@@ -41,7 +41,7 @@ def test_records_noise_and_pages(tmp_path: Path, capsys: pytest.CaptureFixture[s
     page, out = tmp_path / "page.html", tmp_path / "again.nc"
     words = ["simulate", "model", "short_period", str(source), "--sensor", "q=0.001"]
     words += ["--process", "q=0.002", "--gust", "alpha=0.01:0.8", "--seed", "3"]
-    words += ["--html", str(page), "--output", str(out)]
+    words += ["--html", str(page), "--write", str(out)]
     assert run(words) == 0
     assert "q" in capsys.readouterr().out
     assert page.read_text().startswith("<!DOCTYPE html>")
@@ -53,7 +53,7 @@ def test_records_noise_and_pages(tmp_path: Path, capsys: pytest.CaptureFixture[s
 
 def test_a_nonlinear_model_rests_at_its_trim(tmp_path: Path) -> None:
     path = tmp_path / "quad.csv"
-    words = ["simulate", "model", "quadrotor_6dof", "--duration", "1", "--output", str(path)]
+    words = ["simulate", "model", "quadrotor_6dof", "--duration", "1", "--write", str(path)]
     assert run([*words, "--input", "tau_phi=pulse:0.01:0.1:0.2", "--substeps", "2"]) == 0
     found = fid.read_records(path, inputs=["F"], outputs=["p", "w"])[0]
     assert found["F"][0] > 1.0
@@ -65,7 +65,7 @@ def test_black_boxes_fly_too(tmp_path: Path) -> None:
     path = fid.write_model(model, tmp_path / "arx.toml")
     out = tmp_path / "y.csv"
     words = ["simulate", "model", str(path), "--rate", "10", "--input", "u=step:1:0"]
-    assert run([*words, "--output", str(out)]) == 0
+    assert run([*words, "--write", str(out)]) == 0
     found = fid.read_records(out, inputs=["u"], outputs=["y"])[0]
     wanted = 2.0 * (1.0 - 0.5 ** np.arange(100))
     assert_close(found["y"], wanted, rtol=1e-12, why="closed form of a first-order recursion")
@@ -101,7 +101,7 @@ def test_options_that_exclude_each_other(tmp_path: Path, capsys) -> None:
     for words, said in (
         (["--input", "elevator=step:1"], "give it or RECORDS"),
         (["--run", "1"], "--run belongs to logs"),
-        (["--output", str(tmp_path / "a.csv")], "a .csv holds one record"),
+        (["--write", str(tmp_path / "a.csv")], "a .csv holds one record"),
     ):
         assert run([*start, *words]) == 2
         assert said in capsys.readouterr().err

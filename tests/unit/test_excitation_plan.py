@@ -225,7 +225,7 @@ COMMAND = [
 
 def test_command_designs_and_exports(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     files = [tmp_path / name for name in ("a.csv", "a.html")]
-    options = ["--csv", str(files[0]), "--html", str(files[1])]
+    options = ["--write", str(files[0]), "--html", str(files[1])]
     assert run([*COMMAND, *options, "--json"]) == 0
     shown = capsys.readouterr()
     assert json.loads(shown.out)["go"] is True

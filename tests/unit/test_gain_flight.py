@@ -118,8 +118,8 @@ def test_a_file_of_gains_is_flown_from_the_command_line(
     monkeypatch.setattr("flightid.vehicles.scenario.advised_runs", lambda: short)
     (tmp_path / "gains.param").write_text("ATC_RAT_RLL_P,0.05\n", encoding="utf-8")
     log = tmp_path / "flight.BIN"
-    command = ["simulate", "quadrotor", "--json", "--output", str(log)]
-    done = CliRunner().invoke(program, [*command, "--parameters", str(tmp_path / "gains.param")])
+    command = ["simulate", "quadrotor", "--json", "--write", str(log)]
+    done = CliRunner().invoke(program, [*command, "--gains", str(tmp_path / "gains.param")])
     assert done.exit_code == 0, done.output
     assert log.stat().st_size > 1_000_000
     assert '"damping_1_s"' in done.stdout

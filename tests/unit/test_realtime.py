@@ -186,7 +186,7 @@ def test_fly_from_the_command_line(tmp_path, capsys, monkeypatch) -> None:
                 "elevator=q:0.1:alpha:0.2",
                 "--limits",
                 "elevator=-0.3:0.3",
-                "--output",
+                "--write",
                 str(path),
                 "--json",
             ]
@@ -203,8 +203,8 @@ def test_fly_from_the_command_line(tmp_path, capsys, monkeypatch) -> None:
     for wrong, words_said in (
         (["--feedback", "elevator=q"], "needed INPUT=OUTPUT:GAIN"),
         (["--send", "nowhere"], "needed HOST:PORT"),
-        (["--output", str(tmp_path / "no" / "a.nc")], "there is no folder"),
-        (["--output", str(tmp_path / "a.csv")], "neither .parquet nor .nc"),
+        (["--write", str(tmp_path / "no" / "a.nc")], "there is no folder"),
+        (["--write", str(tmp_path / "a.csv")], "neither .parquet nor .nc"),
     ):
         assert run(["fly", "short_period", *wrong]) == 2
         assert words_said in capsys.readouterr().err

@@ -148,7 +148,7 @@ def test_the_command_peels_a_gyro_loop_and_says_what_it_cannot(
     file, out = str(write_response(flown, tmp_path / "flown.nc")), tmp_path / "made.nc"
 
     def made(*words: str, code: int = 0) -> FrequencyResponse | str:
-        assert run(["response-arithmetic", *words, "--netcdf", str(out)]) == code, words
+        assert run(["response-arithmetic", *words, "--write", str(out)]) == code, words
         said = capsys.readouterr()
         return read_response(out) if code == 0 else said.err
 

@@ -191,7 +191,7 @@ def test_command(tmp_path: Path) -> None:
         "--json",
         "--html",
         str(page),
-        "--netcdf",
+        "--write",
         str(stored),
     ]
     run = CliRunner().invoke(command, arguments)

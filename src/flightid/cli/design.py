@@ -40,12 +40,12 @@ class Kinds(click.Choice[str]):
 
 @click.command(cls=OptionsCommand, fields_of=_fields)
 @click.argument("kind", type=Kinds())
-@click.option("--csv", "csv_file", type=WRITTEN, help="Write the samples to this file.")
+@click.option("--write", "target", type=WRITTEN, help="Write the samples to this file (*.csv).")
 @html_option
 @json_option
 def command(
     kind: str,
-    csv_file: Path | None,
+    target: Path | None,
     html: Path | None,
     as_json: bool,
     **options: Any,  # noqa: ANN401 — read from the fields
@@ -62,8 +62,8 @@ def command(
         kind, excitation.RateAxis(**guess), limits=excitation.Limits(**limits), **of_design
     )
     emit(plan, as_json=as_json)
-    if csv_file is not None:
-        note(f"Wrote {excitation.write_csv(plan.excitation, csv_file)}")
+    if target is not None:
+        note(f"Wrote {excitation.write_csv(plan.excitation, target)}")
     if html is not None:
         note(f"Wrote {_write_page(plan, html)}")
     leave_by_verdict(plan.findings)

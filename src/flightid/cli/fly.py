@@ -42,7 +42,8 @@ def _fields() -> dict[str, type[Options]]:
     help="Fly this law: a TOML file of [[block]] tables, as [[loop.block]] in a study.",
 )
 @click.option(
-    "--output",
+    "--write",
+    "target",
     type=WRITTEN,
     help="Write the flight: .parquet or .nc.",
 )
@@ -53,7 +54,7 @@ def command(
     values: tuple[str, ...],
     gains: Path | None,
     blocks: Path | None,
-    output: Path | None,
+    target: Path | None,
     as_json: bool,
     **options: Any,  # noqa: ANN401 — read from the fields
 ) -> None:
@@ -67,10 +68,10 @@ def command(
     from flightid.simulation.fly_options import FlyOptions
     from flightid.simulation.realtime import fly_model
 
-    if output is not None and not output.parent.is_dir():
-        raise click.UsageError(f"--output: there is no folder {output.parent}; make it first")
-    if output is not None and output.suffix not in (".parquet", ".nc"):
-        raise click.UsageError(f"--output: {output.name} ends in neither .parquet nor .nc")
+    if target is not None and not target.parent.is_dir():
+        raise click.UsageError(f"--write: there is no folder {target.parent}; make it first")
+    if target is not None and target.suffix not in (".parquet", ".nc"):
+        raise click.UsageError(f"--write: {target.name} ends in neither .parquet nor .nc")
     asked = FlyOptions(**given_options(FlyOptions, options, "a flight"))
     if gains is not None and blocks is not None:
         raise click.UsageError("--gains and --blocks move the same inputs: give one of them")
@@ -88,8 +89,8 @@ def command(
         session = fly_model(source, asked, controller=around, say=note)
     finally:
         signal.signal(signal.SIGTERM, before)
-    if output is not None:
-        note(f"Wrote {write_records(session.record, output)}")
+    if target is not None:
+        note(f"Wrote {write_records(session.record, target)}")
     emit(session, as_json=as_json)
 
 

@@ -24,8 +24,9 @@ if TYPE_CHECKING:
     from flightid.options import Options
     from flightid.responses import FrequencyResponse
 
-netcdf_option = click.option(
-    "--netcdf",
+write_option = click.option(
+    "--write",
+    "target",
     type=WRITTEN,
     help="Write the response to this file, which response-arithmetic takes.",
 )
@@ -40,14 +41,14 @@ def _fields() -> dict[str, type[Options]]:
 
 @click.command(cls=OptionsCommand, fields_of=_fields)
 @click.argument("files", type=FILES, nargs=-1, required=True)
-@netcdf_option
+@write_option
 @level_option
 @html_option
 @all_option
 @json_option
 def command(
     files: tuple[Path, ...],
-    netcdf: Path | None,
+    target: Path | None,
     level: float | None,
     html: Path | None,
     as_json: bool,
@@ -65,12 +66,12 @@ def command(
     records = read_files(files, *of_files, **channels, excitations=injected)
     with progress(None, "Estimating"):
         response = estimate_response(records, **channels, **of_response)
-    show_response(response, netcdf, html, as_json=as_json, level=level)
+    show_response(response, target, html, as_json=as_json, level=level)
 
 
 def show_response(
     response: FrequencyResponse,
-    netcdf: Path | None,
+    target: Path | None,
     html: Path | None,
     *,
     as_json: bool,
@@ -81,8 +82,8 @@ def show_response(
     from flightid.uncertainty.quantiles import showing
 
     emit(response, as_json=as_json)
-    if netcdf is not None:
-        note(f"Wrote {write_response(response, netcdf)}")
+    if target is not None:
+        note(f"Wrote {write_response(response, target)}")
     if html is not None:
         with showing(level):
             note(f"Wrote {_write_page(response, html)}")

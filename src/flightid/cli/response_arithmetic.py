@@ -11,7 +11,7 @@ import click
 from flightid.cli.lists import ListsCommand
 from flightid.cli.output import all_option, json_option, level_option
 from flightid.cli.pages import html_option
-from flightid.cli.response import netcdf_option, show_response
+from flightid.cli.response import show_response, write_option
 from flightid.cli.sources import load_source
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ MODELS = (".toml", ".json")
     help="Of RESPONSE; given again: of OTHER. Default: all that a file holds.",
 )
 @click.option("--actuator", metavar="KNOWN", help="Of a loop, ahead of the vehicle in it.")
-@netcdf_option
+@write_option
 @level_option
 @html_option
 @all_option
@@ -52,12 +52,12 @@ def command(
     other: str | None,
     pairs: tuple[str, ...],
     actuator: str | None,
-    netcdf: Path | None,
+    target: Path | None,
     level: float | None,
     html: Path | None,
     as_json: bool,
 ) -> None:
-    """Compute with responses that `flightid response --netcdf` wrote, and carry their errors on.
+    """Compute with responses that `flightid response --write` wrote, and carry their errors on.
 
     OTHER is a response, or what is known without error: a number, coefficients in s with the
     highest power first ("1 / 0.05 1" lags by 0.05 s), or a model of one input and one output.
@@ -97,7 +97,7 @@ def command(
     told = {"other": other, "actuator": actuator, "pairs": ", ".join(pairs)}
     step = Step(f"response_arithmetic.{operation}", {"response": response.name, **told}, VERSION)
     made = replace(made, history=(*made.history, step))
-    show_response(made, netcdf, html, as_json=as_json, level=level)
+    show_response(made, target, html, as_json=as_json, level=level)
 
 
 def _read(path: Path, pair: str = "", *, whole: bool = False) -> FrequencyResponse:

@@ -25,7 +25,8 @@ def command() -> None:
 
 @command.command()
 @click.option(
-    "--output",
+    "--write",
+    "target",
     required=True,
     type=WRITTEN,
     help="DataFlash log to write, for example flight.BIN.",
@@ -39,14 +40,12 @@ def command() -> None:
 )
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of noise.")
 @click.option(
-    "--parameters",
+    "--gains",
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
     help="Gains to fly: a file of `flightid tune --write`.",
 )
 @json_option
-def quadrotor(
-    output: Path, scenario: str, seed: int, parameters: Path | None, as_json: bool
-) -> None:
+def quadrotor(target: Path, scenario: str, seed: int, gains: Path | None, as_json: bool) -> None:
     """Sweep a 450 mm quadrotor on a gyroscopic rig; print the truth an identification should find.
 
     The log is ArduCopter's: mixer sweeps of roll, pitch and yaw, then doublets for verification.
@@ -57,14 +56,14 @@ def quadrotor(
     from flightid.vehicles.ardupilot_log import write_ardupilot_log
     from flightid.vehicles.scenario import fly_scenario
 
-    gains = {} if parameters is None else read_parameters(parameters)
-    autopilot = vars(Autopilot().with_parameters(gains))
+    flown = {} if gains is None else read_parameters(gains)
+    autopilot = vars(Autopilot().with_parameters(flown))
     with progress(2, "Flying") as advance:
         flight = fly_scenario(scenario, seed=seed, autopilot=autopilot)
         advance()
-        write_ardupilot_log(flight, output)
+        write_ardupilot_log(flight, target)
         advance()
-    note(f"Wrote {output}")
+    note(f"Wrote {target}")
     emit(flight, as_json=as_json)
 
 
@@ -80,7 +79,7 @@ def _fields() -> dict[str, type[Options]]:
 @model_argument
 @click.argument("records", nargs=-1, type=FILES)
 @model_options
-@click.option("--output", "written", type=WRITTEN, help="Write .csv, .parquet or .nc.")
+@click.option("--write", "target", type=WRITTEN, help="Write .csv, .parquet or .nc.")
 @click.option("--html", type=WRITTEN, help="Write a page with time histories.")
 @json_option
 def model(
@@ -88,7 +87,7 @@ def model(
     records: tuple[Path, ...],
     axis: str | None,
     values: tuple[str, ...],
-    written: Path | None,
+    target: Path | None,
     html: Path | None,
     as_json: bool,
     **options: Any,  # noqa: ANN401 — read from the fields
@@ -113,8 +112,8 @@ def model(
             added = Noise(**noise) if noise else None
             made.append(simulate(chosen, record, units=chosen.units, noise=added, **of_run))
             advance()
-    if written is not None:
-        note(f"Wrote {write_out(made, written)}")
+    if target is not None:
+        note(f"Wrote {write_out(made, target)}")
     if html is not None:
         note(f"Wrote {_page(html, model, made, driven)}")
     for flown in made:
