@@ -28,6 +28,7 @@ WITHOUT_PICTURE = {
     "SweepPlan": "a card to print",
     "FleetDrift": "the page of the fleet draws the histories of its vehicles",
     "FleetStatus": "numbers of logs",
+    "FleetOutliers": "the page of the fleet draws vehicles beside their type",
     "Flight": "a simulated log, drawn from its records",
     "FilterChoice": "a table; the spectrum behind it is drawn by the flight review",
     "FlownSession": "its record draws itself",

@@ -141,6 +141,14 @@ class VehicleEstimates:
             found.append(float(0.5 * (low + high)))
         return found[0], found[1]
 
+    def next_chance(self, value: float, variance: float) -> float:
+        """Chance that the next vehicle, estimated with a variance, lies as far to either side."""
+        centre, deviation, weights = self._mixture
+        reach = np.sqrt(deviation**2 + variance)
+        below = float(np.sum(weights * ndtr((value - centre) / reach)))
+        above = float(np.sum(weights * ndtr((centre - value) / reach)))
+        return min(1.0, 2.0 * min(below, above))
+
 
 def _shares(count: int) -> tuple[Array, Array]:
     """Probabilities that lie closer towards 0 and 1, and what each stands for."""

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.fleet.statistics.flight_estimates import FlightEstimates
+from flightid.fleet.statistics.flight_estimates import Flags, FlightEstimates
 from flightid.fleet.statistics.heterogeneity import FEWEST, VehicleEstimates
 from flightid.fleet.statistics.spread_search import SpreadFit, search_spreads
 from flightid.result import Result
@@ -107,6 +108,11 @@ class Population(
     def names(self) -> tuple[str, ...]:
         """Parameters, in the order of the covariances."""
         return self.data.names
+
+    @cached_property
+    def own(self) -> tuple[tuple[Array, Array, Flags], ...]:
+        """Each vehicle's own estimate, its covariance, and which parameters its flights told."""
+        return _own(self.spreads)
 
     @property
     def next_covariance(self) -> Array:
@@ -210,7 +216,7 @@ def estimate_population(
     `flightid.fleet.statistics.heterogeneity.VehicleEstimates`.
     """
     spreads = search_spreads(data, structure=structure, within_structure=within_structure)
-    own = [spreads.vehicle(place) for place in range(len(data.members))]
+    own = _own(spreads)
     parameters = {}
     for i, name in enumerate(data.names):
         there = [each for each in own if each[2][i]]
@@ -220,6 +226,10 @@ def estimate_population(
         )
         parameters[name] = _parameter(name, data.units[i], i, spreads, vehicles)
     return Population(type_name, parameters, spreads, data)
+
+
+def _own(spreads: SpreadFit) -> tuple[tuple[Array, Array, Flags], ...]:
+    return tuple(spreads.vehicle(place) for place in range(len(spreads.score)))
 
 
 def _parameter(
