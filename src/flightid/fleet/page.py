@@ -1,0 +1,207 @@
+"""One page about a fleet: lights by vehicle, types, what changed, logs that could not be used."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+
+from flightid.conventions import Light
+from flightid.findings import Finding, counted
+from flightid.fleet.pictures import history_picture, type_picture
+from flightid.fleet.statistics.answers import FleetAnswers, Row, TypeAnswers, fitted_share
+from flightid.fleet.statistics.drift import FleetDrift, ParameterHistory
+from flightid.fleet.statistics.repeats import RepeatScatter
+from flightid.report.content import Block, Document, Lights, Paragraph, Section, TableBlock
+from flightid.report.figures import figure_block
+from flightid.table import Cell, Column, Table
+from flightid.uncertainty.quantiles import interval_words, shown
+from flightid.version import VERSION
+
+SHOWN = 9
+"""Histories drawn at most; those that changed come first."""
+NAMED = 40
+"""Vehicles with a light of their own; of more, those that are green are counted."""
+
+
+def fleet_document(answers: FleetAnswers, title: str = "Fleet") -> Document:
+    """Say what a fleet's catalogue tells.
+
+    Parameters
+    ----------
+    answers : FleetAnswers
+    title : str
+    """
+    fitted, every = fitted_share(answers.logs)
+    vehicles = {name for each in answers.types for name in each.data.members}
+    words = (
+        f"{counted(every, 'log')}, {fitted} with a model, of {counted(len(vehicles), 'vehicle')}"
+    )
+    sections = [
+        Section("Vehicles", tuple(_vehicles(answers))),
+        *(Section(_type_title(each), tuple(_type_blocks(each))) for each in answers.types),
+        Section("Logs that could not be used", tuple(_refused(answers.logs))),
+    ]
+    return Document(title, words, tuple(sections), f"Made by flightid {VERSION}.")
+
+
+def _type_title(each: TypeAnswers) -> str:
+    return f"Type “{each.type_name}”, model “{each.model}”"
+
+
+def _vehicles(answers: FleetAnswers) -> Iterator[Block]:
+    """One light a vehicle: changed is red, unlike its type amber."""
+    found = {
+        name: _light(name, answers.types)
+        for name in sorted({name for each in answers.types for name in each.data.members})
+    }
+    if not found:
+        yield Paragraph("No vehicle has a model with intervals.")
+        return
+    worrying = [each for each in found.values() if each.light is not Light.GREEN]
+    green = len(found) - len(worrying)
+    if len(found) <= NAMED:
+        yield Lights(tuple(found.values()), "Changed, or unlike their type")
+    else:
+        rest = Finding(
+            "vehicles-normal", Light.GREEN, f"{green} vehicles neither changed nor are unlike"
+        )
+        yield Lights((*worrying, *((rest,) if green else ())), "Changed, or unlike their type")
+    if answers.undated:
+        yield Paragraph(
+            f"{counted(answers.undated, 'flight')} without a date: part of their type, but of no "
+            "history."
+        )
+
+
+def _light(vehicle: str, types: Sequence[TypeAnswers]) -> Finding:
+    said, light = [], Light.GREEN
+    for each in types:
+        for history in each.drift.alarms if each.drift is not None else ():
+            if history.vehicle == vehicle:
+                said.append(_change_words(history))
+                light = Light.RED
+        for one in each.outliers.odd if each.outliers is not None else ():
+            if one.vehicle == vehicle:
+                said.append(one.words())
+                light = Light.RED if light is Light.RED else Light.AMBER
+    if not said:
+        return Finding("vehicle", light, f"{vehicle}: no change, like its type")
+    act = "look at what was done to it, and verify its model on a new flight"
+    return Finding("vehicle", light, f"{vehicle}: {'; '.join(said)}", act)
+
+
+def _change_words(history: ParameterHistory) -> str:
+    change = history.change_percent
+    ends = change.interval(shown())
+    size = "" if change.value is None else f" by {change.value:+.2g} %"
+    around = "" if ends is None else f" ({ends[0]:+.2g} to {ends[1]:+.2g} %)"
+    return f"{history.name} changed{size}{around}"
+
+
+def _type_blocks(each: TypeAnswers) -> Iterator[Block]:
+    for reason in each.reasons:
+        yield Paragraph(f"Not answered: {reason}.")
+    if each.population is not None:
+        yield TableBlock(each.population.summary())
+        caption = (
+            "Every vehicle's own estimate with its interval, and, shaded, where the next vehicle "
+            f"lies with {interval_words(shown())}."
+        )
+        yield figure_block(type_picture(each.population), caption)
+    if each.outliers is not None:
+        many = len(each.outliers.vehicles) > SHOWN
+        yield TableBlock(each.outliers.summary(), folded=many and not each.outliers.odd)
+    if each.drift is not None:
+        yield from _drift_blocks(each.drift)
+
+
+def _drift_blocks(drift: FleetDrift) -> Iterator[Block]:
+    yield Lights(tuple(_errors_light(each) for each in drift.repeats), "Errors of the estimates")
+    slopes = _slopes(drift)
+    if slopes.rows:
+        yield TableBlock(slopes)
+    yield TableBlock(drift.summary())
+    events = _events(drift)
+    if events.rows:
+        yield TableBlock(events)
+    ranked = sorted(drift.histories, key=lambda one: 2.0 if one.chance is None else one.chance)
+    if ranked:
+        caption = (
+            "Estimates of flights with their intervals, what covariates explain taken out; the "
+            "level behind them; orange where it changed, and when. The least likely come first."
+        )
+        yield figure_block(history_picture(ranked[:SHOWN]), caption)
+
+
+def _errors_light(scatter: RepeatScatter) -> Finding:
+    ends = scatter.understated_ends(shown())
+    if ends is None:
+        return Finding(
+            "repeats",
+            Light.UNKNOWN,
+            f"{scatter.name}: no vehicle flew twice on a day, so its errors are taken as stated",
+            "fly some vehicles twice a day: scatter beyond the errors would count as change",
+        )
+    words = (
+        f"{scatter.name}: flights of one day scatter {scatter.understated:.2f} times their errors "
+        f"({ends[0]:.2f} to {ends[1]:.2f}; χ² {scatter.chi2:.0f} of {scatter.freedom})"
+    )
+    if scatter.errors_hold:
+        return Finding("repeats", Light.GREEN, words)
+    act = "errors were made as large before anything was called a change"
+    return Finding("repeats", Light.AMBER, words, act)
+
+
+def _slopes(drift: FleetDrift) -> Table:
+    rows: list[tuple[Cell, ...]] = []
+    for name, effects in drift.slopes.items():
+        for each in effects:
+            low, high = each.interval(shown()) or (None, None)
+            rows.append((name, each.name, each.value, low, high, each.reason or None))
+    words = interval_words(shown())
+    columns = (
+        *(Column("parameter"), Column("covariate"), Column("change a unit", digits=3)),
+        *(Column(f"{words} low", digits=3), Column(f"{words} high", digits=3), Column("note")),
+    )
+    notes = tuple(f"{n} flights do not tell {k}." for k, n in drift.covariates_missing.items())
+    return Table("What covariates explain", columns, tuple(rows), notes).without_empty_columns()
+
+
+def _events(drift: FleetDrift) -> Table:
+    rows: list[tuple[Cell, ...]] = []
+    for history in drift.histories:
+        for each in history.events:
+            low, high = each.percent.interval(shown()) or (None, None)
+            event = each.event.what
+            value, reason = each.percent.value, each.percent.reason or None
+            rows.append(
+                (event, history.vehicle, history.name, value, low, high, each.chance, reason)
+            )
+    words = interval_words(shown())
+    columns = (
+        *(Column("event"), Column("vehicle"), Column("parameter")),
+        *(
+            Column("change", "%", 3),
+            Column(f"{words} low", "%", 3),
+            Column(f"{words} high", "%", 3),
+        ),
+        *(Column("chance without", digits=2), Column("note")),
+    )
+    return Table("Events", columns, tuple(rows)).without_empty_columns()
+
+
+def _refused(logs: Sequence[Row]) -> Iterator[Block]:
+    left = [each for each in logs if each["outcome"] != "fitted"]
+    if not left:
+        yield Paragraph("Every log gave a model.")
+        return
+    counts = Counter((each["outcome"], each["reason"] or "") for each in left)
+    rows: list[tuple[Cell, ...]] = []
+    for (outcome, reason), number in counts.most_common():
+        first = next(e for e in left if (e["outcome"], e["reason"] or "") == (outcome, reason))
+        rows.append((number, outcome, reason, first["message"], first["action"], first["address"]))
+    columns = (
+        *(Column("logs"), Column("outcome"), Column("reason"), Column("in words")),
+        *(Column("what to change"), Column("for example")),
+    )
+    yield TableBlock(Table("By reason", columns, tuple(rows)).without_empty_columns())

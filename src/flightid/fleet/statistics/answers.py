@@ -1,0 +1,208 @@
+"""The questions of a fleet, answered from the rows of its catalogue."""
+
+from __future__ import annotations
+
+import datetime
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from flightid.errors import FlightidError
+from flightid.fleet.catalogue.schema import FITTED, from_lower_triangle
+from flightid.fleet.statistics.covariates import Covariate
+from flightid.fleet.statistics.drift import FleetDrift, find_drift
+from flightid.fleet.statistics.events import FleetEvent
+from flightid.fleet.statistics.flight_estimates import FlightEstimates
+from flightid.fleet.statistics.outliers import FleetOutliers, find_outliers
+from flightid.fleet.statistics.population import Population, estimate_population
+
+Row = Mapping[str, Any]
+Rows = Mapping[str, Sequence[Row]]
+RED = "red"
+
+
+@dataclass(frozen=True, eq=False)
+class TypeAnswers:
+    """What is known of one model of one type.
+
+    Attributes
+    ----------
+    type_name, model : str
+    data : FlightEstimates
+    population : Population or None
+    outliers : FleetOutliers or None
+    drift : FleetDrift or None
+    reasons : tuple of str
+        Why an answer is missing.
+    """
+
+    type_name: str
+    model: str
+    data: FlightEstimates
+    population: Population | None
+    outliers: FleetOutliers | None
+    drift: FleetDrift | None
+    reasons: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class FleetAnswers:
+    """Answers by type and model, with what became of every log.
+
+    Attributes
+    ----------
+    types : tuple of TypeAnswers
+    logs : sequence of mapping
+        Rows of the catalogue's table of logs.
+    undated : int
+        Flights without a date, which are in no history.
+    """
+
+    types: tuple[TypeAnswers, ...]
+    logs: Sequence[Row]
+    undated: int = 0
+
+
+def answer_questions(
+    rows: Rows,
+    *,
+    events: Sequence[FleetEvent] = (),
+    covariates: Sequence[str] = (),
+    parameters: Sequence[str] = (),
+) -> FleetAnswers:
+    """Answer what a fleet file asks.
+
+    Parameters
+    ----------
+    rows : mapping of str to sequence of mapping
+        Tables ``logs``, ``parameters``, ``covariances`` and ``covariates`` of the catalogue.
+    events : sequence of FleetEvent
+        On the clock of Unix, s, UTC.
+    covariates : sequence of str
+        Names of covariates that are taken out before drift is looked for.
+    parameters : sequence of str
+        Parameters that are asked about; none: all that are free.
+
+    Returns
+    -------
+    FleetAnswers
+        Flights whose model is red, that name no vehicle or type, or have no interval, are left out.
+    """
+    told = [each for each in rows["parameters"] if _counts(each, parameters)]
+    groups = sorted({(each["type"], each["model"]) for each in told})
+    answers, undated = [], 0
+    for type_name, model in groups:
+        mine = [e for e in told if (e["type"], e["model"]) == (type_name, model)]
+        data = _estimates(mine, [e for e in rows["covariances"] if e["model"] == model])
+        dated = np.array([_instant(_first(mine, log)) is not None for log in data.flights])
+        undated += int(np.count_nonzero(~dated))
+        answers.append(_answered(type_name, model, data, dated, rows, events, covariates))
+    return FleetAnswers(tuple(answers), tuple(rows["logs"]), undated)
+
+
+def _counts(row: Row, parameters: Sequence[str]) -> bool:
+    known = all(row[key] is not None for key in ("vehicle", "type", "value", "stderr", "position"))
+    asked = not parameters or row["name"] in parameters
+    return bool(known and asked and row["light"] != RED and row["stderr"] > 0.0)
+
+
+def _first(rows: Sequence[Row], log: str) -> Row:
+    return next(each for each in rows if each["log"] == log)
+
+
+def _instant(row: Row) -> float | None:
+    """Start of a flight on the clock of Unix, s; None where nobody says."""
+    found = row["flown_at"]
+    if found is None:
+        return None
+    at = datetime.datetime.fromisoformat(found) if isinstance(found, str) else found
+    aware = at if at.tzinfo is not None else at.replace(tzinfo=datetime.UTC)
+    return float(aware.timestamp())
+
+
+def _estimates(rows: Sequence[Row], covariances: Sequence[Row]) -> FlightEstimates:
+    names = sorted({each["name"] for each in rows})
+    logs = list(dict.fromkeys(each["log"] for each in rows))
+    units = {each["name"]: each["unit"] or "1" for each in rows}
+    values, known = np.zeros((len(logs), len(names))), np.zeros((len(logs), len(names)), dtype=bool)
+    matrices = np.zeros((len(logs), len(names), len(names)))
+    place = {log: n for n, log in enumerate(logs)}
+    columns = {name: i for i, name in enumerate(names)}
+    for each in rows:
+        n, i = place[each["log"]], columns[each["name"]]
+        values[n, i], known[n, i] = each["value"], True
+        matrices[n, i, i] = each["stderr"] ** 2
+    for each in covariances:
+        if each["log"] in place:
+            _set_covariance(matrices[place[each["log"]]], each, columns)
+    heads = [_first(rows, log) for log in logs]
+    return FlightEstimates.of(
+        names,
+        [str(each["vehicle"]) for each in heads],
+        values,
+        matrices,
+        time_s=[_instant(each) or 0.0 for each in heads],
+        units=[units[name] for name in names],
+        known=known,
+        flights=logs,
+    )
+
+
+def _set_covariance(matrix: Any, row: Row, columns: Mapping[str, int]) -> None:  # noqa: ANN401 — an array
+    """Correlations of a fit about the standard errors that its parameters state."""
+    found = np.array(from_lower_triangle(row["lower"]))
+    sizes = np.sqrt(np.diag(found))
+    stated = np.sqrt(np.diag(matrix))
+    for a, first in enumerate(row["names"]):
+        for b, second in enumerate(row["names"]):
+            if a != b and first in columns and second in columns and sizes[a] * sizes[b] > 0.0:
+                i, j = columns[first], columns[second]
+                matrix[i, j] = found[a, b] / (sizes[a] * sizes[b]) * stated[i] * stated[j]
+
+
+def _answered(
+    type_name: str,
+    model: str,
+    data: FlightEstimates,
+    dated: Any,  # noqa: ANN401 — an array
+    rows: Rows,
+    events: Sequence[FleetEvent],
+    covariates: Sequence[str],
+) -> TypeAnswers:
+    reasons: list[str] = []
+    population = outliers = drift = None
+    try:
+        population = estimate_population(data, type_name)
+        outliers = find_outliers(population)
+    except FlightidError as error:
+        reasons.append(error.reason)
+    if dated.any():
+        flights = data.chosen(dated)
+        drift = find_drift(flights, _covariates(flights, rows, covariates), events)
+    else:
+        reasons.append("no flight has a date, so nothing is said of change")
+    return TypeAnswers(type_name, model, data, population, outliers, drift, tuple(reasons))
+
+
+def _covariates(
+    data: FlightEstimates, rows: Rows, names: Sequence[str]
+) -> dict[str, list[float | str | None]]:
+    """One value a flight; of the logs themselves where the covariates lack it, as firmware."""
+    found: dict[str, list[float | str | None]] = {}
+    logs = {each["log"]: each for each in rows["logs"]}
+    for name in names:
+        told = {
+            each["log"]: each["value"] if each["text"] is None else each["text"]
+            for each in rows["covariates"]
+            if each["name"] == name
+        }
+        own: Covariate = [told.get(log, logs.get(log, {}).get(name)) for log in data.flights]
+        found[name] = list(own)
+    return found
+
+
+def fitted_share(logs: Sequence[Row]) -> tuple[int, int]:
+    """Logs with a model, and all of them."""
+    return sum(each["outcome"] == FITTED for each in logs), len(logs)

@@ -1,0 +1,103 @@
+"""The page of a fleet: what it says of vehicles whose truth is known."""
+
+from __future__ import annotations
+
+import datetime
+
+import pytest
+
+from flightid.conventions import Light
+from flightid.fleet.page import fleet_document
+from flightid.fleet.statistics.answers import FleetAnswers, answer_questions
+from flightid.fleet.statistics.events import FleetEvent
+from flightid.report.content import Figure, TableBlock
+from flightid.report.html import to_html
+from flightid.report.text import to_text
+from tests.fleet_rows import fleet_rows
+
+MOTOR = FleetEvent(
+    "motor replaced",
+    datetime.datetime(2026, 1, 23, tzinfo=datetime.UTC).timestamp(),
+    ("v02",),
+)
+
+
+@pytest.fixture(scope="module")
+def answers() -> FleetAnswers:
+    return answer_questions(fleet_rows(3), events=[MOTOR], covariates=["battery"])
+
+
+def test_each_vehicle_has_the_light_that_its_truth_asks_for(answers: FleetAnswers) -> None:
+    lights = {
+        each.message.partition(":")[0]: each
+        for each in fleet_document(answers).findings
+        if each.code == "vehicle"
+    }
+    assert len(lights) == 12
+    assert lights["v00"].light is Light.RED
+    assert "Ltphi changed by -15 % (-" in lights["v00"].message
+    assert lights["v01"].light is Light.AMBER
+    assert "v01: Ltphi " in lights["v01"].message
+    assert " % above the type, " in lights["v01"].message
+    assert "Lp normal" in lights["v01"].message
+    assert lights["v02"].light is Light.RED
+    sound = [each for name, each in lights.items() if name not in ("v00", "v01", "v02")]
+    assert all(each.light is Light.GREEN for each in sound), sound
+
+
+def test_the_correlation_of_a_fit_is_carried_on(answers: FleetAnswers) -> None:
+    data = answers.types[0].data
+    matrix = data.covariances[0]
+    assert data.names == ("Lp", "Ltphi")
+    assert matrix[0, 1] == pytest.approx(0.5 * (matrix[0, 0] * matrix[1, 1]) ** 0.5)
+
+
+def test_the_page_tells_events_slopes_and_refused_logs(answers: FleetAnswers) -> None:
+    document = fleet_document(answers, "Survey fleet")
+    tables = {b.table.title: b.table for b in document.walk() if isinstance(b, TableBlock)}
+    event = next(row for row in tables["Events"].rows if row[2] == "Ltphi")
+    assert event[:2] == ("motor replaced", "v02")
+    low, high = event[4], event[5]
+    assert isinstance(low, float)
+    assert isinstance(high, float)
+    assert low < 10.0 < high
+    refused = tables["By reason"]
+    assert refused.rows[0][:3] == (2, "refused", "rate-too-low")
+    assert "set LOG_BITMASK to log RATE at 400 Hz" in refused.rows[0]
+    slope = next(r for r in tables["What covariates explain"].rows if r[0] == "Ltphi")
+    assert slope[2] == pytest.approx(0.02 * 140.0, rel=0.25)
+    assert sum(isinstance(block, Figure) for block in document.walk()) == 2
+    page = to_html(document)
+    assert "Survey fleet" in page
+    assert "291 logs, 288 with a model, of 12 vehicles" in to_text(document)
+
+
+def test_red_models_and_flights_without_a_date_are_left_out_where_they_do_not_belong() -> None:
+    rows = fleet_rows(4, 5, 8)
+    for each in rows["parameters"]:
+        if each["vehicle"] == "v00":
+            each["light"] = "red"
+        if each["vehicle"] == "v01":
+            each["flown_at"] = None
+    answers = answer_questions(rows)
+    found = answers.types[0]
+    assert answers.undated == 8
+    assert found.data.members == ("v01", "v02", "v03", "v04")
+    assert found.drift is not None
+    assert {each.vehicle for each in found.drift.histories} == {"v02", "v03", "v04"}
+
+
+def test_one_vehicle_has_a_history_but_no_type() -> None:
+    rows = fleet_rows(5, 1, 12)
+    found = answer_questions(rows).types[0]
+    assert found.population is None
+    assert "a population needs several vehicles" in found.reasons[0]
+    assert found.drift is not None
+    assert "Not answered" in to_text(fleet_document(answer_questions(rows)))
+
+
+def test_a_catalogue_without_models_says_so() -> None:
+    rows = fleet_rows(6, 0)
+    assert "No vehicle has a model with intervals." in to_text(
+        fleet_document(answer_questions(rows))
+    )
