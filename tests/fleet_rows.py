@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import hashlib
 from typing import Any
 
 import numpy as np
@@ -36,16 +37,16 @@ def fleet_rows(seed: int, vehicles: int = 12, flights: int = 24) -> Rows:
             values[1] *= 1.0 + 0.02 * (battery - 15.5)
             values[1] *= 0.85 if vehicle == 0 and flight >= 14 else 1.0
             values[1] *= 1.1 if vehicle == 2 and flight >= 12 else 1.0
-            log = f"{vehicle:02}{flight:03}"
+            log = _digest(f"{vehicle:02}{flight:03}")
             common = {
                 "log": log, "vehicle": f"v{vehicle:02}", "type": "quad",
-                "flown_at": at.replace(tzinfo=None), "light": "green",
+                "flown_at": at.replace(tzinfo=None).isoformat(), "light": "green",
             }  # fmt: skip
             _fitted(rows, common, values, covariance, battery)
     for number, reason in enumerate(("rate-too-low", "rate-too-low", "empty")):
         rows["logs"].append(
             {
-                "log": f"bad{number}",
+                "log": _digest(f"bad{number}"),
                 "vehicle": None,
                 "type": None,
                 "flown_at": None,
@@ -61,12 +62,16 @@ def fleet_rows(seed: int, vehicles: int = 12, flights: int = 24) -> Rows:
     return rows
 
 
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
 def _fitted(
     rows: Rows, common: dict[str, Any], values: np.ndarray, covariance: np.ndarray, battery: float
 ) -> None:
     rows["logs"].append(
         common
-        | {"address": f"logs/{common['log']}.bin", "outcome": "fitted", "reason": None}
+        | {"address": f"logs/{common['log'][:6]}.bin", "outcome": "fitted", "reason": None}
         | {"message": None, "action": None, "firmware": "4.6"}
     )
     model = common | {"model": "roll"}

@@ -3,11 +3,19 @@
 from __future__ import annotations
 
 import datetime
+from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
+from flightid.cli.fleet import command
 from flightid.conventions import Light
+from flightid.fleet.catalogue.compaction import compact
+from flightid.fleet.catalogue.loose import write_loose
+from flightid.fleet.catalogue.record import LogRecord
+from flightid.fleet.opening import current_store
 from flightid.fleet.page import fleet_document
+from flightid.fleet.settings import read_fleet
 from flightid.fleet.statistics.answers import FleetAnswers, answer_questions
 from flightid.fleet.statistics.events import FleetEvent
 from flightid.report.content import Figure, TableBlock
@@ -101,3 +109,28 @@ def test_a_catalogue_without_models_says_so() -> None:
     assert "No vehicle has a model with intervals." in to_text(
         fleet_document(answer_questions(rows))
     )
+
+
+def test_the_command_answers_a_fleet_file_from_its_catalogue(tmp_path: Path) -> None:
+    pytest.importorskip("duckdb")
+    pytest.importorskip("pyarrow")
+    path = tmp_path / "fleet.toml"
+    path.write_text(
+        '[fleet]\ntitle = "Survey"\nlogs = ["logs"]\n'
+        '[questions]\ncovariates = ["battery"]\nparameters = ["Ltphi"]\n'
+        '[[event]]\ndate = "2026-01-23"\nvehicle = "v02"\nwhat = "new propellers"\n'
+    )
+    rows = fleet_rows(3, 5)
+    store = current_store(read_fleet(path))
+    for log in [each["log"] for each in rows["logs"]]:
+        own = {name: [e for e in table if e["log"] == log] for name, table in rows.items()}
+        write_loose(store, LogRecord(log, own))
+    compact(store)
+    page = tmp_path / "fleet.html"
+    found = CliRunner().invoke(command, ["report", str(path), "--html", str(page)])
+    assert found.exit_code == 1, found.output
+    assert "<title>Survey" in page.read_text()
+    text = CliRunner().invoke(command, ["report", str(path)]).output
+    assert "v00: Ltphi changed by -1" in text
+    assert "new propellers  v02      Ltphi" in text
+    assert " Lp " not in text

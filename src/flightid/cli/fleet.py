@@ -6,7 +6,14 @@ from pathlib import Path
 
 import click
 
-from flightid.cli.output import emit, emit_values, json_option, leave_by_verdict, note
+from flightid.cli.output import (
+    WRITTEN,
+    emit,
+    emit_values,
+    json_option,
+    leave_by_verdict,
+    note,
+)
 
 FLEET_FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
 
@@ -79,3 +86,31 @@ def query(place: str, sql: str, as_json: bool) -> None:
         emit_values(answer.to_dict()["rows"])
     else:
         click.echo(answer)
+
+
+@command.command("report", short_help="One page: vehicles, types, what changed, refused logs.")
+@click.argument("place", metavar="FLEET | CATALOGUE")
+@click.option("--html", type=WRITTEN, help="Write the page to this file instead of printing text.")
+@json_option
+def report(place: str, html: Path | None, as_json: bool) -> None:
+    """Answer the questions of a fleet file from its catalogue, on one page.
+
+    Lights by vehicle, each type with the interval of its next vehicle, parameters over time with
+    events and changes, and the logs that could not be used with what to change. The exit code is 1
+    where a vehicle changed.
+    """
+    from flightid.files import write_atomically
+    from flightid.fleet import fleet_report
+    from flightid.report.html import to_html
+    from flightid.report.json import to_dict
+    from flightid.report.text import to_text
+
+    document = fleet_report(place)
+    if html is not None:
+        write_atomically(html, to_html(document))
+        note(f"Wrote {html}")
+    elif as_json:
+        emit_values(to_dict(document))
+    else:
+        click.echo(to_text(document), nl=False)
+    leave_by_verdict(document.findings)

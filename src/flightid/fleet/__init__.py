@@ -2,6 +2,7 @@
 
 from flightid.fleet.catalogue.catalogue import Catalogue
 from flightid.fleet.opening import open_catalogue as open
+from flightid.fleet.reporting import ask_fleet, fleet_report
 from flightid.fleet.run import FleetRun, run_fleet
 from flightid.fleet.settings import FleetSettings, read_fleet
 from flightid.fleet.status import FleetStatus, fleet_status
@@ -11,6 +12,8 @@ __all__ = [
     "FleetRun",
     "FleetSettings",
     "FleetStatus",
+    "ask_fleet",
+    "fleet_report",
     "fleet_status",
     "open",
     "read_fleet",

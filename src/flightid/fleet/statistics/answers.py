@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,10 +17,12 @@ from flightid.fleet.statistics.events import FleetEvent
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
 from flightid.fleet.statistics.outliers import FleetOutliers, find_outliers
 from flightid.fleet.statistics.population import Population, estimate_population
+from flightid.uncertainty.quantiles import LEVEL, half_width
 
 Row = Mapping[str, Any]
 Rows = Mapping[str, Sequence[Row]]
 RED = "red"
+UNDATED = "no flight has a date, so nothing is said of change"
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +73,9 @@ def answer_questions(
     events: Sequence[FleetEvent] = (),
     covariates: Sequence[str] = (),
     parameters: Sequence[str] = (),
+    population: bool = True,
+    drift: bool = True,
+    outliers: bool = True,
 ) -> FleetAnswers:
     """Answer what a fleet file asks.
 
@@ -84,6 +89,8 @@ def answer_questions(
         Names of covariates that are taken out before drift is looked for.
     parameters : sequence of str
         Parameters that are asked about; none: all that are free.
+    population, drift, outliers : bool
+        Which questions are asked.
 
     Returns
     -------
@@ -98,7 +105,14 @@ def answer_questions(
         data = _estimates(mine, [e for e in rows["covariances"] if e["model"] == model])
         dated = np.array([_instant(_first(mine, log)) is not None for log in data.flights])
         undated += int(np.count_nonzero(~dated))
-        answers.append(_answered(type_name, model, data, dated, rows, events, covariates))
+        one = _answered(type_name, model, data, population=population, outliers=outliers)
+        if drift and dated.any():
+            flights = data.chosen(dated)
+            explained = _covariates(flights, rows, covariates)
+            one = replace(one, drift=find_drift(flights, explained, events))
+        elif drift:
+            one = replace(one, reasons=(*one.reasons, UNDATED))
+        answers.append(one)
     return FleetAnswers(tuple(answers), tuple(rows["logs"]), undated)
 
 
@@ -133,7 +147,9 @@ def _estimates(rows: Sequence[Row], covariances: Sequence[Row]) -> FlightEstimat
     for each in rows:
         n, i = place[each["log"]], columns[each["name"]]
         values[n, i], known[n, i] = each["value"], True
-        matrices[n, i, i] = each["stderr"] ** 2
+        # As `Fit.carried`: what Student's distribution adds to a 95 % interval.
+        wider = half_width(LEVEL, each.get("freedom")) / half_width(LEVEL)
+        matrices[n, i, i] = (wider * each["stderr"]) ** 2
     for each in covariances:
         if each["log"] in place:
             _set_covariance(matrices[place[each["log"]]], each, columns)
@@ -163,27 +179,16 @@ def _set_covariance(matrix: Any, row: Row, columns: Mapping[str, int]) -> None: 
 
 
 def _answered(
-    type_name: str,
-    model: str,
-    data: FlightEstimates,
-    dated: Any,  # noqa: ANN401 — an array
-    rows: Rows,
-    events: Sequence[FleetEvent],
-    covariates: Sequence[str],
+    type_name: str, model: str, data: FlightEstimates, *, population: bool, outliers: bool
 ) -> TypeAnswers:
-    reasons: list[str] = []
-    population = outliers = drift = None
+    if not (population or outliers):
+        return TypeAnswers(type_name, model, data, None, None, None)
     try:
-        population = estimate_population(data, type_name)
-        outliers = find_outliers(population)
+        found = estimate_population(data, type_name)
+        odd = find_outliers(found) if outliers else None
     except FlightidError as error:
-        reasons.append(error.reason)
-    if dated.any():
-        flights = data.chosen(dated)
-        drift = find_drift(flights, _covariates(flights, rows, covariates), events)
-    else:
-        reasons.append("no flight has a date, so nothing is said of change")
-    return TypeAnswers(type_name, model, data, population, outliers, drift, tuple(reasons))
+        return TypeAnswers(type_name, model, data, None, None, None, (error.reason,))
+    return TypeAnswers(type_name, model, data, found if population else None, odd, None)
 
 
 def _covariates(

@@ -1,0 +1,124 @@
+"""The page of a catalogue: its rows read, the questions of its fleet file answered."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from flightid.fleet.opening import open_catalogue
+from flightid.fleet.page import fleet_document
+from flightid.fleet.settings import FleetQuestions, FleetSettings, read_fleet
+from flightid.fleet.statistics.answers import FleetAnswers, answer_questions
+from flightid.fleet.statistics.events import FleetEvent
+from flightid.uncertainty.quantiles import showing
+
+if TYPE_CHECKING:
+    from flightid.fleet.catalogue.catalogue import Catalogue
+    from flightid.report.content import Document
+
+ASKED = ("logs", "parameters", "covariances", "covariates")
+
+
+def ask_fleet(place: str | Path) -> FleetAnswers:
+    """Answer the questions of a fleet from its catalogue.
+
+    Parameters
+    ----------
+    place : str or Path
+        Fleet file, whose questions and events count; or folder or address of a catalogue.
+
+    Returns
+    -------
+    FleetAnswers
+        By type and model: population, outliers and drift.
+
+    Raises
+    ------
+    DataError
+        There is no catalogue.
+    StudyError
+        A fleet file with errors.
+    OptionError
+        The extra ``fleet`` is not installed.
+
+    Reference
+    ---------
+    Those of `flightid.fleet.statistics`.
+
+    Example
+    -------
+    >>> import flightid as fid
+    >>> answers = fid.fleet.ask_fleet("fleet.toml")                  # doctest: +SKIP
+    >>> answers.types[0].population.summary()                        # doctest: +SKIP
+    """
+    settings = _settings(place)
+    questions = FleetQuestions() if settings is None else settings.questions
+    with open_catalogue(place) as catalogue:
+        rows = {name: _rows(catalogue, name) for name in ASKED}
+    return answer_questions(
+        rows,
+        events=[] if settings is None else _events(settings),
+        covariates=questions.covariates,
+        parameters=questions.parameters,
+        population=questions.population,
+        drift=questions.drift,
+        outliers=questions.outliers,
+    )
+
+
+def fleet_report(place: str | Path) -> Document:
+    """One page about a fleet, as a content tree.
+
+    Parameters
+    ----------
+    place : str or Path
+        Fleet file, or folder or address of a catalogue.
+
+    Returns
+    -------
+    Document
+        For `flightid.report.html.to_html` and its neighbours.
+
+    Raises
+    ------
+    DataError
+        There is no catalogue.
+    StudyError
+        A fleet file with errors.
+    OptionError
+        The extra ``fleet`` is not installed.
+
+    Reference
+    ---------
+    Those of `flightid.fleet.statistics`.
+
+    Example
+    -------
+    >>> import flightid as fid
+    >>> fid.fleet.fleet_report("fleet.toml").verdict                 # doctest: +SKIP
+    """
+    settings = _settings(place)
+    with showing(None if settings is None else settings.questions.level):
+        return fleet_document(
+            ask_fleet(place), "Fleet" if settings is None else settings.words.title
+        )
+
+
+def _settings(place: str | Path) -> FleetSettings | None:
+    return read_fleet(place) if str(place).endswith(".toml") else None
+
+
+def _events(settings: FleetSettings) -> list[FleetEvent]:
+    return [
+        FleetEvent(
+            each.what,
+            each.instant.timestamp(),
+            () if each.vehicle is None else (each.vehicle,),
+        )
+        for each in settings.events
+    ]
+
+
+def _rows(catalogue: Catalogue, name: str) -> list[dict[str, Any]]:
+    found = catalogue.table(name)
+    return [dict(zip(found.columns, row, strict=True)) for row in found.fetchall()]
