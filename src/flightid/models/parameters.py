@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from copy import copy
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,6 +87,20 @@ class Parameter:
                 action="start inside the bounds, or widen them",
             )
 
+    def with_value(self, value: float) -> Parameter:
+        """Copy with another value; of a tied one, what its tie gives.
+
+        Raises
+        ------
+        ModelError
+            The value lies outside the bounds.
+        """
+        made = copy(self)
+        object.__setattr__(made, "value", value)
+        if self.tie is None:
+            made._check_numbers()
+        return made
+
     @property
     def status(self) -> str:
         """``"free"``, ``"fixed"`` or ``"tied"``."""
@@ -143,12 +158,16 @@ class Parameters(Mapping[str, Parameter], TableView):
                 raise ModelError(f"parameter {parameter.name} is given twice")
             self._items[parameter.name] = parameter
         self._check_ties()
+        self._evaluate()
+
+    def _evaluate(self) -> None:
+        """Values of tied parameters, and all values as plain floats."""
         known: Iterable[float | None] = (each.value for each in self.values())
         if self.tied:
             known = self.tape(self.names).evaluate(self.independent_values())
         for each, value in zip([*self.values()], known, strict=True):
             if type(each.value) is not float or each.value != value:
-                self._items[each.name] = replace(each, value=float(value or 0.0))
+                self._items[each.name] = each.with_value(float(value or 0.0))
 
     def _check_ties(self) -> None:
         units = self.units
@@ -274,10 +293,14 @@ class Parameters(Mapping[str, Parameter], TableView):
             A parameter is tied, or a value lies outside its bounds.
         """
         self.independent_values(values)
-        return Parameters(
-            replace(p, value=float(values[p.name])) if p.name in values else p
+        made = Parameters.__new__(Parameters)
+        # Names, units and ties are those that were checked.
+        made._items = {
+            p.name: p.with_value(float(values[p.name])) if p.name in values else p
             for p in self.values()
-        )
+        }
+        made._evaluate()
+        return made
 
     def with_parameter(self, parameter: Parameter) -> Parameters:
         """Copy with one parameter replaced by another of the same name.

@@ -123,9 +123,9 @@ def _likely(name: str, known: Sequence[str]) -> str:
 
 def _units(blocks: tuple[Block, ...], declared: Mapping[str, str]) -> dict[str, str]:
     """Unit by signal; blocks whose signals are alike pass units on."""
-    units: dict[str, tuple[str, str]] = {}
+    units: dict[str, tuple[str, object]] = {}
 
-    def learn(name: str, unit: str, who: str) -> bool:
+    def learn(name: str, unit: str, who: object) -> bool:
         known = units.get(name)
         if known is None:
             units[name] = (unit, who)
@@ -143,7 +143,7 @@ def _units(blocks: tuple[Block, ...], declared: Mapping[str, str]) -> dict[str, 
         learn(name, canonical(unit), "the connection")
     for block in blocks:
         for name, unit in block.units.items():
-            learn(name, unit, repr(block))
+            learn(name, unit, block)
     fresh = True
     while fresh:
         fresh = False
@@ -152,32 +152,38 @@ def _units(blocks: tuple[Block, ...], declared: Mapping[str, str]) -> dict[str, 
                 ends = (*block.inputs, *block.outputs)
                 for name in [each for each in ends if each in units]:
                     unit = units[name][0]
-                    fresh |= bool(sum(learn(other, unit, repr(block)) for other in ends))
+                    fresh |= bool(sum(learn(other, unit, block) for other in ends))
     return {name: unit for name, (unit, _) in units.items()}
 
 
 def _sample_times(wiring: Wiring) -> dict[str, float | None]:
     """Sample time by signal; blocks without memory take that of what they read."""
     found: dict[str, float | None] = dict.fromkeys(wiring.signals)
-    # A sample time passes at most through every block on its way.
-    for _ in wiring.blocks:
-        for block in wiring.blocks:
-            step = _own_time(block, found)
-            found.update(dict.fromkeys(block.outputs, step))
+    kinds = [(block, block.is_static) for block in wiring.blocks]
+    static = [block for block, is_static in kinds if is_static]
     for block in wiring.blocks:
-        _check_time(block, found)
+        found.update(dict.fromkeys(block.outputs, block.sample_time_s))
+    # A sample time passes at most through every block on its way.
+    for _ in static:
+        moved = False
+        for block in static:
+            step = _read_time(block, found)
+            moved |= any(found[name] != step for name in block.outputs)
+            found.update(dict.fromkeys(block.outputs, step))
+        if not moved:
+            break
+    for block, is_static in kinds:
+        own = _read_time(block, found) if is_static else block.sample_time_s
+        _check_time(block, block.part.sample_time_s if isinstance(block.part, Hold) else own, found)
     return found
 
 
-def _own_time(block: Block, times: Mapping[str, float | None]) -> float | None:
-    if not block.is_static:
-        return block.sample_time_s
+def _read_time(block: Block, times: Mapping[str, float | None]) -> float | None:
     read = [times[name] for name in block.inputs if times[name] is not None]
     return read[0] if read else None
 
 
-def _check_time(block: Block, times: Mapping[str, float | None]) -> None:
-    own = block.part.sample_time_s if isinstance(block.part, Hold) else _own_time(block, times)
+def _check_time(block: Block, own: float | None, times: Mapping[str, float | None]) -> None:
     for name in block.inputs:
         step = times[name]
         if step is None or step == own:

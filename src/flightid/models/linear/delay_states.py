@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from math import comb, factorial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.models.linear.realisation import canonical_form
+from flightid.models.linear.realisation import Block, block_of, side_by_side
 
 Array = NDArray[np.float64]
 
@@ -52,15 +53,18 @@ def delays_as_states(
     """
     a, b, c, d, delays_s = matrices
     m = len(delays_s)
-    entries = []
-    for j, delay in enumerate(delays_s):
-        above, below = pade_delay(delay, order) if delay else (np.ones(1), np.ones(1))
-        # Leading coefficients out of the way: a delay of a millisecond to the third is 1e-9.
-        gain = float(above[0] / below[0])
-        entries.append((j, j, gain, [above / above[0]], [below / below[0]]))
-    fa, fb, fc, fd = canonical_form((m, m), entries)
+    late = [(j, j, _realised(float(delay), order)) for j, delay in enumerate(delays_s)]
+    fa, fb, fc, fd = side_by_side((m, m), late)
     whole = np.block([[a, b @ fc], [np.zeros((len(fa), len(a))), fa]])
     return whole, np.vstack([b @ fd, fb]), np.hstack([c, d @ fc]), d @ fd
+
+
+@lru_cache(maxsize=256)
+def _realised(delay_s: float, order: int) -> Block:
+    """One delay: loops ask for the same ones again and again."""
+    above, below = pade_delay(delay_s, order) if delay_s else (np.ones(1), np.ones(1))
+    # Leading coefficients out of the way: a delay of a millisecond to the third is 1e-9.
+    return block_of(float(above[0] / below[0]), [above / above[0]], [below / below[0]])
 
 
 def shift_registers(

@@ -13,6 +13,8 @@ Array = NDArray[np.float64]
 Matrices = tuple[Array, Array, Array, Array, Array]
 Entry = tuple[int, int, float, list[Array], list[Array]]
 """Row, column, gain, numerator factors, denominator factors (highest power first)."""
+Block = tuple[Array, Array, float]
+"""A, C and D of one transfer function."""
 
 _SAME_DELAY_S = 1e-12
 
@@ -41,12 +43,18 @@ def canonical_form(shape: tuple[int, int], entries: Sequence[Entry]) -> tuple[Ar
     ---------
     Kailath, *Linear Systems* (1980), §2.1: controller canonical form.
     """
-    blocks = [_block(*entry[2:]) for entry in entries]
-    n = sum(len(block[0]) for block in blocks)
+    return side_by_side(shape, [(*entry[:2], block_of(*entry[2:])) for entry in entries])
+
+
+def side_by_side(
+    shape: tuple[int, int], placed: Sequence[tuple[int, int, Block]]
+) -> tuple[Array, ...]:
+    """A, B, C, D of transfer functions by row, column and their own realisation."""
+    n = sum(len(block[0]) for *_, block in placed)
     a, d = np.zeros((n, n)), np.zeros(shape)
     b, c = np.zeros((n, shape[1])), np.zeros((shape[0], n))
     start = 0
-    for (row, column, *_), (block_a, block_c, feed) in zip(entries, blocks, strict=True):
+    for row, column, (block_a, block_c, feed) in placed:
         stop = start + len(block_a)
         a[start:stop, start:stop] = block_a
         if stop > start:
@@ -64,9 +72,14 @@ def _product(factors: list[Array]) -> Array:
     return np.trim_zeros(result, "f")
 
 
-def _block(
-    gain: float, numerator: list[Array], denominator: list[Array]
-) -> tuple[Array, Array, float]:
+def block_of(gain: float, numerator: list[Array], denominator: list[Array]) -> Block:
+    """A, C and D of one transfer function, whose input moves the first state.
+
+    Raises
+    ------
+    ModelError
+        More zeros than poles, or a denominator that is zero.
+    """
     above, below = gain * _product(numerator), _product(denominator)
     if len(below) == 0:
         raise ModelError("a denominator is zero", needed="a factor that is not zero")
