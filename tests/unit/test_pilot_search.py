@@ -4,6 +4,7 @@ import numpy as np
 
 from flightid.responses.errors.pilot_search import (
     SPARE,
+    PilotColumns,
     columns_of,
     joined,
     solve,
@@ -22,9 +23,8 @@ def test_eliminated_transients_solve_the_whole_problem() -> None:
     basis = [turns(omega, 10.0, order) for omega in data.omega]
     ends = [turns(omega, 10.0, order + SPARE) for omega in data.omega]
     weights = 1.0 / (1.0 + np.abs(target))
-    numerators, denominator, transients = solve(
-        data, basis, ends, target, weights, target * weights
-    )
+    made = PilotColumns.of(data, order, 10.0)
+    numerators, denominator, transients = solve(made, target, weights, target * weights)
     columns = joined(columns_of(data, basis, ends, target)) * weights
     both = np.concatenate([columns.real, columns.imag], axis=1).T
     right = np.concatenate([(target * weights).real, (target * weights).imag])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,8 @@ BEYOND_BAND = 1.3
 """Bins are fitted up to this multiple of the highest frequency of the response."""
 STARTS, STEPS, HALVINGS = 6, 12, 6
 SETTLED = 1e-5
+SOUND = 1e-6
+"""Diagonal of a triangle, of columns of unit length, above which it is solved as it is."""
 
 
 def turns(omega: Real, scale_rad_s: float, order: int) -> Complex:
@@ -83,22 +86,56 @@ def spectra_of(
     return PilotBins(tuple(omegas), tuple(ins), tuple(outs), lengths, sample_time_s)
 
 
+@dataclass(frozen=True)
+class PilotColumns:
+    """What one order makes of the bins, by record; columns of `fixed` hold for all denominators.
+
+    Attributes
+    ----------
+    basis, ends : list of ndarray, shape (order + 1, n_f) and (order + 1 + SPARE, n_f)
+        Powers for numerators and denominator, and for the record's transient.
+    whole : ndarray, shape (order + 1, n_bins)
+        The basis of all records.
+    fixed : list of ndarray, shape (n_fixed, n_f)
+        Sensitivities times the denominator, of the transient and of the numerators.
+    """
+
+    basis: list[Complex]
+    ends: list[Complex]
+    whole: Complex
+    fixed: list[Complex]
+
+    @classmethod
+    def of(cls, data: PilotBins, order: int, scale: float) -> PilotColumns:
+        """Of an order."""
+        ends = [turns(omega, scale, order + SPARE) for omega in data.omega]
+        basis = [each[: order + 1] for each in ends]
+        fixed = [
+            np.concatenate([end, *(row * phi for row in u)])
+            for u, phi, end in zip(data.inputs, basis, ends, strict=True)
+        ]
+        return cls(basis, ends, np.concatenate(basis, axis=1), fixed)
+
+    @cached_property
+    def edges(self) -> list[int]:
+        """Bins at which a record begins, but for the first."""
+        return [int(each) for each in np.cumsum([phi.shape[1] for phi in self.basis])[:-1]]
+
+
 def search(data: PilotBins, order: int, scale: float, weights: Real) -> PilotState:
     """Sanathanan and Koerner's iteration, then Gauss–Newton steps from its best."""
-    basis = [turns(omega, scale, order) for omega in data.omega]
-    ends = [turns(omega, scale, order + SPARE) for omega in data.omega]
-    joined = np.concatenate(basis, axis=1)
+    columns = PilotColumns.of(data, order, scale)
     target = np.concatenate(data.output)
     state, denominator = None, np.ones(len(target), dtype=np.complex128)
     for _ in range(STARTS):
         scaled = weights / np.abs(denominator)
-        found = solve(data, basis, ends, target, scaled, target * scaled)
-        made = _made(data, basis, ends, weights, *found)
+        found = solve(columns, target, scaled, target * scaled)
+        made = _made(data, columns, weights, *found)
         state = made if state is None or made.cost < state.cost else state
-        denominator = found[1] @ joined
+        denominator = found[1] @ columns.whole
     assert state is not None
     for _ in range(STEPS):
-        stepped = _gauss_newton(data, basis, ends, weights, state)
+        stepped = _gauss_newton(data, columns, weights, state)
         done = stepped.cost > state.cost * (1.0 - SETTLED)
         state = stepped
         if done:
@@ -135,84 +172,92 @@ def joined(columns: Sequence[tuple[Complex, Complex]]) -> Complex:
 
 
 def solve(
-    data: PilotBins,
-    basis: Sequence[Complex],
-    ends: Sequence[Complex],
-    output: Complex,
-    weights: Real | Complex,
-    target: Complex,
+    columns: PilotColumns, output: Complex, weights: Real | Complex, target: Complex
 ) -> tuple[Real, Real, tuple[Real, ...]]:
     """Coefficients whose weighed sensitivities come nearest to a target; a denominator from one on.
 
     Each record's transient is eliminated by an orthogonal triangle of its own rows.
     """
-    edges = np.cumsum([phi.shape[1] for phi in basis])[:-1]
     triangles: list[Real] = []
-    for (own, shared), weight, right in zip(
-        columns_of(data, basis, ends, output),
-        np.split(weights, edges),
-        np.split(target, edges),
+    for fixed, phi, y, weight, right in zip(
+        columns.fixed,
+        columns.basis,
+        *(np.split(each, columns.edges) for each in (output, weights, target)),
         strict=True,
     ):
-        rows = np.concatenate([own * weight, shared * weight, right[None]])
-        parts = np.concatenate([rows.real, rows.imag], axis=1)
-        triangles.append(np.asarray(np.linalg.qr(parts.T, mode="r")))
-    n_own = len(ends[0])
-    sizes = np.linalg.norm(np.concatenate(triangles), axis=0)[n_own:-1]
-    solved = _least_squares(np.concatenate([each[n_own:, n_own:] for each in triangles]), sizes)
-    transients = []
-    for each in triangles:
-        top = each[:n_own, : n_own + 1].copy()
-        top[:, -1] = each[:n_own, -1] - each[:n_own, n_own:-1] @ solved
-        transients.append(_least_squares(top, np.linalg.norm(top[:, :-1], axis=0)))
-    n_in, size = len(data.inputs[0]), len(basis[0])
-    split = n_in * size
+        n_fixed = len(fixed)
+        rows = np.empty((n_fixed + len(phi), len(y)), dtype=np.complex128)
+        np.multiply(fixed, weight, out=rows[:n_fixed])
+        np.multiply(phi[1:], -y * weight, out=rows[n_fixed:-1])
+        rows[-1] = right
+        triangles.append(np.asarray(np.linalg.qr(rows.view(np.float64).T, mode="r")))
+    size = len(columns.basis[0])
+    n_own = size + SPARE
+    shared = np.concatenate([each[n_own:, n_own:] for each in triangles])
+    above = np.concatenate([each[:n_own, n_own:-1] for each in triangles])
+    sizes = np.sqrt(np.sum(shared[:, :-1] ** 2, axis=0) + np.sum(above**2, axis=0))
+    solved = _least_squares(np.asarray(np.linalg.qr(shared, mode="r")), sizes)
+    tops = [each[:n_own] for each in triangles]
+    own = np.array([each[:, :n_own] for each in tops])
+    left = np.array([each[:, -1] - each[:, n_own:-1] @ solved for each in tops])
+    transients = _triangles_solved(own, left, np.sqrt(np.sum(own**2, axis=1)))
+    split = len(solved) - (size - 1)
     denominator = np.concatenate([[1.0], solved[split:]])
-    return solved[:split].reshape(n_in, size), denominator, tuple(transients)
+    return solved[:split].reshape(-1, size), denominator, tuple(transients)
 
 
-def _least_squares(rows: Real, sizes: Real) -> Real:
-    """Least squares for the last column by the others, each scaled by its size."""
+def _triangles_solved(triangles: Real, right: Real, sizes: Real) -> Real:
+    """Each of some triangles by its right side, at once where all are sound."""
     sizes = np.maximum(sizes, np.finfo(float).tiny)
-    solved = np.linalg.lstsq(rows[:, :-1] / sizes, rows[:, -1], rcond=1e-10)[0]
+    scaled = triangles / sizes[:, None]
+    if np.abs(np.diagonal(scaled, axis1=1, axis2=2)).min() > SOUND:
+        return np.asarray(np.linalg.solve(scaled, right[..., None])[..., 0] / sizes)
+    found = [np.linalg.lstsq(*pair, rcond=1e-10)[0] for pair in zip(scaled, right, strict=True)]
+    return np.array(found) / sizes
+
+
+def _least_squares(triangle: Real, sizes: Real) -> Real:
+    """Least squares for the last column of a triangle by the others, each scaled by its size."""
+    sizes = np.maximum(sizes, np.finfo(float).tiny)
+    left, right = triangle[:, :-1] / sizes, triangle[:, -1]
+    diagonal, n = np.abs(np.diagonal(left)), left.shape[1]
+    if len(left) >= n and diagonal.min(initial=1.0) > SOUND:
+        solved = np.linalg.solve(left[:n], right[:n])
+    else:
+        solved = np.linalg.lstsq(left, right, rcond=1e-10)[0]
     return np.asarray(solved / sizes)
 
 
 def _made(
     data: PilotBins,
-    basis: Sequence[Complex],
-    ends: Sequence[Complex],
+    columns: PilotColumns,
     weights: Real,
     numerators: Real,
     denominator: Real,
     transients: tuple[Real, ...],
 ) -> PilotState:
-    modelled = np.concatenate(
-        [
-            (np.einsum("if,if->f", numerators @ phi, u) + transient @ end) / (denominator @ phi)
-            for phi, end, u, transient in zip(basis, ends, data.inputs, transients, strict=True)
-        ]
-    )
+    above = [
+        np.einsum("if,if->f", numerators @ phi, u) + transient @ end
+        for phi, end, u, transient in zip(
+            columns.basis, columns.ends, data.inputs, transients, strict=True
+        )
+    ]
+    modelled = np.concatenate(above) / (denominator @ columns.whole)
     residual = weights * (np.concatenate(data.output) - modelled)
     cost = float(np.mean(np.abs(residual) ** 2))
     return PilotState(numerators, denominator, transients, modelled, residual, cost)
 
 
 def _gauss_newton(
-    data: PilotBins,
-    basis: Sequence[Complex],
-    ends: Sequence[Complex],
-    weights: Real,
-    state: PilotState,
+    data: PilotBins, columns: PilotColumns, weights: Real, state: PilotState
 ) -> PilotState:
-    under = state.denominator @ np.concatenate(basis, axis=1)
-    moves = solve(data, basis, ends, state.modelled, weights / under, state.residual)
+    under = state.denominator @ columns.whole
+    moves = solve(columns, state.modelled, weights / under, state.residual)
     length = 1.0
     for _ in range(HALVINGS):
         moved = _made(
             data,
-            basis,
-            ends,
+            columns,
             weights,
             state.numerators + length * moves[0],
             np.concatenate([[1.0], state.denominator[1:] + length * moves[1][1:]]),
