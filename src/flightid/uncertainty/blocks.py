@@ -13,6 +13,8 @@ from flightid.uncertainty.parts import LEAST_INFORMATION, RecordParts
 from flightid.uncertainty.residual_noise import Autoregression, FittedDirections
 
 Array = NDArray[np.float64]
+AT_ONCE = 4096
+"""Rows that are turned together: they stay in the cache."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,19 +124,35 @@ def levels(blocks: Sequence[RecordBlock]) -> Array:
     return np.where(known, squares / counts[:, None] / np.where(known, common, 1.0), 1.0)
 
 
-def _halves(block: RecordBlock) -> Array:
-    """[basis, projected in the first half, projected in the second], (n_outputs, n, m + 2 n)."""
-    n_outputs, n_samples = block.residual.shape
-    own, shared = (
-        part.reshape(n_outputs, n_samples, -1) for part in (block.basis, block.projected)
-    )
-    m, count = own.shape[2], shared.shape[2]
-    wide = np.zeros((n_outputs, n_samples, m + 2 * count))
-    half = block.middle
-    wide[:, :, :m] = own
-    wide[:, :half, m : m + count] = shared[:, :half]
-    wide[:, half:, m + count :] = shared[:, half:]
+def _of_output(part: Array, block: RecordBlock, output: int) -> Array:
+    """Rows of one output, (n_samples, k)."""
+    n_samples = block.residual.shape[1]
+    return part[output * n_samples : (output + 1) * n_samples]
+
+
+def _halves(block: RecordBlock, output: int) -> Array:
+    """[basis, projected in the first half, projected in the second] of one output, (n, m + 2 n)."""
+    own, shared = (_of_output(part, block, output) for part in (block.basis, block.projected))
+    m, count, half = own.shape[1], shared.shape[1], block.middle
+    wide = np.zeros((len(shared), m + 2 * count))
+    wide[:, :m] = own
+    wide[:half, m : m + count] = shared[:half]
+    wide[half:, m + count :] = shared[half:]
     return wide
+
+
+def _squares_of_halves(block: RecordBlock, output: int) -> Array:
+    """Products of `_halves`, of which one is zero where the other is not."""
+    own, shared = (_of_output(part, block, output) for part in (block.basis, block.projected))
+    m, count, half = own.shape[1], shared.shape[1], block.middle
+    found = np.zeros((m + 2 * count, m + 2 * count))
+    found[:m, :m] = own.T @ own
+    for first, rows in ((m, slice(None, half)), (m + count, slice(half, None))):
+        span = slice(first, first + count)
+        found[span, span] = shared[rows].T @ shared[rows]
+        found[:m, span] = own[rows].T @ shared[rows]
+        found[span, :m] = found[:m, span].T
+    return found
 
 
 def middle_of(shares: Array) -> int:
@@ -156,20 +174,34 @@ def middle_of(shares: Array) -> int:
 
 def _information(slopes: Array) -> Array:
     """Share of each row in the information on all parameters (its leverage), shape (n_rows,)."""
-    size = np.linalg.norm(slopes, axis=0)
-    scaled = slopes[:, size > 0.0] / size[size > 0.0]
-    sizes, axes = np.linalg.eigh(scaled.T @ scaled)
+    square = slopes.T @ slopes
+    size = np.sqrt(np.diag(square))
+    seen = size > 0.0
+    sizes, axes = np.linalg.eigh(
+        (square / np.where(seen, np.outer(size, size), 1.0))[seen][:, seen]
+    )
     kept = sizes > LEAST_INFORMATION
-    return np.asarray(np.sum((scaled @ axes[:, kept]) ** 2 / sizes[kept], axis=1))
+    turn = np.zeros((len(size), int(kept.sum())))
+    turn[seen] = axes[:, kept] / np.sqrt(sizes[kept]) / size[seen, None]
+    found = np.empty(len(slopes))
+    for begin in range(0, len(slopes), AT_ONCE):
+        turned = slopes[begin : begin + AT_ONCE] @ turn
+        found[begin : begin + AT_ONCE] = np.einsum("ij,ij->i", turned, turned)
+    return found
 
 
 def noise_heard(models: Sequence[Autoregression], blocks: Sequence[RecordBlock]) -> list[Array]:
     """XᵀΩX of `_halves` by output of each record, for noise of these models and its own level."""
     return [
-        level[:, None, None]
-        * np.array([noise.squared(part) for noise, part in zip(models, _halves(each), strict=True)])
+        level[:, None, None] * np.array([_heard(noise, each, o) for o, noise in enumerate(models)])
         for each, level in zip(blocks, levels(blocks), strict=True)
     ]
+
+
+def _heard(noise: Autoregression, block: RecordBlock, output: int) -> Array:
+    if noise.is_white:
+        return np.asarray(noise.lags[0] * _squares_of_halves(block, output))
+    return noise.squared(_halves(block, output))
 
 
 def directions_taken(blocks: Sequence[RecordBlock]) -> list[FittedDirections]:
@@ -197,19 +229,21 @@ def joined(apart: Array, block: RecordBlock) -> Array:
 
 def _flight(answers: Array, block: RecordBlock) -> RecordParts:
     """Scores of both halves, their information, and their noise with the own numbers taken out."""
-    wide = _halves(block).reshape(block.residual.size, -1)
-    m, count = block.basis.shape[1], block.projected.shape[1]
-    halves = wide[:, m:]
-    turn = np.vstack([-block.basis.T @ halves, np.eye(2 * count)])
-    parts = np.split(halves, 2, axis=1)
-    # A half is zero in the other, so it meets all of what answers there alone.
+    count = block.projected.shape[1]
     answering = block.projected if block.answering is None else block.answering
-    square = np.stack([part.T @ answering for part in parts])
-    return RecordParts(
-        (halves.T @ block.residual.ravel()).reshape(2, count),
-        square,
-        (turn.T @ answers @ turn).reshape(2, count, 2, count),
-    )
+    scores, square = np.zeros((2, count)), np.zeros((2, count, count))
+    on_own = np.zeros((block.basis.shape[1], 2, count))
+    for output, residual in enumerate(block.residual):
+        shared, answer, own = (
+            _of_output(part, block, output) for part in (block.projected, answering, block.basis)
+        )
+        for place, rows in enumerate((slice(None, block.middle), slice(block.middle, None))):
+            # A half meets what answers there alone.
+            scores[place] += residual[rows] @ shared[rows]
+            square[place] += shared[rows].T @ answer[rows]
+            on_own[:, place] += own[rows].T @ shared[rows]
+    turn = np.vstack([-on_own.reshape(-1, 2 * count), np.eye(2 * count)])
+    return RecordParts(scores, square, (turn.T @ answers @ turn).reshape(2, count, 2, count))
 
 
 def rest_of(flights: Sequence[RecordParts], beside: JointResiduals | None) -> RecordParts | None:

@@ -28,6 +28,8 @@ SHARPEST = 1e6
 """Power of one line over the whole power that no sound model reaches."""
 VALLEY = 0.02
 """Share of the mean power below which a spectrum is not believed."""
+AT_ONCE = 8192
+"""Real and imaginary parts of bins that are turned together."""
 LEAST_FREEDOM = 1.0
 """Below it Student's distribution has no mean, and its interval no meaning."""
 
@@ -349,15 +351,24 @@ def _lost(
         each[m:, m:] = shared
         for o, (part, spectrum, model) in enumerate(zip(parts, spectra, models, strict=True)):
             if model.is_white:
-                left = (2.0 * spectrum[0] * np.eye(len(part)) - each) @ part
-            else:
-                # Noise ends with the record.
-                shaped = part * _both(spectrum)
-                ended = scipy.fft.irfft(shaped.view(np.complex128), length)[:, :n]
-                left = 2.0 * scipy.fft.rfft(ended, length).view(np.float64) - each @ part
-            power = np.einsum("kb,kb->b", left, part)
-            lost[o] += power[::2] + power[1::2]
+                lost[o] += _powers(2.0 * spectrum[0] * np.eye(len(part)) - each, part)
+                continue
+            # Noise ends with the record.
+            shaped = part * _both(spectrum)
+            ended = scipy.fft.irfft(shaped.view(np.complex128), length)[:, :n]
+            met = np.einsum("kb,kb->b", scipy.fft.rfft(ended, length).view(np.float64), part)
+            lost[o] += 2.0 * (met[::2] + met[1::2]) - _powers(each, part)
     return lost / sum(lengths)
+
+
+def _powers(form: Array, part: Array) -> Array:
+    """Quadratic form in the transforms of each bin, by spans of bins that stay in the cache."""
+    found = np.empty(part.shape[1] // 2)
+    for begin in range(0, part.shape[1], AT_ONCE):
+        here = part[:, begin : begin + AT_ONCE]
+        power = np.einsum("kb,kb->b", form @ here, here)
+        found[begin // 2 : (begin + AT_ONCE) // 2] = power[::2] + power[1::2]
+    return found
 
 
 def _squared(part: Array, weights: Array, is_white: bool) -> Array:

@@ -27,6 +27,7 @@ NUMBERS = 2
 """Variance and corner."""
 STARTED = 0.3
 """Share of the mean power that a drift begins with."""
+_TINY = float(np.finfo(float).tiny)
 SEEN, OCTAVES = 1.5, (4, 8, 16, 32)
 """Standard deviations by which the power of so many half cycles makes a drift worth a look."""
 
@@ -150,14 +151,16 @@ def _parted(
     """Both models after some rounds."""
     fast, drift = pair
     ends = 1.0 if length % 2 == 0 else 2.0
+    variance, (power, under) = drift.variance, drift._parts(length)
     for _ in range(rounds):
-        other, own = fast.spectrum(), drift.spectrum(length)
-        share = own / np.maximum(other + own, np.finfo(float).tiny)
-        slow = share**2 * whole + share * other
-        fast = fitted((1.0 - share) ** 2 * whole + share * other)
+        other, own = fast.spectrum(), variance * power / under
+        share = own / np.maximum(other + own, _TINY)
+        mixed = share * other
+        slow = share**2 * whole + mixed
+        fast = fitted((1.0 - share) ** 2 * whole + mixed)
         total = 2.0 * np.sum(slow) - slow[0] - (2.0 - ends) * slow[-1]
-        drift = replace(drift, variance=float(total) / length)
-    return fast, drift
+        variance = float(total) / length
+    return fast, replace(drift, variance=variance)
 
 
 def _criterion(spectrum: Array, numbers: int, whole: Array, n: int) -> float:

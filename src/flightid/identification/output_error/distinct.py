@@ -48,11 +48,14 @@ def run_with_slopes(
         if runs_of is None
         else runs_of.native.run_record(place, *asked)
     )
+    shifted = outputs + own.bias[:, None]
+    if not own.free_bias:
+        return shifted, slopes
     n_outputs, n_samples = outputs.shape
     biases = np.zeros((n_outputs, n_samples, len(own.free_bias)))
     for column, output in enumerate(own.free_bias):
         biases[output, :, column] = 1.0
-    return outputs + own.bias[:, None], np.concatenate([slopes, biases], axis=2)
+    return shifted, np.concatenate([slopes, biases], axis=2)
 
 
 def require_distinct(
@@ -112,8 +115,9 @@ def _alike(
         slopes = run_with_slopes(model, prepared, runs_of, place, numbers)[1]
         if numbers.start is None and len(numbers.initial) == len(prepared.states):
             require_slopes(slopes, numbers, prepared.states, model.outputs, n)
-        slopes = slopes / scale
-        rows = slopes.reshape(-1, slopes.shape[2])
+        # Lengths and angles are those of the triangle, of as many rows as there are numbers.
+        weighed = [triangle_of_rows(part) / size for part, size in zip(slopes, scale, strict=True)]
+        rows = triangle_of_rows(np.concatenate(weighed))
         shared.append(rows[:, :n])
         own.append(rows[:, n:])
     size = np.sqrt(np.sum([np.sum(each**2, axis=0) for each in shared], axis=0))
@@ -132,9 +136,9 @@ def _alike(
 
 
 def _scale(prepared: RecordSet) -> Array:
-    """Size of each output over all records, shape (n_outputs, 1, 1)."""
+    """Size of each output over all records, shape (n_outputs,)."""
     spread = np.max([np.ptp(outputs, axis=1) for _, outputs, _ in prepared.arrays], axis=0)
-    return np.asarray(np.where(spread > 0.0, spread, 1.0))[:, None, None]
+    return np.asarray(np.where(spread > 0.0, spread, 1.0))
 
 
 def _basis(own: Array) -> Array:
