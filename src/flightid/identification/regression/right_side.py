@@ -146,16 +146,27 @@ class RightSide:
         free = self.model.parameters.free_indices
         still = np.zeros((states.shape[1], n))
         rest = np.hstack([states.T, inputs.T])
-        found, slopes = self.model.native.sample(values, np.hstack([still, rest]), list(range(n)))
-        moving = -_solve(slopes[:, :n], found[:, :n, None])[:, :, 0]
         directions = [*range(n), *range(2 * n, 2 * n + m), *(2 * n + m + k for k in free)]
-        found, slopes = self.model.native.sample(values, np.hstack([moving, rest]), directions)
-        _require_affine(found[:, :n], slopes[:, :n, :n], moving)
+        explicit = _is_explicit(self.model)
+        first = directions if explicit else directions[:n]
+        found, slopes = self.model.native.sample(values, np.hstack([still, rest]), first)
+        moving = -_solve(slopes[:, :n, :n], found[:, :n, None])[:, :, 0]
+        if not explicit:
+            found, slopes = self.model.native.sample(values, np.hstack([moving, rest]), directions)
+            _require_affine(found[:, :n], slopes[:, :n, :n], moving)
         rates = -_solve(slopes[:, :n, :n], slopes[:, :n, n:])
         others = [n + place for place in self.reconstruction.others]
         outputs = slopes[:, others, n:] + slopes[:, others, :n] @ rates
         whole = np.concatenate([rates, outputs], axis=1)
         return _StateValues(np.hstack([moving, found[:, others]]), whole[:, :, :m], whole[:, :, m:])
+
+
+def _is_explicit(model: StateSpaceModel) -> bool:
+    """Whether each equation gives a derivative that stands nowhere else: slopes know no motion."""
+    named = [*model.definitions.values(), *model.measurements.values()]
+    formulas = [*model.equations.values(), *(each.expression for each in named)]
+    derivatives = {f"{state}'" for state in model.states}
+    return set(model.equations) == derivatives and not any("'" in each for each in formulas)
 
 
 def curve(states: Array, place: float) -> Array:
