@@ -337,7 +337,7 @@ def _lost(
     """
     length = models[0].length
     spectra = [model.spectrum() for model in models]
-    weights = [_both(_twice(length) * spectrum / length) for spectrum in spectra]
+    weights = [_both(_twice(length) * each / length) for each in spectra]
     inner = [
         np.sum(
             [_squared(e, w, m.is_white) for e, w, m in zip(parts, weights, models, strict=True)],
@@ -353,8 +353,7 @@ def _lost(
             if model.is_white:
                 lost[o] += _powers(2.0 * spectrum[0] * np.eye(len(part)) - each, part)
                 continue
-            # Noise ends with the record.
-            shaped = part * _both(spectrum)
+            shaped = part * _both(spectrum)  # which ends with the record
             ended = scipy.fft.irfft(shaped.view(np.complex128), length)[:, :n]
             met = np.einsum("kb,kb->b", scipy.fft.rfft(ended, length).view(np.float64), part)
             lost[o] += 2.0 * (met[::2] + met[1::2]) - _powers(each, part)
