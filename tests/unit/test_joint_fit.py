@@ -7,8 +7,12 @@ import pytest
 
 import flightid as fid
 from flightid.errors import DataError, FitError, OptionError
+from flightid.identification.output_error.fit import searched
+from flightid.identification.records.options import RecordOptions
+from flightid.identification.records.setup import prepare_records
 from tests.closeness import assert_close
 from tests.joint_flights import BAND, flight, lag, swept
+from tests.strangers import joint_fits
 
 FAST = {"band_rad_s": BAND, "correct_bias": False}
 
@@ -100,3 +104,50 @@ def test_what_it_refuses() -> None:
         fid.identify(truth, (_given(truth, 0.0), record))
     with pytest.raises(OptionError, match="no such option"):
         fid.identify(truth, (known, record), cost="likelihood")  # type: ignore[call-overload]
+
+
+@pytest.mark.parametrize("name", ["short period, short windows", "accelerometer, short windows"])
+def test_windows_shorter_than_the_motion_settle_at_a_minimum(name: str) -> None:
+    """Rounds of fit and correction cycled here in 60 of 60 and left no intervals."""
+    craft = joint_fits.VEHICLES[name]
+    fit = joint_fits.fly_and_fit(1, name=name)
+    told = fit.provenance["estimator_bias"]
+    assert (told["applied"], told["converged"]) == (True, True)
+    for key, value in craft.truth.items():
+        known = fit.parameters[key]
+        assert abs(known.value - value) < 3.5 * (known.stderr or 0.0)
+
+
+def test_the_fit_is_a_minimum_of_what_the_estimator_makes_of_the_model() -> None:
+    craft = joint_fits.VEHICLES["lightly damped, 25 s"]
+    flown, beside = joint_fits.flights(0, craft)
+    response = joint_fits.response_of(craft, flown)
+    fit = fid.identify(craft.model(), (response, beside))
+    value = fit.parameters["Za"].value
+    for share in (0.98, 1.02):
+        fixed = fit.model.with_fixed(Za=share * value)
+        assert fid.identify(fixed, (response, beside)).objective > fit.objective
+
+
+def test_what_written_residuals_raise_reaches_the_caller() -> None:
+    """And where they have no value the search shortens its steps."""
+    record = flight(lag(), 0)
+    model = lag().with_values({"Lp": -3.0, "Ltphi": 90.0})
+    options = RecordOptions()
+    prepared = prepare_records(model, [record], options)
+    goal = np.array([100.0, -4.0, 0.03])
+
+    def residuals(x: np.ndarray) -> np.ndarray:
+        return 1e6 * (x - goal) if x[0] < 105.0 else np.full(3, np.nan)
+
+    def broken(x: np.ndarray) -> np.ndarray:
+        raise ZeroDivisionError(x.shape)
+
+    def jacobian(x: np.ndarray) -> np.ndarray:
+        return 5e5 * np.eye(len(x))  # steps go twice as far as they should
+
+    fitted = searched(model, prepared, options, written=(residuals, jacobian, 3)).fitted
+    found = [fitted.parameters[name].value for name in ("Ltphi", "Lp", "tau")]
+    assert_close(np.array(found, dtype=float), goal, rtol=1e-6, why="they outweigh the record")
+    with pytest.raises(ZeroDivisionError, match="3"):
+        searched(model, prepared, options, written=(residuals, broken, 3))

@@ -1,5 +1,7 @@
 //! Face of `flightid_core::fits::levenberg_marquardt` for residuals written in Python.
-//! (Python side: identification/regression/rounds.py)
+//! (Python side: identification/regression/rounds.py, identification/joint/estimator_inside.py)
+
+use std::sync::{Arc, Mutex};
 
 use flightid_core::CoreError;
 use flightid_core::fits::least_squares::{Minimum, Options, Problem, Progress};
@@ -36,29 +38,52 @@ pub fn ending<'py>(py: Python<'py>, found: Minimum) -> PyResult<Ending<'py>> {
     ))
 }
 
-struct Callback<'a, 'py> {
-    py: Python<'py>,
-    residuals: &'a Bound<'py, PyAny>,
-    jacobian: &'a Bound<'py, PyAny>,
+/// Residuals, their Jacobian and how many there are, as Python hands them over.
+pub type WrittenResiduals<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, usize);
+
+/// Residuals written in Python, on whatever thread a search runs.
+#[derive(Clone)]
+pub struct Callback {
+    residuals: Arc<Py<PyAny>>,
+    jacobian: Arc<Py<PyAny>>,
     n_parameters: usize,
     n_residuals: usize,
-    raised: Option<PyErr>,
+    raised: Arc<Mutex<Option<PyErr>>>,
 }
 
 const RAISED: CoreError = CoreError::NotFinite { what: "a callback that raised", index: 0 };
 
-impl<'py> Callback<'_, 'py> {
-    fn keep(&mut self, error: PyErr) -> CoreError {
-        self.raised = Some(error);
+impl Callback {
+    /// Of so many variables.
+    pub fn new(
+        (residuals, jacobian, n_residuals): WrittenResiduals<'_>,
+        n_parameters: usize,
+    ) -> Self {
+        let (residuals, jacobian) = (Arc::new(residuals.unbind()), Arc::new(jacobian.unbind()));
+        Self { residuals, jacobian, n_parameters, n_residuals, raised: Arc::default() }
+    }
+
+    /// What the residuals or their Jacobian raised.
+    pub fn raised(&self) -> Option<PyErr> {
+        self.raised.lock().ok().and_then(|mut kept| kept.take())
+    }
+
+    fn keep(&self, error: PyErr) -> CoreError {
+        if let Ok(mut kept) = self.raised.lock() {
+            kept.get_or_insert(error);
+        }
         RAISED
     }
 
     /// A search shortens its steps where a point has no value: what raised is not asked again.
     fn ready(&self) -> Result<(), CoreError> {
-        if self.raised.is_none() { Ok(()) } else { Err(RAISED) }
+        match self.raised.lock() {
+            Ok(kept) if kept.is_none() => Ok(()),
+            _ => Err(RAISED),
+        }
     }
 
-    fn copy(&mut self, call: PyResult<Vec<f64>>, target: &mut [f64]) -> Result<(), CoreError> {
+    fn copy(&self, call: PyResult<Vec<f64>>, target: &mut [f64]) -> Result<(), CoreError> {
         let values = call.map_err(|error| self.keep(error))?;
         if values.len() != target.len() {
             let (found, needed) = (values.len(), target.len());
@@ -70,7 +95,7 @@ impl<'py> Callback<'_, 'py> {
     }
 }
 
-impl Problem for Callback<'_, '_> {
+impl Problem for Callback {
     fn n_parameters(&self) -> usize {
         self.n_parameters
     }
@@ -81,8 +106,8 @@ impl Problem for Callback<'_, '_> {
 
     fn residuals(&mut self, x: &[f64], residuals: &mut [f64]) -> Result<(), CoreError> {
         self.ready()?;
-        let x = PyArray1::from_slice(self.py, x);
-        let call = self.residuals.call1((x,)).and_then(|result| {
+        let call = Python::attach(|py| {
+            let result = self.residuals.bind(py).call1((PyArray1::from_slice(py, x),))?;
             let result: RowMajor1<'_, f64> = result.extract()?;
             Ok(result.to_vec()?)
         });
@@ -91,8 +116,8 @@ impl Problem for Callback<'_, '_> {
 
     fn jacobian(&mut self, x: &[f64], jacobian: &mut [f64]) -> Result<(), CoreError> {
         self.ready()?;
-        let x = PyArray1::from_slice(self.py, x);
-        let call = self.jacobian.call1((x,)).and_then(|result| {
+        let call = Python::attach(|py| {
+            let result = self.jacobian.bind(py).call1((PyArray1::from_slice(py, x),))?;
             let result: RowMajor2<'_, f64> = result.extract()?;
             Ok(result.to_vec()?)
         });
@@ -109,8 +134,8 @@ impl Problem for Callback<'_, '_> {
 #[allow(clippy::too_many_arguments)]
 fn least_squares<'py>(
     py: Python<'py>,
-    residuals: &Bound<'py, PyAny>,
-    jacobian: &Bound<'py, PyAny>,
+    residuals: Bound<'py, PyAny>,
+    jacobian: Bound<'py, PyAny>,
     start: RowMajor1<'_, f64>,
     lower: RowMajor1<'_, f64>,
     upper: RowMajor1<'_, f64>,
@@ -119,8 +144,7 @@ fn least_squares<'py>(
     stop: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Ending<'py>> {
     let start = start.as_slice()?;
-    let (n_parameters, raised) = (start.len(), None);
-    let mut problem = Callback { py, residuals, jacobian, n_parameters, n_residuals, raised };
+    let mut problem = Callback::new((residuals, jacobian, n_residuals), start.len());
     let options = Options { maximum_iterations, ..Options::default() };
     let mut signal = None;
     let ask = |cost: f64| {
@@ -135,7 +159,7 @@ fn least_squares<'py>(
     };
     let (lower, upper) = (lower.as_slice()?, upper.as_slice()?);
     let found = minimise(&mut problem, start, lower, upper, &options, proceed);
-    if let Some(error) = signal.or(problem.raised) {
+    if let Some(error) = signal.or(problem.raised()) {
         return Err(error);
     }
     ending(py, found.map_err(from_core)?)

@@ -15,6 +15,7 @@ use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 
 use crate::error::from_core;
+use crate::fits::least_squares::{Callback, WrittenResiduals};
 use crate::interrupt;
 use crate::row_major::{RowMajor1, RowMajor2};
 
@@ -112,32 +113,52 @@ pub fn record_data(records: &[Flown<'_>], own: Vec<Own<'_>>) -> PyResult<Vec<Rec
 }
 
 /// Fit from each start, or the words of the error that stopped it; with responses beside the records
-/// where there are any.
+/// where there are any, or with residuals written in Python.
 ///
 /// # Errors
-/// Where records and model do not belong together, or the user interrupts.
+/// Where records and model do not belong together, what the residuals raised, or the user interrupts.
 pub fn fit<'py, T: Trajectories>(
     py: Python<'py>,
     trajectories: &T,
     data: &[RecordData],
     noise: NoiseArguments,
     beside: Option<&(impl Problem + Clone + Sync)>,
+    written: Option<WrittenResiduals<'py>>,
     search: SearchArguments<'py>,
 ) -> PyResult<Vec<Bound<'py, PyAny>>> {
-    let (starts, lower, upper, maximum_iterations) = search;
+    let exact = Options {
+        maximum_iterations: search.3,
+        gradient_tolerance: 1e-8,
+        step_tolerance: 1e-10,
+        cost_tolerance: 1e-14,
+    };
+    let Some(written) = written else {
+        return fit_beside(py, trajectories, data, noise, beside, search, &exact);
+    };
+    // Their derivatives are differences: no nearer.
+    let options = Options { gradient_tolerance: 1e-5, cost_tolerance: 1e-9, ..exact };
+    let problem = Callback::new(written, trajectories.n_parameters());
+    let found = fit_beside(py, trajectories, data, noise, Some(&problem), search, &options);
+    problem.raised().map_or(found, Err)
+}
+
+fn fit_beside<'py, T: Trajectories>(
+    py: Python<'py>,
+    trajectories: &T,
+    data: &[RecordData],
+    noise: NoiseArguments,
+    beside: Option<&(impl Problem + Clone + Sync)>,
+    search: SearchArguments<'py>,
+    options: &Options,
+) -> PyResult<Vec<Bound<'py, PyAny>>> {
+    let (starts, lower, upper, _) = search;
     let width = trajectories.n_parameters().max(1);
     let starts: Vec<_> = starts.as_slice()?.chunks_exact(width).map(<[f64]>::to_vec).collect();
     let (lower, upper) = (lower.as_slice()?, upper.as_slice()?);
     let (full, limit, consistency) = noise;
     let noise = Noise { full, limit, consistency };
-    let options = Options {
-        maximum_iterations,
-        gradient_tolerance: 1e-8,
-        step_tolerance: 1e-10,
-        cost_tolerance: 1e-14,
-    };
     let work = |stop: interrupt::Stop<'_>| {
-        fit_from(trajectories, data, &noise, beside, &starts, (lower, upper), &options, stop)
+        fit_from(trajectories, data, &noise, beside, &starts, (lower, upper), options, stop)
     };
     let found = if starts.len() == 1 && data.len() == 1 {
         interrupt::run_here(py, work)?

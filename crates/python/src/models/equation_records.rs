@@ -12,6 +12,7 @@ use pyo3::prelude::*;
 
 use crate::error::from_core;
 use crate::fits::frequency_fit::{Beside, WhitenedResponses};
+use crate::fits::least_squares::WrittenResiduals;
 use crate::fits::output_error::{
     Flown, NoiseArguments, Own, SearchArguments, driven, fit, hold as named, record_data, run,
 };
@@ -76,11 +77,11 @@ impl EquationRecords {
         Ok(Self { model, ode, substeps, plans })
     }
 
-    /// fit_records(self, values: NDArray[np.float64], free: Sequence[int], records: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], float]], own: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int], Sequence[tuple[float, float]]]], hold: str, noise: tuple[bool, float, float], search: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], int], responses: tuple[Sequence[tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.float64], NDArray[np.float64]]], Sequence[tuple[int, int, NDArray[np.float64]]]] | None = ...) -> list[tuple[NDArray[np.float64], float, NDArray[np.float64], list[NDArray[np.float64]], list[list[bool]], int, str] | str]
+    /// fit_records(self, values: NDArray[np.float64], free: Sequence[int], records: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], float]], own: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int], Sequence[tuple[float, float]]]], hold: str, noise: tuple[bool, float, float], search: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], int], responses: tuple[Sequence[tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.float64], NDArray[np.float64]]], Sequence[tuple[int, int, NDArray[np.float64]]]] | None = ..., written: tuple[Callable[[NDArray[np.float64]], NDArray[np.float64]], Callable[[NDArray[np.float64]], NDArray[np.float64]], int] | None = ...) -> list[tuple[NDArray[np.float64], float, NDArray[np.float64], list[NDArray[np.float64]], list[list[bool]], int, str] | str]
     ///
     /// As `StateSpace.fit_records`.
     #[allow(clippy::too_many_arguments)]
-    #[pyo3(signature = (values, free, records, own, hold, noise, search, responses = None))]
+    #[pyo3(signature = (values, free, records, own, hold, noise, search, responses = None, written = None))]
     fn fit_records<'py>(
         &self,
         py: Python<'py>,
@@ -92,12 +93,13 @@ impl EquationRecords {
         noise: NoiseArguments,
         search: SearchArguments<'py>,
         responses: Option<WhitenedResponses<'py>>,
+        written: Option<WrittenResiduals<'py>>,
     ) -> PyResult<Vec<Bound<'py, PyAny>>> {
         let places = 0..records.len();
         let model = self.on(places, values.as_slice()?, &free, &records, hold)?;
         let beside = responses.map(Beside::new).transpose()?;
         let beside = self.model.get().on(beside.as_ref(), values.as_slice()?, &free)?;
-        fit(py, &model, &record_data(&records, own)?, noise, beside.as_ref(), search)
+        fit(py, &model, &record_data(&records, own)?, noise, beside.as_ref(), written, search)
     }
 
     /// run_record(self, place: int, values: NDArray[np.float64], free: Sequence[int], record: tuple[NDArray[np.float64], NDArray[np.float64], float], own: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int], Sequence[tuple[float, float]]], hold: str, with_slopes: bool) -> tuple[NDArray[np.float64], NDArray[np.float64]]

@@ -16,6 +16,7 @@ use crate::error::from_core;
 use crate::fits::frequency_fit::{
     Beside, Response, Run, Search, WhitenedResponses, log_gradients, measured, responses, search,
 };
+use crate::fits::least_squares::WrittenResiduals;
 use crate::fits::output_error::{
     self, Flown, NoiseArguments, Own, SearchArguments, linear, record_data,
 };
@@ -120,16 +121,16 @@ impl TransferFunctions {
         search(py, model, &measured(data)?, whitening, &wanted)
     }
 
-    /// fit_records(self, values: NDArray[np.float64], free: Sequence[int], records: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], float]], own: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int], Sequence[tuple[float, float]]]], hold: str, noise: tuple[bool, float, float], search: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], int], responses: tuple[Sequence[tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.float64], NDArray[np.float64]]], Sequence[tuple[int, int, NDArray[np.float64]]]] | None = ...) -> list[tuple[NDArray[np.float64], float, NDArray[np.float64], list[NDArray[np.float64]], list[list[bool]], int, str] | str]
+    /// fit_records(self, values: NDArray[np.float64], free: Sequence[int], records: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], float]], own: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int], Sequence[tuple[float, float]]]], hold: str, noise: tuple[bool, float, float], search: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], int], responses: tuple[Sequence[tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.float64], NDArray[np.float64]]], Sequence[tuple[int, int, NDArray[np.float64]]]] | None = ..., written: tuple[Callable[[NDArray[np.float64]], NDArray[np.float64]], Callable[[NDArray[np.float64]], NDArray[np.float64]], int] | None = ...) -> list[tuple[NDArray[np.float64], float, NDArray[np.float64], list[NDArray[np.float64]], list[list[bool]], int, str] | str]
     ///
     /// Output error from each start (θ, objective, noise covariance, each record's own numbers and
     /// whether they are determined, iterations, termination), or the words of the error that stopped
     /// it. A record is (inputs, outputs, sample time); its own numbers are (initial state, input
     /// shifts, output biases, free entries of each); noise is (full, limit of the loss, consistency);
     /// a search is (starts, lower, upper, most steps). Responses (data, whitening runs) add the sum of
-    /// their whitened squares.
+    /// their whitened squares; so do residuals written in Python (residuals, Jacobian, how many).
     #[allow(clippy::too_many_arguments)]
-    #[pyo3(signature = (values, free, records, own, hold, noise, search, responses = None))]
+    #[pyo3(signature = (values, free, records, own, hold, noise, search, responses = None, written = None))]
     fn fit_records<'py>(
         &self,
         py: Python<'py>,
@@ -141,6 +142,7 @@ impl TransferFunctions {
         noise: NoiseArguments,
         search: SearchArguments<'py>,
         responses: Option<WhitenedResponses<'py>>,
+        written: Option<WrittenResiduals<'py>>,
     ) -> PyResult<Vec<Bound<'py, PyAny>>> {
         let family = TransferFamily::new(&self.functions, &self.pairs, values.as_slice()?, &free);
         let trajectories = linear(family, &records, hold)?;
@@ -149,7 +151,7 @@ impl TransferFunctions {
         let model = model.map_err(from_core)?;
         let beside = beside.as_ref().map(|data| data.fit(model)).transpose()?;
         let data = record_data(&records, own)?;
-        output_error::fit(py, &trajectories, &data, noise, beside.as_ref(), search)
+        output_error::fit(py, &trajectories, &data, noise, beside.as_ref(), written, search)
     }
 
     /// run_record(self, values: NDArray[np.float64], free: Sequence[int], record: tuple[NDArray[np.float64], NDArray[np.float64], float], own: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int], Sequence[tuple[float, float]]], hold: str, with_slopes: bool) -> tuple[NDArray[np.float64], NDArray[np.float64]]

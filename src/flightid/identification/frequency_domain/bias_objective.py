@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,8 @@ from flightid.uncertainty.response_errors import DECIBEL, DEGREE
 
 Array = NDArray[np.float64]
 Curves = list[NDArray[np.complex128]]
+Whitening = list[tuple[int, int, Array]]
+"""First response, number and matrix of each run, as `whitening` gives them."""
 
 
 @dataclass(frozen=True)
@@ -70,33 +73,18 @@ class Objective:
         grids = [each.omega_rad_s for each in self.selected]
         return [slope.T for slope in slopes_of(self.at(x), grids)]
 
-    def following(self) -> Array:
-        """Derivatives of corrected points by the free parameters, at the model as it stands.
-
-        Of each run of the errors all real parts, then all imaginary ones, shape (n_points, n_free).
-        """
-        x = np.array([parameter.value or 0.0 for parameter in self.model.parameters.free])
-        moved = [
-            own - whole for own, whole in zip(self.model_slopes(x), self.slopes(x), strict=True)
-        ]
-        parts = []
-        for run in self.errors.runs:
-            joined = np.concatenate(moved[run.first : run.first + run.count], axis=1)
-            parts += [joined.real, joined.imag]
-        return np.concatenate(parts, axis=1).T
-
     def residuals(self, estimates: Curves) -> Array:
         """Weighted decibels and degrees, or whitened errors."""
         if self.cost == "likelihood":
             errors = [q - each.response for q, each in zip(estimates, self.selected, strict=True)]
-            return self._whitened(errors)
+            return whitened(errors, self._matrices)
         logs = [np.log(q / each.response) for q, each in zip(estimates, self.selected, strict=True)]
         return self._weighted(logs)
 
     def jacobian(self, estimates: Curves, slopes: Curves) -> Array:
         """Derivatives of the residuals, shape (n_residuals, n_free)."""
         if self.cost == "likelihood":
-            return self._whitened(slopes).T
+            return whitened(slopes, self._matrices).T
         logs = [slope / q for q, slope in zip(estimates, slopes, strict=True)]
         return self._weighted(logs).T
 
@@ -110,12 +98,9 @@ class Objective:
             parts.append(both)
         return np.concatenate(parts, axis=-1)
 
-    def _whitened(self, errors: Curves) -> Array:
-        parts = []
-        for first, count, matrix in whitening(self.errors):
-            run = np.concatenate(errors[first : first + count], axis=-1)
-            parts.append(np.concatenate([run.real, run.imag], axis=-1) @ matrix.T)
-        return np.concatenate(parts, axis=-1)
+    @cached_property
+    def _matrices(self) -> Whitening:
+        return whitening(self.errors)
 
     @property
     def _frequencies(self) -> NDArray[np.intp]:
@@ -133,3 +118,12 @@ class Objective:
             ]
             for each in self.selected
         ]
+
+
+def whitened(curves: Curves, matrices: Whitening) -> Array:
+    """Complex values by response as residuals of unit variance, along the last axis."""
+    parts = []
+    for first, count, matrix in matrices:
+        run = np.concatenate(curves[first : first + count], axis=-1)
+        parts.append(np.concatenate([run.real, run.imag], axis=-1) @ matrix.T)
+    return np.concatenate(parts, axis=-1)

@@ -56,8 +56,19 @@ class SearchOutcome:
 
 
 @dataclass
-class _SearchPoint:
-    """A point of the search."""
+class SearchPoint:
+    """A point of the search.
+
+    Attributes
+    ----------
+    x : ndarray
+        Values of the free parameters.
+    estimates : list of ndarray
+        What the estimator makes of the model there, by response.
+    residuals : ndarray
+    cost : float
+        Their sum of squares.
+    """
 
     x: Array
     estimates: Curves
@@ -65,8 +76,8 @@ class _SearchPoint:
     cost: float
 
     @classmethod
-    def of(cls, objective: Objective, x: Array) -> _SearchPoint | None:
-        """None where the model cannot be followed over the records."""
+    def of(cls, objective: Objective, x: Array) -> SearchPoint | None:
+        """At these values; None where the model cannot be followed over the records."""
         try:
             estimates = objective.estimates(x)
         except OUTSIDE:
@@ -93,7 +104,7 @@ def search(objective: Objective, start: Array) -> SearchOutcome:
     ---------
     Madsen, Nielsen & Tingleff, *Methods for Non-linear Least Squares Problems* (2004), §3.2.
     """
-    here = _SearchPoint.of(objective, start)
+    here = SearchPoint.of(objective, start)
     if here is None:
         objective.estimates(start)  # says why, if it is a simulation that cannot be
         raise FitError(
@@ -110,13 +121,13 @@ def search(objective: Objective, start: Array) -> SearchOutcome:
     damping, step, away = 0.0, np.inf, np.inf
     jacobian = np.zeros((0, len(start)))
     for count in range(MOST_STEPS):
-        jacobian = _jacobian(objective, here, extra)
+        jacobian = jacobian_at(objective, here, extra)
         whole = _step(jacobian, here, bounds, 0.0)
         step = _size(jacobian, whole, here)
         small = np.all(np.abs(whole) <= ROUNDING * np.maximum(np.abs(here.x), 1e-300))
         if step <= ENOUGH or small:
             if away > NEARBY:
-                extra, away = _extra(objective, here.x), 0.0
+                extra, away = added_slopes(objective, here.x), 0.0
                 continue
             step = step if step <= ENOUGH else 0.0
             beyond = None if bounds is limits else _beyond(objective, here, bounds, limits)
@@ -127,13 +138,13 @@ def search(objective: Objective, start: Array) -> SearchOutcome:
             here, bounds, away = beyond, limits, np.inf
             continue
         tried = _step(jacobian, here, bounds, damping) if damping else whole
-        there = _SearchPoint.of(objective, np.clip(here.x + tried, *bounds))
+        there = SearchPoint.of(objective, np.clip(here.x + tried, *bounds))
         if there is None or there.cost >= here.cost:
             cell = objective.correction.cell(objective.at(here.x)) if bounds is limits else None
             if cell is not None:
                 bounds = np.maximum(cell[0], limits[0]), np.minimum(cell[1], limits[1])
             elif away > 0.0:
-                extra, away = _extra(objective, here.x), 0.0
+                extra, away = added_slopes(objective, here.x), 0.0
             else:
                 damping = max(10.0 * damping, 1e-3)
                 if damping > LARGEST_DAMPING:
@@ -141,12 +152,12 @@ def search(objective: Objective, start: Array) -> SearchOutcome:
             continue
         effect = jacobian @ (there.x - here.x)
         missed = np.linalg.norm(there.residuals - here.residuals - effect)
-        extra = _learned(objective, extra, here, there, np.linalg.norm(jacobian, axis=0))
+        extra = learned_slopes(objective, extra, here, there, np.linalg.norm(jacobian, axis=0))
         away += _size(jacobian, there.x - here.x, there)
         here = _along(objective, here, there, jacobian, bounds)
         damping = 0.0 if damping <= 1e-3 else 0.1 * damping
         if missed > CURVED * np.linalg.norm(effect):
-            extra, away = _extra(objective, here.x), 0.0
+            extra, away = added_slopes(objective, here.x), 0.0
     reason = f"the search stopped {step:.2g} of the residuals' scatter away from a minimum"
     return SearchOutcome(
         _end(here, jacobian, MOST_STEPS, "stalled"), here.estimates, step, begun, reason
@@ -155,11 +166,11 @@ def search(objective: Objective, start: Array) -> SearchOutcome:
 
 def _along(
     objective: Objective,
-    here: _SearchPoint,
-    there: _SearchPoint,
+    here: SearchPoint,
+    there: SearchPoint,
     jacobian: Array,
     bounds: tuple[Array, Array],
-) -> _SearchPoint:
+) -> SearchPoint:
     """The better of a step and its stretch to the lowest point of the parabola along it.
 
     Where residuals curve, steps overshoot or fall short by the same share again and again.
@@ -172,39 +183,40 @@ def _along(
     share = min(max(-0.5 * slope / bend, 1.0 / STRETCH), STRETCH)
     if abs(share - 1.0) < NEAR:
         return there
-    better = _SearchPoint.of(objective, np.clip(here.x + share * way, *bounds))
+    better = SearchPoint.of(objective, np.clip(here.x + share * way, *bounds))
     return there if better is None or better.cost >= there.cost else better
 
 
 def _beyond(
     objective: Objective,
-    here: _SearchPoint,
+    here: SearchPoint,
     bounds: tuple[Array, Array],
     limits: tuple[Array, Array],
-) -> _SearchPoint | None:
+) -> SearchPoint | None:
     """A lower cost just across a jump at which the search stands."""
     best = None
     for edge, limit, way in zip(bounds, limits, (-1.0, 1.0), strict=True):
         for place in np.flatnonzero((here.x == edge) & (edge != limit)):
             x = here.x.copy()
             x[place] += way * ACROSS * (bounds[1][place] - bounds[0][place])
-            there = _SearchPoint.of(objective, np.clip(x, *limits))
+            there = SearchPoint.of(objective, np.clip(x, *limits))
             if there is not None and there.cost < (best or here).cost:
                 best = there
     return best
 
 
-def _end(place: _SearchPoint, jacobian: Array, count: int, termination: str) -> DenseEnd:
+def _end(place: SearchPoint, jacobian: Array, count: int, termination: str) -> DenseEnd:
     return DenseEnd(place.x, place.cost, count, termination, place.residuals, jacobian)
 
 
-def _extra(objective: Objective, x: Array) -> Curves:
+def added_slopes(objective: Objective, x: Array) -> Curves:
+    """What the estimator adds to the model's own slopes, by response, shape (n_free, n) each."""
     both = zip(objective.slopes(x), objective.model_slopes(x), strict=True)
     return [whole - own for whole, own in both]
 
 
-def _learned(
-    objective: Objective, extra: Curves, here: _SearchPoint, there: _SearchPoint, scale: Array
+def learned_slopes(
+    objective: Objective, extra: Curves, here: SearchPoint, there: SearchPoint, scale: Array
 ) -> Curves:
     """The slopes that the estimator adds, made to give what the last step did.
 
@@ -227,7 +239,14 @@ def _learned(
     return found
 
 
-def _jacobian(objective: Objective, here: _SearchPoint, extra: Curves) -> Array:
+def jacobian_at(objective: Objective, here: SearchPoint, extra: Curves) -> Array:
+    """Derivatives of the residuals, from the model's own slopes and what the estimator adds.
+
+    Raises
+    ------
+    FitError
+        They are not finite.
+    """
     own = objective.model_slopes(here.x)
     slopes = [a + b for a, b in zip(own, extra, strict=True)]
     found = objective.jacobian(here.estimates, slopes)
@@ -240,15 +259,13 @@ def _jacobian(objective: Objective, here: _SearchPoint, extra: Curves) -> Array:
     return found
 
 
-def _size(jacobian: Array, step: Array, place: _SearchPoint) -> float:
+def _size(jacobian: Array, step: Array, place: SearchPoint) -> float:
     """Effect of a step on the residuals, a parameter, over their scatter."""
     scatter = np.sqrt(place.cost / len(place.residuals) * len(step))
     return float(np.linalg.norm(jacobian @ step) / max(scatter, 1e-300))
 
 
-def _step(
-    jacobian: Array, here: _SearchPoint, bounds: tuple[Array, Array], damping: float
-) -> Array:
+def _step(jacobian: Array, here: SearchPoint, bounds: tuple[Array, Array], damping: float) -> Array:
     """Damped Gauss–Newton step; parameters at a bound that they press against stay there."""
     gradient = jacobian.T @ here.residuals
     low, high = bounds

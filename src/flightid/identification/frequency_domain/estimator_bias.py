@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.errors import DataError, ModelError, SingularError
+from flightid.errors import DataError, ModelError, OptionError, SingularError
 from flightid.identification.frequency_domain.model_residuals import ModelResiduals
 from flightid.models import GreyBoxModel, Parameter
 from flightid.responses import FrequencyResponse
@@ -29,8 +29,8 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Places = NDArray[np.intp]
 
-OUTSIDE = (DataError, ModelError, SingularError)
-"""Ends of models that cannot be followed over the records."""
+OUTSIDE = (DataError, ModelError, OptionError, SingularError)
+"""Ends of models that cannot be followed over the records, delays without bounds among them."""
 DIFFERENCE = 1e-5
 """Relative change of a parameter for derivatives of modelled outputs."""
 WHOLE = 1e-9

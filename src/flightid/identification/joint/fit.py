@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.errors import DataError, FlightidError
+from flightid.errors import DataError, FitError, FlightidError
 from flightid.identification.fit import Fit
 from flightid.identification.fit_findings import (
     NoiseCost,
@@ -22,11 +22,18 @@ from flightid.identification.fit_findings import (
     rivals,
     why_misfit,
 )
-from flightid.identification.frequency_domain.bias_findings import BiasOutcome, sizes
-from flightid.identification.frequency_domain.bias_objective import Objective
-from flightid.identification.frequency_domain.bias_rounds import iterate
+from flightid.identification.frequency_domain.bias_findings import (
+    TOLERABLE,
+    BiasOutcome,
+    sizes,
+)
+from flightid.identification.frequency_domain.bias_objective import Curves, Objective, whitened
 from flightid.identification.frequency_domain.error_model import ErrorModel, error_model, whitening
-from flightid.identification.frequency_domain.estimator_bias import Correction
+from flightid.identification.frequency_domain.estimator_bias import (
+    OUTSIDE,
+    Correction,
+    why_unknown,
+)
 from flightid.identification.frequency_domain.feedback_findings import (
     LOOP_BIAS,
     bias_of_points,
@@ -43,12 +50,14 @@ from flightid.identification.frequency_domain.noise_cost import noise_costs
 from flightid.identification.frequency_domain.opened import opened
 from flightid.identification.frequency_domain.options import FrequencyDomainOptions
 from flightid.identification.frequency_domain.selection import SelectedResponse
+from flightid.identification.frequency_domain.without_bias import CHANCE, MISFIT, NOISE
+from flightid.identification.joint.estimator_inside import InsideEnd, again, search_inside
 from flightid.identification.joint.independence import judge_independence
 from flightid.identification.joint.options import JointOptions
 from flightid.identification.multistart import cluster
+from flightid.identification.output_error.beside import WhitenedResponses
 from flightid.identification.output_error.fit import (
     SearchEnd,
-    WhitenedResponses,
     conclude,
     searched,
 )
@@ -82,20 +91,16 @@ class ChosenPoints:
         ]
         return data, whitening(self.errors)
 
-    def beside(self, fitted: GreyBoxModel, following: Array | None = None) -> JointResiduals:
-        """Derivatives of the whitened errors, of data at rest and of data that follow the model.
+    def beside(self, fitted: GreyBoxModel, extra: Curves | None = None) -> JointResiduals:
+        """Derivatives of the whitened errors, by which the fit is a minimum.
 
-        `following` are the derivatives of the points by the free parameters, run after run.
+        `extra` is what the estimator adds to the model's slopes, (n_free, n) by response.
         """
-        slopes = self._slopes(fitted)
-        if following is None:
-            return JointResiduals(slopes, slopes)
-        matrices = [matrix for _, _, matrix in whitening(self.errors)]
-        ends = np.cumsum([matrix.shape[1] for matrix in matrices])[:-1]
-        moved = [
-            matrix @ part for matrix, part in zip(matrices, np.split(following, ends), strict=True)
-        ]
-        return JointResiduals(slopes, slopes - np.vstack(moved))
+        slopes = [slope.T for slope in slopes_of(fitted, [e.omega_rad_s for e in self.selected])]
+        if extra is not None:
+            slopes = [own + more for own, more in zip(slopes, extra, strict=True)]
+        rows = whitened(slopes, whitening(self.errors)).T
+        return JointResiduals(rows, rows)
 
     def whitened_bias(
         self, fitted: GreyBoxModel, response: FrequencyResponse, hold: str
@@ -108,14 +113,6 @@ class ChosenPoints:
         ends = np.cumsum([matrix.shape[1] for matrix in matrices])[:-1]
         parts = zip(matrices, np.split(known, ends), strict=True)
         return np.concatenate([matrix @ part for matrix, part in parts])
-
-    def _slopes(self, fitted: GreyBoxModel) -> Array:
-        by_response = slopes_of(fitted, [each.omega_rad_s for each in self.selected])
-        rows = []
-        for first, count, matrix in whitening(self.errors):
-            run = np.concatenate(by_response[first : first + count])
-            rows.append(matrix @ np.concatenate([run.real, run.imag]))
-        return np.vstack(rows)
 
 
 def fit_jointly(model: GreyBoxModel, data: Sequence[object], options: JointOptions) -> Fit:
@@ -139,7 +136,7 @@ def fit_jointly(model: GreyBoxModel, data: Sequence[object], options: JointOptio
     if options.correct_bias:
         made = _without_bias(found, prepared, response, points, options)
         setup += made.outcome.findings()
-    beside = made.points.beside(made.found.fitted, made.following)
+    beside = made.points.beside(made.found.fitted, made.extra)
     bias = made.points.whitened_bias(made.found.fitted, response, options.hold)
     beside = replace(beside, bias=bias)
     fit = conclude(made.found, options, setup, beside)
@@ -180,7 +177,7 @@ class _UnbiasedSearch:
 
     found: SearchEnd
     points: ChosenPoints
-    following: Array | None
+    extra: Curves | None
     outcome: BiasOutcome
 
 
@@ -219,32 +216,64 @@ def _corrected(
     points: ChosenPoints,
     options: JointOptions,
 ) -> _UnbiasedSearch:
-    """Take the estimator's bias out of the response, and fit again, until nothing moves."""
+    """Search from an end with the estimator inside, by the errors that are left at the last."""
     once = replace(options, starts=1)
-
-    def corrected_points(corrected: FrequencyResponse) -> ChosenPoints:
-        # The errors stay those of the response as it was measured.
-        return ChosenPoints(select_by(prepared.model, corrected, once.of_responses), points.errors)
-
-    def refit(model: GreyBoxModel, corrected: FrequencyResponse) -> GreyBoxModel:
-        return searched(model, prepared, once, corrected_points(corrected).native).fitted
-
-    first = conclude(found, options, (), points.beside(found.fitted))
-    scales = {p.name: p.stderr for p in first.parameters.values() if p.stderr}
     without = Correction(response, options.hold)
-    done = iterate(found.fitted, without, scales, refit)
-    if not done.outcome.applied:
-        return _UnbiasedSearch(found, points, None, done.outcome)
-    after = corrected_points(done.data)
-    known = without.errors(done.model)
-    if known is not None:
-        errors = error_model(replace(done.data, errors=known), after.selected)
-        after = replace(after, errors=errors)
-    # The last search weighs the points by the errors that the intervals are computed from.
-    last = searched(done.model, prepared, once, after.native)
-    objective = Objective(last.fitted, without, after.selected, after.errors, "likelihood")
-    moved = sizes(points.selected, after.selected, after.errors)
-    return _UnbiasedSearch(last, after, objective.following(), replace(done.outcome, sizes=moved))
+    objective = Objective(found.fitted, without, points.selected, points.errors, "likelihood")
+
+    def not_done(reason: str, *, possible: bool = True) -> _UnbiasedSearch:
+        return _UnbiasedSearch(found, points, None, BiasOutcome(reason, possible))
+
+    reason = why_unknown(response)
+    if reason:
+        return not_done(reason, possible=False)
+    try:
+        end = _best_end(found.fitted, prepared, once, objective)
+        reason = _why_worse(found, end, objective) or ("" if end.step <= TOLERABLE else end.reason)
+        if reason:
+            return not_done(reason)
+        known = without.errors(end.found.fitted)
+        if known is not None:
+            errors = error_model(replace(response, errors=known), points.selected)
+            objective = replace(objective, errors=errors)
+            # The last search weighs the points by the errors that the intervals are computed from.
+            end = again(end, prepared, once, objective)
+        fitted = end.found.fitted
+        after = select_by(fitted, without.apply(fitted), once.of_responses)
+    except (FitError, *OUTSIDE) as error:
+        return not_done(str(error))
+    moved = sizes(points.selected, after, objective.errors)
+    outcome = BiasOutcome("", steps=end.steps, last=end.step, sizes=moved)
+    return _UnbiasedSearch(end.found, ChosenPoints(after, objective.errors), end.extra, outcome)
+
+
+def _best_end(
+    fitted: GreyBoxModel, prepared: RecordSet, options: JointOptions, objective: Objective
+) -> InsideEnd:
+    """From the fit without correction and, where that ends badly, from the model's own values."""
+    first = search_inside(fitted, prepared, options, objective)
+    if first.step <= TOLERABLE and first.misfit <= MISFIT:
+        return first
+    with suppress(FitError, *OUTSIDE):
+        own = search_inside(prepared.model, prepared, options, objective)
+        if (own.step > TOLERABLE, own.cost) < (first.step > TOLERABLE, first.cost):
+            return own
+    return first
+
+
+def _why_worse(found: SearchEnd, end: InsideEnd, objective: Objective) -> str:
+    """Why an end with the estimator inside is none; empty where it costs no more than without."""
+    plain = curves_of(found.fitted, [each.omega_rad_s for each in objective.selected])
+    residuals = objective.residuals(plain)
+    before = float(residuals @ residuals)
+    rise = 2.0 * (end.cost - found.groups[0][0].cost)
+    chance = end.misfit <= CHANCE and objective.correction.data.errors is None
+    if rise <= (NOISE - 1.0) * before or chance:
+        return ""
+    return (
+        f"it would raise the cost of the response from {before:.3g} by {rise:.3g}: the model does "
+        "not hold what the records do, or the search met a wrong minimum"
+    )
 
 
 def _with_responses(

@@ -24,6 +24,7 @@ from flightid.identification.fit_findings import (
 from flightid.identification.fitted_record import FittedRecord
 from flightid.identification.frequency_domain.feedback_findings import judge_feedback
 from flightid.identification.multistart import End, cluster, collect, draw_starts, local_minima
+from flightid.identification.output_error.beside import WhitenedResponses, WrittenResiduals
 from flightid.identification.output_error.distinct import require_distinct, run_with_slopes
 from flightid.identification.output_error.equation_records import (
     EquationRuns,
@@ -59,10 +60,6 @@ _NEAR = 0.5 * np.log(1.1)
 """Log-likelihood of a sample whose residual variance is ten percent larger."""
 ROUNDS = 3
 """Most searches with a new choice of the modes that are set at the end of a record."""
-WhitenedResponses = tuple[
-    Sequence[tuple[Array, NDArray[np.complex128], Array, Array]], Sequence[tuple[int, int, Array]]
-]
-"""Frequencies, response and two weights, not used, of each; first response, number and matrix."""
 NativeEnd = tuple[Array, float, Array, list[Array], list[list[bool]], int, str]
 
 
@@ -198,6 +195,8 @@ def searched(
     prepared: RecordSet,
     options: RecordOptions,
     responses: WhitenedResponses | None = None,
+    written: WrittenResiduals | None = None,
+    bounds: tuple[Array, Array] | None = None,
 ) -> SearchEnd:
     """Search, again where the estimates have other growing modes than their start.
 
@@ -208,6 +207,10 @@ def searched(
     options : RecordOptions
     responses : WhitenedResponses, optional
         Fitted together with the records.
+    written : WrittenResiduals, optional
+        The same, of other data.
+    bounds : tuple of ndarray, optional
+        Of the free parameters, lower and upper; default: the model's.
 
     Raises
     ------
@@ -219,9 +222,9 @@ def searched(
         runs_of = equation_runs(model, prepared)
         placed = prepared if runs_of is None else segmented_starts(prepared, runs_of)
         placed = replace(placed, model=model)
-        if turn == 0 and responses is None:
+        if turn == 0 and responses is None and written is None:
             require_distinct(model, placed, runs_of)
-        groups = cluster(search_records(placed, starts, runs_of, responses))
+        groups = cluster(search_records(placed, starts, runs_of, responses, written, bounds))
         fitted = _with_estimates(model, groups[0][0])
         after = equation_runs(fitted, prepared)
         if _growing(after) == _growing(runs_of):
@@ -263,11 +266,16 @@ def search_records(
     options: RecordOptions,
     runs_of: EquationRuns | None = None,
     responses: WhitenedResponses | None = None,
+    written: WrittenResiduals | None = None,
+    bounds: tuple[Array, Array] | None = None,
 ) -> list[RecordEnd]:
     """Ends of all starts, best first; no statistics."""
     model = prepared.model
     free = model.parameters.free
     native = model.native if runs_of is None else runs_of.native
+    if bounds is None:
+        bounds = np.array([p.minimum for p in free]), np.array([p.maximum for p in free])
+    beside = (responses,) if written is None else (responses, written)
     found = native.fit_records(
         model.parameters.independent_values(),
         model.parameters.free_indices,
@@ -275,13 +283,8 @@ def search_records(
         [numbers.native for numbers in prepared.own],
         prepared.hold,
         (options.noise_covariance == "full", options.limit, options.consistency),
-        (
-            draw_starts(free, options.starts, options.seed),
-            np.array([parameter.minimum for parameter in free]),
-            np.array([parameter.maximum for parameter in free]),
-            options.maximum_iterations,
-        ),
-        responses,
+        (draw_starts(free, options.starts, options.seed), *bounds, options.maximum_iterations),
+        *beside,
     )
     return collect([each if isinstance(each, str) else RecordEnd.of_native(each) for each in found])
 
