@@ -12,6 +12,8 @@ from flightid.identification.hold_likelihood import HeldOutputs, held_outputs
 from flightid.identification.hold_test import judged
 from flightid.identification.rival_holds import OtherHold
 from flightid.models import load_model
+from flightid.record import Step
+from flightid.record.history import FLOWN, FROM_LOG
 from tests.closeness import assert_close
 from tests.strangers import holds
 
@@ -64,6 +66,23 @@ def test_bars_of_smooth_samples_told_as_steps_reach_the_rival() -> None:
     assert low < holds.TRUTH["tau"] < high
     assert OtherHold("zero", "tau", 9.0, -2.0, expected=1.0).is_ruled_out
     assert not OtherHold("zero", "tau", 9.0, -1.5, expected=1.0).is_ruled_out
+
+
+def test_bars_of_smooth_samples_told_as_lines_reach_steps_but_not_those_of_an_autopilot(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(holds, "NOISE", 0.1)
+    spans = []
+    for done in (None, Step(FLOWN), Step(FROM_LOG)):
+        record = holds.flight(0, "smooth steps", told="first").replace(step=done)
+        spans.append(fid.identify(holds.model(), record).parameters["tau"].interval95)
+    (low, high), *words = spans
+    assert low < holds.TRUTH["tau"] < high
+    assert all(beyond > holds.TRUTH["tau"] for beyond, _ in words)
+    # Lines told as lines, which the data bear out.
+    sure = fid.identify(holds.model(), holds.flight(0, "smooth lines", told="first"))
+    assert str(sure.evidence.light) == "green"
+    assert (sure.parameters["tau"].stderr or 1.0) < 1.5e-3
 
 
 @pytest.mark.parametrize(

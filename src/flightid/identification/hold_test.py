@@ -21,6 +21,7 @@ from flightid.identification.fit import Fit
 from flightid.identification.methods import Method
 from flightid.identification.rival_holds import DECISIVE, DOUBTFUL, OtherHold, Rivals
 from flightid.record.chosen_hold import ASSUMED, DECLARED, RECORDED, ChosenHold
+from flightid.record.history import FLOWN
 from flightid.record.hold import BETWEEN, HOLDS, InputHold, Loop
 from flightid.record.repeats import found_staircase, is_rough
 
@@ -100,7 +101,7 @@ def _told(fit: Fit, held: ChosenHold, rivals: Rivals) -> tuple[Fit, ChosenHold]:
         return fit, held
     if finding.light is not Light.GREEN:
         fit = _widened(fit, rivals.as_fitted(known))
-    elif held.hold == "zero" and _are_smooth(rivals) and not known[0].is_ruled_out:
+    elif _may_be_either(held.hold, rivals) and not known[0].is_ruled_out:
         fit = _widened(fit, rivals.as_fitted(known))
         finding = replace(finding, message=f"{finding.message}, which the intervals reach")
     return fit, replace(held, findings=(*held.findings, finding))
@@ -137,11 +138,16 @@ def _steps_told_otherwise(steps: OtherHold, rivals: Rivals, whose: str) -> Findi
     return None
 
 
-def _are_smooth(rivals: Rivals) -> bool:
-    """Whether no input told as steps looks like a device's; none of a log, which is its loop's."""
+def _may_be_either(told: InputHold, rivals: Rivals) -> bool:
+    """Whether samples bear no witness to the steps, or lines, that they were told as.
+
+    Smooth ones do not. Of a log they are its loop's, and so are rows of a simulated autopilot,
+    which between them are nearly lines.
+    """
+    if told == "band_limited" or rivals.logged or (told == "first" and rivals.made_by(FLOWN)):
+        return False
     samples = [record[name] for record in rivals.records for name in rivals.fit.model.inputs]
-    stairs = any(found_staircase(each) is not None or is_rough(each) for each in samples)
-    return not (rivals.logged or stairs)
+    return not any(found_staircase(each) is not None or is_rough(each) for each in samples)
 
 
 def _asked(fit: Fit, held: ChosenHold, rivals: Rivals) -> tuple[Fit, ChosenHold]:

@@ -9,6 +9,8 @@ from flightid.table import Cell
 
 FROM_LOG = "Log.record"
 """Operation that heads the history of a log's record."""
+FLOWN = "simulation.fly"
+"""The same of a simulated flight's record, whose rows are those of its log."""
 NEW_BASES = ("conditioning.to_uniform", "conditioning.resample")
 SPREADS = ("low-pass", "band-limited", JITTERED := "previous value of stamps that jitter")
 """What these do to a channel that puts what is later into a sample."""

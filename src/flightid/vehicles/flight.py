@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from flightid import _native
 from flightid.errors import OptionError, UnknownNameError
 from flightid.record import Record, Step
+from flightid.record.history import FLOWN
 from flightid.result import Result
 from flightid.table import Column, Table
 from flightid.vehicles.autopilot import Autopilot, PilotDoublet, SidActivation
@@ -132,7 +133,7 @@ class Flight(Result, schema="flightid.flight/1", untold={"rows": "time histories
             excitations={"excitation": self["sid_applied"][part]},
             units=_UNITS,
             name=f"flight, seed {self.seed}",
-            history=[Step("simulation.fly", {"seed": self.seed, "gyro": gyro})],
+            history=[Step(FLOWN, {"seed": self.seed, "gyro": gyro})],
         )
 
     def run_record(self, axis: AxisName, *, gyro: Gyro = "filtered") -> Record:
