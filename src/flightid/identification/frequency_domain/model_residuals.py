@@ -271,6 +271,8 @@ class ModelResiduals:
         step = self.linear.sample_time_s
         motions, free = [], []
         for each in systems_of(model):
+            if np.max(each.delays_s, initial=0.0) > n * step:
+                raise self._diverges(kept, "a delay longer than the record")
             modes = split_modes(each, n * step)
             inputs = self._columns(each.inputs)
             rows = [k for k in kept if self.outputs[k] in each.outputs]
