@@ -16,6 +16,7 @@ from flightid.errors import FlightidError, StudyError
 from flightid.fleet.settings import FleetSettings, VehicleRules, instant_of
 from flightid.logs import Log
 from flightid.reading import DOCUMENT_BYTES
+from flightid.units import DIMENSIONLESS, convert
 
 BOARD = re.compile(r"\b([0-9A-F]{8} [0-9A-F]{8} [0-9A-F]{8})$")
 """The unique number of the processor, as ArduPilot writes it at the start of a log."""
@@ -212,8 +213,11 @@ def _fix(log: Log) -> tuple[float, datetime.datetime | None]:
     if "GPS" in log and {"GWk", "GMS"} <= set(log.messages["GPS"].fields):
         table = log.table("GPS")
         row = int(np.argmax(table["GWk"] > 0))
-        week, ms = float(table["GWk"][row]), float(table["GMS"][row])
-        since = datetime.timedelta(weeks=week, milliseconds=ms, seconds=-LEAP_S)
+        # Milliseconds of the week, with a multiplier where the log declares one.
+        unit = "ms" if table.unit("GMS") == DIMENSIONLESS else table.unit("GMS")
+        of_week_s = float(convert(table["GMS"][row], unit, "s"))
+        week = float(table["GWk"][row])
+        since = datetime.timedelta(weeks=week, seconds=of_week_s - LEAP_S)
         return float(table.time_s[row]), GPS_EPOCH + since if 0 < week < 1e5 else None
     for topic, column in UNIX_GPS:
         if topic in log and column in log.messages[topic].fields:

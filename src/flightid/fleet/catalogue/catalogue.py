@@ -107,19 +107,18 @@ class Catalogue:
         OptionError
             It is no SELECT, or DuckDB refuses it, with DuckDB's own words.
         """
+        needed = "one SELECT over " + ", ".join(TABLES)
         try:
-            found = self._connection.sql(sql)
+            statements = self._connection.extract_statements(sql)
+            kinds = [statement.type.name for statement in statements]
+            if kinds == ["SELECT"]:
+                return self._connection.sql(sql)
         except self._errors as error:
             raise OptionError(
-                "the catalogue cannot answer this",
-                found=str(error).strip(),
-                needed="one SELECT over " + ", ".join(TABLES),
+                "the catalogue cannot answer this", found=str(error).strip(), needed=needed
             ) from error
-        if found is None:
-            raise OptionError(
-                "this asks for no rows", found=sql[:80], needed="one SELECT over the tables"
-            )
-        return found
+        found = ", ".join(kinds) or "no statement"
+        raise OptionError("the catalogue takes questions alone", found=found, needed=needed)
 
     def answer(self, sql: str) -> Table:
         """Answer of one SELECT as a table of plain values; see `query`."""

@@ -1,0 +1,154 @@
+"""The catalogue: rows counted once whatever died when, broken files, and what SQL may not do."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("duckdb")
+pytest.importorskip("pyarrow")
+
+from flightid.errors import DataError, OptionError
+from flightid.fleet.catalogue.catalogue import Catalogue
+from flightid.fleet.catalogue.compaction import MOST_SMALL, compact, merge, rewrite
+from flightid.fleet.catalogue.loose import loose_logs, loose_name, write_loose
+from flightid.fleet.catalogue.parts import MANIFEST, PARTS, KnownLogs, read_parts
+from flightid.fleet.catalogue.record import LogRecord
+from flightid.fleet.catalogue.store import FolderStore
+
+
+def record(number: int) -> LogRecord:
+    log = hashlib.sha256(str(number).encode()).hexdigest()
+    common = {"log": log, "vehicle": f"V{number % 3}", "type": "quad", "light": "green"}
+    common["flown_at"] = f"2026-03-{number % 28 + 1:02d}T00:00:00"
+    value = {**common, "model": "m", "name": "Lp", "value": -3.0 - number, "stderr": 0.1}
+    matrix = {**common, "model": "m", "names": ["Lp"], "lower": [0.01]}
+    entry = {**common, "outcome": "fitted", "models": 1, "address": f"{number}.bin"}
+    return LogRecord(log, {"logs": [entry], "parameters": [value], "covariances": [matrix]})
+
+
+def filled(folder: Path, numbers: range) -> FolderStore:
+    store = FolderStore(folder)
+    for number in numbers:
+        write_loose(store, record(number))
+    return store
+
+
+def sums(store: FolderStore) -> tuple[int, float]:
+    with Catalogue(store) as catalogue:
+        sql = "SELECT count(*), sum(value) FROM parameters"
+        n, total = catalogue.query(sql).fetchall()[0]
+        assert catalogue.counts() == {"fitted": n}
+    return n, total
+
+
+def test_a_record_keeps_its_values_and_a_broken_one_is_seen() -> None:
+    content = record(1).to_bytes()
+    again = LogRecord.from_bytes(content)
+    assert again.to_bytes() == content
+    assert again.rows["parameters"][0]["value"] == -4.0
+    for broken in (content[:-20], b"{}", content.replace(b"-4.0", b'"x"'), b"\xff"):
+        with pytest.raises(DataError):
+            LogRecord.from_bytes(broken)
+
+
+def test_compaction_changes_no_answer(tmp_path: Path) -> None:
+    store = filled(tmp_path, range(7))
+    before = sums(store)
+    part = compact(store)
+    assert part is not None
+    assert (part.n_logs, part.outcomes) == (7, {"fitted": 7})
+    assert loose_logs(store) == []
+    write_loose(store, record(7))
+    assert sums(store) == (8, before[1] - 10.0)
+    known = KnownLogs(store, read_parts(store)[0])
+    assert known.in_parts(record(3).log)
+    assert not known.in_parts(record(7).log)
+    assert known(record(7).log)
+    with Catalogue(store) as catalogue:
+        sql = "SELECT DISTINCT typeof(flown_at), typeof(value) FROM parameters"
+        assert catalogue.query(sql).fetchall() == [("TIMESTAMP", "DOUBLE")]
+        assert catalogue.query("SELECT lower FROM covariances").fetchall()[0] == ([0.01],)
+
+
+def test_a_crash_between_compaction_and_deletion_counts_no_row_twice(tmp_path: Path) -> None:
+    store = filled(tmp_path, range(5))
+    expected = sums(store)
+    compact(store)
+    for number in (1, 4):
+        write_loose(store, record(number))
+    assert sums(store) == expected
+    assert compact(store) is None
+    assert loose_logs(store) == []
+
+
+def test_parts_without_manifest_count_nowhere_and_overlapping_ones_once(tmp_path: Path) -> None:
+    store = filled(tmp_path, range(4))
+    expected = sums(store)
+    first = compact(store)
+    assert first is not None
+    write_loose(store, record(0))
+    write_loose(store, record(9))
+    # Another operator of a bucket, who saw no part yet, compacts two of the same logs.
+    hidden = store.read(f"{PARTS}/{first.name}/{MANIFEST}")
+    store.remove(f"{PARTS}/{first.name}/{MANIFEST}")
+    assert sums(store)[0] == 2
+    compact(store)
+    store.write(f"{PARTS}/{first.name}/{MANIFEST}", hidden)
+    assert sums(store) == (5, expected[1] - 12.0)
+
+
+def test_small_parts_are_merged_and_logs_forgotten(tmp_path: Path) -> None:
+    store = FolderStore(tmp_path)
+    for number in range(MOST_SMALL + 1):
+        write_loose(store, record(number))
+        compact(store)
+    expected = sums(store)
+    (joined,) = merge(store)
+    assert [part.name for part in read_parts(store)[0]] == [joined.name]
+    assert sums(store) == expected
+    rewrite(store, [joined], frozenset({record(2).log}))
+    assert sums(store) == (expected[0] - 1, expected[1] + 5.0)
+
+
+def test_broken_files_go_to_quarantine_and_are_told(tmp_path: Path) -> None:
+    store = filled(tmp_path, range(3))
+    path = tmp_path / loose_name(record(1).log)
+    path.write_bytes(path.read_bytes()[:100])
+    with Catalogue(store) as catalogue:
+        assert catalogue.counts() == {"failed": 1, "fitted": 2}
+        kinds = catalogue.query("SELECT kind FROM failures").fetchall()
+    assert kinds == [("record",)]
+    assert [name[:64] for name in store.names("quarantine")] == [record(1).log]
+    part = compact(store)
+    assert part is not None
+    assert loose_logs(store) == [record(1).log], "a broken record stays loose, to be run again"
+    file = tmp_path / part.file("parameters")
+    file.write_bytes(file.read_bytes()[:-9])
+    parts, broken = read_parts(store)
+    assert (parts, broken) == ([], [part.name])
+
+
+@pytest.mark.parametrize(
+    "sql",
+    [
+        "SELECT * FROM read_csv('/etc/passwd')",
+        "SELECT * FROM read_text('/etc/hostname')",
+        "COPY (SELECT 1) TO 'out.csv'",
+        "INSTALL httpfs",
+        "LOAD httpfs",
+        "ATTACH 'other.db'",
+        "SET enable_external_access = true",
+        "SELECT nothing FROM logs",
+        "DROP VIEW logs; DELETE FROM loose_logs",
+    ],
+)
+def test_sql_reads_the_catalogue_and_nothing_else(tmp_path: Path, sql: str) -> None:
+    store = filled(tmp_path / "own", range(2))
+    compact(store)
+    with Catalogue(store) as catalogue:
+        with pytest.raises(OptionError):
+            catalogue.query(sql).fetchall()
+        assert catalogue.answer("SELECT count(*) AS n FROM logs").rows == ((2,),)

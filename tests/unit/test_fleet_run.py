@@ -1,0 +1,202 @@
+"""A fleet from logs to answers: twelve flights of four vehicles, and processes that misbehave."""
+
+from __future__ import annotations
+
+import datetime
+import importlib.util
+import os
+import shutil
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from flightid.fleet import fleet_status, run_fleet
+from flightid.fleet.addresses import LogAddress, find_logs
+from flightid.fleet.engine import plain
+from flightid.fleet.engine.order import KILLED, LogOrder, RunOrder, run_order
+from flightid.fleet.engine.sandbox import DEAD, MEMORY, TIME, Sandbox
+from flightid.fleet.identity import FleetTables, read_tables
+from flightid.fleet.opening import open_catalogue
+from flightid.fleet.run_one import LogTask, run_one
+from flightid.fleet.settings import read_fleet
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "fleet"
+
+
+@pytest.fixture(scope="module")
+def fleet(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The example with twelve flights of four vehicles, one of them empty, not run yet."""
+    folder = tmp_path_factory.mktemp("fleet")
+    for name in ("fleet.toml", "study.toml"):
+        shutil.copy(EXAMPLE / name, folder)
+    _example().main(folder / "logs", 4, 3)
+    (folder / "logs" / "V03-2026-01-29.bin").write_bytes(b"")
+    return folder / "fleet.toml"
+
+
+def _example() -> Any:
+    """The script of the example."""
+    specification = importlib.util.spec_from_file_location("fly", EXAMPLE / "fly.py")
+    assert specification is not None
+    assert specification.loader is not None
+    fly = importlib.util.module_from_spec(specification)
+    specification.loader.exec_module(fly)
+    return fly
+
+
+@pytest.fixture
+def order(fleet: Path, tmp_path: Path) -> RunOrder:
+    settings = read_fleet(fleet)
+    return run_order(settings, read_tables(settings), str(tmp_path / "catalogue"))
+
+
+@pytest.fixture
+def hanging(tmp_path: Path) -> Iterator[LogAddress]:
+    """A log that never ends: a pipe to which nobody writes."""
+    pipe = tmp_path / "V01-hangs.bin"
+    os.mkfifo(pipe)
+    yield LogAddress(str(pipe), 0, "1", 0.0)
+    pipe.unlink()
+
+
+def test_one_log_gives_the_same_record_every_time(fleet: Path) -> None:
+    task = LogTask(read_fleet(fleet))
+    (address, *_) = find_logs([str(fleet.parent / "logs")])
+    first, second = (run_one(address, task) for _ in range(2))
+    assert first is not None
+    assert second is not None
+    for name, rows in first.rows.items():
+        for one, other in zip(rows, second.rows[name], strict=True):
+            changed = {key for key in one if one[key] != other[key]}
+            assert changed <= {"processor_s", "memory_bytes"}
+    row = {each["name"]: each for each in first.rows["parameters"]}["T_m"]
+    truth = _example().vehicle(0, 0, datetime.date(2026, 1, 5)).motor_lag_s
+    assert abs(row["value"] - truth) < 3.0 * row["stderr"] < 0.5 * truth
+    assert (row["vehicle"], row["type"]) == ("V00", "450 mm quadrotor")
+    places = [each["position"] for each in first.rows["parameters"]]
+    (covariance,) = first.rows["covariances"]
+    names = [each["name"] for each in first.rows["parameters"]]
+    assert [covariance["names"][place] for place in places] == names
+    diagonal = [covariance["lower"][i * (i + 3) // 2] for i in places]
+    told = [each["stderr"] ** 2 for each in first.rows["parameters"]]
+    assert diagonal == pytest.approx(told)
+    assert {each["name"] for each in first.rows["margins"]} >= {"phase margin", "gain margin"}
+    assert run_one(address, replace(task, known=lambda log: log == first.log)) is None
+
+
+def test_a_fleet_is_run_once_and_then_only_for_what_is_missing(
+    fleet: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("flightid.fleet.run.find_spec", lambda _: None)
+    done = run_fleet(fleet, workers=1)
+    assert (done.found, done.kept, done.outcomes) == (12, 0, {"fitted": 11, "refused": 1})
+    # A copy under another name is known by its bytes; nothing else is read again.
+    logs = fleet.parent / "logs"
+    shutil.copy(logs / "V00-2026-01-05.bin", logs / "V00-copy.bin")
+    monkeypatch.setattr("flightid.fleet.engine.sandbox.ONE_THREAD", ())
+    again = run_fleet(fleet, workers=1)
+    assert (again.found, again.kept, again.outcomes) == (13, 13, {})
+    status = fleet_status(fleet)
+    assert status.outcomes == {"fitted": 11, "refused": 1}
+    pytest.importorskip("duckdb")
+    with open_catalogue(fleet) as catalogue:
+        sql = "SELECT vehicle, count(*) FROM parameters WHERE name = 'T_m' GROUP BY ALL ORDER BY 1"
+        assert catalogue.query(sql).fetchall() == [("V00", 3), ("V01", 3), ("V02", 3), ("V03", 2)]
+        ((reason, message),) = catalogue.query(
+            "SELECT reason, message FROM logs WHERE outcome = 'refused'"
+        ).fetchall()
+    assert reason == "LogFormatError"
+    assert "empty file" in message
+
+
+def test_a_log_that_hangs_is_ended_by_the_clock(order: RunOrder, hanging: LogAddress) -> None:
+    with Sandbox(replace(order, time_s=1.0)) as box:
+        outcome = box.run(LogOrder(hanging))
+        assert (outcome.outcome, outcome.reason, outcome.stage) == (KILLED, TIME, "address")
+        assert "1 s" in outcome.message
+        assert box.pid is None
+
+
+def test_a_process_that_dies_is_named_by_its_signal(order: RunOrder, hanging: LogAddress) -> None:
+    with Sandbox(order) as box:
+        ended = threading.Thread(target=_kill, args=(box,))
+        ended.start()
+        outcome = box.run(LogOrder(hanging))
+        ended.join()
+    assert (outcome.outcome, outcome.reason) == (KILLED, DEAD)
+    assert outcome.signal == signal.SIGKILL
+    assert "SIGKILL" in outcome.message
+
+
+def _kill(box: Sandbox) -> None:
+    while box.pid is None:
+        time.sleep(0.01)
+    time.sleep(0.5)
+    os.kill(box.pid, signal.SIGKILL)
+
+
+@pytest.mark.skipif(not Path("/proc").is_dir(), reason="limits of address space are Linux's")
+def test_a_log_that_eats_memory_costs_itself_alone(fleet: Path, order: RunOrder) -> None:
+    (address, *_) = find_logs([str(fleet.parent / "logs")])
+    with Sandbox(replace(order, memory_mib=256)) as box:
+        outcome = box.run(LogOrder(address))
+    assert outcome.outcome in ("failed", KILLED)
+    assert outcome.reason == MEMORY
+
+
+def test_a_process_is_replaced_when_it_is_worn(order: RunOrder, fleet: Path) -> None:
+    empty = LogAddress(str(fleet.parent / "logs" / "V03-2026-01-29.bin"), 0, "1", 0.0)
+    with Sandbox(replace(order, recycle=2)) as box:
+        seen = []
+        for number in range(3):
+            outcome = box.run(LogOrder(replace(empty, stamp=str(number))))
+            seen.append((outcome.outcome, box.pid))
+    # The second and third are the bytes of the first.
+    assert [outcome for outcome, _ in seen] == ["refused", "known", "known"]
+    assert seen[0][1] == seen[1][1] != seen[2][1]
+
+
+def test_a_log_that_killed_twice_is_recorded_with_its_vehicle(
+    fleet: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("fleet.toml", "study.toml"):
+        shutil.copy(fleet.parent / name, tmp_path)
+    (tmp_path / "logs").mkdir()
+    shutil.copy(fleet.parent / "logs" / "V02-2026-01-07.bin", tmp_path / "logs")
+    text = (tmp_path / "fleet.toml").read_text().replace("time_s = 300", "time_s = 0.001")
+    (tmp_path / "fleet.toml").write_text(text)
+    monkeypatch.setattr("flightid.fleet.run.find_spec", lambda _: None)
+    assert run_fleet(tmp_path / "fleet.toml", workers=1).outcomes == {"failed": 1}
+    assert run_fleet(tmp_path / "fleet.toml", workers=1).kept == 1
+    (tmp_path / "fleet.toml").write_text(text.replace("0.001", "300"))
+    retried = run_fleet(tmp_path / "fleet.toml", workers=1, retry=True)
+    assert (retried.kept, retried.outcomes) == (0, {"fitted": 1})
+    assert fleet_status(tmp_path / "fleet.toml").outcomes == {"fitted": 1}
+
+
+def test_the_window_keeps_a_long_list_from_being_read_ahead(
+    order: RunOrder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Idle(Sandbox):
+        def run(self, order: LogOrder) -> object:  # type: ignore[override]
+            return order
+
+    monkeypatch.setattr(plain, "Sandbox", Idle)
+    taken = []
+
+    def logs() -> Iterator[LogOrder]:
+        for number in range(100):
+            taken.append(number)
+            yield LogOrder(LogAddress(f"{number}.bin", 0, ""))
+
+    results = plain.run_plain(order, logs(), 2)
+    next(iter(results))
+    assert len(taken) <= 2 * plain.WINDOW + 1
+    assert len(list(results)) == 99
+    assert FleetTables().told("V1", "a.bin") == ""
