@@ -1,4 +1,8 @@
-"""Term selection against SysIdentPy and two kinds of NumPy, and free runs."""
+"""Term selection against SysIdentPy and two kinds of NumPy, and free runs.
+
+Times are processor time, which other work on the machine lengthens little; with one thread each
+(RAYON_NUM_THREADS=1, OPENBLAS_NUM_THREADS=1) they are those of one core.
+"""
 
 from __future__ import annotations
 
@@ -22,9 +26,9 @@ SLOW = 2.0
 def _seconds(work: Callable[[], object]) -> float:
     times = []
     for _ in range(3):
-        start = time.perf_counter()
+        start = time.process_time()
         work()
-        times.append(time.perf_counter() - start)
+        times.append(time.process_time() - start)
     return sorted(times)[1]
 
 
@@ -125,9 +129,9 @@ def _selection(name: str, columns: Array, y: Array, peers: tuple[str, ...]) -> l
         if peer == "SysIdentPy FROLS" and importlib.util.find_spec("sysidentpy") is None:
             rows.append((work, seconds, None, None, "skipped: sysidentpy is not installed"))
             continue
-        start = time.perf_counter()
+        start = time.process_time()
         theirs = PEERS[peer](columns, y)
-        taken = time.perf_counter() - start
+        taken = time.process_time() - start
         if taken < SLOW:
             taken = _seconds(lambda peer=peer: PEERS[peer](columns, y))  # type: ignore[misc]
         same = next((k for k in range(N_TERMS) if theirs[k] != found[0][k]), None)

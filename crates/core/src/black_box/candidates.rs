@@ -1,5 +1,5 @@
-//! Candidate terms of a regression: given columns, and radial functions that are kept or computed
-//! when they are read. (Python side: identification/narx/candidates.py)
+//! Candidate terms of a regression: given columns, and radial functions that are computed when they
+//! are read. (Python side: identification/narx/candidates.py)
 
 use rayon::prelude::*;
 
@@ -17,19 +17,18 @@ const BLOCK: usize = 512;
 pub struct Candidates<'a> {
     /// Given columns, one after the other, `n_samples` long.
     pub columns: &'a [f64],
-    /// Radial functions of `radial` that were computed before (`Radial::columns`); empty: they are
-    /// computed when they are read.
-    pub kept: &'a [f64],
     /// Radial functions and the regressors at which they are read, (n_samples × dimension).
     pub radial: Option<(Radial<'a>, &'a [f64])>,
+    /// Whether a selection keeps all of them beside, in single precision, and reads those.
+    pub rounded: bool,
     /// Length of a column.
     pub n_samples: usize,
 }
 
 impl<'a> Candidates<'a> {
-    /// Given columns alone.
+    /// Given columns alone, rounded for a selection.
     pub fn given(columns: &'a [f64], n_samples: usize) -> Self {
-        Self { columns, kept: &[], radial: None, n_samples }
+        Self { columns, radial: None, rounded: true, n_samples }
     }
 
     fn n_given(&self) -> usize {
@@ -52,15 +51,11 @@ impl<'a> Candidates<'a> {
         if index < given {
             return &self.columns[index * n..(index + 1) * n];
         }
-        let radial = index - given;
-        match self.radial {
-            Some((functions, regressors)) if self.kept.is_empty() => {
-                scratch.resize(n, 0.0);
-                functions.fill(radial, regressors, scratch);
-                scratch
-            }
-            _ => &self.kept[radial * n..(radial + 1) * n],
+        scratch.resize(n, 0.0);
+        if let Some((functions, regressors)) = self.radial {
+            functions.fill(index - given, regressors, scratch);
         }
+        scratch
     }
 
     /// Map every candidate that `open` names, with its column, in the order of the candidates.
@@ -125,10 +120,6 @@ impl<'a> Candidates<'a> {
             if regressors.len() != n * radial.dimension {
                 let (found, needed) = (regressors.len(), n * radial.dimension);
                 return Err(CoreError::Shape { what: "values of the regressors", found, needed });
-            }
-            if !self.kept.is_empty() && self.kept.len() != n * radial.len() {
-                let (found, needed) = (self.kept.len(), n * radial.len());
-                return Err(CoreError::Shape { what: "values of radial functions", found, needed });
             }
             require_finite("the regressors", regressors)?;
         }

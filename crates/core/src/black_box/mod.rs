@@ -13,4 +13,5 @@ pub mod polynomial_orders;
 pub mod polynomial_predictor;
 pub mod radial_basis;
 pub(crate) mod remainder;
+pub(crate) mod rounded_columns;
 pub mod stop_rule;

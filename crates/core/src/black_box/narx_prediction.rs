@@ -108,9 +108,7 @@ impl Narx<'_> {
             }
             sum += product;
         }
-        for (index, weight) in self.radial_weights.iter().enumerate() {
-            sum += weight * self.radial.value(index, x);
-        }
+        sum = self.radial.add_weighted(sum, self.radial_weights, x);
         let (low, high) = self.bounds;
         if !sum.is_finite() {
             // ∞ − ∞ has no side: hold the middle.

@@ -3,8 +3,9 @@
 //!
 //! For every candidate p_j the squared length a_j and the product b_j = w_jᵀy of its part w_j that is
 //! orthogonal to the chosen terms are kept; a new direction q changes them by r_j = qᵀp_j alone, so
-//! the candidates are read and never written. `look_ahead.rs` finds r_j for several terms at a time.
-//! A penalty λ_j on a term's squared coefficient along w_j shrinks it by a_j/(a_j + λ_j).
+//! the candidates are read and never written: in single precision (`rounded_columns.rs`), after which
+//! those that may be the best within the bounds of its errors are worked out in double; or where they
+//! are computed at each reading, for several terms at a time (`look_ahead.rs`). A penalty λ_j on a term's squared coefficient along w_j shrinks it by a_j/(a_j + λ_j).
 //!
 //! Reference: Chen, Cowan & Grant, IEEE Trans. Neural Networks 2 (1991), eqs. 12 to 20; leave-one-out
 //! errors: Chen, Hong, Harris & Sharkey, IEEE Trans. SMC-B 34 (2004), eqs. 15 to 20; penalties: Chen,
@@ -16,6 +17,7 @@ use crate::black_box::candidates::Candidates;
 use crate::black_box::look_ahead::{LookAhead, Progress};
 use crate::black_box::radial_basis::require_finite;
 use crate::black_box::remainder::Remainder;
+use crate::black_box::rounded_columns::{RoundedColumns, round};
 use crate::black_box::stop_rule::Path;
 use crate::black_box::stop_rule::Stop;
 use crate::error::CoreError;
@@ -23,8 +25,6 @@ use crate::numerics::gram_schmidt::{dot, orthogonalise, subtract};
 
 /// Below this share of its length a candidate counts as a combination of the chosen terms.
 const COLLINEAR: f64 = 1e-10;
-/// Below this share of its last exact value a squared length has lost digits to cancellation.
-const CANCELLED: f64 = 1e-6;
 /// A sum of squared errors below this share of the target's is rounding: nothing is left to explain.
 const ROUNDING: f64 = 1e-26;
 
@@ -57,9 +57,11 @@ pub struct Selection {
 
 struct State<'a> {
     candidates: &'a Candidates<'a>,
+    /// What is left of the candidates, in single precision; None where they are computed when read.
+    rounded: Option<RoundedColumns>,
     remainders: Vec<Remainder>,
     directions: Vec<Vec<f64>>,
-    /// Product of each direction with every open candidate.
+    /// Product of each direction with every open candidate, of candidates that are not rounded.
     shares: Vec<Vec<f64>>,
     /// Column k of R, k + 1 long.
     factor: Vec<Vec<f64>>,
@@ -77,27 +79,23 @@ impl<'a> State<'a> {
         y: &[f64],
         penalties: &[f64],
     ) -> Result<Self, CoreError> {
-        let shut = Remainder {
-            length: 0.0,
-            product: 0.0,
-            full: 0.0,
-            exact: 0.0,
-            penalty: 0.0,
-            open: false,
+        let (rounded, remainders) = if candidates.rounded {
+            let (rounded, remainders) = RoundedColumns::of(candidates, y, penalties);
+            (Some(rounded), remainders)
+        } else {
+            let start = |index: usize, column: &[f64]| {
+                let penalty = *penalties.get(index).unwrap_or(&0.0);
+                Remainder::whole(dot(column, column), dot(column, y), penalty)
+            };
+            (None, candidates.map(Remainder::whole(0.0, 0.0, 0.0), |_| true, start))
         };
-        let start = |index: usize, column: &[f64]| {
-            let (length, product) = (dot(column, column), dot(column, y));
-            let open = length > 0.0 && length.is_finite();
-            let penalty = *penalties.get(index).unwrap_or(&0.0);
-            Remainder { length, product, full: length, exact: length, penalty, open }
-        };
-        let remainders = candidates.map(shut, |_| true, start);
         let odd = |rest: &Remainder| !rest.length.is_finite();
         for (index, _) in remainders.iter().enumerate().filter(|(_, rest)| odd(rest)) {
             require_finite("the candidates", candidates.column(index, &mut Vec::new()))?;
         }
         Ok(Self {
             candidates,
+            rounded,
             remainders,
             directions: Vec::new(),
             shares: Vec::new(),
@@ -111,15 +109,26 @@ impl<'a> State<'a> {
     }
 
     /// The open candidate that lowers the error most; the first of equals.
-    fn best(&self) -> Option<usize> {
-        let mut best = None;
-        let mut most = 0.0;
-        for (index, candidate) in self.remainders.iter().enumerate() {
-            if candidate.open && candidate.reduction() > most {
-                (best, most) = (Some(index), candidate.reduction());
+    ///
+    /// Whichever may be it within its doubts is worked out in double precision, until one without
+    /// doubt reaches the bounds of all others.
+    fn best(&mut self) -> Option<usize> {
+        loop {
+            let mut best = None;
+            let mut most = 0.0;
+            for (index, candidate) in self.remainders.iter().enumerate() {
+                if candidate.open && candidate.largest_reduction() > most {
+                    (best, most) = (Some(index), candidate.largest_reduction());
+                }
             }
+            let index = best?;
+            if self.remainders[index].is_certain() {
+                return best;
+            }
+            let rounded = self.rounded.as_mut().map(|columns| columns.column_mut(index));
+            let vector = Vector { candidates: self.candidates, directions: &self.directions };
+            vector.restore(index, &mut self.remainders[index], &self.unpenalised, rounded);
         }
-        best
     }
 
     /// Add a candidate; false where it is a combination of the chosen terms.
@@ -149,31 +158,37 @@ impl<'a> State<'a> {
         true
     }
 
+    /// Products of the newest direction, that of candidate `index`, with the open candidates.
+    fn share(&self, index: usize, ahead: &mut LookAhead) -> Vec<f64> {
+        let open = |index: usize| self.remainders[index].open;
+        match (&self.rounded, self.directions.last()) {
+            (Some(columns), Some(newest)) => columns.products(newest, open),
+            _ => ahead.share(index, &self.progress()),
+        }
+    }
+
     /// Take the newest direction out of every open candidate, whose products with it are given.
     fn deflate(&mut self, share: Vec<f64>) {
-        self.shares.push(share);
         let Some(&gain) = self.gains.last() else { return };
-        let newest = &self.shares[self.shares.len() - 1];
-        self.remainders.iter_mut().zip(newest).for_each(|(candidate, r)| {
-            candidate.length -= r * r;
-            candidate.product -= r * gain;
-        });
-        let (candidates, directions) = (self.candidates, &self.directions);
-        let (shares, residual) = (&self.shares, &self.unpenalised);
+        let vector = Vector { candidates: self.candidates, directions: &self.directions };
+        let residual = &self.unpenalised;
+        let each = self.remainders.par_iter_mut().zip(&share).enumerate();
         // Errors of the shares lie along the directions: b does not see them, a to second order.
-        self.remainders.par_iter_mut().enumerate().for_each_init(Vec::new, |scratch, item| {
-            let (index, candidate) = item;
-            if candidate.open && candidate.length < CANCELLED * candidate.exact {
-                let mut w = candidates.column(index, scratch).to_vec();
-                for (q, share) in directions.iter().zip(shares) {
-                    subtract(&mut w, share[index], q);
-                }
-                candidate.length = dot(&w, &w);
-                candidate.product = dot(&w, residual);
-                candidate.exact = candidate.length;
-                candidate.open = candidate.length > COLLINEAR * candidate.full;
+        let restore = |(index, (candidate, r)): (usize, (&mut Remainder, &f64)), rounded| {
+            candidate.deflate(*r, gain);
+            if candidate.open && candidate.lost() {
+                vector.restore(index, candidate, residual, rounded);
             }
-        });
+        };
+        match &mut self.rounded {
+            Some(columns) => {
+                each.zip(columns.each_mut()).for_each(|(item, place)| restore(item, Some(place)));
+            }
+            None => {
+                each.for_each(|item| restore(item, None));
+                self.shares.push(share);
+            }
+        }
     }
 
     fn progress(&self) -> Progress<'_> {
@@ -200,6 +215,35 @@ impl<'a> State<'a> {
             weights[row] = (weights[row] - later) / self.factor[row][row];
         }
         weights
+    }
+}
+
+/// Where what is left of a candidate comes from.
+struct Vector<'a> {
+    candidates: &'a Candidates<'a>,
+    directions: &'a [Vec<f64>],
+}
+
+impl Vector<'_> {
+    /// Work out what is left of a candidate from its column; `rounded` is what is read of it from now.
+    fn restore(
+        &self,
+        index: usize,
+        candidate: &mut Remainder,
+        residual: &[f64],
+        rounded: Option<(&mut [f32], &mut f64)>,
+    ) {
+        let mut w = self.candidates.column(index, &mut Vec::new()).to_vec();
+        let shares: Vec<f64> = self.directions.iter().map(|q| dot(q, &w)).collect();
+        self.directions.iter().zip(shares).for_each(|(q, share)| subtract(&mut w, share, q));
+        candidate.length = dot(&w, &w);
+        candidate.product = dot(&w, residual);
+        candidate.exact = candidate.length;
+        candidate.open = candidate.length > COLLINEAR * candidate.full;
+        (candidate.length_doubt, candidate.product_doubt) = (0.0, 0.0);
+        if let Some((values, scale)) = rounded.filter(|_| candidate.open) {
+            candidate.missed = round(&w, candidate.length, values, scale);
+        }
     }
 }
 
@@ -250,7 +294,7 @@ pub fn select(
         if path.terms.len() >= most || (path.terms.len() >= forced && enough) {
             break;
         }
-        let share = ahead.share(index, &state.progress());
+        let share = state.share(index, &mut ahead);
         state.deflate(share);
     }
     let kept = stop.kept(forced, y.len(), &path);

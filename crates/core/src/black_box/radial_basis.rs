@@ -3,9 +3,14 @@
 //! Reference: Chen, Cowan & Grant, "Orthogonal least squares learning algorithm for radial basis
 //! function networks", IEEE Trans. Neural Networks 2 (1991), section II.
 
-use rayon::prelude::*;
-
 use crate::error::CoreError;
+use crate::numerics::decay::decay;
+use crate::numerics::widest::widest;
+
+/// Samples whose distances are found before their functions.
+const BLOCK: usize = 64;
+/// Partial sums of a squared distance.
+const LANES: usize = 4;
 
 /// Shape of a radial function of distance d and width β.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,12 +42,26 @@ impl Kernel {
 
     /// Value at a squared distance.
     pub fn value(self, squared: f64, beta: f64) -> f64 {
+        let mut value = [squared];
+        self.replace(&mut value, beta);
+        value[0]
+    }
+
+    /// Values in place of squared distances.
+    #[inline(always)]
+    fn replace(self, squared: &mut [f64], beta: f64) {
+        let power = beta * beta;
         match self {
-            Self::Gaussian => (-squared / (beta * beta)).exp(),
-            Self::Multiquadric => (squared + beta * beta).sqrt(),
-            Self::InverseMultiquadric => 1.0 / (squared + beta * beta).sqrt(),
-            Self::ThinPlate if squared > 0.0 => 0.5 * squared * squared.ln(),
-            Self::ThinPlate => 0.0,
+            Self::Gaussian => squared.iter_mut().for_each(|each| *each = decay(*each / power)),
+            Self::Multiquadric => {
+                squared.iter_mut().for_each(|each| *each = (*each + power).sqrt())
+            }
+            Self::InverseMultiquadric => {
+                squared.iter_mut().for_each(|each| *each = 1.0 / (*each + power).sqrt());
+            }
+            Self::ThinPlate => squared.iter_mut().filter(|each| **each > 0.0).for_each(|each| {
+                *each *= 0.5 * each.ln();
+            }),
         }
     }
 }
@@ -99,33 +118,83 @@ impl<'a> Radial<'a> {
         self.kernel.value(squared_distance(x, centre), self.beta)
     }
 
-    /// Function `index` at every row of the regressors.
-    pub(crate) fn fill(&self, index: usize, regressors: &[f64], values: &mut [f64]) {
-        let rows = regressors.chunks_exact(self.dimension);
-        values.iter_mut().zip(rows).for_each(|(value, x)| *value = self.value(index, x));
+    /// `sum` and the weighted functions at `x`, added one after the other.
+    pub fn add_weighted(&self, mut sum: f64, weights: &[f64], x: &[f64]) -> f64 {
+        let mut values = [0.0; BLOCK];
+        let centres = self.centres.chunks(BLOCK * self.dimension);
+        for (centres, weights) in centres.zip(weights.chunks(BLOCK)) {
+            let values = &mut values[..weights.len()];
+            widest(
+                #[inline(always)]
+                || {
+                    squared_distances(centres, x, values);
+                    self.kernel.replace(values, self.beta);
+                },
+            );
+            for (weight, value) in weights.iter().zip(values) {
+                sum += weight * *value;
+            }
+        }
+        sum
     }
 
-    /// All functions at every row of the regressors, one function after the other.
-    pub fn columns(&self, regressors: &[f64]) -> Vec<f64> {
-        let n = regressors.len() / self.dimension;
-        let mut values = vec![0.0; n * self.len()];
-        let columns = values.par_chunks_exact_mut(n.max(1)).enumerate();
-        columns.for_each(|(index, column)| self.fill(index, regressors, column));
-        values
+    /// Function `index` at every row of the regressors.
+    pub(crate) fn fill(&self, index: usize, regressors: &[f64], values: &mut [f64]) {
+        let centre = &self.centres[index * self.dimension..(index + 1) * self.dimension];
+        let rows = regressors.chunks(BLOCK * self.dimension);
+        for (values, rows) in values.chunks_mut(BLOCK).zip(rows) {
+            widest(
+                #[inline(always)]
+                || {
+                    squared_distances(rows, centre, values);
+                    self.kernel.replace(values, self.beta);
+                },
+            );
+        }
     }
 }
 
-/// ‖a − b‖², in four partial sums so that the compiler can use vector registers.
+/// ‖a − b‖².
 fn squared_distance(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; 4];
-    let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
-    let tail: f64 = a4.remainder().iter().zip(b4.remainder()).map(|(x, c)| (x - c).powi(2)).sum();
-    for (x, c) in a4.zip(b4) {
-        for lane in 0..4 {
+    total(partial_sums(a, b), a, b)
+}
+
+/// ‖x − centre‖² of up to `BLOCK` rows x.
+#[inline(always)]
+fn squared_distances(rows: &[f64], centre: &[f64], found: &mut [f64]) {
+    let mut sums = [[0.0; LANES]; BLOCK];
+    let sums = &mut sums[..found.len()];
+    for (sums, x) in sums.iter_mut().zip(rows.chunks_exact(centre.len())) {
+        *sums = partial_sums(x, centre);
+    }
+    if centre.len().is_multiple_of(LANES) {
+        found.iter_mut().zip(sums).for_each(|(each, sums)| *each = total(*sums, &[], &[]));
+        return;
+    }
+    let rows = rows.chunks_exact(centre.len());
+    for ((each, sums), x) in found.iter_mut().zip(sums).zip(rows) {
+        *each = total(*sums, x, centre);
+    }
+}
+
+/// Squared differences in four sums, so that the compiler can use vector registers.
+#[inline(always)]
+fn partial_sums(a: &[f64], b: &[f64]) -> [f64; LANES] {
+    let mut sums = [0.0; LANES];
+    for (x, c) in a.chunks_exact(LANES).zip(b.chunks_exact(LANES)) {
+        for lane in 0..LANES {
             let difference = x[lane] - c[lane];
             sums[lane] += difference * difference;
         }
     }
+    sums
+}
+
+/// The sums with what does not fill four.
+#[inline(always)]
+fn total(sums: [f64; LANES], a: &[f64], b: &[f64]) -> f64 {
+    let (rest, other) = (a.chunks_exact(LANES).remainder(), b.chunks_exact(LANES).remainder());
+    let tail: f64 = rest.iter().zip(other).map(|(x, c)| (x - c).powi(2)).sum();
     sums[0] + sums[1] + sums[2] + sums[3] + tail
 }
 
@@ -154,6 +223,25 @@ mod tests {
         assert!((at(Kernel::InverseMultiquadric) - 1.0 / 13.0_f64.sqrt()).abs() < 1e-16);
         assert!((at(Kernel::ThinPlate) - 9.0 * 3.0_f64.ln()).abs() < 1e-14);
         assert_eq!(Kernel::ThinPlate.value(0.0, 1.0), 0.0);
+    }
+
+    #[test]
+    fn columns_are_the_values_one_by_one() {
+        for (n, dimension) in [(1, 1), (63, 3), (130, 4), (70, 9)] {
+            let x: Vec<f64> = (0..n * dimension).map(|i| (1.0 + i as f64).sin()).collect();
+            for name in ["gaussian", "multiquadric", "inverse_multiquadric", "thin_plate"] {
+                let kernel = Kernel::from_name(name).unwrap();
+                let radial = Radial::new(kernel, 1.5, &x, dimension).unwrap();
+                let mut values = vec![0.0; n];
+                radial.fill(n / 2, &x, &mut values);
+                for (value, row) in values.iter().zip(x.chunks(dimension)) {
+                    assert_eq!(*value, radial.value(n / 2, row));
+                }
+                let (weights, at) = (&x[..n], &x[..dimension]);
+                let sum = (0..n).fold(2.0, |sum, k| sum + weights[k] * radial.value(k, at));
+                assert_eq!(radial.add_weighted(2.0, weights, at), sum);
+            }
+        }
     }
 
     #[test]

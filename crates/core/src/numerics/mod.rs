@@ -2,6 +2,7 @@
 
 pub mod complex_lanes;
 pub mod complex_lu;
+pub(crate) mod decay;
 pub mod dual;
 pub(crate) mod gram_schmidt;
 pub mod householder;

@@ -47,8 +47,8 @@ fn stop_rule(name: &str, goal: f64) -> Result<Stop, CoreError> {
 
 /// select_terms(target: NDArray[np.float64], columns: NDArray[np.float64], regressors: NDArray[np.float64], centres: NDArray[np.float64], kernel: str, beta: float, keep: bool, forced: int, stop: str, goal: float, maximum_terms: int, regularisation: str = 'none', penalty: float = 0.0) -> tuple[list[int], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], int]
 ///
-/// Orthogonal least squares over given columns, then radial functions at the centres (kept, or
-/// computed at each reading): terms, error reduction, sums of squares, leave-one-out mean squares;
+/// Orthogonal least squares over given columns, then radial functions at the centres (all kept in
+/// single precision, or computed at each reading): terms, error reduction, sums of squares, leave-one-out mean squares;
 /// weights, penalties and flat triangular factor of the kept terms; number of collinear candidates.
 #[pyfunction]
 #[pyo3(signature = (target, columns, regressors, centres, kernel, beta, keep, forced, stop, goal, maximum_terms, regularisation="none", penalty=0.0))]
@@ -80,11 +80,7 @@ fn select_terms<'py>(
                 let kernel = Kernel::from_name(kernel)?;
                 Some((Radial::new(kernel, beta, centres, dimension)?, regressors))
             };
-            let kept = match radial {
-                Some((functions, at)) if keep => functions.columns(at),
-                _ => Vec::new(),
-            };
-            let candidates = Candidates { columns, kept: &kept, radial, n_samples: y.len() };
+            let candidates = Candidates { columns, radial, rounded: keep, n_samples: y.len() };
             let (rule, penalties) = (stop_rule(stop, goal)?, of_name(regularisation, penalty)?);
             select_regularised(&candidates, y, forced, penalties, rule, maximum_terms)
         })

@@ -77,7 +77,8 @@ fn radial_candidates_on_the_fly_equal_the_same_columns_given() {
         .flat_map(|j| x.chunks(dimension).map(move |row| radial.value(j, row)).collect::<Vec<_>>())
         .collect();
     let given = Candidates::given(&columns, n);
-    let lazy = Candidates { columns: &[], kept: &[], radial: Some((radial, &x)), n_samples: n };
+    let lazy =
+        Candidates { columns: &[], radial: Some((radial, &x)), rounded: false, n_samples: n };
     let a = select(&given, &y, 0, &[], Stop::Press, 25).unwrap();
     let b = select(&lazy, &y, 0, &[], Stop::Press, 25).unwrap();
     assert_eq!((&a.terms, a.kept), (&b.terms, b.kept));
@@ -222,7 +223,7 @@ fn refuses_what_cannot_be_selected_from() {
     assert!(select(&some, &[1.0, 2.0], 2, &[], Stop::Terms, 2).is_err());
     let radial = Radial::new(Kernel::Gaussian, 1.0, &[0.0, 1.0], 2).unwrap();
     let odd =
-        Candidates { columns: &[], kept: &[], radial: Some((radial, &[1.0; 3])), n_samples: 2 };
+        Candidates { columns: &[], radial: Some((radial, &[1.0; 3])), rounded: true, n_samples: 2 };
     assert!(select(&odd, &[1.0, 2.0], 0, &[], Stop::Terms, 1).is_err());
 }
 
@@ -234,7 +235,7 @@ fn products_found_ahead_are_those_of_the_directions() {
     let trend = normal(&mut random, n);
     let columns: Vec<f64> = (0..n * m).map(|i| random.normal() + trend[i % n]).collect();
     let y = normal(&mut random, n);
-    let candidates = Candidates::given(&columns, n);
+    let candidates = Candidates { rounded: false, ..Candidates::given(&columns, n) };
     let mut state = State::new(&candidates, &y, &[]).unwrap();
     let mut ahead = LookAhead::new(0, 40);
     for _ in 0..39 {
@@ -263,8 +264,81 @@ fn refuses_penalties_and_columns_without_meaning() {
     let refused = select(&nan, &[1.0, 2.0], 0, &[], Stop::Terms, 1).unwrap_err();
     assert_eq!(refused, CoreError::NotFinite { what: "the candidates", index: 1 });
     assert!(select(&some, &[1.0, 2.0], 0, &[f64::NAN], Stop::Terms, 1).is_err());
-    let radial = Radial::new(Kernel::Gaussian, 1.0, &[0.0, 1.0], 1).unwrap();
-    let odd =
-        Candidates { columns: &[], kept: &[1.0], radial: Some((radial, &[0.0; 2])), n_samples: 2 };
-    assert!(select(&odd, &[1.0, 2.0], 0, &[], Stop::Terms, 1).is_err());
+}
+
+/// Columns of very different size that share a trend, copies among them.
+fn alike(n: usize, m: usize, seed: u64) -> (Vec<f64>, Vec<f64>) {
+    let mut random = Random::new(seed);
+    let trend = normal(&mut random, n);
+    let mut columns = Vec::new();
+    for j in 0..m {
+        let (size, apart) = (10.0_f64.powi(j as i32 % 7 - 3), 10.0_f64.powi(-(j as i32 % 4)));
+        columns.extend(trend.iter().map(|value| size * (value + apart * random.normal())));
+    }
+    let copy: Vec<f64> = columns[..n].iter().map(|value| 2.0 * value).collect();
+    columns.extend(copy);
+    (columns, trend.iter().map(|value| value + 0.1 * random.normal()).collect())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+    #[test]
+    fn rounded_candidates_are_chosen_as_exact_ones(
+        n in 12_usize..60, m in 8_usize..50, seed in 0_u64..1_000_000,
+    ) {
+        let (columns, y) = alike(n, m, seed);
+        let candidates = Candidates::given(&columns, n);
+        let exact = Candidates { rounded: false, ..candidates };
+        let ours = select(&candidates, &y, 1, &[], Stop::Terms, 9).unwrap();
+        let plain = select(&exact, &y, 1, &[], Stop::Terms, 9).unwrap();
+        prop_assert_eq!(&ours.terms, &plain.terms);
+        prop_assert_eq!(ours.weights, plain.weights);
+        prop_assert_eq!(ours.collinear, plain.collinear);
+    }
+
+    #[test]
+    fn what_is_left_is_within_its_doubts(seed in 0_u64..1_000_000) {
+        let (n, m) = (50, 40);
+        let (columns, y) = alike(n, m, seed);
+        let candidates = Candidates::given(&columns, n);
+        let mut state = State::new(&candidates, &y, &[]).unwrap();
+        let mut ahead = LookAhead::new(0, 12);
+        for _ in 0..12 {
+            let index = state.best().unwrap();
+            assert!(state.remainders[index].is_certain());
+            if state.add(index) {
+                let share = state.share(index, &mut ahead);
+                state.deflate(share);
+            }
+            for (j, rest) in state.remainders.iter().enumerate().filter(|(_, rest)| rest.open) {
+                let mut w = columns[j * n..(j + 1) * n].to_vec();
+                orthogonalise(&mut w, &state.directions);
+                let (length, product) = (dot(&w, &w), dot(&w, &state.unpenalised));
+                // Double precision's own errors beside the doubts: of a whole candidate.
+                let (a, b) = (1e-14 * rest.full, 1e-14 * (rest.full * dot(&y, &y)).sqrt());
+                prop_assert!((rest.length - length).abs() <= rest.length_doubt + a);
+                prop_assert!((rest.product - product).abs() <= rest.product_doubt + b);
+                prop_assert!(rest.length_doubt <= 0.25 * rest.length);
+            }
+        }
+    }
+}
+
+#[test]
+fn candidates_alike_in_single_precision_are_told_apart() {
+    let mut random = Random::new(31);
+    let (n, m) = (64, 12);
+    let (first, trend) = (normal(&mut random, n), normal(&mut random, n));
+    let apart = normal(&mut random, n);
+    let y: Vec<f64> = (0..n).map(|t| 3.0 * first[t] + trend[t] + 0.5 * apart[t]).collect();
+    // The more of `apart` a candidate holds the better; they differ by 1e-11 from one to the next.
+    let mut columns = first;
+    for j in 0..m {
+        let far = 1e-11 * ((5 * j + 3) % m) as f64;
+        columns.extend(trend.iter().zip(&apart).map(|(value, other)| value + far * other));
+    }
+    let single: Vec<f32> = columns.iter().map(|value| *value as f32).collect();
+    assert!((2..=m).filter(|j| single[j * n..(j + 1) * n] == single[n..2 * n]).count() > 6);
+    let ours = select(&Candidates::given(&columns, n), &y, 1, &[], Stop::Terms, 2).unwrap();
+    assert_eq!(ours.terms, [0, 5]);
 }
