@@ -10,7 +10,7 @@ import pytest
 import flightid as fid
 from flightid.cli.program import run
 from flightid.errors import DataError
-from flightid.record.digest import MARKS, RecordDigest, digest_of, record_sha256
+from flightid.record.digest import MARKS, RecordDigest, _smallest, digest_of, record_sha256
 from flightid.validation.verification.of_the_fit import SEEN
 from tests.closeness import assert_close
 from tests.contract.test_kinds import STRUCTURES, fit, record
@@ -111,3 +111,12 @@ def test_a_study_does_not_call_a_copy_unseen(
     assert "the model was fitted to these samples (record 'flown')" in said
     assert "has seen: it predicts" not in said
     assert "not seen" not in said
+
+
+def test_marks_are_the_smallest_hashes_each_once() -> None:
+    random = np.random.default_rng(4)
+    for size in (0, 1, MARKS, 4 * MARKS, 4 * MARKS + 1, 20_000):
+        even = random.integers(0, 2**64 - 1, size, dtype=np.uint64, endpoint=True)
+        few = random.choice(even, size) if size else even
+        for hashes in (even, few, even[: size // 40].repeat(40), even >> np.uint64(40), ~even // 2):
+            assert np.array_equal(_smallest(hashes), np.unique(hashes)[:MARKS])
