@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import flightid as fid
 from flightid.conditioning import remove_outliers
@@ -31,6 +32,15 @@ def codes(samples: np.ndarray, unit: str = "1") -> list[tuple[str, Light]]:
     return [(finding.code, finding.light) for finding in record_findings(record)]
 
 
+def smooth(*, frozen: bool = False) -> np.ndarray:
+    """Without noise: steps of many levels through a lag that settles; it may freeze on its way."""
+    levels = np.repeat(np.sin(np.arange(1.0, 16.0) ** 2), N // 15)
+    samples = lfilter([0.0, 0.1], [1.0, -0.9], levels)
+    if frozen:
+        samples[1003 : 1003 + N // 5] = samples[1003]
+    return np.asarray(samples)
+
+
 def dead(share: float) -> np.ndarray:
     samples = ROLL.copy()
     samples[1000 : 1000 + int(share * N)] = samples[1000]
@@ -51,6 +61,9 @@ def dead(share: float) -> np.ndarray:
         (ROLL + 2 * np.pi * (np.arange(N) == 700), "rad", [("spikes", Light.AMBER)]),
         (dead(0.02), "1", [("flat", Light.AMBER)]),
         (dead(0.2), "1", [("flat", Light.RED)]),
+        (smooth(), "1", []),
+        (np.round(smooth(), 7), "1", []),
+        (smooth(frozen=True), "1", [("flat", Light.RED)]),
         (np.repeat(ROLL[::5], 5), "1", [("samples-repeated", Light.AMBER)]),
         (np.clip(ROLL, -1.2, 1.2), "1", [("clipped", Light.RED)]),
         (np.mod(0.7 * TIME_S, 2 * np.pi), "rad", [("wrapped", Light.RED)]),

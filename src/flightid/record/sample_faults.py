@@ -29,6 +29,9 @@ HARMFUL = 0.5
 RED_SHARE = 0.05
 """Share of a channel's variance, or of its samples, from which a fault is red."""
 DEAD_SAMPLES, DEAD_SHARE, NOISY = 20, 0.01, 0.3
+REPEATED, ABRUPT = 0.01, 0.25
+"""Share of values that come twice in a channel that never rests; last step before it stops, over
+the median one."""
 LIMIT_SHARE, LIMIT_RUN, LIMIT_RUNS, LEVELS = 0.01, 3, 3, 30
 TURN = 2.0 * np.pi
 
@@ -199,9 +202,9 @@ def _wraps(channel: _ExaminedChannel) -> SampleFault | None:
 
 
 def _dead(channel: _ExaminedChannel) -> SampleFault | None:
-    """Stretches of one and the same value in a channel whose noise never rests.
+    """Stretches of one and the same value in a channel whose noise, or whose motion, never rests.
 
-    One at the beginning or the end may be rest.
+    One at the beginning or the end may be rest; one at an end of the range may be a limit.
     """
     if not channel.rests:
         return None
@@ -217,7 +220,8 @@ def _dead(channel: _ExaminedChannel) -> SampleFault | None:
         moving[start:stop] = False
     steps = channel.steps[moving]
     turning = np.mean(np.diff(np.sign(steps)) != 0) if steps.size > DEAD_SAMPLES else 0.0
-    if turning < NOISY or np.mean(steps == 0.0) > 1.0 - 2 * NOISY:
+    noisy = turning >= NOISY and np.mean(steps == 0.0) <= 1.0 - 2 * NOISY
+    if not (noisy or _stops_in_motion(channel, starts[long], steps)):
         return None
     first, last = int(starts[long][0]), int(stops[long][-1])
     share = float(np.sum((stops - starts)[long])) / values.size
@@ -226,10 +230,24 @@ def _dead(channel: _ExaminedChannel) -> SampleFault | None:
     said = (
         f"{name} stands still at one value for {100 * share:.2g} % of its samples, from "
         f"{stamps[starts[longest]]:.6g} to {stamps[stops[longest]]:.6g} s at the longest, though "
-        "its noise never rests elsewhere: nothing was measured there"
+        f"{'its noise never rests' if noisy else 'it never rests'} elsewhere: nothing was measured "
+        "there"
     )
     action = "cut the record before and after, or leave the channel out"
     return channel.fault(np.array([first, last]), ("flat", light, said, action))
+
+
+def _stops_in_motion(channel: _ExaminedChannel, starts: NDArray[np.intp], elsewhere: Array) -> bool:
+    """Whether a channel that never repeats a value elsewhere stops within one sample, inside.
+
+    What settles stops little by little, and what a limit stops lies at an end of its range.
+    """
+    values = channel.values
+    if elsewhere.size <= DEAD_SAMPLES or np.mean(elsewhere == 0.0) > REPEATED:
+        return False
+    before = np.abs(channel.steps[starts - 1])
+    inside = (values[starts] > values.min()) & (values[starts] < values.max())
+    return bool(np.all(inside & (before >= ABRUPT * np.median(np.abs(elsewhere)))))
 
 
 def _held(channel: _ExaminedChannel) -> SampleFault | None:

@@ -17,6 +17,9 @@ use crate::numerics::householder::{back_substitute, dot, norm, triangularise};
 
 /// Relative rise of the cost that rounding alone does not predict.
 const RISE: f64 = 1e-9;
+/// Relative fall of the cost that a minimum may leave: of thousands of residuals a thousandth of a
+/// standard error.
+const OFFSET: f64 = 1e-9;
 
 /// Where a search ended.
 #[derive(Debug, Clone)]
@@ -257,12 +260,23 @@ impl<'a> Search<'a> {
             return Some(Termination::Cost);
         }
         if small {
-            return Some(if self.damping < 1.0 { Termination::Step } else { Termination::Stalled });
+            return Some(if self.damping < 1.0 { Termination::Step } else { self.stalled() });
         }
         // Refusals in a row raise the damping ever faster.
         self.damping *= self.growth;
         self.growth *= 2.0;
-        (self.damping > 1e20).then_some(Termination::Stalled)
+        (self.damping > 1e20).then(|| self.stalled())
+    }
+
+    /// Where no step lowers the cost: at a minimum, as far as the cost can tell, where even the
+    /// undamped step would take next to nothing away.
+    ///
+    /// Reference: Bates & Watts (1981), *Technometrics* 23: the relative offset.
+    fn stalled(&mut self) -> Termination {
+        self.damping = f64::EPSILON.powi(2);
+        self.solve();
+        let left = self.predicted_reduction() + self.point.beside;
+        if left <= OFFSET * self.cost { Termination::Cost } else { Termination::Stalled }
     }
 
     fn predicted_reduction(&self) -> f64 {

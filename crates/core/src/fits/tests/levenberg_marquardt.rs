@@ -98,3 +98,41 @@ fn bad_bounds_and_starts_are_refused() {
     let nan = minimise(&mut Rosenbrock, &[f64::NAN, 0.0], &[-1.0; 2], &[1.0; 2], &options, go);
     assert!(matches!(nan, Err(CoreError::NotFinite { .. })));
 }
+
+/// A cost that no step lowers, whatever its slope promises.
+struct Deaf {
+    slope: f64,
+}
+
+impl Objective for Deaf {
+    fn n_parameters(&self) -> usize {
+        1
+    }
+
+    fn cost(&mut self, _x: &[f64]) -> Result<f64, CoreError> {
+        Ok(1.0)
+    }
+
+    fn begin(&mut self, _x: &[f64]) -> Result<(), CoreError> {
+        Ok(())
+    }
+
+    fn linearise(&mut self, _x: &[f64], point: &mut Point) -> Result<(), CoreError> {
+        point.cost = 1.0;
+        point.triangle[0] = 1.0;
+        point.projected[0] = self.slope;
+        Ok(())
+    }
+}
+
+#[test]
+fn a_stall_is_a_minimum_where_next_to_nothing_is_left() {
+    // The undamped step promises the slope's square of a cost of one.
+    for (slope, ended) in [(1e-6, Termination::Cost), (1e-2, Termination::Stalled)] {
+        let (low, high) = ([f64::NEG_INFINITY], [f64::INFINITY]);
+        let found =
+            search(&mut Deaf { slope }, &[1.0], &low, &high, &Options::default(), &mut |_| true)
+                .unwrap();
+        assert_eq!(found.termination, ended);
+    }
+}
