@@ -26,6 +26,10 @@ SETTINGS = {
     "distributed.worker.daemon": False,
     "distributed.worker.memory.terminate": False,
     "distributed.worker.memory.pause": False,
+    # What a waiting worker costs: it profiles itself every 10 ms otherwise.
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "200ms",
+    "distributed.admin.system-monitor.interval": "5s",
 }
 SILENCE_S = 10.0
 """Time without a result after which the workers are counted."""
