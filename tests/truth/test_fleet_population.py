@@ -148,16 +148,16 @@ def test_intervals_of_ten_vehicles_cover() -> None:
 @pytest.mark.parametrize("spread", [0.5, 1.0, 3.0])
 @pytest.mark.parametrize("k", [5, 10, 20])
 def test_intervals_cover_as_often_as_they_say(k: int, spread: float) -> None:
-    """Of 2,000 fleets: 93 to 97 %, counting errors of the count (0.5 %) aside."""
-    found = _coverage(k, spread, 2000, 100 * k + int(10 * spread))
-    assert np.all((found > 0.925) & (found < 0.98)), found
+    """Of 400 fleets: 93 to 97 %, with two errors of the count (1.1 %) to either side."""
+    found = _coverage(k, spread, 400, 100 * k + int(10 * spread))
+    assert np.all((found > 0.908) & (found < 0.992)), found
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("k", [5, 10, 20])
 def test_intervals_of_a_type_without_spread_are_long_rather_than_short(k: int) -> None:
-    found = _coverage(k, 0.0, 1000, k)
-    assert np.all(found > 0.93), found
+    found = _coverage(k, 0.0, 300, k)
+    assert np.all(found > 0.915), found
 
 
 def test_the_next_vehicle_of_a_known_spread_is_student() -> None:
