@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import errno
 import importlib.util
 import os
 import shutil
@@ -16,10 +17,18 @@ from typing import Any
 
 import pytest
 
+from flightid.errors import DataError
 from flightid.fleet import fleet_status, run_fleet
 from flightid.fleet.addresses import LogAddress, find_logs
 from flightid.fleet.engine import plain
-from flightid.fleet.engine.order import KILLED, LogOrder, RunOrder, run_order
+from flightid.fleet.engine.order import (
+    KILLED,
+    STORAGE,
+    LogOrder,
+    LogOutcome,
+    RunOrder,
+    run_order,
+)
 from flightid.fleet.engine.sandbox import DEAD, MEMORY, TIME, Sandbox
 from flightid.fleet.identity import FleetTables, read_tables
 from flightid.fleet.opening import open_catalogue
@@ -200,3 +209,25 @@ def test_the_window_keeps_a_long_list_from_being_read_ahead(
     assert len(taken) <= 2 * plain.WINDOW + 1
     assert len(list(results)) == 99
     assert FleetTables().told("V1", "a.bin") == ""
+
+
+def test_a_full_disk_ends_the_run_and_blames_no_log(
+    fleet: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    (address, *_) = find_logs([str(fleet.parent / "logs")])
+    with monkeypatch.context() as patch:
+        patch.setattr("flightid.fleet.run_one.read_log", full)
+        with pytest.raises(OSError, match="No space left"):
+            run_one(address, LogTask(read_fleet(fleet)))
+    for name in ("fleet.toml", "study.toml"):
+        shutil.copy(fleet.parent / name, tmp_path)
+    (tmp_path / "logs").mkdir()
+    (tmp_path / "logs" / "V01-20260301.bin").write_bytes(b"no log")
+    said = LogOutcome(LogOrder(address), STORAGE, "", message="No space left on device")
+    monkeypatch.setattr("flightid.fleet.run.find_spec", lambda _: None)
+    monkeypatch.setattr("flightid.fleet.run.run_plain", lambda *_: iter([said]))
+    with pytest.raises(DataError, match="run the fleet again"):
+        run_fleet(tmp_path / "fleet.toml")
