@@ -65,6 +65,7 @@ stubs: develop  ## regenerate src/flightid/_native.pyi
 
 test: wheel lint  ## everything that must pass before a merge
 	cargo test --workspace --quiet
+	@command -v chromium google-chrome >/dev/null || echo "No Chromium: the page is not tried in a browser (apt-get install chromium)"
 	$(PYTEST) $(SPREAD) --doctest-modules tests --pyargs flightid
 
 test-nightly: wheel  ## every example whole and longer draws of properties, minutes; then what test-slow does

@@ -1,0 +1,265 @@
+"""The local page in a real Chromium: from a dropped log to a dragged band, by mouse and keyboard.
+
+Where Chromium, Playwright or the built page is missing these are skipped, with how to get it; with
+FLIGHTID_BROWSER=required, as `.ci/run` has it, they fail.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import shutil
+import threading
+import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from http.server import BaseHTTPRequestHandler, HTTPServer
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.contract.source import ROOT
+from tests.sweep_log import SweepFlight
+
+CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
+AXE = ROOT / "app" / "node_modules" / "axe-core" / "axe.min.js"
+REQUIRED = os.environ.get("FLIGHTID_BROWSER") == "required"
+ARGUMENTS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
+SERIOUS = ("serious", "critical")
+WAIT_MS = 60_000
+
+
+def _missing() -> str:
+    try:
+        import fastapi  # noqa: F401
+        import playwright.sync_api  # noqa: F401
+
+        from flightid.app.page import page_files
+
+        page_files()
+    except ImportError as error:
+        return f"no {error.name}: pip install 'flightid[app]' playwright"
+    except ValueError as error:
+        return str(error)
+    return "" if CHROMIUM else "no Chromium: apt-get install chromium"
+
+
+@dataclass
+class Window:
+    """A page of the browser, with what it complained about."""
+
+    page: Any
+    complaints: list[str] = field(default_factory=list)
+
+    def watch(self) -> Window:
+        self.page.on("console", self._console)
+        self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        self.page.set_default_timeout(WAIT_MS)
+        return self
+
+    def _console(self, message: Any) -> None:
+        if message.type in ("error", "warning"):
+            self.complaints.append(message.text)
+
+
+@dataclass
+class Desk:
+    """A browser and a workspace that is served to it."""
+
+    browser: Any
+    context: Any
+    address: str
+    folder: Path
+
+    def open(self, place: str = "") -> Window:
+        window = Window(self.context.new_page()).watch()
+        window.page.goto(self.address.partition("?")[0] + place)
+        return window
+
+    @property
+    def study(self) -> dict[str, Any]:
+        (path,) = (self.folder / "studies").glob("[!.]*.toml")
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+
+
+@pytest.fixture(scope="module")
+def desk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Desk]:
+    if missing := _missing():
+        pytest.fail(missing) if REQUIRED else pytest.skip(missing)
+    from playwright.sync_api import sync_playwright
+
+    from flightid.app.guard import Session
+    from flightid.app.page import page_files
+    from flightid.app.serving import bound_socket, server_of
+    from flightid.app.workspace import Workspace
+
+    folder = tmp_path_factory.mktemp("workspace")
+    bound = bound_socket(0)
+    session = Session(bound.getsockname()[1])
+    server = server_of(Workspace(folder), page_files(), session)
+    thread = threading.Thread(target=lambda: asyncio.run(server.serve(sockets=[bound])))
+    thread.start()
+    with sync_playwright() as tools:
+        browser = tools.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+        context = browser.new_context(viewport={"width": 1280, "height": 800})
+        first = context.new_page()
+        first.goto(session.address)
+        first.wait_for_selector(".drop", timeout=WAIT_MS)
+        first.close()
+        yield Desk(browser, context, session.address, folder)
+        browser.close()
+    server.should_exit = True
+    thread.join()
+
+
+def _findings(page: Any) -> list[str]:
+    """Serious findings of axe-core on what is shown, in both colours."""
+    found = []
+    page.evaluate(AXE.read_text(encoding="utf-8"))
+    for theme in ("dark", "light"):
+        page.evaluate(f"document.documentElement.dataset.theme = '{theme}'")
+        told = page.evaluate("axe.run(document, {resultTypes: ['violations']})")
+        found += [
+            f"{theme}: {each['id']}: {each['nodes'][0]['html'][:120]}"
+            for each in told["violations"]
+            if each["impact"] in SERIOUS
+        ]
+    return found
+
+
+def test_from_a_dropped_log_to_a_dragged_band(desk: Desk, tmp_path: Path) -> None:
+    window = desk.open()
+    page = window.page
+    page.wait_for_selector(".empty")
+    said = _findings(page)
+    page.set_input_files(
+        "input[type=file]", SweepFlight(sweep_s=25.0, rate_hz=100.0).write(tmp_path)
+    )
+    page.wait_for_selector(".cards")
+    assert "can carry a model of roll, pitch and yaw" in page.inner_text("h1")
+    page.locator(".uplot canvas").nth(1).wait_for()
+    # Any field, by parts of its name and Enter.
+    page.fill("#field", "imu gyrx")
+    page.press("#field", "Enter")
+    page.wait_for_selector("section[aria-label='Plot of IMU.GyrX'] canvas")
+    said += _findings(page)
+    # A span is typed; the model is fitted on it; the change is taken back.
+    before = desk.study
+    page.locator("input[type=number]").nth(0).fill("40")
+    page.locator("input[type=number]").nth(1).fill("55.5")
+    page.locator("input[type=number]").nth(1).press("Tab")
+    page.click("text=fit Roll rate")
+    page.wait_for_selector("pre .changed")
+    named = desk.study["model"][0]["identify"]
+    assert {"name": named[0], "span_s": [40.0, 55.5]} in desk.study["segment"]
+    page.click("text=Undo")
+    page.locator("pre .changed", has_text='["roll sweep"]').wait_for()
+    assert desk.study == before
+    # The band: by arrow key, then by the mouse.
+    page.click("nav >> text=Response")
+    page.wait_for_selector(".handle")
+    page.locator(".uplot canvas").nth(2).wait_for()
+    page.locator(".handle").nth(1).press("ArrowLeft")
+    page.locator("pre .changed", has_text="band_rad_s").wait_for()
+    low, high = desk.study["model"][0]["band_rad_s"]
+    assert [low, high] == [
+        before["model"][0]["band_rad_s"][0],
+        pytest.approx(before["model"][0]["band_rad_s"][1] / 1.03, rel=1e-3),
+    ]
+    box = page.locator(".handle").nth(0).bounding_box()
+    middle = (box["x"] + box["width"] / 2.0, box["y"] + box["height"] / 2.0)
+    page.mouse.move(*middle)
+    page.mouse.down()
+    page.mouse.move(middle[0] + 60.0, middle[1], steps=6)
+    page.mouse.up()
+    for _ in range(100):
+        if desk.study["model"][0]["band_rad_s"][0] != low:
+            break
+        page.wait_for_timeout(100)
+    assert desk.study["model"][0]["band_rad_s"][0] > 1.05 * low
+    assert desk.study["model"][0]["band_rad_s"][1] == high
+    said += _findings(page)
+    assert not said
+    assert not window.complaints
+    page.close()
+
+
+def test_a_second_window_overwrites_nothing(desk: Desk) -> None:
+    place = f"#/response/{next((desk.folder / 'studies').glob('*.toml')).stem}"
+    first, second = desk.open(place), desk.open(place)
+    for window in (first, second):
+        window.page.locator("#n").wait_for()
+    first.page.fill("#n", "31")
+    first.page.press("#n", "Tab")
+    first.page.wait_for_selector("pre .changed")
+    second.page.fill("#least", "0.7")
+    second.page.press("#least", "Tab")
+    second.page.wait_for_selector("dialog[open]")
+    assert "n_omega = 31" in second.page.inner_text("dialog pre >> nth=0")
+    assert "minimum_coherence" not in str(desk.study)
+    second.page.click("text=Take theirs, then mine")
+    second.page.wait_for_selector("dialog[open]", state="detached")
+    second.page.wait_for_selector("pre .changed")
+    assert desk.study["model"][0]["response"] == {"n_omega": 31, "minimum_coherence": 0.7}
+    # The conflict itself is one answer of 409, which the browser writes down.
+    assert not first.complaints
+    assert all("409" in each for each in second.complaints)
+    for window in (first, second):
+        window.page.close()
+
+
+class _Stranger(BaseHTTPRequestHandler):
+    """A page of another local port."""
+
+    def do_GET(self) -> None:
+        self.send_response(200)
+        self.send_header("content-type", "text/html")
+        self.end_headers()
+        self.wfile.write(b"<!doctype html><title>stranger</title>")
+
+    def log_message(self, format: str, *args: object) -> None:
+        pass
+
+
+TRIES = """async (ours) => {
+  const told = {};
+  const tried = async (name, call) => {
+    try { const answer = await call(); told[name] = answer.type + answer.status; }
+    catch (error) { told[name] = "refused"; }
+  };
+  const all = { credentials: "include" };
+  await tried("read", () => fetch(ours + "/api/workspace", all));
+  await tried("read blindly", () => fetch(ours + "/api/workspace", { ...all, mode: "no-cors" }));
+  await tried("post", () => fetch(ours + "/api/jobs", { ...all, method: "POST", body: "{}" }));
+  const put = { ...all, method: "PUT", body: "x" };
+  await tried("put", () => fetch(ours + "/api/logs?name=a.bin", put));
+  told.socket = await new Promise((done) => {
+    const socket = new WebSocket(ours.replace("http", "ws") + "/api/live");
+    socket.onopen = () => done("open");
+    socket.onclose = () => done("refused");
+  });
+  told.frame = await new Promise((done) => {
+    const frame = document.createElement("iframe");
+    frame.src = ours + "/";
+    frame.onload = () => {
+      try { done(String(frame.contentDocument)); } catch { done("refused"); }
+    };
+    document.body.append(frame);
+  });
+  return told;
+}"""
+
+
+def test_a_page_of_another_local_port_gets_nothing(desk: Desk) -> None:
+    """The browser sends it our cookie, as SameSite=Strict does not part ports."""
+    logs = sorted((desk.folder / "logs").rglob("*"))
+    with HTTPServer(("127.0.0.1", 0), _Stranger) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        page = desk.context.new_page()
+        page.goto(f"http://127.0.0.1:{server.server_port}/")
+        told = page.evaluate(TRIES, desk.address.partition("/?")[0])
+        page.close()
+        server.shutdown()
+    assert set(told.values()) <= {"refused", "null"}, told
+    assert sorted((desk.folder / "logs").rglob("*")) == logs
