@@ -1,0 +1,75 @@
+"""How long a hand waits for the local page's server: medians of 50, wall and processor time.
+
+    python -m benchmarks.app_latency [LOG]      default: a simulated flight of sweeps of 130 s
+
+Drags of a band go over the socket as the page sends them; a zoom is one view of a channel of 10⁷
+samples; the page's list is asked while ten jobs run.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from tests.sweep_log import SweepFlight
+
+from flightid.app import work
+from flightid.app.pyramid import Pyramid, view
+from flightid.app.study_edits import KeyEdit
+
+REPEATS = 50
+
+
+def medians(call: Callable[[int], object]) -> str:
+    """Median wall and processor time of a call, ms."""
+    wall, processor = [], []
+    for number in range(REPEATS):
+        begun, used = time.perf_counter(), time.process_time()
+        call(number)
+        wall.append(time.perf_counter() - begun)
+        processor.append(time.process_time() - used)
+    return f"{1e3 * np.median(wall):7.1f} ms wall, {1e3 * np.median(processor):7.1f} ms processor"
+
+
+def drags(log: Path, folder: Path) -> None:
+    """A band dragged, a band let go, a log looked at."""
+    study = folder / "studies" / "a.toml"
+    study.parent.mkdir()
+    begun = time.process_time()
+    work.make_overview(log, study, folder / "overview.json")
+    print(
+        f"log of {log.stat().st_size / 1e6:.0f} MB to verdict: {time.process_time() - begun:.2f} s"
+    )
+    text = study.read_text()
+
+    def drag(number: int, intervals: bool = False) -> None:
+        edit = KeyEdit(("model", 0, "band_rad_s"), [2.0 + 0.01 * number, 20.0])
+        work.make_responses(study, text, "Roll rate", [edit], True, intervals)
+
+    drag(0)
+    print(f"band dragged → response:            {medians(drag)}")
+    print(f"band let go → bars of its windows:  {medians(lambda k: drag(k, True))}")
+
+
+def zooms() -> None:
+    """A long channel."""
+    n = 10_000_000
+    time_s, values = np.arange(n) / 1000.0, np.random.default_rng(0).standard_normal(n)
+    begun = time.process_time()
+    made = Pyramid.of(time_s, values)
+    print(f"levels of 10⁷ samples:              {1e3 * (time.process_time() - begun):7.1f} ms")
+    spans = np.random.default_rng(1).uniform(0.0, 4000.0, (REPEATS, 2)).cumsum(axis=1)
+    told = medians(lambda k: view([made], (spans[k][0], spans[k][1] + 1.0), 1200).tobytes())
+    print(f"one view of it, 1200 columns:       {told}")
+
+
+if __name__ == "__main__":
+    with tempfile.TemporaryDirectory() as name:
+        given = [Path(each) for each in sys.argv[1:]]
+        path = given[0] if given else SweepFlight(rate_hz=100.0, sweep_s=130.0).write(Path(name))
+        drags(path, Path(name))
+    zooms()
