@@ -63,6 +63,16 @@ def flight(page: Page) -> None:
     photograph(page, "app-flight.png")
 
 
+def response(page: Page) -> None:
+    """The screen of a frequency response, the direct estimate beside the instrument's."""
+    page.click("nav >> text=Response")
+    page.click("text=Direct beside instrument")
+    page.locator("pre .changed", has_text="compare").wait_for()
+    page.locator(".key.dashed").wait_for()
+    page.wait_for_timeout(2000)  # for the bars that windows widen
+    photograph(page, "app-response.png")
+
+
 def main(log: Path) -> None:
     """Take all pictures."""
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as tools:
@@ -76,6 +86,7 @@ def main(log: Path) -> None:
             page.goto(session.address)
             page.wait_for_selector("tbody a")
             flight(page)
+            response(page)
             browser.close()
 
 

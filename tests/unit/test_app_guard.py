@@ -167,12 +167,10 @@ def test_a_token_is_worth_one_cookie() -> None:
     assert enter(session.token, cookie=f"{session.cookie}={session.secret}")[0] == 200
 
 
-@pytest.mark.parametrize(("more", "status"), [(0, 200), (1, 499)])
-def test_a_body_without_a_length_is_counted(
-    more: int, status: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_body_without_a_length_is_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("flightid.app.guard.UPLOAD_BYTES", 1000)
     head: dict[str, str | None] = {"content-type": "application/octet-stream"}
-    body = (b"x" * 600, b"x" * (400 + more), b"")
-    assert _asked(head, method="PUT", body=body)[0] == status
+    for more, status in ((0, 200), (1, 499)):
+        body = (b"x" * 600, b"x" * (400 + more), b"")
+        assert _asked(head, method="PUT", body=body)[0] == status
     assert UPLOAD_BYTES == 1 << 30

@@ -40,8 +40,12 @@ def test_a_spike_of_one_sample_among_two_million_shows() -> None:
     assert table[0][np.argmax(table[1] == 1.0)] == pytest.approx(1234.567, abs=n * 1e-3 / 800)
 
 
-@pytest.mark.parametrize("n", [100, 100_000])
-def test_gaps_and_missing_values_break_the_line_at_every_zoom(n: int) -> None:
+def test_gaps_and_missing_values_break_the_line_at_every_zoom() -> None:
+    for n in (100, 100_000):
+        _breaks(n)
+
+
+def _breaks(n: int) -> None:
     time_s = np.arange(n) * 0.01
     time_s[n // 2 :] += 0.2 * n * 0.01  # a silence of a fifth of the record
     values = np.ones(n)

@@ -167,6 +167,11 @@ def test_requests_that_a_stranger_makes_on_the_wire(browser: Browser, flown: Flo
     for origin in (None, "http://127.0.0.1:1"):
         with pytest.raises(InvalidStatus), browser.socket(origin=origin):
             pass
+    bound = bound_socket(0)
+    assert bound.getsockname()[0] == "127.0.0.1"
+    with pytest.raises(OptionError, match="the port cannot be taken"):
+        bound_socket(bound.getsockname()[1])
+    bound.close()
 
 
 def test_any_field_is_drawn_at_any_zoom(browser: Browser, flown: Flown) -> None:
@@ -203,18 +208,15 @@ def test_only_the_newest_question_of_a_hand_is_answered(browser: Browser, flown:
         assert "no study" in json.loads(line.recv(timeout=60))["error"]
 
 
-def test_jobs_that_a_killed_server_left_are_offered_again(tmp_path: Path) -> None:
+def test_a_cancelled_job_and_a_killed_one_can_be_begun_again(
+    browser: Browser, flown: Flown, tmp_path: Path
+) -> None:
     Workers(Workspace(tmp_path)).stop()
     job = Job(id="review-x", kind="review", log="x", state="waiting")
     (tmp_path / ".flightid" / "jobs" / "review-x.json").write_text(job.model_dump_json())
     left = Workers(Workspace(tmp_path))
     assert [each.state for each in left.all()] == ["interrupted"]
     left.stop()
-
-
-def test_a_cancelled_job_leaves_nothing_and_can_be_begun_again(
-    browser: Browser, flown: Flown
-) -> None:
     browser.workspace.forget(flown.log)
     flight = browser.ask(f"/api/logs/{flown.log}")[1]
     waiting = [job["id"] for job in flight["jobs"] if job["state"] == "waiting"]
@@ -281,11 +283,3 @@ def _lines_give(study: Path, folder: Path, expected: FrequencyResponse) -> None:
     lines = lines.replace("read_log('", f"read_log('{folder}/").replace("print(", "str(")
     exec(lines, scope)
     np.testing.assert_array_equal(scope["response"].response, expected.response)
-
-
-def test_the_loopback_alone_is_bound_and_a_taken_port_is_told() -> None:
-    bound = bound_socket(0)
-    assert bound.getsockname()[0] == "127.0.0.1"
-    with pytest.raises(OptionError, match="the port cannot be taken"):
-        bound_socket(bound.getsockname()[1])
-    bound.close()

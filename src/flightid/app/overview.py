@@ -34,7 +34,8 @@ READINGS = ("rise time", "overshoot", "settling time", "-3 dB bandwidth")
 PLACES = {
     "airborne": "air",
     "excitation-found": "sid autotune chirp sweep steps",
-    "saturation": "limit",
+    "saturated": "limit",
+    "tipped-over": "fall",
     "gap": "gap",
     "dropout": "gap",
 }

@@ -22,6 +22,8 @@ FINE = 4
 """A block is at most this part of a column, so that no sample is drawn a column away."""
 GAP_FACTOR = 8.0
 """Silence longer than this many usual steps is a gap."""
+SAMPLED = 100_000
+"""Steps between stamps that tell the usual one."""
 SKIPPED = np.inf
 """In a view: this series has no sample here, and its line goes on. NaN: the line is broken."""
 
@@ -65,14 +67,20 @@ class Pyramid:
             time_s, values = time_s[order], values[order]
         values = np.where(np.isfinite(values), values, np.nan)
         steps = np.diff(time_s)
-        usual = float(np.median(steps)) if steps.size else 0.0
+        usual = float(np.median(steps[:: 1 + steps.size // SAMPLED])) if steps.size else 0.0
         broken = np.isnan(values)
         broken[:-1] |= steps > GAP_FACTOR * usual if usual > 0.0 else False
         levels: list[Array] = []
-        level = np.stack([values, values, broken.astype(np.float64)])
-        while level.shape[1] > FACTOR:
-            level = _coarser(level, FACTOR if levels else BASE)
-            levels.append(level)
+        rows: tuple[Array, Array, Array] = (values, values, broken.astype(np.float64))
+        while rows[0].size > FACTOR:
+            factor = FACTOR if levels else BASE
+            low, high, ends = rows
+            rows = (
+                _blocks(low, factor, np.minimum, np.fmin),
+                _blocks(high, factor, np.maximum, np.fmax),
+                _blocks(ends, factor, np.maximum, np.fmax),
+            )
+            levels.append(np.stack(rows))
         return cls(time_s, values, broken, tuple(levels))
 
     def write(self, path: Path) -> Path:
@@ -126,9 +134,17 @@ class Pyramid:
         return _reduced(level, blocks)
 
 
-def _coarser(level: Array, factor: int) -> Array:
-    edges = np.arange(0, level.shape[1] + factor, factor)
-    return _reduced(level, np.minimum(edges, level.shape[1]))
+def _blocks(row: Array, factor: int, fast: np.ufunc, missing: np.ufunc) -> Array:
+    """Extremes of blocks of a row, the last one shorter; missing values count only alone."""
+    whole = row.size // factor
+    made = np.empty(-(-row.size // factor))
+    table = row[: whole * factor].reshape(whole, factor)
+    made[:whole] = fast.reduce(table, axis=1)
+    holes = np.flatnonzero(np.isnan(made[:whole]))
+    made[holes] = missing.reduce(table[holes], axis=1)
+    if made.size > whole:
+        made[whole] = missing.reduce(row[whole * factor :])
+    return made
 
 
 def _reduced(level: Array, edges: NDArray[np.int64]) -> Array:

@@ -95,7 +95,8 @@ def _add_page(app: FastAPI, page: Mapping[str, tuple[str, bytes]]) -> None:
 
     @app.get("/{name:path}", include_in_schema=False)
     async def part(name: str) -> Response:
-        return _file(name)
+        # Browsers ask for this name where a page that is left at once names another.
+        return _file("icon.svg" if name == "favicon.ico" else name)
 
     def _file(name: str) -> Response:
         if name not in page:

@@ -49,7 +49,8 @@ class TimelineBlock:
     Attributes
     ----------
     kind, axis, text : str
-        Kind as in `FoundExcitation`, or "mode", "limit", "air", "gap"; its axis, if any; words.
+        Kind as in `FoundExcitation`, or "mode", "limit", "air", "gap", "fall"; its axis, if any;
+        words.
     start_s, stop_s : float
     """
 
@@ -130,6 +131,9 @@ def _blocks(log: Log, inspection: Inspection, span: Span) -> list[TimelineBlock]
         for each in inspection.excitations
     ]
     found += [TimelineBlock("gap", "", each.reason, each.start_s, each.stop_s) for each in log.gaps]
+    if inspection.phases.tipped_s is not None:
+        fell = inspection.phases.tipped_s
+        found.append(TimelineBlock("fall", "", "the vehicle falls over", fell, span[1]))
     apart = (span[1] - span[0]) / JOINED
     limits = [
         TimelineBlock("limit", "", f"{contact.what} at its {contact.limit}", *each)
