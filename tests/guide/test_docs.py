@@ -15,7 +15,7 @@ BLOCK = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
 
 LONG = {
     *("tuning", "verification", "responses", "margins", "evidence", "regression", "inspection"),
-    *("identify", "black_box", "flight"),
+    *("identify", "black_box", "flight", "fleet"),
 }
 """Pages whose examples take half a second or more; the verbs they call have tests of their own."""
 RUN = [

@@ -61,6 +61,7 @@ def flight(seed: int, noise_share: float = NOISE) -> fid.Record:
         outputs={"p": clean + noise},
         units={"p": "rad/s"},
         hold="first",
+        history=quiet().history,  # lines by construction, which samples alone do not show
     )
 
 
