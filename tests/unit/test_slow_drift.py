@@ -11,8 +11,14 @@ from scipy.signal import lfilter
 
 import flightid as fid
 from flightid.uncertainty.driven_noise import driven_products
-from flightid.uncertainty.residual_noise import Autoregression, _lags, autoregression, periodogram
-from flightid.uncertainty.slow_drift import Drift, _is_slow
+from flightid.uncertainty.residual_noise import (
+    Autoregression,
+    _fitted,
+    _lags,
+    autoregression,
+    periodogram,
+)
+from flightid.uncertainty.slow_drift import FASTEST, SLOWEST, Drift, _is_slow, _parted
 from tests.closeness import assert_close
 from tests.strangers import noises, output_error
 
@@ -91,6 +97,26 @@ def test_a_walk_under_white_noise_is_found(seed: int) -> None:
     slow_level, fast_level = model.freedom(np.array([np.inf, 1.05 * float(model.lags[0])]))
     assert slow_level < 8.0
     assert fast_level > 40.0
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_rounds_end_where_more_of_them_would(seed: int) -> None:
+    """At every corner a hundred rounds, and Whittle's likelihood of what they end in."""
+    random = np.random.default_rng(seed)
+    power = periodogram(noises.drift(random, N)[:, None] + noises.ar1(random, N, 0.5)[:, None])
+    found = autoregression(power, N)
+    assert found.drift is not None
+    ends, fitted = [], partial(_fitted, n=N, length=found.length)
+    for corner in np.geomspace(SLOWEST / N, FASTEST, 4):
+        fast, slow = fitted(power), Drift(0.3 * power.mean(), corner)
+        for _ in range(100):
+            fast, slow = _parted(fitted, power, found.length, (fast, slow), 1)
+        level = fast.spectrum() + slow.spectrum(found.length)
+        worth = -N * np.mean(np.log(level) + power / level) - fast.order * np.log(N)
+        ends.append((worth, slow))
+    best = max(ends, key=lambda each: each[0])[1]
+    assert found.drift.corner == pytest.approx(best.corner, rel=1e-12)
+    assert_close(found.drift.variance, best.variance, rtol=1e-6, why="rounds end at 1e-7")
 
 
 @pytest.mark.parametrize("seed", range(4))
