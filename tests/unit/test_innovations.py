@@ -302,6 +302,33 @@ def test_data_decide_on_feedthrough_and_order(numerator: list[float], at_once: b
     assert "kept third" in fit.details.order.summary().to_text()
 
 
+def _resonant(seed: int, n: int, noise_pole: float = 0.0) -> fid.Record:
+    """A pair of poles with noise of one pole in the output, in SciPy."""
+    random = np.random.default_rng(seed)
+    u = random.standard_normal(n)
+    y = lfilter([0.0, 1.0, 0.5], [1.0, -1.5, 0.8], u)
+    drive = np.sqrt(1.0 - noise_pole**2) * random.standard_normal(n)
+    y += 0.3 * y.std() * lfilter([1.0], [1.0, -noise_pole], drive)
+    return fid.Record.from_arrays(np.arange(n) * 0.1, inputs={"u": u}, outputs={"y": y})
+
+
+@pytest.mark.parametrize(("seed", "n"), [(1, 2_000), (4, 10_000), (7, 10_000), (9, 10_000)])
+def test_chance_in_the_kept_third_adds_no_states(seed: int, n: int) -> None:
+    """Where one standard error would: better by less than Student's 5 % is not better."""
+    structure = M.subspace("u", "y", refine=False)
+    assert fid.identify(structure, _resonant(seed, n)).model.order == 2
+
+
+def test_refined_predictions_ask_for_the_pole_of_the_noise() -> None:
+    record = _resonant(0, 2_000, 0.9)
+    assert fid.identify(M.subspace("u", "y", refine=False), record).model.order == 2
+    fit = fid.identify(M.subspace("u", "y"), record)
+    assert fit.model.order == fit.details.order.chosen == 3
+    assert fit.covariance is not None
+    poles = [each.z for each in fit.details.roots if each.kind == "pole"]
+    assert min(abs(pole - 0.9) for pole in poles) < 0.05
+
+
 def test_a_stable_estimate_is_asked_for() -> None:
     random, n = np.random.default_rng(1), 300
     u = random.standard_normal(n)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -23,16 +22,15 @@ from flightid.identification.prediction_error.roots import Errors
 from flightid.identification.prediction_error.sampling_rate import sampling_findings
 from flightid.identification.subspace.data import SubspaceData, acts_at_once, gather
 from flightid.identification.subspace.details import SubspaceDetails
-from flightid.identification.subspace.determinant import log_determinant
-from flightid.identification.subspace.estimate import Matrices, decompose, realise
+from flightid.identification.subspace.estimate import Matrices, decompose
 from flightid.identification.subspace.findings import PREDICTOR_AT_CIRCLE, judge_innovations
 from flightid.identification.subspace.order import OrderChoice, choose_order, determinant_criteria
 from flightid.identification.subspace.prediction_errors import (
     Predictor,
     RefinementResult,
-    refine,
     whitener,
 )
+from flightid.identification.subspace.refined_order import refined_order, scaled
 from flightid.identification.subspace.roots import (
     innovations_gains,
     innovations_roots,
@@ -59,78 +57,14 @@ def fit_subspace(structure: SubspaceStructure, data: Record | Sequence[Record]) 
     if structure.direct is None:
         structure = replace(structure, direct=acts_at_once(gathered, gathered.horizon(structure)))
     decomposed = decompose(structure, gathered)
-    choice, start = choose_order(structure, gathered, decomposed)
-    size = gathered.scales
-    spare = ""
+    choice, start, limit = choose_order(structure, gathered, decomposed)
     if structure.refine:
-        found = _refined(structure, gathered, start)
-        fewer = [order for order in choice.rivals.values() if order < choice.chosen]
-        if found.covariance is not None and fewer:
-            # Where a state is not there, its pole is anywhere and the information near singular.
-            numbers = 2 * len(structure.outputs) + len(structure.inputs)
-            for order in sorted({min(fewer), choice.chosen - 1}):
-                less = realise(structure, gathered, decomposed, order)
-                limit = _spared_level(found, order, numbers)
-                lower = _refined(structure, gathered, less, enough=limit)
-                if spare := _spare_states(lower, found, numbers):
-                    break
+        choice, found, spare = refined_order(
+            structure, gathered, decomposed, (choice, limit), start
+        )
     else:
-        found = _unrefined(structure, gathered, _scaled(start, 1.0 / size))
+        found, spare = _unrefined(structure, gathered, scaled(start, 1.0 / gathered.scales)), ""
     return _assemble(structure, records, gathered, choice, found, spare)
-
-
-def _refined(
-    structure: SubspaceStructure,
-    data: SubspaceData,
-    start: Matrices,
-    *,
-    enough: float | None = None,
-) -> RefinementResult:
-    return refine(
-        data,
-        _scaled(start, 1.0 / data.scales),
-        direct=bool(structure.direct),
-        initial_state=structure.initial_state,
-        maximum_iterations=structure.maximum_iterations,
-        enough=enough,
-    )
-
-
-def _spared_level(found: RefinementResult, fewer: int, numbers: int) -> float:
-    """Log determinant below which so many states do as well, by the Bayesian criterion.
-
-    Parameters
-    ----------
-    found : RefinementResult
-        With the states that were asked.
-    fewer : int
-        States.
-    numbers : int
-        Parameters that a state brings.
-
-    Reference
-    ---------
-    Schwarz (1978), Estimating the dimension of a model, *Annals of Statistics* 6.
-    """
-    samples = sum(each.shape[1] for each in found.errors)
-    saved = (found.matrices[0].shape[0] - fewer) * numbers
-    penalty: float = saved * math.log(samples) / samples
-    return log_determinant(found.errors) + penalty
-
-
-def _spare_states(lower: RefinementResult, found: RefinementResult, numbers: int) -> str:
-    """Why fewer states do as well, by `_spared_level`; else empty."""
-    order, fewer = (each.matrices[0].shape[0] for each in (found, lower))
-    level, limit = log_determinant(lower.errors), _spared_level(found, fewer, numbers)
-    if not (np.isfinite(level - limit) and level < limit):
-        return ""
-    return f"{fewer} states foretell the outputs as well as {order}"
-
-
-def _scaled(matrices: Matrices, size: Array) -> Matrices:
-    """The model with its outputs multiplied by `size`."""
-    a, b, c, d, k = matrices
-    return a, b, size[:, None] * c, size[:, None] * d, k / size
 
 
 def _unrefined(
@@ -165,7 +99,7 @@ def _assemble(
         structure.inputs,
         structure.outputs,
         data.channels.sample_time_s,
-        *_scaled(found.matrices, size),
+        *scaled(found.matrices, size),
         noise_covariance=joint @ joint.T * (len(size) / found.degrees),
         units=data.channels.units,
         operating_point=data.channels.operating_point,

@@ -35,6 +35,8 @@ Array = NDArray[np.float64]
 FITTED = 2.0 / 3.0
 """Share of each record that fits the models which run through the rest of it."""
 STRETCHES = 12
+BEYOND_CHANCE = 1.7958848187040437
+"""Student's 95 % point, one side, of a mean over so many stretches, in standard errors."""
 SAME = 1e-6
 """Relative difference of mean squares that is rounding."""
 
@@ -125,8 +127,9 @@ class OrderChoice(Result, schema="flightid.order_choice/1"):
             f"{self.horizon} block rows of past and of future",
             "SVC: squared next canonical correlation + d ln N / N; BIC of errors one step ahead "
             "before refinement; the smallest value counts",
-            "taken: the fewest states whose free run on the kept third of each record errs no more "
-            "than a standard error above the best; without it the smallest SVC",
+            "taken: the fewest states whose free run on the kept third of each record is not worse "
+            "than the best beyond chance (5 %), and more, up to one standard error's choice, where "
+            "BIC of the refined model asks for them; without a kept third the smallest SVC",
         )
         return Table(repr(self), columns, tuple(rows), notes)
 
@@ -142,8 +145,11 @@ class OrderChoice(Result, schema="flightid.order_choice/1"):
 
 def choose_order(
     structure: SubspaceStructure, data: SubspaceData, found: Subspace
-) -> tuple[OrderChoice, Matrices]:
-    """Order by free run on kept samples unless one is asked, and the model of that order.
+) -> tuple[OrderChoice, Matrices, int]:
+    """Order by free run on kept samples unless one is asked, the model of that order, and a limit.
+
+    The limit is the order that one standard error of the free runs would take: what lies between
+    is open.
 
     Reference: Bauer, "Order estimation for subspace methods", *Automatica* 37 (2001).
     """
@@ -171,7 +177,7 @@ def choose_order(
         chosen, values, found.correlations, gap, tuple(svc), tuple(made), found.horizon,
         structure.order is not None, tuple(float(np.mean(each)) for each in runs),
     )  # fmt: skip
-    return choice, fitted[chosen]
+    return choice, fitted[chosen], simplest(runs, errors_apart=1.0)
 
 
 def kept_errors(structure: SubspaceStructure, data: SubspaceData, largest: int) -> list[Array]:
@@ -189,16 +195,21 @@ def kept_errors(structure: SubspaceStructure, data: SubspaceData, largest: int) 
     skip = usual_stretch(min(y.shape[1] for y in kept.outputs), largest)
     if min(y.shape[1] for y in kept.outputs) < skip + STRETCHES:
         return []
-    return [_kept_error(structure, first, kept, each, skip) for each in made]
+    return [free_run_errors(structure, first, kept, each, skip) for each in made]
 
 
-def _kept_error(
+def free_run_errors(
     structure: SubspaceStructure,
     first: SubspaceData,
     kept: SubspaceData,
     matrices: Matrices,
     skip: int,
 ) -> Array:
+    """Squared errors of a free run over the outputs' power, in stretches of `kept`.
+
+    Levels are those of `first`, whose records go on in `kept`; the state at the start is fitted to
+    the first `skip` samples, which do not count.
+    """
     model = InnovationsModel(structure.inputs, structure.outputs, 1.0, *matrices)
     size, a, c = kept.scales[:, None], matrices[0], matrices[2]
     squares = []
@@ -219,11 +230,14 @@ def _kept_error(
     return np.array([np.mean(part) for part in np.array_split(joint, STRETCHES)])
 
 
-def simplest(errors: Sequence[Array]) -> int:
-    """Fewest states that err no more than the best by one standard error; 0 where nothing ran.
+def simplest(errors: Sequence[Array], *, errors_apart: float = BEYOND_CHANCE) -> int:
+    """Fewest states that do not err more than the best beyond chance; 0 where nothing ran.
+
+    Means over stretches longer than the noise remembers are independent, so Student's test of
+    paired differences allows for its colour.
 
     Reference: Breiman et al., *Classification and Regression Trees* (1984), section 3.4.3, of
-    differences in the same stretches.
+    differences in the same stretches; Schmeiser (1982), *Operations Research* 30, batch means.
 
     Example
     -------
@@ -238,7 +252,7 @@ def simplest(errors: Sequence[Array]) -> int:
             continue
         more = each - best
         spread = float(np.std(more, ddof=1)) / math.sqrt(more.size)
-        if float(np.mean(more)) <= max(spread, SAME * float(np.mean(best))):
+        if float(np.mean(more)) <= max(errors_apart * spread, SAME * float(np.mean(best))):
             return place + 1
     return 0
 
