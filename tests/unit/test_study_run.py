@@ -14,6 +14,7 @@ from flightid.cli.program import run
 from flightid.conventions import Light
 from flightid.errors import StudyError
 from flightid.findings import Finding
+from flightid.report.content import Figure
 from flightid.report.html import to_html
 from flightid.report.text import to_text
 from flightid.study import answer
@@ -109,6 +110,16 @@ def test_every_stage_left_its_result(study: fid.Study) -> None:
     assert set(study.truth.parameters(item.fit.model)) == {"Ltphi", "Lp", "T_m", "tau"}
     assert set(study.records) == {"sweep", "doublet"}
     assert re.fullmatch(r"Study\('Short flight <b>', 1 model, .*green.*\)", repr(study))
+
+
+def test_the_report_shows_the_time_history_that_was_used(study: fid.Study) -> None:
+    """Instrument, input and output over the time of the log, and nothing else of the record."""
+    figures = [block for block in study.document.walk() if isinstance(block, Figure)]
+    (drawn,) = (each for each in figures if each.caption.startswith("What the responses were"))
+    assert "sweep; injected signals, inputs and" in drawn.caption
+    traces = [(each["name"], each["yaxis"]) for each in drawn.spec["data"]]
+    assert traces == [("excitation", "y"), ("input", "y2"), ("output", "y3")]
+    assert study.identified[0].training == (study.records["sweep"],)
 
 
 def test_text_html_and_json_agree_on_the_numbers(study: fid.Study) -> None:
@@ -258,7 +269,7 @@ def test_the_next_step_of_a_model_with_two_inputs_can_be_taken(
     shown = " ".join(capsys.readouterr().out.split())
     said = re.search(r"flightid (tune \S+ --controller pi_d --loops y/u)", shown)
     assert said is not None
-    assert run([*said[1].split(), "--controller-rate-hz", "20", "--draws", "6"]) == 0
+    assert run([*said[1].split(), "--loop-rate-hz", "20", "--draws", "6"]) == 0
     assert "gains of y" in capsys.readouterr().out
     assert run([*said[1].split()[:-1], "y/v"]) == 1
     assert "name one: --loops y/u" in capsys.readouterr().err

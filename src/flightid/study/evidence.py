@@ -83,7 +83,7 @@ def _bands(fit: Fit, item: ModelResults, checks: Iterable[Check]) -> tuple[Check
     """Band and coherence of a fit to records: of all that it was fitted to or predicts."""
     outputs, inputs = tuple(fit.model.outputs), tuple(fit.model.inputs)
     predicted = _predicts(checks)
-    if predicted and item.training:
+    if predicted and item.training and not fit.responses:
         whole = (*item.training, *(each for each in item.unfitted if _holds(each, fit)))
         return power_of_records(whole, inputs, outputs, predicted=True)
     response = item.response

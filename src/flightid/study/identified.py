@@ -70,7 +70,7 @@ class ModelResults:
     reduction_judged : tuple of Finding
         Whether the reduced model predicts unseen records as the full one does.
     training : tuple of Record
-        What a structure without equations was fitted to.
+        What a structure without equations was fitted to, or what fitted responses were made of.
     unfitted : tuple of Record
         What chose the structure and what verifies: damage in them counts as in the others.
     untested : tuple of Finding

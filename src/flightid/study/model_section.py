@@ -20,6 +20,7 @@ from flightid.plot.modes import pole_map
 from flightid.plot.pictures import record_history
 from flightid.plot.polynomial import pole_zero
 from flightid.plot.residuals import correlations, spectrum_comparison
+from flightid.plot.training import training_history
 from flightid.report.blocks import result_blocks
 from flightid.report.content import Block, Lights, Paragraph, Section, TableBlock
 from flightid.report.evidence import evidence_blocks
@@ -71,9 +72,11 @@ def _first(item: ModelResults, truth: Truth | None) -> Iterator[Block]:
         )
     elif fit.responses:
         yield from response_figures(item, truth)
+        yield from _training(item, fit)
+        yield from record_figures(fit)
     elif item.settings.structure is None:
         yield from record_figures(fit)
-    for record in item.training:
+    for record in () if fit.responses else item.training:
         yield figure_block(record_history(record), f"{record.name}: what the model was fitted to.")
         yield figure_block(
             input_figure(record, fit.model.inputs),
@@ -97,6 +100,26 @@ def _first(item: ModelResults, truth: Truth | None) -> Iterator[Block]:
         yield TableBlock(estimates_table(item, truth), folded=True)
     if item.settings.structure is None and item.response is not None and item.response.findings:
         yield Lights(item.response.findings, "Frequency response")
+
+
+def _training(item: ModelResults, fit: Fit) -> Iterator[Block]:
+    """The time history behind responses that were fitted."""
+    assert item.response is not None
+    if not item.training:
+        return
+    pairs = [each.name.split("/") for each in fit.responses]
+    outputs, inputs = (list(dict.fromkeys(side)) for side in zip(*pairs, strict=True))
+    used: tuple[str, ...] = ()
+    if item.response.estimator == "instrument":
+        used = item.settings.response.excitations or item.training[0].excitations
+    names = ", ".join(item.settings.flown)
+    several = len(item.training)
+    after = "" if several == 1 else f", {several} manoeuvres one after the other"
+    yield figure_block(
+        training_history(item.training, inputs, outputs, used),
+        f"What the responses were made of: {names}{after}; {'injected signals, ' if used else ''}"
+        "inputs and the outputs that were used, of each short stretch its extremes.",
+    )
 
 
 def _parts(item: ModelResults, truth: Truth | None) -> Iterator[Section]:

@@ -270,6 +270,9 @@ def _examine(
         seen = [record for name in settings.identify for record in records[name].value]
         channels = (part.task.inputs, part.task.outputs)
         found = replace(found, training=tuple(narrowed(each, *channels) for each in seen))
+    elif fit.responses:
+        flown = tuple(each for name in settings.flown for each in records[name].value)
+        found = replace(found, training=flown)
     counts = StageResult(fit, part.fitted.key)
     tests = spectra = None
     if settings.check.tests_residuals:
