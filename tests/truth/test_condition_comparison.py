@@ -193,3 +193,29 @@ def test_one_rule_judges_parameters_and_modes_together() -> None:
     chances = {f"{row.name} {name}": p for row in rows for name, p in row.chances.items()}
     said = {f"{f.message.split(':')[0]} fast" for f in found.findings if "changed" in f.code}
     assert said == holm(chances)
+
+
+def test_models_of_one_record_have_no_changes() -> None:
+    """The noise of one record moves both, so that nothing is said of chance; of two it is."""
+    truth = fid.load_model("rate_first_order", axis="roll").with_values({"Ltphi": 40.0, "Lp": -4.0})
+    time_s = np.arange(0.0, 30.0, 0.02)
+    stick = fid.Record.from_arrays(
+        time_s, inputs={"tau_phi": 0.2 * np.sin(0.2 * time_s**2)}, hold="zero"
+    )
+
+    def flown(seed: int) -> fid.Record:
+        noise = fid.Noise(sensor={"p": 0.05}, seed=seed)
+        return fid.simulate(truth, stick, units=truth.units, noise=noise)
+
+    first, again = flown(1), flown(2)
+    held = truth.with_fixed(Ltphi=40.0)
+    base = fid.identify(truth, first, method="output_error")
+    rivals = (fid.identify(held, each, method="output_error") for each in (first, again))
+    same, other = (fid.compare_conditions({"free": base, "held": each}) for each in rivals)
+    assert same["Lp"].chances == {}
+    assert same["Lp"].ratios["held"].interval95 is None
+    assert "of one record" in same.summary().to_text()
+    assert {f.code for f in same.findings} >= {"one-record"}
+    assert not {f.code for f in same.findings} & {"changed", "sign-changed"}
+    assert 0.0 < other["Lp"].chances["held"] < 1.0
+    assert "one-record" not in {f.code for f in other.findings}

@@ -19,10 +19,10 @@ from flightid.control.margins.outside_band import BEYOND, outside_band
 from flightid.control.stepped.gain_controller import GainController
 from flightid.control.stepped.gain_loops import UncertainPlant, gain_loops
 from flightid.conventions import Light
-from flightid.dynamics.conditions.ratios import even_error
+from flightid.dynamics.conditions.ratios import SHARED_ERRORS, even_error
 from flightid.errors import DataError
 from flightid.findings import Finding
-from flightid.identification.prediction.remembered import training_digests
+from flightid.identification.prediction.remembered import share_samples
 from flightid.identification.uncertain_of import source_findings
 from flightid.result import Result
 from flightid.review.changes import LoopChange, change_of, change_table, significant_of, verdicts
@@ -49,7 +49,6 @@ ONE_RECORD = (
     "Both models are fitted to one record, whose noise moves both: differences have no interval, "
     "and nothing says which of them are chance."
 )
-SHARED_ERRORS = "both models are of one record, and their errors hang together"
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -183,7 +182,7 @@ def compare_margins(
             found=f"{', '.join(old)} and {', '.join(new)}",
             needed="gains around one input of both",
         )
-    one_record = not one_model and _share_samples(before[0], after[0])
+    one_record = not one_model and share_samples(before[0], after[0])
     changes = tuple(
         _shared_errors(change) if one_record else change
         for name in shared
@@ -198,11 +197,6 @@ def compare_margins(
     return MarginComparison(
         names, changes, told[0], told[1], one_model, one_record, significant, findings
     )
-
-
-def _share_samples(before: object, after: object) -> bool:
-    known = training_digests(after)
-    return any(one.overlaps(other) for one in training_digests(before) for other in known)
 
 
 def _shared_errors(change: LoopChange) -> LoopChange:

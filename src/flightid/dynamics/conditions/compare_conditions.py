@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 
 from flightid.conventions import Light
-from flightid.dynamics.conditions.ratios import chance_of, holm, ratio_of
+from flightid.dynamics.conditions.ratios import SHARED_ERRORS, chance_of, holm, ratio_of
 from flightid.dynamics.conditions.result import (
     ComparedMode,
     ComparedNumber,
@@ -21,15 +21,17 @@ from flightid.dynamics.modes.result import Mode, Modes
 from flightid.errors import ModelError, OptionError
 from flightid.findings import Finding
 from flightid.identification import Fit
+from flightid.identification.prediction.remembered import share_samples
 from flightid.identification.uncertain_of import source_findings
 from flightid.identification.uncertain_parameters import parameter_estimates
 from flightid.models import StateSpaceModel, TransferFunctionModel
-from flightid.uncertainty.estimate import Reading
+from flightid.uncertainty.estimate import Estimate, Reading
 
 ALIKE = 0.3
 """Least common participation of two modes that are taken for the same one."""
 FAR = 10.0
 """Cost of a pair of modes that cannot be the same."""
+ONE_RECORD = "fitted to one record, whose noise moves both: nothing says what of it is a change"
 NUMBERS = ("natural frequency", "damping ratio", "real")
 
 
@@ -64,9 +66,10 @@ def compare_conditions(sources: Mapping[str, object]) -> ConditionComparison:
 
     Assumes
     -------
-    Conditions identified from different flights, so that their errors are independent. A change is
-    called significant by Holm's rule: one false verdict among all parameters and modes together in
-    5 % of comparisons.
+    Conditions identified from different flights, so that their errors are independent. Of models
+    whose files or fits say that they were fitted to samples of the base, ratios have no interval
+    and no difference is called a change. A change is called significant by Holm's rule: one false
+    verdict among all parameters and modes together in 5 % of comparisons.
 
     Reference
     ---------
@@ -92,8 +95,10 @@ def compare_conditions(sources: Mapping[str, object]) -> ConditionComparison:
         _Condition(name, {}, modes(source)) if black_boxes else _condition(name, source)
         for name, source in sources.items()
     ]
-    numbers = tuple(_numbers(conditions))
-    matched, alone = _match(conditions)
+    first, *later = sources
+    tied = frozenset(name for name in later if share_samples(sources[first], sources[name]))
+    numbers = tuple(_numbers(conditions, tied))
+    matched, alone = _match(conditions, tied)
     alone_parameters = {
         c.name: tuple(n for n in c.values if not any(n in o.values for o in conditions if o != c))
         for c in conditions
@@ -110,6 +115,10 @@ def compare_conditions(sources: Mapping[str, object]) -> ConditionComparison:
         *_changes(numbers, significant),
         *_changes(of_modes, significant),
         *_turned(conditions, matched),
+        *(
+            Finding("one-record", Light.UNKNOWN, f"{first} and {each}: {ONE_RECORD}")
+            for each in tied
+        ),
         *(
             replace(finding, message=f"{name}: {finding.message}")
             for name, source in sources.items()
@@ -141,24 +150,28 @@ def _condition(name: str, source: object) -> _Condition:
     return _Condition(name, values, modes(source))
 
 
-def _numbers(conditions: Sequence[_Condition]) -> Iterator[ComparedNumber]:
+def _numbers(conditions: Sequence[_Condition], tied: frozenset[str]) -> Iterator[ComparedNumber]:
     names = dict.fromkeys(name for condition in conditions for name in condition.values)
     for name in names:
         there = {c.name: c.values[name] for c in conditions if name in c.values}
         if len(there) > 1:
-            yield _compared(name, there)
+            yield _compared(name, there, tied)
 
 
-def _compared(name: str, there: dict[str, Reading]) -> ComparedNumber:
+def _compared(name: str, there: dict[str, Reading], tied: frozenset[str]) -> ComparedNumber:
+    """A number side by side; nothing is said of chance where one record's noise moves both."""
     base, *others = there
     ratios = {o: ratio_of(there[o], there[base], f"{name}, {o} over {base}") for o in others}
-    chances = {o: chance_of(there[o], there[base]) for o in others}
+    for other, ratio in ratios.items():
+        if other in tied and ratio.interval95 is not None:
+            ratios[other] = Estimate(ratio.name, ratio.value, "1", None, SHARED_ERRORS)
+    chances = {o: chance_of(there[o], there[base]) for o in others if o not in tied}
     known = {key: value for key, value in chances.items() if value is not None}
     return ComparedNumber(name, there, ratios, known)
 
 
 def _match(
-    conditions: Sequence[_Condition],
+    conditions: Sequence[_Condition], tied: frozenset[str]
 ) -> tuple[list[ComparedMode], dict[str, tuple[str, ...]]]:
     """Modes of later conditions that answer to those of the first, and the rest."""
     conditions = [_Condition(c.name, c.values, _without_delays(c.modes)) for c in conditions]
@@ -177,7 +190,7 @@ def _match(
     alone[base.name] = tuple(found[base.name].name for found in answers.values() if len(found) == 1)
     names = [mode.name for mode in base.modes]
     matched = [
-        _compared_mode(found, base.name, names.count(found[base.name].name) == 1)
+        _compared_mode(found, base.name, names.count(found[base.name].name) == 1, tied)
         for found in answers.values()
         if len(found) > 1
     ]
@@ -205,7 +218,9 @@ def _distance(first: Mode, second: Mode) -> float:
     return (1.0 - common) + apart
 
 
-def _compared_mode(found: dict[str, Mode], base: str, is_alone: bool) -> ComparedMode:
+def _compared_mode(
+    found: dict[str, Mode], base: str, is_alone: bool, tied: frozenset[str]
+) -> ComparedMode:
     """A mode's numbers side by side; its frequency tells it from others of its name."""
     numbers = []
     pair, mode_name = found[base].is_pair, found[base].name
@@ -218,7 +233,7 @@ def _compared_mode(found: dict[str, Mode], base: str, is_alone: bool) -> Compare
         for condition, mode in found.items():
             number = {q.name: q for q in mode.quantities}[name]
             there[condition] = number
-        numbers.append(_compared(f"{mode_name}, {name}", there))
+        numbers.append(_compared(f"{mode_name}, {name}", there, tied))
     return ComparedMode(mode_name, found, tuple(numbers))
 
 

@@ -12,6 +12,7 @@ from flightid.uncertainty.quantiles import half_width, two_sided_chance
 
 EXACT = ("", "exact", "fixed", "same fit", UNFITTED, NO_COVARIANCE)
 """Reasons of a number without an interval that was declared, so that it counts as exact."""
+SHARED_ERRORS = "both models are of one record, and their errors hang together"
 UNBOUNDED = "the interval of the denominator holds zero: no bound"
 
 

@@ -126,6 +126,12 @@ def training_digests(source: object) -> list[RecordDigest]:
     return [RecordDigest.from_dict(each) for each in entry] if isinstance(entry, list) else []
 
 
+def share_samples(source: object, other: object) -> bool:
+    """Whether two models were fitted to the same samples, whose noise then moves both."""
+    known = training_digests(other)
+    return any(mine.overlaps(each) for mine in training_digests(source) for each in known)
+
+
 def provenance_entry(source: object, key: str) -> object:
     """What the provenance of a fit, or of the model in its file, holds; None where nothing."""
     estimated = getattr(model_of(source), "estimated", None)
