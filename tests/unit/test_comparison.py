@@ -51,6 +51,8 @@ def test_the_better_model_is_named_with_its_numbers() -> None:
     assert contrast.stretches_better == 12
     text = str(result.summary())
     assert "near errs by" in text
+    bare = fid.verify([_lag(2.1), _lag(1.0)], _flown(0.01, unit="1"), names=["near", "far"])
+    assert f"near errs by {bare.contrast('p').first_rms:.3g}, far by" in str(bare.summary())
     assert f"yes, {-contrast.change_percent:.0f} % less" in text
     assert -95 < contrast.change_percent < -80
     assert "weighted error over all outputs: near" in text

@@ -33,6 +33,7 @@ from flightid.report.html import to_html
 from flightid.report.json import from_dict, to_dict
 from flightid.report.text import to_text
 from flightid.table import Column, Table
+from flightid.wrapping import wrapped
 from tests.closeness import assert_close
 
 VOID = {"meta", "br", "img", "link", "hr", "input"}
@@ -263,6 +264,21 @@ def test_a_plot_shown_twice_is_stored_once() -> None:
     ranks = np.frombuffer(gzip.decompress(base64.b64decode(packed)), np.uint8).reshape(4, -1)
     steps = np.ascontiguousarray(ranks.T).view("<u4").ravel()
     assert np.cumsum(steps, dtype="<u4").tobytes() == samples.tobytes()
+
+
+def test_commands_stay_on_one_line_and_wide_pictures_scroll() -> None:
+    """What is to be typed can be copied; a phone scrolls a diagram with a width of its own."""
+    command = "flightid compare before.BIN B --gains gains.param --level 0.9"
+    text = f"gains of roll keep their margins at the worst vehicle: {command} says what changed"
+    for width in range(20, 100, 7):
+        lines = wrapped(f"{text}; flightid run rig.csv: then look.", width, later="  ")
+        assert [each.count(command) for each in lines].count(1) == 1
+        assert any("flightid run rig.csv:" in each for each in lines)
+        assert " ".join(each.strip() for each in lines).startswith(text)
+        assert all(len(each) <= width or "flightid" in each for each in lines)
+    specs = [{"data": [], "layout": {**size, "height": 200}} for size in ({"width": 900}, {})]
+    section = Section("Loops", tuple(Figure(spec, "drawn") for spec in specs))
+    assert to_html(Document("Title", "", (section,))).count('class="wide"') == 1
 
 
 def test_headings_tell_their_meaning_on_hover() -> None:

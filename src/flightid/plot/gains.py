@@ -20,6 +20,7 @@ STEPS = {
     "step": "output per set-point",
 }
 ROW_PX = 26
+TITLE_PX = 22
 
 
 def overlaid_steps(designs: Sequence[PidDesign]) -> go.PlotFigure:
@@ -36,7 +37,13 @@ def overlaid_steps(designs: Sequence[PidDesign]) -> go.PlotFigure:
     """
     told = {each.name for design in designs for each in design.responses}
     names = [name for name in STEPS if name in told]
-    made = look.figure(1, len(names), shared_x=False, height_px=330)
+    titles = [STEPS[name] for name in names]
+    # Above their plots: beside them a phone lays the second on the first plot.
+    made = look.figure(1, len(names), column_titles=titles, shared_x=False, height_px=350)
+    made.update_layout(legend={"y": 1.0 + TITLE_PX / (made.layout["height"] - 110)})
+    made.update_layout(margin={"t": 60})
+    for title in made.layout["annotations"]:
+        title["font"] = {"size": 13}
     for place, design in enumerate(designs):
         colour = COLOURS.get(design.axis, look.SERIES[place % len(look.SERIES)])
         for column, name in enumerate(names, 1):
@@ -55,8 +62,8 @@ def overlaid_steps(designs: Sequence[PidDesign]) -> go.PlotFigure:
                     words, time_s, values[few], colour=colour, dash=dash, legend=column == 1
                 )
                 made.add_trace(drawn, 1, column)
-    for column, name in enumerate(names, 1):
-        look.label_axes(made, x="time [s]", y=[STEPS[name]], column=column)
+    for column in range(1, len(names) + 1):
+        look.label_axes(made, x="time [s]", y=[""], column=column)
     return made
 
 

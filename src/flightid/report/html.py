@@ -115,13 +115,16 @@ class _Numbering:
                     # A picture that is shown again, as the answer's is, is stored once.
                     "spec_id": self._first.setdefault(text, place),
                     "height": int(spec.get("layout", {}).get("height") or DEFAULT_HEIGHT_PX),
-                    "wide": sum(name.startswith("xaxis") for name in spec["layout"]) > MANY_PLOTS
-                    if "layout" in spec
-                    else False,
+                    "wide": _is_wide(spec.get("layout", {})),
                     "packed": "gzip" if small else "no",
                     "payload": Markup(_gzipped(text.encode()) if small else text),
                 }
         return values
+
+
+def _is_wide(layout: dict[str, Any]) -> bool:
+    """Whether a phone scrolls a picture: it has a width of its own, or many plots."""
+    return "width" in layout or sum(name.startswith("xaxis") for name in layout) > MANY_PLOTS
 
 
 def _shown_table(values: dict[str, Any]) -> dict[str, Any]:

@@ -276,8 +276,9 @@ def _word(contrast: Contrast) -> str:
 
 
 def _finding(contrast: Contrast) -> Finding:
+    unit = "" if contrast.unit == "1" else f" {contrast.unit}"
     numbers = (
-        f"{contrast.output}: {contrast.first} errs by {contrast.first_rms:.3g} {contrast.unit}, "
+        f"{contrast.output}: {contrast.first} errs by {contrast.first_rms:.3g}{unit}, "
         f"{contrast.rival} by {contrast.rival_rms:.3g}"
     )
     counted = (
