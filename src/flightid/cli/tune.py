@@ -16,7 +16,7 @@ from flightid.cli.output import (
     level_option,
     note,
 )
-from flightid.cli.proposals import of_data, show_answer, taken_study
+from flightid.cli.proposals import is_study, of_data, show_answer, taken_study
 from flightid.cli.records import FILES
 
 if TYPE_CHECKING:
@@ -100,6 +100,11 @@ def command(
         from flightid.study import run_study
 
         of_log = options.get("controller") is None
+        if of_log and not is_study(files) and not any(map(_is_flown, files)):
+            raise click.UsageError(
+                "records hold no gains of an autopilot: name a PID of its own with "
+                "--controller pi_d"
+            )
         cache: dict[str, Any] = {}
         path, folder = taken_study(files, output, log, data, tune=of_log, cache=cache)
         study = run_study(path, output=folder, log=log, tune=asked, level=level, cache=cache)
@@ -149,6 +154,14 @@ def _holds_models(files: tuple[Path, ...]) -> bool:
     except FlightidError:
         return len(files) > 1
     return len(files) > 1 or "estimated" in content or "kind" in content
+
+
+def _is_flown(file: Path) -> bool:
+    """Whether a file is a flight, whose log may hold gains."""
+    from flightid.logs import is_log
+    from flightid.record.formats.sniff import is_bag
+
+    return is_bag(file) if file.is_dir() else is_log(file)
 
 
 def _show(tuning: Tuning, level: float | None) -> None:

@@ -124,6 +124,8 @@ def study_of_records(
     )
     columns = columns_of([part.record for part in read], inputs, outputs, injected)
     keys = _keys(reading, folder)
+    if injected and model is None:
+        raise _needs_equations(paths, columns, injected)
     groups, missed = _groups(read, columns)
     body: list[str] = []
     names: list[str] = []
@@ -151,6 +153,22 @@ def study_of_records(
     told_of = (*columns.said, *_times(read), *_stamps(read))
     head = _head(paths, (*columns.said, *keyed, *_stamps(read)), missed)
     return Proposal((*head, *body), tuple(names), tuple(missed), said=told_of)
+
+
+def _needs_equations(
+    paths: Sequence[Path], columns: Columns, injected: tuple[str, ...]
+) -> StudyError:
+    """Free runs choose structures, and in a closed loop they favour biased ones."""
+    files = " ".join(map(str, paths))
+    flags = {"inputs": columns.inputs, "outputs": columns.outputs, "excitation": injected}
+    named = " ".join(f"--{name} {','.join(names)}" for name, names in flags.items())
+    return StudyError(
+        "no structure can be looked for in a closed loop: the noise that comes back to "
+        f"{', '.join(columns.inputs)} moves free runs, which would choose a biased one",
+        found=f"{', '.join(injected)} injected, and no equations to fit by way of it",
+        needed="model='rate_first_order', another of the library, or a file of equations",
+        action=f"name it; what the loop tells without one: flightid response {files} {named}",
+    )
 
 
 def _times(read: Sequence[_Stretch]) -> list[str]:
@@ -279,16 +297,15 @@ def _model(
     span_s = record.duration_s * FITTED
     low = CYCLES * math.tau / span_s
     high = math.tau * record.sample_rate_hz / SAMPLES_PER_CYCLE
-    by_injection = (
-        "# By way of what was injected, so a controller in the loop does not bias the estimate.",
-        f'response = {{ estimator = "instrument", excitations = {toml_value(list(injected))} }}',
-    )
     if model is not None:
         template = [f"template = {toml_value(model)}"]
         if not injected:
             template += ['fit = { method = "output_error" }']
         elif high > 2 * low:
-            template += [f"band_rad_s = {toml_value([_round(low), _round(high)])}", *by_injection]
+            said = "# By way of what was injected: a controller in the loop does not bias that."
+            names = toml_value(list(injected))
+            template += [f"band_rad_s = {toml_value([_round(low), _round(high)])}", said]
+            template += [f'response = {{ estimator = "instrument", excitations = {names} }}']
         return iter(["", "[[model]]", f"name = {toml_value(name)}", *template, *lines])
     kind, found, orders_of = _structure(record, group.inputs, output, segments)
     orders = [f"{order} = {toml_value(list(orders_of[order]))}" for order in USED[kind]]
@@ -302,7 +319,6 @@ def _model(
             f"structure = {toml_value(kind)}",
             f"inputs = {toml_value(list(group.inputs))}", f"outputs = {toml_value(output)}",
             *lines, f"select = {toml_value(segments.choice)}", *coherent, *orders,
-            *(by_injection if injected else ()),
         ]
     )  # fmt: skip
 
