@@ -42,7 +42,7 @@ COMMANDS: dict[str, tuple[list[str], set[str]]] = {
     "interpret": ([], {*GREY, *NARX}),
     "compare": (["{other}"], SAMPLED),
     # The innovations form has one state too many here, and so a steady gain of either sign.
-    "tune": (["--controller", "pi", "--controller-rate-hz", "20", "--nominal"], TUNE_REFUSES),
+    "tune": (["--controller", "pi", "--loop-rate-hz", "20", "--nominal"], TUNE_REFUSES),
 }
 
 

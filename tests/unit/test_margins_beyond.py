@@ -15,7 +15,7 @@ def test_margins_above_the_band_are_named_with_their_frequency(top: float, said:
     plant = fid.load_model("rate_motor_lag").with_values(
         {"Ltphi": 140.0, "Lp": -4.0, "T_m": 0.05, "tau": 0.02}
     )
-    asked = fid.ControllerOptions(controller="pi", controller_rate_hz=200.0)
+    asked = fid.ControllerOptions(controller="pi", loop_rate_hz=200.0)
     design = fid.tune_controller(plant, controller=asked, nominal=True, band_rad_s=(0.1, top))
     found = [each for each in design.findings if each.code == "margin-beyond-band"]
     assert bool(found) is said

@@ -83,7 +83,7 @@ def test_a_saturated_integral_comes_back_at_once() -> None:
 
 def test_the_code_does_what_the_recursion_does(tmp_path: Path) -> None:
     loop = _loop(direct=True, low=-1.5, high=2.0, rate_per_s=40.0)
-    design = replace(_tuned(controller_rate_hz=50.0), loop=loop)
+    design = replace(_tuned(loop_rate_hz=50.0), loop=loop)
     fid.export(design, tmp_path / "pid.c")
     build = ["cc", "-std=c99", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC", "-o"]
     subprocess.run([*build, tmp_path / "pid.so", tmp_path / "pid.c"], check=True)
@@ -130,9 +130,9 @@ def test_slow_and_fast_plants_have_gains_of_their_own_time(factor: float) -> Non
     )
     design = fid.tune_controller(
         plant, nominal=True, band_rad_s=(0.1 * factor, 60.0 * factor),
-        controller=fid.ControllerOptions(controller_rate_hz=100.0 * factor),
+        controller=fid.ControllerOptions(loop_rate_hz=100.0 * factor),
     )  # fmt: skip
-    usual = _tuned(controller_rate_hz=100.0)
+    usual = _tuned(loop_rate_hz=100.0)
     assert design.exists
     assert_close(design.gains["Kp"], usual.gains["Kp"], rtol=0.03, why="one plant in another time")
     assert_close(
@@ -142,15 +142,15 @@ def test_slow_and_fast_plants_have_gains_of_their_own_time(factor: float) -> Non
 
 def test_the_error_is_turned_for_a_plant_that_answers_the_other_way() -> None:
     plant = replace(LAG, c=-np.asarray(LAG.c))
-    design = _tuned(plant, controller_rate_hz=50.0)
+    design = _tuned(plant, loop_rate_hz=50.0)
     assert design.plain is not None
     assert design.plain.direct
-    assert design.gains == _tuned(controller_rate_hz=50.0).gains
+    assert design.gains == _tuned(loop_rate_hz=50.0).gains
 
 
 def test_an_unstable_plant_is_held() -> None:
     plant = LinearSystem([[2.0]], [[1.0]], [[-3.0]], [[0.0]], ("u",), ("y",))
-    design = _tuned(plant, controller="pi", controller_rate_hz=200.0)
+    design = _tuned(plant, controller="pi", loop_rate_hz=200.0)
     assert design.exists
     assert design.plain is not None
     assert design.plain.direct
@@ -159,10 +159,10 @@ def test_an_unstable_plant_is_held() -> None:
 
 
 def test_two_degrees_of_freedom_bound_the_overshoot() -> None:
-    design = _tuned(controller="two_dof", controller_rate_hz=50.0, overshoot=0.25)
+    design = _tuned(controller="two_dof", loop_rate_hz=50.0, overshoot=0.25)
     assert design.response("step").overshoot <= 0.25
     b = design.plain.values["b"] if design.plain else 0.0
-    higher = _tuned(controller="pi_d", controller_rate_hz=50.0).response("step").overshoot
+    higher = _tuned(controller="pi_d", loop_rate_hz=50.0).response("step").overshoot
     assert b < 1.0
     assert higher > 0.25
 
@@ -203,14 +203,14 @@ def test_a_command_ends_in_gains_and_code(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     fid.write_model(_fit(), tmp_path / "rig.toml")
-    said = ["tune", str(tmp_path / "rig.toml"), "--controller", "pi_d", "--controller-rate-hz"]
+    said = ["tune", str(tmp_path / "rig.toml"), "--controller", "pi_d", "--loop-rate-hz"]
     for name in ("gains.toml", "gains.c"):
         assert run([*said, "100", "--draws", "6", "--write", str(tmp_path / name)]) == 0
         assert "worst" in capsys.readouterr().out
         assert (tmp_path / name).exists()
     (written,) = tomllib.loads((tmp_path / "gains.toml").read_text())["controller"]
     assert_close(written["ideal"]["K"], written["Kp"], rtol=1e-12, why="the same gain")
-    two = _tuned(controller="pi", controller_rate_hz=50.0)
+    two = _tuned(controller="pi", loop_rate_hz=50.0)
     (slow,) = tomllib.loads(two.write(tmp_path / "pi.toml")[0].read_text())["controller"]
     assert_close(slow["series"]["K"], slow["Kp"], rtol=1e-12, why="PI: one form as the other")
 

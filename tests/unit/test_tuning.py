@@ -172,7 +172,7 @@ def test_what_took_the_errors_says_how_to_have_them() -> None:
     assert _towards_errors(source, "given alone").startswith("fit a measured response")
 
 
-PLAIN = {"controller": fid.ControllerOptions(controller="p", controller_rate_hz=400.0), "draws": 5}
+PLAIN = {"controller": fid.ControllerOptions(controller="p", loop_rate_hz=400.0), "draws": 5}
 
 
 def test_a_crossover_of_a_plain_loop_where_little_was_measured_is_red() -> None:

@@ -29,7 +29,7 @@ def export_pid(loop: PidLoop, path: Path, name: str, remarks: Iterable[str] = ()
             "a continuous controller has no recursion that code could run",
             found="no rate",
             needed="the rate of the controller",
-            action="tune it again with controller_rate_hz",
+            action="tune it again with loop_rate_hz",
         )
     step, stem = 1.0 / loop.loop_rate_hz, file_stem(path)
     tracking = loop.values.get("tracking_s", 0.0)

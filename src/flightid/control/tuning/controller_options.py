@@ -24,7 +24,7 @@ class ControllerOptions(Options):
 
     Example
     -------
-    >>> ControllerOptions(controller="pi", controller_rate_hz=50.0).gains
+    >>> ControllerOptions(controller="pi", loop_rate_hz=50.0).gains
     'pi'
     """
 
@@ -37,7 +37,7 @@ class ControllerOptions(Options):
     loops: tuple[str, ...] = option(
         (), doc="Loops to close, each as output/input; default: those of models with one of each."
     )
-    controller_rate_hz: float | None = option(
+    loop_rate_hz: float | None = option(
         None,
         unit="Hz",
         above=0.0,

@@ -108,13 +108,13 @@ def tune_controller(
     >>> import flightid as fid
     >>> plant = fid.load_model("rate_first_order").with_values({"Lp": -5.0, "Ltphi": 10.0})
     >>> design = fid.tune_controller(plant, nominal=True, band_rad_s=(0.1, 60.0),
-    ...     controller=fid.ControllerOptions(controller="pi", controller_rate_hz=100.0))
+    ...     controller=fid.ControllerOptions(controller="pi", loop_rate_hz=100.0))
     >>> design.worst_case("loop", "phase margin").nominal > 45.0
     True
     """
     asked = controller or ControllerOptions()
     channels = _channels(fit, inputs, outputs)
-    rate_hz = asked.controller_rate_hz or _own_rate(fit)
+    rate_hz = asked.loop_rate_hz or _own_rate(fit)
     sampled = rate_hz is not None
     need = replace(requirements or TuningRequirements(), noise_growth=None)
     common = {"draws": draws, "fresh": draws, "seed": seed, "band_rad_s": band_rad_s,
@@ -259,7 +259,7 @@ def _turn(
             "the model has no lag that would bound its gains",
             found=f"its phase stays above {TURN_DEG:g} deg",
             needed="a band that was identified, or the rate of the controller",
-            action="give band_rad_s or controller_rate_hz",
+            action="give band_rad_s or loop_rate_hz",
         )
     return float(omega[late[0]]) if late.size else top
 
