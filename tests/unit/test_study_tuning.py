@@ -72,6 +72,8 @@ def test_a_study_is_tuned_from_its_log_and_its_models_beside_it(
     assert results["tuning"]["designs"]["roll"]["exists"]
     made = tmp_path / "roll-output"
     assert "Roll gains" in (made / "report.txt").read_text(encoding="utf-8")
+    shown = (made / "report.txt").read_text(encoding="utf-8")
+    assert "flightid tune roll.toml --write gains.param" in shown
 
     file, log = str(made / "models" / "roll_rate.toml"), str(made / "flight.bin")
     quick = ["--draws", "12", "--no-angle-loop", "--json"]
@@ -90,6 +92,16 @@ def test_settings_are_read_and_checked(study: Path) -> None:
     study.write_text(STUDY + "luck = 1\n", encoding="utf-8")
     with pytest.raises(StudyError, match="there is no key 'luck'"):
         read_settings(study)
+
+
+def test_records_need_a_controller_of_their_own(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It is said before anything is fitted."""
+    (tmp_path / "rig.csv").write_text("time,u,y\n0,1,0\n0.1,1,0.1\n", encoding="utf-8")
+    assert run(["tune", str(tmp_path / "rig.csv")]) == 2
+    assert "name a PID of its own with --controller pi_d" in capsys.readouterr().err
+    assert [each.name for each in tmp_path.iterdir()] == ["rig.csv"]
 
 
 def test_records_alone_hold_no_gains() -> None:

@@ -60,7 +60,7 @@ def answer_of(study: StudyResults, *, source: str | None = None) -> StudyAnswer:
     tuning = study.tuning
     if tuning is None:
         return StudyAnswer(tuple(findings))
-    findings.append(_gains(tuning))
+    findings.append(_gains(tuning, source))
     if study.gain_flight is not None:
         findings.append(_flown(study.gain_flight))
     made = tuning.sound or tuple(design for design in tuning.designs if design.exists)
@@ -173,7 +173,7 @@ def _next(study: StudyResults, source: str) -> str:
     return f"for gains of a PID: flightid tune {source} --controller pi_d{loop}"
 
 
-def _gains(tuning: Tuning) -> Finding:
+def _gains(tuning: Tuning, source: str) -> Finding:
     """Whether there are gains, and what they promise or what is in the way."""
     designs, findings = tuning.sound, tuning.findings
     left = "; ".join(f"{axis}: {why}" for axis, why in tuning.left_out.items())
@@ -192,7 +192,9 @@ def _gains(tuning: Tuning) -> Finding:
     axes = ", ".join(design.axis for design in designs)
     plain = any(isinstance(design.loop, PidLoop) for design in designs)
     file = "gains.c (or .toml)" if plain else f"gains{parameter_suffix(designs[0].flown.autopilot)}"
-    way = f"--write {file} writes them; " + (
+    # A PID's structure and loops are the user's own words, which stand on the line above.
+    command = "" if plain else f"flightid tune {source} "
+    way = f"{command}--write {file} writes them; " + (
         f"fly step 1 of {steps}, log, and look again" if steps > 1 else "fly them, and log"
     )
     message = f"gains of {axes}{promise} at the worst vehicle that the data allow"
