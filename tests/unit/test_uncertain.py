@@ -131,6 +131,23 @@ def test_then_carries_on() -> None:
     assert made.carried(lambda value: value).stderr == pytest.approx([np.sqrt(0.15)])
 
 
+def test_what_is_kept_is_made_once_and_says_the_same() -> None:
+    made: list[float] = []
+
+    def squared(numbers: np.ndarray) -> np.ndarray:
+        made.append(float(numbers[0]))
+        return numbers**2
+
+    plain = Uncertain(np.array([3.0, 4.0]), np.diag([0.01, 0.04]), squared)
+    wanted, once = plain.carried(np.sum), len(made)
+    kept = plain.kept()
+    for _ in range(2):
+        found = kept.then(np.sum).carried(np.asarray)
+        assert found.numbers.tobytes() == wanted.numbers.tobytes()
+        assert found.covariance.tobytes() == wanted.covariance.tobytes()
+    assert len(made) == 2 * once
+
+
 def test_fits_of_every_kind_have_a_covariance() -> None:
     u = np.random.default_rng(0).standard_normal(600)
     truth = fid.PolynomialModel(("u",), "y", 0.1, a=[1, -1.5, 0.7], b=[[1.0, 0.5]])

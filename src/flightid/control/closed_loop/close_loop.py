@@ -109,10 +109,12 @@ def close_loop(
         plant = linear_system(model) if linear else model
         return _closed(plant, vehicle, around, moved, name)
 
-    loops = uncertain.then(closed)
+    drawn = uncertain.then(closed)
+    # Poles and the margins at each actuator are read off the same loops; draws but once.
+    loops = drawn.kept()
     estimate = loops.value
     poles, propagated = _poles(loops, estimate)
-    tried = loops.draws(draws, seed) if draws and loops.known else []
+    tried = drawn.draws(draws, seed) if draws and drawn.known else []
     unstable = sum(unstable_count(each) > 0 for each in tried)
     findings = (*uncertain.findings, *_findings(estimate, len(tried), unstable))
     return ClosedLoop(
