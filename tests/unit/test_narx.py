@@ -160,6 +160,7 @@ def test_views() -> None:
     text = fit.summary().to_text()
     assert "u(t-2)^2" in text
     assert "polynomial" in fit.details.terms_table().to_text()
+    assert not fit.details.terms_table().notes, "no radial term, no centre"
     assert "free run of the linear model" in text
     assert fit.to_dict()["schema"] == "flightid.fit/1"
     assert fit.details.n_samples == 398

@@ -47,6 +47,8 @@ def test_local_penalties_are_ridge_along_orthogonal_parts_with_bayesian_errors()
     assert_close(update, penalties[5:], rtol=1e-8, why="fixed point of the evidence")
     assert np.all(penalties[:5] == 0)
     assert "penalty λ" in fit.details.terms_table().to_text()
+    radial = any(item.term.centre for item in fit.details.chosen)
+    assert radial == any("centre" in note for note in fit.details.terms_table().notes)
     text = fit.summary().to_text()
     assert "posterior" in text
 

@@ -11,6 +11,11 @@ from flightid.models.narx.structure import NarxStructure
 from flightid.models.narx.terms import Term
 from flightid.table import Column, Table
 
+CENTRES = (
+    "where a radial term is centred, in scaled lags: centre of that term in results.json (chosen) "
+    "and in the model file"
+)
+
 
 @dataclass(frozen=True)
 class ChosenTerm:
@@ -135,7 +140,9 @@ class NarxDetails(Details):
             )
             for item in self.chosen
         )
-        return Table("Terms in the order of choice", columns, rows).without_empty_columns()
+        radial = any(len(item.term.centre) for item in self.chosen)
+        notes = (CENTRES,) if radial else ()
+        return Table("Terms in the order of choice", columns, rows, notes).without_empty_columns()
 
     def tables(self) -> tuple[Table, ...]:
         """The table of the terms."""
