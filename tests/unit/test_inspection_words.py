@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,7 +21,8 @@ from flightid.inspection.inspection import Inspection
 from flightid.inspection.rates import StreamRate
 from flightid.inspection.signals import Signal
 from flightid.inspection.skew import StreamSkew, _skew
-from flightid.inspection.usable_band import _without_scraps
+from flightid.inspection.thresholds import LONGEST_WINDOW
+from flightid.inspection.usable_band import _longest_window
 from flightid.logs.source import Event, Gap
 from tests.closeness import assert_close
 
@@ -126,9 +127,15 @@ def test_a_card_is_blamed_only_where_the_logger_lost_samples() -> None:
 
 def test_one_scrap_does_not_shorten_the_windows_of_all() -> None:
     pieces = (1.45, 2.91, 3.12, 1.87, 2.08, 5.51, 4.16, 6.55)
-    made = [SimpleNamespace(duration_s=length) for length in pieces]
-    kept = _without_scraps(cast("Any", made), 7.0)
-    assert [each.duration_s for each in kept] == [6.55, 5.51, 4.16, 3.12, 2.91]
+    window = _longest_window(list(pieces), 7.0)
+    assert window == 2.91
+    kept = sorted((each for each in pieces if each >= window), reverse=True)
+    assert kept == [6.55, 5.51, 4.16, 3.12, 2.91]
+
+
+def test_a_long_flight_gives_more_windows_not_longer_ones() -> None:
+    assert _longest_window([279.0], 7.0) == 279.0 / 7.0
+    assert _longest_window([12_000.0], 7.0) == LONGEST_WINDOW.value
 
 
 def test_bursts_have_no_rate() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from flightid.logs import Log, LogTable
 
+Array = NDArray[np.float64]
 MOTOR_FUNCTIONS = range(33, 41)
 """SERVOn_FUNCTION of ArduPilot's motors 1 to 8."""
 FEWEST_SAMPLES = 5
@@ -75,7 +76,7 @@ def _ardupilot(log: Log) -> Actuators | None:
     span = most - least
     return _made(
         table,
-        motors,
+        table.arrays(motors),
         least + span * parameters.get("MOT_SPIN_MIN", 0.15),
         least + span * parameters.get("MOT_SPIN_MAX", 0.95),
     )
@@ -84,16 +85,28 @@ def _ardupilot(log: Log) -> Actuators | None:
 def _px4(log: Log) -> Actuators | None:
     if "actuator_motors" in log:
         table = log.table("actuator_motors", log.messages["actuator_motors"].instances[0])
-        used = [f"control[{i}]" for i in range(12) if f"control[{i}]" in table]
-        used = [name for name in used if np.any(np.isfinite(table[name]))]
-        return _made(table, used, 0.0, 1.0) if used else None
+        names = [f"control[{i}]" for i in range(12) if f"control[{i}]" in table]
+        found = _moving(log, table, names, np.isfinite)
+        return _made(table, found, 0.0, 1.0) if found else None
     if "actuator_outputs" not in log:
         return None
     table = log.table("actuator_outputs", log.messages["actuator_outputs"].instances[0])
-    used = [f"output[{i}]" for i in range(8) if f"output[{i}]" in table]
-    used = [name for name in used if np.any(table[name] > 0)]
+    names = [f"output[{i}]" for i in range(8) if f"output[{i}]" in table]
+    found = _moving(log, table, names, lambda values: values > 0)
     low, high = _limits(log.parameters, ("PWM", "PWM_MAIN"), DEFAULT_PWM)
-    return _made(table, used, low, high) if used else None
+    return _made(table, found, low, high) if found else None
+
+
+def _moving(
+    log: Log, table: LogTable, names: list[str], test: Callable[[Array], NDArray[np.bool_]]
+) -> dict[str, Array]:
+    """Columns of which any row passes a test, read one after the other: the others are not kept."""
+    found = {}
+    for name in names:
+        column = log.table(table.name, table.instance)[name]
+        if np.any(test(column)):
+            found[name] = column
+    return found
 
 
 def _betaflight(log: Log) -> Actuators | None:
@@ -105,7 +118,7 @@ def _betaflight(log: Log) -> Actuators | None:
     low, high = (log.parameters.get(f"motorOutput[{i}]", 0.0) for i in range(2))
     if not used or not 0.0 < low < high:
         return None
-    return _made(table, used, low, high)
+    return _made(table, table.arrays(used), low, high)
 
 
 def _limits(
@@ -120,6 +133,6 @@ def _limits(
     return next((pair for pair in pairs if 0.0 < pair[0] < pair[1]), default)
 
 
-def _made(table: LogTable, names: list[str], low: float, high: float) -> Actuators:
-    values = np.nan_to_num(np.array([table[name] for name in names]), copy=False, nan=low)
-    return Actuators(table.name, tuple(names), table.time_s, values, low, high)
+def _made(table: LogTable, motors: dict[str, Array], low: float, high: float) -> Actuators:
+    values = np.nan_to_num(np.array([*motors.values()]), copy=False, nan=low)
+    return Actuators(table.name, tuple(motors), table.time_s, values, low, high)

@@ -46,7 +46,7 @@ class Signal:
     @property
     def rate_hz(self) -> float:
         """Samples per second from the median interval."""
-        return float(1.0 / np.median(np.diff(self.time_s)))
+        return float(1.0 / np.median(np.diff(self.time_s), overwrite_input=True))
 
     def within(self, spans: Iterable[Span]) -> NDArray[np.float64]:
         """Values at stamps inside any of the spans."""
@@ -94,17 +94,24 @@ def places(log: Log, name: str, most: int | None = None) -> list[Signal]:
             continue
         good = believable(samples.time_s) & np.isfinite(samples.values)
         if np.count_nonzero(good) >= 2:
-            stamps, values = samples.time_s[good], samples.values[good]
+            stamps, values = samples.time_s, samples.values
+            if not np.all(good):
+                stamps, values = stamps[good], values[good]
             found.append(Signal(name, stamps, values, channel.unit, str(source)))
     return found
 
 
-def records(signals: list[Signal], inputs: set[str], spans: Iterable[Span]) -> list[Record]:
-    """Records of the spans at the rate of the slowest signal, cut at gaps.
+def records(
+    signals: list[Signal],
+    inputs: set[str],
+    spans: Iterable[Span],
+    sample_time_s: float | None = None,
+) -> list[Record]:
+    """Records of the spans at the rate of the slowest signal, or at one given, cut at gaps.
 
     A span comes from one stream and ends with it; each part of it that all signals cover is taken.
     """
-    slowest = min(signals, key=lambda signal: signal.rate_hz)
+    step_s = sample_time_s or 1.0 / min(signal.rate_hz for signal in signals)
     begin = max(float(signal.time_s[0]) for signal in signals)
     end = min(float(signal.time_s[-1]) for signal in signals)
     made: list[Record] = []
@@ -112,7 +119,7 @@ def records(signals: list[Signal], inputs: set[str], spans: Iterable[Span]) -> l
         try:
             base = to_uniform(
                 {signal.name: (signal.time_s, signal.values) for signal in signals},
-                sample_time_s=1.0 / slowest.rate_hz,
+                sample_time_s=step_s,
                 span_s=span,
                 gaps="split",
             )

@@ -39,6 +39,12 @@ CYCLES_IN_WINDOW = Threshold(
 LOWEST_OF_INTEREST = Threshold(
     0.3, "Hz", "2 rad/s: a decade below the 20 rad/s at which rate loops of multirotors cross over"
 )
+LONGEST_WINDOW = Threshold(
+    40,
+    "s",
+    "two cycles at 0.05 Hz (0.3 rad/s), where sweeps of aircraft begin (Tischler & Remple, "
+    "ch. 5); a longer flight gives more windows, which settle the coherence",
+)
 SAMPLES_PER_CYCLE = Threshold(
     10, "1", "gain and phase of a sampled-and-held signal stay within 2 % and 18 deg of the signal"
 )

@@ -3,26 +3,33 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flightid.errors import FlightidError
 from flightid.inspection.axes import AxisChannels, axes_of
 from flightid.inspection.excitation_found import FoundExcitation
-from flightid.inspection.signals import Span, find, records
+from flightid.inspection.signals import Signal, Span, find
+from flightid.inspection.stretches import FlightStretches, packed
 from flightid.inspection.thresholds import (
     CYCLES_IN_WINDOW,
     INDEPENDENT_WINDOWS,
+    LONGEST_WINDOW,
     MINIMUM_COHERENCE,
     SAMPLES_PER_CYCLE,
     SAMPLES_PER_CYCLE_LEAST,
 )
 from flightid.logs import Log
 from flightid.record import Record
-from flightid.responses import FrequencyResponse, estimate_response
 from flightid.responses.bands import usable_band
-from flightid.surface import speaking
+from flightid.responses.estimators.composite import Composite
+from flightid.responses.running import SpectralSum
+
+N_OMEGA = 60
+"""Frequencies at which coherence is computed."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +71,28 @@ class AxisBand:
         return self.band_rad_s[1] / self.band_rad_s[0] if self.band_rad_s else 0.0
 
 
+@dataclass(frozen=True, eq=False)
+class AxesCoherence:
+    """What commands explain of the rates, of all axes at once.
+
+    Attributes
+    ----------
+    omega_rad_s : ndarray, shape (n_f,)
+    inputs, outputs : tuple of str
+        Commands that moved, and rates.
+    composite : Composite
+        Of every rate with every command.
+    cut : str
+        What gaps did to the windows; empty where none cut a span.
+    """
+
+    omega_rad_s: NDArray[np.float64]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    composite: Composite
+    cut: str
+
+
 def lowest_hz(airborne_s: float) -> float:
     """Lowest frequency of which five independent windows hold two cycles each, Hz."""
     if airborne_s <= 0:
@@ -79,10 +108,13 @@ def axis_bands(
     An axis with injected runs is judged by them alone: windows without excitation are no evidence.
     """
     axes = axes_of(log.vehicle)
-    inputs = {axis: find(log, names.command) for axis, names in axes.items()}
-    outputs = {axis: find(log, names.rate) for axis, names in axes.items()}
+    held = packed(_found(log, [name for names in axes.values() for name in names[:2]]))
+    by_name = {signal.name: signal for signal in held}
+    inputs = {axis: by_name.get(names.command) for axis, names in axes.items()}
+    outputs = {axis: by_name.get(names.rate) for axis, names in axes.items()}
     present = [axes[axis] for axis in axes if inputs[axis] and outputs[axis]]
-    known: dict[tuple[Span, ...], tuple[FrequencyResponse | None, str]] = {}
+    signals = tuple(by_name[name] for names in present for name in names[:2])
+    known: dict[tuple[Span, ...], AxesCoherence | str] = {}
     found = []
     for axis, (tau, rate, _) in axes.items():
         command, motion = inputs[axis], outputs[axis]
@@ -94,94 +126,96 @@ def axis_bands(
         own = tuple((e.start_s, e.stop_s) for e in excited if e.is_injected and e.axis == axis)
         chosen = own or spans
         if chosen not in known:
-            known[chosen] = _response(log, present, chosen)
-        response, why = known[chosen]
+            known[chosen] = _explained(signals, present, chosen)
+        explained = known[chosen]
         slowest = min(command.rate_hz, motion.rate_hz)
         labels = (command.label, motion.label)
-        band, coherence, largest = None, None, None
-        if response is not None and tau in response.inputs:
-            band, coherence, largest, reason = _band(response, rate, tau, slowest)
-            why = f"{reason}{why}" if reason else ""
-        elif response is not None:
+        band, coherence, largest, why = None, None, None, ""
+        if isinstance(explained, str):
+            why = explained
+        elif tau in explained.inputs:
+            band, coherence, largest, reason = _band(explained, rate, tau, slowest)
+            why = f"{reason}{explained.cut}" if reason else ""
+        else:
             why = f"{labels[0]} did not move"
         found.append(AxisBand(axis, *labels, slowest, band, coherence, why, largest))
     return tuple(found)
 
 
-def _response(
-    log: Log, axes: list[AxisChannels], spans: tuple[Span, ...]
-) -> tuple[FrequencyResponse | None, str]:
-    """Estimate all axes at once; None with the reason where that is not possible."""
+def _found(log: Log, names: list[str]) -> Iterator[Signal]:
+    """Signals that the log holds, one after the other."""
+    return (signal for name in names if (signal := find(log, name)) is not None)
+
+
+def _explained(
+    signals: tuple[Signal, ...], axes: list[AxisChannels], spans: tuple[Span, ...]
+) -> AxesCoherence | str:
+    """Coherence of all axes at once, or the reason where that is not possible."""
+    commands, outputs = [axis.command for axis in axes], [axis.rate for axis in axes]
     if not spans or not axes:
-        return None, "nothing was flown" if axes else "no axis has command and rate logged"
-    made = _records(log, axes, spans)
-    inputs = [axis.command for axis in axes if _moves(made, axis.command)]
+        return "nothing was flown" if axes else "no axis has command and rate logged"
+    stretches = FlightStretches(signals, frozenset(commands), spans)
+    # A long flight is read twice, for it is not held.
+    flown: Iterable[Record] = stretches if stretches.are_long else list(stretches)
+    lengths, moved, step_s = [], set(), 0.0
+    for record in flown:
+        step_s = step_s or record.sample_time_s
+        lengths.append(record.duration_s)
+        moved |= {name for name in commands if np.ptp(record[name]) > 0}
+    inputs = [name for name in commands if name in moved]
     if not inputs:
-        return None, "no command moved" if made else "no span holds command and rate together"
+        return "no command moved" if lengths else "no span holds command and rate together"
     # Conditioning on each other input costs one independent window.
-    windows = INDEPENDENT_WINDOWS.value + len(inputs) - 1
-    kept = _without_scraps(made, windows)
-    total = sum(record.duration_s for record in kept)
-    window = min(total / windows, kept[-1].duration_s)
+    window = _longest_window(lengths, INDEPENDENT_WINDOWS.value + len(inputs) - 1)
     low = CYCLES_IN_WINDOW.value * 2.0 * math.pi / window
-    high = 2.0 * math.pi * kept[0].sample_rate_hz / SAMPLES_PER_CYCLE_LEAST.value
+    high = 2.0 * math.pi / (step_s * SAMPLES_PER_CYCLE_LEAST.value)
+    cut = _cut(lengths, stretches)
     if high < 1.2 * low:
-        return None, (
+        return (
             f"the windows reach down to {low / (2 * math.pi):.3g} Hz, the sampling up to "
-            f"{high / (2 * math.pi):.3g} Hz: no band is left{_cut(made, kept, spans)}"
+            f"{high / (2 * math.pi):.3g} Hz: no band is left{cut}"
         )
+    omega = np.geomspace(low, high, N_OMEGA)
+    windows = [window, window / 2] if high > 4 * low else [window]
+    total = SpectralSum((*inputs, *outputs), windows, omega, step_s)
+    for record in flown:
+        if record.duration_s >= window:
+            total.add({name: record[name] for name in (*inputs, *outputs)})
     try:
-        # Nobody reads the findings of this response: no command's options are looked up for them.
-        with speaking(str):
-            return estimate_response(
-                kept,
-                inputs=inputs,
-                outputs=[axis.rate for axis in axes],
-                band_rad_s=(low, high),
-                n_omega=60,
-                window_s=[window, window / 2] if high > 4 * low else [window],
-                covariance=False,
-            ), _cut(made, kept, spans)
+        found = total.composite(inputs, outputs)
     except FlightidError as error:
-        return None, error.problem
+        return error.problem
+    return AxesCoherence(omega, tuple(inputs), tuple(outputs), found, cut)
 
 
-def _records(log: Log, axes: list[AxisChannels], spans: tuple[Span, ...]) -> list[Record]:
-    """Records of the spans, cut at gaps."""
-    wanted = [find(log, name) for axis in axes for name in (axis.command, axis.rate)]
-    signals = [signal for signal in wanted if signal is not None]
-    return records(signals, {axis.command for axis in axes}, spans)
+def _longest_window(lengths: list[float], windows: float) -> float:
+    """The longest window of which the records that hold it give enough, s, up to the cap.
+
+    Records shorter than it are scraps: no window lies in them.
+    """
+    ordered = np.sort(lengths)[::-1]
+    reach = np.minimum(ordered, np.cumsum(ordered) / windows)
+    return min(float(reach.max()), LONGEST_WINDOW.value)
 
 
-def _without_scraps(made: list[Record], windows: float) -> list[Record]:
-    """The longest records, as many as give the longest windows that all of them hold."""
-    ordered = sorted(made, key=lambda record: -record.duration_s)
-    lengths = np.array([record.duration_s for record in ordered])
-    reach = np.minimum(lengths, np.cumsum(lengths) / windows)
-    return ordered[: int(np.argmax(reach)) + 1]
-
-
-def _cut(made: list[Record], kept: list[Record], spans: tuple[Span, ...]) -> str:
+def _cut(lengths: list[float], flown: FlightStretches) -> str:
     """What gaps did to the windows; empty where none cut a span."""
-    if len(made) <= len(spans):
+    if len(lengths) <= flown.n_parts:
         return ""
+    pieces = len(lengths) - flown.n_parts + len(flown.spans)
     return (
-        f"; gaps cut the flight into {len(made)} pieces, the longest "
-        f"{kept[0].duration_s:.2g} s: close them first"
+        f"; gaps cut the flight into {pieces} pieces, the longest "
+        f"{max(lengths):.2g} s: close them first"
     )
 
 
-def _moves(made: list[Record], name: str) -> bool:
-    return any(float(np.ptp(record[name])) > 0 for record in made)
-
-
 def _band(
-    response: FrequencyResponse, output: str, tau: str, rate_hz: float
+    explained: AxesCoherence, output: str, tau: str, rate_hz: float
 ) -> tuple[tuple[float, float] | None, float | None, float | None, str]:
-    row, column = response.outputs.index(output), response.inputs.index(tau)
-    omega = response.omega_rad_s
-    enough = response.n_independent[row, column] >= INDEPENDENT_WINDOWS.value - 0.5
-    coherence = np.where(enough, response.coherence[row, column], 0.0)
+    row, column = explained.outputs.index(output), explained.inputs.index(tau)
+    omega, found = explained.omega_rad_s, explained.composite
+    enough = found.n_independent[row, column] >= INDEPENDENT_WINDOWS.value - 0.5
+    coherence = np.where(enough, found.coherence[row, column], 0.0)
     fast_enough = omega <= 2.0 * math.pi * rate_hz / SAMPLES_PER_CYCLE.value
     if not np.any(fast_enough):
         return (

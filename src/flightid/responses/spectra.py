@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from flightid.responses.windows.transform import HANN_POWER, FoldedBasis, WindowPlan, transform
 
 MAXIMUM_CHUNK = 1 << 22
-"""Largest number of real values of transforms that are held at a time."""
+"""Largest number of real values of frames, or of their transforms, that are held at a time."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,8 @@ def pieces(
         Number of the first window of the piece, and its samples.
     """
     count = plan.count(samples.shape[1])
-    step = max(1, MAXIMUM_CHUNK // (2 * n_f * samples.shape[0]))
+    # Windows overlap, so that the frames of a piece are longer than its samples.
+    step = max(1, MAXIMUM_CHUNK // (max(2 * n_f, plan.length) * samples.shape[0]))
     for first in range(0, count, step):
         last = min(first + step, count)
         start = first * plan.hop
