@@ -14,14 +14,17 @@ from flightid.errors import FlightidError
 from flightid.findings import Finding
 from flightid.planning.flown_axis import FlownAxis
 from flightid.record import Record
-from flightid.responses import estimate_response
+from flightid.responses import FrequencyResponse, estimate_response
+from flightid.uncertainty.quantiles import half_width
 
 LARGEST_ERROR, LEAST_ERROR, FEWEST_POINTS = 0.2, 0.04, 6
 """A frequency counts as measured up to this random error; none weighs more than one of the least;
-so many make a check."""
+so many make a check. The least is what windows may bend of a response."""
 CAREFULLY = "begin with a third of the amplitude, look at the log, then fly the whole"
-LARGEST_MISS = 0.25
-"""Root mean square of the logarithm, beyond what noise explains: a quarter of the loop."""
+LARGEST_MISS = math.log(1.3)
+"""Root mean square of the logarithm: peaks of the card, which scale with the loop, hold to 30 %."""
+SURELY = half_width(0.90)
+"""Standard errors to each end of the interval: one end holds in 95 of 100 flights."""
 
 
 @dataclass(frozen=True)
@@ -32,18 +35,27 @@ class LoopCheck:
     ----------
     miss : float
         Root mean square of the logarithm of flown over predicted, without the share of noise.
+    least, most : float
+        Lower and upper 95 % bound of the miss, each by itself, by the response's own covariance.
     lowest_rad_s, highest_rad_s : float
         Where it was compared.
     """
 
     miss: float
+    least: float
+    most: float
     lowest_rad_s: float
     highest_rad_s: float
 
     @property
     def holds(self) -> bool:
-        """Whether the prediction flies as the vehicle did."""
-        return self.miss <= LARGEST_MISS
+        """Whether the prediction flies as the vehicle did, beyond doubt."""
+        return self.most <= LARGEST_MISS
+
+    @property
+    def is_missed(self) -> bool:
+        """Whether the vehicle did not fly as predicted, beyond doubt."""
+        return self.least > LARGEST_MISS
 
     def finding(self, axis: str) -> Finding:
         """How far the plan may be trusted for an axis."""
@@ -54,11 +66,16 @@ class LoopCheck:
         if self.holds:
             said = f"{axis}: expected within {self.miss:.0%} of {flown}"
             return Finding("loop-as-flown", Light.GREEN, said)
+        apart = f"{self.miss:.0%} ({self.least:.0%} to {self.most:.0%}) away from {flown}"
+        if self.is_missed:
+            said = f"{axis}: what the plan expects is {apart}"
+            return Finding("loop-not-as-flown", Light.AMBER, said, CAREFULLY)
         return Finding(
-            "loop-not-as-flown",
-            Light.AMBER,
-            f"{axis}: what the plan expects is {self.miss:.0%} away from {flown}",
-            CAREFULLY,
+            "loop-untold",
+            Light.UNKNOWN,
+            f"{axis}: what the plan expects is {apart}: whether it holds to "
+            f"{math.expm1(LARGEST_MISS):.0%} is not told",
+            f"fly a minute with brisker sticks about {axis} and plan from that log, or {CAREFULLY}",
         )
 
 
@@ -115,7 +132,50 @@ def check_loop(
     plant = vehicle.response(omega)
     fed = plant * loop.feedback(omega, gyro="filtered", with_hold=False)
     predicted = plant * loop.forward(omega, with_hold=False) / (1.0 + fed)
-    apart = np.abs(np.log(flown.response[0, 0][sure] / predicted)) ** 2 - 2.0 * error[sure] ** 2
+    logs = np.log(flown.response[0, 0][sure] / predicted)
     weight = np.maximum(error[sure], LEAST_ERROR) ** -2
-    miss = math.sqrt(max(0.0, float(np.average(apart, weights=weight))))
-    return LoopCheck(miss, float(omega[0]), float(omega[-1]))
+    ends = _interval(logs, _covariance(flown, sure, error), weight / weight.sum())
+    return LoopCheck(*ends, float(omega[0]), float(omega[-1]))
+
+
+def _covariance(
+    flown: FrequencyResponse, sure: NDArray[np.bool_], error: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Of real and imaginary parts of the logarithm at the sure frequencies, (2 n, 2 n)."""
+    if flown.errors is None:
+        return np.diag(np.tile(error[sure] ** 2, 2))
+    omega, values = flown.omega_rad_s[sure], flown.response[0, 0][sure]
+    scale = np.diag(1.0 / values)
+    turn = np.block([[scale.real, -scale.imag], [scale.imag, scale.real]])
+    return np.asarray(turn @ flown.covariance_at(omega)[0] @ turn.T)
+
+
+def _interval(
+    logs: NDArray[np.complex128], covariance: NDArray[np.float64], weight: NDArray[np.float64]
+) -> tuple[float, float, float]:
+    """Root of the weighted mean square of logarithms, less noise's, with its bounds.
+
+    With d of mean μ and covariance C, ``dᵀWd`` has the mean ``m + tr(WC)``, ``m = μᵀWμ``, and the
+    variance ``2 tr(WCWC) + 4 μᵀWCWμ``, the last share in the direction of d. Bounds are the m that
+    lie `SURELY` of their own standard deviations from what was found (a score interval), and
+    `LEAST_ERROR` further out for the bias of the estimate.
+
+    Reference
+    ---------
+    Mathai & Provost, *Quadratic Forms in Random Variables* (1992), theorem 3.2b.2.
+    """
+    parts = np.concatenate([logs.real, logs.imag])
+    w = np.tile(weight, 2)
+    through = w[:, None] * covariance
+    square = float(parts @ (w * parts))
+    spread = 2.0 * float(np.einsum("ij,ji->", through, through))
+    along = 4.0 * float((w * parts) @ covariance @ (w * parts)) / max(square, 1e-300)
+    found = square - float(np.trace(through))
+    # (m − found)² = z² (spread + along·m), solved for m.
+    middle = found + 0.5 * SURELY**2 * along
+    inside = SURELY**2 * (spread + along * found) + 0.25 * SURELY**4 * along**2
+    half = math.sqrt(max(0.0, inside))
+    least, most = middle - half, middle + half
+    miss, low, high = (math.sqrt(max(0.0, each)) for each in (found, least, most))
+    # What windows bend of a response adds at most its own size to a root of squares.
+    return miss, max(0.0, low - LEAST_ERROR), high + LEAST_ERROR
