@@ -11,11 +11,13 @@ from scipy.signal import chirp, lfilter
 
 from flightid import Record, inspect_log, run_study
 from flightid.cli.program import run
+from flightid.cli.wording import as_typed
 from flightid.conventions import Light
 from flightid.errors import DataError, OptionError, StudyError, UnknownNameError
 from flightid.findings import Finding
 from flightid.study.proposal import Proposal, propose_study
 from flightid.study.proposal.columns import columns_of
+from flightid.surface import speaking
 from tests.ordinary_log import write_ordinary_log
 
 RIG_WITH_GAINS = """
@@ -115,6 +117,35 @@ def test_a_study_that_was_changed_by_hand_stays(tmp_path: Path) -> None:
     with pytest.raises(StudyError, match="not as flightid wrote it"):
         made.write(target)
     assert "Mine" in target.read_text()
+
+
+def test_a_proposal_hands_its_scan_to_the_study_that_it_wrote(tmp_path: Path) -> None:
+    rig = _rig(tmp_path)
+    head, *rows = rig.read_text().splitlines()
+    cells = [row.split(",") for row in rows]
+    # An answer at once, so that a finding of the scan's fit asks for a declared loop.
+    fast = [f"{t},{u},{float(y) + 2 * float(u):.8g}" for t, u, y in cells]
+    rig.write_text("\n".join([head, *fast]) + "\n")
+    known: dict[str, object] = {}
+    study = tmp_path / "study.toml"
+    with speaking(as_typed):
+        made = propose_study(
+            [rig], folder=tmp_path, inputs=["volts"], outputs=["beam"], cache=known
+        )
+    made.write(study)
+    found, alone = (
+        run_study(study, output=tmp_path / name, cache=given)
+        for name, given in (("handed", dict(known)), ("alone", None))
+    )
+    kept = {"record: rig, fitted", "record: rig, choice", "orders: beam from volts"}
+    assert kept == set(found.from_cache) <= set(alone.carried_out)
+    # To the last digit and word, though the command that scanned speaks of options.
+    written = [(tmp_path / name / "results.json").read_text() for name in ("handed", "alone")]
+    assert written[0] == written[1]
+    # Other samples: nothing of the old ones stands.
+    _rig(tmp_path, seed=1)
+    again = run_study(study, output=tmp_path / "changed", cache=known)
+    assert again.from_cache == ()
 
 
 def test_columns_are_told_by_name_then_unit_or_refused() -> None:

@@ -29,6 +29,7 @@ from flightid.study.stages import (
     fit_equations,
     fit_without_equations,
     judge_reduction,
+    scan_records,
     select_coherent,
 )
 from flightid.study.task import Task, narrowed
@@ -227,8 +228,13 @@ def _fit(
         assert structure is not None
         told = replace(structure, coherence=(), select=())
         unseen = [records[name] for name in structure.select]
+        scan = None
+        if told.scans_orders and task.inputs:
+            tried = {**told.orders, **told.options}
+            asked = (told.structure, tried, task.inputs, told.outputs, flown, unseen)
+            scan = runner.stage(f"orders: {settings.name}", scan_records, *asked)
         fitted = runner.stage(
-            f"fit: {settings.name}", fit_without_equations, told, task.inputs, flown, unseen
+            f"fit: {settings.name}", fit_without_equations, told, task.inputs, flown, unseen, scan
         )
         return Part(task, responses, coherent, fitted)
     if reducing is not None and not settings.reduce:

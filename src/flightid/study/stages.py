@@ -29,11 +29,13 @@ from flightid.study.structures import fit_structure
 from flightid.study.task import Task, narrowed, with_responses
 from flightid.validation import (
     Comparison,
+    OrderScan,
     ResidualTests,
     SpectrumComparison,
     Verification,
     compare_spectra,
     residual_tests,
+    scan_orders,
     verify,
 )
 from flightid.validation.verification.baseline import baseline_of
@@ -208,16 +210,44 @@ def fit_without_equations(
     inputs: tuple[str, ...],
     flown: Sequence[Group],
     unseen: Sequence[Group],
+    scan: OrderScan | None = None,
 ) -> ModelFits:
     """Fit a structure to records, or the best of several; nothing where no input is coherent."""
     if not inputs:
         return ModelFits()
-    told, ranked = (
-        [narrowed(record, inputs, settings.outputs) for record in flat(records)]
-        for records in (flown, unseen)
-    )
-    fit, choice = fit_structure(settings, inputs, told, ranked)
+    told, ranked = (_channels(each, inputs, settings.outputs) for each in (flown, unseen))
+    fit, choice = fit_structure(settings, inputs, told, ranked, scan)
     return ModelFits({fit.method: fit}, choice=choice)
+
+
+def scan_records(
+    kind: str,
+    tried: Mapping[str, Any],
+    inputs: tuple[str, ...],
+    outputs: tuple[str, ...],
+    flown: Sequence[Group],
+    unseen: Sequence[Group],
+) -> OrderScan:
+    """Polynomial structures of a kind by free run, before the scan is widened.
+
+    Parameters
+    ----------
+    kind : str
+    tried : mapping of str to object
+        Orders to try, and options of the structure.
+    inputs, outputs : tuple of str
+        Outputs: one.
+    flown, unseen : sequence of Group
+        Records of the fits, and of the free runs.
+    """
+    told, ranked = (_channels(each, inputs, outputs) for each in (flown, unseen))
+    return scan_orders(told, ranked, kind=kind, inputs=inputs, outputs=outputs[0], **tried)
+
+
+def _channels(
+    groups: Sequence[Group], inputs: tuple[str, ...], outputs: tuple[str, ...]
+) -> list[Record]:
+    return [narrowed(record, inputs, outputs) for record in flat(groups)]
 
 
 def check(

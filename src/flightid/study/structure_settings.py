@@ -95,6 +95,11 @@ class StructureSettings(OrderOptions):
         counts = [len(values) for values in (*self.orders.values(), self.widths)]
         return self.structure == ANY or max(counts) > 1
 
+    @property
+    def scans_orders(self) -> bool:
+        """Whether several polynomial structures are tried."""
+        return self.is_scanned and self.structure not in (NARX, SUBSPACE)
+
 
 def _several(given: Any) -> tuple[Any, ...]:  # noqa: ANN401 - numbers, one or several
     if given == SPECTRUM:

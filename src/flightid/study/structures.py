@@ -15,7 +15,7 @@ from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.record import Record
 from flightid.study.structure_settings import NARX, SUBSPACE, StructureSettings
 from flightid.study.widened_scan import CLEAR, doubted, widened
-from flightid.validation import NarxSearch, OrderScan, scan_orders, search_narx
+from flightid.validation import NarxSearch, OrderScan, search_narx
 from flightid.validation.order_scan.edges import Structure
 from flightid.validation.order_scan.narx_search import search_further
 from flightid.validation.order_scan.result import OrderTrial, is_settled
@@ -35,6 +35,7 @@ def fit_structure(
     inputs: tuple[str, ...],
     flown: Sequence[Record],
     unseen: Sequence[Record],
+    scan: OrderScan | None = None,
 ) -> tuple[Fit, Choice | None]:
     """Fit a structure; of several the one that the study's rule takes.
 
@@ -45,6 +46,8 @@ def fit_structure(
         Those with coherence.
     flown, unseen : sequence of Record
         Records of the fit, and of the choice.
+    scan : OrderScan, optional
+        Of polynomial structures that are tried: of these orders on these records.
 
     Returns
     -------
@@ -55,25 +58,28 @@ def fit_structure(
         return _subspace(settings, inputs, list(flown)), None
     if settings.structure == NARX:
         return _narx(settings, inputs, list(flown), list(unseen))
-    return _polynomial(settings, inputs, list(flown), list(unseen))
+    return _polynomial(settings, inputs, list(flown), list(unseen), scan)
 
 
 def _polynomial(
-    settings: StructureSettings, inputs: tuple[str, ...], flown: list[Record], unseen: list[Record]
+    settings: StructureSettings,
+    inputs: tuple[str, ...],
+    flown: list[Record],
+    unseen: list[Record],
+    scan: OrderScan | None,
 ) -> tuple[Fit, OrderScan | None]:
     (output,) = settings.outputs
-    if not settings.is_scanned:
+    if scan is None:
         orders: dict[str, Any] = {name: values[0] for name, values in settings.orders.items()}
         asked = PolynomialModel.general(inputs, output, **orders, **settings.options)
         return identify(asked, flown), None
-    tried: dict[str, Any] = {**settings.orders, **settings.options}
-    scan, findings = widened(
-        scan_orders(flown, unseen, kind=settings.structure, inputs=inputs, outputs=output, **tried),
+    wide, findings = widened(
+        scan,
         lambda each: [trial.structure for trial in each.trials],
         lambda each: ranked(each, settings.rule)[0].structure,
         lambda each, structures: scan_further(each, structures, flown, unseen),
     )
-    return doubted(_cleanest(scan, settings.rule, flown), findings), scan
+    return doubted(_cleanest(wide, settings.rule, flown), findings), wide
 
 
 def _subspace(settings: StructureSettings, inputs: tuple[str, ...], flown: list[Record]) -> Fit:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, MutableMapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -24,10 +24,11 @@ from flightid.record.formats.columns import channel_name
 from flightid.record.time_question import time_column, time_said
 from flightid.study.proposal.columns import Columns, columns_of
 from flightid.study.proposal.options import DataOptions, told
+from flightid.study.proposal.order_scans import ProposedScans, record_file
 from flightid.study.proposal.proposal import Proposal
+from flightid.study.stage_runner import StageRunner
 from flightid.study.structures import ranked
 from flightid.surface import as_key, speaking
-from flightid.validation import scan_orders
 
 KINDS = ("arx", "armax", "bj", "oe")
 ORDERS = {"na": (1, 2, 3, 4), "nb": (1, 2, 3), "nc": (1, 2), "nd": (1, 2), "nf": (1, 2, 3, 4)}
@@ -90,6 +91,7 @@ def study_of_records(
     outputs: tuple[str, ...],
     excitations: tuple[str, ...] = (),
     reading: DataOptions | None = None,
+    cache: MutableMapping[str, Any] | None = None,
 ) -> Proposal:
     """Study file for records.
 
@@ -107,6 +109,8 @@ def study_of_records(
         Columns that were injected ahead of a controller: responses are estimated by way of them.
     reading : DataOptions, optional
         How the files are read.
+    cache : mutable mapping of str to object, optional
+        Takes the records and scans of the study, so that its run finds them done.
 
     Raises
     ------
@@ -127,21 +131,28 @@ def study_of_records(
     if injected and model is None:
         raise _needs_equations(paths, columns, injected)
     groups, missed = _groups(read, columns)
+    runner = StageRunner(cache)
     body: list[str] = []
     names: list[str] = []
     for whole in groups:
         segments = _segments(whole)
         group, still = _driven(whole, segments)
         missed += still
+        tables = {}
         for name, part, span in segments.all:
-            body += [*part.lines(name, span, folder), *keys]
-            body += [] if reading.time_column else part.time_key()
+            timed = [] if reading.time_column else part.time_key()
+            tables[name] = [*part.lines(name, span, folder), *keys, *timed]
+            body += tables[name]
+        fitted, choice = (
+            record_file(tables[n], folder) for n in (segments.fitted, segments.choice)
+        )
+        scans = ProposedScans(fitted, choice, group.inputs, columns.outputs, injected, runner)
         for output in columns.outputs if model is None else columns.outputs[:1]:
             name = (
                 f"{output} from {' and '.join(group.inputs)}" if model is None else Path(model).stem
             )
             try:
-                body += list(_model(name, group, segments, output, model, injected))
+                body += list(_model(name, group, segments, output, model, scans))
             except FlightidError as error:
                 why = str(error).partition(". Next: ")[0]
                 said = f"{name}: no model, {why}"
@@ -289,8 +300,9 @@ def _model(
     segments: _Segments,
     output: str,
     model: str | None,
-    injected: tuple[str, ...] = (),
+    scans: ProposedScans,
 ) -> Iterator[str]:
+    injected = scans.injected
     lines = [f"identify = {toml_value(segments.fitted)}"]
     lines += [f"verify = {toml_value(list(segments.unseen))}"]
     record = group.parts[0].record
@@ -307,7 +319,7 @@ def _model(
             template += [f"band_rad_s = {toml_value([_round(low), _round(high)])}", said]
             template += [f'response = {{ estimator = "instrument", excitations = {names} }}']
         return iter(["", "[[model]]", f"name = {toml_value(name)}", *template, *lines])
-    kind, found, orders_of = _structure(record, group.inputs, output, segments)
+    kind, found, orders_of = _structure(scans, output, record.unit(output))
     orders = [f"{order} = {toml_value(list(orders_of[order]))}" for order in USED[kind]]
     coherent = (
         (f"band_rad_s = {toml_value([_round(low), _round(high)])}",) if high > 2 * low else ()
@@ -324,21 +336,16 @@ def _model(
 
 
 def _structure(
-    record: Record, inputs: tuple[str, ...], output: str, segments: _Segments
+    scans: ProposedScans, output: str, unit: str
 ) -> tuple[str, str, dict[str, tuple[int, ...]]]:
     """The structure that runs freely with the least error, what each reached, and orders tried."""
-    seen, unseen = (
-        record.select([*inputs, output]).with_roles(
-            **dict.fromkeys(inputs, "input"), **{output: "output"}
-        ).segment(*span)
-        for span in segments.spans
-    )  # fmt: skip
-    orders = ORDERS | {"nk": delays_to_scan([seen], inputs, output)}
+    flown = scans.flown(output)
+    orders = ORDERS | {"nk": delays_to_scan([flown], scans.inputs, output)}
     of_kind = dict.fromkeys(KINDS, orders)
     reached: dict[str, float] = {}
     for kind in sorted(KINDS, key=("arx", "armax", "oe", "bj").index):
-        tried: dict[str, Any] = {order: of_kind[kind][order] for order in USED[kind]}
-        scan = scan_orders(seen, unseen, inputs=inputs, outputs=output, kind=kind, **tried)
+        tried = {order: of_kind[kind][order] for order in USED[kind]}
+        scan = scans.scan(kind, output, tried)
         best = scan.trials[0].free_run_rms
         if best is not None:
             reached[kind] = best
@@ -351,7 +358,7 @@ def _structure(
     least = min(reached.values())
     # What comes last assumes least of the noise, so that its intervals hold for more of it.
     good = [kind for kind in KINDS if reached.get(kind, math.inf) <= AS_GOOD * least]
-    return good[-1], f"{said} {record.unit(output)}".rstrip(), of_kind[good[-1]]
+    return good[-1], f"{said} {unit}".rstrip(), of_kind[good[-1]]
 
 
 def _stamps(read: Sequence[_Stretch]) -> Iterator[str]:

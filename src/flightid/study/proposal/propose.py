@@ -46,7 +46,8 @@ def propose_study(
     tune : bool
         Let the study end in gains of the autopilot that flew.
     cache : mutable mapping of str to object, optional
-        Takes what is read of a log and found in it; given to `run_study`, nothing is done twice.
+        Takes what is read and found, of records also the scan of orders; given to `run_study`,
+        nothing is done twice.
     **reading : object
         How records are read, and what is declared of inputs (of a log too): arguments of
         `flightid.read_records`.
@@ -76,6 +77,7 @@ def propose_study(
             outputs=tuple(outputs),
             excitations=tuple(excitations),
             reading=asked,
+            cache=cache,
         )
     if len(paths) > 1 or named:
         raise OptionError(

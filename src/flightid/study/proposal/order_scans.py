@@ -1,0 +1,92 @@
+"""Scans of orders for a proposal: stages of the study that it writes, which finds them done."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from flightid.conventions import Role
+from flightid.errors import StudyError
+from flightid.reading import parse_toml
+from flightid.record import Record
+from flightid.study.reading import TableReader
+from flightid.study.record_files import RecordFile, load_records, read_record_file
+from flightid.study.stage_runner import StageResult, StageRunner
+from flightid.study.stages import scan_records
+from flightid.study.task import narrowed
+from flightid.surface import as_key, speaking
+from flightid.validation import OrderScan
+
+Orders = Mapping[str, tuple[int, ...]]
+
+
+def record_file(lines: Sequence[str], folder: Path) -> RecordFile:
+    """What a study says of a record in the lines of its table, read as the study reads them."""
+    rows = parse_toml("\n".join(lines), "a study file", "proposal", StudyError)["record"]
+    return read_record_file(TableReader(rows[0], "[[record]]"), folder)
+
+
+@dataclass(frozen=True)
+class ProposedScans:
+    """Scans of the structures that a proposal weighs, on the records as its study will read them.
+
+    A scan depends on files, spans, channels and orders alone, so the cache of stages gives that of
+    the structure that was taken to the study; where the study's differ in any, it scans anew.
+
+    Attributes
+    ----------
+    fitted, choice : RecordFile
+        What is fitted, and what ranks structures.
+    inputs, outputs, injected : tuple of str
+        Channels of all models of the study; injected ones are read with what is fitted.
+    runner : StageRunner
+    """
+
+    fitted: RecordFile
+    choice: RecordFile
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    injected: tuple[str, ...]
+    runner: StageRunner
+
+    @cached_property
+    def _records(self) -> tuple[StageResult[list[Record]], StageResult[list[Record]]]:
+        """Loaded as the study does it, without what it conditions: a proposal asks for none."""
+        roles = {
+            **dict.fromkeys(self.inputs, Role.INPUT),
+            **dict.fromkeys(self.outputs, Role.OUTPUT),
+        }
+        beside = dict.fromkeys(self.injected, Role.EXCITATION)
+        first, second = (
+            self.runner.stage(f"record: {file.name}", load_records, file, channels, None)
+            for file, channels in ((self.fitted, beside | roles), (self.choice, roles))
+        )
+        return first, second
+
+    def flown(self, output: str) -> Record:
+        """What is fitted, inputs and one output of it.
+
+        Raises
+        ------
+        FlightidError
+            The study could not read it.
+        """
+        (record,) = self._records[0].value
+        whole = narrowed(record, self.inputs, (output,))
+        return whole.select([*self.inputs, output])
+
+    def scan(self, kind: str, output: str, orders: Orders) -> OrderScan:
+        """Structures of a kind for an output, as the study scans them.
+
+        Raises
+        ------
+        FlightidError
+            The study could not read the records, or no structure could be fitted.
+        """
+        flown, unseen = ([each] for each in self._records)
+        asked = (kind, dict(orders), self.inputs, (output,), flown, unseen)
+        # Findings of its fit stand in the study's report, in the words of the study.
+        with speaking(as_key):
+            return self.runner.stage(f"orders: {output}, {kind}", scan_records, *asked).value
