@@ -209,3 +209,25 @@ def test_understated_errors_show_in_repeats_and_raise_no_alarm() -> None:
     low, high = scatter.understated_ends() or (0.0, 0.0)
     assert low < 2.0 < high
     assert not find_drift(data).alarms
+
+
+@pytest.mark.parametrize(("short", "odd_share"), [(0.7, 0.0), (1.0, 0.03)])
+def test_errors_without_repeats_raise_few_alarms(short: float, odd_share: float) -> None:
+    """Errors told 0.7 times as large, or 3 % of flights six times further off: no change."""
+    rng, false, odd = np.random.default_rng(21), 0, 0
+    vehicles = [f"{number:02}" for number in np.repeat(np.arange(10), 12)]
+    for _ in range(25):
+        errors = rng.normal(size=(120, 2)) * np.where(rng.random((120, 2)) < odd_share, 6.0, 1.0)
+        found = find_drift(
+            FlightEstimates.of(
+                ["Lp", "Ltphi"],
+                vehicles,
+                10.0 + errors,
+                np.tile(short**2 * np.eye(2), (120, 1, 1)),
+                time_s=np.tile(DAY_S * np.arange(12.0), 10),
+            )
+        )
+        false += bool(found.alarms)
+        odd += sum(found.odd_flights.values())
+    assert false <= 4  # without the mends 18 and 20; 7 % of 100 fleets
+    assert odd < 10 if odd_share == 0.0 else 80 < odd < 180

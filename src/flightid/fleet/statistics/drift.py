@@ -20,6 +20,7 @@ from flightid.fleet.statistics.flight_estimates import FlightEstimates
 from flightid.fleet.statistics.largest_step import FEWEST, StepScan, scan_steps
 from flightid.fleet.statistics.local_level import LocalLevel, follow_level
 from flightid.fleet.statistics.multiple_testing import FALSE_SHARE, corrected
+from flightid.fleet.statistics.neighbours import neighbour_factor, variances_with_odd_ones
 from flightid.fleet.statistics.repeats import RepeatScatter, repeat_scatter
 from flightid.fleet.statistics.wandering import wandering_chance
 from flightid.result import Result
@@ -108,6 +109,8 @@ class FleetDrift(Result, schema="flightid.fleet_drift/1"):
         By parameter: what covariates do.
     covariates_missing : mapping of str to int
         Flights that do not tell a covariate.
+    odd_flights : mapping of str to int
+        By parameter: flights so far off those before and after them that they count for less.
 
     Example
     -------
@@ -125,6 +128,7 @@ class FleetDrift(Result, schema="flightid.fleet_drift/1"):
     repeats: tuple[RepeatScatter, ...]
     slopes: Mapping[str, tuple[Reading, ...]]
     covariates_missing: Mapping[str, int]
+    odd_flights: Mapping[str, int]
 
     @property
     def alarms(self) -> tuple[ParameterHistory, ...]:
@@ -169,7 +173,12 @@ class FleetDrift(Result, schema="flightid.fleet_drift/1"):
             f"{asked} histories asked, at most {FALSE_SHARE:.0%} of the alarms false "
             "(Benjamini and Hochberg)."
         )
-        return Table("What changed", columns, tuple(rows), (note,))
+        odd = ", ".join(f"{n} of {name}" for name, n in self.odd_flights.items() if n)
+        notes = (
+            note,
+            *((f"Flights far off those beside them count for less: {odd}.",) if odd else ()),
+        )
+        return Table("What changed", columns, tuple(rows), notes)
 
 
 def find_drift(
@@ -199,8 +208,8 @@ def find_drift(
     Assumes
     -------
     Errors of flights are independent and normal, with the variances that are given times what
-    repeats within a day show. Biased where no vehicle flew twice a day and errors are understated:
-    scatter then counts as change.
+    repeats within a day, or steps from flight to flight, show, whichever is more. Flights far off
+    those before and those after them count for less.
 
     Reference
     ---------
@@ -210,16 +219,20 @@ def find_drift(
     histories: list[ParameterHistory] = []
     slopes: dict[str, tuple[Reading, ...]] = {}
     bare = [fit_covariates(data, i, design, _variances(data, i)) for i in range(len(data.names))]
-    repeats = repeat_scatter(_explained(data, design, bare))
+    explained = _explained(data, design, bare)
+    repeats = repeat_scatter(explained)
+    odd: dict[str, int] = {}
     for i, name in enumerate(data.names):
-        factor = repeats[i].variance_factor
-        fitted = fit_covariates(data, i, design, factor * _variances(data, i))
+        factor = max(repeats[i].variance_factor, neighbour_factor(explained, i))
+        variances, off = variances_with_odd_ones(explained, i, factor)
+        odd[name] = int(off.sum())
+        fitted = fit_covariates(data, i, design, variances)
         slopes[name] = fitted.effects
         for vehicle in data.members:
-            found = _history(data, i, vehicle, design, fitted, factor, events)
+            found = _history(data, i, vehicle, design, fitted, variances, events)
             if found is not None:
                 histories.append(found)
-    return FleetDrift(_judged(histories), repeats, slopes, design.missing)
+    return FleetDrift(_judged(histories), repeats, slopes, design.missing, odd)
 
 
 def _variances(data: FlightEstimates, i: int) -> Array:
@@ -242,7 +255,7 @@ def _history(
     vehicle: str,
     design: CovariateDesign,
     fitted: CovariateSlopes,
-    factor: float,
+    errors: Array,
     events: Sequence[FleetEvent],
 ) -> ParameterHistory | None:
     rows = np.flatnonzero((data.member_of == data.members.index(vehicle)) & data.known[:, i])
@@ -250,7 +263,7 @@ def _history(
         return None
     rows = rows[np.argsort(data.time_s[rows], kind="stable")]
     name, unit, time_s = data.names[i], data.units[i], data.time_s[rows]
-    values, variances = data.values[rows, i], factor * data.covariances[rows, i, i]
+    values, variances = data.values[rows, i], errors[rows]
     covariance, tested = np.diag(variances), values
     if design.names:
         slope, error = fitted.without[vehicle]
