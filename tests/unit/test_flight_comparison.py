@@ -16,7 +16,7 @@ from flightid.conventions import Light
 from flightid.dynamics.conditions.ratios import difference_of
 from flightid.errors import DataError
 from flightid.plot.flight import compared_steps
-from flightid.review.changes import BY_FREQUENCY, TRACKING, change_of
+from flightid.review.changes import BY_FREQUENCY, TRACKING, change_of, verdicts
 from flightid.review.comparison import compare_loops
 from flightid.review.next_step import flown_step
 from flightid.review.promised import promised_loops
@@ -130,6 +130,25 @@ def test_gains_filters_and_other_vehicles_are_said(
     found = fid.compare_flights(review, other)
     assert (found.findings[0].code, found.findings[0].light) == ("not-alike", Light.AMBER)
     assert found.summary().title.endswith("of different firmware")
+    framed = replace(other, identity=replace(other.identity, frame="another"))
+    assert Light.GREEN not in [f.light for f in fid.compare_flights(review, framed).findings]
+    cut = replace(review, loops=review.loops[1:])
+    notes = fid.compare_flights(review, cut).summary().notes
+    assert any("Not compared: " in n and f"{review.loops[0].name} (" in n for n in notes)
+
+
+def test_what_intervals_show_to_be_worse_is_not_green_and_the_tolerance_is_printed() -> None:
+    less = Estimate[float | None]("overshoot", 6.8, "%", 0.1)
+    more = Estimate[float | None]("overshoot", 10.7, "%", 0.1)
+    change = change_of("yaw attitude", less, more)
+    assert not change.is_material
+    (found,) = verdicts([change], [change.key])
+    assert found.light is Light.UNKNOWN
+    assert "5 points of overshoot: overshoot" in found.action
+    (kept,) = verdicts([change], [change.key], promised=True)
+    assert "but for 1 that changed by less than what counts (10 % of a number, 5 p" in kept.message
+    (back,) = verdicts([change_of("yaw attitude", more, less)], [change.key])
+    assert back.light is Light.GREEN
 
 
 @pytest.mark.parametrize(

@@ -15,9 +15,11 @@ from flightid.conventions import Light
 from flightid.errors import OptionError, UnknownNameError
 from flightid.findings import Finding
 from flightid.inspection.advice import set_bits
+from flightid.inspection.excitation_found import FoundExcitation
 from flightid.inspection.flight_phases import FlightPhases, flight_phases
 from flightid.planning.axis_guess import guess_axis
 from flightid.planning.flight_findings import flight_findings
+from flightid.planning.loop_check import MISSED
 from flightid.planning.result import AxisSweep
 from flightid.planning.still_rate import still_rate
 from flightid.report.flight_card import card_html
@@ -271,6 +273,9 @@ def test_no_go_leaves_no_settings(plan: fid.SweepPlan, tmp_path: Path) -> None:
     assert not (tmp_path / "none").exists()
     assert "SID_AXIS 1" not in card_html(fell)
     assert len(fell.write(tmp_path / "forced", write_no_go=True)) == 6
+    missed = replace(plan, findings=(Finding(MISSED, Light.AMBER, "yaw: 442% away"),))
+    assert (plan.verdict, missed.verdict, fell.verdict) == ("go", "not held", "no-go")
+    assert 'class="verdict">not held<' in card_html(missed)
 
 
 def test_a_fall_an_unknown_rate_and_a_trim_are_said(
@@ -281,6 +286,12 @@ def test_a_fall_an_unknown_rate_and_a_trim_are_said(
     found = flight_findings(opened, phases, plan.sweeps, 400.0)
     lights = {each.code: each.light for each in found}
     assert lights == {"tipped-over": Light.RED, "loop-rate-typical": Light.AMBER}
+    swept = [FoundExcitation("sid", axis, 12.0, 60.0, "") for axis in ("roll", "roll", "yaw")]
+    with monkeypatch.context() as patch:
+        patch.setattr("flightid.planning.flight_findings.excitations", lambda *_: swept)
+        first = flight_findings(opened, phases, plan.sweeps, 400.0)[0]
+    assert "already: roll (2), yaw;" in first.message
+    assert first.action == f"next is flightid tune {opened.path.name}"
     monkeypatch.setattr("flightid.planning.flight_findings.LARGEST_TRIM", 0.0)
     (said,) = flight_findings(opened, replace(phases, tipped_s=None), plan.sweeps[2:], 0.0)
     assert said.code == "trim-let-go"

@@ -21,6 +21,8 @@ LARGEST_ERROR, LEAST_ERROR, FEWEST_POINTS = 0.2, 0.04, 6
 """A frequency counts as measured up to this random error; none weighs more than one of the least;
 so many make a check. The least is what windows may bend of a response."""
 CAREFULLY = "begin with a third of the amplitude, look at the log, then fly the whole"
+MISSED = "loop-not-as-flown"
+"""Code of the finding that a loop flew otherwise than expected, beyond doubt."""
 LARGEST_MISS = math.log(1.3)
 """Root mean square of the logarithm: peaks of the card, which scale with the loop, hold to 30 %."""
 SURELY = half_width(0.90)
@@ -69,7 +71,7 @@ class LoopCheck:
         apart = f"{self.miss:.0%} ({self.least:.0%} to {self.most:.0%}) away from {flown}"
         if self.is_missed:
             said = f"{axis}: what the plan expects is {apart}"
-            return Finding("loop-not-as-flown", Light.AMBER, said, CAREFULLY)
+            return Finding(MISSED, Light.AMBER, said, CAREFULLY)
         return Finding(
             "loop-untold",
             Light.UNKNOWN,

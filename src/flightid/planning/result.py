@@ -19,6 +19,7 @@ from flightid.files import write_atomically
 from flightid.findings import Finding, worst
 from flightid.planning.axis_guess import AxisGuess
 from flightid.planning.flight_time import FlightTime
+from flightid.planning.loop_check import MISSED
 from flightid.planning.procedures import STOP, Procedure
 from flightid.planning.settings import INTEGERS, betaflight_cli
 from flightid.result import Result
@@ -122,6 +123,13 @@ class SweepPlan(Result, schema="flightid.sweep_plan/1"):
     def is_go(self) -> bool:
         """Whether nothing on the list is red."""
         return worst(self.findings) is not Light.RED
+
+    @property
+    def verdict(self) -> str:
+        """``"no-go"``; ``"not held"`` where the flight missed an expected loop; or ``"go"``."""
+        if not self.is_go:
+            return "no-go"
+        return "not held" if any(f.code == MISSED for f in self.findings) else "go"
 
     def summary(self) -> Table:
         """A line for each axis: what to fly."""
@@ -263,11 +271,10 @@ class SweepPlan(Result, schema="flightid.sweep_plan/1"):
         return STOP
 
     def _computed(self) -> dict[str, object]:
-        return {"go": self.is_go, "batteries": self.flight_time.batteries}
+        batteries = self.flight_time.batteries
+        return {"go": self.is_go, "verdict": self.verdict, "batteries": batteries}
 
     def __repr__(self) -> str:
         """Whose plan, how many axes and the verdict on one line."""
-        verdict = "go" if self.is_go else "no-go"
-        return (
-            f"SweepPlan({self.name!r}, {self.procedure.title}, {len(self.sweeps)} axes, {verdict})"
-        )
+        axes = f"{len(self.sweeps)} axes"
+        return f"SweepPlan({self.name!r}, {self.procedure.title}, {axes}, {self.verdict})"

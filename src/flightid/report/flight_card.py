@@ -44,7 +44,7 @@ def card_html(plan: SweepPlan) -> str:
             tables=[_shown(table) for table in plan._tables()],
             settings=[(", ".join(axes), said) for said, axes in names.items()],
             findings=[each for each in plan.findings if str(each.light) != "green"],
-            verdict="go" if plan.is_go else "no-go",
+            verdict=plan.verdict,
             version=VERSION,
         )
     )

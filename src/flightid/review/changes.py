@@ -34,6 +34,7 @@ WORSE = {
 MATERIAL_SHARE, MATERIAL_OVERSHOOT = 0.1, 5.0
 """A tenth of what was promised, or five points of overshoot: what no pilot feels is no miss. A
 model's simplification alone moves numbers by a few percent, which its covariance does not hold."""
+TOLERANCE = f"{100 * MATERIAL_SHARE:g} % of a number, {MATERIAL_OVERSHOOT:g} points of overshoot"
 IN_MILLISECONDS = 1e3
 
 
@@ -89,10 +90,19 @@ class LoopChange:
     @property
     def is_worse(self) -> bool:
         """Whether a pilot would feel it, and would rather not: slower, or less true."""
+        return self.is_material and self._leans_worse
+
+    @property
+    def is_slightly_worse(self) -> bool:
+        """Whether it went that way by less than a pilot would feel."""
+        return not self.is_material and self._leans_worse
+
+    @property
+    def _leans_worse(self) -> bool:
         if self.name == "level":
             old, new = (abs((each.value or 0.0) - 1.0) for each in (self.before, self.after))
-            return self.is_material and new > old
-        return self.is_material and WORSE[self.name] * (self.difference.value or 0.0) > 0.0
+            return new > old
+        return WORSE[self.name] * (self.difference.value or 0.0) > 0.0
 
     def to_dict(self) -> dict[str, object]:
         """Plain values."""
@@ -167,17 +177,23 @@ def verdicts(
         judged = [c for c in changes if c.chance is not None]
         count = len({c.loop for c in judged})
         said = f"{len(judged)} numbers of {count} loop{'' if count == 1 else 's'}"
-        yield Finding(
-            "promise-kept" if promised else "loops-unchanged", Light.GREEN,
-            f"{said}: {'flown as promised' if promised else 'no change beyond chance'}",
-        )  # fmt: skip
+        told = "flown as promised" if promised else "no change beyond chance"
+        small = sum(each.key in significant for each in judged)
+        if small:
+            told += f" but for {small} that changed by less than what counts ({TOLERANCE})"
+        code = "promise-kept" if promised else "loops-unchanged"
+        yield Finding(code, Light.GREEN, f"{said}: {told}")
 
 
 def _changed(said: str, found: list[LoopChange]) -> Finding:
-    """Amber where something got worse; not judged where the tracking error alone did."""
+    """Amber where something got worse; not judged where it did by little, or tracking alone."""
     worse = [each.name for each in found if each.is_worse]
     if not worse:
-        return Finding("loop-changed", Light.GREEN, said)
+        little = [each.name for each in found if each.is_slightly_worse]
+        if not little:
+            return Finding("loop-changed", Light.GREEN, said)
+        action = f"worse beyond chance, by less than {TOLERANCE}: {', '.join(little)}; weigh it"
+        return Finding("loop-changed", Light.UNKNOWN, said, action)
     if worse == [TRACKING]:
         action = "compare flights whose sticks moved alike: quicker sticks are tracked worse"
         return Finding("loop-changed", Light.UNKNOWN, said, action)

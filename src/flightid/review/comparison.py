@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
@@ -114,11 +114,27 @@ class FlightComparison(Result, schema="flightid.flight_comparison/1"):
         if cut:
             alone = "" if self.promised else "; flightid flight reads each over its own"
             yield f"{STEPS} ({'; '.join(cut)}){alone}."
+        if left := self._left_out():
+            yield f"Not compared: {left}."
         if any(each.name == TRACKING for each in self.changes):
             yield (
                 "Tracking error: rms of the error over that of the set-point; it depends on how "
                 "fast the sticks moved too."
             )
+
+    def _left_out(self) -> str:
+        """Loops that one of both alone tells, and why."""
+        compared = {each.loop for each in self.changes}
+        sides = dict(zip(("promised", "flown") if self.promised else self.names,
+                         (self.before, self.after), strict=True))  # fmt: skip
+        found: dict[str, list[str]] = {}
+        for side, loops in sides.items():
+            told = {loop.name: loop for loop in loops}
+            for name in dict.fromkeys(each.name for each in (*self.before, *self.after)):
+                if name not in compared and (name not in told or not told[name].is_told):
+                    why = told[name].reason if name in told else "nothing of it"
+                    found.setdefault(name, []).append(f"{side}: {why}")
+        return "; ".join(f"{name} ({', '.join(why)})" for name, why in found.items())
 
     def gains_table(self) -> Table:
         """Parameters that differ."""
@@ -181,7 +197,11 @@ def compare_loops(
             action="see flightid flight LOG of each for what to fly",
         )
     kept = significant_of(changes)
-    findings = (*_unlike(unlike), *verdicts(changes, kept, promised=promised))
+    judged = list(verdicts(changes, kept, promised=promised))
+    if "vehicle" in unlike or "frame" in unlike:
+        # Of two vehicles no difference praises what was set, and no likeness either.
+        judged = [replace(e, light=Light.UNKNOWN) if e.light is Light.GREEN else e for e in judged]
+    findings = (*_unlike(unlike), *judged)
     return FlightComparison(
         names, promised, changes, before, after, gains, filters, unlike, kept, findings
     )
