@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -72,3 +73,24 @@ def test_a_low_passed_output_leaves_the_loop_unknown() -> None:
     assert feedback_test(plain).loop == "closed"
     told = plain.replace({}, step=steps[-1])
     assert (feedback_test(told).loop, feedback_test(told).source) == ("unknown", "filtered")
+
+
+@pytest.mark.parametrize("share", [0.0, 0.02, 0.5])
+def test_a_line_above_the_new_nyquist_frequency_is_named(share: float) -> None:
+    rows = rig(1)
+    time_s, y = rows["y"]
+    size = np.sqrt(2.0 * share / (1.0 - share) * np.var(y))
+    rows = {**rows, "y": (time_s, y + size * np.sin(2.0 * np.pi * 83.0 * time_s))}
+    for interpolation in (None, {"y": "band-limited"}):
+        grid = replace(GRID, interpolation=interpolation)
+        steps = grid.pieces(rows, ())[0][2]
+        found = [step.options for step in steps if step.options.get("code") == "folded-power"]
+        assert bool(found) is (share == 0.5 and interpolation is None)
+        for each in found:
+            text = r"y: (\d+)% of its power lies above 25 Hz, most at 83 Hz"
+            said = re.search(text, str(each["found"]))
+            assert said is not None
+            # Windows of 5 s see a little less of the slow motion of some than of others.
+            assert abs(int(said[1]) - 50) <= 3
+            assert "folds to 17 Hz" in str(each["found"])
+            assert "'y': 'band-limited'" in str(each["action"])

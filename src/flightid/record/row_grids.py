@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from flightid.conventions import Role
 from flightid.errors import DataError
 from flightid.record.channel import Channel
-from flightid.record.checks import REMOVE_OUTLIERS, entry_steps
+from flightid.record.checks import REMOVE_OUTLIERS, entry_steps, fault_steps
+from flightid.record.folded_power import folded_power
 from flightid.record.history import Step
 from flightid.record.hold import InputHold
 from flightid.record.interpolation import SAME_RATE, Interpolation, is_coarser, usual_method
@@ -151,6 +152,12 @@ class RowGrid:
         fastest = min((time_s for time_s, _ in rows.values()), key=mean_spacing_s)
         require_sensible_base(fastest, step_s, self.time_column)
         ways = self.methods(rows, step_s)
+        steps += fault_steps(
+            fault
+            for name, way in ways.items()
+            if way == Interpolation.POINT
+            and (fault := folded_power(name, *rows[name], step_s)) is not None
+        )
         held = [name for name in self.driving if ways[name] == "previous"]
         made = to_uniform(
             rows,
