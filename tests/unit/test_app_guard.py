@@ -174,3 +174,23 @@ def test_a_body_without_a_length_is_counted(monkeypatch: pytest.MonkeyPatch) -> 
         body = (b"x" * 600, b"x" * (400 + more), b"")
         assert _asked(head, method="PUT", body=body)[0] == status
     assert UPLOAD_BYTES == 1 << 30
+
+
+def test_cookies_of_other_pages_lock_nobody_out() -> None:
+    for other in ('prefs={"a":1}', "a[1]=x", "n=ü", "a=\x00;;=", f"{SESSION.cookie}=bad", "="):
+        for line in (f"{other}; {COOKIE}", f"{COOKIE};{other}"):
+            assert _asked({"cookie": line})[0] == 200
+        assert _asked({"cookie": f"x{COOKIE}; {other}"})[0] == 401
+        assert _asked({"cookie": f'a="; {SESSION.cookie}={SESSION.secret}x; "; {other}'})[0] == 401
+
+
+def test_a_second_host_is_refused() -> None:
+    headers = {name: [value] for name, value in OURS.items()}
+    scope = {"type": "http", "method": "GET", "path": "/api/workspace"}
+    guard = Guard(_inner, SESSION)
+    assert guard.refusal(scope, headers) is None
+    for hosts in ([OURS["host"], "evil.example"], [OURS["host"]] * 2):
+        refused = guard.refusal(scope, {**headers, "host": hosts})
+        assert refused is not None
+        assert refused.status == 421
+    assert _asked({**JSON, "content-length": "9" * 5000}, method="POST")[0] == 413

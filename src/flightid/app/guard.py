@@ -11,7 +11,6 @@ from __future__ import annotations
 import secrets
 from collections.abc import Awaitable, Callable, MutableMapping
 from dataclasses import dataclass, field
-from http.cookies import CookieError, SimpleCookie
 from typing import Any
 from urllib.parse import parse_qs
 
@@ -44,6 +43,7 @@ BODIES = {
 DOCUMENT_BYTES = 1 << 20
 UPLOAD_BYTES = 1 << 30
 """Most bytes of a body in JSON, and of a log."""
+MOST_DIGITS = 18
 FIRST = "/"
 ENTRY = (
     "<!doctype html><html lang=en><meta charset=utf-8><title>flightid</title>"
@@ -163,7 +163,7 @@ class Guard:
         told = bool(sites) or upgrade
         if not first and not (told and all(site == "same-origin" for site in sites)):
             return Refusal(403, "This request does not come from the page of flightid.")
-        if not self._session.knows(_cookie_of(headers, self._session.cookie)):
+        if not any(map(self._session.knows, _cookies_of(headers, self._session.cookie))):
             return Refusal(401, "Open the address that flightid app has printed.")
         return None if upgrade else _refused_body(scope, headers)
 
@@ -181,7 +181,8 @@ def _refused_body(scope: Scope, headers: dict[str, list[str]]) -> Refusal | None
     if needed is not None and given != needed:
         return Refusal(415, f"A body of {needed} is needed.")
     length = headers.get("content-length", ["0"])[0]
-    if not (length.isascii() and length.isdigit()) or int(length) > _most(method):
+    plain = length.isascii() and length.isdigit() and len(length) <= MOST_DIGITS
+    if not plain or int(length) > _most(method):
         return Refusal(413, f"The body is longer than {_most(method) >> 20} MiB.")
     return None
 
@@ -197,14 +198,10 @@ def _headers(scope: Scope) -> dict[str, list[str]]:
     return found
 
 
-def _cookie_of(headers: dict[str, list[str]], name: str) -> str:
-    jar: SimpleCookie = SimpleCookie()
-    for line in headers.get("cookie", []):
-        try:
-            jar.load(line)
-        except CookieError:
-            return ""
-    return jar[name].value if name in jar else ""
+def _cookies_of(headers: dict[str, list[str]], name: str) -> list[str]:
+    """Values of a cookie. Other pages of this machine share the jar: theirs are passed over."""
+    pairs = [part.partition("=") for line in headers.get("cookie", []) for part in line.split(";")]
+    return [value.strip() for key, _, value in pairs if key.strip() == name]
 
 
 def _bounded(scope: Scope, receive: Receive) -> Receive:
