@@ -151,6 +151,9 @@ def test_who_has_not_seen_the_last_version_changes_nothing(browser: Browser, flo
     status, told, _ = browser.ask(place, "PATCH", wrong, If_Match=changed["etag"])
     assert status == 422
     assert "band_rad_s" in told["error"]
+    for sent in ({"path": ["study", "title"], "value": "\ud800"}, {"path": ["\ud800"], "value": 1}):
+        assert browser.ask(place, "PATCH", {"edits": [sent]}, If_Match=changed["etag"])[0] == 422
+    assert browser.ask(place, "POST", {"text": "\ud800"}, If_Match=changed["etag"])[0] == 422
     whole = {"text": before}
     assert browser.ask(place, "POST", whole, If_Match=changed["etag"])[0] == 200
     assert flown.study.read_text() == before

@@ -56,11 +56,18 @@ export interface JobNews {
   job: Job;
 }
 
+/** A file or folder of the workspace that is not listed, and why. */
+export interface LeftOut {
+  path: string;
+  reason: string;
+}
+
 /** The workspace. */
 export interface Listing {
   folder: string;
   version: string;
   logs: LogItem[];
+  left_out: LeftOut[];
 }
 
 /** A log of the workspace; what an overview tells is there once it was made. */

@@ -12,19 +12,24 @@ import multiprocessing
 import os
 from collections.abc import Callable
 from concurrent.futures import CancelledError, Future
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from pebble import ProcessExpired, ProcessPool
 
 from flightid.app import work
+from flightid.app.kept_parts import kept_part
+from flightid.app.own_folders import own_folder, read_plain
 from flightid.app.schemas import Job
 from flightid.app.workspace import Workspace
+from flightid.errors import FlightidError
 from flightid.files import write_atomically
 
 LONGEST_S = 900.0
 """Of a job; a hand's request may take `PATIENCE_S`."""
 PATIENCE_S = 60.0
+NOTE_BYTES = 1 << 16
 KINDS = ("overview", "review")
 Listener = Callable[[Job], None]
 
@@ -48,11 +53,9 @@ class Workers:
         made: dict[str, Any] = {"context": context, "initializer": work.limit_memory}
         self._live = ProcessPool(max_workers=1, **made)
         self._long = ProcessPool(max_workers=max(1, (os.cpu_count() or 2) - 1), **made)
-        self._folder = workspace.folder / ".flightid" / "jobs"
-        self._folder.mkdir(exist_ok=True)
-        for path in sorted(self._folder.glob("*.json")):
-            job = Job(**json.loads(path.read_text(encoding="utf-8")))
-            self._jobs[job.id] = job.model_copy(update={"state": "interrupted"})
+        self._folder = own_folder(workspace.folder, ".flightid", "jobs")
+        for job in _interrupted(self._folder):
+            self._jobs[job.id] = job
 
     def start(self) -> None:
         """Load the workers before anybody waits for them; call it inside the event loop."""
@@ -84,7 +87,7 @@ class Workers:
         """Begin a job, unless its result is there, it runs, or it failed and nobody asks again."""
         name = f"{kind}-{log}"
         known = self._jobs.get(name)
-        if self._workspace.result(log, kind) is not None:
+        if kept_part(self._workspace, log, kind) is not None:
             return
         if known is not None and known.state == "waiting":
             return
@@ -93,8 +96,13 @@ class Workers:
         job = Job(id=name, kind=kind, log=log, state="waiting")  # type: ignore[arg-type]
         result = self._workspace.result_path(log, f"{kind}.json")
         inputs: tuple[object, ...] = (work.make_review, path, result)
-        if kind == "overview":
-            inputs = (work.make_overview, path, self._workspace.study_path(log), result)
+        try:
+            if kind == "overview":
+                inputs = (work.make_overview, path, self._workspace.study_path(log), result)
+        except FlightidError as error:
+            self._jobs[name] = job.model_copy(update={"state": "failed", "reason": str(error)})
+            self._tell(self._jobs[name])
+            return
         write_atomically(self._folder / f"{name}.json", job.model_dump_json())
         self._jobs[name] = job
         future = self._long.schedule(work.answered, args=inputs, timeout=LONGEST_S)
@@ -149,3 +157,19 @@ class Workers:
     def _tell(self, job: Job) -> None:
         for listener in list(self._listeners):
             listener(job)
+
+
+def _interrupted(folder: Path) -> list[Job]:
+    """Jobs that a killed server ran; a note that cannot be one of ours is removed."""
+    jobs = []
+    for path in sorted(folder.glob("*.json")):
+        try:
+            job = Job(**json.loads(read_plain(path, NOTE_BYTES)))
+            if job.id != path.stem or job.id != f"{job.kind}-{job.log}":
+                raise ValueError(job.id)
+        except (OSError, TypeError, ValueError, RecursionError):
+            with suppress(OSError):  # a folder stays
+                path.unlink()
+        else:
+            jobs.append(job.model_copy(update={"state": "interrupted"}))
+    return jobs

@@ -17,8 +17,9 @@ from flightid.app.schemas import (
     ResponsePart,
     ResponseQuestion,
 )
-from flightid.app.studies import Studies
+from flightid.app.studies import Studies, text_of
 from flightid.app.study_edits import KeyEdit
+from flightid.errors import FlightidError
 
 MOST_WORDS = 1 << 16
 
@@ -97,7 +98,10 @@ async def _answered(
         path = studies.path(question.log)
     if path is None:
         return ResponseAnswer(request=question.request, error="This log has no study.")
-    text = path.read_text(encoding="utf-8")
+    try:
+        text = text_of(path)
+    except FlightidError as error:
+        return ResponseAnswer(request=question.request, error=str(error))
     edits = [KeyEdit(tuple(each.path), each.value) for each in question.edits]
     inputs = (path, text, question.model, edits, question.around, question.intervals)
     made, refusal, seconds = await workers.live(work.make_responses, *inputs)

@@ -132,12 +132,20 @@ class LogItem(Message):
     light: Light | None = None
 
 
+class LeftOut(Message):
+    """A file or folder of the workspace that is not listed, and why."""
+
+    path: str
+    reason: str
+
+
 class Listing(Message):
     """The workspace."""
 
     folder: str
     version: str
     logs: list[LogItem]
+    left_out: list[LeftOut] = []
 
 
 class FlightScreen(Message):

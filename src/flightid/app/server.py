@@ -4,32 +4,34 @@ from __future__ import annotations
 
 import asyncio
 import hashlib
+import json
 import math
 import re
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 from fastapi import FastAPI, Header, HTTPException, Query, Request, Response
-from fastapi.responses import JSONResponse
+from fastapi.exceptions import RequestValidationError
 
 from flightid.app import work
 from flightid.app.guard import UPLOAD_BYTES
 from flightid.app.jobs import KINDS, Workers
+from flightid.app.kept_parts import kept_fields, kept_overview, kept_review
 from flightid.app.live import add_socket
+from flightid.app.own_folders import is_link, shown_name
 from flightid.app.pyramid import Pyramid, view
 from flightid.app.schemas import (
     Edits,
     FieldGroup,
     FlightScreen,
     Job,
+    LeftOut,
     Listing,
     LogItem,
-    Overview,
-    ReviewPart,
     StudyText,
     WholeText,
 )
@@ -73,7 +75,8 @@ def make_server(workspace: Workspace, page: Mapping[str, tuple[str, bytes]]) -> 
         openapi_url=None,
         lifespan=lifespan,
     )
-    app.add_exception_handler(FlightidError, _refused)
+    for refused in (FlightidError, OSError, RequestValidationError):
+        app.add_exception_handler(refused, _refused)
     studies = Studies(workspace)
     _add_logs(app, workspace, workers)
     _add_jobs(app, workspace, workers)
@@ -83,9 +86,14 @@ def make_server(workspace: Workspace, page: Mapping[str, tuple[str, bytes]]) -> 
     return app
 
 
-async def _refused(request: Request, error: Exception) -> JSONResponse:
+async def _refused(request: Request, error: Exception) -> Response:
+    """The sentence of a refusal, in ASCII: what was sent may be no text that has a UTF-8."""
     del request
-    return JSONResponse({"error": str(error)}, status_code=422)
+    said = str(error)
+    if isinstance(error, RequestValidationError):
+        places = [f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors()]
+        said = "; ".join(places)
+    return Response(json.dumps({"error": said}), 422, media_type="application/json")
 
 
 def _add_page(app: FastAPI, page: Mapping[str, tuple[str, bytes]]) -> None:
@@ -111,7 +119,8 @@ def _add_logs(app: FastAPI, workspace: Workspace, workers: Workers) -> None:
         await asyncio.to_thread(workspace.scan)
         made = await asyncio.to_thread(_listing, workspace)
         for each in [log for log in made.logs if log.light is None][:MOST_LOOKED_AT]:
-            workers.ensure("overview", each.id, _known(workspace, each.id))
+            if (path := workspace.log_path(each.id)) is not None:
+                workers.ensure("overview", each.id, path)
         return made
 
     @app.put("/api/logs")
@@ -129,24 +138,23 @@ def _add_logs(app: FastAPI, workspace: Workspace, workers: Workers) -> None:
         path = _known(workspace, log)
         for kind in KINDS:
             workers.ensure(kind, log, path)
-        overview, review = workspace.result(log, "overview"), workspace.result(log, "review")
         return FlightScreen(
             id=log,
             name=path.name,
             path=path.relative_to(workspace.folder).as_posix(),
-            overview=None if overview is None else Overview(**overview),
-            review=None if review is None else ReviewPart(**review),
+            overview=kept_overview(workspace, log),
+            review=kept_review(workspace, log),
             jobs=workers.of_log(log),
         )
 
     @app.get("/api/logs/{log}/fields")
     async def fields(log: Log) -> list[FieldGroup]:
         path = _known(workspace, log)
-        if workspace.result(log, "fields") is None:
+        if (found := kept_fields(workspace, log)) is None:
             target = workspace.result_path(log, "fields.json")
             await _made(workers.live(work.make_fields, path, target))
-        found = workspace.result(log, "fields") or {"groups": []}
-        return [FieldGroup(**group) for group in found["groups"]]
+            found = kept_fields(workspace, log)
+        return found or []
 
     @app.get("/api/logs/{log}/view", response_class=Response)
     async def seen(
@@ -175,9 +183,12 @@ async def _pyramid(
     message, number, field = match.groups()
     name = hashlib.sha256(series.encode()).hexdigest()[:24]
     target = workspace.result_path(log, f"{name}.npy").with_suffix(".npy")
-    if not target.is_file():
-        instance = None if number is None else int(number)
-        await _made(workers.live(work.make_pyramid, path, message, instance, field, target))
+    with suppress(OSError, ValueError, IndexError, EOFError):
+        if not is_link(target):
+            return await asyncio.to_thread(Pyramid.read, target)
+    # Not there, or broken; the new one takes its place.
+    instance = None if number is None else int(number)
+    await _made(workers.live(work.make_pyramid, path, message, instance, field, target))
     return await asyncio.to_thread(Pyramid.read, target)
 
 
@@ -197,10 +208,9 @@ def _known(workspace: Workspace, log: str) -> Path:
 def _listing(workspace: Workspace) -> Listing:
     logs = []
     for entry in workspace.index.entries():
-        found = workspace.result(entry.id, "overview")
+        shown = kept_overview(workspace, entry.id)
         told: dict[str, Any] = {}
-        if found is not None:
-            shown = Overview(**found)
+        if shown is not None:
             swept = [b for b in shown.blocks if b.kind in ("sid", "chirp", "sweep", "autotune")]
             told = {
                 "vehicle": shown.vehicle,
@@ -220,7 +230,9 @@ def _listing(workspace: Workspace) -> Listing:
                 **told,
             )
         )
-    return Listing(folder=str(workspace.folder), version=VERSION, logs=logs)
+    left = [LeftOut(path=path, reason=why) for path, why in workspace.left_out.items()]
+    folder = shown_name(workspace.folder)
+    return Listing(folder=folder, version=VERSION, logs=logs, left_out=left)
 
 
 def _add_jobs(app: FastAPI, workspace: Workspace, workers: Workers) -> None:

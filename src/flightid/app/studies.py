@@ -8,12 +8,13 @@ from typing import Any
 
 from fastapi import HTTPException
 
+from flightid.app.own_folders import read_plain
 from flightid.app.python_lines import python_lines
 from flightid.app.schemas import Edits, StudyText, WholeText
 from flightid.app.study_edits import KeyEdit, edited, etag_of, write_study
 from flightid.app.workspace import Workspace
-from flightid.errors import FlightidError
-from flightid.reading import read_toml
+from flightid.errors import FlightidError, StudyError
+from flightid.reading import DOCUMENT_BYTES, read_toml
 from flightid.study.settings import read_settings
 
 
@@ -39,7 +40,7 @@ class Studies:
         path = self.path(log)
         if path is None:
             return None
-        text = path.read_text(encoding="utf-8")
+        text = text_of(path)
         return StudyText(
             text=text, etag=etag_of(text), settings=_tables(path), python=_python(path)
         )
@@ -58,11 +59,27 @@ class Studies:
         if path is None:
             return None
         with self._lock:
-            text = path.read_text(encoding="utf-8")
+            text = text_of(path)
             if etag_of(text) != tag:
                 raise HTTPException(409, {"text": text, "etag": etag_of(text)})
             write_study(path, made(text))
             return self.read(log)
+
+
+def text_of(path: Path) -> str:
+    """Text of a study file.
+
+    Raises
+    ------
+    StudyError
+        It is a link, too long, no UTF-8, or cannot be read.
+    """
+    try:
+        return read_plain(path, DOCUMENT_BYTES).decode()
+    except (OSError, UnicodeError) as error:
+        raise StudyError(
+            "the study file cannot be read", found=str(error), needed="a file of UTF-8"
+        ) from error
 
 
 def _tables(path: Path) -> dict[str, Any]:

@@ -11,12 +11,11 @@ from typing import Any
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
 
+from flightid.app.own_folders import draft_of
 from flightid.errors import StudyError
 from flightid.files import write_atomically
 from flightid.reading import DOCUMENT_BYTES
 from flightid.study.settings import read_settings
-
-DRAFT = ".draft-"
 
 
 @dataclass(frozen=True)
@@ -52,7 +51,7 @@ def edited(text: str, edits: Sequence[KeyEdit]) -> str:
     Raises
     ------
     StudyError
-        The text is no TOML, or a path leads nowhere.
+        The text is no TOML, a path leads nowhere, or a value is no text (half a surrogate pair).
 
     Example
     -------
@@ -67,11 +66,22 @@ def edited(text: str, edits: Sequence[KeyEdit]) -> str:
         document: Any = tomlkit.parse(text)
         for edit in edits:
             _apply(document, edit)
-        return str(tomlkit.dumps(document))
-    except (TOMLKitError, KeyError, IndexError, TypeError, ValueError) as error:
+        made = str(tomlkit.dumps(document))
+        made.encode()
+        return made
+    except (
+        TOMLKitError,
+        AttributeError,
+        KeyError,
+        IndexError,
+        TypeError,
+        ValueError,
+        RecursionError,
+    ) as error:
+        said = f"{type(error).__name__}: {error}".encode(errors="replace").decode()
         raise StudyError(
             "the study file cannot be changed there",
-            found=f"{type(error).__name__}: {error}",
+            found=said,
             needed="a key of docs/study.md",
         ) from error
 
@@ -95,6 +105,15 @@ def _apply(document: Any, edit: KeyEdit) -> None:  # noqa: ANN401 - a parsed doc
         place[last] = edit.value
 
 
+def _bytes_of(text: str) -> bytes:
+    try:
+        return text.encode()
+    except UnicodeEncodeError as error:
+        raise StudyError(
+            "the study file is no text", found="half a surrogate pair", needed="UTF-8"
+        ) from error
+
+
 def require_study(path: Path, text: str) -> None:
     """Refuse what `flightid run` would refuse; paths are those beside `path`.
 
@@ -103,14 +122,10 @@ def require_study(path: Path, text: str) -> None:
     StudyError
         Names every key that does not fit.
     """
-    if len(text.encode()) > DOCUMENT_BYTES:
+    if len(_bytes_of(text)) > DOCUMENT_BYTES:
         raise StudyError("the study file is too long", needed=f"{DOCUMENT_BYTES} bytes at most")
-    draft = path.with_name(f"{DRAFT}{path.name}")
-    try:
-        draft.write_text(text, encoding="utf-8")
+    with draft_of(path, text) as draft:
         read_settings(draft)
-    finally:
-        draft.unlink(missing_ok=True)
 
 
 def write_study(path: Path, text: str) -> str:

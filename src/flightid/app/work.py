@@ -14,9 +14,10 @@ from pathlib import Path
 from typing import Any
 
 from flightid.app.overview import light_of, overview_of, review_of
+from flightid.app.own_folders import draft_of
 from flightid.app.pyramid import Pyramid
 from flightid.app.schemas import FieldGroup, ResponseCurve, ResponsePart, ShownFinding
-from flightid.app.study_edits import DRAFT, KeyEdit, edited
+from flightid.app.study_edits import KeyEdit, edited
 from flightid.errors import FlightidError
 from flightid.files import write_atomically
 from flightid.logs import Log, read_log
@@ -122,12 +123,8 @@ def make_responses(
     study: Path, text: str, model: str, edits: Sequence[KeyEdit], around: bool, intervals: bool
 ) -> Mapping[str, Any]:
     """Responses of a model by a study with edits that are not written yet."""
-    draft = study.with_name(f"{DRAFT}live-{study.name}")
-    try:
-        draft.write_text(edited(text, edits) if edits else text, encoding="utf-8")
+    with draft_of(study, edited(text, edits) if edits else text) as draft:
         made = preview_responses(draft, model, around=around, cache=KEPT)
-    finally:
-        draft.unlink(missing_ok=True)
     curves = [
         curve
         for name, each in made.responses.items()

@@ -3,7 +3,8 @@
 ``logs/<id>/<name>`` what was dropped, by the hash of its bytes; ``studies/<id>.toml``;
 ``.flightid/results/<id>/`` what was computed. Logs that lie elsewhere in the folder stay there.
 Files are written whole, flushed and renamed; what a killed server leaves behind is a temporary
-file that the next start removes.
+file that the next start removes. The folder may be a stranger's: `own_folders` follows no link of
+it, and a file that cannot be listed is told with its reason.
 """
 
 from __future__ import annotations
@@ -13,17 +14,29 @@ import json
 import re
 import shutil
 from collections.abc import AsyncIterator, Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from flightid.app.index import LogIndex
-from flightid.errors import OptionError
+from flightid.app.own_folders import (
+    clear_left,
+    is_link,
+    made_name,
+    new_file,
+    own_folder,
+    read_plain,
+    shown_name,
+)
+from flightid.errors import FlightidError, OptionError
 from flightid.files import flush, sha256_of_file, write_atomically
 from flightid.logs import is_log
 from flightid.version import VERSION
 
 HIDDEN = ".flightid"
 ID = re.compile(r"[0-9a-f]{16}")
+NAME_BYTES = 120
+"""Of a log's name; file systems end at 255."""
 DEEPEST = 6
 """Folders below the workspace that are looked into for logs."""
 SUFFIXES = frozenset(
@@ -42,7 +55,7 @@ class Workspace:
     Raises
     ------
     OptionError
-        There is no such folder.
+        There is no such folder, or one that the page needs for itself in it is a link.
     """
 
     def __init__(self, folder: str | Path) -> None:
@@ -54,26 +67,44 @@ class Workspace:
                 needed="a folder with logs, or an empty one",
                 action="make it first, or name another",
             )
-        for part in ("logs", "studies", f"{HIDDEN}/results", f"{HIDDEN}/uploads"):
-            self.folder.joinpath(part).mkdir(parents=True, exist_ok=True)
-        for left in self._hidden("uploads").iterdir():
-            left.unlink()
+        self._own("logs")
+        for part in ("results", "jobs"):
+            self._own(HIDDEN, part)
+        clear_left(self._own("studies"))
+        clear_left(self._own(HIDDEN, "uploads"))
+        for planted in self._own(HIDDEN).glob("index.sqlite*"):
+            if is_link(planted):
+                planted.unlink()
         self.index = LogIndex(self._hidden("index.sqlite"))
+        self.left_out: dict[str, str] = {}
 
     def scan(self) -> None:
-        """Look for logs in the folder; what has kept its size and time is not read again."""
-        seen = []
-        for path in _files(self.folder, DEEPEST):
-            if not self._inside(path):
-                continue
-            status = path.stat()
-            name = path.relative_to(self.folder).as_posix()
-            seen.append(name)
-            if self.index.is_current(name, status.st_size, status.st_mtime_ns):
-                continue
+        """Look for logs in the folder; what has kept its size and time is not read again.
+
+        What cannot be listed stands in `left_out`, with its reason.
+        """
+        seen: list[str] = []
+        left: dict[Path, str] = {}
+        for path in _files(self.folder, DEEPEST, left, everything=False):
+            try:
+                seen += self._seen(path)
+            except (OSError, FlightidError, UnicodeError) as error:
+                left[path] = _reason(error)
+        self.index.keep(seen)
+        named = {shown_name(path.relative_to(self.folder)): why for path, why in left.items()}
+        self.left_out = dict(sorted(named.items()))
+
+    def _seen(self, path: Path) -> list[str]:
+        """Name of a file in the index, brought up to date; none where it lies elsewhere."""
+        if not self._inside(path):
+            return []
+        status = path.stat()
+        name = path.relative_to(self.folder).as_posix()
+        name.encode()
+        if not self.index.is_current(name, status.st_size, status.st_mtime_ns):
             known = sha256_of_file(path)[:16] if is_log(path) else None
             self.index.put(name, known, status.st_size, status.st_mtime_ns)
-        self.index.keep(seen)
+        return [name]
 
     def log_path(self, log: str) -> Path | None:
         """Path of a log by its hash; None where the workspace holds no such log."""
@@ -81,8 +112,9 @@ class Workspace:
             return None
         for name in self.index.paths(log):
             path = self.folder / name
-            if path.is_file() and self._inside(path):
-                return path
+            with suppress(OSError):
+                if path.is_file() and self._inside(path):
+                    return path
         return None
 
     async def take(self, name: str, chunks: AsyncIterator[bytes]) -> str:
@@ -101,15 +133,12 @@ class Workspace:
         """
         plain = plain_name(name)
         digest = hashlib.sha256()
-        folder = self._hidden("uploads")
-        temporary = folder / f"{hashlib.sha256(plain.encode()).hexdigest()[:8]}-{id(chunks)}.part"
-        try:
-            with temporary.open("wb") as stream:
-                async for chunk in chunks:
-                    digest.update(chunk)
-                    stream.write(chunk)
-            named = temporary.with_name(f"{temporary.stem}{Path(plain).suffix}")
-            temporary = temporary.replace(named)
+        folder = self._own(HIDDEN, "uploads")
+        with new_file(folder, f"{made_name('part')}{Path(plain).suffix}") as (stream, temporary):
+            async for chunk in chunks:
+                digest.update(chunk)
+                stream.write(chunk)
+            stream.close()
             if not is_log(temporary):
                 raise OptionError(
                     "this file is no log that flightid reads",
@@ -117,15 +146,11 @@ class Workspace:
                     needed="a log of ArduPilot, PX4, Betaflight or INAV",
                 )
             flush(temporary)
-            found = digest.hexdigest()[:16]
-            return self._keep(temporary, found, plain)
-        finally:
-            temporary.unlink(missing_ok=True)
+            return self._keep(temporary, digest.hexdigest()[:16], plain)
 
     def _keep(self, temporary: Path, log: str, name: str) -> str:
         if self.log_path(log) is None:
-            folder = self.folder / "logs" / log
-            folder.mkdir(exist_ok=True)
+            folder = self._own("logs", log)
             final = temporary.replace(folder / name)
             flush(folder)
             status = final.stat()
@@ -134,22 +159,54 @@ class Workspace:
         return log
 
     def study_path(self, log: str) -> Path:
-        """Where the study of a log is, or would be."""
-        return self.folder / "studies" / f"{_checked(log)}.toml"
+        """Where the study of a log is, or would be.
+
+        Raises
+        ------
+        OptionError
+            That is a link: what it leads to is not ours to show or to change.
+        """
+        path = self._own("studies") / f"{_checked(log)}.toml"
+        if is_link(path):
+            raise OptionError(
+                "a study file is a link",
+                found=f"studies/{path.name}",
+                needed="a file",
+                action="copy what it leads to in its place",
+            )
+        return path
 
     def result_path(self, log: str, name: str) -> Path:
-        """Where a result of this version is, or would be; its folder is made."""
-        folder = self._hidden("results") / _checked(log)
-        folder.mkdir(exist_ok=True)
-        return folder / f"{name}-{VERSION}"
+        """Where a result of this version is, or would be; its folder is made, links are removed."""
+        folder = self._own(HIDDEN, "results") / _checked(log)
+        if is_link(folder) or (folder.exists() and not folder.is_dir()):
+            folder.unlink()
+        path = self._own(HIDDEN, "results", log) / f"{name}-{VERSION}"
+        if is_link(path):
+            path.unlink()
+        return path
 
     def result(self, log: str, name: str) -> dict[str, Any] | None:
-        """A result that was written; None where there is none."""
+        """A result that was written; None where there is none, and where it is broken."""
         path = self.result_path(log, f"{name}.json")
-        if not path.is_file():
+        if not path.exists():
             return None
-        found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        try:
+            found = json.loads(read_plain(path))
+        except (OSError, ValueError, RecursionError):
+            found = None
+        if not isinstance(found, dict):
+            self.drop_result(log, name)
+            return None
         return found
+
+    def drop_result(self, log: str, name: str) -> None:
+        """Remove a result that cannot be what was written; it is made again when asked for."""
+        path = self.result_path(log, f"{name}.json")
+        if path.is_dir():
+            shutil.rmtree(path, ignore_errors=True)
+        else:
+            path.unlink(missing_ok=True)
 
     def keep_result(self, log: str, name: str, values: Mapping[str, Any]) -> None:
         """Write a result whole."""
@@ -159,6 +216,9 @@ class Workspace:
     def forget(self, log: str) -> None:
         """Remove what was computed of a log; the log and its study stay."""
         shutil.rmtree(self._hidden("results") / _checked(log), ignore_errors=True)
+
+    def _own(self, *parts: str) -> Path:
+        return own_folder(self.folder, *parts)
 
     def _hidden(self, name: str) -> Path:
         return self.folder / HIDDEN / name
@@ -182,7 +242,8 @@ def plain_name(name: str) -> str:
     'flight 7.BIN'
     """
     last = re.split(r"[/\\]", name)[-1]
-    kept = re.sub(r"[^\w .()+-]", "_", last).strip(" .")[-120:]
+    plain = re.sub(r"[^\w .()+-]", "_", last).strip(" .")
+    kept = plain.encode()[-NAME_BYTES:].decode("utf-8", "ignore").strip(" .")
     if not kept:
         raise OptionError("a log needs a name", found=repr(name), needed="such as flight.BIN")
     return kept
@@ -194,12 +255,33 @@ def _checked(log: str) -> str:
     return log
 
 
-def _files(folder: Path, deep: int) -> Iterator[Path]:
-    """Files that may be logs, hidden folders left out."""
-    for path in sorted(folder.iterdir()):
+def _reason(error: Exception) -> str:
+    if isinstance(error, UnicodeError):
+        return "its name is not UTF-8"
+    if isinstance(error, OSError):
+        return error.strerror or str(error)
+    return str(error)
+
+
+def _files(folder: Path, deep: int, left: dict[Path, str], *, everything: bool) -> Iterator[Path]:
+    """Files that may be logs, hidden folders left out; all of those that the page has taken."""
+    root = deep == DEEPEST
+    try:
+        listed = sorted(folder.iterdir())
+    except OSError as error:
+        left[folder] = _reason(error)
+        return
+    for path in listed:
         if path.name.startswith("."):
             continue
-        if path.is_dir() and deep and not path.is_symlink():
-            yield from _files(path, deep - 1)
-        elif path.suffix.lower() in SUFFIXES and path.is_file():
+        try:
+            goes_on = path.is_dir() and not path.is_symlink()
+            is_file = path.is_file()
+        except OSError as error:
+            left[path] = _reason(error)
+            continue
+        if goes_on and deep:
+            taken = everything or (root and path.name == "logs")
+            yield from _files(path, deep - 1, left, everything=taken)
+        elif is_file and (everything or path.suffix.lower() in SUFFIXES):
             yield path
