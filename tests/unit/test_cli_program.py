@@ -134,6 +134,33 @@ def test_unknown_verb_names_the_nearest(capsys: pytest.CaptureFixture[str]) -> N
     assert "Did you mean 'probe'?" in capsys.readouterr().err
 
 
+def test_a_wrong_command_names_the_right_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("flight.BIN").write_bytes(b"")
+    Path("a.param").write_text("ATC_RAT_RLL_P 0.1\n")
+    Path("rig-output").mkdir()
+    Path("rig-study.toml").write_text(
+        '[study]\ntitle = "t"\naircraft = "a"\n[[record]]\nname = "r"\npath = "r.csv"\n'
+        '[[model]]\nname = "m"\nstructure = "oe"\ninputs = ["u"]\noutputs = "y"\n'
+        'identify = "r"\nnb = 1\nnf = 1\nnk = 1\n'
+    )
+    for typed, meant in {
+        "help": "flightid --help",
+        "analyze": "flightid run LOG",
+        "plan quadrotor": "flightid plan --vehicle quad\n",
+        "tune flight.bin": "flightid tune flight.BIN\n",
+        "fleet run flight.BIN": "one log: flightid run flight.BIN",
+        "tune rig-study.toml": "flightid tune rig-study.toml --controller pi_d",
+        "compare rig-output": "flightid compare A B",
+        "compare a.param rig-output": "flightid compare MODEL --gains a.param",
+        "modes a.param": "name it as --gains a.param",
+    }.items():
+        assert program.run(typed.split()) == 2, typed
+        assert meant in capsys.readouterr().err, typed
+
+
 def test_numbers_that_are_not_finite_are_refused() -> None:
     with pytest.raises(ValueError, match="Out of range float"):
         output.emit_values({"x": float("nan")})

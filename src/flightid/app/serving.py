@@ -45,6 +45,7 @@ def serve(folder: Path, port: int, *, say: Callable[[str], None], opens: bool) -
     session = Session(bound.getsockname()[1])
     server = server_of(workspace, page, session)
     say(f"flightid serves {workspace.folder} to this machine alone; Ctrl-C ends it.")
+    say("The address opens once, in one browser; for another, end this and start it again:")
     say(session.address)
     if opens:
         threading.Timer(0.3, webbrowser.open, (session.address,)).start()

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from flightid.cli.compared_loops import compared_loops, short_names
+from flightid.cli.hints import PARAMETERS
 from flightid.cli.lists import ListOption, ListsCommand
 from flightid.cli.model_commands import feedback_option
 from flightid.cli.output import all_option, json_option, level_option, note
@@ -76,10 +77,8 @@ def command(
 
     if len(set(files)) < len(files):
         raise click.UsageError("a file is named twice: parts of a log are flight.BIN@20:80")
-    if laws := [file for file in files if file.endswith(".toml") and _holds_gains(Path(file))]:
-        told = f"MODEL --gains {','.join(laws)}"
-        raise click.UsageError(f"{laws[0]} holds gains, no model: flightid compare {told}")
     flights = [file for file in files if _is_flight(file)]
+    _require_sides(files, flights, closed=bool(gains or feedback))
     if not flights:
         loops = compared_loops(files, axis, gains, feedback, loop_rate_hz)
         results: list[Result] = [*_conditions(files, axis, needed=not loops), *loops]
@@ -102,6 +101,31 @@ def command(
             for table in made.settings_tables():
                 click.echo(f"{table}\n")
         show(made, "Comparison", as_json=as_json, html=html, level=level)
+
+
+def _require_sides(files: Sequence[str], flights: Sequence[str], *, closed: bool) -> None:
+    """Refuse gains in place of models, and one side alone that no loop is closed around."""
+    if laws := [file for file in files if file.endswith(".toml") and _holds_gains(Path(file))]:
+        told = f"MODEL --gains {','.join(laws)}"
+        raise click.UsageError(f"{laws[0]} holds gains, no model: flightid compare {told}")
+    if sets := [file for file in files if file.endswith(PARAMETERS)]:
+        told = f"flightid compare MODEL --gains {','.join(sets)}"
+        raise click.UsageError(
+            f"{sets[0]} holds gains, no model and no flight: margins under them: {told}; what a "
+            "flight kept of its promise: flightid compare STUDY-output LOG"
+        )
+    if len(files) == len(flights) == 1:
+        raise click.UsageError(
+            f"one log has nothing beside it: flightid flight {files[0]}, or flightid compare "
+            f"{files[0]} OTHER"
+        )
+    if len(files) == 1 and not closed:
+        results = sorted(str(each) for each in Path(files[0]).glob("*-output"))
+        named = f" (here: {', '.join(results)})" if results else ""
+        raise click.UsageError(
+            f"nothing stands beside {files[0]}: flightid compare A B, of logs, models or results "
+            f"of studies{named}"
+        )
 
 
 def _conditions(

@@ -46,6 +46,11 @@ def run(
     """
     from flightid.fleet import run_fleet
 
+    if fleet.suffix != ".toml":
+        raise click.UsageError(
+            f"{fleet} is no fleet file, which is a .toml that names the logs (docs/fleet.md); one "
+            f"log: flightid run {fleet}"
+        )
     done = run_fleet(fleet, workers=workers, scheduler=scheduler, retry=retry)
     if as_json:
         emit_values(done.to_dict())

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import click
 
+from flightid.cli.hints import MEANT, missing_hint
 from flightid.cli.output import Exit, note
 from flightid.cli.wording import as_typed
 from flightid.errors import FlightidError
@@ -52,6 +53,7 @@ NOT_VERBS = frozenset(
         "compared_loops",
         "equations",
         "gain_files",
+        "hints",
         "lists",
         "model_commands",
         "option_fields",
@@ -95,7 +97,9 @@ class Verbs(click.Group):
             from difflib import get_close_matches
 
             near = get_close_matches(args[0], self.list_commands(ctx), n=1)
-            hint = f" Did you mean {near[0]!r}?" if near else ""
+            hint = f" Did you mean {near[0]!r}?" if near else " All commands: flightid --help"
+            if args[0] in MEANT:
+                hint = f" That is: {MEANT[args[0]]}"
             ctx.fail(f"There is no command {args[0]!r}.{hint}")
         return super().resolve_command(ctx, args)
 
@@ -150,6 +154,9 @@ def run(arguments: Sequence[str] | None = None) -> int:
             )
     except click.ClickException as error:
         error.show()
+        where = error.ctx if isinstance(error, click.UsageError) else None
+        if where and (hint := missing_hint(error.format_message(), where.command_path)):
+            note(f"Hint: {hint}")
         return error.exit_code
     except (KeyboardInterrupt, click.Abort):
         note("Interrupted; nothing was left half-written.")

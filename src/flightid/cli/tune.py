@@ -105,6 +105,8 @@ def command(
                 "records hold no gains of an autopilot: name a PID of its own with "
                 "--controller pi_d"
             )
+        if is_study(files) and log is None and TuneSettings().changed(asked).controller is None:
+            _require_gains(files[0])
         cache: dict[str, Any] = {}
         path, folder = taken_study(files, output, log, data, tune=of_log, cache=cache)
         study = run_study(path, output=folder, log=log, tune=asked, level=level, cache=cache)
@@ -154,6 +156,19 @@ def _holds_models(files: tuple[Path, ...]) -> bool:
     except FlightidError:
         return len(files) > 1
     return len(files) > 1 or "estimated" in content or "kind" in content
+
+
+def _require_gains(source: Path) -> None:
+    """Say before a fit that a study's records hold no gains and that it asks for no PID."""
+    from flightid.study.settings import read_settings
+
+    settings = read_settings(source)
+    own = settings.tune is not None and settings.tune.controller is not None
+    if settings.log is None and settings.flight is None and not own:
+        raise click.UsageError(
+            "records of a study hold no gains of an autopilot: name a PID of its own: "
+            f"flightid tune {source} --controller pi_d"
+        )
 
 
 def _is_flown(file: Path) -> bool:

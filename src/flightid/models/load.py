@@ -96,6 +96,11 @@ def load_model(path: str | Path, *, axis: str | None = None) -> Model:
 
 def _no_model(name: str) -> UnknownNameError:
     """Of data in place of a model, the way to one."""
+    if Path(name).suffix in (".param", ".params", ".parm"):
+        return UnknownNameError(
+            "a file of parameters holds gains, no model", found=name,
+            needed="a model's .toml, or a study's folder", action=f"name it as --gains {name}",
+        )  # fmt: skip
     if Path(name).is_file():
         return UnknownNameError(
             "this file holds no model", found=name, needed="a model's .toml, or a study's folder",

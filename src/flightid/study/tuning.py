@@ -169,7 +169,7 @@ def _flight(log: Log | None) -> Log:
     raise StudyError(
         "gains of an autopilot cannot be tuned without the log that it flew",
         needed="a log, or a controller that is no autopilot's",
-        action="tune a PID of its own, controller='pi_d'",
+        action="name a PID of its own: flightid tune STUDY --controller pi_d",
     )
 
 
