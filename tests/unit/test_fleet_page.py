@@ -53,6 +53,30 @@ def test_each_vehicle_has_the_light_that_its_truth_asks_for(answers: FleetAnswer
     assert all(each.light is Light.GREEN for each in sound), sound
 
 
+def test_vehicles_too_few_to_be_judged_are_grey_and_not_green() -> None:
+    rows = fleet_rows(3)
+    mine = [row for row in rows["parameters"] if row["vehicle"] in ("v03", "v04")]
+    logs = set({row["vehicle"]: row["log"] for row in mine}.values())
+    few = {key: [e for e in rows[key] if e.get("log") in logs] for key in rows if key != "logs"}
+    found = fleet_document(answer_questions({**few, "logs": rows["logs"]})).findings
+    lights = [each for each in found if each.code == "vehicle"]
+    assert [each.light for each in lights] == [Light.UNKNOWN, Light.UNKNOWN]
+    for each in lights:
+        assert "cannot tell whether it changed (fewer than" in each.message
+        assert "cannot tell whether it is like its type (" in each.message
+        assert "no change" not in each.message
+
+
+def test_a_long_history_without_a_type_is_no_green_light() -> None:
+    rows = fleet_rows(3)
+    logs = {e["log"] for e in rows["parameters"] if e["vehicle"] in ("v03", "v04")}
+    some = {key: [e for e in rows[key] if e.get("log") in logs] for key in rows if key != "logs"}
+    found = fleet_document(answer_questions({**some, "logs": rows["logs"]})).findings
+    (first, _) = [each for each in found if each.code == "vehicle"]
+    assert first.light is Light.UNKNOWN
+    assert first.message.startswith("v03: no change; cannot tell whether it is like its type (")
+
+
 def test_the_correlation_of_a_fit_is_carried_on(answers: FleetAnswers) -> None:
     data = answers.types[0].data
     matrix = data.covariances[0]

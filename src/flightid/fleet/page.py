@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 
 from flightid.conventions import Light
 from flightid.findings import Finding, counted
+from flightid.fleet.normality import MORE, quiet_light
 from flightid.fleet.pictures import history_picture, type_picture
 from flightid.fleet.statistics.answers import FleetAnswers, Row, TypeAnswers, fitted_share
 from flightid.fleet.statistics.drift import FleetDrift, ParameterHistory
@@ -57,20 +58,29 @@ def _vehicles(answers: FleetAnswers) -> Iterator[Block]:
     if not found:
         yield Paragraph("No vehicle has a model with intervals.")
         return
-    worrying = [each for each in found.values() if each.light is not Light.GREEN]
-    green = len(found) - len(worrying)
     if len(found) <= NAMED:
-        yield Lights(tuple(found.values()), "Changed, or unlike their type")
+        shown_lights = tuple(found.values())
     else:
-        rest = Finding(
-            "vehicles-normal", Light.GREEN, f"{green} vehicles neither changed nor are unlike"
-        )
-        yield Lights((*worrying, *((rest,) if green else ())), "Changed, or unlike their type")
+        worrying = [e for e in found.values() if e.light in (Light.RED, Light.AMBER)]
+        shown_lights = (*worrying, *_counts(list(found.values())))
+    yield Lights(shown_lights, "Changed, or unlike their type")
     if answers.undated:
         yield Paragraph(
             f"{counted(answers.undated, 'flight')} without a date: part of their type, but of no "
             "history."
         )
+
+
+def _counts(found: Sequence[Finding]) -> Iterator[Finding]:
+    """How many of a large fleet are normal, and of how many that cannot be told."""
+    green = sum(each.light is Light.GREEN for each in found)
+    grey = sum(each.light is Light.UNKNOWN for each in found)
+    if green:
+        words = f"{green} vehicles neither changed nor are unlike"
+        yield Finding("vehicles-normal", Light.GREEN, words)
+    if grey:
+        words = f"of {counted(grey, 'vehicle')} too little is known to call them normal"
+        yield Finding("vehicles-unknown", Light.UNKNOWN, words, MORE)
 
 
 def _light(vehicle: str, types: Sequence[TypeAnswers]) -> Finding:
@@ -85,7 +95,7 @@ def _light(vehicle: str, types: Sequence[TypeAnswers]) -> Finding:
                 said.append(one.words())
                 light = Light.RED if light is Light.RED else Light.AMBER
     if not said:
-        return Finding("vehicle", light, f"{vehicle}: no change, like its type")
+        return quiet_light(vehicle, types)
     act = "look at what was done to it, and verify its model on a new flight"
     return Finding("vehicle", light, f"{vehicle}: {'; '.join(said)}", act)
 
