@@ -55,6 +55,12 @@ RATE_GOOD = Threshold(
     100, "Hz", "25 samples a cycle at 4 Hz (sampling rate at least 25 times the highest frequency)"
 )
 RATE_LEAST = Threshold(30, "Hz", "10 samples a cycle at 3 Hz, where rate loops cross over")
+OF_SWEEP = Threshold(
+    0.75, "1", "of the last frequency of a logged sweep: above it the fade-out takes its power"
+)
+EXCITED_POWER = Threshold(
+    0.01, "1", "20 dB below the strongest: below it noise and harmonics in a loop outweigh a sweep"
+)
 BAND_GOOD = Threshold(10, "1", "a decade around crossover fixes gain, lag and delay separately")
 BAND_LEAST = Threshold(3, "1", "half a decade: gain and delay, no dynamics")
 GAP_FACTOR = Threshold(2.5, "1", "median spacings; the same limit as the resampling's gap policy")

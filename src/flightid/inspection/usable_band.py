@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from flightid.errors import FlightidError
 from flightid.inspection.axes import AxisChannels, axes_of
 from flightid.inspection.excitation_found import FoundExcitation
+from flightid.inspection.excited_to import excited_to
 from flightid.inspection.signals import Signal, Span, find
 from flightid.inspection.stretches import FlightStretches, packed
 from flightid.inspection.thresholds import (
@@ -24,7 +25,7 @@ from flightid.inspection.thresholds import (
 )
 from flightid.logs import Log
 from flightid.record import Record
-from flightid.responses.bands import usable_band
+from flightid.responses.bands import coherent_parts
 from flightid.responses.estimators.composite import Composite
 from flightid.responses.running import SpectralSum
 
@@ -46,7 +47,7 @@ class AxisBand:
         Rate of the slower of the two, Hz; 0 where one is missing.
     band_rad_s : tuple of float, or None
         Widest band in which the partial coherence reaches 0.6 with at least five independent
-        windows and ten samples a cycle, rad/s.
+        windows and ten samples a cycle, and that ends where the power of the sweeps does, rad/s.
     coherence : float or None
         Mean partial coherence in the band; the largest anywhere where there is no band.
     largest_coherence : float or None
@@ -54,6 +55,8 @@ class AxisBand:
         was computed.
     reason : str
         Why there is no band; empty where there is one.
+    excited_to_rad_s : float
+        Where the power of the sweeps of this axis ends, rad/s; infinite without any.
     """
 
     axis: str
@@ -64,6 +67,7 @@ class AxisBand:
     coherence: float | None
     reason: str = ""
     largest_coherence: float | None = None
+    excited_to_rad_s: float = math.inf
 
     @property
     def span(self) -> float:
@@ -131,14 +135,15 @@ def axis_bands(
         slowest = min(command.rate_hz, motion.rate_hz)
         labels = (command.label, motion.label)
         band, coherence, largest, why = None, None, None, ""
+        highest = excited_to(log, axis, excited)
         if isinstance(explained, str):
             why = explained
         elif tau in explained.inputs:
-            band, coherence, largest, reason = _band(explained, rate, tau, slowest)
+            band, coherence, largest, reason = _band(explained, rate, tau, slowest, highest)
             why = f"{reason}{explained.cut}" if reason else ""
         else:
             why = f"{labels[0]} did not move"
-        found.append(AxisBand(axis, *labels, slowest, band, coherence, why, largest))
+        found.append(AxisBand(axis, *labels, slowest, band, coherence, why, largest, highest))
     return tuple(found)
 
 
@@ -210,7 +215,7 @@ def _cut(lengths: list[float], flown: FlightStretches) -> str:
 
 
 def _band(
-    explained: AxesCoherence, output: str, tau: str, rate_hz: float
+    explained: AxesCoherence, output: str, tau: str, rate_hz: float, highest: float
 ) -> tuple[tuple[float, float] | None, float | None, float | None, str]:
     row, column = explained.outputs.index(output), explained.inputs.index(tau)
     omega, found = explained.omega_rad_s, explained.composite
@@ -230,8 +235,14 @@ def _band(
     if not np.any(enough & fast_enough):
         windows = "fewer than five independent windows stand behind every frequency"
         return None, None, None, f"{windows}: coherence is not judged"
-    band = usable_band(omega[fast_enough], coherence[fast_enough], MINIMUM_COHERENCE.value)
-    largest = float(coherence[fast_enough].max())
+    excited = fast_enough & (omega <= highest)
+    if not np.any(excited):
+        return None, None, None, "the sweep ends below the lowest frequency that its length tells"
+    parts = coherent_parts(omega[fast_enough], coherence[fast_enough], MINIMUM_COHERENCE.value)
+    clipped = [(low, min(high, highest)) for low, high in parts]
+    wide = [part for part in clipped if part[1] > part[0]]
+    band = max(wide, key=lambda part: part[1] / part[0]) if wide else None
+    largest = float(coherence[excited].max())
     if band is None:
         # Rounded down, so that what stays below the limit is not written as the limit.
         size = f"(largest {math.floor(100.0 * largest) / 100.0:.2f})"

@@ -221,6 +221,8 @@ def _band(log: Log, band: AxisBand) -> Finding:
         f"{band.axis}: usable from {low:.2g} to {high:.2g} Hz ({band.band_rad_s[0]:.3g} to "
         f"{band.band_rad_s[1]:.3g} rad/s), mean coherence {band.coherence:.2f}"
     )
+    if band.band_rad_s[1] >= band.excited_to_rad_s:
+        text += ", up to where the power of the sweep ends"
     if band.span < BAND_LEAST.value:
         return Finding(
             f"narrow-band-{band.axis}",
@@ -247,6 +249,19 @@ def _loop(log: Log, found: Inspection) -> list[Finding]:
     ]
 
 
+def _room(found: Inspection, limit: str) -> str:
+    """What keeps a signal off its limit; of an amplitude only where a manoeuvre had one."""
+    centre = "straighten motors and frame, and trim the centre of gravity"
+    flown = [each for each in found.excitations if each.kind in ("sid", "chirp", "sweep")]
+    if flown:
+        return f"lower the amplitude of the {flown[0].kind}; {centre}"
+    more = {
+        "lower": "lower MOT_SPIN_MIN (ArduPilot), lower gains, or more weight",
+        "upper": "less weight, larger propellers, or gentler flying",
+    }
+    return f"{centre} first; then {more.get(limit.partition(' ')[0], 'gentler flying')}"
+
+
 def _quality(log: Log, found: Inspection) -> list[Finding]:
     findings = []
     worst = next(iter(found.saturations), None)
@@ -256,7 +271,7 @@ def _quality(log: Log, found: Inspection) -> list[Finding]:
                 "saturated",
                 Light.AMBER,
                 f"{worst.what} is at its {worst.limit} for {100 * worst.share:.0f} % of the flight",
-                "lower the amplitude, trim the centre of gravity, or change the hover throttle",
+                _room(found, worst.limit),
             )
         )
     for message in found.messages_used:

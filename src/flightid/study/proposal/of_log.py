@@ -29,8 +29,6 @@ TEMPLATES = {"roll": "rate_motor_lag", "pitch": "rate_motor_lag", "yaw": "rate_r
 """Rate of a multirotor to its mixer's command; in yaw the rotors' own inertia turns it first."""
 CHIRP = "chirp"
 """Channel of the maps: the chirp of Betaflight, of whichever axis."""
-OF_SWEEP = 0.75
-"""Part of the last frequency of a sweep up to which its power lasts, fade-out included."""
 OF_WINDOW = 2.0
 """Above the lowest coherent frequency: there a window holds two cycles, and a fit wants four."""
 SEARCHED = ("chirp", "sweep", "autotune")
@@ -150,8 +148,8 @@ def _axis(log: Log, inspection: Inspection, band: AxisBand, model: str | None) -
             inspection, axis, "there is no usual model of this vehicle's surfaces",
             "name one of the library or of your own: --model short_period",
         )  # fmt: skip
-    flown, unseen, high = _flown(log, axis, runs, others)
-    low, high = OF_WINDOW * band.band_rad_s[0], min(band.band_rad_s[1], high)
+    flown, unseen = _flown(log, axis, runs, others)
+    low, high = OF_WINDOW * band.band_rad_s[0], band.band_rad_s[1]
     if high < BAND_LEAST.value * low:
         return _missed(inspection, axis, "the band of its sweep that coherence supports is narrow")
     if not unseen:
@@ -176,23 +174,22 @@ COMMANDS = ("tau_phi", "tau_theta", "tau_psi")
 
 def _flown(
     log: Log, axis: str, runs: list[SidRun], others: list[FoundExcitation]
-) -> tuple[tuple[_Segment, ...], tuple[_Segment, ...], float]:
-    """Segments of the fit, a run kept back where there are several, and the highest swept rad/s."""
+) -> tuple[tuple[_Segment, ...], tuple[_Segment, ...]]:
+    """Segments of the fit, and a run kept back where there are several."""
     if not runs:
         # A chirp is told from what else moved the axis, which is no part of its fit.
         told = _chirped(others) or others
         numbered = enumerate(((each.start_s, each.stop_s) for each in told), 1)
         made = [_Segment(f"{axis} {k}", span_s=span) for k, span in numbered]
         kept = made[-1:] if len(made) > 1 and _chirped(others) else []
-        return tuple(made[: len(made) - len(kept)]), tuple(kept), math.inf
+        return tuple(made[: len(made) - len(kept)]), tuple(kept)
     segments = []
     for k, run in enumerate(runs, 1):
         alike = [each for each in log.sid_runs if each.axis == run.axis]
         name = f"{axis} sweep" + (f" {k}" if len(runs) > 1 else "")
         segments.append(_Segment(name, run=(run.axis, alike.index(run))))
-    high = math.tau * OF_SWEEP * max(max(run.f_start_hz, run.f_stop_hz) for run in runs)
     kept = segments[-1:] if len(segments) > 1 else []
-    return tuple(segments[: len(segments) - len(kept)]), tuple(kept), high
+    return tuple(segments[: len(segments) - len(kept)]), tuple(kept)
 
 
 def _chirped(others: list[FoundExcitation]) -> list[FoundExcitation]:
