@@ -201,6 +201,24 @@ def test_large_overshoot_is_amber_and_wide_intervals_are_not_green(
     assert bool(step.action) is (light is not Light.GREEN)
 
 
+@pytest.mark.parametrize(
+    ("level", "error", "said"),
+    [(0.54, 0.03, "short of"), (1.5, 0.1, "beyond"), (0.54, 0.3, ""), (0.95, 0.01, "")],
+)
+def test_a_loop_that_ends_far_from_what_is_asked_is_amber(
+    review: fid.FlightReview, level: float, error: float, said: str
+) -> None:
+    loop = review["roll rate"]
+    told = Estimate("level", level, "1", error)
+    readings = tuple(told if r.name == told.name else r for r in loop.readings)
+    found = judge_flight(replace(review, loops=(replace(loop, readings=readings),)))
+    step = next(f for f in found if f.code == "step-roll-rate")
+    assert f"ends at {level:.3g} (" in step.message
+    assert step.light is (Light.AMBER if said else Light.GREEN)
+    assert (f"it stays {said} what is asked" in step.message) is bool(said)
+    assert bool(step.action) is bool(said)
+
+
 def test_a_yaw_moment_is_mended_before_the_limits_that_it_leads_to(
     review: fid.FlightReview,
 ) -> None:

@@ -30,7 +30,9 @@ from flightid.study.settings import Settings
 
 AXES = ("roll", "pitch", "yaw")
 MOST_EVENTS = 500
-READINGS = ("rise time", "overshoot", "settling time", "-3 dB bandwidth")
+READINGS = ("level", "rise time", "overshoot", "settling time", "-3 dB bandwidth")
+CALLED = {"level": "ends at"}
+"""What people say of a reading."""
 PLACES = {
     "airborne": "air",
     "excitation-found": "sid autotune chirp sweep steps",
@@ -213,7 +215,7 @@ def _step(loop: LoopResponse) -> StepCurve:
         step=loop.step.tolist(),
         low=low.tolist(),
         high=high.tolist(),
-        readings=[(name, known[name]) for name in READINGS if name in known],
+        readings=[(CALLED.get(name, name), known[name]) for name in READINGS if name in known],
     )
 
 

@@ -26,6 +26,11 @@ WIDEST_TRACKING = Threshold(
 OVERSHOOT = Threshold(
     31, "%", "a pair of poles damped by 0.35, the least of level 1: MIL-F-8785C, 3.2.2.1.2"
 )
+LEVEL_OFF = Threshold(
+    0.15,
+    "1",
+    "of what is asked: a loop with an integrator ends at one; less is wind and fits (ours)",
+)
 VIBE_GOOD = Threshold(
     30, "m/s^2", "ArduPilot, Measuring Vibration: below 30 m/s/s is normally acceptable"
 )

@@ -13,7 +13,7 @@ from flightid.review.loops import what_to_fly
 from flightid.review.motors import MotorUse
 from flightid.review.result import FlightReview
 from flightid.review.tables import cell
-from flightid.review.thresholds import OVERSHOOT, SATURATED, UNBALANCED
+from flightid.review.thresholds import LEVEL_OFF, OVERSHOOT, SATURATED, UNBALANCED
 from flightid.review.vibration import Vibration
 
 FAST_GYRO = {
@@ -84,10 +84,11 @@ def _loops(review: FlightReview) -> Iterator[Finding]:
     told = [loop for loop in review.loops if loop.is_told]
     for loop in told:
         half, over = cell(loop["delay to half"], 1e3), cell(loop["overshoot"])
-        yield Finding(
-            f"step-{loop.axis}-{loop.loop}",
-            *_overshoot(loop, f"{loop.name}: half way after {half} ms, overshoots by {over} %"),
+        said = (
+            f"{loop.name}: ends at {cell(loop['level'])} of what is asked, half way there after "
+            f"{half} ms, overshoots by {over} %"
         )
+        yield Finding(f"step-{loop.axis}-{loop.loop}", *_level(loop, *_overshoot(loop, said)))
     if not review.phases.airborne:
         return
     for loop in review.loops:
@@ -124,6 +125,32 @@ def _overshoot(loop: LoopResponse, said: str) -> tuple[Light, str, str]:
         return Light.GREEN, said, ""
     said = f"{said}; beyond {limit:g} % damping is poor"
     return Light.AMBER, said, CALMER[loop.loop]
+
+
+SHORT = {
+    "rate": "raise I of this loop, and look for motors at a limit, wind, and what the set-point "
+    "is scaled by; replies slower than the window of this step count as missing too",
+    "attitude": "mend the rate loop first; then look for a trim or wind that holds the angle off",
+}
+LONG = {
+    "rate": "look for feed-forward that is too large, and for what the set-point is scaled by",
+    "attitude": "feed less of the set-point's rate forward, and look for what scales the set-point",
+}
+
+
+def _level(loop: LoopResponse, light: Light, said: str, action: str) -> tuple[Light, str, str]:
+    """The same, amber where the step ends far from one and its interval leaves one out."""
+    level, off = loop["level"], LEVEL_OFF.value
+    value = 1.0 if level.value is None else level.value
+    ends = level.interval95 or (value, value)
+    if value < 1.0 - off and ends[1] < 1.0:
+        what, do = "short of what is asked: sticks do not give the motion they stand for", SHORT
+    elif value > 1.0 + off and ends[0] > 1.0:
+        what, do = "beyond what is asked: sticks give more motion than they stand for", LONG
+    else:
+        return light, said, action
+    acts = "; ".join(filter(None, (do[loop.loop], action)))
+    return Light.AMBER, f"{said}; it stays {what}", acts
 
 
 def _motors(review: FlightReview) -> Iterator[Finding]:
