@@ -56,8 +56,11 @@ def _end(log: Log, axis: str, sweep: FoundExcitation) -> float:
     table = log.table("SIDD")
     measured = _power_end(table.time_s, table["Targ"], span)
     alike = [run for run in log.sid_runs if run.chirp_span_s == span]
-    logged = [max(run.f_start_hz, run.f_stop_hz) for run in alike]
-    return min(measured, *(math.tau * OF_SWEEP.value * each for each in logged), math.inf)
+    known = [OF_SWEEP.value * max(run.f_start_hz, run.f_stop_hz) for run in alike]
+    # A run that was broken off never came to its last frequency: the mode logs where it was.
+    flown = table["F"][inside(table.time_s, [span])]
+    known += [float(flown.max())] if flown.size and flown.max() > 0.0 else []
+    return min(measured, *(math.tau * each for each in known), math.inf)
 
 
 def _power_end(time_s: Array, values: Array, span: Span) -> float:
@@ -99,8 +102,8 @@ def power_end(values: Array, sample_rate_hz: float) -> float:
     5
     """
     window = max(values.size // PIECES, 16)
-    # Zeros on both sides give the first and last samples the weight of all others.
-    padded = np.pad(values, window // 2)
+    # Mirrored ends give the first and last samples the weight of all others, without a jump.
+    padded = np.pad(values, window // 2, mode="reflect", reflect_type="odd")
     pieces = np.lib.stride_tricks.sliding_window_view(padded, window)[:: window // 2]
     spectra = np.fft.rfft(pieces * np.hanning(window), axis=1)
     power = np.mean(np.abs(spectra) ** 2, axis=0)
