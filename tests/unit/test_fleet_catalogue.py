@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import hashlib
+import json
+import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -12,11 +16,12 @@ pytest.importorskip("pyarrow")
 
 from flightid.errors import DataError, OptionError
 from flightid.fleet.catalogue.catalogue import Catalogue
-from flightid.fleet.catalogue.compaction import MOST_SMALL, compact, merge, rewrite
+from flightid.fleet.catalogue.compaction import MOST_SMALL, compact, merge, rewrite, set_aside
 from flightid.fleet.catalogue.loose import loose_logs, loose_name, write_loose
 from flightid.fleet.catalogue.parts import MANIFEST, PARTS, KnownLogs, read_parts
 from flightid.fleet.catalogue.record import LogRecord
 from flightid.fleet.catalogue.store import FolderStore
+from flightid.fleet.opening import opened_store
 
 
 def record(number: int) -> LogRecord:
@@ -102,7 +107,8 @@ def test_parts_without_manifest_count_nowhere_and_overlapping_ones_once(tmp_path
 
 def test_small_parts_are_merged_and_logs_forgotten(tmp_path: Path) -> None:
     store = FolderStore(tmp_path)
-    for number in range(MOST_SMALL + 1):
+    assert MOST_SMALL == 8
+    for number in range(9):
         write_loose(store, record(number))
         compact(store)
     expected = sums(store)
@@ -129,6 +135,94 @@ def test_broken_files_go_to_quarantine_and_are_told(tmp_path: Path) -> None:
     file.write_bytes(file.read_bytes()[:-9])
     parts, broken = read_parts(store)
     assert (parts, broken) == ([], [part.name])
+
+
+@pytest.mark.parametrize("at", [0, 40, -10])
+def test_a_part_with_a_flipped_byte_goes_to_quarantine_and_the_rest_counts(
+    tmp_path: Path, at: int
+) -> None:
+    store = filled(tmp_path, range(3))
+    part = compact(store)
+    assert part is not None
+    write_loose(store, record(7))
+    file = tmp_path / part.file("logs")
+    content = bytearray(file.read_bytes())
+    content[at] ^= 0xFF
+    file.write_bytes(content)
+    assert sums(store) == (1, -10.0)
+    assert set_aside(store) == [part.name]
+    assert read_parts(store) == ([], [])
+    assert f"{part.name}.logs.parquet" in set(store.names("quarantine"))
+    assert not any(map(KnownLogs(store, []).in_parts, [record(0).log]))
+
+
+def test_a_manifest_that_lies_costs_its_own_part_alone(tmp_path: Path) -> None:
+    store = filled(tmp_path, range(3))
+    part = compact(store)
+    assert part is not None
+    place = f"{PARTS}/{part.name}/{MANIFEST}"
+    good = json.loads(store.read(place))
+    changes: list[Callable[[dict[str, Any]], object]] = [
+        lambda m: m.pop("sizes"),
+        lambda m: m.update(sizes={}),
+        lambda m: m["sizes"].update({"\ud800": 1}),
+        lambda m: m["sizes"].update({"logs.keys": 33}),
+        lambda m: m["rows"].update(logs=4),
+        lambda m: m.update(name="another"),
+        lambda m: m["digests"].update({"logs.keys": "0" * 64}),
+    ]
+    for change in changes:
+        broken = json.loads(json.dumps(good))
+        change(broken)
+        store.write(place, json.dumps(broken).encode())
+        assert read_parts(store) == ([], [part.name])
+    for content in (
+        b"[" * 100_000,
+        json.dumps(good).encode().replace(b'"logs": 3', b'"logs": 1e400'),
+    ):
+        store.write(place, content)
+        assert read_parts(store) == ([], [part.name])
+    # One that says that it stands in place of itself stands all the same.
+    store.write(place, json.dumps({**good, "replaces": [part.name]}).encode())
+    assert [each.name for each in read_parts(store)[0]] == [part.name]
+    store.write("fleet.json", b"[" * 100_000)
+    with pytest.raises(DataError, match="no catalogue"):
+        opened_store(str(tmp_path))
+
+
+@pytest.mark.parametrize(
+    ("column", "value"),
+    [
+        ("duration_s", 10**400),
+        ("duration_s", 2**53 + 1),
+        ("bytes", 2**70),
+        ("flown_at", "2026-03-01T00:00:00+02:00"),
+        ("flown_at", "2026-W10-1"),
+        ("vehicle", "\ud800"),
+    ],
+)
+def test_a_value_that_no_table_can_hold_goes_to_quarantine(
+    tmp_path: Path, column: str, value: object
+) -> None:
+    store = filled(tmp_path, range(2))
+    values = json.loads(record(1).to_bytes())
+    values["tables"]["logs"][0][values["columns"]["logs"].index(column)] = value
+    store.write(loose_name(record(1).log), json.dumps(values).encode())
+    with Catalogue(store) as catalogue:
+        assert catalogue.counts() == {"failed": 1, "fitted": 1}
+
+
+def test_an_answer_has_a_limit_of_time_and_writes_nowhere(tmp_path: Path) -> None:
+    with Catalogue(filled(tmp_path, range(2))) as catalogue:
+        begun = time.monotonic()
+        with pytest.raises(OptionError, match="too long"):
+            catalogue.answer(
+                "SELECT count(*) FROM range(1e9::BIGINT) a, range(1e9::BIGINT) b", time_s=0.2
+            )
+        assert time.monotonic() - begun < 20.0
+        ((folder, now),) = catalogue.answer("SELECT current_setting('temp_directory'), now()").rows
+    assert folder == ""
+    assert str(now).startswith("20")
 
 
 @pytest.mark.parametrize(

@@ -77,8 +77,16 @@ def status(place: str, as_json: bool) -> None:
 @command.command("query", short_help="Answer one SELECT over the tables of the catalogue.")
 @click.argument("place", metavar="FLEET | CATALOGUE")
 @click.argument("sql")
+@click.option(
+    "--time-limit",
+    "time_s",
+    type=click.FloatRange(min=0.0, min_open=True, max=1e6),
+    default=60.0,
+    show_default=True,
+    help="Longest time for the answer, s.",
+)
 @json_option
-def query(place: str, sql: str, as_json: bool) -> None:
+def query(place: str, sql: str, time_s: float, as_json: bool) -> None:
     """Answer SQL, one SELECT in DuckDB's dialect, over the tables of the catalogue.
 
     Nothing but the catalogue can be read, and nothing can be changed.
@@ -86,7 +94,7 @@ def query(place: str, sql: str, as_json: bool) -> None:
     from flightid import fleet
 
     with fleet.open(place) as catalogue:
-        answer = catalogue.answer(sql)
+        answer = catalogue.answer(sql, time_s=time_s)
     if as_json:
         emit_values(answer.to_dict()["rows"])
     else:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from flightid.errors import DataError
 from flightid.fleet.catalogue.catalogue import Catalogue
+from flightid.fleet.catalogue.parts import BROKEN_JSON
 from flightid.fleet.catalogue.store import Store, store_at
 from flightid.fleet.engine.order import recipe
 from flightid.fleet.settings import FleetSettings, read_fleet
@@ -72,7 +73,9 @@ def opened_store(place: str) -> Store:
     try:
         note = json.loads(store_at(place).read(CURRENT))
         own = str(note["current"])
-    except (OSError, ValueError, KeyError, TypeError) as error:
+        if not own.isalnum():
+            raise ValueError(own)
+    except (OSError, *BROKEN_JSON) as error:
         raise DataError(
             "there is no catalogue of a fleet here",
             found=place,

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import datetime
+import threading
 from collections.abc import Sequence
 from decimal import Decimal
 from typing import Any, Self
 
 import numpy as np
 
-from flightid.errors import OptionError
+from flightid.errors import DataError, OptionError
 from flightid.extras import extra_module
 from flightid.fleet.catalogue.compaction import tables_of
 from flightid.fleet.catalogue.loose import loose_logs, read_loose
@@ -19,6 +20,9 @@ from flightid.fleet.catalogue.store import ObjectStore, Store
 from flightid.table import Cell, Column, Table
 
 PURPOSE = "queries of a catalogue"
+QUERY_S = 60.0
+"""Longest time for one answer, s."""
+ZONED = "TIMESTAMP WITH TIME ZONE"
 
 
 class Catalogue:
@@ -41,7 +45,7 @@ class Catalogue:
     def __init__(self, store: Store) -> None:
         duckdb = extra_module("duckdb", PURPOSE)
         self._store = store
-        self._errors = duckdb.Error
+        self._errors, self._interruption = duckdb.Error, duckdb.InterruptException
         self._connection = duckdb.connect(":memory:")
         parts, self.broken = read_parts(store)
         known = KnownLogs(store, parts)
@@ -50,8 +54,15 @@ class Catalogue:
         if isinstance(store, ObjectStore):
             self._connection.register_filesystem(store.fs)
         twice = _twice(store, parts)
-        for table in TABLES.values():
-            self._view(table, parts, twice)
+        try:
+            for table in TABLES.values():
+                self._view(table, parts, twice)
+        except duckdb.Error as error:
+            raise DataError(
+                "tables of the catalogue cannot be read",
+                found=str(error)[:300],
+                action="move parts/ away and run the fleet again: it takes those logs again",
+            ) from error
         self._lock()
 
     def _view(
@@ -82,6 +93,7 @@ class Catalogue:
         folder = self._store.root.replace("'", "''")
         for setting in (
             f"allowed_directories = ['{folder}/']",
+            "temp_directory = ''",  # Nothing is written where somebody happens to work.
             "autoinstall_known_extensions = false",
             "autoload_known_extensions = false",
             "enable_external_access = false",
@@ -120,13 +132,39 @@ class Catalogue:
         found = ", ".join(kinds) or "no statement"
         raise OptionError("the catalogue takes questions alone", found=found, needed=needed)
 
-    def answer(self, sql: str) -> Table:
-        """Answer of one SELECT as a table of plain values; see `query`."""
-        found = self.query(sql)
+    def answer(self, sql: str, *, time_s: float = QUERY_S) -> Table:
+        """Answer of one SELECT as a table of plain values.
+
+        Parameters
+        ----------
+        sql : str
+            As `query` takes it.
+        time_s : float
+            Longest time for it, s.
+
+        Raises
+        ------
+        OptionError
+            As `query` raises it, or there was no answer in that time.
+        """
+        if not 0.0 < time_s <= threading.TIMEOUT_MAX:
+            raise OptionError("no time for an answer", found=f"{time_s:g} s", needed="above 0 s")
+        clock = threading.Timer(time_s, self._connection.interrupt)
+        clock.daemon = True
+        clock.start()
         try:
+            found = _plain(self.query(sql))
             rows = tuple(tuple(map(_cell, row)) for row in found.fetchall())
+        except self._interruption as error:
+            raise OptionError(
+                "the question takes too long",
+                found=f"no answer after {time_s:g} s",
+                action="ask for less, or give it more time (--time-limit)",
+            ) from error
         except self._errors as error:
             raise OptionError("the catalogue cannot answer this", found=str(error)) from error
+        finally:
+            clock.cancel()
         return Table("Answer", tuple(map(Column, found.columns)), rows)
 
     def table(self, name: str) -> Any:  # noqa: ANN401 - of a library that an extra installs
@@ -164,6 +202,19 @@ class Catalogue:
     def __repr__(self) -> str:
         """Place and number of logs."""
         return f"Catalogue({self._store.root!r}, {sum(self.counts().values())} logs)"
+
+
+def _plain(found: Any) -> Any:  # noqa: ANN401 - of a library that an extra installs
+    """Instants with a zone as text: values of Python need one more library for them."""
+    if ZONED not in map(str, found.types):
+        return found
+    names = ('"' + name.replace('"', '""') + '"' for name in found.columns)
+    return found.project(
+        ", ".join(
+            f"CAST({name} AS VARCHAR) AS {name}" if str(kind) == ZONED else name
+            for name, kind in zip(names, found.types, strict=True)
+        )
+    )
 
 
 def _cell(value: object) -> Cell:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import io
 from collections.abc import Iterator, Mapping, Sequence
 from importlib import import_module
@@ -10,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from flightid.extras import extra_module
-from flightid.fleet.catalogue.loose import BROKEN, loose_logs, loose_name, read_loose
+from flightid.fleet.catalogue.loose import BROKEN, QUARANTINE, loose_logs, loose_name, read_loose
 from flightid.fleet.catalogue.parts import (
     KEYS,
     MANIFEST,
@@ -104,6 +105,23 @@ def _longest(part: TablePart) -> int:
     return max(part.rows.values(), default=0)
 
 
+def set_aside(store: Store) -> list[str]:
+    """Move parts that cannot be used to quarantine, file by file; their names.
+
+    Their logs are in no part from then on: the next run takes them again.
+    """
+    with _alone(store) as is_ours:
+        parts, broken = read_parts(store) if is_ours else ([], [])
+        replaced = {name for part in parts for name in part.replaces}
+        moved = [name for name in broken if name not in replaced]
+        for name in moved:
+            for file in store.names(f"{PARTS}/{name}"):
+                store.write(f"{QUARANTINE}/{name}.{file}", store.read(f"{PARTS}/{name}/{file}"))
+        for name in broken:
+            store.remove(f"{PARTS}/{name}")
+        return moved
+
+
 def rewrite(
     store: Store, parts: Sequence[TablePart], without: frozenset[str] = frozenset()
 ) -> TablePart:
@@ -171,23 +189,24 @@ def arrow_schema(table: FleetTable) -> Any:  # noqa: ANN401 - of a library that 
 def _write(store: Store, tables: Mapping[str, Any], replaces: tuple[str, ...]) -> TablePart:
     parquet = extra_module("pyarrow.parquet", PURPOSE)
     logs = tables["logs"]["log"].to_pylist()
-    name, sizes = new_name(logs), {}
+    name, files = new_name(logs), dict[str, bytes]()
     for table, rows in tables.items():
         if not rows.num_rows:
             continue
         ordered = rows.sort_by([("vehicle", "ascending"), ("flown_at", "ascending")])
         target = io.BytesIO()
         parquet.write_table(ordered, target, compression="zstd")
-        sizes[f"{table}.parquet"] = target.getbuffer().nbytes
-        store.write(f"{PARTS}/{name}/{table}.parquet", target.getvalue())
-    keys = key_bytes(logs)
-    sizes[KEYS] = len(keys)
-    store.write(f"{PARTS}/{name}/{KEYS}", keys)
+        files[f"{table}.parquet"] = target.getvalue()
+    files[KEYS] = key_bytes(logs)
+    for file, content in files.items():
+        store.write(f"{PARTS}/{name}/{file}", content)
     outcomes: dict[str, int] = {}
     for outcome in tables["logs"]["outcome"].to_pylist():
         outcomes[outcome] = outcomes.get(outcome, 0) + 1
     counts = {table: rows.num_rows for table, rows in tables.items()}
-    part = TablePart(name, counts, sizes, outcomes, replaces)
+    sizes = {file: len(content) for file, content in files.items()}
+    digests = {file: hashlib.sha256(content).hexdigest() for file, content in files.items()}
+    part = TablePart(name, counts, sizes, digests, outcomes, replaces)
     store.write(f"{PARTS}/{name}/{MANIFEST}", part.to_bytes())
     return part
 
@@ -219,11 +238,16 @@ def _alone(store: Store) -> Iterator[bool]:
 def read_columns(
     store: Store, parts: Sequence[TablePart], table: str, names: Sequence[str]
 ) -> Iterator[tuple[str, ...]]:
-    """Some text columns of a table, row by row; empty text for null."""
+    """Some columns of a table as text, row by row; empty text for null."""
     parquet = extra_module("pyarrow.parquet", PURPOSE)
     for part in (part for part in parts if part.rows.get(table)):
         content = io.BytesIO(store.read(part.file(table)))
         rows = parquet.read_table(content, columns=list(names))
         columns = [rows[name].to_pylist() for name in names]
         for row in zip(*columns, strict=True):
-            yield tuple(value or "" for value in row)
+            yield tuple(map(text_of, row))
+
+
+def text_of(value: object) -> str:
+    """A value as text; empty for null."""
+    return "" if value is None else str(value)

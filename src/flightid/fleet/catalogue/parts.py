@@ -19,8 +19,10 @@ from flightid.fleet.catalogue.store import Store
 
 PARTS = "parts"
 MANIFEST = "manifest.json"
-KEYS = "keys.bin"
+KEYS = "logs.keys"
 KEY_BYTES = 32
+BROKEN_JSON = (ValueError, KeyError, TypeError, AttributeError, RecursionError, OverflowError)
+"""What a document that somebody has broken may raise."""
 Keys = NDArray[np.void]
 """Digests of logs, sorted, 32 bytes each."""
 
@@ -37,6 +39,8 @@ class TablePart:
         Number of rows by table; a table without rows has no file.
     sizes : mapping of str to int
         Size of each file, B.
+    digests : mapping of str to str
+        SHA-256 of each file.
     outcomes : mapping of str to int
         Logs by outcome.
     replaces : tuple of str
@@ -46,6 +50,7 @@ class TablePart:
     name: str
     rows: Mapping[str, int]
     sizes: Mapping[str, int]
+    digests: Mapping[str, str]
     outcomes: Mapping[str, int] = field(default_factory=dict)
     replaces: tuple[str, ...] = ()
 
@@ -65,6 +70,7 @@ class TablePart:
             "name": self.name,
             "rows": dict(self.rows),
             "sizes": dict(self.sizes),
+            "digests": dict(self.digests),
             "outcomes": dict(self.outcomes),
             "replaces": list(self.replaces),
         }
@@ -85,10 +91,11 @@ class TablePart:
                 raise DataError("a part of another version", found=values["schema"])
             rows = {str(k): int(v) for k, v in values["rows"].items() if k in TABLES}
             sizes = {str(k): int(v) for k, v in values["sizes"].items()}
+            digests = {str(k): str(v) for k, v in values["digests"].items()}
             outcomes = {str(k): int(v) for k, v in values["outcomes"].items()}
             replaces = tuple(map(str, values["replaces"]))
-            return cls(str(values["name"]), rows, sizes, outcomes, replaces)
-        except (ValueError, KeyError, TypeError, AttributeError) as error:
+            return cls(str(values["name"]), rows, sizes, digests, outcomes, replaces)
+        except BROKEN_JSON as error:
             if isinstance(error, DataError):
                 raise
             raise DataError("these bytes are no manifest", found=str(error)[:200]) from error
@@ -98,7 +105,7 @@ def read_parts(store: Store) -> tuple[list[TablePart], list[str]]:
     """Parts that count, in the order of their names, and folders that cannot be used.
 
     A folder without a manifest is being written, or its writer died: it counts nowhere. One whose
-    files are missing or of another size cannot be used.
+    files are missing or of other bytes than it states cannot be used.
     """
     found: dict[str, TablePart] = {}
     broken = []
@@ -112,15 +119,22 @@ def read_parts(store: Store) -> tuple[list[TablePart], list[str]]:
             broken.append(name)
             continue
         found[name] = part
-    gone = {name for part in found.values() for name in part.replaces}
+    gone = {name for own, part in found.items() for name in part.replaces if name != own}
     return [part for name, part in found.items() if name not in gone], broken
 
 
 def _require_whole(store: Store, part: TablePart, name: str) -> None:
     if part.name != name:
         raise DataError("a manifest of another part", found=part.name, needed=name)
+    tables = (f"{table}.parquet" for table, rows in part.rows.items() if rows)
+    needed = {KEYS, *tables}
+    if needed != set(part.sizes) or needed != set(part.digests):
+        raise DataError("a manifest of other files", found=sorted(part.sizes), needed=needed)
+    if part.sizes[KEYS] != KEY_BYTES * part.n_logs:
+        raise DataError("keys of other logs", found=part.sizes[KEYS])
     for file, size in part.sizes.items():
-        if store.n_bytes(f"{PARTS}/{name}/{file}") != size:
+        place = f"{PARTS}/{name}/{file}"
+        if store.n_bytes(place) != size or store.digest(place) not in (None, part.digests[file]):
             raise DataError("a file of a part is not whole", found=file)
 
 
@@ -131,7 +145,7 @@ def read_keys(store: Store, part: TablePart) -> Keys:
 
 
 def key_bytes(logs: Sequence[str]) -> bytes:
-    """Digests as `keys.bin` holds them."""
+    """Digests as `logs.keys` holds them."""
     return b"".join(sorted(map(bytes.fromhex, logs)))
 
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import datetime
 import json
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeGuard
 
 from flightid.errors import DataError, FlightidError
+from flightid.fleet.catalogue.parts import BROKEN_JSON
 from flightid.fleet.catalogue.schema import (
     INSTANT,
     NUMBER,
@@ -22,6 +24,12 @@ from flightid.fleet.catalogue.schema import (
 )
 
 KEY_LENGTH = 64
+MOST_EXACT = 1 << 53
+"""Greatest whole number that a float64 of Arrow takes."""
+MOST_WHOLE = 1 << 63
+STAMP = re.compile(r"[0-9]{4}-[0-9]{2}-[0-9]{2}(T[0-9]{2}:[0-9]{2}:[0-9]{2}(\.[0-9]{6})?)?")
+"""Instants as they are written: UTC without zone, to the microsecond."""
+SURROGATE = re.compile("[\ud800-\udfff]")
 Rows = Mapping[str, Sequence[Mapping[str, Any]]]
 
 
@@ -66,7 +74,8 @@ class LogRecord:
         columns = {name: list(TABLES[name].names) for name in tables}
         values = {"schema": SCHEMA, "log": self.log, "columns": columns, "tables": tables}
         text = json.dumps(values, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
-        return text.encode()
+        # A lone surrogate, of a name that was no text, becomes a question mark.
+        return text.encode(errors="replace")
 
     @classmethod
     def from_bytes(cls, content: bytes) -> LogRecord:
@@ -91,7 +100,7 @@ class LogRecord:
                 raise DataError("a record of several logs")
         except FlightidError:
             raise
-        except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        except BROKEN_JSON as error:
             raise DataError(
                 "these bytes are no record of a log",
                 found=f"{type(error).__name__}: {error}"[:200],
@@ -113,15 +122,23 @@ def _rows(table: FleetTable, given: list[list[Any]]) -> list[dict[str, Any]]:
     return made
 
 
+def _is_whole(value: object) -> TypeGuard[int]:
+    return isinstance(value, int) and not isinstance(value, bool)
+
+
 def _fits(value: object, kind: str) -> bool:
     if kind == TEXT:
-        return isinstance(value, str)
+        return isinstance(value, str) and not SURROGATE.search(value)
     if kind == NUMBER:
-        return isinstance(value, int | float) and not isinstance(value, bool)
+        return isinstance(value, float) or (_is_whole(value) and abs(value) <= MOST_EXACT)
     if kind == WHOLE:
-        return isinstance(value, int) and not isinstance(value, bool)
+        return _is_whole(value) and -MOST_WHOLE <= value < MOST_WHOLE
     if kind == INSTANT:
-        return isinstance(value, str) and bool(datetime.datetime.fromisoformat(value))
+        return (
+            isinstance(value, str)
+            and STAMP.fullmatch(value) is not None
+            and bool(datetime.datetime.fromisoformat(value))
+        )
     assert kind in (TEXTS, NUMBERS)
     inner = TEXT if kind == TEXTS else NUMBER
     return isinstance(value, list) and all(_fits(item, inner) for item in value)
