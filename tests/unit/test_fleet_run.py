@@ -8,6 +8,7 @@ import importlib.util
 import os
 import shutil
 import signal
+import tempfile
 import threading
 import time
 from collections.abc import Iterator
@@ -20,6 +21,8 @@ import pytest
 from flightid.errors import DataError
 from flightid.fleet import fleet_status, run_fleet
 from flightid.fleet.addresses import LogAddress, find_logs
+from flightid.fleet.catalogue.loose import write_loose
+from flightid.fleet.catalogue.record import LogRecord
 from flightid.fleet.engine import plain
 from flightid.fleet.engine.order import (
     KILLED,
@@ -31,7 +34,7 @@ from flightid.fleet.engine.order import (
 )
 from flightid.fleet.engine.sandbox import DEAD, MEMORY, TIME, Sandbox
 from flightid.fleet.identity import FleetTables, read_tables
-from flightid.fleet.opening import open_catalogue
+from flightid.fleet.opening import current_store, open_catalogue
 from flightid.fleet.run_one import LogTask, run_one
 from flightid.fleet.settings import read_fleet
 
@@ -124,12 +127,16 @@ def test_a_fleet_is_run_once_and_then_only_for_what_is_missing(
     assert "empty file" in message
 
 
-def test_a_log_that_hangs_is_ended_by_the_clock(order: RunOrder, hanging: LogAddress) -> None:
+def test_a_log_that_hangs_is_ended_by_the_clock(
+    order: RunOrder, hanging: LogAddress, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     with Sandbox(replace(order, time_s=1.0)) as box:
         outcome = box.run(LogOrder(hanging))
         assert (outcome.outcome, outcome.reason, outcome.stage) == (KILLED, TIME, "address")
         assert "1 s" in outcome.message
         assert box.pid is None
+    assert not list(Path(tempfile.gettempdir()).glob("flightid-order-*"))
 
 
 def test_a_process_that_dies_is_named_by_its_signal(order: RunOrder, hanging: LogAddress) -> None:
@@ -231,3 +238,81 @@ def test_a_full_disk_ends_the_run_and_blames_no_log(
     monkeypatch.setattr("flightid.fleet.run.run_plain", lambda *_: iter([said]))
     with pytest.raises(DataError, match="run the fleet again"):
         run_fleet(tmp_path / "fleet.toml")
+    monkeypatch.setattr("flightid.fleet.run.current_store", full)
+    with pytest.raises(DataError, match="run the fleet again"):
+        run_fleet(tmp_path / "fleet.toml")
+
+
+def test_what_is_no_file_is_a_failure_of_its_own(fleet: Path, tmp_path: Path) -> None:
+    Path(tmp_path, "good.bin").write_bytes(b"no log")
+    Path(tmp_path, "dangling.bin").symlink_to(tmp_path / "gone")
+    Path(tmp_path, "zero.bin").symlink_to("/dev/zero")
+    os.mkfifo(tmp_path / "pipe.bin")
+    Path(os.fsdecode(os.fsencode(tmp_path) + b"/\xff.bin")).write_bytes(b"no log")
+    found = {each.name: each for each in find_logs([str(tmp_path)])}
+    problems = {name: each.problem for name, each in found.items()}
+    assert problems.pop("good.bin") == ""
+    assert set(problems) == {"dangling.bin", "zero.bin", "pipe.bin", "\\xff.bin"}
+    task = LogTask(read_fleet(fleet))
+    for name, problem in problems.items():
+        made = run_one(found[name], task)
+        assert made is not None
+        assert problem
+        assert problem in made.rows["failures"][0]["message"]
+        assert LogRecord.from_bytes(made.to_bytes()).outcome == "refused"
+
+
+def test_a_log_longer_than_the_fleet_allows_is_refused(fleet: Path, tmp_path: Path) -> None:
+    with (tmp_path / "long.bin").open("wb") as file:
+        file.truncate((1 << 20) + 1)
+    settings = read_fleet(fleet)
+    task = LogTask(replace(settings, limits=replace(settings.limits, log_mib=1)))
+    made = run_one(find_logs([str(tmp_path)])[0], task)
+    assert made is not None
+    assert "at most 1 MiB" in made.rows["failures"][0]["message"]
+
+
+def test_nobody_tries_a_pattern_without_a_clock(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def never(*_: object) -> None:
+        raise AssertionError("a pattern of the user in the parent")
+
+    (tmp_path / "aaaa.bin").write_bytes(b"no log")
+    text = "[fleet]\ntitle = 't'\nlogs = ['.']\n[vehicles]\nby = 'name'\npattern = '^(a*)*_'\n"
+    (tmp_path / "fleet.toml").write_text(text)
+    monkeypatch.setattr("flightid.fleet.run.find_spec", lambda _: None)
+    monkeypatch.setattr("flightid.fleet.identity.re.search", never)
+
+    def killed(_: RunOrder, logs: list[LogOrder], __: int | None) -> Iterator[LogOutcome]:
+        return (LogOutcome(log, KILLED, log.address.digest, TIME) for log in logs)
+
+    monkeypatch.setattr("flightid.fleet.run.run_plain", killed)
+    assert run_fleet(tmp_path / "fleet.toml").outcomes == {"failed": 1}
+
+
+def test_an_address_has_one_record_that_counts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "a.bin").write_bytes(b"first")
+    (tmp_path / "fleet.toml").write_text("[fleet]\ntitle = 't'\nlogs = ['.']\n")
+    monkeypatch.setattr("flightid.fleet.run.find_spec", lambda _: None)
+    store = current_store(read_fleet(tmp_path / "fleet.toml"))
+
+    def taken(_: RunOrder, logs: list[LogOrder], __: int | None) -> Iterator[LogOutcome]:
+        for log in logs:
+            made = run_one(log.address, LogTask(read_fleet(tmp_path / "fleet.toml")))
+            assert made is not None
+            write_loose(store, made)
+            yield LogOutcome(log, made.outcome, made.log)
+
+    monkeypatch.setattr("flightid.fleet.run.run_plain", taken)
+    seen = os.stat(tmp_path / "a.bin")
+    assert run_fleet(tmp_path / "fleet.toml").outcomes == {"refused": 1}
+    (tmp_path / "a.bin").write_bytes(b"first and more")  # as `cp -p` leaves it: at the same instant
+    os.utime(tmp_path / "a.bin", ns=(seen.st_mtime_ns, seen.st_mtime_ns))
+    again = run_fleet(tmp_path / "fleet.toml")
+    assert (again.kept, again.outcomes) == (0, {"refused": 1})
+    assert [each.code for each in again.findings] == ["replaced-records"]
+    assert fleet_status(tmp_path / "fleet.toml").outcomes == {"refused": 1}
+    assert run_fleet(tmp_path / "fleet.toml").kept == 1

@@ -78,8 +78,7 @@ def status(place: str, as_json: bool) -> None:
 @click.argument("place", metavar="FLEET | CATALOGUE")
 @click.argument("sql")
 @click.option(
-    "--time-limit",
-    "time_s",
+    "--time-s",
     type=click.FloatRange(min=0.0, min_open=True, max=1e6),
     default=60.0,
     show_default=True,

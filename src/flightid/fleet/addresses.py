@@ -6,6 +6,7 @@ import datetime
 import glob
 import hashlib
 import os
+import stat
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -19,6 +20,8 @@ SUFFIXES = (".bin", ".ulg", ".bbl", ".bfl", ".tlog", ".log")
 """What a folder is searched for; a glob or a file's own name takes any."""
 WILD = "*?["
 LOCAL = "file://"
+GONE = "gone"
+"""Stamp of a file that cannot be reached: a dangling link, or one removed meanwhile."""
 
 
 @dataclass(frozen=True)
@@ -34,12 +37,15 @@ class LogAddress:
         Changes where the log does: time of change, or ETag.
     changed_s : float or None
         Time of the last change, s since 1970.
+    problem : str
+        Why it cannot be read as it lies there; empty where nothing is known against it.
     """
 
     address: str
     n_bytes: int
     stamp: str
     changed_s: float | None = None
+    problem: str = ""
 
     @property
     def name(self) -> str:
@@ -102,16 +108,24 @@ def _local(place: str) -> Iterator[LogAddress]:
                     yield _of_file(Path(folder) / name)
     elif any(letter in place for letter in WILD):
         for name in glob.iglob(place, recursive=True):
-            if Path(name).is_file():
+            if not Path(name).is_dir():
                 yield _of_file(Path(name))
     else:
         raise _missing(place)
 
 
 def _of_file(path: Path) -> LogAddress:
-    seen = path.stat()
-    stamp = str(seen.st_mtime_ns)
-    return LogAddress(str(path.absolute()), seen.st_size, stamp, seen.st_mtime)
+    """A file of this machine; what cannot be read is a log with a problem, and costs no other."""
+    place = os.fsencode(path.absolute())
+    address = place.decode(errors="backslashreplace")
+    try:
+        seen = path.stat()
+    except OSError as error:
+        return LogAddress(address, 0, GONE, None, f"it cannot be reached: {error.strerror}")
+    problem = "" if stat.S_ISREG(seen.st_mode) else "it is no regular file"
+    if address.encode() != place:
+        problem = "its path is not UTF-8: rename it"
+    return LogAddress(address, seen.st_size, str(seen.st_mtime_ns), seen.st_mtime, problem)
 
 
 def _remote(place: str) -> Iterator[LogAddress]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -12,7 +12,14 @@ from flightid.conventions import Light
 from flightid.errors import DataError, OptionError
 from flightid.findings import Finding
 from flightid.fleet.addresses import LogAddress, find_logs
-from flightid.fleet.catalogue.compaction import compact, merge, read_columns, rewrite
+from flightid.fleet.catalogue.compaction import (
+    compact,
+    merge,
+    read_columns,
+    rewrite,
+    set_aside,
+    text_of,
+)
 from flightid.fleet.catalogue.loose import (
     BROKEN,
     loose_logs,
@@ -37,7 +44,7 @@ from flightid.fleet.engine.order import (
 from flightid.fleet.engine.plain import run_plain
 from flightid.fleet.identity import FleetTables, identify_log, read_tables
 from flightid.fleet.opening import current_store
-from flightid.fleet.run_one import made_record
+from flightid.fleet.run_one import FULL, made_record
 from flightid.fleet.settings import FleetSettings, read_fleet
 from flightid.progress import progress
 
@@ -128,22 +135,45 @@ def run_fleet(
     >>> fid.fleet.run_fleet("fleet.toml")                            # doctest: +SKIP
     FleetRun(200 logs, 0 kept, 188 fitted, 12 refused)
     """
+    try:
+        return _run(path, workers, scheduler, retry=retry)
+    except OSError as error:
+        if error.errno not in FULL:
+            raise
+        raise _no_space(str(error)) from error
+
+
+def _run(path: str | Path, workers: int | None, scheduler: str | None, *, retry: bool) -> FleetRun:
     settings = read_fleet(path)
     tables = read_tables(settings)
     if scheduler is not None:
         require_address(scheduler)
     store = current_store(settings)
     order = run_order(settings, tables, store.root)
+    aside = set_aside(store)
     addresses = find_logs([settings.place(place) for place in settings.words.logs])
-    missing = _missing(store, addresses, tables, retry=retry)
+    missing, earlier = _missing(store, addresses, tables, retry=retry)
     counts, findings = Counter[str](), list(_findings(scheduler, addresses))
+    replaced, seen = set[str](), set[str]()
     run = _Run(settings, tables, store, order, workers, scheduler)
     with progress(len(missing), settings.path.stem) as advance:
         for outcome in run.outcomes(orders(missing, tables)):
             counts[outcome.outcome] += 1
+            replaced |= earlier.get(outcome.order.address.address, set())
+            seen.add(outcome.log)
             advance()
+    replaced -= seen
+    _forget(store, replaced)
     run.tidy(1)
     kept = len(addresses) - len(missing) + counts.pop(KNOWN, 0)
+    if aside:
+        text = (
+            f"{len(aside)} tables were damaged: they lie in quarantine, their logs were taken again"
+        )
+        findings.append(Finding("damaged-parts", Light.AMBER, text))
+    if replaced:
+        text = f"{len(replaced)} earlier records count no more: their logs have other bytes now"
+        findings.append(Finding("replaced-records", Light.GREEN, text))
     return FleetRun(settings.catalogue, len(addresses), kept, dict(counts), tuple(findings))
 
 
@@ -153,13 +183,14 @@ class LogEntry:
 
     Attributes
     ----------
-    log, address, stamp, outcome, reason, id, told : str
-        Columns of the table of logs; empty for null.
+    log, address, stamp, bytes, outcome, reason, id, told : str
+        Columns of the table of logs, numbers as text; empty for null.
     """
 
     log: str
     address: str
     stamp: str
+    bytes: str
     outcome: str
     reason: str
     id: str
@@ -168,21 +199,35 @@ class LogEntry:
 
 def _missing(
     store: Store, addresses: list[LogAddress], tables: FleetTables, *, retry: bool
-) -> list[LogAddress]:
-    """Logs that no record stands for, by address and stamp alone: nothing is read for it.
+) -> tuple[list[LogAddress], dict[str, set[str]]]:
+    """Logs that no record stands for, by address, size and stamp alone: nothing is read for it.
 
-    Records of which the tables of vehicles and flights say something else by now are forgotten, and
-    so are broken ones and, where that is asked, those that failed.
+    Beside them the records that stand at each address for what lay there before. Records of which
+    the tables of vehicles and flights say something else by now are forgotten, and so are broken
+    ones, those that another of the same address has replaced and, where that is asked, those that
+    failed.
     """
-    done, again = set[tuple[str, str]](), set[str]()
+    there = {each.address: each for each in addresses}
+    done, again, earlier = set[str](), set[str](), dict[str, set[str]]()
     for entry in _entries(store):
         is_stale = entry.told != tables.told(entry.id or None, entry.address)
         if entry.reason == BROKEN or is_stale or (retry and entry.outcome == FAILED):
             again.add(entry.log)
-        else:
-            done.add((entry.address, entry.stamp))
+        elif entry.address in there:
+            if _stands_for(entry, there[entry.address]):
+                done.add(entry.address)
+            else:
+                earlier.setdefault(entry.address, set()).add(entry.log)
+    for address in done:
+        again |= earlier.pop(address, set())
     _forget(store, again)
-    return [each for each in addresses if (each.address, each.stamp) not in done]
+    return [each for each in addresses if each.address not in done], earlier
+
+
+def _stands_for(entry: LogEntry, address: LogAddress) -> bool:
+    """Whether a log is still the one that was taken; stores of objects tell that by the stamp."""
+    is_as_long = address.local is None or entry.bytes == str(address.n_bytes)
+    return entry.stamp == address.stamp and is_as_long
 
 
 def _entries(store: Store) -> Iterator[LogEntry]:
@@ -193,7 +238,7 @@ def _entries(store: Store) -> Iterator[LogEntry]:
         yield from (LogEntry(*row) for row in read_columns(store, parts, "logs", names))
     for record in read_loose(store, loose_logs(store)):
         entry = record.rows["logs"][0]
-        yield LogEntry(*(str(entry.get(name) or "") for name in names))
+        yield LogEntry(*map(text_of, (entry.get(name) for name in names)))
 
 
 def _forget(store: Store, logs: set[str]) -> None:
@@ -218,6 +263,15 @@ def _findings(scheduler: str | None, addresses: list[LogAddress]) -> Iterator[Fi
             "there is no log at the places of the fleet file",
             "name folders, globs or addresses in [fleet] logs",
         )
+
+
+def _no_space(found: str) -> DataError:
+    return DataError(
+        "nothing can be written any more",
+        found=found,
+        needed="space where the catalogue and temporary files lie",
+        action="make room and run the fleet again: only what is missing is taken",
+    )
 
 
 class _Run:
@@ -255,12 +309,7 @@ class _Run:
 
     def _counted(self, outcome: LogOutcome) -> LogOutcome:
         if outcome.outcome == STORAGE:
-            raise DataError(
-                "nothing can be written any more",
-                found=outcome.message,
-                needed="space where the catalogue and temporary files lie",
-                action="make room and run the fleet again: only what is missing is taken",
-            )
+            raise _no_space(outcome.message)
         self.written += 1
         if self.written % self.settings.limits.compact_every == 0:
             self.tidy(self.settings.limits.compact_every // 2)
@@ -269,9 +318,11 @@ class _Run:
     def _failed(self, outcome: LogOutcome) -> LogOutcome:
         """The record of a log that killed its process twice."""
         address = outcome.order.address
-        identity = identify_log(
-            None, address.address, address.changed_s, self.settings.vehicles, self.tables
-        )
+        rules = self.settings.vehicles
+        if rules.by == "name":
+            # The pattern may be what hung the process: here nobody has a clock on it.
+            rules = replace(rules, by="log", pattern=None)
+        identity = identify_log(None, address.address, address.changed_s, rules, self.tables)
         entry = {
             "address": address.address,
             "bytes": address.n_bytes,

@@ -178,6 +178,13 @@ def peak_bytes() -> int | None:
 def _fetched(address: LogAddress, scratch: Path, task: LogTask, state: Progress) -> Path:
     """The log as a local file, its digest taken on the way, block by block."""
     task.tell(ADDRESS, state.log)
+    if address.problem:
+        raise FileFormatError(
+            f"{address.name} cannot be taken as a log",
+            found=address.problem,
+            needed="a regular file under a name in UTF-8",
+            action="mend or remove it",
+        )
     most = task.settings.limits.log_mib << 20
     local = address.local
     if local is not None:

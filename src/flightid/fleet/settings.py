@@ -21,6 +21,8 @@ from flightid.study.reading import TOP, TableReader, read_table
 
 Made = TypeVar("Made", bound=Options)
 SUBJECT = "fleet file"
+LEAST_MIB = 512
+"""Address space in which a log can be taken at all, MiB."""
 RULES = ("log", "folder", "name")
 """How vehicles are told apart: an id inside the log, the folder it lies in, its file name."""
 
@@ -67,9 +69,13 @@ class VehicleRules(Options):
 class RunLimits(Options):
     """What ``[limits]`` says: what one log may cost."""
 
-    time_s: float = option(600.0, unit="s", above=0.0, doc="Longest time for one log.")
+    time_s: float = option(600.0, unit="s", above=0.0, maximum=1e6, doc="Longest time for one log.")
     memory_mib: int = option(
-        4096, unit="MiB", minimum=256, doc="Most address space of the process that takes a log."
+        4096,
+        unit="MiB",
+        minimum=LEAST_MIB,
+        maximum=1 << 24,
+        doc="Most address space of the process that takes a log.",
     )
     log_mib: int = option(2048, unit="MiB", minimum=1, doc="Longest log that is fetched.")
     recycle: int = option(200, minimum=1, doc="Logs after which a process is replaced.")

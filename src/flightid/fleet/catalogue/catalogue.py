@@ -159,7 +159,7 @@ class Catalogue:
             raise OptionError(
                 "the question takes too long",
                 found=f"no answer after {time_s:g} s",
-                action="ask for less, or give it more time (--time-limit)",
+                action="ask for less, or give it more time (--time-s)",
             ) from error
         except self._errors as error:
             raise OptionError("the catalogue cannot answer this", found=str(error)) from error

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import sys
 import tempfile
 import threading
@@ -20,7 +21,7 @@ from typing import Any, TextIO
 from flightid.fleet.catalogue.loose import write_loose
 from flightid.fleet.catalogue.parts import KnownLogs, read_parts
 from flightid.fleet.catalogue.store import store_at
-from flightid.fleet.engine.order import KNOWN, STORAGE, LogOrder, RunOrder
+from flightid.fleet.engine.order import KNOWN, SCRATCH, STORAGE, LogOrder, RunOrder
 from flightid.fleet.identity import FleetTables
 from flightid.fleet.run_one import FULL, LogTask, run_one
 from flightid.fleet.settings import read_fleet
@@ -50,17 +51,30 @@ def main() -> None:
     threading.Thread(target=_listen, args=(lines,), daemon=True).start()
     order = json.loads(lines.get())
     limit_memory(order["memory_mib"])
-    with tempfile.TemporaryDirectory(prefix="flightid-order-") as folder:
-        take = _ready(order, Path(folder), said)
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            take = _ready(order, Path(folder), said)
+        except OSError as error:
+            if error.errno not in FULL:
+                raise
+            _say(said, _full(error))
+            return
         _say(said, {"ready": True})
         while True:
             _say(said, take(json.loads(lines.get())))
+
+
+def _full(error: OSError) -> dict[str, Any]:
+    return {"outcome": STORAGE, "log": "", "message": str(error)}
 
 
 def _listen(lines: SimpleQueue[str]) -> None:
     for line in sys.stdin:
         lines.put(line)
     # The parent is gone or has had enough: nobody wants the rest.
+    scratch = Path(tempfile.gettempdir())
+    if scratch.name.startswith(SCRATCH):
+        shutil.rmtree(scratch, ignore_errors=True)
     os._exit(ORPHAN)
 
 
@@ -94,7 +108,7 @@ def _ready(
         except OSError as error:
             if error.errno not in FULL:
                 raise
-            return {"outcome": STORAGE, "log": "", "message": str(error)}
+            return _full(error)
         entry = record.rows["logs"][0]
         names = ("outcome", "log", "reason", "message", "memory_bytes")
         return {name: entry.get(name) for name in names}

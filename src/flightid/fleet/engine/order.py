@@ -119,6 +119,8 @@ class LogOutcome:
 
 
 KNOWN, KILLED, STORAGE = "known", "killed", "storage"
+SCRATCH = "flightid-order-"
+"""How the temporary folder of a process begins: its parent makes it and removes it."""
 
 
 def study_files(settings: FleetSettings) -> list[Path]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -14,7 +15,14 @@ from collections.abc import Mapping
 from queue import Empty, SimpleQueue
 from typing import Any, BinaryIO, Self
 
-from flightid.fleet.engine.order import KILLED, LogOrder, LogOutcome, RunOrder
+from flightid.fleet.engine.order import (
+    KILLED,
+    SCRATCH,
+    STORAGE,
+    LogOrder,
+    LogOutcome,
+    RunOrder,
+)
 
 CHILD = "flightid.fleet.engine.child"
 START_S = 120.0
@@ -38,6 +46,7 @@ class Sandbox:
         self._child: subprocess.Popen[bytes] | None = None
         self._lines: SimpleQueue[bytes | None] = SimpleQueue()
         self._errors: BinaryIO | None = None
+        self._scratch: str | None = None
         self._taken = 0
 
     @property
@@ -49,7 +58,10 @@ class Sandbox:
         """Take one log; whatever becomes of the process, this returns."""
         if self._child is None or self._taken >= self._order.recycle:
             self.close()
-            problem = self._start()
+            problem, message = self._start()
+            if problem == STORAGE:
+                self.close()
+                return LogOutcome(order, STORAGE, order.address.digest, message=message)
             if problem is not None:
                 return self._killed(order, problem, "process", order.address.digest, 0.0)
         self._taken += 1
@@ -68,9 +80,12 @@ class Sandbox:
                 return _outcome(order, said, log, time.monotonic() - begun)
             stage, log = said["stage"], said["log"]
 
-    def _start(self) -> str | None:
-        """Start a process; why it is not ready, where it is not."""
+    def _start(self) -> tuple[str | None, str]:
+        """Start a process; why it is not ready, where it is not, and its words for it."""
+        # All that it leaves for a while lies here: whatever kills it, the folder goes with it.
+        self._scratch = tempfile.mkdtemp(prefix=SCRATCH)
         surroundings = dict.fromkeys(ONE_THREAD, "1") | dict(os.environ)
+        surroundings |= dict.fromkeys(("TMPDIR", "TEMP", "TMP"), self._scratch)
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115 - as long as the process
         self._child = subprocess.Popen(
             [sys.executable, "-m", CHILD],
@@ -88,9 +103,13 @@ class Sandbox:
         reader.start()
         self._send(self._order.to_dict())
         try:
-            return None if self._lines.get(timeout=START_S) is not None else DEAD
+            line = self._lines.get(timeout=START_S)
         except Empty:
-            return TIME
+            return TIME, ""
+        if line is None:
+            return DEAD, ""
+        said = json.loads(line)
+        return said.get("outcome"), str(said.get("message") or "")
 
     def _send(self, values: Mapping[str, Any]) -> None:
         assert self._child is not None
@@ -144,7 +163,9 @@ class Sandbox:
                     _close(stream)
         if self._errors is not None:
             self._errors.close()
-        self._child = self._errors = None
+        if self._scratch is not None:
+            shutil.rmtree(self._scratch, ignore_errors=True)
+        self._child = self._errors = self._scratch = None
 
     def __enter__(self) -> Self:
         return self
