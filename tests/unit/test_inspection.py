@@ -15,6 +15,7 @@ import flightid as fid
 from flightid.cli.inspect import command
 from flightid.conventions import Light
 from flightid.inspection import advice
+from flightid.inspection.carried import carried_axes, carried_sentence
 from flightid.inspection.inspection import Inspection
 from flightid.logs import Log
 from flightid.logs.ulog.reader import UlogSource
@@ -115,6 +116,24 @@ def test_a_fall_ends_the_flight(inspected: Callable[[SweepFlight], Inspection]) 
     inspection = inspected(SweepFlight(tips_over=True, sweep_s=20.0))
     assert inspection.phases.tipped_s == pytest.approx(75.3, abs=0.2)
     assert inspection.phases.airborne[-1][1] <= 75.4
+
+
+def test_a_fall_is_the_first_thing_that_is_said(
+    inspected: Callable[[SweepFlight], Inspection],
+) -> None:
+    said = carried_sentence(inspected(SweepFlight(tips_over=True, sweep_s=20.0)))
+    assert said.startswith("The vehicle falls over at ")
+
+
+def test_without_a_sweep_no_axis_carries_a_model_and_the_verdict_is_red(
+    inspected: Callable[[SweepFlight], Inspection],
+) -> None:
+    found = inspected(SweepFlight(injected=False))
+    assert carried_axes(found) == ()
+    assert codes(found, Light.RED) == {"no-model"}
+    assert "can support identification" not in found.to_text()
+    why = "roll, pitch, yaw: nothing was injected, and no sweep was flown"
+    assert carried_sentence(found) == f"This log can carry no model: {why}."
 
 
 def test_skew_is_measured(inspected: Callable[[SweepFlight], Inspection]) -> None:

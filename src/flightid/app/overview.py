@@ -22,6 +22,7 @@ from flightid.app.schemas import (
 )
 from flightid.findings import Finding
 from flightid.inspection import Inspection
+from flightid.inspection.carried import carried_sentence
 from flightid.logs import Log
 from flightid.review import FlightReview
 from flightid.review.loop_response import LoopResponse
@@ -71,7 +72,7 @@ def overview_of(
         duration_s=inspection.duration_s,
         airborne=inspection.phases.airborne_words,
         light=light_of(inspection.verdict),
-        sentence=sentence_of(inspection, cards),
+        sentence=carried_sentence(inspection),
         verdicts=_verdicts(inspection.findings, timeline.blocks),
         cards=cards,
         span_s=timeline.span_s,
@@ -92,20 +93,6 @@ def overview_of(
         events=_events(log),
         has_study=settings is not None,
     )
-
-
-def sentence_of(inspection: Inspection, cards: Iterable[AxisCard]) -> str:
-    """What the log can carry, in one sentence."""
-    able = [card.axis for card in cards if card.kind == "model"]
-    if able:
-        listed = able[0] if len(able) == 1 else f"{', '.join(able[:-1])} and {able[-1]}"
-        said = f"This log can carry a model of {listed}"
-        doubt = str(inspection.verdict) == "amber"
-        return f"{said}, with reservations." if doubt else f"{said}."
-    airborne = inspection.phases
-    if airborne.is_known and not airborne.airborne:
-        return "This log holds no flight, so it can carry no model."
-    return "This log can carry no model: nothing in it excited the vehicle widely enough."
 
 
 def review_of(review: FlightReview) -> ReviewPart:

@@ -8,15 +8,17 @@ from dataclasses import dataclass, replace
 from flightid.conventions import Light
 from flightid.findings import Finding, worst
 from flightid.inspection.axes import axes_of
+from flightid.inspection.carried import carried_axes, carried_sentence
 from flightid.inspection.excitation_found import FoundExcitation
 from flightid.inspection.flight_phases import FlightPhases
 from flightid.inspection.rates import StreamRate
 from flightid.inspection.saturation import Saturation
 from flightid.inspection.skew import StreamSkew
 from flightid.inspection.usable_band import AxisBand
-from flightid.inspection.verdict_lines import verdict_lines
+from flightid.inspection.verdict_lines import WIDTH, verdict_lines
 from flightid.result import Result
 from flightid.table import Column, Table
+from flightid.wrapping import wrapped
 
 WORDS = {
     Light.GREEN: "can support identification",
@@ -98,12 +100,14 @@ class Inspection(Result, schema="flightid.inspection/1"):
         channels : iterable of str
             Canonical names, for example ``"q"``; none of any axis: all findings count.
         """
+        # Who fits a model all the same is judged by its evidence, not by what `run` would try.
+        kept = tuple(f for f in self.findings if f.code != "no-model")
         wanted = set(channels)
         names = axes_of(self.vehicle)
         others = {axis for axis, own in names.items() if not wanted & set(own)}
         if len(others) == len(names):
-            return self.findings
-        return tuple(f for f in self.findings if f.code.rsplit("-", 1)[-1] not in others)
+            return kept
+        return tuple(f for f in kept if f.code.rsplit("-", 1)[-1] not in others)
 
     def with_findings(self, findings: tuple[Finding, ...]) -> Inspection:
         """Copy with other findings."""
@@ -128,13 +132,19 @@ class Inspection(Result, schema="flightid.inspection/1"):
             for finding, action in self._advised()
         )
         columns = (Column("light"), Column("code"), Column("found"), Column("do"))
-        return Table(f"{self.name}: {WORDS[self.verdict]}", columns, rows)
+        return Table(f"{self.name}: {self._words()}", columns, rows)
 
     def to_text(self) -> str:
         """Verdict, sentences and tables for a terminal."""
         head = f"{self.name}: {self.firmware or self.kind}, {self.duration_s:.1f} s"
-        said = f"{head}\nThis log {WORDS[self.verdict]}.\n{verdict_lines(self.findings)}"
+        said = "\n".join(wrapped(carried_sentence(self), WIDTH))
+        said = f"{head}\n{said}\nThis log {self._words()}.\n{verdict_lines(self.findings)}"
         return "\n\n".join([said, *(t.to_text() for t in self.tables()[1:])])
+
+    def _words(self) -> str:
+        """What the light means, where an axis carries a model at all."""
+        able = self.verdict in (Light.RED, Light.UNKNOWN) or carried_axes(self)
+        return WORDS[self.verdict] if able else WORDS[Light.RED]
 
     def in_short(self) -> str:
         """The flight in a line, what each axis supports, what moved it, what was at a limit."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from flightid.conventions import Light
 from flightid.findings import Finding, counted
 from flightid.inspection import advice
+from flightid.inspection.carried import carried_axes
 from flightid.inspection.gap_findings import gap_findings
 from flightid.inspection.signals import map_of
 from flightid.inspection.thresholds import (
@@ -33,7 +34,18 @@ def judge(log: Log, found: Inspection) -> tuple[Finding, ...]:
     if found.phases.airborne:
         findings += [*_length(found), *_bands(log, found), *_loop(log, found)]
     findings += [*_logging(log, found), *_excitation(log, found)]
-    return _ranked([*findings, *_quality(log, found), *_scales(log, found)])
+    findings += [*_quality(log, found), *_scales(log, found)]
+    return _ranked([*findings, *_without_model(log, found, findings)])
+
+
+def _without_model(log: Log, found: Inspection, told: list[Finding]) -> list[Finding]:
+    """That no axis carries a model, where nothing else has said so."""
+    if any(each.light is Light.RED for each in told) or not found.phases.airborne:
+        return []
+    if carried_axes(found):
+        return []
+    what = "no axis carries a model: none has a sweep or injection in a band wide enough"
+    return [Finding("no-model", Light.RED, what, advice.excitation(log))]
 
 
 def _scales(log: Log, found: Inspection) -> list[Finding]:

@@ -14,9 +14,9 @@ from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.inspection import Inspection, inspect_log
 from flightid.inspection.axes import axes_of
+from flightid.inspection.carried import OF_WINDOW, why_no_model
 from flightid.inspection.excitation_found import FoundExcitation
 from flightid.inspection.signals import Span
-from flightid.inspection.thresholds import BAND_LEAST
 from flightid.inspection.usable_band import AxisBand
 from flightid.logs import Log, read_log
 from flightid.logs.dataflash.sid_runs import SidRun
@@ -29,8 +29,6 @@ TEMPLATES = {"roll": "rate_motor_lag", "pitch": "rate_motor_lag", "yaw": "rate_r
 """Rate of a multirotor to its mixer's command; in yaw the rotors' own inertia turns it first."""
 CHIRP = "chirp"
 """Channel of the maps: the chirp of Betaflight, of whichever axis."""
-OF_WINDOW = 2.0
-"""Above the lowest coherent frequency: there a window holds two cycles, and a fit wants four."""
 SEARCHED = ("chirp", "sweep", "autotune")
 """Excitations without a logged injection from which a model may be tried."""
 
@@ -137,12 +135,11 @@ def study_of_log(
 def _axis(log: Log, inspection: Inspection, band: AxisBand, model: str | None) -> _Axis | Finding:
     """What can be identified of an axis, or why nothing."""
     axis = band.axis
-    if band.band_rad_s is None:
-        return _missed(inspection, axis, band.reason)
+    why = why_no_model(inspection, band)
+    if band.band_rad_s is None or why:
+        return _missed(inspection, axis, why)
     runs = [run for run in log.sid_runs if str(run.body_axis) == axis and run.is_complete]
     others = [e for e in inspection.excitations if e.axis == axis and e.kind in SEARCHED]
-    if not runs and not others:
-        return _missed(inspection, axis, "nothing was injected, and no sweep was flown")
     if model is None and axes_of(log.vehicle)[axis].command not in COMMANDS:
         return _missed(
             inspection, axis, "there is no usual model of this vehicle's surfaces",
@@ -150,8 +147,6 @@ def _axis(log: Log, inspection: Inspection, band: AxisBand, model: str | None) -
         )  # fmt: skip
     flown, unseen = _flown(log, axis, runs, others)
     low, high = OF_WINDOW * band.band_rad_s[0], band.band_rad_s[1]
-    if high < BAND_LEAST.value * low:
-        return _missed(inspection, axis, "the band of its sweep that coherence supports is narrow")
     if not unseen:
         avoid = [(e.start_s, e.stop_s) for e in inspection.excitations if e.is_injected]
         sid = [(run.start_s - 1.0, run.stop_s + 1.0) for run in log.sid_runs]

@@ -12,6 +12,7 @@ from flightid.errors import StudyError
 from flightid.files import write_atomically
 from flightid.findings import Finding
 from flightid.inspection import Inspection
+from flightid.inspection.carried import carried_sentence
 from flightid.wrapping import wrapped
 
 WIDTH = 100
@@ -52,6 +53,9 @@ class Proposal:
     def refusal(self) -> str:
         """That there is no model and why, what the data show all the same, and what to do, last."""
         said = ["No model can be identified from these data."]
+        if self.inspection is not None:
+            said = _wrapped(carried_sentence(self.inspection))
+            said.append("No model can be identified from these data.")
         reasons: dict[str, list[str]] = {}
         for finding in self.findings:
             what, _, why = finding.message.partition(": no model, ")

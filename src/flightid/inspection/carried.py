@@ -1,0 +1,104 @@
+"""What a log can carry, as `inspect`, `run` and the page all say it: one verdict for one log."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Protocol
+
+from flightid.conventions import Light
+from flightid.findings import Finding
+from flightid.inspection.excitation_found import FoundExcitation
+from flightid.inspection.flight_phases import FlightPhases
+from flightid.inspection.thresholds import BAND_LEAST
+from flightid.inspection.usable_band import AxisBand
+
+
+class InspectedLog(Protocol):
+    """What is asked of an `Inspection`."""
+
+    @property
+    def bands(self) -> tuple[AxisBand, ...]:
+        """What each axis supports."""
+        ...
+
+    @property
+    def excitations(self) -> tuple[FoundExcitation, ...]:
+        """What excited the vehicle."""
+        ...
+
+    @property
+    def phases(self) -> FlightPhases:
+        """Airborne spans."""
+        ...
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """Verdicts."""
+        ...
+
+    @property
+    def verdict(self) -> Light:
+        """Worst light."""
+        ...
+
+
+SEARCHED = ("sid", "chirp", "sweep", "autotune")
+"""Excitations from which a model may be tried."""
+OF_WINDOW = 2.0
+"""Above the lowest coherent frequency: there a window holds two cycles, and a fit wants four."""
+BROKEN_OFF = "broken off"
+
+
+def why_no_model(inspection: InspectedLog, band: AxisBand) -> str:
+    """Why an axis carries no model; empty where one may be tried."""
+    if band.band_rad_s is None:
+        return band.reason
+    made = [e for e in inspection.excitations if e.axis == band.axis and e.kind in SEARCHED]
+    if not any(not each.detail.endswith(BROKEN_OFF) for each in made):
+        return "nothing was injected, and no sweep was flown"
+    if band.band_rad_s[1] < BAND_LEAST.value * OF_WINDOW * band.band_rad_s[0]:
+        return "the band of its sweep that coherence supports is narrow"
+    return ""
+
+
+def carried_axes(inspection: InspectedLog) -> tuple[str, ...]:
+    """Axes of which a model may be tried."""
+    return tuple(b.axis for b in inspection.bands if not why_no_model(inspection, b))
+
+
+def carried_sentence(inspection: InspectedLog) -> str:
+    """What a log can carry; a fall and what was at a limit come first, for they come before all.
+
+    Parameters
+    ----------
+    inspection : Inspection
+    """
+    return " ".join([*_first(inspection), _carried(inspection)])
+
+
+def _first(inspection: InspectedLog) -> Iterator[str]:
+    fallen = inspection.phases.tipped_s
+    if fallen is None:
+        return
+    yield f"The vehicle falls over at {fallen:.1f} s."
+    limited = next((f.message for f in inspection.findings if f.code == "saturated"), "")
+    if limited:
+        yield f"Before that {limited}."
+
+
+def _carried(inspection: InspectedLog) -> str:
+    phases = inspection.phases
+    if phases.is_known and not phases.airborne:
+        return "This log holds no flight, so it can carry no model."
+    able = carried_axes(inspection)
+    if able:
+        listed = able[0] if len(able) == 1 else f"{', '.join(able[:-1])} and {able[-1]}"
+        said = f"This log can carry a model of {listed}"
+        if inspection.verdict is Light.RED:
+            return f"{said}, but not as it is: see what is red."
+        return f"{said}{', with reservations' if inspection.verdict is Light.AMBER else ''}."
+    reasons: dict[str, list[str]] = {}
+    for band in inspection.bands:
+        reasons.setdefault(why_no_model(inspection, band), []).append(band.axis)
+    told = "; ".join(f"{', '.join(axes)}: {why}" for why, axes in reasons.items())
+    return f"This log can carry no model: {told or 'no axis is logged'}."
