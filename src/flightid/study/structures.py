@@ -15,7 +15,7 @@ from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.record import Record
 from flightid.study.structure_settings import NARX, SUBSPACE, StructureSettings
 from flightid.study.widened_scan import CLEAR, doubted, widened
-from flightid.validation import NarxSearch, OrderScan, search_narx
+from flightid.validation import NarxSearch, OrderScan, scan_orders, search_narx
 from flightid.validation.order_scan.edges import Structure
 from flightid.validation.order_scan.narx_search import search_further
 from flightid.validation.order_scan.result import OrderTrial, is_settled
@@ -47,7 +47,7 @@ def fit_structure(
     flown, unseen : sequence of Record
         Records of the fit, and of the choice.
     scan : OrderScan, optional
-        Of polynomial structures that are tried: of these orders on these records.
+        Of polynomial structures that are tried: of these orders on these records. Default: made.
 
     Returns
     -------
@@ -69,6 +69,10 @@ def _polynomial(
     scan: OrderScan | None,
 ) -> tuple[Fit, OrderScan | None]:
     (output,) = settings.outputs
+    if scan is None and settings.scans_orders:
+        tried: dict[str, Any] = {**settings.orders, **settings.options}
+        kind = settings.structure
+        scan = scan_orders(flown, unseen, kind=kind, inputs=inputs, outputs=output, **tried)
     if scan is None:
         orders: dict[str, Any] = {name: values[0] for name, values in settings.orders.items()}
         asked = PolynomialModel.general(inputs, output, **orders, **settings.options)
