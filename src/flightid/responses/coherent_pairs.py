@@ -14,6 +14,9 @@ from flightid.responses.response import FrequencyResponse
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
 
+MINIMUM_DECADES = 0.3
+"""An octave."""
+
 
 @dataclass(frozen=True)
 class CoherentPair:
@@ -126,7 +129,7 @@ def coherent_pairs(
     responses: FrequencyResponse,
     *,
     minimum_coherence: float = 0.6,
-    minimum_decades: float = 0.3,
+    minimum_decades: float = MINIMUM_DECADES,
 ) -> CoherentPairs:
     """Choose the responses that a fit should use, by their coherence.
 

@@ -14,6 +14,7 @@ from flightid.inspection import Inspection
 from flightid.models import GreyBoxModel
 from flightid.record import Record
 from flightid.responses import CoherentPairs, FrequencyResponse
+from flightid.responses.coherent_pairs import MINIMUM_DECADES
 from flightid.responses.options import AUTOMATIC
 from flightid.study.evidence import examined
 from flightid.study.identified import ModelFits, ModelResults
@@ -212,14 +213,15 @@ def _fit(
     settings, coherent = task.settings, None
     first = next(iter(responses.values()), None)
     if first is not None and (settings.by_coherence or task.model is None):
+        decades = settings.response.minimum_decades
         coherent = runner.stage(
             f"coherence: {settings.name}",
             select_coherent,
             first,
             settings.response.minimum_coherence,
-            settings.response.minimum_decades,
+            MINIMUM_DECADES if decades is None else decades,
             settings.responses == (UNBROKEN,),
-            task.model is None,
+            task.model is None and decades is None,
         )
         task = chosen_by(task, coherent.value)
     flown = [records[name] for name in settings.identify]

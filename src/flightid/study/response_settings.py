@@ -30,8 +30,11 @@ class ResponseSettings(ResponseOptions):
     minimum_coherence: float = option(
         0.6, above=0.0, maximum=1.0, doc="Points with less coherence are left out of a fit."
     )
-    minimum_decades: float = option(
-        0.3, above=0.0, doc="Width of the coherent band that a response needs to be chosen."
+    minimum_decades: float | None = option(
+        None,
+        above=0.0,
+        doc="Width of the coherent band that a response needs to be chosen; not told: 0.3, and no "
+        "narrow response takes its only inputs from a structure without equations.",
     )
     loop: str = option(  # type: ignore[assignment]  # a file has no word for None
         TEST, choices=(TEST, *LOOPS), doc="Whether a loop was closed, where it is known."
