@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 import flightid as fid
-from flightid.plot.training import extremes, training_history
+from flightid.plot.thinning import thinned_on_shared_stamps
+from flightid.plot.training import training_history
 from tests.closeness import assert_close
 
 
@@ -52,7 +53,7 @@ def test_extremes_stand_in_their_order() -> None:
     rng = np.random.default_rng(3)
     time_s, samples = np.arange(10_000.0), rng.standard_normal(10_000)
     samples[1234], samples[1239] = 9.0, -9.0
-    stamps, kept = extremes(time_s, samples, 400)
+    stamps, kept = thinned_on_shared_stamps(time_s, samples, 400)
     assert stamps.size == kept.size == 400
     assert np.all(np.diff(stamps) > 0)
     peak = int(np.argmax(kept))

@@ -8,7 +8,7 @@ import numpy as np
 
 from flightid.plot import graph_objects as go
 from flightid.plot import look
-from flightid.plot.record import thinned
+from flightid.plot.thinning import thinned
 from flightid.record import Record
 from flightid.review import FlightReview
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.plot import graph_objects as go
 from flightid.plot import look
+from flightid.plot.thinning import thinned
 
 MAXIMUM_POINTS = 3000
 SMOOTH_POINTS = 300
@@ -90,7 +90,7 @@ def time_histories(panels: Sequence[Panel]) -> go.PlotFigure:
     named: set[str] = set()
     for place, panel in enumerate(panels):
         for trace in panel.traces:
-            time_s, samples = thinned(trace.time_s, trace.samples)
+            time_s, samples = thinned(trace.time_s, trace.samples, MAXIMUM_POINTS)
             made.add_trace(
                 look.line(
                     trace.name,
@@ -117,29 +117,3 @@ def time_histories(panels: Sequence[Panel]) -> go.PlotFigure:
 def sparse(n: int) -> slice:
     """Every so many points of a smooth curve of n, as many as a screen can tell apart."""
     return slice(None, None, max(1, n // SMOOTH_POINTS))
-
-
-def thinned(
-    time_s: NDArray[np.float64], samples: NDArray[np.float64], maximum: int = MAXIMUM_POINTS
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Smallest and largest sample of each of many short stretches, in their order.
-
-    Parameters
-    ----------
-    time_s, samples : ndarray, shape (n_samples,)
-        Signal.
-    maximum : int
-        Largest number of points kept; a signal that is not longer is returned as it is.
-
-    Returns
-    -------
-    tuple of ndarray
-        Stamps and samples, at most `maximum` of them, with every peak of the signal among them.
-    """
-    if samples.size <= maximum:
-        return time_s, samples
-    edges = np.linspace(0, samples.size, maximum // 2 + 1).astype(int)
-    lowest = [a + int(np.argmin(samples[a:b])) for a, b in pairwise(edges)]
-    highest = [a + int(np.argmax(samples[a:b])) for a, b in pairwise(edges)]
-    kept = np.unique(np.concatenate([lowest, highest]))
-    return time_s[kept], samples[kept]

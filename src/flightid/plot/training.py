@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flightid.plot import graph_objects as go
 from flightid.plot import look
 from flightid.plot.record import Panel, Trace, time_histories
+from flightid.plot.thinning import thinned_on_shared_stamps
 from flightid.record import Record
 
 SHOWN_POINTS = 900
@@ -67,42 +67,6 @@ def training_history(
     return time_histories(panels)
 
 
-def extremes(
-    time_s: NDArray[np.float64], samples: NDArray[np.float64], maximum: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Smallest and largest sample of many short stretches, on stamps that every channel shares.
-
-    Parameters
-    ----------
-    time_s, samples : ndarray, shape (n_samples,)
-        Signal.
-    maximum : int
-        Largest number of points kept; a signal that is not longer is returned as it is.
-
-    Returns
-    -------
-    tuple of ndarray
-        Stamps, beginning and middle of each stretch, and its extremes in their order: equal stamps
-        of many channels are stored once in a page.
-
-    Example
-    -------
-    >>> time_s = np.arange(8.0)
-    >>> stamps, samples = extremes(time_s, np.array([0, 3, 1, 2, 9, 5, 4, 6.0]), 4)
-    >>> stamps.tolist(), samples.tolist()
-    ([0.0, 2.0, 4.0, 6.0], [0.0, 3.0, 9.0, 4.0])
-    """
-    if samples.size <= maximum:
-        return time_s, samples
-    edges = np.linspace(0, samples.size, maximum // 2 + 1).astype(int)
-    starts, stops = edges[:-1], edges[1:]
-    low = np.array([a + np.argmin(samples[a:b]) for a, b in zip(starts, stops, strict=True)])
-    high = np.array([a + np.argmax(samples[a:b]) for a, b in zip(starts, stops, strict=True)])
-    order = np.sort(np.stack([low, high]), axis=0)
-    stamps = np.stack([time_s[starts], time_s[(starts + stops) // 2]])
-    return stamps.T.reshape(-1), samples[order.T.reshape(-1)]
-
-
 def _starts(records: Sequence[Record]) -> list[float]:
     """What is added to the stamps of each record."""
     if len(records) == 1:
@@ -127,6 +91,6 @@ def _traces(
         if name not in record:
             continue
         share = max(2, 2 * round(0.5 * SHOWN_POINTS * record.n_samples / whole))
-        stamps, samples = extremes(record.time_s + start, record[name], share)
+        stamps, samples = thinned_on_shared_stamps(record.time_s + start, record[name], share)
         traces.append(Trace(words, stamps, step * np.round(samples / step), colour))
     return traces
