@@ -6,16 +6,19 @@ python tools/page_types.py              fail where it is not what the server say
 
 from __future__ import annotations
 
+import importlib
+import pkgutil
 import sys
 from pathlib import Path
 from typing import Any
 
 from pydantic.json_schema import models_json_schema
 
-from flightid.app import schemas
+import flightid.app
+from flightid.app.schemas import Message
 
 TARGET = Path(__file__).resolve().parent.parent / "app" / "src" / "lib" / "types.ts"
-HEAD = "// Made by tools/page_types.py from src/flightid/app/schemas.py; not to be edited.\n"
+HEAD = "// Made by tools/page_types.py from src/flightid/app/*schemas.py; not to be edited.\n"
 PLAIN = {
     "string": "string",
     "number": "number",
@@ -27,12 +30,18 @@ PLAIN = {
 
 def page_types() -> str:
     """The whole file."""
-    base = schemas.Message
-    models = [
-        each
-        for each in vars(schemas).values()
-        if isinstance(each, type) and issubclass(each, base) and each is not base
+    names = [each.name for each in pkgutil.iter_modules(flightid.app.__path__)]
+    subjects = [
+        importlib.import_module(f"flightid.app.{name}")
+        for name in names
+        if name.endswith("schemas")
     ]
+    models = {
+        each: None
+        for subject in subjects
+        for each in vars(subject).values()
+        if isinstance(each, type) and issubclass(each, Message) and each is not Message
+    }
     _, made = models_json_schema([(each, "serialization") for each in models])
     parts = [_interface(name, schema) for name, schema in sorted(made["$defs"].items())]
     return "\n".join([HEAD, *parts])

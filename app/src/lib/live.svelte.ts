@@ -1,15 +1,19 @@
-import type { Job, ResponseAnswer, ResponseQuestion } from "./types";
+import type { Reply, Job, Question } from "./types";
 
-type Asked = Omit<ResponseQuestion, "request">;
+/** A question waiting for its answer, and who hears it. */
+interface Waiting {
+  question: Question;
+  answered: boolean;
+  hear: (answer: never) => void;
+}
 
-/** The socket: the newest question alone is answered; news of jobs come on it too. */
+/** The socket: of each kind the newest question alone is answered; news of jobs come on it too. */
 class Live {
   connected = $state(false);
   jobs: Record<string, Job> = $state({});
   #socket: WebSocket | null = null;
   #last = 0;
-  #waiting: ResponseQuestion | null = null;
-  #hear: (answer: ResponseAnswer) => void = () => {};
+  #waiting: Record<string, Waiting> = {};
   #news = new Set<(job: Job) => void>();
 
   open() {
@@ -17,7 +21,7 @@ class Live {
     this.#socket = socket;
     socket.onopen = () => {
       this.connected = true;
-      if (this.#waiting) socket.send(JSON.stringify(this.#waiting));
+      for (const each of Object.values(this.#waiting)) if (!each.answered) socket.send(JSON.stringify(each.question));
     };
     socket.onclose = () => {
       this.connected = false;
@@ -28,18 +32,20 @@ class Live {
       if (told.job) {
         this.jobs[told.job.id] = told.job;
         for (const hear of this.#news) hear(told.job);
-      } else if (told.request === this.#last) {
-        this.#waiting = null;
-        this.#hear(told);
+        return;
       }
+      const waiting = Object.values(this.#waiting).find((each) => each.question.request === told.request);
+      if (!waiting) return;
+      waiting.answered = true;
+      waiting.hear(told as never);
     };
   }
 
-  /** Ask; answers to older questions are not heard any more. */
-  ask(question: Asked, hear: (answer: ResponseAnswer) => void) {
-    this.#hear = hear;
-    this.#waiting = { ...question, request: ++this.#last };
-    if (this.#socket?.readyState === WebSocket.OPEN) this.#socket.send(JSON.stringify(this.#waiting));
+  /** Ask; answers to older questions of this kind are not heard any more. */
+  ask<Q extends Question, A extends Reply>(kind: string, question: Omit<Q, "request" | "kind">, hear: (answer: A) => void) {
+    const made = { ...question, kind, request: ++this.#last } as unknown as Q;
+    this.#waiting[kind] = { question: made, answered: false, hear };
+    if (this.#socket?.readyState === WebSocket.OPEN) this.#socket.send(JSON.stringify(made));
   }
 
   /** Hear of jobs; returns what ends it. */

@@ -1,4 +1,4 @@
-// Made by tools/page_types.py from src/flightid/app/schemas.py; not to be edited.
+// Made by tools/page_types.py from src/flightid/app/*schemas.py; not to be edited.
 
 /** The best that a log gives of one axis. */
 export interface AxisCard {
@@ -102,12 +102,27 @@ export interface Overview {
   has_study: boolean;
 }
 
-/** Its answer, or why there is none. */
-export interface ResponseAnswer {
+/** A request on the socket: what the page shows under edits that are not written yet. */
+export interface Question {
   request: number;
-  response: ResponsePart | null;
+  kind: string;
+  log: string;
+  edits: Edit[];
+}
+
+/** The answer to a question of that number, or why there is none. */
+export interface Reply {
+  request: number;
   error: string | null;
   seconds: number;
+}
+
+/** Its answer. */
+export interface ResponseAnswer {
+  request: number;
+  error: string | null;
+  seconds: number;
+  response: ResponsePart | null;
 }
 
 /** One response of one estimator. */
@@ -139,12 +154,13 @@ export interface ResponsePart {
   findings: ShownFinding[];
 }
 
-/** A request on the socket: responses of a model under edits that are not written yet. */
+/** Responses of a model. */
 export interface ResponseQuestion {
   request: number;
+  kind: string;
   log: string;
-  model: string;
   edits: Edit[];
+  model: string;
   around: boolean;
   intervals: boolean;
 }

@@ -30,8 +30,23 @@ LONGEST_S = 900.0
 """Of a job; a hand's request may take `PATIENCE_S`."""
 PATIENCE_S = 60.0
 NOTE_BYTES = 1 << 16
-KINDS = ("overview", "review")
 Listener = Callable[[Job], None]
+
+
+def _overview(workspace: Workspace, log: str, path: Path) -> tuple[object, ...]:
+    result = workspace.result_path(log, "overview.json")
+    return work.make_overview, path, workspace.study_path(log), result
+
+
+def _review(workspace: Workspace, log: str, path: Path) -> tuple[object, ...]:
+    return work.make_review, path, workspace.result_path(log, "review.json")
+
+
+WORK: dict[str, Callable[[Workspace, str, Path], tuple[object, ...]]] = {
+    "overview": _overview,
+    "review": _review,
+}
+"""Call and inputs of each kind of job (`Job.kind`); its result is a part of `kept_parts.PARTS`."""
 
 
 class Workers:
@@ -94,11 +109,8 @@ class Workers:
         if known is not None and known.state in ("failed", "cancelled") and not again:
             return
         job = Job(id=name, kind=kind, log=log, state="waiting")  # type: ignore[arg-type]
-        result = self._workspace.result_path(log, f"{kind}.json")
-        inputs: tuple[object, ...] = (work.make_review, path, result)
         try:
-            if kind == "overview":
-                inputs = (work.make_overview, path, self._workspace.study_path(log), result)
+            inputs = WORK[kind](self._workspace, log, path)
         except FlightidError as error:
             self._jobs[name] = job.model_copy(update={"state": "failed", "reason": str(error)})
             self._tell(self._jobs[name])

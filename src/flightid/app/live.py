@@ -1,41 +1,48 @@
-"""The socket: questions of a hand that drags, of which only the newest is worth an answer."""
+"""The socket: questions of a hand that drags, of each kind only the newest worth an answer."""
 
 from __future__ import annotations
 
 import asyncio
+import json
+from collections.abc import Awaitable, Callable
 from contextlib import suppress
+from dataclasses import dataclass
 
 from fastapi import FastAPI, WebSocket, WebSocketDisconnect
 from pydantic import ValidationError
 
-from flightid.app import work
-from flightid.app.jobs import Workers
-from flightid.app.schemas import (
-    Job,
-    JobNews,
-    ResponseAnswer,
-    ResponsePart,
-    ResponseQuestion,
-)
-from flightid.app.studies import Studies, text_of
-from flightid.app.study_edits import KeyEdit
-from flightid.errors import FlightidError
+from flightid.app.backstage import Backstage
+from flightid.app.response_answers import answer_response
+from flightid.app.schemas import Job, JobNews, Question, Reply, ResponseQuestion
 
 MOST_WORDS = 1 << 16
 
 
-def add_socket(app: FastAPI, studies: Studies, workers: Workers) -> None:
-    """Answer questions and tell news of jobs on ``/api/live``."""
+@dataclass(frozen=True)
+class Answerer:
+    """What questions of a kind look like, and who answers them."""
+
+    question: type[Question]
+    answer: Callable[[Question, Backstage], Awaitable[Reply]]
+
+
+ANSWERERS: dict[str, Answerer] = {"response": Answerer(ResponseQuestion, answer_response)}
+"""By kind; a screen that asks while a hand drags adds its own."""
+
+
+def add_socket(app: FastAPI, backstage: Backstage) -> None:
+    """Reply questions and tell news of jobs on ``/api/live``."""
 
     @app.websocket("/api/live")
     async def live(socket: WebSocket) -> None:
         await socket.accept()
         news: asyncio.Queue[Job] = asyncio.Queue()
-        newest = NewestQuestion()
-        leave = workers.listen(news.put_nowait)
-        sides = [
-            asyncio.create_task(_tell(socket, news)),
-            asyncio.create_task(_answer(socket, newest, studies, workers)),
+        newest = {kind: NewestQuestion() for kind in ANSWERERS}
+        leave = backstage.workers.listen(news.put_nowait)
+        sides = [asyncio.create_task(_tell(socket, news))]
+        sides += [
+            asyncio.create_task(_answer(socket, waiting, ANSWERERS[kind], backstage))
+            for kind, waiting in newest.items()
         ]
         try:
             while True:
@@ -43,8 +50,9 @@ def add_socket(app: FastAPI, studies: Studies, workers: Workers) -> None:
                 if len(words) > MOST_WORDS:
                     await socket.close(1009)
                     return
-                newest.put(ResponseQuestion.model_validate_json(words))
-        except ValidationError:
+                question = read_question(words)
+                newest[question.kind].put(question)
+        except ValueError:
             await socket.close(1007)
         except (WebSocketDisconnect, RuntimeError):
             pass
@@ -56,19 +64,34 @@ def add_socket(app: FastAPI, studies: Studies, workers: Workers) -> None:
                     await side
 
 
+def read_question(words: str) -> Question:
+    """A question of a known kind.
+
+    Raises
+    ------
+    ValueError
+        It is none.
+    """
+    try:
+        kind = str(json.loads(words).get("kind", "response"))
+        return ANSWERERS[kind].question.model_validate_json(words)
+    except (ValidationError, AttributeError, KeyError, RecursionError) as error:
+        raise ValueError(str(error)) from error
+
+
 class NewestQuestion:
     """Room for one question: a newer one takes the place of an older that waits."""
 
     def __init__(self) -> None:
-        self._question: ResponseQuestion | None = None
+        self._question: Question | None = None
         self._there = asyncio.Event()
 
-    def put(self, question: ResponseQuestion) -> None:
+    def put(self, question: Question) -> None:
         """Ask; what was asked before and not begun is dropped."""
         self._question = question
         self._there.set()
 
-    async def get(self) -> ResponseQuestion:
+    async def get(self) -> Question:
         """The newest question, when there is one."""
         await self._there.wait()
         self._there.clear()
@@ -82,30 +105,8 @@ async def _tell(socket: WebSocket, news: asyncio.Queue[Job]) -> None:
 
 
 async def _answer(
-    socket: WebSocket, newest: NewestQuestion, studies: Studies, workers: Workers
+    socket: WebSocket, newest: NewestQuestion, answerer: Answerer, backstage: Backstage
 ) -> None:
     while True:
-        question = await newest.get()
-        answer = await _answered(question, studies, workers)
+        answer = await answerer.answer(await newest.get(), backstage)
         await socket.send_text(answer.model_dump_json())
-
-
-async def _answered(
-    question: ResponseQuestion, studies: Studies, workers: Workers
-) -> ResponseAnswer:
-    path = None
-    with suppress(Exception):
-        path = studies.path(question.log)
-    if path is None:
-        return ResponseAnswer(request=question.request, error="This log has no study.")
-    try:
-        text = text_of(path)
-    except FlightidError as error:
-        return ResponseAnswer(request=question.request, error=str(error))
-    edits = [KeyEdit(tuple(each.path), each.value) for each in question.edits]
-    inputs = (path, text, question.model, edits, question.around, question.intervals)
-    made, refusal, seconds = await workers.live(work.make_responses, *inputs)
-    if refusal:
-        return ResponseAnswer(request=question.request, error=refusal, seconds=seconds)
-    shown = ResponsePart(**made)
-    return ResponseAnswer(request=question.request, response=shown, seconds=seconds)

@@ -1,4 +1,7 @@
-"""What the page and the server tell each other; the page's types are made from these."""
+"""What the page and the server tell each other; the page's types are made from these.
+
+A subject of its own goes into a file ``<subject>_schemas.py`` beside this one.
+"""
 
 from __future__ import annotations
 
@@ -227,24 +230,36 @@ class ResponsePart(Message):
     findings: list[ShownFinding]
 
 
-class ResponseQuestion(Message):
-    """A request on the socket: responses of a model under edits that are not written yet."""
+class Question(Message):
+    """A request on the socket: what the page shows under edits that are not written yet."""
 
     request: int
+    kind: str
     log: str
-    model: str
     edits: list[Edit] = Field(default_factory=list, max_length=32)
+
+
+class Reply(Message):
+    """The answer to a question of that number, or why there is none."""
+
+    request: int
+    error: str | None = None
+    seconds: float = 0.0
+
+
+class ResponseQuestion(Question):
+    """Responses of a model."""
+
+    kind: Literal["response"] = "response"
+    model: str
     around: bool = False
     intervals: bool = False
 
 
-class ResponseAnswer(Message):
-    """Its answer, or why there is none."""
+class ResponseAnswer(Reply):
+    """Its answer."""
 
-    request: int
     response: ResponsePart | None = None
-    error: str | None = None
-    seconds: float = 0.0
 
 
 class JobNews(Message):

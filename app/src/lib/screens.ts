@@ -1,0 +1,33 @@
+import type { Component } from "svelte";
+import Flight from "../screens/Flight.svelte";
+import Library from "../screens/Library.svelte";
+import Response from "../screens/Response.svelte";
+import type { Study } from "./study.svelte";
+
+/** What every screen is given: the log of the address, its study, and the rest of the address. */
+export interface Given {
+  log: string;
+  study: Study | null;
+  name: string;
+}
+
+/** A screen: its word in the address, what it is called, and when its link is there. */
+export interface Screen {
+  name: string;
+  title: string;
+  component: Component<any>;
+  /** Whether it is of one log: its address holds the log, and it is made anew for another. */
+  ofLog: boolean;
+  /** Whether it can be drawn only where the study is there. */
+  needsStudy: boolean;
+  shows: (given: Given) => boolean;
+}
+
+const hasModels = ({ log, study }: Given) => Boolean(log && study?.models.length);
+
+/** In the order of the links; the first is where the address says nothing else. */
+export const SCREENS: Screen[] = [
+  { name: "logs", title: "Logs", component: Library, ofLog: false, needsStudy: false, shows: () => true },
+  { name: "flight", title: "Flight", component: Flight, ofLog: true, needsStudy: false, shows: ({ log }) => Boolean(log) },
+  { name: "response", title: "Response", component: Response, ofLog: true, needsStudy: true, shows: hasModels },
+];

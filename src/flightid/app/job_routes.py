@@ -1,0 +1,28 @@
+"""Answers about jobs: which run, begin one again, end one."""
+
+from __future__ import annotations
+
+from fastapi import FastAPI, HTTPException
+
+from flightid.app.backstage import Backstage, known_log
+from flightid.app.schemas import Job
+
+
+def add_job_routes(app: FastAPI, backstage: Backstage) -> None:
+    """Answer what the head of the page asks."""
+    workspace, workers = backstage.workspace, backstage.workers
+
+    @app.get("/api/jobs")
+    async def jobs() -> list[Job]:
+        return workers.all()
+
+    @app.post("/api/jobs")
+    async def again(job: Job) -> list[Job]:
+        workers.ensure(job.kind, job.log, known_log(workspace, job.log), again=True)
+        return workers.all()
+
+    @app.delete("/api/jobs/{name}")
+    async def cancel(name: str) -> list[Job]:
+        if not workers.cancel(name):
+            raise HTTPException(404, "There is no such job that runs.")
+        return workers.all()

@@ -1,0 +1,91 @@
+"""Answers about logs: the listing of the workspace, an upload, what is known of one."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+from fastapi import FastAPI, HTTPException, Query, Request
+
+from flightid.app.backstage import Backstage, LogName, known_log
+from flightid.app.guard import UPLOAD_BYTES
+from flightid.app.kept_parts import kept_overview, kept_review
+from flightid.app.own_folders import shown_name
+from flightid.app.schemas import FlightScreen, LeftOut, Listing, LogItem
+from flightid.app.workspace import Workspace
+from flightid.version import VERSION
+
+MOST_LOOKED_AT = 200
+"""Logs that a listing has inspected, one after the other; others when they are opened."""
+OF_FLIGHT = ("overview", "review")
+"""Jobs that the screen of a flight needs."""
+
+
+def add_log_routes(app: FastAPI, backstage: Backstage) -> None:
+    """Answer what the screens Logs and Flight ask."""
+    workspace, workers = backstage.workspace, backstage.workers
+
+    @app.get("/api/workspace")
+    async def listing() -> Listing:
+        await asyncio.to_thread(workspace.scan)
+        made = await asyncio.to_thread(_listing, workspace)
+        for each in [log for log in made.logs if log.light is None][:MOST_LOOKED_AT]:
+            if (path := workspace.log_path(each.id)) is not None:
+                workers.ensure("overview", each.id, path)
+        return made
+
+    @app.put("/api/logs")
+    async def upload(request: Request, name: Annotated[str, Query(max_length=300)]) -> LogItem:
+        length = int(request.headers.get("content-length", 0))
+        if length > UPLOAD_BYTES:
+            raise HTTPException(413)
+        log = await workspace.take(name, request.stream())
+        path = known_log(workspace, log)
+        workers.ensure("overview", log, path)
+        return next(each for each in _listing(workspace).logs if each.id == log)
+
+    @app.get("/api/logs/{log}")
+    async def flight(log: LogName) -> FlightScreen:
+        path = known_log(workspace, log)
+        for kind in OF_FLIGHT:
+            workers.ensure(kind, log, path)
+        return FlightScreen(
+            id=log,
+            name=path.name,
+            path=path.relative_to(workspace.folder).as_posix(),
+            overview=kept_overview(workspace, log),
+            review=kept_review(workspace, log),
+            jobs=workers.of_log(log),
+        )
+
+
+def _listing(workspace: Workspace) -> Listing:
+    logs = []
+    for entry in workspace.index.entries():
+        shown = kept_overview(workspace, entry.id)
+        told: dict[str, Any] = {}
+        if shown is not None:
+            swept = [b for b in shown.blocks if b.kind in ("sid", "chirp", "sweep", "autotune")]
+            told = {
+                "vehicle": shown.vehicle,
+                "firmware": shown.firmware,
+                "duration_s": shown.duration_s,
+                "sweeps": len(swept),
+                "light": shown.light,
+            }
+        changed = time.strftime("%Y-%m-%d %H:%M", time.localtime(entry.mtime_ns / 1e9))
+        logs.append(
+            LogItem(
+                id=entry.id,
+                name=Path(entry.path).name,
+                path=entry.path,
+                size=entry.size,
+                changed=changed,
+                **told,
+            )
+        )
+    left = [LeftOut(path=path, reason=why) for path, why in workspace.left_out.items()]
+    folder = shown_name(workspace.folder)
+    return Listing(folder=folder, version=VERSION, logs=logs, left_out=left)
