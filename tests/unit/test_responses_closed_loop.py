@@ -14,6 +14,7 @@ from flightid import Record, estimate_response
 from flightid.cli.response import command
 from flightid.errors import DataError
 from flightid.plot.response import response_figure
+from flightid.responses.estimators.instrument import excited_share
 from tests.closeness import assert_close
 
 DT = 0.02
@@ -201,3 +202,51 @@ def test_command(tmp_path: Path) -> None:
     assert values["window_s"] == [6.0, 3.0]
     assert page.stat().st_size > 1000
     assert stored.exists()
+
+
+def _beyond_the_sweep(seed: int) -> Record:
+    """A sweep to 10 rad/s at u = r − K y(t−1), gusts everywhere: beyond it u follows y alone."""
+    rng = np.random.default_rng(seed)
+    n = 12000
+    fade = np.clip(np.minimum(np.arange(n), n - 1 - np.arange(n)) / 200.0, 0.0, 1.0)
+    r = fade * signal.chirp(np.arange(n) * DT, 0.05, n * DT, 10.0 / (2.0 * np.pi))
+    v = signal.lfilter([0.05], [1.0, -0.9], rng.standard_normal(n))
+    den = np.array([1.0, -0.7, 0.3 * 0.9])
+    y = signal.lfilter([0, 0.3], den, r) + signal.lfilter([1, -0.7, 0], den, v)
+    u = r - 0.9 * np.concatenate([[0.0], y[:-1]])
+    return Record.from_arrays(
+        np.arange(n) * DT, inputs={"u": u}, outputs={"y": y}, excitations={"r": r}
+    )
+
+
+def test_feedback_beyond_the_sweep_is_not_coherent() -> None:
+    """There y − H u vanishes at H = −1/controller: nothing is left, and nothing is known."""
+    ours = estimate_response(
+        _beyond_the_sweep(0), band_rad_s=(1.0, 60.0), n_omega=60, estimator="instrument"
+    )
+    omega, off = ours.omega_rad_s, np.abs(ours.response[0, 0] / _truth(ours.omega_rad_s) - 1.0)
+    beyond, inside = omega > 16.0, (omega > 2.0) & (omega < 9.0)
+    assert np.median(off[beyond]) > 0.5, "the inverse of the controller"
+    assert ours.coherence[0, 0, beyond].max() < 0.6
+    assert np.median(ours.random_error[0, 0, beyond]) > 0.2
+    assert ours.coherence[0, 0, inside].min() > 0.9
+    assert off[inside].max() < 0.15
+    low, high = ours.pair("y", "u").usable_band()
+    assert low < 2.0
+    assert 9.0 < high < 16.0
+
+
+def test_each_of_two_inputs_has_its_own_share() -> None:
+    """Inputs that mix: what follows the excitations of one, the other taken out."""
+    r = np.random.default_rng(3)
+    half = r.standard_normal((5, 2, 2)) + 1j * r.standard_normal((5, 2, 2))
+    excited = half @ half.conj().transpose(0, 2, 1)
+    noise = np.eye(2) * np.array([0.1, 40.0])
+    share = excited_share(np.linalg.inv(excited), excited + noise)
+    for f in range(5):
+        whole = excited[f] + noise
+        for j, k in ((0, 1), (1, 0)):
+            alone, all_ = (
+                (m[j, j] - m[j, k] * m[k, j] / m[k, k]).real for m in (excited[f], whole)
+            )
+            assert_close(share[j, f], alone / all_, rtol=1e-9, why="Schur complements, by hand")

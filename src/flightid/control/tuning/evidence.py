@@ -16,6 +16,7 @@ from flightid.errors import DataError, FlightidError
 from flightid.evidence.evidence import LOOP
 from flightid.findings import Finding
 from flightid.identification.fit import WITHHOLDING, Fit
+from flightid.identification.instrument_fit import instrument_fit
 from flightid.identification.model_error import ModelErrorBound
 from flightid.identification.simpler_structure import simpler_fit
 from flightid.identification.uncertain_of import evidence_behind, uncertain_of
@@ -30,6 +31,8 @@ UNEXPLAINED_PERCENT = 20.0
 """Of an output's variance: beyond it no gains, whatever the residuals are."""
 SIMPLER = "simpler-structure"
 """Code of gains for a simpler structure than the one that was asked for."""
+BY_INSTRUMENT = "instrument-fit"
+"""Code of gains for a fit by way of the excitation in place of one that a loop biases."""
 Array = NDArray[np.float64]
 
 
@@ -163,13 +166,18 @@ def gather(
 
 
 def _with_errors(source: object) -> tuple[object, tuple[Finding, ...]]:
-    """The source, or the simpler fit for one whose orders are too high for errors."""
-    simpler = simpler_fit(source) if isinstance(source, Fit) else None
-    if simpler is None:
+    """The source, or what stands in for a fit without errors or one that a loop biases."""
+    if not isinstance(source, Fit):
         return source, ()
-    action = "identify with these orders, so that the model of the gains is the one you keep"
-    text = f"gains rest on {simpler.reason}"
-    return simpler.fit, (Finding(SIMPLER, Light.AMBER, text, action),)
+    if (simpler := simpler_fit(source)) is not None:
+        action = "identify with these orders, so that the model of the gains is the one you keep"
+        text = f"gains rest on {simpler.reason}"
+        return simpler.fit, (Finding(SIMPLER, Light.AMBER, text, action),)
+    if (other := instrument_fit(source)) is not None:
+        action = "fit the response by estimator='instrument', so that the model of the gains is "
+        text = f"gains rest on {other.reason}"
+        return other.fit, (Finding(BY_INSTRUMENT, Light.AMBER, text, f"{action}the one you keep"),)
+    return source, ()
 
 
 def _accepted(refusal: DataError, *, accept_red: bool) -> Finding:
