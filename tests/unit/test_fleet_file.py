@@ -11,6 +11,7 @@ from flightid.errors import StudyError
 from flightid.fleet.addresses import find_logs
 from flightid.fleet.engine.cluster import scheduler_finding
 from flightid.fleet.identity import identify_log, read_tables
+from flightid.fleet.proposal import propose_fleet
 from flightid.fleet.settings import FleetSettings, read_fleet
 from flightid.logs import DataflashWriter
 
@@ -105,3 +106,26 @@ def test_places_are_searched_and_each_log_stands_once(tmp_path: Path) -> None:
 )
 def test_an_open_scheduler_of_another_machine_is_warned_of(address: str, warned: bool) -> None:
     assert (scheduler_finding(address) is not None) == warned
+
+
+def test_a_folder_gets_a_fleet_file_that_says_what_was_chosen(tmp_path: Path) -> None:
+    logs = tmp_path / "logs"
+    logs.mkdir()
+    for name in ("V01-2026-03-01", "V01-2026-03-02", "V02-2026-03-01"):
+        (logs / f"{name}.bin").write_bytes(name.encode())
+    made = propose_fleet(logs)
+    assert made.said[0] == "3 logs"
+    assert "what file names begin with (2 vehicles, such as V01)" in made.said[1]
+    settings = read_fleet(made.write())
+    assert (settings.vehicles.by, settings.words.logs) == ("name", ("logs",))
+    assert settings.catalogue == str(tmp_path / "logs-fleet-catalogue")
+    made.path.write_text(made.text + "# mine")
+    with pytest.raises(StudyError, match="a fleet file for this folder already"):
+        propose_fleet(logs).write()
+    for vehicle in ("a", "b"):
+        (tmp_path / "more" / vehicle).mkdir(parents=True)
+        (tmp_path / "more" / vehicle / "1.ulg").write_bytes(vehicle.encode())
+    assert read_fleet(propose_fleet(tmp_path / "more").write()).vehicles.by == "folder"
+    (tmp_path / "none").mkdir()
+    with pytest.raises(StudyError, match="no log in this folder"):
+        propose_fleet(tmp_path / "none")

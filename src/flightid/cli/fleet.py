@@ -15,7 +15,7 @@ from flightid.cli.output import (
     note,
 )
 
-FLEET_FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
+FLEET_FILE = click.Path(exists=True, path_type=Path)
 
 
 @click.group(short_help="From thousands of logs to one catalogue, and what it tells of vehicles.")
@@ -27,7 +27,7 @@ def command() -> None:
 
 
 @command.command("run", short_help="Take every log that the catalogue lacks.")
-@click.argument("fleet", type=FLEET_FILE)
+@click.argument("fleet", metavar="FLEET | FOLDER", type=FLEET_FILE)
 @click.option("--workers", type=click.IntRange(min=1), help="Processes; default: one a processor.")
 @click.option(
     "--scheduler",
@@ -41,11 +41,16 @@ def run(
 ) -> None:
     """Take every log of FLEET that its catalogue lacks, and compact the catalogue.
 
+    Of a FOLDER of logs a fleet file with comments is written beside it first, and what was chosen
+    is said: <folder>-fleet.toml is what the other commands take from then on.
+
     A log that fails costs itself alone. Interrupt a run at any time: the next one takes what is
     missing. The exit code is 1 where no log was found.
     """
     from flightid.fleet import run_fleet
 
+    if fleet.is_dir():
+        fleet = _proposed(fleet)
     if fleet.suffix != ".toml":
         raise click.UsageError(
             f"{fleet} is no fleet file, which is a .toml that names the logs (docs/fleet.md); one "
@@ -62,6 +67,20 @@ def run(
     for finding in done.findings:
         note(str(finding))
     leave_by_verdict(done.findings)
+
+
+def _proposed(folder: Path) -> Path:
+    """The fleet file of a folder: the one that is there, or one that is written now."""
+    from flightid.fleet import propose_fleet
+
+    made = propose_fleet(folder)
+    if made.path.exists():
+        note(f"Taking {made.path}, which is there already")
+        return made.path
+    for said in made.said:
+        note(said)
+    note(f"Wrote {made.write()}")
+    return made.path
 
 
 @command.command("status", short_help="Count what is done, refused, failed and missing.")
@@ -84,16 +103,30 @@ def status(place: str, as_json: bool) -> None:
     show_default=True,
     help="Longest time for the answer, s.",
 )
+@click.option(
+    "--most-rows",
+    type=click.IntRange(min=1),
+    default=100_000,
+    show_default=True,
+    help="Longest answer.",
+)
+@click.option(
+    "--earlier",
+    is_flag=True,
+    help="Let records of earlier studies and versions count where there is no newer one.",
+)
 @json_option
-def query(place: str, sql: str, time_s: float, as_json: bool) -> None:
+def query(
+    place: str, sql: str, time_s: float, most_rows: int, earlier: bool, as_json: bool
+) -> None:
     """Answer SQL, one SELECT in DuckDB's dialect, over the tables of the catalogue.
 
     Nothing but the catalogue can be read, and nothing can be changed.
     """
     from flightid import fleet
 
-    with fleet.open(place) as catalogue:
-        answer = catalogue.answer(sql, time_s=time_s)
+    with fleet.open(place, earlier=earlier) as catalogue:
+        answer = catalogue.answer(sql, time_s=time_s, most_rows=most_rows)
     if as_json:
         emit_values(answer.to_dict()["rows"])
     else:

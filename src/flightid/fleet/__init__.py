@@ -2,6 +2,7 @@
 
 from flightid.fleet.catalogue.catalogue import Catalogue
 from flightid.fleet.opening import open_catalogue as open
+from flightid.fleet.proposal import FleetProposal, propose_fleet
 from flightid.fleet.reporting import ask_fleet, fleet_report
 from flightid.fleet.run import FleetRun, run_fleet
 from flightid.fleet.settings import FleetSettings, read_fleet
@@ -9,6 +10,7 @@ from flightid.fleet.status import FleetStatus, fleet_status
 
 __all__ = [
     "Catalogue",
+    "FleetProposal",
     "FleetRun",
     "FleetSettings",
     "FleetStatus",
@@ -16,6 +18,7 @@ __all__ = [
     "fleet_report",
     "fleet_status",
     "open",
+    "propose_fleet",
     "read_fleet",
     "run_fleet",
 ]

@@ -1,0 +1,168 @@
+"""A fleet file for a folder of logs that has none: what was chosen, and why, beside each line."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+
+from flightid.errors import FlightidError, StudyError
+from flightid.files import write_atomically
+from flightid.fleet.addresses import LogAddress, find_logs
+from flightid.fleet.identity import DATES, FleetTables, identify_log
+from flightid.fleet.settings import VehicleRules
+from flightid.logs import read_log
+
+NAMED = re.compile(r"^([A-Za-z]+[-_]?[0-9]+)[-_.]")
+PATTERN = "^([A-Za-z]+[-_]?[0-9]+)[-_.]"
+"""What file names begin with that name their vehicle: V07-2026-03-01.bin."""
+LOOKED_AT = 3
+"""Logs that are read for the id inside them."""
+
+
+@dataclass(frozen=True)
+class FleetProposal:
+    """The fleet file of a folder, before it is written.
+
+    Attributes
+    ----------
+    path : Path
+        Where it belongs: beside the folder, as its catalogue will be.
+    text : str
+        TOML with comments.
+    said : tuple of str
+        What was chosen and why.
+    """
+
+    path: Path
+    text: str
+    said: tuple[str, ...]
+
+    def write(self) -> Path:
+        """Write it where it belongs.
+
+        Raises
+        ------
+        StudyError
+            There is a file already that says something else.
+        """
+        content = self.text.encode()
+        if self.path.exists() and self.path.read_bytes() != content:
+            raise StudyError(
+                "there is a fleet file for this folder already",
+                found=str(self.path),
+                action=f"run it: flightid fleet run {self.path}",
+            )
+        write_atomically(self.path, content)
+        return self.path
+
+
+def propose_fleet(folder: str | Path) -> FleetProposal:
+    """A fleet file for a folder of logs.
+
+    Vehicles are told apart by an id inside the logs where a few of them have one, else by the
+    folders that they lie in, else by what their names begin with.
+
+    Parameters
+    ----------
+    folder : str or Path
+
+    Returns
+    -------
+    FleetProposal
+
+    Raises
+    ------
+    StudyError
+        There is no log in it.
+
+    Example
+    -------
+    >>> import flightid as fid
+    >>> made = fid.fleet.propose_fleet("logs")
+    >>> made.path.name, made.said[0]
+    ('logs-fleet.toml', '2 logs')
+    """
+    place = Path(folder).absolute()
+    logs = find_logs([str(place)])
+    if not logs:
+        raise StudyError(
+            "there is no log in this folder", found=str(place), needed=".bin, .ulg, .bbl and others"
+        )
+    rule, why = _rule(place, logs)
+    dated = sum(DATES.search(each.name) is not None for each in logs)
+    n = len(logs)
+    said = (
+        f"{n} log{'s' * (n != 1)}",
+        f"vehicles by {why}",
+        f"dates by the first fix in the log, else by the name ({dated} of {n} have one), "
+        "else by the file",
+        "the study that each log asks for (name one in [fleet] study to take all alike)",
+    )
+    return FleetProposal(
+        place.with_name(f"{place.name}-fleet.toml"), _text(place, rule, said), said
+    )
+
+
+def _rule(place: Path, logs: Sequence[LogAddress]) -> tuple[VehicleRules, str]:
+    ids = [found for each in logs[:LOOKED_AT] if (found := _id_inside(each))]
+    if ids:
+        return VehicleRules(), f"the id inside the logs (such as {ids[0]})"
+    folders = Counter(PurePosixPath(each.address).parent for each in logs)
+    if len(folders) > 1 and Path(next(iter(folders))) != place:
+        return VehicleRules(by="folder"), f"the {len(folders)} folders that they lie in"
+    names = [named[1] for each in logs if (named := NAMED.match(each.name))]
+    if len(names) > len(logs) // 2:
+        vehicles = len(set(names))
+        rule = VehicleRules(by="name", pattern=PATTERN)
+        return rule, f"what file names begin with ({vehicles} vehicles, such as {names[0]})"
+    return VehicleRules(), "the id inside the logs, though the first have none"
+
+
+def _id_inside(address: LogAddress) -> str | None:
+    try:
+        log = read_log(Path(address.address))
+    except (FlightidError, OSError):
+        return None
+    identity = identify_log(log, address.address, None, VehicleRules(), FleetTables())
+    return identity.own
+
+
+def _text(place: Path, rule: VehicleRules, said: Sequence[str]) -> str:
+    quoted = json.dumps  # A JSON string is a TOML string.
+    lines = [
+        "# Written by flightid fleet run; docs/fleet.md describes every key. Change it freely."
+    ]
+    lines += [f"# Chosen: {each}." for each in said]
+    lines += [
+        "",
+        "[fleet]",
+        f"title = {quoted(place.name, ensure_ascii=False)}",
+        f"logs = [{quoted(place.name, ensure_ascii=False)}]  # folders, globs and addresses",
+        '# study = "study.toml"  # every log goes through it; flightid new LOG writes one',
+        "# reports = true  # keep the page of every log",
+        "",
+        "[vehicles]",
+        f'by = "{rule.by}"  # log, folder or name',
+    ]
+    if rule.pattern is not None:
+        lines.append(f"pattern = '{rule.pattern}'  # its first group is the id")
+    lines += [
+        '# type = "X500"  # default: autopilot and kind of vehicle',
+        '# flight_table = "flights.csv"  # columns log, and any of vehicle, flown_at, pilot, …',
+        "",
+        "[limits]",
+        "time_s = 600  # for one log",
+        "memory_mib = 4096  # address space of the process that takes it",
+        "",
+        "[questions]",
+        '# covariates = ["battery_start_v", "firmware"]  # taken out before drift is looked for',
+        "",
+        "# [[event]]",
+        '# date = "2026-03-01"',
+        '# what = "new propellers"',
+    ]
+    return "\n".join(lines) + "\n"
