@@ -14,6 +14,7 @@ from _pytest.doctest import DoctestModule
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests import fleet_examples
 from tests.examples import PROFILE
 
 if TYPE_CHECKING:
@@ -29,11 +30,13 @@ settings.register_profile("search", deadline=None, max_examples=2000)
 settings.load_profile(PROFILE)
 
 
-def pytest_configure() -> None:
+def pytest_configure(config: pytest.Config) -> None:
     """Collect garbage seldom: modules and trees of sources live as long as the run does.
 
     Files of tests need not outlive a power cut: 2,000 of them waited 5 ms each for the disk.
     """
+    if not config.pluginmanager.has_plugin("fleet-examples"):
+        config.pluginmanager.register(fleet_examples, "fleet-examples")
     gc.set_threshold(100_000, 20, 100)
     os.fsync = lambda _: None
 

@@ -21,7 +21,7 @@ from flightid.fleet.catalogue.loose import loose_logs, loose_name, write_loose
 from flightid.fleet.catalogue.parts import MANIFEST, PARTS, KnownLogs, read_parts
 from flightid.fleet.catalogue.record import LogRecord
 from flightid.fleet.catalogue.store import FolderStore
-from flightid.fleet.opening import opened_store
+from flightid.fleet.opening import open_catalogue, opened_store
 
 
 def record(number: int) -> LogRecord:
@@ -246,3 +246,44 @@ def test_sql_reads_the_catalogue_and_nothing_else(tmp_path: Path, sql: str) -> N
         with pytest.raises(OptionError):
             catalogue.query(sql).fetchall()
         assert catalogue.answer("SELECT count(*) AS n FROM logs").rows == ((2,),)
+
+
+def test_the_newest_record_of_a_log_counts_over_studies_and_versions(tmp_path: Path) -> None:
+    """Two sets under one catalogue: what the present one lacks comes from the one before."""
+    note = {"schema": "flightid.fleet_place/1", "current": "b" * 12, "title": ""}
+    (tmp_path / "fleet.json").write_text(json.dumps(note))
+    old, new = (FolderStore(tmp_path / (letter * 12)) for letter in "ab")
+    for number in range(4):
+        write_loose(old, record(number))
+    compact(old)
+    for number, value in ((1, -50.0), (9, -60.0)):
+        made = record(number)
+        made.rows["parameters"][0]["value"] = value  # type: ignore[index]
+        write_loose(new, made)
+    compact(new)
+    sql = "SELECT sum(value), count(*) FROM parameters"
+    with open_catalogue(tmp_path) as catalogue:
+        assert catalogue.query(sql).fetchall() == [(-110.0, 2)]
+    with open_catalogue(tmp_path, earlier=True) as catalogue:
+        assert catalogue.query(sql).fetchall() == [(-110.0 - 3.0 - 5.0 - 6.0, 5)]
+        found = dict(catalogue.query("SELECT recipe, count(*) FROM logs GROUP BY 1").fetchall())
+    assert found == {"a" * 12: 3, "b" * 12: 2}
+    # The older set's record of a log counts again once it is written anew.
+    write_loose(old, record(1))
+    rewrite(old, read_parts(old)[0], frozenset({record(1).log}))
+    with open_catalogue(tmp_path, earlier=True) as catalogue:
+        assert catalogue.query(sql).fetchall() == [(-60.0 - 3.0 - 4.0 - 5.0 - 6.0, 5)]
+
+
+def test_questions_end_in_time_and_answers_at_a_length(tmp_path: Path) -> None:
+    store = filled(tmp_path, range(3))
+    endless = "SELECT sum(a.range * b.range) FROM range(10000000) a, range(10000000) b"
+    with Catalogue(store) as catalogue:
+        begun = time.monotonic()
+        with pytest.raises(OptionError, match="takes too long"):
+            catalogue.query(endless, time_s=0.3)
+        assert time.monotonic() - begun < 20.0
+        with pytest.raises(OptionError, match="more than 2 rows"):
+            catalogue.query("SELECT * FROM logs", most_rows=2)
+        found = catalogue.query("SELECT * FROM logs", most_rows=3)
+        assert len(found.fetchall()) == len(found.fetchall()) == 3

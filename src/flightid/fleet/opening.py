@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 from flightid.errors import DataError
@@ -13,16 +14,21 @@ from flightid.fleet.engine.order import recipe
 from flightid.fleet.settings import FleetSettings, read_fleet
 
 CURRENT = "fleet.json"
+RECIPE = re.compile("[0-9a-f]{12}")
 FLEET_SCHEMA = "flightid.fleet_place/1"
 
 
-def open_catalogue(place: str | Path) -> Catalogue:
+def open_catalogue(place: str | Path, *, earlier: bool = False) -> Catalogue:
     """Open the catalogue of a fleet for questions.
 
     Parameters
     ----------
     place : str or Path
         Folder or address of the catalogue, or the fleet file (``*.toml``).
+    earlier : bool
+        Whether records of earlier studies and versions count for logs of which there is no newer
+        one: a fleet that is being taken again is whole meanwhile. The column ``recipe`` of the
+        table ``logs`` tells them apart.
 
     Returns
     -------
@@ -39,10 +45,17 @@ def open_catalogue(place: str | Path) -> Catalogue:
     Example
     -------
     >>> import flightid as fid
-    >>> catalogue = fid.fleet.open("fleet.toml")                     # doctest: +SKIP
-    >>> catalogue.query("select vehicle, count(*) from logs group by all").df()  # doctest: +SKIP
+    >>> with fid.fleet.open("fleet.toml") as catalogue:
+    ...     catalogue.query("select vehicle, count(*) from logs group by 1 order by 1").fetchall()
+    [('v00', 8), ('v01', 8), ('v02', 8), ('v03', 8), ('v04', 8), (None, 3)]
     """
-    return Catalogue(opened_store(catalogue_place(place)))
+    outer = catalogue_place(place).rstrip("/")
+    store = opened_store(outer)
+    if not earlier:
+        return Catalogue(store)
+    present = store.root.rpartition("/")[2]
+    others = (name for name in sorted(store_at(outer).folders("")) if RECIPE.fullmatch(name))
+    return Catalogue(store, [store_at(f"{outer}/{each}") for each in others if each != present])
 
 
 def catalogue_place(place: str | Path) -> str:

@@ -48,8 +48,8 @@ def ask_fleet(place: str | Path) -> FleetAnswers:
     Example
     -------
     >>> import flightid as fid
-    >>> answers = fid.fleet.ask_fleet("fleet.toml")                  # doctest: +SKIP
-    >>> answers.types[0].population.summary()                        # doctest: +SKIP
+    >>> fid.fleet.ask_fleet("fleet.toml").types[0].population
+    Population('quad', 5 vehicles, 40 flights, 2 parameters, I² 100 % at most)
     """
     settings = _settings(place)
     questions = FleetQuestions() if settings is None else settings.questions
@@ -95,7 +95,8 @@ def fleet_report(place: str | Path) -> Document:
     Example
     -------
     >>> import flightid as fid
-    >>> fid.fleet.fleet_report("fleet.toml").verdict                 # doctest: +SKIP
+    >>> fid.fleet.fleet_report("fleet.toml").title
+    'Survey'
     """
     settings = _settings(place)
     with showing(None if settings is None else settings.questions.level):

@@ -47,10 +47,12 @@ from flightid.fleet.opening import current_store
 from flightid.fleet.run_one import FULL, made_record
 from flightid.fleet.settings import FleetSettings, read_fleet
 from flightid.progress import progress
+from flightid.result import Result
+from flightid.table import Column, Table
 
 
-@dataclass(frozen=True)
-class FleetRun:
+@dataclass(frozen=True, repr=False)
+class FleetRun(Result, schema="flightid.fleet_run/1"):
     """What one run of a fleet did.
 
     Attributes
@@ -77,15 +79,12 @@ class FleetRun:
     outcomes: dict[str, int]
     findings: tuple[Finding, ...] = ()
 
-    def to_dict(self) -> dict[str, object]:
-        """Plain values."""
-        return {
-            "catalogue": self.catalogue,
-            "found": self.found,
-            "kept": self.kept,
-            "outcomes": dict(self.outcomes),
-            "findings": [finding.to_dict() for finding in self.findings],
-        }
+    def summary(self) -> Table:
+        """Table of the numbers."""
+        rows: list[tuple[str, int]] = [("logs found", self.found), ("kept", self.kept)]
+        rows += [(f"{name} logs", n) for name, n in sorted(self.outcomes.items())]
+        columns = (Column("what"), Column("number"))
+        return Table(f"Run of {self.catalogue}", columns, tuple(rows))
 
     def __repr__(self) -> str:
         """Numbers of logs on one line."""
@@ -132,8 +131,8 @@ def run_fleet(
     Example
     -------
     >>> import flightid as fid
-    >>> fid.fleet.run_fleet("fleet.toml")                            # doctest: +SKIP
-    FleetRun(200 logs, 0 kept, 188 fitted, 12 refused)
+    >>> fid.fleet.run_fleet("fleet.toml", workers=1)
+    FleetRun(2 logs, 0 kept, 2 refused)
     """
     try:
         return _run(path, workers, scheduler, retry=retry)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import hashlib
+import re
 import shutil
 import sys
 import tempfile
@@ -28,13 +29,17 @@ from flightid.fleet.settings import FleetSettings
 from flightid.fleet.study_rows import study_rows, told_covariates, usable
 from flightid.logs import read_log
 from flightid.study import Study, run_study
-from flightid.study.proposal import propose_study
+from flightid.study.proposal import Proposal, propose_study
 
 ADDRESS, READING, STUDY, PROCESS = "address", "reading", "study", "process"
 Tell = Callable[[str, str], None]
 """Takes what was begun, and the digest of the log once it is known: ahead of what may kill."""
 MESSAGE_LENGTH = 2000
 FULL = {errno.ENOSPC, errno.EDQUOT, errno.EROFS}
+GRAVITY = (Light.RED, Light.AMBER, Light.UNKNOWN, Light.GREEN)
+SETTING = re.compile(r"\b[A-Z][A-Z0-9]+_[A-Z0-9_]+\b|\blog(ged|ging)?\b")
+"""An action that speaks of the logging, or of a parameter of the autopilot."""
+MOST_ACTIONS = 3
 MEMORY = "memory"
 """Kind of a failure: more memory than the fleet allows one log."""
 
@@ -220,7 +225,7 @@ def _studied(path: Path, output: Path, task: LogTask, state: Progress) -> Study:
         if study is None:
             made = propose_study((path,), folder=output.parent, cache=cache)
             if not made.models:
-                raise FlightidError(made.refusal())
+                raise _unidentified(made)
             study = output.with_name("study.toml")
             made.write(study)
         found = run_study(study, output=output, log=path, cache=cache)
@@ -229,6 +234,30 @@ def _studied(path: Path, output: Path, task: LogTask, state: Progress) -> Study:
         task.reports.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(output / "report.html", place)
     return found
+
+
+class LogRefusalError(FlightidError):
+    """Why a log gives no model, by the code of the verdict that decided it."""
+
+    code = "no-model"
+
+
+def _unidentified(made: Proposal) -> LogRefusalError:
+    """The verdict that decided, and what to change: settings of the logging come first."""
+    seen = () if made.inspection is None else made.inspection.findings
+    bad = [each for each in (*seen, *made.findings) if each.light is not Light.GREEN]
+    # The worst decides; of several, the inspection's, which looks at how the log was written.
+    decisive = min(bad, key=lambda each: GRAVITY.index(each.light), default=None)
+    actions = [each.action for each in bad if each.action]
+    actions.sort(key=lambda action: SETTING.search(action) is None)
+    refusal = LogRefusalError(
+        "no model can be identified from this log",
+        found=None if decisive is None else decisive.message,
+        action="; ".join(list(dict.fromkeys(actions))[:MOST_ACTIONS]) or None,
+    )
+    if decisive is not None:
+        refusal.code = decisive.code
+    return refusal
 
 
 @contextlib.contextmanager
@@ -295,4 +324,6 @@ def _failure(error: Exception, stage: str, elapsed_s: float) -> dict[str, Any]:
 
 
 def _kind(error: Exception) -> str:
+    if isinstance(error, LogRefusalError):
+        return error.code
     return MEMORY if isinstance(error, MemoryError) else type(error).__name__

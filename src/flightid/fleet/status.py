@@ -88,8 +88,8 @@ def fleet_status(place: str | Path) -> FleetStatus:
     Example
     -------
     >>> import flightid as fid
-    >>> fid.fleet.fleet_status("fleet.toml")                         # doctest: +SKIP
-    FleetStatus(188 fitted, 12 refused)
+    >>> fid.fleet.fleet_status("fleet.toml")
+    FleetStatus(40 fitted, 3 refused)
     """
     where = catalogue_place(place)
     found = None

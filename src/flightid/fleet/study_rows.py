@@ -15,6 +15,8 @@ from flightid.dynamics.modes.modes import modes
 from flightid.errors import FlightidError
 from flightid.findings import Finding
 from flightid.fleet.catalogue.schema import lower_triangle
+from flightid.fleet.fitted_points import response_rows
+from flightid.fleet.parameter_words import meaning
 from flightid.identification import Fit
 from flightid.logs import Log
 from flightid.review import FlightReview
@@ -52,6 +54,8 @@ def study_rows(study: Study, log: Log | None) -> dict[str, list[Row]]:
         common = {"model": item.name, "light": str(fit.evidence.light)}
         for name, made in _of_fit(fit, log).items():
             rows.setdefault(name, []).extend({**common, **row} for row in made)
+        told = ({**common, **row} for row in response_rows(fit, item.response))
+        rows.setdefault("responses", []).extend(told)
     if study.review is not None:
         rows["gains_flown"] = list(_gains(study.review))
         rows["covariates"] = list(_covariates(study.review, log))
@@ -88,6 +92,7 @@ def _parameters(fit: Fit) -> Iterator[Row]:
             "unit": each.unit,
             "status": each.status,
             "position": at.get(name),
+            "meaning": meaning(name, fit.model.parameters[name].note),
         }
 
 

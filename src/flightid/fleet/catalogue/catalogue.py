@@ -8,13 +8,11 @@ from collections.abc import Sequence
 from decimal import Decimal
 from typing import Any, Self
 
-import numpy as np
-
 from flightid.errors import DataError, OptionError
 from flightid.extras import extra_module
 from flightid.fleet.catalogue.compaction import tables_of
-from flightid.fleet.catalogue.loose import loose_logs, read_loose
-from flightid.fleet.catalogue.parts import KEY_BYTES, KnownLogs, TablePart, read_keys, read_parts
+from flightid.fleet.catalogue.newest import LOOSE, RecordSet, older_records
+from flightid.fleet.catalogue.parts import TablePart
 from flightid.fleet.catalogue.schema import TABLES, FleetTable
 from flightid.fleet.catalogue.store import ObjectStore, Store
 from flightid.table import Cell, Column, Table
@@ -22,6 +20,8 @@ from flightid.table import Cell, Column, Table
 PURPOSE = "queries of a catalogue"
 QUERY_S = 60.0
 """Longest time for one answer, s."""
+MOST_ANSWERED, MOST_SHOWN = 50_000_000, 100_000
+"""Rows of an answer that is computed with, and of one that is shown."""
 ZONED = "TIMESTAMP WITH TIME ZONE"
 
 
@@ -34,65 +34,79 @@ class Catalogue:
     ----------
     store : Store
         Of one study and version.
+    earlier : sequence of Store
+        Of earlier ones, whose records count for logs that have no newer one.
 
     Example
     -------
     >>> import flightid as fid
-    >>> with fid.fleet.open("fleet-catalogue") as catalogue:         # doctest: +SKIP
-    ...     catalogue.query("select vehicle, avg(value) from parameters group by all").df()
+    >>> with fid.fleet.open("fleet.toml") as catalogue:
+    ...     catalogue.query("select outcome, count(*) from logs group by all order by 1").fetchall()
+    [('fitted', 40), ('refused', 3)]
     """
 
-    def __init__(self, store: Store) -> None:
+    def __init__(self, store: Store, earlier: Sequence[Store] = ()) -> None:
         duckdb = extra_module("duckdb", PURPOSE)
         self._store = store
         self._errors, self._interruption = duckdb.Error, duckdb.InterruptException
         self._connection = duckdb.connect(":memory:")
-        parts, self.broken = read_parts(store)
-        known = KnownLogs(store, parts)
-        loose = [log for log in loose_logs(store) if not known.in_parts(log)]
-        self._records = tables_of(list(read_loose(store, loose)))
+        sets = [RecordSet.of(each) for each in (store, *earlier)]
+        self.broken = sets[0].broken
+        older = older_records(sets)
+        hidden = {(place, log) for (place, name), logs in older.items() if name == LOOSE
+                  for log in logs}  # fmt: skip
+        records = [
+            record
+            for place, each in enumerate(sets)
+            for record in each.records
+            if (place, record.log) not in hidden
+        ]
+        self._records = tables_of(records)
         if isinstance(store, ObjectStore):
             self._connection.register_filesystem(store.fs)
-        twice = _twice(store, parts)
         try:
             for table in TABLES.values():
-                self._view(table, parts, twice)
+                self._view(table, sets, older)
         except duckdb.Error as error:
             raise DataError(
                 "tables of the catalogue cannot be read",
                 found=str(error)[:300],
                 action="move parts/ away and run the fleet again: it takes those logs again",
             ) from error
-        self._lock()
+        self._lock([each.store.root for each in sets])
 
     def _view(
-        self, table: FleetTable, parts: Sequence[TablePart], twice: dict[str, list[str]]
+        self,
+        table: FleetTable,
+        sets: Sequence[RecordSet],
+        older: dict[tuple[int, str], list[str]],
     ) -> None:
-        """One table over everything that holds rows of it."""
+        """One table over everything that holds rows of it, each log by its newest record."""
         columns = ", ".join(f'"{name}"' for name in table.names)
-        whole = [part for part in parts if part.rows.get(table.name) and part.name not in twice]
         selects = [f"SELECT {columns} FROM loose_{table.name}"]
         self._connection.register("arriving", self._records[table.name])
         self._connection.execute(f"CREATE TABLE loose_{table.name} AS SELECT * FROM arriving")
         self._connection.unregister("arriving")
-        if whole:
-            selects.append(f"SELECT {columns} FROM read_parquet([{self._files(table, whole)}])")
-        for part in (part for part in parts if part.name in twice and part.rows.get(table.name)):
-            logs = ", ".join(f"'{log}'" for log in twice[part.name])
-            file = self._files(table, [part])
-            select = f"SELECT {columns} FROM read_parquet([{file}]) WHERE log NOT IN ({logs})"
-            selects.append(select)
+        for place, each in enumerate(sets):
+            mine = [part for part in each.parts if part.rows.get(table.name)]
+            whole = [part for part in mine if (place, part.name) not in older]
+            if whole:
+                files = _files(each.store, table, whole)
+                selects.append(f"SELECT {columns} FROM read_parquet([{files}])")
+            for part in mine:
+                if logs := older.get((place, part.name)):
+                    left = ", ".join(f"'{log}'" for log in logs)
+                    file = _files(each.store, table, [part])
+                    selects.append(
+                        f"SELECT {columns} FROM read_parquet([{file}]) WHERE log NOT IN ({left})"
+                    )
         self._connection.execute(f"CREATE VIEW {table.name} AS {' UNION ALL '.join(selects)}")
 
-    def _files(self, table: FleetTable, parts: Sequence[TablePart]) -> str:
-        paths = (self._store.path(part.file(table.name)) for part in parts)
-        return ", ".join("'" + path.replace("'", "''") + "'" for path in paths)
-
-    def _lock(self) -> None:
+    def _lock(self, places: Sequence[str]) -> None:
         """From here on: no file but the catalogue's, no extension, no setting."""
-        folder = self._store.root.replace("'", "''")
+        folders = ", ".join("'" + place.replace("'", "''") + "/'" for place in places)
         for setting in (
-            f"allowed_directories = ['{folder}/']",
+            f"allowed_directories = [{folders}]",
             "temp_directory = ''",  # Nothing is written where somebody happens to work.
             "autoinstall_known_extensions = false",
             "autoload_known_extensions = false",
@@ -101,24 +115,57 @@ class Catalogue:
         ):
             self._connection.execute(f"SET {setting}")
 
-    def query(self, sql: str) -> Any:  # noqa: ANN401 - of a library that an extra installs
-        """Answer of one SELECT.
+    def query(self, sql: str, *, time_s: float = QUERY_S, most_rows: int = MOST_ANSWERED) -> Any:  # noqa: ANN401 - of a library that an extra installs
+        """Answer of one SELECT, worked out before this returns.
 
         Parameters
         ----------
         sql : str
             In DuckDB's dialect, over the tables of `tables`.
+        time_s : float
+            Longest time for it, s.
+        most_rows : int
+            Longest answer.
 
         Returns
         -------
         duckdb.DuckDBPyRelation
-            ``.df()`` makes a pandas frame of it, ``.fetchall()`` tuples, ``.arrow()`` a table.
+            Over the answer: ``.df()`` makes a pandas frame of it, ``.fetchall()`` tuples,
+            ``.arrow()`` a table.
 
         Raises
         ------
         OptionError
-            It is no SELECT, or DuckDB refuses it, with DuckDB's own words.
+            It is no SELECT, or DuckDB refuses it, with DuckDB's own words; or its answer takes
+            longer, or is longer, than it may.
         """
+        if not 0.0 < time_s <= threading.TIMEOUT_MAX:
+            raise OptionError("no time for an answer", found=f"{time_s:g} s", needed="above 0 s")
+        clock = threading.Timer(time_s, self._connection.interrupt)
+        clock.daemon = True
+        clock.start()
+        try:
+            found = self._asked(sql).limit(most_rows + 1).to_arrow_table()
+        except self._interruption as error:
+            raise OptionError(
+                "the question takes too long",
+                found=f"no answer after {time_s:g} s",
+                action="ask for less, or give it more time (--time-s)",
+            ) from error
+        except self._errors as error:
+            raise OptionError("the catalogue cannot answer this", found=str(error)) from error
+        finally:
+            clock.cancel()
+        if found.num_rows > most_rows:
+            raise OptionError(
+                "the answer is too long",
+                found=f"more than {most_rows:,} rows",
+                action="group or limit it, or allow more (--most-rows)",
+            )
+        return self._connection.from_arrow(found)
+
+    def _asked(self, sql: str) -> Any:  # noqa: ANN401 - of a library that an extra installs
+        """What DuckDB makes of one SELECT, not worked out."""
         needed = "one SELECT over " + ", ".join(TABLES)
         try:
             statements = self._connection.extract_statements(sql)
@@ -132,7 +179,7 @@ class Catalogue:
         found = ", ".join(kinds) or "no statement"
         raise OptionError("the catalogue takes questions alone", found=found, needed=needed)
 
-    def answer(self, sql: str, *, time_s: float = QUERY_S) -> Table:
+    def answer(self, sql: str, *, time_s: float = QUERY_S, most_rows: int = MOST_SHOWN) -> Table:
         """Answer of one SELECT as a table of plain values.
 
         Parameters
@@ -141,30 +188,16 @@ class Catalogue:
             As `query` takes it.
         time_s : float
             Longest time for it, s.
+        most_rows : int
+            Longest answer.
 
         Raises
         ------
         OptionError
-            As `query` raises it, or there was no answer in that time.
+            As `query` raises it.
         """
-        if not 0.0 < time_s <= threading.TIMEOUT_MAX:
-            raise OptionError("no time for an answer", found=f"{time_s:g} s", needed="above 0 s")
-        clock = threading.Timer(time_s, self._connection.interrupt)
-        clock.daemon = True
-        clock.start()
-        try:
-            found = _plain(self.query(sql))
-            rows = tuple(tuple(map(_cell, row)) for row in found.fetchall())
-        except self._interruption as error:
-            raise OptionError(
-                "the question takes too long",
-                found=f"no answer after {time_s:g} s",
-                action="ask for less, or give it more time (--time-s)",
-            ) from error
-        except self._errors as error:
-            raise OptionError("the catalogue cannot answer this", found=str(error)) from error
-        finally:
-            clock.cancel()
+        found = _plain(self.query(sql, time_s=time_s, most_rows=most_rows))
+        rows = tuple(tuple(map(_cell, row)) for row in found.fetchall())
         return Table("Answer", tuple(map(Column, found.columns)), rows)
 
     def table(self, name: str) -> Any:  # noqa: ANN401 - of a library that an extra installs
@@ -228,17 +261,7 @@ def _cell(value: object) -> Cell:
     return str(value)
 
 
-def _twice(store: Store, parts: Sequence[TablePart]) -> dict[str, list[str]]:
-    """Logs of a part that an earlier one holds too, as two operators of a bucket may leave them."""
-    if len(parts) < 2:
-        return {}
-    keys = [read_keys(store, part) for part in parts]
-    origin = np.repeat(np.arange(len(parts)), [len(each) for each in keys])
-    every = np.concatenate(keys)
-    joined = every.view(f"S{KEY_BYTES}")
-    order = np.lexsort((origin, joined))
-    again = np.flatnonzero(joined[order][1:] == joined[order][:-1]) + 1
-    found: dict[str, list[str]] = {}
-    for at in order[again]:
-        found.setdefault(parts[origin[at]].name, []).append(every[at].tobytes().hex())
-    return found
+def _files(store: Store, table: FleetTable, parts: Sequence[TablePart]) -> str:
+    """Paths of a table's files as SQL lists them."""
+    paths = (store.path(part.file(table.name)) for part in parts)
+    return ", ".join("'" + path.replace("'", "''") + "'" for path in paths)

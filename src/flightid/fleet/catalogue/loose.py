@@ -24,8 +24,9 @@ def loose_name(log: str) -> str:
 
 
 def write_loose(store: Store, record: LogRecord) -> None:
-    """Write the record of a log whole or not at all."""
-    store.write(loose_name(record.log), record.to_bytes())
+    """Write the record of a log whole or not at all, with the instant and the store's name."""
+    recipe = store.root.rpartition("/")[2]
+    store.write(loose_name(record.log), record.stamped(recipe).to_bytes())
 
 
 def loose_logs(store: Store) -> list[str]:

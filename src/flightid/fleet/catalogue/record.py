@@ -65,6 +65,12 @@ class LogRecord:
         found = self.rows["logs"][0].get("reason")
         return None if found is None else str(found)
 
+    def stamped(self, recipe: str) -> LogRecord:
+        """The record as it is kept: which recipe made it, and that it was now."""
+        now = datetime.datetime.now(datetime.UTC).replace(tzinfo=None)
+        own = {"recorded_at": now.isoformat(timespec="microseconds"), "recipe": recipe}
+        return LogRecord(self.log, {**self.rows, "logs": [{**self.rows["logs"][0], **own}]})
+
     def to_bytes(self) -> bytes:
         """The document: columns by name once a table, then bare rows; the same for equal rows."""
         tables = {

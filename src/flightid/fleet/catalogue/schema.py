@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-SCHEMA = "flightid.fleet/1"
+SCHEMA = "flightid.fleet/2"
 """Version of all tables: columns are added or changed under a new number only."""
 
 TEXT = "VARCHAR"
@@ -109,6 +109,8 @@ LOGS = _table(
     FleetColumn("processor_s", NUMBER, "Processor time; of this run, not of the log.", "s"),
     FleetColumn("memory_bytes", WHOLE, "Most memory of the process; of this run.", "B"),
     FleetColumn("attempts", WHOLE, "How often the log was tried."),
+    FleetColumn("recorded_at", INSTANT, "When the record was written, UTC: the newest counts."),
+    FleetColumn("recipe", TEXT, "Twelve digits for study, version of flightid and rules."),
     of_model=False,
 )
 PARAMETERS = _table(
@@ -123,6 +125,7 @@ PARAMETERS = _table(
     FleetColumn(
         "position", WHOLE, "Place in covariances.names from 0; null where it is not there."
     ),
+    FleetColumn("meaning", TEXT, "In words, as the model has it: roll damping; null without."),
 )
 COVARIANCES = _table(
     "covariances",
@@ -131,6 +134,17 @@ COVARIANCES = _table(
     FleetColumn(
         "lower", NUMBERS, "Lower triangle with diagonal, row by row: n (n + 1) / 2 numbers."
     ),
+)
+RESPONSES = _table(
+    "responses",
+    "Measured responses at the points that a fit used, the bias of their estimator taken out.",
+    FleetColumn("output", TEXT, "Channel that answers."),
+    FleetColumn("input", TEXT, "Channel that drives."),
+    FleetColumn("unit", TEXT, "Of the output."),
+    FleetColumn("omega_rad_s", NUMBERS, "Frequencies.", "rad/s"),
+    FleetColumn("real", NUMBERS, "Real part of output over input.", "unit"),
+    FleetColumn("imag", NUMBERS, "Imaginary part.", "unit"),
+    FleetColumn("random_error", NUMBERS, "Standard error of the magnitude, share of it.", "1"),
 )
 MODES = _table(
     "modes",
@@ -196,6 +210,7 @@ _ALL = (
     LOGS,
     PARAMETERS,
     COVARIANCES,
+    RESPONSES,
     MODES,
     MARGINS,
     GAINS_FLOWN,
