@@ -10,7 +10,7 @@ import flightid
 
 PUBLIC = [name for name in flightid.__all__ if not name.startswith("__")]
 # A verb's numbers come from somewhere; these take or show data without a formula.
-NO_FORMULA = {"fleet_status", "open", "read_fleet", "run_fleet"} | {
+NO_FORMULA = {"fleet_status", "open", "propose_fleet", "read_fleet", "run_fleet"} | {
     "read_log",
     "read_records",
     "load_model",

@@ -27,6 +27,7 @@ WITHOUT_PICTURE = {
     "ExportFiles": "files",
     "SweepPlan": "a card to print",
     "FleetDrift": "the page of the fleet draws the histories of its vehicles",
+    "FleetRun": "numbers of logs",
     "FleetStatus": "numbers of logs",
     "FleetOutliers": "the page of the fleet draws vehicles beside their type",
     "Flight": "a simulated log, drawn from its records",

@@ -35,6 +35,12 @@ class FleetProposal:
         TOML with comments.
     said : tuple of str
         What was chosen and why.
+
+    Example
+    -------
+    >>> import flightid as fid
+    >>> fid.fleet.propose_fleet("logs").write().name
+    'logs-fleet.toml'
     """
 
     path: Path
@@ -60,7 +66,7 @@ class FleetProposal:
         return self.path
 
 
-def propose_fleet(folder: str | Path) -> FleetProposal:
+def propose_fleet(place: str | Path) -> FleetProposal:
     """A fleet file for a folder of logs.
 
     Vehicles are told apart by an id inside the logs where a few of them have one, else by the
@@ -68,7 +74,8 @@ def propose_fleet(folder: str | Path) -> FleetProposal:
 
     Parameters
     ----------
-    folder : str or Path
+    place : str or Path
+        The folder.
 
     Returns
     -------
@@ -86,13 +93,15 @@ def propose_fleet(folder: str | Path) -> FleetProposal:
     >>> made.path.name, made.said[0]
     ('logs-fleet.toml', '2 logs')
     """
-    place = Path(folder).absolute()
-    logs = find_logs([str(place)])
+    folder = Path(place).absolute()
+    logs = find_logs([str(folder)])
     if not logs:
         raise StudyError(
-            "there is no log in this folder", found=str(place), needed=".bin, .ulg, .bbl and others"
+            "there is no log in this folder",
+            found=str(folder),
+            needed=".bin, .ulg, .bbl and others",
         )
-    rule, why = _rule(place, logs)
+    rule, why = _rule(folder, logs)
     dated = sum(DATES.search(each.name) is not None for each in logs)
     n = len(logs)
     said = (
@@ -103,16 +112,16 @@ def propose_fleet(folder: str | Path) -> FleetProposal:
         "the study that each log asks for (name one in [fleet] study to take all alike)",
     )
     return FleetProposal(
-        place.with_name(f"{place.name}-fleet.toml"), _text(place, rule, said), said
+        folder.with_name(f"{folder.name}-fleet.toml"), _text(folder, rule, said), said
     )
 
 
-def _rule(place: Path, logs: Sequence[LogAddress]) -> tuple[VehicleRules, str]:
+def _rule(folder: Path, logs: Sequence[LogAddress]) -> tuple[VehicleRules, str]:
     ids = [found for each in logs[:LOOKED_AT] if (found := _id_inside(each))]
     if ids:
         return VehicleRules(), f"the id inside the logs (such as {ids[0]})"
     folders = Counter(PurePosixPath(each.address).parent for each in logs)
-    if len(folders) > 1 and Path(next(iter(folders))) != place:
+    if len(folders) > 1 and Path(next(iter(folders))) != folder:
         return VehicleRules(by="folder"), f"the {len(folders)} folders that they lie in"
     names = [named[1] for each in logs if (named := NAMED.match(each.name))]
     if len(names) > len(logs) // 2:
@@ -131,7 +140,7 @@ def _id_inside(address: LogAddress) -> str | None:
     return identity.own
 
 
-def _text(place: Path, rule: VehicleRules, said: Sequence[str]) -> str:
+def _text(folder: Path, rule: VehicleRules, said: Sequence[str]) -> str:
     quoted = json.dumps  # A JSON string is a TOML string.
     lines = [
         "# Written by flightid fleet run; docs/fleet.md describes every key. Change it freely."
@@ -140,8 +149,8 @@ def _text(place: Path, rule: VehicleRules, said: Sequence[str]) -> str:
     lines += [
         "",
         "[fleet]",
-        f"title = {quoted(place.name, ensure_ascii=False)}",
-        f"logs = [{quoted(place.name, ensure_ascii=False)}]  # folders, globs and addresses",
+        f"title = {quoted(folder.name, ensure_ascii=False)}",
+        f"logs = [{quoted(folder.name, ensure_ascii=False)}]  # folders, globs and addresses",
         '# study = "study.toml"  # every log goes through it; flightid new LOG writes one',
         "# reports = true  # keep the page of every log",
         "",

@@ -11,7 +11,7 @@ from typing import Any, Self
 from flightid.errors import DataError, OptionError
 from flightid.extras import extra_module
 from flightid.fleet.catalogue.compaction import tables_of
-from flightid.fleet.catalogue.newest import LOOSE, RecordSet, older_records
+from flightid.fleet.catalogue.newest import LOOSE, VersionRecords, older_records
 from flightid.fleet.catalogue.parts import TablePart
 from flightid.fleet.catalogue.schema import TABLES, FleetTable
 from flightid.fleet.catalogue.store import ObjectStore, Store
@@ -50,7 +50,7 @@ class Catalogue:
         self._store = store
         self._errors, self._interruption = duckdb.Error, duckdb.InterruptException
         self._connection = duckdb.connect(":memory:")
-        sets = [RecordSet.of(each) for each in (store, *earlier)]
+        sets = [VersionRecords.of(each) for each in (store, *earlier)]
         self.broken = sets[0].broken
         older = older_records(sets)
         hidden = {(place, log) for (place, name), logs in older.items() if name == LOOSE
@@ -78,7 +78,7 @@ class Catalogue:
     def _view(
         self,
         table: FleetTable,
-        sets: Sequence[RecordSet],
+        sets: Sequence[VersionRecords],
         older: dict[tuple[int, str], list[str]],
     ) -> None:
         """One table over everything that holds rows of it, each log by its newest record."""

@@ -18,7 +18,7 @@ LOOSE = ""
 
 
 @dataclass(frozen=True)
-class RecordSet:
+class VersionRecords:
     """All records of one study and version.
 
     Attributes
@@ -37,7 +37,7 @@ class RecordSet:
     broken: tuple[str, ...]
 
     @classmethod
-    def of(cls, store: Store) -> RecordSet:
+    def of(cls, store: Store) -> VersionRecords:
         """What lies in a store."""
         parts, broken = read_parts(store)
         known = KnownLogs(store, parts)
@@ -45,7 +45,7 @@ class RecordSet:
         return cls(store, tuple(parts), tuple(read_loose(store, loose)), tuple(broken))
 
 
-def older_records(sets: Sequence[RecordSet]) -> dict[tuple[int, str], list[str]]:
+def older_records(sets: Sequence[VersionRecords]) -> dict[tuple[int, str], list[str]]:
     """Logs of which a newer record stands elsewhere, by place of the set and part.
 
     Of records of one instant the one of the earlier set, and of its first part, counts.
@@ -84,7 +84,7 @@ def older_records(sets: Sequence[RecordSet]) -> dict[tuple[int, str], list[str]]
     return older
 
 
-def _written(sets: Sequence[RecordSet], place: tuple[int, str]) -> dict[str, str]:
+def _written(sets: Sequence[VersionRecords], place: tuple[int, str]) -> dict[str, str]:
     """When each record of a part, or of the loose files, was written, as text that sorts."""
     number, name = place
     found = sets[number]

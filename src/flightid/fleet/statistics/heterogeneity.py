@@ -15,6 +15,8 @@ from flightid.uncertainty.quantiles import LEVEL, student_quantiles, tails
 Array = NDArray[np.float64]
 FEWEST = 3
 """Vehicles without which nothing is said of the next one."""
+FEWEST_SHAPED = 4
+"""Vehicles without which nothing is said of the shape of their distribution."""
 SPREADS, MEANS = 200, 60
 """Quantiles of the spread's confidence distribution, and of Student's about each mean."""
 HALVINGS = 60
@@ -39,7 +41,8 @@ class VehicleEstimates:
     ----------
     Viechtbauer, *Statistics in Medicine* 26 (2007), 37–52 (interval of the spread by its profile);
     Higgins & Thompson, *Statistics in Medicine* 21 (2002), 1539–1558 (I²); IntHout, Ioannidis &
-    Borm, *BMC Med. Res. Methodol.* 14:25 (2014) (Hartung–Knapp); Nagashima, Noma & Furukawa,
+    Borm, *BMC Med. Res. Methodol.* 14:25 (2014) (Hartung–Knapp); Shoemaker, *Am. Stat.* 57 (2003),
+    105–114 (freedom of a variance by the kurtosis); Nagashima, Noma & Furukawa,
     *Stat. Methods Med. Res.* 28 (2019), 1689–1702 (interval of the next).
 
     Example
@@ -87,13 +90,32 @@ class VehicleEstimates:
         typical = self.freedom * total / (total**2 - np.sum(weights**2))
         return float(spread_variance / (spread_variance + typical))
 
-    def spread_quantiles(self, shares: Array) -> Array:
+    @cached_property
+    def _spread_freedom(self) -> float:
+        """Degrees of freedom of the scatter, fewer where vehicles lie further out than normal.
+
+        Of k draws a variance has the relative variance 2/(k − 1) + excess/k; the excess is their own
+        sample kurtosis, about the spread in the middle of its confidence distribution.
+        """
+        k = len(self.values)
+        if k < FEWEST_SHAPED:
+            return float(self.freedom)
+        middle = self.spread_quantiles(np.array([0.5]))
+        weights = 1.0 / (self.variances + middle)
+        apart = np.sqrt(weights) * (self.values - weights @ self.values / weights.sum())
+        fourth = float(np.mean(apart**4) / np.mean(apart**2) ** 2)
+        excess = (k - 1) / ((k - 2) * (k - 3)) * ((k + 1) * (fourth - 3.0) + 6.0)
+        return self.freedom / (1.0 + max(excess, 0.0) * self.freedom / (2.0 * k))
+
+    def spread_quantiles(self, shares: Array, freedom: float | None = None) -> Array:
         """Quantiles of the confidence distribution of the variance between vehicles.
 
         At the true variance the weighed squares are χ² with k − 1 degrees of freedom, exactly so
-        for normal errors, and they fall as it grows: P(variance ≤ v) = P(χ² ≥ Q(v)).
+        for normal errors, and they fall as it grows: P(variance ≤ v) = P(χ² ≥ Q(v)). With fewer
+        degrees of freedom they scatter more about the same mean.
         """
-        target = chdtri(self.freedom, np.asarray(shares))
+        freedom = self.freedom if freedom is None else freedom
+        target = chdtri(freedom, np.asarray(shares)) * self.freedom / freedom
         scale = float(np.var(self.values) + self.variances.mean())
         low = np.full(len(target), np.log(1e-12 * scale))
         high = np.full(len(target), np.log(1e12 * scale))
@@ -104,8 +126,12 @@ class VehicleEstimates:
         return np.where(self.weighed(np.zeros(1))[2] <= target, 0.0, np.exp(high))
 
     def spread_ends(self, level: float = LEVEL) -> tuple[float, float]:
-        """Interval of the standard deviation between vehicles, in the values' unit."""
-        low, high = np.sqrt(self.spread_quantiles(np.array(tails(level))))
+        """Interval of the standard deviation between vehicles, in the values' unit.
+
+        Longer where vehicles lie further out than normal ones do, as their kurtosis tells; of few
+        vehicles that shows in part alone.
+        """
+        low, high = np.sqrt(self.spread_quantiles(np.array(tails(level)), self._spread_freedom))
         return float(low), float(high)
 
     @cached_property

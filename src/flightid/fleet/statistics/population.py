@@ -149,6 +149,8 @@ class Population(
             Column(f"mean, {words} low"),
             Column(f"mean, {words} high"),
             Column("between vehicles", digits=3),
+            Column(f"between, {words} low", digits=3),
+            Column(f"between, {words} high", digits=3),
             Column("next vehicle low"),
             Column("next vehicle high"),
             Column("between flights", digits=3),
@@ -158,18 +160,21 @@ class Population(
         rows: list[tuple[Cell, ...]] = []
         for name, found in self.parameters.items():
             mean = found.mean.interval(level) or (None, None)
+            spread = found.spread.interval(level) or (None, None)
             following = found.next_vehicle.interval(level) or (None, None)
             unit = "" if found.mean.unit == "1" else found.mean.unit
             rows.append(
                 (
-                    *(name, unit, found.mean.value, *mean, found.spread.value, *following),
+                    *(name, unit, found.mean.value, *mean, found.spread.value, *spread, *following),
                     *(found.flight_spread.value, found.inconsistency_percent, found.n_vehicles),
                 )
             )
         note = (
             f"Restricted likelihood, spread between vehicles {self.spreads.structure}, "
             f"between flights {self.spreads.within_structure}. The next vehicle lies between its "
-            f"two columns with {words}."
+            f"two columns with {words}. Intervals of the spread take vehicles for draws of one bell "
+            "curve, longer where they lie further out; of vehicles of two kinds or with rare odd ones "
+            "they hold the truth less often (docs/fleet.md)."
         )
         return Table(f"Type “{self.type_name}”", columns, tuple(rows), (note,))
 
