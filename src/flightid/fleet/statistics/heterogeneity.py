@@ -94,8 +94,8 @@ class VehicleEstimates:
     def _spread_freedom(self) -> float:
         """Degrees of freedom of the scatter, fewer where vehicles lie further out than normal.
 
-        Of k draws a variance has the relative variance 2/(k − 1) + excess/k; the excess is their own
-        sample kurtosis, about the spread in the middle of its confidence distribution.
+        Of k draws a variance has the relative variance 2/(k − 1) + excess/k; the excess is their
+        own sample kurtosis, about the spread in the middle of its confidence distribution.
         """
         k = len(self.values)
         if k < FEWEST_SHAPED:
