@@ -172,9 +172,9 @@ class Population(
         note = (
             f"Restricted likelihood, spread between vehicles {self.spreads.structure}, "
             f"between flights {self.spreads.within_structure}. The next vehicle lies between its "
-            f"two columns with {words}. Intervals of the spread take vehicles for draws of a normal "
-            "distribution, longer where some lie further out: with few odd ones among many they hold "
-            "the truth less often."
+            f"two columns with {words}. Intervals of the spread take vehicles for draws of a "
+            "normal distribution, longer where some lie further out: with few odd ones among many "
+            "they hold the truth less often."
         )
         return Table(f"Type “{self.type_name}”", columns, tuple(rows), (note,))
 
