@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import flightid as fid
-from flightid.errors import LogFormatError, MissingColumnError
+from flightid.control.autopilots.from_log import autopilot_of
+from flightid.errors import DataError, LogFormatError, MissingColumnError
 from flightid.logs.blackbox.reader import open_blackbox
 from tests.blackbox_builder import END, FIELDS, SETTINGS, blackbox, header, unsigned
 
@@ -108,6 +109,26 @@ def test_axes_are_turned_into_those_of_an_aircraft(tmp_path: Path) -> None:
         np.testing.assert_allclose(record[rate], exact, rtol=1e-12, atol=1e-12)
         terms = sum(columns[f"axis{term}[{place}]"] for term in "PID")
         np.testing.assert_allclose(record[command], sign * terms / 1e3, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("wing", [False, True])
+def test_inav_names_its_set_points_otherwise_and_tells_a_wing(tmp_path: Path, wing: bool) -> None:
+    """INAV calls itself Cleanflight, set-points axisRate, and logs fwAltP of wings alone."""
+    columns = _columns(n=64, size=0.5)
+    columns["time"] = 10_000_000 + 500 * np.arange(64)
+    head, mark, frames = blackbox(columns).partition(b"\nH Field I signed")
+    head = head.replace(b"Betaflight 4.4.2", b"INAV 7.1.2").replace(b"setpoint[3]", b"navState")
+    head = head.replace(b"setpoint[", b"axisRate[").replace(b"rssi", b"fwAltP" if wing else b"rssi")
+    log = _open(tmp_path, head + mark + frames)
+    assert log.vehicle == (None if wing else "copter")
+    if wing:
+        return
+    record = log.record(names=["p_ref", "q_ref", "r_ref", "p"])
+    for place, (name, sign) in enumerate((("p_ref", 1.0), ("q_ref", -1.0), ("r_ref", -1.0))):
+        exact = sign * np.radians(columns[f"setpoint[{place}]"])
+        np.testing.assert_allclose(record[name], exact, rtol=1e-12, atol=1e-12)
+    with pytest.raises(DataError, match=r"flightid flight LOG00001\.BFL tells steps and noise"):
+        autopilot_of(log)
 
 
 def test_log_without_end_is_called_cut(tmp_path: Path) -> None:

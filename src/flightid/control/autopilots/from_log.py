@@ -57,8 +57,9 @@ def autopilot_of(log: Log) -> str:
         raise DataError(
             "the controllers of this firmware are not known",
             found=log.firmware or "a firmware that is not named",
-            needed="Betaflight 4.3 or newer",
-            action="update the firmware, and log a flight with it",
+            needed="Betaflight 4.3 or newer, whose loop is known to the last filter",
+            action=f"flightid flight {log.path.name} tells steps and noise all the same; for gains "
+            "fly such a firmware",
         )
     return name
 

@@ -34,7 +34,9 @@ MODES = {1: "ANGLE", 2: "HORIZON"}
 """Bits of Betaflight's active modes that tell what levels the vehicle (`rc_modes.h`)."""
 GRAVITY = "acc_1G"
 HIGH_RESOLUTION = 10.0
-RATES = ("gyroADC[", "gyroUnfilt[")
+RATES = ("gyroADC[", "gyroUnfilt[", "gyroRaw[")
+WING = ("fwAltP", "fwPosP")
+"""Fields that INAV logs of fixed wings alone."""
 FINE = (*RATES, "setpoint[", "rcCommand[")
 """Fields that ``blackbox_high_resolution`` stores ten times as fine."""
 FORCES, VOLTAGE, CURRENT = "accSmooth[", "vbatLatest", "amperageLatest"
@@ -69,7 +71,7 @@ def open_blackbox(path: Path) -> TableSource:
     lost = [ByteRange(*part) for part in native.skipped()]
     return TableSource(
         "betaflight",
-        "copter" if header.get("Firmware type", "").lower() != "inav" else None,
+        None if any(name in tables[LOOP].units for name in WING) else "copter",
         header.get("Firmware revision", "blackbox"),
         tables,
         settings_of(header),
