@@ -1,7 +1,8 @@
 """One axis of a vehicle under an autopilot's loops, flown by sticks: a simulator of its own.
 
-ArduPilot: D on the filtered error, set-point filtered first. PX4: D on the measured rate. Linear,
-one step a tick; the truth is the same loop's answer to a step of the set-point without noise.
+ArduPilot: D on the filtered error, set-point filtered first. PX4 and Betaflight: D on the measured
+rate; Betaflight feeds the slope of the set-point forward, through a filter. Linear, one step a
+tick; the truth is the same loop's answer to a step of the set-point without noise.
 """
 
 from __future__ import annotations
@@ -36,6 +37,8 @@ class Axis:
     target_hz: float = 20.0
     derivative_hz: float = 20.0
     gyro_hz: float = 40.0
+    forward: float = 0.0
+    forward_hz: float = 30.0
     gust: float = 4.0
     gust_s: float = 0.4
     noise: float = 0.05
@@ -80,10 +83,11 @@ def fly(
         return h / (h + 1.0 / (2.0 * np.pi * hz)) if hz else 1.0
 
     at, ad = share(axis.target_hz if axis.form == "ardupilot" else 0.0), share(axis.derivative_hz)
+    af = share(axis.forward_hz)
     b, a = _biquad(axis.gyro_hz, axis.loop_hz)
     motor = 1.0 - np.exp(-h / axis.motor_s)
     queue = [0.0] * max(axis.delay_ticks, 1)
-    target = total = slope = before = lag = rate = angle = 0.0
+    target = total = slope = before = lag = rate = angle = pushed = last = 0.0
     z1 = z2 = 0.0
     for k in range(n):
         raw = rate + noisy[k]
@@ -96,7 +100,9 @@ def fly(
         moved = error if axis.form == "ardupilot" else -seen
         slope += ad * ((moved - before) / h - slope)
         before = moved
-        u = axis.p * error + total + axis.d * slope
+        pushed += af * ((asked - last) / h - pushed)
+        last = asked
+        u = axis.p * error + total + axis.d * slope + axis.forward * pushed
         out.append((angle, asked, seen, u))
         queue.append(u)
         lag += motor * (queue.pop(0) - lag)

@@ -18,6 +18,11 @@ from tests.strangers.ordinary_flights import Axis, ordinary, step
 WINDOW_S, SLOWEST_HZ, INSTANTS = 0.5, 2.0, 8
 QUADROTOR = Axis()
 PX4 = Axis(form="px4", p=0.15, i=0.2, d=0.003)
+BETAFLIGHT = Axis(
+    form="betaflight", loop_hz=1000.0, effectiveness=400.0, damping=4.0, motor_s=0.03,
+    delay_ticks=2, p=0.06, i=0.1, d=0.0012, derivative_hz=80.0, gyro_hz=150.0, forward=0.0015,
+    gust=8.0,
+)  # fmt: skip
 HELICOPTER = Axis(
     effectiveness=60.0, damping=12.0, motor_s=0.06, p=0.1, i=0.15, d=0.0, angle_p=4.0, gust=2.0
 )
@@ -97,6 +102,7 @@ CASES = tuple(
         ("quadrotor, ArduPilot, acro", QUADROTOR, True, {}),
         ("quadrotor, PX4, angle mode", PX4, False, {}),
         ("quadrotor, PX4, acro, 50 Hz", PX4, True, {"every": 8}),
+        ("quadrotor, Betaflight, acro", BETAFLIGHT, True, {"every": 4}),
         ("helicopter, angle mode", HELICOPTER, False, {}),
         ("plane, angle mode", PLANE, False, {}),
         ("quadrotor, calm", replace(QUADROTOR, gust=0.5), False, {}),
