@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from flightid.cli.compared_loops import compared_loops, short_names
+from flightid.cli.compared_loops import compared_loops, paired_models, short_names
 from flightid.cli.hints import PARAMETERS
 from flightid.cli.lists import ListOption, ListsCommand
 from flightid.cli.model_commands import feedback_option
@@ -137,8 +137,12 @@ def _conditions(
 
     if len(files) == 1 and not needed:
         return []
+    names = short_names(files)
     try:
-        named = zip(short_names(files), files, strict=True)
+        if all(Path(file).is_dir() for file in files):
+            both = paired_models(files).values()
+            return [compare_conditions(dict(zip(names, each, strict=True))) for each in both]
+        named = zip(names, files, strict=True)
         return [compare_conditions({name: load_source(model, axis) for name, model in named})]
     except ModelError:
         if needed:
