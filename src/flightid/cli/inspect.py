@@ -12,8 +12,9 @@ from flightid.cli.records import FILES
 
 @click.command("inspect", short_help="Say what a log holds and what it is good for.")
 @click.argument("log", metavar="LOG | RECORDS", type=FILES)
+@click.option("--all", "whole", is_flag=True, help="Rates of all messages, and clock skews.")
 @json_option
-def command(log: Path, as_json: bool) -> None:
+def command(log: Path, whole: bool, as_json: bool) -> None:
     """Say what LOG holds, whether it can support identification, and what to do instead.
 
     Reads logs of ArduPilot, PX4, Betaflight and INAV, telemetry, and ROS bags of PX4 or MAVROS.
@@ -35,5 +36,5 @@ def command(log: Path, as_json: bool) -> None:
     if as_json:
         emit_values(inspection.to_dict())
     else:
-        click.echo(inspection.to_text())
+        click.echo(inspection.to_text() if whole else inspection.on_screen())
     leave_by_verdict(inspection.findings)

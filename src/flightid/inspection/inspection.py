@@ -135,11 +135,26 @@ class Inspection(Result, schema="flightid.inspection/1"):
         return Table(f"{self.name}: {self._words()}", columns, rows)
 
     def to_text(self) -> str:
-        """Verdict, sentences and tables for a terminal."""
+        """Verdict, sentences and all tables for a terminal."""
+        return "\n\n".join([self._said(), *(t.to_text() for t in self.tables()[1:])])
+
+    def on_screen(self) -> str:
+        """The same with the rates of what a model would be made of alone, and no clock skews."""
+        tables = (self._axes(), self._excitations(), self._saturations(), self._used_rates())
+        return "\n\n".join([self._said(), *(t.to_text() for t in tables if t.rows)])
+
+    def _said(self) -> str:
         head = f"{self.name}: {self.firmware or self.kind}, {self.duration_s:.1f} s"
         said = "\n".join(wrapped(carried_sentence(self), WIDTH))
-        said = f"{head}\n{said}\nThis log {self._words()}.\n{verdict_lines(self.findings)}"
-        return "\n\n".join([said, *(t.to_text() for t in self.tables()[1:])])
+        return f"{head}\n{said}\nThis log {self._words()}.\n{verdict_lines(self.findings)}"
+
+    def _used_rates(self) -> Table:
+        """Rates of what a model would be made of; the others are counted."""
+        used = tuple(r for r in self.rates if r.label in self.messages_used)
+        rest = len(self.rates) - len(used)
+        made = replace(self, rates=used)._rates()
+        more = f"{rest} more messages: --all" if rest else ""
+        return replace(made, notes=(*made.notes, more)) if more else made
 
     def _words(self) -> str:
         """What the light means, where an axis carries a model at all."""

@@ -53,15 +53,18 @@ class Proposal:
     def refusal(self) -> str:
         """That there is no model and why, what the data show all the same, and what to do, last."""
         said = ["No model can be identified from these data."]
+        sentence, grounded = "", False
         if self.inspection is not None:
-            said = _wrapped(carried_sentence(self.inspection))
-            said.append("No model can be identified from these data.")
+            sentence = carried_sentence(self.inspection)
+            said = _wrapped(sentence)
+            grounded = self.inspection.phases.is_known and not self.inspection.phases.airborne
         reasons: dict[str, list[str]] = {}
         for finding in self.findings:
             what, _, why = finding.message.partition(": no model, ")
             reasons.setdefault(why, []).append(what)
         for why, parts in reasons.items():
-            said += _wrapped(f"- {', '.join(parts)}: {why}")
+            if why not in sentence and not grounded:
+                said += _wrapped(f"- {', '.join(parts)}: {why}")
         actions = [finding.action for finding in self.findings if finding.action]
         if self.inspection is not None:
             said += ["", self.inspection.in_short()]
