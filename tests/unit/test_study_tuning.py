@@ -5,12 +5,15 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
+from scipy.signal import cont2discrete, lfilter
 
 from flightid.cli.program import run
 from flightid.errors import StudyError
 from flightid.study.settings import read_settings
 from flightid.study.tuning import TuneSettings, tune_models
+from tests.closeness import assert_close
 
 STUDY = """
 [study]
@@ -94,14 +97,33 @@ def test_settings_are_read_and_checked(study: Path) -> None:
         read_settings(study)
 
 
-def test_records_need_a_controller_of_their_own(
+def test_records_get_a_pid_of_its_own_with_their_modes(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """It is said before anything is fitted."""
-    (tmp_path / "rig.csv").write_text("time,u,y\n0,1,0\n0.1,1,0.1\n", encoding="utf-8")
-    assert run(["tune", str(tmp_path / "rig.csv")]) == 2
-    assert "name a PID of its own with --controller pi_d" in capsys.readouterr().err
-    assert [each.name for each in tmp_path.iterdir()] == ["rig.csv"]
+    """One command from a rig's file to modes and gains; models say the whole command."""
+    random = np.random.default_rng(2)
+    u = np.repeat(random.choice([-1.0, 1.0], 150), 4)
+    # s² + 2·0.3·2 s + 4, of held inputs, every 0.1 s.
+    num, den, _ = cont2discrete(([4.0], [1.0, 1.2, 4.0]), 0.1)
+    y = lfilter(num.ravel(), den, u) + 0.01 * random.standard_normal(u.size)
+    rows = "".join(
+        f"{0.1 * k:.1f},{a},{b:.8g}\n" for k, (a, b) in enumerate(zip(u, y, strict=True))
+    )
+    (tmp_path / "rig.csv").write_text(f"time,u,y\n{rows}", encoding="utf-8")
+    file = str(tmp_path / "rig.csv")
+    assert run(["tune", file, "--draws", "12"]) == 0
+    said = capsys.readouterr()
+    assert "gains of a PID of its own, --controller pi_d" in said.err
+    assert "controller.toml and controller.c: close the loop" in said.out.replace(
+        "\n           ", " "
+    )
+    (row,) = [each for each in said.out.splitlines() if "oscillation" in each]
+    omega, zeta = (float(row.split()[-4 + place]) for place in (1, 2))
+    assert_close([omega, zeta], [2.0, 0.3], rtol=0.02, why="the rig's own")
+    folder = tmp_path / "rig-output"
+    assert {"controller.c", "controller.toml"} <= {each.name for each in folder.iterdir()}
+    assert run(["tune", str(folder)]) == 2
+    assert f"flightid tune {folder} --controller pi_d" in capsys.readouterr().err
 
 
 def test_records_alone_hold_no_gains() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -23,6 +24,10 @@ if TYPE_CHECKING:
     from flightid.control.tuning.result import Tuning
     from flightid.options import Options
     from flightid.study.tuning import TuneSettings
+
+
+USUAL = "pi_d"
+"""Controller of records where none is named."""
 
 
 def _fields() -> dict[str, type[Options]]:
@@ -75,7 +80,8 @@ def command(
     Of a LOG, or of RECORDS of a rig, the study that they ask for is written beside the results
     first, as `flightid run` does.
 
-    With --controller it is a PID of its own around each loop, and no log is needed; --write takes
+    RECORDS hold no gains of an autopilot: their gains are those of a PID of its own around each
+    loop, pi_d unless --controller names another, of models too where it is given; --write takes
     gains.toml then, or gains.c for code.
 
     A MODEL is a .toml file, the JSON of a fit, or the output folder of a study, all models of which
@@ -99,16 +105,15 @@ def command(
     else:
         from flightid.study import run_study
 
-        of_log = options.get("controller") is None
-        if of_log and not is_study(files) and not any(map(_is_flown, files)):
-            raise click.UsageError(
-                "records hold no gains of an autopilot: name a PID of its own with "
-                "--controller pi_d"
+        own = TuneSettings().changed(asked).controller is not None
+        if not own and log is None and _without_gains(files):
+            own, asked["controller"] = True, USUAL
+            note(
+                "records hold no gains of an autopilot: these are gains of a PID of its own, "
+                f"--controller {USUAL}"
             )
-        if is_study(files) and log is None and TuneSettings().changed(asked).controller is None:
-            _require_gains(files[0])
         cache: dict[str, Any] = {}
-        path, folder = taken_study(files, output, log, data, tune=of_log, cache=cache)
+        path, folder = taken_study(files, output, log, data, tune=not own, cache=cache)
         study = run_study(path, output=folder, log=log, tune=asked, level=level, cache=cache)
         tuning = study.tuning
         refused = [str(each).partition("] ")[2] for each in study.faults]
@@ -158,17 +163,15 @@ def _holds_models(files: tuple[Path, ...]) -> bool:
     return len(files) > 1 or "estimated" in content or "kind" in content
 
 
-def _require_gains(source: Path) -> None:
-    """Say before a fit that a study's records hold no gains and that it asks for no PID."""
+def _without_gains(files: tuple[Path, ...]) -> bool:
+    """Whether all there is are records, or a study of records that asks for no PID itself."""
     from flightid.study.settings import read_settings
 
-    settings = read_settings(source)
+    if not is_study(files):
+        return not any(map(_is_flown, files))
+    settings = read_settings(files[0])
     own = settings.tune is not None and settings.tune.controller is not None
-    if settings.log is None and settings.flight is None and not own:
-        raise click.UsageError(
-            "records of a study hold no gains of an autopilot: name a PID of its own: "
-            f"flightid tune {source} --controller pi_d"
-        )
+    return settings.log is None and settings.flight is None and not own
 
 
 def _is_flown(file: Path) -> bool:
@@ -201,9 +204,11 @@ def _of_models(files: tuple[Path, ...], log: Path | None, settings: TuneSettings
     from flightid.study.tuning import tune_files
 
     if log is None and settings.controller is None:
+        named = " ".join(quote(str(file)) for file in files)
         raise click.UsageError(
             "models hold no gains: name the flight with --log, or a PID of its own with "
-            "--controller pi_d"
+            f"--controller: flightid tune {named} --log LOG, flightid tune {named} "
+            f"--controller {USUAL}"
         )
     found = [path for file in files for path in (models_of(file) if file.is_dir() else [file])]
     return tune_files(found, None if log is None else read_log(log), settings)

@@ -14,7 +14,7 @@ from flightid.conventions import Light
 from flightid.findings import Finding, counted, worst
 from flightid.report.content import Document, Lights, Section, TableBlock
 from flightid.study.elsewhere import red_elsewhere
-from flightid.study.estimate_tables import structure_words
+from flightid.study.estimate_tables import short_modes_table, structure_words
 from flightid.study.faults import CODE
 from flightid.table import Cell, Column, Table
 
@@ -111,9 +111,11 @@ def short_document(study: StudyResults, document: Document) -> Document:
     models = models_in_short(study.identified)
     faults = (Lights(study.faults),) if study.faults else ()
     tables = tuple(map(TableBlock, answer.tables))
+    roots = short_modes_table(study.identified)
+    moving = (TableBlock(roots),) if roots.rows else ()
     red = red_elsewhere(answer.findings, document.sections[1:])
     sections = (
-        Section("Models", (models, *faults)),
+        Section("Models", (models, *moving, *faults)),
         *((Section("Gains", tables),) if tables else ()),
         Section(
             f"Answer: {document.verdict} ({document.tally})",
@@ -191,13 +193,17 @@ def _gains(tuning: Tuning, source: str) -> Finding:
     steps = max(len(design.stages) for design in designs)
     axes = ", ".join(design.axis for design in designs)
     plain = any(isinstance(design.loop, PidLoop) for design in designs)
-    file = "gains.c (or .toml)" if plain else f"gains{parameter_suffix(designs[0].flown.autopilot)}"
-    # A PID's structure and loops are the user's own words, which stand on the line above.
-    command = "" if plain else f"flightid tune {source} "
-    way = f"{command}--write {file} writes them; " + (
-        f"fly step 1 of {steps}, log, and look again" if steps > 1 else "fly them, and log"
-    )
-    message = f"gains of {axes}{promise} at the worst vehicle that the data allow"
+    if plain:
+        coded = all(design.plain and design.plain.sampled for design in designs)
+        files = "controller.toml and controller.c" if coded else "controller.toml"
+        way = f"they lie beside the report as {files}: close the loop with them, and log"
+    else:
+        file = f"gains{parameter_suffix(designs[0].flown.autopilot)}"
+        way = f"flightid tune {source} --write {file} writes them; " + (
+            f"fly step 1 of {steps}, log, and look again" if steps > 1 else "fly them, and log"
+        )
+    what = "rig" if plain else "vehicle"
+    message = f"gains of {axes}{promise} at the worst {what} that the data allow"
     if left:
         message += f"; none to fly, they stay as flown: {left}"
     return Finding("gains", worst(findings) if findings else Light.GREEN, message, way)
@@ -260,5 +266,6 @@ def _margin_table(designs: tuple[PidDesign, ...]) -> Table:
     notes = [note]
     if any(f.code == "margin-beyond-band" for each in designs for f in each.findings):
         notes.append("–: read above the band to which the model was shown to hold; not promised.")
-    title = "Margins of the worst vehicle that the data allow"
+    what = "rig" if any(isinstance(each.loop, PidLoop) for each in designs) else "vehicle"
+    title = f"Margins of the worst {what} that the data allow"
     return Table(title, tuple(columns), tuple(rows), tuple(notes)).without_empty_columns()

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from flightid.dynamics.modes.modes import modes
+from flightid.errors import ModelError
 from flightid.identification import PolynomialDetails
 from flightid.models import NarxStructure, PolynomialStructure
 from flightid.table import Cell, Column, Table
@@ -14,6 +17,7 @@ from flightid.uncertainty.quantiles import interval_words, shown
 from flightid.validation import Verdict
 
 if TYPE_CHECKING:
+    from flightid.dynamics.modes.result import Mode
     from flightid.identification import Fit
     from flightid.study.identified import ModelResults
     from flightid.study.truth import Truth
@@ -171,6 +175,47 @@ def structure_words(fit: Fit) -> str:
         return f"innovations form, {fit.model.order} states"
     free = sum(parameter.status == "free" for parameter in fit.parameters.values())
     return f"{fit.model.name}, {free} free parameters"
+
+
+def short_modes_table(items: Iterable[ModelResults]) -> Table:
+    """Modes of models without equations: frequency, damping or time constant, each with its ±.
+
+    Parameters
+    ----------
+    items : iterable of ModelResults
+        Of one study; those whose modes are not known are left out.
+    """
+    columns = (
+        Column("model"), Column("mode"),
+        Column("f_n", "Hz", 4), Column("±", "Hz", 2), Column("ω_n", "rad/s", 4),
+        Column("ζ", digits=3), Column("±", digits=2),
+        Column("time constant", "s", 4), Column("±", "s", 2),
+    )  # fmt: skip
+    rows: list[tuple[Cell, ...]] = []
+    for item in items:
+        if item.fit is None or not isinstance(item.fit.details, PolynomialDetails):
+            continue
+        with suppress(ModelError):
+            rows += [(item.name, *_mode_cells(mode)) for mode in modes(item.fit)]
+    note = f"±: half of the {interval_words(shown())} interval."
+    made = Table("Modes", columns, tuple(rows)).without_empty_columns()
+    told = any(column.name == "±" for column in made.columns)
+    return replace(made, notes=(note,)) if told else made
+
+
+def _mode_cells(mode: Mode) -> tuple[Cell, ...]:
+    """A pair by frequency and damping, a real root by its time constant."""
+    if mode.eigenvalue is None:
+        return (mode.named.character, *[None] * 7)
+    if not mode.is_pair:
+        slow = mode.time_constant
+        return (mode.named.character, *[None] * 5, slow.value, slow.half(shown()))
+    omega, zeta = mode.natural_frequency, mode.damping_ratio
+    half = omega.half(shown())
+    wide = None if half is None else half * HZ
+    value = omega.value
+    hertz = None if value is None else value * HZ
+    return (mode.named.character, hertz, wide, value, zeta.value, zeta.half(shown()), None, None)
 
 
 def modes_words(details: PolynomialDetails) -> str:
