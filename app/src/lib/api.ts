@@ -1,4 +1,4 @@
-import type { Edit, FieldGroup, FlightScreen, Job, Listing, LogItem, StudyText } from "./types";
+import type { Edit, FieldGroup, FlightScreen, GainFile, Job, Listing, LogItem, StudyText } from "./types";
 
 /** A refusal of the server, in its own words. */
 export class Refusal extends Error {
@@ -47,6 +47,7 @@ export const workspace = () => json<Listing>("/api/workspace");
 export const flight = (log: string) => json<FlightScreen>(`/api/logs/${log}`);
 export const fields = (log: string) => json<FieldGroup[]>(`/api/logs/${log}/fields`);
 export const study = (log: string) => json<StudyText | null>(`/api/studies/${log}`);
+export const gainFiles = (log: string) => json<GainFile[]>(`/api/studies/${log}/gains`);
 export const jobs = () => json<Job[]>("/api/jobs");
 export const cancel = (id: string) => json<Job[]>(`/api/jobs/${id}`, { method: "DELETE" });
 export const again = (job: Job) => json<Job[]>("/api/jobs", sent("POST", job));

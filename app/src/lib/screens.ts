@@ -1,5 +1,6 @@
 import type { Component } from "svelte";
 import Flight from "../screens/Flight.svelte";
+import Gains from "../screens/Gains.svelte";
 import Library from "../screens/Library.svelte";
 import Response from "../screens/Response.svelte";
 import type { Study } from "./study.svelte";
@@ -30,4 +31,5 @@ export const SCREENS: Screen[] = [
   { name: "logs", title: "Logs", component: Library, ofLog: false, needsStudy: false, shows: () => true },
   { name: "flight", title: "Flight", component: Flight, ofLog: true, needsStudy: false, shows: ({ log }) => Boolean(log) },
   { name: "response", title: "Response", component: Response, ofLog: true, needsStudy: true, shows: hasModels },
+  { name: "gains", title: "Gains", component: Gains, ofLog: true, needsStudy: true, shows: hasModels },
 ];

@@ -13,6 +13,21 @@ export interface AxisCard {
   coherence: number | null;
 }
 
+/** Gains of an axis and what they promise. */
+export interface AxisGains {
+  axis: string;
+  by_hand: boolean;
+  light: "green" | "amber" | "red" | "unknown";
+  sentence: string;
+  sliders: GainSlider[];
+  margins: MarginRow[];
+  curves: TimeCurve[];
+  loops: NicholsCurve[];
+  steps: GainStep[];
+  filters: string[];
+  findings: ShownFinding[];
+}
+
 /** One key and its value; None takes it out. */
 export interface Edit {
   path: (string | number)[];
@@ -40,6 +55,60 @@ export interface FlightScreen {
   overview: Overview | null;
   review: ReviewPart | null;
   jobs: Job[];
+}
+
+/** A parameter file. */
+export interface GainFile {
+  name: string;
+  text: string;
+}
+
+/** A gain with its range; `found` is what the search took, where it searched. */
+export interface GainSlider {
+  name: string;
+  unit: string;
+  flown: number | null;
+  found: number | null;
+  value: number;
+  low: number;
+  high: number;
+}
+
+/** A step on the way to the new gains. */
+export interface GainStep {
+  gains: Record<string, number>;
+  stable: boolean;
+  phase_margin_deg: number | null;
+  gain_margin_db: number | null;
+}
+
+/** Its answer: all gains, or the axis that moved. */
+export interface GainsAnswer {
+  request: number;
+  error: string | null;
+  seconds: number;
+  gains: GainsPart | null;
+  moved: AxisGains | null;
+}
+
+/** Gains of a study. */
+export interface GainsPart {
+  axes: AxisGains[];
+  refused: RefusedGains[];
+  findings: ShownFinding[];
+  n_steps: number;
+  left_out: Record<string, string>;
+  refusal: string;
+}
+
+/** Gains of a study; with `values` one axis is judged at once, as a slider moves. */
+export interface GainsQuestion {
+  request: number;
+  kind: string;
+  log: string;
+  edits: Edit[];
+  axis: string;
+  values: Record<string, number>;
 }
 
 /** Long work: its state, and where it can be asked for again. */
@@ -84,6 +153,28 @@ export interface LogItem {
   light: "green" | "amber" | "red" | "unknown" | null;
 }
 
+/** A number of a loop over all plants, beside that of the flown gains. */
+export interface MarginRow {
+  loop: string;
+  name: string;
+  unit: string;
+  required: string;
+  met: boolean;
+  nominal: number | null;
+  low: number | null;
+  high: number | null;
+  worst: number | null;
+  flown: number | null;
+  flown_worst: number | null;
+}
+
+/** A loop broken at the output, for the chart of Nichols. */
+export interface NicholsCurve {
+  name: string;
+  phase_deg: number[];
+  gain_db: number[];
+}
+
 /** What an inspection finds, laid out for the page. */
 export interface Overview {
   name: string;
@@ -108,6 +199,12 @@ export interface Question {
   kind: string;
   log: string;
   edits: Edit[];
+}
+
+/** An axis that its data do not allow. */
+export interface RefusedGains {
+  axis: string;
+  finding: ShownFinding;
 }
 
 /** The answer to a question of that number, or why there is none. */
@@ -224,6 +321,17 @@ export interface StudyText {
   etag: string;
   settings: Record<string, unknown>;
   python: string;
+}
+
+/** A time response of the estimate, with the extremes of some plants. */
+export interface TimeCurve {
+  name: string;
+  unit: string;
+  time_s: number[];
+  estimate: number[];
+  low: number[];
+  high: number[];
+  flown: number[] | null;
 }
 
 /** A study file to put in place of another. */

@@ -1,6 +1,7 @@
 """Long work in processes beside the server: started once, cancelled for good, found again.
 
-Two pools. One process keeps logs open for what a hand waits for; others take what lasts seconds.
+Three pools. One process keeps logs open for what a hand waits for, one plants of tunings; others
+take what lasts seconds.
 What is running stands in a file, so that a killed server offers it again.
 """
 
@@ -50,7 +51,7 @@ WORK: dict[str, Callable[[Workspace, str, Path], tuple[object, ...]]] = {
 
 
 class Workers:
-    """Both pools.
+    """All pools.
 
     Parameters
     ----------
@@ -67,6 +68,7 @@ class Workers:
         context = multiprocessing.get_context("spawn")
         made: dict[str, Any] = {"context": context, "initializer": work.limit_memory}
         self._live = ProcessPool(max_workers=1, **made)
+        self._tuning = ProcessPool(max_workers=1, **made)
         self._long = ProcessPool(max_workers=max(1, (os.cpu_count() or 2) - 1), **made)
         self._folder = own_folder(workspace.folder, ".flightid", "jobs")
         for job in _interrupted(self._folder):
@@ -80,9 +82,9 @@ class Workers:
 
     def stop(self) -> None:
         """End all processes."""
-        for pool in (self._live, self._long):
+        for pool in (self._live, self._tuning, self._long):
             pool.stop()
-        for pool in (self._live, self._long):
+        for pool in (self._live, self._tuning, self._long):
             pool.join()
 
     def listen(self, listener: Listener) -> Callable[[], None]:
@@ -135,14 +137,11 @@ class Workers:
 
     async def live(self, call: Callable[..., Any], *inputs: object) -> tuple[Any, str, float]:
         """Result of a hand's request, or the sentence of its refusal."""
-        future = self._live.schedule(work.answered, args=(call, *inputs), timeout=PATIENCE_S)
-        try:
-            made: tuple[Any, str, float] = await asyncio.wrap_future(future)
-        except TimeoutError:
-            return None, f"This took more than {PATIENCE_S:.0f} s and was ended.", PATIENCE_S
-        except ProcessExpired:
-            return None, "The worker ended; the file may need more memory than is allowed.", 0.0
-        return made
+        return await _awaited(self._live, PATIENCE_S, call, *inputs)
+
+    async def tuned(self, call: Callable[..., Any], *inputs: object) -> tuple[Any, str, float]:
+        """The same in the process that keeps plants of tunings, where seconds hold up no drag."""
+        return await _awaited(self._tuning, LONGEST_S, call, *inputs)
 
     def _soon(self, call: Callable[..., None], *inputs: object) -> None:
         if self._loop is not None and not self._loop.is_closed():
@@ -169,6 +168,20 @@ class Workers:
     def _tell(self, job: Job) -> None:
         for listener in list(self._listeners):
             listener(job)
+
+
+async def _awaited(
+    pool: ProcessPool, patience_s: float, call: Callable[..., Any], *inputs: object
+) -> tuple[Any, str, float]:
+    """Result of a call in a pool, or the sentence of its refusal."""
+    future = pool.schedule(work.answered, args=(call, *inputs), timeout=patience_s)
+    try:
+        made: tuple[Any, str, float] = await asyncio.wrap_future(future)
+    except TimeoutError:
+        return None, f"This took more than {patience_s:.0f} s and was ended.", patience_s
+    except ProcessExpired:
+        return None, "The worker ended; the file may need more memory than is allowed.", 0.0
+    return made
 
 
 def _interrupted(folder: Path) -> list[Job]:

@@ -12,6 +12,8 @@ from fastapi import FastAPI, WebSocket, WebSocketDisconnect
 from pydantic import ValidationError
 
 from flightid.app.backstage import Backstage
+from flightid.app.gain_answers import answer_gains
+from flightid.app.gain_schemas import GainsQuestion
 from flightid.app.response_answers import answer_response
 from flightid.app.schemas import Job, JobNews, Question, Reply, ResponseQuestion
 
@@ -26,7 +28,10 @@ class Answerer:
     answer: Callable[[Question, Backstage], Awaitable[Reply]]
 
 
-ANSWERERS: dict[str, Answerer] = {"response": Answerer(ResponseQuestion, answer_response)}
+ANSWERERS: dict[str, Answerer] = {
+    "response": Answerer(ResponseQuestion, answer_response),
+    "gains": Answerer(GainsQuestion, answer_gains),
+}
 """By kind; a screen that asks while a hand drags adds its own."""
 
 

@@ -12,6 +12,7 @@ from fastapi.exceptions import RequestValidationError
 
 from flightid.app.backstage import Backstage
 from flightid.app.field_routes import add_field_routes
+from flightid.app.gain_answers import add_gain_routes
 from flightid.app.job_routes import add_job_routes
 from flightid.app.jobs import Workers
 from flightid.app.live import add_socket
@@ -28,6 +29,7 @@ ROUTES: tuple[Callable[[FastAPI, Backstage], None], ...] = (
     add_field_routes,
     add_job_routes,
     add_study_routes,
+    add_gain_routes,
     add_socket,
 )
 """One module each; a new subject adds its own."""

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from flightid.control.tuning.controller_options import ControllerOptions
+from flightid.control.tuning.flown_gains import loops_of, require_known
 from flightid.control.tuning.options import TuneOptions
 from flightid.control.tuning.pid_design import PidDesign
 from flightid.control.tuning.requirements import TuningRequirements
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
 
 KINDS = (TuningRequirements, TuneOptions, ControllerOptions)
 """Dataclasses whose options are the keys of [tune], and options of ``flightid tune``."""
-AUTOPILOT_ONLY = ("gyro", "angle_loop", "signs", "other_loops", "filters")
+AUTOPILOT_ONLY = ("gyro", "angle_loop", "signs", "other_loops", "filters", "by_hand")
 """Options that a PID of its own does not know."""
 
 
@@ -50,6 +51,11 @@ class TuneSettings:
     requirements: TuningRequirements = field(default_factory=TuningRequirements)
     options: TuneOptions = field(default_factory=TuneOptions)
     controller: ControllerOptions | None = None
+
+    @property
+    def has_other_filters(self) -> bool:
+        """Whether gains are tuned with filters that did not fly, which all axes share."""
+        return self.options.filters != "flown"
 
     def changed(self, given: Mapping[str, Any]) -> TuneSettings:
         """With some requirements and options replaced, by name.
@@ -160,6 +166,48 @@ def tune_models(
     if not fits:
         return None
     return _tuned(fits, _flight(log), settings, checks)
+
+
+def tune_by_hand(
+    identified: Iterable[ModelResults], log: Log | None, settings: TuneSettings, searched: Tuning
+) -> Tuning:
+    """The gains of a study with some by hand, where those of the search are known.
+
+    Axes that share no model with a gain by hand are those of the search; so are those of
+    `tune_models` with these settings, which searches them once more.
+
+    Parameters
+    ----------
+    identified : iterable of ModelResults
+    log : Log or None
+    settings : TuneSettings
+        With gains by hand and flown filters.
+    searched : Tuning
+        The same without gains by hand.
+    """
+    flight = _flight(log)
+    by_hand = settings.options.by_hand or {}
+    loops = {each.axis: each for each in loops_of(flight, "", CHANNELS)}
+    touched: list[ModelResults] = []
+    for item in identified:
+        axes = [] if item.fit is None else _axes(item.fit.model)
+        own = {name for axis in axes if axis in loops for name in loops[axis].names.values()}
+        if own & by_hand.keys():
+            touched.append(item)
+    require_known(by_hand, list(loops.values()))
+    made = tune_models(touched, log, settings) if touched else None
+    if made is None:
+        return searched
+    new = {each.axis: each for each in made.designs}
+    anew = {*new, *(each.axis for each in made.refused)}
+    return replace(
+        searched,
+        designs=tuple(new.get(each.axis, each) for each in searched.designs),
+        together=(
+            *(each for each in searched.together if not anew & {*each.axes}),
+            *made.together,
+        ),
+    )
 
 
 def _flight(log: Log | None) -> Log:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,6 +91,8 @@ class Setting:
     noise_allowed : float or None
         Output noise that is fine where that of the flight is known: bounds it in place of its
         growth, or as much as the flown gains make behind the filters that are tuned with.
+    by_hand : mapping of str to float
+        Gains by name that are judged as they stand; axes without any are searched.
     """
 
     evidence: TuningEvidence
@@ -101,6 +103,7 @@ class Setting:
     requirements: TuningRequirements
     noise: tuple[Array, Array] | None = None
     noise_allowed: float | None = None
+    by_hand: Mapping[str, float] = field(default_factory=dict)
 
     def coherence_of(self, place: int) -> tuple[Array, Array] | None:
         """Frequencies and coherence of an axis' measured response, where the fit rests on one."""
@@ -204,6 +207,11 @@ def tune_axis(
     """
     paths = ControllerPaths(loops[place], setting.gyro, setting.with_angle)
     limit = _noise_limit(setting, paths, flown, place)
+    given = {name: setting.by_hand[name] for name in paths.names if name in setting.by_hand}
+    if given:
+        loop = paths.with_parameters({n: paths.loop.written(v) for n, v in given.items()})
+        fresh, old = _judged(setting, paths, limit, loops, flown, place)
+        return _result(setting, paths, held_by_hand(fresh, paths.gains_of(loop)), loop, fresh, old)
     plants = setting.searched.axis(place, loops, setting.gyro)
     first = list(range(1 + len(setting.evidence.corners)))
     found = search(problem_of(setting, plants, paths, limit), first, advance)
@@ -211,6 +219,33 @@ def tune_axis(
         found = whole_gains(problem_of(setting, plants, paths, limit), paths, found)
     loop = paths.with_parameters(paths.parameters(found.gains))
     fresh, old = _judged(setting, paths, limit, loops, flown, place)
+    return _result(setting, paths, found, loop, fresh, old)
+
+
+def held_by_hand(problem: LoopProblem, gains: Array) -> GainSearchResult:
+    """Gains that nobody searched, with the requirements that fresh plants do not meet.
+
+    Parameters
+    ----------
+    problem : LoopProblem
+        Its plants are those to promise for.
+    gains : ndarray, shape (n_gains,)
+    """
+    judged = problem.judge(gains[None])
+    least = dict(zip(judged.names, judged.slack[:, 0].min(axis=-1).tolist(), strict=True))
+    short = tuple(name for name, slack in least.items() if slack < 0.0)
+    nearest = () if short else (min(least, key=lambda name: least[name]),)
+    return GainSearchResult(gains, not short, short or nearest, least, by_hand=True)
+
+
+def _result(
+    setting: Setting,
+    paths: ControllerPaths,
+    found: GainSearchResult,
+    loop: AxisLoop,
+    fresh: LoopProblem,
+    old: LoopAssessment | None,
+) -> AxisResult:
     gains = paths.gains_of(loop)
     made, met = worst_cases(fresh, gains, old, setting.evidence.band_rad_s)
     held = None if old is None else old.stable[0]

@@ -38,12 +38,24 @@ def verdict(result: AxisResult, drawn: int) -> Finding:
         short = [
             f"{name} {slack:+.0%}" for name, slack in result.found.slack.items() if slack < 0.0
         ]
+        if result.found.by_hand:
+            return Finding(
+                "no-gains",
+                Light.RED,
+                f"the gains set by hand do not meet all requirements for every plant: "
+                f"{', '.join(short)}",
+                "go back towards the gains of the search (leave out by_hand)",
+            )
         return Finding(
             "no-gains",
             Light.RED,
             f"no gains were found that meet all requirements for every plant, on a grid over their "
             f"ranges nor by search from it; nearest: {', '.join(short)}",
             advice(result.found.binding),
+        )
+    if not drawn and result.found.by_hand:
+        return Finding(
+            "gains", Light.AMBER, f"gains set by hand, for the model alone; nearest: {names}"
         )
     if not drawn:
         return Finding("gains", Light.AMBER, f"gains found for the model alone; binding: {names}")

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 
 from flightid.control.autopilots import AxisLoop, axis_loop, axis_loop_of
+from flightid.errors import DataError, OptionError
 from flightid.logs import Log
 
 Gains = AxisLoop | Log | Mapping[str, float]
@@ -37,3 +39,42 @@ def flown_loop(gains: Gains | GainsOfAxes, autopilot: str, axis: str) -> AxisLoo
         return own
     named = {name: value for name, value in gains.items() if not isinstance(value, AxisLoop)}
     return axis_loop(autopilot, axis, named)
+
+
+def loops_of(gains: GainsOfAxes, autopilot: str, axes: Iterable[str]) -> list[AxisLoop]:
+    """Controllers of those axes that the flight tells."""
+    found = []
+    for axis in axes:
+        with suppress(DataError):
+            found.append(flown_loop(gains, autopilot, axis))
+    return found
+
+
+def require_known(values: Mapping[str, float], loops: Sequence[AxisLoop]) -> None:
+    """Refuse gains by hand that no axis has, or that lie outside the autopilot's range.
+
+    Raises
+    ------
+    OptionError
+        Names every one of them.
+    """
+    ranges = {name: each for loop in loops for name, each in loop.ranges.items()}
+    known = {name for loop in loops for name in loop.names.values()}
+    unknown = [name for name in values if name not in known]
+    if unknown:
+        raise OptionError(
+            "by_hand names what is no gain of these axes",
+            found=", ".join(unknown),
+            needed="among " + ", ".join(sorted(known & ranges.keys())),
+        )
+    outside = [
+        f"{name} = {value:g} ({ranges[name].low:g} to {ranges[name].high:g})"
+        for name, value in values.items()
+        if name in ranges and not ranges[name].low <= value <= ranges[name].high
+    ]
+    if outside:
+        raise OptionError(
+            "a gain by hand lies outside its range",
+            found=", ".join(outside),
+            needed="values inside the range that the autopilot's documentation gives",
+        )

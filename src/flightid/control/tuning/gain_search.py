@@ -57,12 +57,15 @@ class GainSearchResult:
         be met.
     slack : dict of str to float
         Least slack of each requirement over the plants.
+    by_hand : bool
+        Whether the gains were given and nothing was searched.
     """
 
     gains: Array
     exists: bool
     binding: tuple[str, ...]
     slack: dict[str, float]
+    by_hand: bool = False
 
 
 def search(

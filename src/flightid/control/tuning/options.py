@@ -54,6 +54,11 @@ class TuneOptions(Options):
         doc="Filters that the gains are tuned with: those that flew, or better ones for the gyro's "
         "noise in the log, which then bounds the output's noise.",
     )
+    by_hand: Mapping[str, float] | None = option(
+        None,
+        doc="Gains by the autopilot's names in place of those of the search: their axes are judged "
+        "as they stand, gains that are not named as flown.",
+    )
     accept_red: bool = option(
         False,
         doc="Make gains where the data refuse them, and write them: every refusal stands in the "

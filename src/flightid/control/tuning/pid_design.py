@@ -17,7 +17,7 @@ from flightid.control.tuning.gain_steps import Stage, TunedGain
 from flightid.control.tuning.loop_problem import LoopProblem
 from flightid.control.tuning.pid_file import write_settings
 from flightid.control.tuning.requirements import TuningRequirements
-from flightid.control.tuning.responses import ResponseBand
+from flightid.control.tuning.responses import ClosedPlants, ResponseBand
 from flightid.control.tuning.worst_cases import WorstCase
 from flightid.conventions import Light
 from flightid.errors import DataError, UnknownNameError
@@ -32,7 +32,10 @@ from flightid.uncertainty.quantiles import interval_words, shown
 class PidDesign(
     Result,
     schema="flightid.pid_design/1",
-    untold={"problem": "the search: every plant at every frequency"},
+    untold={
+        "problem": "the search: every plant at every frequency",
+        **{"closed": "some of the plants", "loops": "controllers of all axes"},
+    },
 ):
     """Result of `flightid.tune_pid`.
 
@@ -66,6 +69,8 @@ class PidDesign(
     provenance : mapping
     filters : tuple of GainChange
         Filters that were not flown and that the gains were tuned with: set with the first step.
+    closed, loops : ClosedPlants or None, and tuple of AxisLoop
+        Some of the plants and the controllers of all axes: to see other gains with.
 
     Example
     -------
@@ -95,6 +100,8 @@ class PidDesign(
     findings: tuple[Finding, ...] = ()
     provenance: Mapping[str, object] = field(default_factory=dict)
     filters: tuple[GainChange, ...] = ()
+    closed: ClosedPlants | None = None
+    loops: tuple[AxisLoop, ...] = ()
 
     @property
     def axis(self) -> str:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from flightid.control.tuning.controller_paths import (
     loop_responses,
     standing,
 )
+from flightid.control.tuning.loop_problem import Plants
 from flightid.control.tuning.sampled_plants import (
     BELOW_NYQUIST,
     AxisLoops,
@@ -46,6 +48,8 @@ SETTLED_SHARE = 1e-3
 FIRST_S, LONGEST = 8.0, 1 << 16
 LIKE_ZERO = 1e-4
 """Share of the lowest frequency at which the limit towards zero is taken."""
+MOST_KEPT = 3
+"""Grids whose plants are kept."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +79,46 @@ class ResponseBand:
     def overshoot(self) -> float:
         """Of a step of the estimate, share of the step."""
         return float(self.estimate.max() - 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class ClosedPlants:
+    """Plants of one axis of several, asked for the time responses of one set of gains or more.
+
+    Attributes
+    ----------
+    plants : SampledPlants
+        The estimate first.
+    place : int
+        Which axis.
+    gyro : {"raw", "filtered"}
+        Which rate the plants end at.
+    """
+
+    plants: SampledPlants
+    place: int
+    gyro: Gyro
+    _seen: dict[tuple[object, ...], Plants] = field(default_factory=dict)
+
+    @cached_property
+    def first(self) -> ClosedPlants:
+        """The estimate alone."""
+        return ClosedPlants(self.plants.take([0]), self.place, self.gyro)
+
+    def axis(self, omega_rad_s: Array, loops: list[AxisLoop]) -> Plants:
+        """The axis with the other loops closed: kept, as gains of this one do not change it."""
+        others = (each.gains for k, each in enumerate(loops) if k != self.place)
+        key = (len(omega_rad_s), *(tuple(each.items()) for each in others))
+        if key not in self._seen:
+            pairs = [standing(loop, omega_rad_s, self.gyro) for loop in loops]
+            closed = AxisLoops(*(np.array(each) for each in zip(*pairs, strict=True)))
+            seen = loop_responses(self.plants, omega_rad_s, loops, self.gyro)
+            if len(self._seen) >= MOST_KEPT:
+                self._seen.clear()
+            self._seen[key] = plants_of_axis(
+                *seen, omega_rad_s, self.plants.unstable, self.place, closed
+            )
+        return self._seen[key]
 
 
 def responses(
@@ -112,7 +156,23 @@ def responses(
     Oppenheim & Schafer, *Discrete-Time Signal Processing*, 3rd ed., section 8.4 (sampling of the
     transform is aliasing in time, which vanishes where the response has died away).
     """
-    step, loop = plants.sample_time_s, loops[place]
+    return closed_responses(ClosedPlants(plants, place, gyro), loops, shown_s=shown_s)
+
+
+def closed_responses(
+    closed: ClosedPlants, loops: list[AxisLoop], *, shown_s: float | None = None
+) -> dict[str, tuple[Array, Array]]:
+    """The same of plants that are kept: other gains of the axis cost no new plants.
+
+    Parameters
+    ----------
+    closed : ClosedPlants
+    loops : list of AxisLoop
+        Controllers of all axes.
+    shown_s : float, optional
+        Length, s; by default each response's own.
+    """
+    step, loop = closed.plants.sample_time_s, loops[closed.place]
     count = 1 << int(np.ceil(np.log2(FIRST_S * loop.time_scale / step)))
 
     def shown(told: str) -> tuple[str, int]:
@@ -120,9 +180,9 @@ def responses(
         return name, 1 + round((shown_s or SHOWN_S[name] * loop.time_scale) / step)
 
     # The estimate alone says at little cost how long it takes; then all plants are asked.
-    for some in ([plants.take([0])] if plants.unstable.size > 1 else []) + [plants]:
+    for some in ([closed.first] if len(closed.plants) > 1 else []) + [closed]:
         while True:
-            pulses = _pulses(some, loops, place, gyro, count)
+            pulses = _pulses(some, loops, count)
             # What has not died away at the end stands in each sample that is summed and shown.
             errors = [
                 min(count, shown(told)[1])
@@ -141,18 +201,15 @@ def responses(
     return found
 
 
-def _pulses(
-    plants: SampledPlants, loops: list[AxisLoop], place: int, gyro: Gyro, count: int
-) -> dict[str, Array]:
+def _pulses(closed: ClosedPlants, loops: list[AxisLoop], count: int) -> dict[str, Array]:
     """Pulse responses, each (n_plants, count)."""
-    omega = np.pi / plants.sample_time_s * np.arange(count // 2 + 1) / (count // 2)
+    place, gyro, step = closed.place, closed.gyro, closed.plants.sample_time_s
+    omega = np.pi / step * np.arange(count // 2 + 1) / (count // 2)
     omega[0], omega[-1] = LIKE_ZERO * omega[1], BELOW_NYQUIST * omega[-1]
-    pairs = [standing(loop, omega, gyro) for loop in loops]
-    closed = AxisLoops(*(np.array(each) for each in zip(*pairs, strict=True)))
-    seen = loop_responses(plants, omega, loops, gyro)
-    axis = plants_of_axis(*seen, omega, plants.unstable, place, closed)
-    rate = closed.feedback[place] * axis.rate
-    whole = rate + closed.outer[place] * axis.angle
+    axis = closed.axis(omega, loops)
+    feedback, outer = standing(loops[place], omega, gyro)
+    rate = feedback * axis.rate
+    whole = rate + outer * axis.angle
     paths = ControllerPaths(loops[place], gyro, has_angle_loop(loops[place]))
     terms = paths.forward(omega)
     gains = paths.gains_of(loops[place])
@@ -162,37 +219,29 @@ def _pulses(
         "disturbance to rate": axis.rate / (1.0 + whole),
     }
     if paths.with_angle:
-        made["angle step"] = closed.outer[place] * axis.angle / (1.0 + whole)
+        made["angle step"] = outer * axis.angle / (1.0 + whole)
         made["disturbance to angle"] = axis.angle / (1.0 + whole)
     return {name: np.fft.irfft(value, count, axis=-1) for name, value in made.items()}
 
 
 def response_bands(
-    plants: SampledPlants,
-    new: list[AxisLoop],
-    flown: list[AxisLoop] | None,
-    place: int,
-    gyro: Gyro,
+    closed: ClosedPlants, new: list[AxisLoop], flown: list[AxisLoop] | None
 ) -> tuple[ResponseBand, ...]:
     """Responses of all plants as bands, beside the flown gains.
 
     Parameters
     ----------
-    plants : SampledPlants
+    closed : ClosedPlants
         The estimate first.
     new, flown : list of AxisLoop
         Controllers of all axes; `flown` is None where they are not stable.
-    place : int
-        Which axis.
-    gyro : {"raw", "filtered"}
 
     Returns
     -------
     tuple of ResponseBand
     """
-    made = responses(plants, new, place, gyro)
-    first = plants.take([0])
-    before = {} if flown is None else responses(first, flown, place, gyro)
+    made = closed_responses(closed, new)
+    before = {} if flown is None else closed_responses(closed.first, flown)
     return tuple(
         ResponseBand(
             name,

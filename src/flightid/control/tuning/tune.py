@@ -21,7 +21,7 @@ from flightid.control.tuning.axis_tuning import (
 from flightid.control.tuning.controller_paths import ControllerPaths, has_angle_loop
 from flightid.control.tuning.evidence import Verdicts, gather
 from flightid.control.tuning.filter_choice import FilterChoice
-from flightid.control.tuning.flown_gains import GainsOfAxes, flown_loop
+from flightid.control.tuning.flown_gains import GainsOfAxes, flown_loop, loops_of, require_known
 from flightid.control.tuning.judge_together import judge_together
 from flightid.control.tuning.options import OtherLoops
 from flightid.control.tuning.pid_design import PidDesign
@@ -44,6 +44,8 @@ from flightid.progress import progress
 
 Array = NDArray[np.float64]
 ROUNDS = 4
+BESIDE = ("filters", "by_hand")
+"""What is shared by axes and is no part of the evidence."""
 SETTLED = 0.02
 """Largest relative change of a gain from one round to the next that ends the rounds."""
 
@@ -65,6 +67,7 @@ def tune(
     accept_red: bool = False,
     other_loops: OtherLoops = "closed",
     filters: FilterChoice | None = None,
+    by_hand: Mapping[str, float] | None = None,
 ) -> Tuning:
     """Gains of several axes; axes of one model are tuned with each other's loops closed.
 
@@ -95,6 +98,9 @@ def tune(
     filters : FilterChoice, optional
         Filters to tune with, as `choose_filters` found them for the noise of the flight, which then
         bounds the output's in place of its growth; default: those that flew.
+    by_hand : mapping of str to float, optional
+        Gains by the autopilot's names that are judged as they stand in place of a search; those of
+        their axes that are not named stay as flown. Axes that none of them belongs to are searched.
 
     Raises
     ------
@@ -103,7 +109,7 @@ def tune(
     ModelError
         The rate of every axis answers its command the other way round.
     OptionError
-        No axis, or one that is not known.
+        No axis, or one that is not known; a gain by hand that no axis has or outside its range.
 
     Reference
     ---------
@@ -130,7 +136,10 @@ def tune(
     shared: dict[str, Any] = {
         "band_rad_s": band_rad_s, "draws": draws, "seed": seed,
         "nominal": nominal, "accept_red": accept_red, "filters": filters,
+        "by_hand": by_hand or {},
     }  # fmt: skip
+    if by_hand:
+        require_known(by_hand, loops_of(gains, autopilot, fits))
     designs: dict[str, PidDesign] = {}
     together: list[Together] = []
     errors: list[tuple[str, FlightidError]] = []
@@ -196,7 +205,8 @@ def _tuned(
     alone = [
         tune_pid(
             fit, gains=loop, requirements=each.requirements, angle_loop=angle_loop, gyro=gyro,
-            sign=each.sign, verification=each.verdicts, **shared,
+            sign=each.sign, verification=each.verdicts,
+            **{**shared, "by_hand": _of(loop, shared["by_hand"])},
         )
         for each, loop in zip(asked, flown, strict=True)
         if len(asked) == 1 or other_loops == "open"
@@ -210,7 +220,7 @@ def _tuned(
         fresh=shared["draws"],
         verification=[verdict for each in asked for verdict in each.verdicts],
         needs_band=any(each.requirements.band_factor is not None for each in asked),
-        **{name: value for name, value in shared.items() if name != "filters"},
+        **{name: value for name, value in shared.items() if name not in BESIDE},
     )
     setting = make_setting(
         evidence,
@@ -223,10 +233,17 @@ def _tuned(
         [each.sign for each in asked],
         None,
     )
+    setting = replace(setting, by_hand=shared["by_hand"])
     if alone:
         return alone, [_closed(setting, alone, flown, asked)]
     made, whole = _coupled(setting, flown, asked, shared["seed"], shared["filters"])
     return made, [whole]
+
+
+def _of(loop: AxisLoop, by_hand: Mapping[str, float]) -> dict[str, float]:
+    """Gains by hand of one axis."""
+    own = set(loop.names.values())
+    return {name: value for name, value in by_hand.items() if name in own}
 
 
 def _closed(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -26,11 +26,11 @@ from flightid.control.tuning.controller_paths import ControllerPaths, has_angle_
 from flightid.control.tuning.evidence import TuningEvidence, Verdicts, gather
 from flightid.control.tuning.filter_choice import FilterChoice
 from flightid.control.tuning.findings import low_coherence, remarks, verdict
-from flightid.control.tuning.flown_gains import Gains, flown_loop
+from flightid.control.tuning.flown_gains import Gains, flown_loop, require_known
 from flightid.control.tuning.order_statistics import least_share
 from flightid.control.tuning.pid_design import PidDesign
 from flightid.control.tuning.requirements import TuningRequirements
-from flightid.control.tuning.responses import response_bands
+from flightid.control.tuning.responses import ClosedPlants, response_bands
 from flightid.control.tuning.sampled_plants import SampledPlants, sample_plants
 from flightid.control.tuning.structure_error import Band, perturbed
 from flightid.errors import ModelError, OptionError
@@ -40,7 +40,7 @@ from flightid.version import VERSION
 
 CHANNELS = {"roll": ("tau_phi", "p"), "pitch": ("tau_theta", "q"), "yaw": ("tau_psi", "r")}
 """Command and rate of each axis, as channel maps and library models name them."""
-DRAWS, SHOWN = 300, 60
+DRAWS, SHOWN, MOVED = 300, 60, 12
 SEARCHED_SIZE = 1.25
 """Errors of structure in the search over those that judge it, whose directions it has not met."""
 ANSWER_S = 0.15
@@ -67,6 +67,7 @@ def tune_pid(
     seed: int = 0,
     nominal: bool = False,
     accept_red: bool = False,
+    by_hand: Mapping[str, float] | None = None,
 ) -> PidDesign:
     """Gains of one axis that keep their margins for every plant that the data allow.
 
@@ -112,6 +113,9 @@ def tune_pid(
         Take a model without covariance, for its own margins alone.
     accept_red : bool
         Make gains where the data refuse them; each refusal is then a red finding.
+    by_hand : mapping of str to float, optional
+        Gains by the autopilot's names that are judged as they stand in place of a search; those
+        that are not named stay as flown.
 
     Returns
     -------
@@ -182,6 +186,8 @@ def tune_pid(
         noise_density(gyro_noise, step),
     )
     setting, start = with_filters(setting, flown, filters)
+    require_known(by_hand or {}, [flown])
+    setting = replace(setting, by_hand=by_hand or {})
     with progress(axis_steps(setting, start), f"tuning {flown.axis}") as advance:
         result = tune_axis(setting, [start], [flown], 0, advance)
     couplings = _couplings(evidence.estimate, channels[0][0])
@@ -280,7 +286,8 @@ def design_of(
     shown = setting.judged.sampled.take(list(range(min(SHOWN, len(setting.judged.sampled)))))
     held = result.flown_stable
     steady = all_flown if held is not None and bool(held[0]) else None
-    bands = response_bands(shown, new, steady, place, setting.gyro) if exists else ()
+    closed = ClosedPlants(shown, place, setting.gyro)
+    bands = response_bands(closed, new, steady) if exists else ()
     count = len(result.met)
     drawn = count + setting.evidence.left_out
     return PidDesign(
@@ -314,6 +321,8 @@ def design_of(
             "rate": setting.gyro,
             "hold_in_model": setting.evidence.hold_in_model,
         },
+        closed=ClosedPlants(shown.take(list(range(min(MOVED, len(shown))))), place, setting.gyro),
+        loops=tuple(new),
     )
 
 

@@ -110,6 +110,7 @@ def worst_cases(
     gains: Array,
     old: LoopAssessment | None,
     band_rad_s: tuple[float, float] | None = None,
+    judged: LoopAssessment | None = None,
 ) -> tuple[tuple[WorstCase, ...], NDArray[np.bool_]]:
     """Numbers of all loops, and which plants meet every requirement.
 
@@ -123,12 +124,14 @@ def worst_cases(
         The flown gains on the same plants; None where nothing was flown.
     band_rad_s : tuple of float or None
         Where the model was shown to hold, rad/s: nothing is promised of what is read above it.
+    judged : LoopAssessment, optional
+        The new gains judged by the problem, where that is known.
 
     Returns
     -------
     tuple of tuple of WorstCase and ndarray of bool, shape (n_plants,)
     """
-    new = problem.judge(gains[None])
+    new = problem.judge(gains[None]) if judged is None else judged
     made = []
     for loop, kind in _wanted(new):
         values = np.asarray(getattr(new.metrics[loop], kind.field))[0]

@@ -1,0 +1,122 @@
+"""What the page and the server tell each other of gains."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from flightid.app.schemas import Light, Message, Question, Reply, ShownFinding
+
+
+class GainSlider(Message):
+    """A gain with its range; `found` is what the search took, where it searched."""
+
+    name: str
+    unit: str
+    flown: float | None
+    found: float | None
+    value: float
+    low: float
+    high: float
+
+
+class MarginRow(Message):
+    """A number of a loop over all plants, beside that of the flown gains."""
+
+    loop: str
+    name: str
+    unit: str
+    required: str
+    met: bool
+    nominal: float | None
+    low: float | None
+    high: float | None
+    worst: float | None
+    flown: float | None
+    flown_worst: float | None
+
+
+class TimeCurve(Message):
+    """A time response of the estimate, with the extremes of some plants."""
+
+    name: str
+    unit: str
+    time_s: list[float]
+    estimate: list[float]
+    low: list[float]
+    high: list[float]
+    flown: list[float] | None
+
+
+class NicholsCurve(Message):
+    """A loop broken at the output, for the chart of Nichols."""
+
+    name: str
+    phase_deg: list[float]
+    gain_db: list[float]
+
+
+class GainStep(Message):
+    """A step on the way to the new gains."""
+
+    gains: dict[str, float]
+    stable: bool
+    phase_margin_deg: float | None
+    gain_margin_db: float | None
+
+
+class AxisGains(Message):
+    """Gains of an axis and what they promise."""
+
+    axis: str
+    by_hand: bool
+    light: Light
+    sentence: str
+    sliders: list[GainSlider]
+    margins: list[MarginRow]
+    curves: list[TimeCurve]
+    loops: list[NicholsCurve]
+    steps: list[GainStep]
+    filters: list[str]
+    findings: list[ShownFinding]
+
+
+class RefusedGains(Message):
+    """An axis that its data do not allow."""
+
+    axis: str
+    finding: ShownFinding
+
+
+class GainsPart(Message):
+    """Gains of a study."""
+
+    axes: list[AxisGains]
+    refused: list[RefusedGains]
+    findings: list[ShownFinding]
+    n_steps: int
+    left_out: dict[str, str]
+    refusal: str
+
+
+class GainFile(Message):
+    """A parameter file."""
+
+    name: str
+    text: str
+
+
+class GainsQuestion(Question):
+    """Gains of a study; with `values` one axis is judged at once, as a slider moves."""
+
+    kind: Literal["gains"] = "gains"
+    axis: str = ""
+    values: dict[str, float] = Field(default_factory=dict, max_length=16)
+
+
+class GainsAnswer(Reply):
+    """Its answer: all gains, or the axis that moved."""
+
+    gains: GainsPart | None = None
+    moved: AxisGains | None = None

@@ -1,0 +1,259 @@
+"""Work on gains in a process of its own: tuned as `flightid tune` does, moved as a slider moves."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import tempfile
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flightid.app.gain_schemas import (
+    AxisGains,
+    GainFile,
+    GainSlider,
+    GainsPart,
+    GainStep,
+    MarginRow,
+    NicholsCurve,
+    RefusedGains,
+    TimeCurve,
+)
+from flightid.app.overview import light_of
+from flightid.app.own_folders import draft_of
+from flightid.app.schemas import ShownFinding
+from flightid.app.study_edits import KeyEdit, edited
+from flightid.app.work import KEPT
+from flightid.control.autopilots.parameter_files import parameter_suffix
+from flightid.control.tuning.moved_gains import MovedGains, move_gains
+from flightid.control.tuning.pid_design import PidDesign
+from flightid.control.tuning.result import Tuning
+from flightid.conventions import Light
+from flightid.errors import DataError, FlightidError, StudyError, UnknownNameError
+from flightid.export.gains import write_gains
+from flightid.findings import Finding, worst
+from flightid.study.gain_preview import preview_tuning
+
+MOST_POINTS = 240
+"""Of a curve on the page."""
+SHOWN_DB = (-40.0, 40.0)
+DIGITS = 6
+
+
+def make_gains(study: Path, text: str, edits: Sequence[KeyEdit]) -> Mapping[str, Any]:
+    """Gains of a study with edits that are not written yet."""
+    whole = edited(text, edits) if edits else text
+    tuning = _tuned(study, whole)
+    by_hand = _hand_gains(whole)
+    found = tuning
+    if by_hand:
+        found = _tuned(study, edited(whole, [KeyEdit(("tune", "by_hand"), None)]))
+    KEPT[_key(whole)] = tuning
+    axes = [
+        _axis(each, move_gains(each, {}), _searched(found, each.axis), by_hand)
+        for each in tuning.designs
+    ]
+    single = {finding for each in tuning.designs for finding in each.findings}
+    refused = {each.finding for each in tuning.refused}
+    return GainsPart(
+        axes=axes,
+        refused=[RefusedGains(axis=r.axis, finding=_shown(r.finding)) for r in tuning.refused],
+        findings=[_shown(f) for f in tuning.findings if f not in single | refused],
+        n_steps=max((len(each.stages) for each in tuning.sound), default=0),
+        left_out=dict(tuning.left_out),
+        refusal=_refusal(tuning),
+    ).model_dump()
+
+
+def move_axis(
+    study: Path, text: str, edits: Sequence[KeyEdit], axis: str, values: Mapping[str, float]
+) -> Mapping[str, Any]:
+    """One axis with other gains, judged by the plants that are kept."""
+    whole = edited(text, edits) if edits else text
+    key = _key(whole)
+    tuning = KEPT.get(key) or _tuned(study, whole)
+    KEPT[key] = tuning
+    for design in tuning.designs:
+        if design.axis == axis:
+            return _axis(design, move_gains(design, values), {}, values).model_dump()
+    raise UnknownNameError(
+        "no gains of this axis", found=axis, needed=", ".join(d.axis for d in tuning.designs)
+    )
+
+
+def make_files(study: Path, text: str) -> list[dict[str, str]]:
+    """The files of ``flightid tune --write``: every step, each with its way back."""
+    tuning = _tuned(study, text)
+    if refusal := _refusal(tuning):
+        raise DataError(refusal)
+    suffix = parameter_suffix(tuning.designs[0].flown.autopilot)
+    with tempfile.TemporaryDirectory() as folder:
+        written = write_gains(tuning, Path(folder) / f"gains{suffix}")
+        return [
+            GainFile(name=each.name, text=each.read_text(encoding="utf-8")).model_dump()
+            for each in written
+        ]
+
+
+def _tuned(study: Path, text: str) -> Tuning:
+    with draft_of(study, text) as draft:
+        made = preview_tuning(draft, cache=KEPT)
+    if made is None:
+        raise StudyError(
+            "no model of this study can be tuned", needed="a model of a rate to its command"
+        )
+    if made.plain:
+        raise StudyError("the page shows gains of an autopilot", found="a PID of its own")
+    return made
+
+
+def _hand_gains(text: str) -> Mapping[str, float]:
+    given = tomllib.loads(text).get("tune", {}).get("by_hand")
+    return given if isinstance(given, dict) else {}
+
+
+def _key(text: str) -> str:
+    """What plants rest on: all of the study but the gains by hand."""
+    document = tomllib.loads(text)
+    if isinstance(document.get("tune"), dict):
+        document["tune"].pop("by_hand", None)
+    return "tuning of " + hashlib.sha256(repr(document).encode()).hexdigest()
+
+
+def _searched(tuning: Tuning, axis: str) -> Mapping[str, float]:
+    for design in tuning.designs:
+        if design.axis == axis and design.exists:
+            return design.gains
+    return {}
+
+
+def _refusal(tuning: Tuning) -> str:
+    """Why there is nothing to download; empty where there is."""
+    try:
+        tuning.writable()
+    except FlightidError as error:
+        return str(error)
+    return ""
+
+
+def _axis(
+    design: PidDesign,
+    moved: MovedGains,
+    found: Mapping[str, float],
+    by_hand: Mapping[str, float],
+) -> AxisGains:
+    hand = any(name in by_hand for name in design.gains)
+    light: Light = worst(design.findings)
+    if moved.short:
+        light = Light.RED
+    count, total = int(moved.met.sum()), len(moved.met)
+    sentence = f"{count} of {total} plants that the data allow meet every requirement"
+    if moved.short:
+        sentence += f"; not met: {', '.join(moved.short)}"
+    return AxisGains(
+        axis=design.axis,
+        by_hand=hand,
+        light=light_of(light),
+        sentence=sentence,
+        sliders=[
+            GainSlider(
+                name=each.name,
+                unit=each.unit,
+                flown=each.flown,
+                found=found.get(each.name),
+                value=moved.values[each.name],
+                low=each.low,
+                high=each.high,
+            )
+            for each in design.changes
+        ],
+        margins=_margins(moved),
+        curves=_curves(moved),
+        loops=_loops(moved),
+        steps=[
+            GainStep(
+                gains=dict(each.gains),
+                stable=each.stable,
+                phase_margin_deg=each.phase_margin_deg,
+                gain_margin_db=each.gain_margin_db,
+            )
+            for each in design.stages
+        ],
+        filters=[f"{each.name} {each.old:g} to {each.value:g}" for each in design.filters],
+        findings=[_shown(each) for each in design.findings],
+    )
+
+
+def _margins(moved: MovedGains) -> list[MarginRow]:
+    rows = []
+    for each in moved.worst_cases:
+        ends = each.estimate.interval(0.95)
+        low, high = ends or (None, None)
+        rows.append(
+            MarginRow(
+                loop=each.loop,
+                name=each.name,
+                unit=each.unit,
+                required=each.required,
+                met=each.met,
+                nominal=each.nominal,
+                low=low,
+                high=high,
+                worst=each.worst,
+                flown=each.flown,
+                flown_worst=each.flown_worst,
+            )
+        )
+    return rows
+
+
+def _curves(moved: MovedGains) -> list[TimeCurve]:
+    made = []
+    for each in moved.responses:
+        rows = slice(None, None, max(1, -(-len(each.time_s) // MOST_POINTS)))
+        made.append(
+            TimeCurve(
+                name=each.name,
+                unit=each.unit,
+                time_s=_plain(each.time_s[rows]),
+                estimate=_plain(each.estimate[rows]),
+                low=_plain(each.low[rows]),
+                high=_plain(each.high[rows]),
+                flown=None if each.flown is None else _plain(each.flown[rows]),
+            )
+        )
+    return made
+
+
+def _loops(moved: MovedGains) -> list[NicholsCurve]:
+    made = []
+    for name, values in moved.loops.items():
+        gain = 20.0 * np.log10(np.maximum(np.abs(values), 1e-9))
+        phase = np.degrees(np.unwrap(np.angle(values)))
+        # The branch in which the loop crosses 0 dB about −180°.
+        cross = int(np.argmin(np.abs(gain)))
+        phase -= 360.0 * math.ceil((phase[cross] - 0.0) / 360.0)
+        kept = np.flatnonzero((gain >= SHOWN_DB[0]) & (gain <= SHOWN_DB[1]))
+        kept = kept[:: max(1, -(-len(kept) // MOST_POINTS))]
+        made.append(
+            NicholsCurve(name=name, phase_deg=_plain(phase[kept]), gain_db=_plain(gain[kept]))
+        )
+    return made
+
+
+def _plain(values: np.ndarray) -> list[float]:
+    return [float(f"{each:.{DIGITS}g}") for each in values.tolist()]
+
+
+def _shown(finding: Finding) -> ShownFinding:
+    return ShownFinding(
+        code=finding.code,
+        light=light_of(finding.light),
+        message=finding.message,
+        action=finding.action,
+        spans_s=[],
+    )

@@ -1,0 +1,127 @@
+"""Other gains of a design, judged by the same plants at once: what a slider shows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.control.tuning.controller_paths import ControllerPaths
+from flightid.control.tuning.pid_design import PidDesign
+from flightid.control.tuning.responses import ResponseBand, response_bands
+from flightid.control.tuning.worst_cases import WorstCase, worst_cases
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, eq=False)
+class MovedGains:
+    """What gains of an axis promise.
+
+    Attributes
+    ----------
+    values : mapping of str to float
+        Every gain that moves, as the autopilot keeps it.
+    worst_cases : tuple of WorstCase
+        Beside those of the flown gains; the numbers of `tune(…, by_hand=values)`.
+    met : ndarray of bool, shape (n_plants,)
+        Which plants meet every requirement.
+    short : tuple of str
+        Requirements that some plant does not meet.
+    responses : tuple of ResponseBand
+        Of some of the plants; none where the estimate is unstable.
+    omega_rad_s : ndarray, shape (n_f,)
+    loops : mapping of str to ndarray of complex, shape (n_f,)
+        Loop broken at the output, of the estimate, of the worst plant and of the flown gains.
+    """
+
+    values: Mapping[str, float]
+    worst_cases: tuple[WorstCase, ...]
+    met: NDArray[np.bool_]
+    short: tuple[str, ...]
+    responses: tuple[ResponseBand, ...]
+    omega_rad_s: Array
+    loops: Mapping[str, Complex]
+
+
+def move_gains(design: PidDesign, values: Mapping[str, float]) -> MovedGains:
+    """Judge other gains by the plants of a design, the loops of the other axes as they stand.
+
+    Parameters
+    ----------
+    design : PidDesign
+        Of an autopilot's axis.
+    values : mapping of str to float
+        By the autopilot's names; those that are not named are those of the design.
+
+    Raises
+    ------
+    UnknownNameError
+        The axis has no such gain.
+
+    Example
+    -------
+    >>> import flightid as fid
+    >>> from flightid.control.autopilots import axis_loop
+    >>> plant = fid.load_model("rate_integrator", axis="roll").with_values(
+    ...     {"Ltphi": 140.0, "tau": 0.03})
+    >>> design = fid.tune_pid(plant, gains=axis_loop("arducopter", "roll", loop_rate_hz=400.0),
+    ...     band_rad_s=(1.0, 100.0), nominal=True)
+    >>> moved = move_gains(design, design.gains)
+    >>> moved.worst_cases[1].nominal == design.worst_cases[1].nominal
+    True
+    """
+    problem = design.problem
+    paths = cast(ControllerPaths, problem.paths)
+    all_values = {**design.gains, **values}
+    loop = paths.with_parameters({n: paths.loop.written(v) for n, v in all_values.items()})
+    gains = paths.gains_of(loop)
+    judged = problem.judge(gains[None])
+    band = cast("tuple[float, float] | None", design.provenance.get("band_rad_s"))
+    made, met = worst_cases(problem, gains, None, band, judged)
+    flown = {(each.loop, each.name): each for each in design.worst_cases}
+    beside = tuple(
+        replace(
+            each,
+            flown=flown[each.loop, each.name].flown,
+            flown_worst=flown[each.loop, each.name].flown_worst,
+        )
+        for each in made
+    )
+    slack = judged.slack[:, 0]
+    short = tuple(n for n, row in zip(judged.names, slack, strict=True) if row.min() < 0.0)
+    worst = int(slack.min(axis=0).argmin())
+    chosen = problem.plants.take([0, worst])
+    seen = problem.loops(gains[None], chosen).whole[0]
+    curves = {"estimate": seen[0], "worst plant": seen[1]}
+    if design.flown.has_flown and not design.filters:
+        old = paths.gains_of(design.flown)[None]
+        curves["flown"] = problem.loops(old, chosen).whole[0, 0]
+    return MovedGains(
+        {name: loop.gains[name] for name in paths.names},
+        beside,
+        met,
+        short,
+        _bands(design, loop) if bool(judged.stable[0, 0]) else (),
+        problem.plants.omega_rad_s,
+        curves,
+    )
+
+
+def _bands(design: PidDesign, loop: object) -> tuple[ResponseBand, ...]:
+    """Time responses with the axis' loop put among the others."""
+    closed = design.closed
+    if closed is None:
+        return ()
+    loops = [loop if k == closed.place else each for k, each in enumerate(design.loops)]
+    known = {each.name: each.flown for each in design.responses}
+    if known:
+        new = response_bands(closed, loops, None)  # type: ignore[arg-type]
+        return tuple(replace(each, flown=known.get(each.name)) for each in new)
+    steady = any(each.flown is not None for each in design.worst_cases)
+    before = [design.flown if k == closed.place else each for k, each in enumerate(design.loops)]
+    return response_bands(closed, loops, before if steady else None)  # type: ignore[arg-type]

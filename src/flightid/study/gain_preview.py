@@ -1,0 +1,68 @@
+"""The stages of a study up to its gains, as the whole run would carry them out."""
+
+from __future__ import annotations
+
+from collections.abc import MutableMapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from flightid.control.tuning.result import Tuning
+from flightid.errors import StudyError
+from flightid.study.pipeline import identify_models
+from flightid.study.settings import read_settings
+from flightid.study.stage_runner import StageRunner
+from flightid.study.taking import take
+from flightid.study.task import load_task
+from flightid.study.tuning import TuneSettings, tune_by_hand, tune_models
+from flightid.surface import as_key, speaking
+
+
+def preview_tuning(
+    path: str | Path, *, cache: MutableMapping[str, Any] | None = None
+) -> Tuning | None:
+    """Tune the gains of a study file, and write nothing: those of ``flightid tune`` of that file.
+
+    Parameters
+    ----------
+    path : str or Path
+        Study file of a log or of records; without ``[tune]`` as usual.
+    cache : mutable mapping of str to object, optional
+        As in `run_study`: what has not changed since is not done again.
+
+    Returns
+    -------
+    Tuning or None
+        None where no model is of a rate to its command.
+
+    Raises
+    ------
+    StudyError
+        The study cannot be carried out as written, or would have to fly first.
+    FlightidError
+        A stage refuses its data.
+    """
+    with speaking(as_key):
+        settings = read_settings(Path(path))
+        if settings.flight is not None:
+            raise StudyError(
+                "a preview takes a log or records, and this study flies first",
+                needed="[log] or [[record]]",
+                action="flightid run writes the log of the flight; name that",
+            )
+        names = tuple(model.name for model in settings.models)
+        tasks = [load_task(each, names) for each in settings.models]
+        runner = StageRunner(cache)
+        taken = take(settings, tasks, None, Path(path).parent, runner)
+        staged = identify_models(
+            tasks, taken.records, taken.inspection, settings.reduce, runner, lambda *_: None
+        )
+        wanted = settings.tune or TuneSettings()
+        if wanted.controller is None and wanted.options.by_hand and not wanted.has_other_filters:
+            alone = replace(wanted, options=replace(wanted.options, by_hand=None))
+            found = runner.stage("tuning", tune_models, staged, taken.log, alone)
+            if found.value is not None:
+                return runner.stage(
+                    "gains by hand", tune_by_hand, staged, taken.log, wanted, found
+                ).value
+        return runner.stage("tuning", tune_models, staged, taken.log, wanted).value

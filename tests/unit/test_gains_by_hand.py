@@ -1,0 +1,77 @@
+"""Gains set by hand: judged as they stand, the same on a slider, in a tuning and in a study."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flightid as fid
+from flightid.control.tuning.moved_gains import move_gains
+from flightid.conventions import Light
+from flightid.errors import DataError, OptionError
+from tests.unit.test_tuning import FLOWN, NEED, _fit
+
+GENTLE = {"ATC_RAT_RLL_P": 0.06, "ATC_ANG_RLL_P": 3.2}
+
+
+@pytest.fixture(scope="module")
+def fit() -> fid.Fit:
+    return _fit()
+
+
+@pytest.fixture(scope="module")
+def found(fit: fid.Fit) -> fid.PidDesign:
+    return fid.tune_pid(fit, gains=FLOWN, requirements=NEED, draws=20)
+
+
+def test_gains_of_the_search_by_hand_promise_what_the_search_promised(
+    fit: fid.Fit, found: fid.PidDesign
+) -> None:
+    again = fid.tune_pid(fit, gains=FLOWN, requirements=NEED, draws=20, by_hand=found.gains)
+    assert again.exists
+    assert [each.to_dict() for each in again.worst_cases] == [
+        each.to_dict() for each in found.worst_cases
+    ]
+    assert again.gains == found.gains
+    assert [stage.gains for stage in again.stages] == [stage.gains for stage in found.stages]
+
+
+def test_a_slider_shows_the_numbers_of_the_tuning(fit: fid.Fit, found: fid.PidDesign) -> None:
+    held = fid.tune_pid(fit, gains=FLOWN, requirements=NEED, draws=20, by_hand=GENTLE)
+    as_flown = {name: FLOWN.gains[name] for name in found.gains}
+    moved = move_gains(found, as_flown | GENTLE)
+    assert [each.to_dict() for each in moved.worst_cases] == [
+        each.to_dict() for each in held.worst_cases
+    ]
+    assert held.gains == dict(moved.values) == as_flown | GENTLE
+    assert bool(moved.met.all()) == held.exists == (not moved.short)
+    for mine, theirs in zip(moved.responses, held.responses, strict=True):
+        np.testing.assert_allclose(mine.estimate, theirs.estimate, rtol=0.0, atol=1e-12)
+        assert np.all(mine.low >= theirs.low - 1e-12)
+    # The loop of the estimate passes −180° + margin where its gain is one.
+    loop, omega = moved.loops["estimate"], moved.omega_rad_s
+    crossing = held.worst_case("whole loop", "crossover").nominal or 0.0
+    phase = np.degrees(np.interp(crossing, omega, np.unwrap(np.angle(loop)))) % 360.0
+    margin = held.worst_case("whole loop", "phase margin").nominal
+    assert phase - 180.0 == pytest.approx(margin, abs=0.3)
+
+
+def test_gains_by_hand_that_break_a_requirement_are_red_and_not_written(
+    fit: fid.Fit, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    folder = tmp_path_factory.mktemp("gains")
+    bold = {"ATC_RAT_RLL_P": 0.45, "ATC_RAT_RLL_I": 0.45, "ATC_RAT_RLL_D": 0.02}
+    made = fid.tune_pid(fit, gains=FLOWN, requirements=NEED, draws=20, by_hand=bold)
+    assert not made.exists
+    assert made.findings[0].light is Light.RED
+    assert "set by hand do not meet" in made.findings[0].message
+    with pytest.raises(DataError, match="no gains of roll"):
+        made.write(folder / "gains.param")
+    assert not list(folder.iterdir())
+
+
+def test_gains_by_hand_that_no_axis_has_are_refused_by_name(fit: fid.Fit) -> None:
+    with pytest.raises(OptionError, match="ATC_RAT_PIT_P"):
+        fid.tune_pid(fit, gains=FLOWN, by_hand={"ATC_RAT_PIT_P": 0.1})
+    with pytest.raises(OptionError, match=r"0\.01 to 0\.5"):
+        fid.tune({"roll": fit}, gains={"roll": FLOWN}, by_hand={"ATC_RAT_RLL_P": 5.0})
