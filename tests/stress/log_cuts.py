@@ -1,4 +1,4 @@
-"""Every log of a folder whole and cut at many places: what `inspect` says of each.
+"""Every log of a folder whole and cut at many places: what `inspect` and `flight` say of each.
 
 `python -m tests.stress.log_cuts FOLDER --places 50` prints each distinct sentence once, numbers
 as #, with how often it came and its first numbers, for somebody to read; then axes that were lost.
@@ -71,6 +71,8 @@ def _inspect(copy: Path, log: str, place: int, found: Sentences) -> None:
         found.say(log, place, f"{band.axis}: {band.reason or 'a band'}")
         if LOST in band.reason:
             found.lost.append(f"{log}, {place}: {band.axis}: {band.reason}")
+    for finding in fid.review_flight(copy).findings:
+        found.say(log, place, f"flight: {finding}")
     flew = bool(inspection.phases.airborne)
     codes = {finding.code for finding in inspection.findings}
     # What one sentence says another may not deny.

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import flightid as fid
 from flightid.conventions import Light
 from flightid.evidence import inspection_check
 from flightid.findings import Finding
@@ -25,6 +26,7 @@ from flightid.inspection.thresholds import LONGEST_WINDOW
 from flightid.inspection.usable_band import _longest_window
 from flightid.logs.source import Event, Gap
 from tests.closeness import assert_close
+from tests.ulog_builder import flight
 
 
 def log(**fields: object) -> Any:
@@ -34,6 +36,7 @@ def log(**fields: object) -> Any:
         "parameters": {},
         "gaps": (),
         "findings": (),
+        "messages": ("vehicle_attitude",),
     }
     known["path"] = Path("flown.bin")
     return SimpleNamespace(**{**known, **fields})
@@ -87,6 +90,19 @@ def test_advice_names_only_what_the_firmware_has(
     flown = log(parameters=parameters)
     assert logging in advice.logging(flown)
     assert excitation in advice.excitation(flown)
+
+
+def test_a_log_that_ends_before_its_messages_says_nothing_of_its_firmware(tmp_path: Path) -> None:
+    """Cut among its parameters: those that are missing are not known to be missing in flight."""
+    whole = bytes(flight())
+    cut = tmp_path / "cut.ulg"
+    cut.write_bytes(whole[: whole.index(b"MC_ROLL_P")])
+    started = fid.read_log(cut)
+    assert not started.parameters
+    assert "ends before its first message" in advice.logging(started)
+    assert "firmware" not in fid.inspect_log(started).to_text()
+    cut.write_bytes(whole)
+    assert "hold no SDLOG_PROFILE" in advice.logging(fid.read_log(cut))
 
 
 def test_bits_of_the_logging_mask_are_those_of_the_vehicle() -> None:

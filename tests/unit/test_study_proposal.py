@@ -119,31 +119,47 @@ def test_a_study_that_was_changed_by_hand_stays(tmp_path: Path) -> None:
     assert "Mine" in target.read_text()
 
 
-def test_a_proposal_hands_its_scan_to_the_study_that_it_wrote(tmp_path: Path) -> None:
-    rig = _rig(tmp_path)
+def _answers_at_once(rig: Path, idle: tuple[str, ...]) -> Path:
+    """So that a finding of the scan's fit asks for a declared loop; with an input that is idle.
+
+    The study leaves that input out, so the scan that it can use does too.
+    """
     head, *rows = rig.read_text().splitlines()
     cells = [row.split(",") for row in rows]
-    # An answer at once, so that a finding of the scan's fit asks for a declared loop.
-    fast = [f"{t},{u},{float(y) + 2 * float(u):.8g}" for t, u, y in cells]
-    rig.write_text("\n".join([head, *fast]) + "\n")
+    other = np.random.default_rng(9).standard_normal((len(rows), len(idle)))
+    fast = [
+        ",".join([t, u, f"{float(y) + 2 * float(u):.8g}", *(f"{v:.6g}" for v in beside)])
+        for (t, u, y), beside in zip(cells, other, strict=True)
+    ]
+    rig.write_text("\n".join([",".join([head, *idle]), *fast]) + "\n")
+    return rig
+
+
+@pytest.mark.parametrize("idle", [(), ("idle",)], ids=["alone", "beside an idle input"])
+def test_a_proposal_hands_its_scan_to_the_study_that_it_wrote(
+    tmp_path: Path, idle: tuple[str, ...]
+) -> None:
+    rig = _answers_at_once(_rig(tmp_path), idle)
+    inputs = ["volts", *idle]
     known: dict[str, object] = {}
     study = tmp_path / "study.toml"
     with speaking(as_typed):
-        made = propose_study(
-            [rig], folder=tmp_path, inputs=["volts"], outputs=["beam"], cache=known
-        )
+        made = propose_study([rig], folder=tmp_path, inputs=inputs, outputs=["beam"], cache=known)
     made.write(study)
     found, alone = (
         run_study(study, output=tmp_path / name, cache=given)
         for name, given in (("handed", dict(known)), ("alone", None))
     )
-    kept = {"record: rig, fitted", "record: rig, choice", "orders: beam from volts"}
+    model = f"beam from {' and '.join(inputs)}"
+    kept = {"record: rig, fitted", "record: rig, choice", f"orders: {model}"}
+    kept |= {f"response: {model}, auto", f"coherence: {model}"}
+    assert [each.fit.model.inputs for each in found.identified] == [("volts",)]
     assert kept == set(found.from_cache) <= set(alone.carried_out)
     # To the last digit and word, though the command that scanned speaks of options.
     written = [(tmp_path / name / "results.json").read_text() for name in ("handed", "alone")]
     assert written[0] == written[1]
     # Other samples: nothing of the old ones stands.
-    _rig(tmp_path, seed=1)
+    _answers_at_once(_rig(tmp_path, seed=1), idle)
     again = run_study(study, output=tmp_path / "changed", cache=known)
     assert again.from_cache == ()
 

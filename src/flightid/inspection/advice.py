@@ -65,6 +65,9 @@ def set_bits(wanted: dict[int, str]) -> str:
 def _px4_logging(log: Log) -> str:
     """The logging profile, where the firmware that flew has one."""
     present = log.parameters.get("SDLOG_PROFILE")
+    if present is None and not log.messages:
+        # Parameters stand before the first message: a file that ends there may lack any of them.
+        return "hand in the whole log: what is left of it ends before its first message"
     if present is None:
         return (
             "log commands and body rates at full rate: the parameters of this firmware hold no "

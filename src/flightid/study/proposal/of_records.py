@@ -319,11 +319,11 @@ def _model(
             template += [f"band_rad_s = {toml_value([_round(low), _round(high)])}", said]
             template += [f'response = {{ estimator = "instrument", excitations = {names} }}']
         return iter(["", "[[model]]", f"name = {toml_value(name)}", *template, *lines])
-    kind, found, orders_of = _structure(scans, output, record.unit(output))
+    band = (_round(low), _round(high)) if high > 2 * low else None
+    driving = scans.driving(output, band)
+    kind, found, orders_of = _structure(scans, output, driving, record.unit(output))
     orders = [f"{order} = {toml_value(list(orders_of[order]))}" for order in USED[kind]]
-    coherent = (
-        (f"band_rad_s = {toml_value([_round(low), _round(high)])}",) if high > 2 * low else ()
-    )
+    coherent = () if band is None else (f"band_rad_s = {toml_value(list(band))}",)
     return iter(
         [
             "", "[[model]]", f"name = {toml_value(name)}",
@@ -336,16 +336,16 @@ def _model(
 
 
 def _structure(
-    scans: ProposedScans, output: str, unit: str
+    scans: ProposedScans, output: str, inputs: tuple[str, ...], unit: str
 ) -> tuple[str, str, dict[str, tuple[int, ...]]]:
     """The structure that runs freely with the least error, what each reached, and orders tried."""
-    flown = scans.flown(output)
-    orders = ORDERS | {"nk": delays_to_scan([flown], scans.inputs, output)}
+    flown = scans.flown(output, inputs)
+    orders = ORDERS | {"nk": delays_to_scan([flown], inputs, output)}
     of_kind = dict.fromkeys(KINDS, orders)
     reached: dict[str, float] = {}
     for kind in sorted(KINDS, key=("arx", "armax", "oe", "bj").index):
         tried = {order: of_kind[kind][order] for order in USED[kind]}
-        scan = scans.scan(kind, output, tried)
+        scan = scans.scan(kind, output, tried, inputs)
         best = scan.trials[0].free_run_rms
         if best is not None:
             reached[kind] = best

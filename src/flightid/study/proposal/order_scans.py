@@ -11,15 +11,18 @@ from flightid.conventions import Role
 from flightid.errors import StudyError
 from flightid.reading import parse_toml
 from flightid.record import Record
+from flightid.responses.coherent_pairs import MINIMUM_DECADES
 from flightid.study.reading import TableReader
 from flightid.study.record_files import RecordFile, load_records, read_record_file
+from flightid.study.response_settings import ResponseSettings
 from flightid.study.stage_runner import StageResult, StageRunner
-from flightid.study.stages import scan_records
+from flightid.study.stages import estimate, scan_records, select_coherent
 from flightid.study.task import narrowed
 from flightid.surface import as_key, speaking
 from flightid.validation import OrderScan
 
 Orders = Mapping[str, tuple[int, ...]]
+Band = tuple[float, float]
 
 
 def record_file(lines: Sequence[str], folder: Path) -> RecordFile:
@@ -33,7 +36,8 @@ class ProposedScans:
     """Scans of the structures that a proposal weighs, on the records as its study will read them.
 
     A scan depends on files, spans, channels and orders alone, so the cache of stages gives that of
-    the structure that was taken to the study; where the study's differ in any, it scans anew.
+    the structure that was taken to the study; where the study's differ in any, it scans anew. Its
+    inputs are those whose responses the study finds coherent, in the same stages.
 
     Attributes
     ----------
@@ -65,7 +69,40 @@ class ProposedScans:
         )
         return first, second
 
-    def flown(self, output: str) -> Record:
+    def driving(self, output: str, band_rad_s: Band | None) -> tuple[str, ...]:
+        """Inputs that the study will take for an output: those whose responses are coherent.
+
+        Parameters
+        ----------
+        output : str
+        band_rad_s : tuple of float or None
+            Of the model in the study; None: it estimates no response and takes all inputs.
+
+        Raises
+        ------
+        FlightidError
+            The study could not read the records, or not estimate the responses.
+        """
+        if band_rad_s is None:
+            return self.inputs
+        asked = ResponseSettings()
+        response = self.runner.stage(
+            f"response: {output}, {asked.estimator}",
+            estimate,
+            [self._records[0]],
+            self.inputs,
+            (output,),
+            band_rad_s,
+            asked.estimator,
+            asked.of_estimates,
+        )
+        limits = (asked.minimum_coherence, MINIMUM_DECADES, False, True)
+        found = self.runner.stage(f"coherence: {output}", select_coherent, response, *limits).value
+        kept = {name.split("/", 1)[1] for name in found.names}
+        # Where none is coherent the study gives no model, whatever is scanned.
+        return tuple(name for name in self.inputs if name in kept) or self.inputs
+
+    def flown(self, output: str, inputs: tuple[str, ...]) -> Record:
         """What is fitted, inputs and one output of it.
 
         Raises
@@ -74,11 +111,11 @@ class ProposedScans:
             The study could not read it.
         """
         (record,) = self._records[0].value
-        whole = narrowed(record, self.inputs, (output,))
-        return whole.select([*self.inputs, output])
+        whole = narrowed(record, inputs, (output,))
+        return whole.select([*inputs, output])
 
-    def scan(self, kind: str, output: str, orders: Orders) -> OrderScan:
-        """Structures of a kind for an output, as the study scans them.
+    def scan(self, kind: str, output: str, orders: Orders, inputs: tuple[str, ...]) -> OrderScan:
+        """Structures of a kind for an output from `driving` inputs, as the study scans them.
 
         Raises
         ------
@@ -86,7 +123,7 @@ class ProposedScans:
             The study could not read the records, or no structure could be fitted.
         """
         flown, unseen = ([each] for each in self._records)
-        asked = (kind, dict(orders), self.inputs, (output,), flown, unseen)
+        asked = (kind, dict(orders), inputs, (output,), flown, unseen)
         # Findings of its fit stand in the study's report, in the words of the study.
         with speaking(as_key):
             return self.runner.stage(f"orders: {output}, {kind}", scan_records, *asked).value
