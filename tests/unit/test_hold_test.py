@@ -58,31 +58,77 @@ def test_estimates_that_rest_on_a_word_say_so() -> None:
     assert "tau would be 140 standard errors away" in said
 
 
-def test_bars_of_smooth_samples_told_as_steps_reach_the_rival() -> None:
-    fit = fid.identify(holds.model(), holds.flight(20, "smooth", told="zero"))
-    assert str(fit.evidence.light) == "green"
-    assert any(line.endswith("which the intervals reach.") for line in fit.evidence.lines)
-    low, high = fit.parameters["tau"].interval95
-    assert low < holds.TRUTH["tau"] < high
-    assert OtherHold("zero", "tau", 9.0, -2.0, expected=1.0).is_ruled_out
-    assert not OtherHold("zero", "tau", 9.0, -1.5, expected=1.0).is_ruled_out
+def _said_on_a_word(fit: fid.Fit) -> list[fid.Finding]:
+    return [each for each in fit.findings if each.code == "hold-unproven"]
 
 
-def test_bars_of_smooth_samples_told_as_lines_reach_steps_but_not_those_of_an_autopilot(
+@pytest.mark.parametrize("told", ["zero", "first"])
+def test_a_word_that_nothing_bears_out_is_amber_in_bars_of_its_own(
+    told: holds.Hold, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Smooth samples of steps: right and wrong words look alike, so neither is green."""
+    monkeypatch.setattr(holds, "NOISE", 0.1)
+    fit = fid.identify(holds.model(), holds.flight(0, "smooth steps", told=told))
+    (said,) = _said_on_a_word(fit)
+    assert str(said.light) == str(fit.evidence.light) == "amber"
+    tau = fit.parameters["tau"]
+    assert (tau.stderr or 1.0) < 1.2e-3
+    # What the other word makes of the delay is said as an amount, and reaches its truth.
+    away = 0.025 if told == "zero" else -0.025
+    assert f"{'0.025 s larger' if told == 'zero' else '0.025 s smaller'}" in said.message
+    truth = holds.TRUTH["tau"] - (0.0 if told == "zero" else away)
+    assert abs((tau.value or 0.0) - truth) < 4.0 * (tau.stderr or 0.0)
+    other = fit.provenance["other_holds"]["first" if told == "zero" else "zero"]
+    assert_close(other["shift"]["tau"], away, atol=1.5e-3, why="half a sample")
+
+
+def test_a_wrong_word_is_never_green_beside_a_miss() -> None:
+    for seed in range(20, 24):
+        fit = fid.identify(holds.model(), holds.flight(seed, "smooth", told="zero"))
+        assert str(fit.evidence.light) == "amber"
+
+
+@pytest.mark.parametrize(
+    ("gain", "expected", "out"), [(-2.0, 1.0, True), (-1.5, 1.0, False), (-1.4, 0.05, False)]
+)
+def test_a_rival_is_ruled_out_where_one_flight_in_fifty_looks_so(
+    gain: float, expected: float, *, out: bool
+) -> None:
+    assert OtherHold("zero", "tau", 9.0, gain, expected=expected).is_ruled_out is out
+
+
+def test_rows_of_an_autopilot_keep_their_word_and_lines_that_data_bear_out_are_green(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(holds, "NOISE", 0.1)
-    spans = []
-    for done in (None, Step(FLOWN), Step(FROM_LOG)):
+    for done in (Step(FLOWN), Step(FROM_LOG)):
         record = holds.flight(0, "smooth steps", told="first").replace(step=done)
-        spans.append(fid.identify(holds.model(), record).parameters["tau"].interval95)
-    (low, high), *words = spans
-    assert low < holds.TRUTH["tau"] < high
-    assert all(beyond > holds.TRUTH["tau"] for beyond, _ in words)
+        fit = fid.identify(holds.model(), record)
+        assert fit.parameters["tau"].interval95[0] > holds.TRUTH["tau"]
+        assert not _said_on_a_word(fit)
     # Lines told as lines, which the data bear out.
     sure = fid.identify(holds.model(), holds.flight(0, "smooth lines", told="first"))
     assert str(sure.evidence.light) == "green"
     assert (sure.parameters["tau"].stderr or 1.0) < 1.5e-3
+
+
+@pytest.mark.parametrize("told", ["zero", None])
+def test_two_levels_bear_out_steps_unless_the_data_say_lines(told: holds.Hold | None) -> None:
+    """A relay of 20 Hz; the lines are SciPy's, as exact as the steps."""
+    lights = []
+    for shape in ("straight", "held"):
+        with pytest.MonkeyPatch.context() as patched:
+            patched.setattr(holds, "held", _relay)
+            record = holds.flight(2, shape, told=told or False)
+        fit = fid.identify(holds.model(), record)
+        lights.append(str(fit.evidence.light))
+        low, high = fit.parameters["tau"].interval95
+        assert low < holds.TRUTH["tau"] < high
+    assert lights == ["amber", "green"]
+
+
+def _relay(random: np.random.Generator, n: int) -> np.ndarray:
+    return 0.05 * np.sign(np.cumprod(np.where(random.random(n) < 0.15, -1.0, 1.0)))
 
 
 @pytest.mark.parametrize(

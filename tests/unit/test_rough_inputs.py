@@ -8,7 +8,8 @@ from typing import Any, cast
 import pytest
 
 import flightid as fid
-from flightid.identification.hold_test import _steps_told_otherwise
+from flightid.identification.rival_holds import OtherHold
+from flightid.identification.told_hold import steps_told_otherwise
 from tests.strangers.holds import TRUTH, flight, model
 
 
@@ -29,6 +30,6 @@ def test_steps_fit_alike_within_one_and_a_half_of_likelihood(gain: float, *, dou
         logged=False, made_by=lambda by: False, records=[flight(2, "held", told="first")],
         fit=SimpleNamespace(model=model()), assumed="first",
     )  # fmt: skip
-    steps = SimpleNamespace(gain=gain, parameter="tau", moved=3.0)
-    found = _steps_told_otherwise(cast(Any, steps), cast(Any, rivals), "as the record says")
+    steps = OtherHold("zero", "tau", 3.0, gain)
+    found = steps_told_otherwise(steps, cast(Any, rivals), "as the record says")
     assert (found is not None) is doubted

@@ -34,6 +34,8 @@ DOUBTFUL, CHANCE = 1.5, 1.73
 in 1 of 24 fits: with 1.5 such a fit is doubted no oftener, however far the two lie apart."""
 RARE = 2.05
 """Standard deviations below its mean at which a gain is found in 1 of 50 fits."""
+NEGLIGIBLE = 0.3
+"""Standard errors by which an estimate may move: a 95 % interval then holds 94 in 100."""
 STEPS = 25
 """Most steps of a fit under another hold: it starts half a sample from its end."""
 _STARTED = {"starts": 1, "start_from": "model", "maximum_iterations": STEPS, "correct_bias": False}
@@ -57,6 +59,10 @@ class OtherHold:
         By how much each estimate moves, in the order of the fit's covariance.
     expected : float
         The gain that it would have on average were it true, and the other way round were it not.
+    unit : str
+        Of the estimate that moves furthest.
+    change : float or None
+        By how much that one moves, in `unit`.
     """
 
     hold: InputHold
@@ -65,6 +71,15 @@ class OtherHold:
     gain: float | None
     shift: tuple[float, ...] = ()
     expected: float = 0.0
+    unit: str = ""
+    change: float | None = None
+
+    @property
+    def by(self) -> str:
+        """In words, by how much the estimate that moves furthest does."""
+        if self.change is None:
+            return ""
+        return f", {abs(self.change):.2g} {self.unit} {'larger' if self.change > 0 else 'smaller'}"
 
     @property
     def doubts(self) -> bool:
@@ -78,7 +93,12 @@ class OtherHold:
     def is_ruled_out(self) -> bool:
         """Whether the data would look as they do in 1 of 50 fits at most, were it true."""
         least = self.expected - RARE * math.sqrt(2.0 * self.expected)
-        return self.gain is not None and self.gain < min(least, 0.0)
+        return self.gain is not None and self.gain < min(least, -DOUBTFUL)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the data leave it open, as they do where nobody could ask them."""
+        return self.is_likely and not self.is_ruled_out
 
     @property
     def is_likely(self) -> bool:
@@ -189,8 +209,15 @@ def _moved_by(hold: InputHold, fit: Fit, shift: np.ndarray, gain: float | None) 
         for size, name in zip(shift, fit.names, strict=True)
     ]
     furthest = int(np.argmax(moved))
+    name = fit.names[furthest]
     return OtherHold(
-        hold, fit.names[furthest], float(moved[furthest]), gain, tuple(map(float, shift))
+        hold,
+        name,
+        float(moved[furthest]),
+        gain,
+        tuple(map(float, shift)),
+        unit=fit.parameters[name].unit,
+        change=float(shift[furthest]),
     )
 
 

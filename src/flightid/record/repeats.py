@@ -87,6 +87,27 @@ def found_staircase(samples: Array) -> Staircase | None:
     return Staircase(1, int(jumps.size)) if large and still else None
 
 
+def stands_still(samples: Array) -> bool:
+    """Whether samples stand still for the most and jump far within one, be it seldom.
+
+    Few such jumps may be a pilot's, so they bear out steps that somebody told and accuse nobody.
+
+    Parameters
+    ----------
+    samples : ndarray, shape (n_samples,)
+
+    Example
+    -------
+    >>> doublet = np.repeat([0.0, 1.0, -1.0, 0.0], 20)
+    >>> stands_still(doublet), stands_still(np.convolve(doublet, np.ones(3), "valid"))
+    (True, False)
+    """
+    moves = np.abs(np.diff(samples))
+    jumps = moves[moves > 0.0]
+    still = 0 < jumps.size <= (1.0 - STANDING) * samples.size
+    return still and bool(np.min(jumps) >= LARGE_JUMP * np.ptp(samples))
+
+
 def is_rough(samples: Array) -> bool:
     """Whether samples move at random from one to the next, so that none tells what lies between.
 

@@ -1,0 +1,212 @@
+"""A hold that somebody vouches for: what the data and the samples say of the word, and what then.
+
+The word stands in the bars, so that a right one gives bars of the right size. What rests on it is
+said as an amount; where neither data nor samples bear it out, the light is not green.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.conventions import Light
+from flightid.evidence.gather import ON_A_WORD
+from flightid.findings import Finding
+from flightid.identification.fit import Fit
+from flightid.identification.rival_holds import DOUBTFUL, NEGLIGIBLE, OtherHold, Rivals
+from flightid.record.chosen_hold import DECLARED, RECORDED, SEEN, ChosenHold
+from flightid.record.history import FLOWN
+from flightid.record.hold import BETWEEN, HOLDS, InputHold
+from flightid.record.repeats import found_staircase, is_rough, stands_still
+
+Array = NDArray[np.float64]
+MATERIAL = 0.66
+"""Standard errors by which bars reach a rival with a fifth more of length; beyond, it is a word."""
+COULD_TELL = 1.0
+"""Expected gain of likelihood from which bars of rough samples reach steps that fit better."""
+WHOSE = {
+    DECLARED: "as was declared", RECORDED: "as the records say", SEEN: "as their two levels say",
+}  # fmt: skip
+
+
+class Witness(Enum):
+    """Who speaks for a hold that was told, where the data leave a rival open."""
+
+    MAKER = "what made the inputs"
+    SAMPLES = "the samples"
+    NOBODY = "nobody"
+
+
+def told(fit: Fit, held: ChosenHold, rivals: Rivals) -> tuple[Fit, ChosenHold]:
+    """The fit under a hold that was told, and the hold with what is to be said of it.
+
+    Parameters
+    ----------
+    fit : Fit
+    held : ChosenHold
+    rivals : Rivals
+        Of that fit.
+    """
+    if not rivals.records:
+        return fit, held
+    others = _others(held.hold, rivals)
+    known = rivals.under(others) if rivals.is_fed_back else rivals.by_likelihood(others)
+    matter = [each for each in known if each.moved > NEGLIGIBLE]
+    if not matter:
+        return fit, held
+    finding, reached = _judged(matter, held, rivals)
+    fit = noted(fit, known)
+    if reached:
+        fit = widened(fit, rivals.as_fitted(reached))
+    return fit, held if finding is None else replace(held, findings=(*held.findings, finding))
+
+
+def _others(hold: InputHold, rivals: Rivals) -> list[InputHold]:
+    """Holds to try: of a log's rows, which are its loop's steps, no straight lines."""
+    if rivals.logged:
+        return ["band_limited" if hold == "zero" else "zero"]
+    if rivals.is_fed_back:
+        return ["first" if hold == "zero" else "zero"]
+    return [each for each in HOLDS if each != hold]
+
+
+def _judged(
+    matter: Sequence[OtherHold], held: ChosenHold, rivals: Rivals
+) -> tuple[Finding | None, list[OtherHold]]:
+    """What to say of a word, and the rivals that bars shall reach."""
+    whose = WHOSE[held.source]
+    doubts = [each for each in matter if each.doubts]
+    if doubts:
+        best = max(doubts, key=lambda each: each.gain or 0.0)
+        return contradicted(best, held.hold, whose), [best]
+    steps = next((each for each in matter if each.hold == "zero" and each.is_open), None)
+    by_maker = rivals.made_by("simulate")
+    if steps is not None and not by_maker:
+        finding = steps_told_otherwise(steps, rivals, whose)
+        if finding is not None:
+            stood = "stands still" in finding.message
+            likelier = steps.expected >= COULD_TELL and (steps.gain or 0.0) > 0.0
+            return finding, [steps] if stood or likelier else []
+    # What is ruled out by less than a decisive likelihood is still said, in green.
+    likely = [each for each in matter if each.is_likely]
+    if by_maker or not likely:
+        return None, []
+    furthest = max(likely, key=lambda each: (each.is_open, each.moved))
+    return _on_a_word(furthest, held.hold, rivals, whose)
+
+
+def _on_a_word(
+    other: OtherHold, taken: InputHold, rivals: Rivals, whose: str
+) -> tuple[Finding | None, list[OtherHold]]:
+    """What rests on a hold that the data neither bear out nor contradict."""
+    witness = witness_of(taken, rivals)
+    if witness is Witness.SAMPLES and taken == "zero":
+        return None, []
+    said = (
+        f"inputs are {BETWEEN[taken]} between samples {whose}; the data cannot tell: were they "
+        f"{BETWEEN[other.hold]}, {other.parameter} would be {other.moved:.2g} standard errors "
+        f"away{other.by}"
+    )
+    if witness is not Witness.NOBODY or not other.is_open:
+        return Finding(ON_A_WORD, Light.GREEN, said), []
+    if other.moved <= MATERIAL:
+        return Finding(ON_A_WORD, Light.GREEN, f"{said}, which the intervals reach"), [other]
+    return (
+        Finding(
+            "hold-unproven",
+            Light.AMBER,
+            f"{said}; intervals are those of that word",
+            "see how the input was made: drive it with steps of several samples or two levels, or "
+            "sample it faster, and the data can tell",
+        ),
+        [],
+    )
+
+
+def witness_of(taken: InputHold, rivals: Rivals) -> Witness:
+    """Who speaks for a word: the autopilot whose rows they are, a loop's computer, or samples.
+
+    Samples that stand still and jump speak for steps, smooth ones for a smooth input; nothing in
+    samples speaks for straight lines. A loop that is closed in samples holds its inputs.
+    """
+    if rivals.logged or (taken == "first" and rivals.made_by(FLOWN)):
+        return Witness.MAKER
+    if taken == "zero" and rivals.is_fed_back:
+        return Witness.MAKER
+    samples = [record[name] for record in rivals.records for name in rivals.fit.model.inputs]
+    return Witness.SAMPLES if _bear_out(taken, samples) else Witness.NOBODY
+
+
+def _bear_out(taken: InputHold, samples: Iterable[Array]) -> bool:
+    moving = [each for each in samples if np.ptp(each) > 0.0]
+    if taken == "zero":
+        return all(found_staircase(each) is not None or stands_still(each) for each in moving)
+    if taken == "band_limited":
+        return not any(is_rough(each) or found_staircase(each) is not None for each in moving)
+    return False
+
+
+def steps_told_otherwise(steps: OtherHold, rivals: Rivals, whose: str) -> Finding | None:
+    """Steps in samples that were told as anything else; none where a log shows what it sampled."""
+    if rivals.logged:
+        return None
+    for record in rivals.records:
+        for name in rivals.fit.model.inputs:
+            stairs: object = found_staircase(record[name])
+            if stairs is None and is_rough(record[name]) and (steps.gain or 0.0) > -DOUBTFUL:
+                stairs = "moves from sample to sample as a device's steps do, and steps fit alike"
+            if stairs is not None:
+                return Finding(
+                    "hold-contradicted",
+                    Light.AMBER,
+                    f"inputs are {BETWEEN[rivals.assumed]} between samples, {whose}, yet {name} of "
+                    f"{record.name!r} {stairs}; as steps, {steps.parameter} is "
+                    f"{steps.moved:.2g} standard errors away{steps.by}",
+                    "declare hold='zero' if the vehicle got these steps",
+                )
+    return None
+
+
+def noted(fit: Fit, known: Sequence[OtherHold]) -> Fit:
+    """The fit with what other holds would make of it in its provenance."""
+    sizes = {
+        each.hold: {
+            "parameter": each.parameter,
+            "moved": each.moved,
+            "gain": each.gain,
+            "shift": dict(zip(fit.names, each.shift, strict=True)),
+        }
+        for each in known
+    }
+    return replace(fit, provenance={**fit.provenance, "other_holds": sizes})
+
+
+def contradicted(best: OtherHold, taken: InputHold, whose: str) -> Finding:
+    """A hold that the data speak against."""
+    return Finding(
+        "hold-contradicted",
+        Light.AMBER,
+        f"the data say that inputs are {BETWEEN[best.hold]} between samples, not {BETWEEN[taken]} "
+        f"{whose}: log-likelihood {best.gain:.3g} higher, {best.parameter} {best.moved:.2g} "
+        f"standard errors away{best.by}",
+        f"declare hold={best.hold!r} for the record, or the hold that is true; a delay of half a "
+        "sample that the model lacks looks alike",
+    )
+
+
+def widened(fit: Fit, others: Sequence[OtherHold]) -> Fit:
+    """The fit whose bars reach what likely other holds would make of the estimates."""
+    if fit.covariance is None:
+        return fit
+    shifts = np.array([each.shift for each in others if each.is_likely])
+    covariance = fit.covariance + shifts.T @ shifts if len(shifts) else fit.covariance
+    errors = dict(zip(fit.names, np.sqrt(np.diag(covariance)), strict=True))
+    known = {
+        name: replace(each, stderr=float(errors[name])) if name in errors else each
+        for name, each in fit.parameters.items()
+    }
+    return replace(fit, covariance=covariance, parameters=known)
