@@ -80,6 +80,7 @@ BELONGS = {
     "process-noise": RESIDUALS,
     "errors-not-white": RESIDUALS,
     "inputs-in-errors": RESIDUALS,
+    "excitation-refutes": RESIDUALS,
     "nothing-told": BAND,
 }
 

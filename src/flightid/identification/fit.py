@@ -39,7 +39,7 @@ WHITE_BOUND = (
     "error beside it allows for their colour."
 )
 
-WITHHOLDING = ("errors-not-white", "inputs-in-errors", "order-too-high")
+WITHHOLDING = ("errors-not-white", "inputs-in-errors", "excitation-refutes", "order-too-high")
 """Findings that say why a fit has no covariance."""
 
 

@@ -15,6 +15,7 @@ from flightid.identification.fit_evidence import evidence_of
 from flightid.identification.held_inputs import hold_for, with_hold_said
 from flightid.identification.hold_test import with_hold_tested
 from flightid.identification.left_by_fit import LEFT, left_by_fit
+from flightid.identification.loop_judged import with_loop_judged
 from flightid.identification.methods import flat, method_of
 from flightid.identification.residual_evidence import in_doubt, with_residuals_judged
 from flightid.identification.training import data_provenance
@@ -202,6 +203,7 @@ def identify(
         fit = with_hold_said(*with_hold_tested(fit, chosen, data, given, held, loop))
     if not in_doubt(fit.findings):
         fit = with_residuals_judged(fit)
+    fit = with_loop_judged(fit, loop)
     fit = replace(fit, provenance={**fit.provenance, LEFT: left_by_fit(fit)})
     # Gathered once somebody asks for it, in the words of who asked for the fit.
     gathered: Any = partial(copy_context().run, evidence_of, fit, flat(data), loop)
