@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 
 from flightid.plot import graph_objects as go
 from flightid.plot import look
 from flightid.plot.frequency_response import Curve, bode
 from flightid.responses import FrequencyResponse
+from flightid.responses.excited_band import excited_to
 from flightid.responses.response_band import response_band
 from flightid.uncertainty.quantiles import shown
 
@@ -19,6 +21,8 @@ def response_figure(
     minimum_coherence: float = 0.6,
 ) -> go.PlotFigure:
     """Draw measured responses over frequency, with 95 % bands (`response_band`).
+
+    Of a closed loop all is greyed above the power of what excited the inputs.
 
     Parameters
     ----------
@@ -49,7 +53,9 @@ def response_figure(
     ]
     units = {pair.unit for pair in drawn}
     unit = units.pop() if len(units) == 1 else ""
-    return bode(curves, unit=unit, minimum_coherence=minimum_coherence)
+    end = min((excited_to(response, name) for _, name in chosen), default=math.inf)
+    band = (float(response.omega_rad_s[0]), end) if math.isfinite(end) else None
+    return bode(curves, unit=unit, minimum_coherence=minimum_coherence, band_rad_s=band)
 
 
 def leading_pairs(response: FrequencyResponse) -> list[tuple[str, str]]:

@@ -26,6 +26,7 @@ from flightid.responses.estimators.windowed import (
     windowed_errors,
     windowed_response,
 )
+from flightid.responses.excited_band import end_findings
 from flightid.responses.feedback import feedback_findings, feedback_of
 from flightid.responses.options import ResponseOptions
 from flightid.responses.response import FrequencyResponse
@@ -211,10 +212,10 @@ def _with_inputs(
         test = FeedbackTest("unknown", "noise model")
     else:
         test = feedback_of(samples, float(response.omega_rad_s[-1]), records, loop)
+    known = replace(response, loop=test)
     return replace(
-        response,
-        findings=(*response.findings, *feedback_findings(test)),
-        loop=test,
+        known,
+        findings=(*response.findings, *feedback_findings(test), *end_findings(known)),
         input_shape=InputShape(common_hold(shapes), loop=common_loop(shapes)),
         digests=tuple(digest_of(each, channels) for each in records),
     )

@@ -17,6 +17,7 @@ from flightid.record.hold import InputShape
 from flightid.responses.bands import choose_frequencies, nearest
 from flightid.responses.errors.linear_estimate import LinearEstimate
 from flightid.responses.errors.random_error import CovarianceSource, ErrorSelection
+from flightid.responses.excited_band import excited_band
 from flightid.responses.pair import PairResponse, quotient_unit
 from flightid.result import Result
 from flightid.table import Column, Table
@@ -314,7 +315,10 @@ class FrequencyResponse(
         )
 
     def summary(self) -> Table:
-        """Table of the pairs: usable band, coherence and random error in it."""
+        """Table of the pairs: usable band, coherence and random error.
+
+        In a closed loop the band ends where the power of what excited the input does.
+        """
         columns = (
             Column("output"),
             Column("input"),
@@ -329,7 +333,7 @@ class FrequencyResponse(
         for output in self.outputs:
             for name in self.inputs:
                 pair = self.pair(output, name)
-                band = pair.usable_band()
+                band = excited_band(self, output, name)
                 rows.append(
                     (
                         output,

@@ -1,0 +1,115 @@
+"""Where a response in a closed loop ends: above the power of what excited it, a loop shows itself.
+
+Beyond the last frequency of a sweep command and rate hang together by feedback alone: coherence is
+near one, and the quotient is the inverse of the controller, not the vehicle.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.conventions import Light
+from flightid.findings import Finding
+from flightid.responses.bands import COHERENT, coherent_parts
+from flightid.uncertainty.feedback import FeedbackTest
+
+STRONG = 0.01
+"""Power over the strongest, in equal parts of a decade: below it feedback outweighs a sweep."""
+FEWEST = 2
+"""Coherent frequencies above the end that make it worth a word."""
+
+
+class ExcitedResponse(Protocol):
+    """What a measured response tells of its inputs' power."""
+
+    @property
+    def omega_rad_s(self) -> NDArray[np.float64]:
+        """Frequencies, rad/s."""
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names."""
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names."""
+
+    @property
+    def coherence(self) -> NDArray[np.float64]:
+        """By output, input and frequency."""
+
+    @property
+    def input_spectrum(self) -> NDArray[np.complex128] | None:
+        """By two inputs and frequency."""
+
+    @property
+    def loop(self) -> FeedbackTest | None:
+        """Whether one was closed."""
+
+
+def excited_to(response: ExcitedResponse, input: str) -> float:
+    """Highest frequency that excited an input in a closed loop, rad/s.
+
+    Parameters
+    ----------
+    response : ExcitedResponse
+        A `FrequencyResponse`.
+    input : str
+
+    Returns
+    -------
+    float
+        Above it ω·S(ω) of the input stays 20 dB below its most; infinite where no loop was closed,
+        where nobody knows, or without spectra.
+
+    Example
+    -------
+    >>> import numpy as np, flightid as fid
+    >>> values = fid.FrequencyResponse.from_values([1.0, 2.0], [1j, 0.1j], inputs=["u"],
+    ...                                            outputs=["p"])
+    >>> excited_to(values, "u")
+    inf
+    """
+    loop = response.loop
+    if response.input_spectrum is None or loop is None:
+        return math.inf
+    if loop.loop != "closed" and not loop.is_taken_care_of:
+        return math.inf
+    place = response.inputs.index(input)
+    level = response.omega_rad_s * np.real(response.input_spectrum[place, place])
+    return float(response.omega_rad_s[np.flatnonzero(level >= STRONG * level.max())[-1]])
+
+
+def excited_band(
+    response: ExcitedResponse, output: str, input: str, minimum: float = COHERENT
+) -> tuple[float, float] | None:
+    """Widest coherent band of a pair, rad/s, up to where its input was excited; None without."""
+    end = excited_to(response, input)
+    coherence = response.coherence[response.outputs.index(output), response.inputs.index(input)]
+    parts = coherent_parts(response.omega_rad_s, coherence, minimum)
+    wide = [(low, min(high, end)) for low, high in parts if min(high, end) > low]
+    return max(wide, key=lambda part: part[1] / part[0]) if wide else None
+
+
+def end_findings(response: ExcitedResponse) -> list[Finding]:
+    """A word for each input above whose power its outputs are coherent still."""
+    found = []
+    for place, name in enumerate(response.inputs):
+        end = excited_to(response, name)
+        above = response.omega_rad_s > end
+        coherent = response.coherence[:, place, above] >= COHERENT
+        if np.any(np.sum(coherent, axis=1) >= FEWEST):
+            found.append(
+                Finding(
+                    "excitation-ends",
+                    Light.GREEN,
+                    f"{name} has power to {end:.3g} rad/s ({end / math.tau:.3g} Hz): what is "
+                    "coherent above it a closed loop feeds back, and is no response of the vehicle",
+                    "sweep further where the response is wanted there",
+                )
+            )
+    return found

@@ -1,0 +1,49 @@
+"""Responses of a closed loop end where their sweep does, although coherence goes on; NumPy's."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import flightid as fid
+from flightid.plot.response import response_figure
+from flightid.responses.excited_band import excited_to
+
+STEP_S, HIGHEST_HZ = 0.005, 4.0
+
+
+def _flown(gain: float) -> fid.Record:
+    """A damped rate that a controller of high gain feeds back, swept to 4 Hz, gusts above it."""
+    random, time_s = np.random.default_rng(0), np.arange(12_000) * STEP_S
+    sweep = np.sin(2.0 * np.pi * (0.1 + 0.5 * (HIGHEST_HZ - 0.1) * time_s / time_s[-1]) * time_s)
+    rate, rows = 0.0, np.zeros((2, time_s.size))
+    for k in range(time_s.size):
+        seen = rate + 0.02 * random.standard_normal()
+        rows[:, k] = sweep[k] - gain * seen, seen
+        rate += STEP_S * (-2.0 * rate + 20.0 * rows[0, k])
+    return fid.Record.from_arrays(time_s, inputs={"u": rows[0]}, outputs={"p": rows[1]})
+
+
+@pytest.mark.parametrize("loop", ["closed", "open"])
+def test_the_usable_band_of_a_closed_loop_ends_with_its_sweep(loop: str) -> None:
+    response = fid.estimate_response(_flown(1.0), loop=loop, band_rad_s=(1.0, 250.0))
+    pair = response.pair("p", "u")
+    beyond = response.omega_rad_s > 2.0 * math.tau * HIGHEST_HZ
+    assert np.median(pair.coherence[0:][beyond]) > 0.9
+    said = [each for each in response.findings if each.code == "excitation-ends"]
+    (row,) = response.summary().rows
+    greyed = response_figure(response, [("p", "u")]).layout["shapes"] or ()
+    boxes = [each for each in greyed if each["type"] == "rect"]
+    if loop == "open":
+        assert math.isinf(excited_to(response, "u"))
+        assert not said
+        assert not boxes
+        assert row[4] > 200.0
+        return
+    end = excited_to(response, "u") / math.tau
+    assert 0.8 * HIGHEST_HZ < end < 1.6 * HIGHEST_HZ
+    assert row[4] == excited_to(response, "u")
+    assert "a closed loop feeds back" in said[0].message
+    assert {each["x0"] for each in boxes} == {excited_to(response, "u")}
