@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from flightid.fleet.statistics.change_kind import DRIFT, STEP, change_kind
 from flightid.fleet.statistics.drift import FleetDrift, find_drift
 from flightid.fleet.statistics.events import FleetEvent
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
@@ -231,3 +232,16 @@ def test_errors_without_repeats_raise_few_alarms(short: float, odd_share: float)
         odd += sum(found.odd_flights.values())
     assert false <= 4  # without neighbours 13 and 21 of 25, with them none
     assert odd < 10 if odd_share == 0.0 else 80 < odd < 180
+
+
+@pytest.mark.parametrize(("gradual", "name", "other"), [(False, STEP, DRIFT), (True, DRIFT, STEP)])
+def test_a_change_is_seldom_called_by_the_other_kind(gradual: bool, name: str, other: str) -> None:
+    """Of 100 of 10 % in 40 flights at most 10 (5 % ± two errors); two thirds by their own name."""
+    rng, found = np.random.default_rng(31), []
+    for _ in range(100):
+        errors, time_s = rng.uniform(0.02, 0.05, 40), np.arange(40.0)
+        level = 0.1 * time_s / 39.0 if gradual else 0.1 * (time_s > 25)
+        noise = errors * rng.normal(size=40)
+        found.append(change_kind(1.0 + level + noise, np.diag(errors**2), time_s))
+    assert found.count(other) <= 10
+    assert found.count(name) >= 65

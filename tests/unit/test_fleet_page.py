@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import re
 from pathlib import Path
 
 import pytest
@@ -158,3 +159,17 @@ def test_the_command_answers_a_fleet_file_from_its_catalogue(tmp_path: Path) -> 
     assert "v00: Ltphi changed by -1" in text
     assert "new propellers  v02      Ltphi" in text
     assert " Lp " not in text
+
+
+def test_the_page_speaks_in_words_and_says_how_a_level_changed() -> None:
+    rows = fleet_rows(3)
+    for each in rows["parameters"]:
+        each["meaning"] = {"Lp": "roll damping", "Ltphi": "roll control power"}[each["name"]]
+    text = to_text(fleet_document(answer_questions(rows, covariates=["battery"])))
+    said = " ".join(text.split())
+    assert "v00: roll control power changed by -15 % (-" in said
+    assert ") at once" in said
+    assert re.search(
+        "v01: roll control power [0-9]+ % above the type, .*; roll damping normal", said
+    )
+    assert "Ltphi is roll control power" in said

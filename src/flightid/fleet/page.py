@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from flightid.conventions import Light
 from flightid.findings import Finding, counted
 from flightid.fleet.normality import MORE, quiet_light
 from flightid.fleet.pictures import history_picture, type_picture
 from flightid.fleet.statistics.answers import FleetAnswers, Row, TypeAnswers, fitted_share
+from flightid.fleet.statistics.change_kind import DRIFT, STEP
 from flightid.fleet.statistics.drift import FleetDrift, ParameterHistory
 from flightid.fleet.statistics.repeats import RepeatScatter
 from flightid.report.content import Block, Document, Lights, Paragraph, Section, TableBlock
@@ -88,11 +89,11 @@ def _light(vehicle: str, types: Sequence[TypeAnswers]) -> Finding:
     for each in types:
         for history in each.drift.alarms if each.drift is not None else ():
             if history.vehicle == vehicle:
-                said.append(_change_words(history))
+                said.append(_change_words(history, each.labels))
                 light = Light.RED
         for one in each.outliers.odd if each.outliers is not None else ():
             if one.vehicle == vehicle:
-                said.append(one.words())
+                said.append(one.words(each.labels))
                 light = Light.RED if light is Light.RED else Light.AMBER
     if not said:
         return quiet_light(vehicle, types)
@@ -100,17 +101,21 @@ def _light(vehicle: str, types: Sequence[TypeAnswers]) -> Finding:
     return Finding("vehicle", light, f"{vehicle}: {'; '.join(said)}", act)
 
 
-def _change_words(history: ParameterHistory) -> str:
+def _change_words(history: ParameterHistory, labels: Mapping[str, str]) -> str:
     change = history.change_percent
     ends = change.interval(shown())
     size = "" if change.value is None else f" by {change.value:+.2g} %"
     around = "" if ends is None else f" ({ends[0]:+.2g} to {ends[1]:+.2g} %)"
-    return f"{history.name} changed{size}{around}"
+    how = {STEP: " at once", DRIFT: " by and by"}.get(history.kind, "")
+    return f"{labels.get(history.name, history.name)} changed{size}{around}{how}"
 
 
 def _type_blocks(each: TypeAnswers) -> Iterator[Block]:
     for reason in each.reasons:
         yield Paragraph(f"Not answered: {reason}.")
+    if each.labels:
+        named = (f"{name} is {words}" for name, words in sorted(each.labels.items()))
+        yield Paragraph(f"In words: {', '.join(named)}.")
     if each.population is not None:
         yield TableBlock(each.population.summary())
         caption = (
@@ -120,7 +125,7 @@ def _type_blocks(each: TypeAnswers) -> Iterator[Block]:
         yield figure_block(type_picture(each.population), caption)
     if each.outliers is not None:
         many = len(each.outliers.vehicles) > SHOWN
-        yield TableBlock(each.outliers.summary(), folded=many and not each.outliers.odd)
+        yield TableBlock(each.outliers.summary(each.labels), folded=many and not each.outliers.odd)
     if each.drift is not None:
         yield from _drift_blocks(each.drift)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -38,6 +38,8 @@ class TypeAnswers:
     drift : FleetDrift or None
     reasons : tuple of str
         Why an answer is missing.
+    labels : mapping of str to str
+        Parameters in words, where their models have them: ``"Lp"`` to ``"roll damping"``.
     """
 
     type_name: str
@@ -47,6 +49,7 @@ class TypeAnswers:
     outliers: FleetOutliers | None
     drift: FleetDrift | None
     reasons: tuple[str, ...] = ()
+    labels: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +115,8 @@ def answer_questions(
             one = replace(one, drift=find_drift(flights, explained, events))
         elif drift:
             one = replace(one, reasons=(*one.reasons, UNDATED))
-        answers.append(one)
+        labels = {e["name"]: e["meaning"] for e in mine if e.get("meaning")}
+        answers.append(replace(one, labels=labels))
     return FleetAnswers(tuple(answers), tuple(rows["logs"]), undated)
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.fleet.statistics.change_kind import change_kind
 from flightid.fleet.statistics.covariates import (
     Covariate,
     CovariateDesign,
@@ -67,6 +68,8 @@ class ParameterHistory:
     false_share : float or None
         Benjamini–Hochberg over all vehicles and parameters; an alarm at 0.05 or less.
     events : tuple of EventEffect
+    kind : str
+        Of an alarm: ``"a step"``, ``"drift"``, or ``"changed"`` where its flights do not tell.
     """
 
     vehicle: str
@@ -82,6 +85,7 @@ class ParameterHistory:
     changed_s: tuple[float, float] | None
     false_share: float | None = None
     events: tuple[EventEffect, ...] = ()
+    kind: str = ""
 
     @property
     def chance(self) -> float | None:
@@ -156,7 +160,6 @@ class FleetDrift(Result, schema="flightid.fleet_drift/1"):
         rows: list[tuple[Cell, ...]] = []
         for each in self.alarms:
             low, high = each.change_percent.interval(level) or (None, None)
-            by = "a step" if (each.step_chance or 0.0) <= (each.walk_chance or 0.0) else "drift"
             rows.append(
                 (
                     each.vehicle,
@@ -165,7 +168,7 @@ class FleetDrift(Result, schema="flightid.fleet_drift/1"):
                     low,
                     high,
                     each.false_share,
-                    by,
+                    each.kind,
                 )
             )
         asked = sum(each.chance is not None for each in self.histories)
@@ -317,7 +320,13 @@ def _judged(histories: Sequence[ParameterHistory]) -> tuple[ParameterHistory, ..
     """Every history with its share of false alarms among all."""
     chances = [each.chance for each in histories]
     shares = iter(corrected([chance for chance in chances if chance is not None]))
-    return tuple(
+    judged = (
         each if chance is None else replace(each, false_share=float(next(shares)))
         for each, chance in zip(histories, chances, strict=True)
     )
+    return tuple(replace(e, kind=_kind(e)) if e.is_alarm else e for e in judged)
+
+
+def _kind(history: ParameterHistory) -> str:
+    """Whether an alarm is a step or drift, as far as its flights tell."""
+    return change_kind(history.values, np.diag(history.variances), history.time_s)
