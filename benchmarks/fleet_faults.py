@@ -1,0 +1,185 @@
+"""What a run of a fleet loses where something is ended with -9 at random, or the disk is full.
+
+Each row: logs in the catalogue when it happened, how the run ended, what was there afterwards, and
+what the next run still had to take. Lost is what had been told as done and is not in the catalogue.
+FLIGHTID_FLEET_LOGS says how many logs a run has (default 40, refused at once; every fourth real).
+"""
+
+from __future__ import annotations
+
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from time import monotonic, sleep
+
+from benchmarks.fleet_throughput import EXAMPLE
+from flightid import fleet
+from flightid.errors import DataError
+from flightid.table import Column, Table
+
+PATIENCE_S = 300.0
+
+
+def run() -> Table:
+    """One row a fault."""
+    count, draws = int(os.environ.get("FLIGHTID_FLEET_LOGS", "40")), random.Random(1)
+    faults: dict[str, Callable[[Path, int, random.Random], tuple[object, ...]]] = {
+        "log process": _killed("process"),
+        "worker": _killed("worker"),
+        "nanny": _killed("nanny"),
+        "client": _killed("client"),
+        "scheduler, by tcp": _scheduler,
+        "full disk": _full_disk,
+        "hanging and greedy logs": _misbehaved,
+    }
+    rows = []
+    for name, fault in faults.items():
+        with tempfile.TemporaryDirectory() as folder:
+            try:
+                rows.append((name, *fault(Path(folder), count, draws)))
+            except (OSError, subprocess.SubprocessError) as error:
+                rows.append((name, None, str(error)[:60], None, None, None, None))
+    columns = (
+        *(Column("ended"), Column("done then"), Column("exit code"), Column("done after")),
+        *(Column("lost"), Column("taken by the next run"), Column("its time", "s", 3)),
+    )
+    return Table(f"Faults in runs of {count} logs", columns, tuple(rows))
+
+
+def _fleet(folder: Path, count: int, extra: str = "") -> Path:
+    for name in ("fleet.toml", "study.toml"):
+        shutil.copy(EXAMPLE / name, folder)
+    if extra:
+        path = folder / "fleet.toml"
+        path.write_text(path.read_text().replace("time_s = 300", extra))
+    real = max(count // 4, 1)
+    command = [sys.executable, str(EXAMPLE / "fly.py"), str(folder / "logs"), "1", str(real)]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    for number in range(count - real):
+        path = folder / "logs" / f"V{number % 9 + 1:02}-2026{number % 12 + 1:02}01-{number}.bin"
+        path.write_bytes(b"no log %d" % number)
+    return folder / "fleet.toml"
+
+
+def _begun(path: Path, *options: str) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-m", "flightid", "fleet", "run", str(path), *options]
+    return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+
+def _done(path: Path) -> int:
+    try:
+        return fleet.fleet_status(path).n_logs
+    except DataError:
+        return 0
+
+
+def _until(path: Path, running: subprocess.Popen[bytes], count: int) -> int:
+    """Wait until so many logs are done, or the run is over; how many there are."""
+    deadline = monotonic() + PATIENCE_S
+    while (done := _done(path)) < count and running.poll() is None and monotonic() < deadline:
+        sleep(0.05)
+    return done
+
+
+def _finished(
+    path: Path, running: subprocess.Popen[bytes], then: int, count: int
+) -> tuple[object, ...]:
+    code = running.wait(timeout=PATIENCE_S)
+    after = _done(path)
+    begun = monotonic()
+    again = fleet.run_fleet(path, workers=2)
+    took_s = monotonic() - begun
+    assert _done(path) == count, f"{_done(path)} of {count} logs in the catalogue at the end"
+    with fleet.open(path) as catalogue:
+        ((rows, logs),) = catalogue.query(
+            "SELECT count(*), count(DISTINCT log) FROM logs"
+        ).fetchall()
+    assert rows == logs, "a log counts twice"
+    return then, code, after, max(then - after, 0), sum(again.outcomes.values()), took_s
+
+
+def _killed(victim: str) -> Callable[[Path, int, random.Random], tuple[object, ...]]:
+    def fault(folder: Path, count: int, draws: random.Random) -> tuple[object, ...]:
+        path = _fleet(folder, count)
+        running = _begun(path, "--workers", "2")
+        then = _until(path, running, draws.randrange(2, count // 2))
+        for pid in _victims(running.pid, victim)[:1]:
+            os.kill(pid, signal.SIGKILL)
+        return _finished(path, running, then, count)
+
+    return fault
+
+
+def _victims(pid: int, kind: str) -> list[int]:
+    """Processes of a run on a cluster of this machine; its nannies are threads of the client."""
+    import psutil  # noqa: PLC0415 - comes with Dask
+
+    below = psutil.Process(pid).children(recursive=True)
+    logs = [each for each in below if "engine.child" in " ".join(each.cmdline())]
+    if kind == "process":
+        return [each.pid for each in logs]
+    if kind == "worker":
+        return [each.ppid() for each in logs]
+    return [pid]
+
+
+def _dask(*arguments: str) -> subprocess.Popen[bytes]:
+    kind, *rest = arguments
+    command = [sys.executable, "-m", f"distributed.cli.dask_{kind}", *rest, "--no-dashboard"]
+    return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+
+def _scheduler(folder: Path, count: int, draws: random.Random) -> tuple[object, ...]:
+    path, port = _fleet(folder, count), draws.randrange(20_000, 30_000)
+    address = f"tcp://127.0.0.1:{port}"
+    scheduler = _dask("scheduler", "--host", "127.0.0.1", "--port", str(port))
+    worker = _dask("worker", address, "--nthreads", "1", "--death-timeout", "30")
+    try:
+        running = _begun(path, "--scheduler", address)
+        then = _until(path, running, draws.randrange(2, count // 2))
+        scheduler.kill()
+        return _finished(path, running, then, count)
+    finally:
+        for process in (scheduler, worker):
+            process.kill()
+            process.wait()
+
+
+def _full_disk(folder: Path, count: int, draws: random.Random) -> tuple[object, ...]:
+    del draws
+    disk = folder / "disk"
+    disk.mkdir()
+    size = ["-o", "size=160k"]
+    subprocess.run(["mount", "-t", "tmpfs", *size, "tmpfs", str(disk)], check=True)
+    try:
+        path = _fleet(folder, count)
+        place = f'study = "study.toml"\ncatalogue = "{disk}/catalogue"'
+        path.write_text(path.read_text().replace('study = "study.toml"', place))
+        running = _begun(path, "--workers", "2")
+        running.wait(timeout=PATIENCE_S)
+        then = _done(path)
+        subprocess.run(["mount", "-o", "remount,size=64m", str(disk)], check=True)
+        return _finished(path, running, then, count)
+    finally:
+        subprocess.run(["umount", str(disk)], check=False)
+
+
+def _misbehaved(folder: Path, count: int, draws: random.Random) -> tuple[object, ...]:
+    """A pattern that never ends on one name, and a log too long for its process's memory."""
+    del draws
+    path = _fleet(folder, count - 2, "time_s = 20\nmemory_mib = 900")
+    text = path.read_text().replace('pattern = "^(V[0-9]+)-"', 'pattern = "^(V[0-9]+)-|^(a+)+$"')
+    path.write_text(text)
+    (folder / "logs" / f"{'a' * 60}.bin").write_bytes(b"hangs")
+    with (folder / "logs" / "V01-20260101-long.bin").open("wb") as file:
+        shutil.copyfileobj((folder / "logs" / "V00-2026-01-05.bin").open("rb"), file)
+        file.truncate(1 << 30)
+    running = _begun(path, "--workers", "2")
+    then = _until(path, running, count)
+    return _finished(path, running, then, count)
