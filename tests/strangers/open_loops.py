@@ -1,0 +1,77 @@
+"""Loops that `advise` sees in records of open ones, and the delays that it tells.
+
+Run: python -m tests.strangers.open_loops --runs 500 [--first-seed 6000]. Rigs of SciPy, moved in
+four ways, by an input that repeats, and lightly damped ones (ζ 0.02); 1 % is the nominal rate.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections import Counter
+
+import numpy as np
+from scipy.signal import cont2discrete, lfilter
+
+import flightid as fid
+from tests.strangers.rig_lights import INPUTS, STEP_S, Array, Rig, injected, noise
+
+KINDS = (*INPUTS, "repeats", "light")
+ZETA, PERIOD, SAMPLES = 0.02, 300, 2400
+
+
+def drawn(seed: int) -> tuple[str, int, fid.Record]:
+    """Kind, samples until the input acts, and the record."""
+    random = np.random.default_rng([seed, 1906])
+    kind, rig = KINDS[seed % len(KINDS)], Rig(random)
+    u = _input(random, kind, rig.omega)
+    y, late = rig.answer(u), rig.delay + 1
+    if kind == "light":
+        den = [rig.omega**-2, 2.0 * ZETA / rig.omega, 1.0]
+        b, a, _ = cont2discrete(([2.0], den), STEP_S, "zoh")
+        y = lfilter(np.concatenate([np.zeros(rig.delay), b.ravel()]), a, u)
+    y = y + noise(random, y.size, float(random.uniform(0.02, 0.2)) * float(np.std(y)))
+    time_s = np.arange(y.size) * STEP_S
+    record = fid.Record.from_arrays(time_s, inputs={"u": u}, outputs={"y": y}, hold="zero")
+    return kind, late, record
+
+
+def _input(random: np.random.Generator, kind: str, omega: float) -> Array:
+    if kind == "repeats":
+        held = max(round(0.5 / omega / STEP_S), 1)
+        levels = np.repeat(random.choice([-1.0, 1.0], PERIOD), held)[:PERIOD]
+        return np.resize(levels, SAMPLES)
+    return injected(random, "prbs" if kind == "light" else kind, SAMPLES, omega)
+
+
+def main() -> None:
+    """Count by kind: records, loops that are not there, delays told, off by more than a sample."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--runs", type=int, default=500)
+    parser.add_argument("--first-seed", type=int, default=6000)
+    parser.add_argument("--until-s", type=float, default=np.inf, help="stop after so many seconds")
+    asked = parser.parse_args()
+    counts: Counter[tuple[str, str]] = Counter()
+    begun = time.monotonic()
+    for seed in range(asked.first_seed, asked.first_seed + asked.runs):
+        if time.monotonic() - begun > asked.until_s:
+            break
+        kind, late, record = drawn(seed)
+        found = fid.advise(record)
+        told = found.delays.get("u")
+        off = told is not None and abs(told - late) > 1
+        closed = found.feedback.is_closed
+        facts = {"records": True, "closed": closed, "told": told is not None, "off": off}
+        counts.update(
+            (each, name) for name, true in facts.items() if true for each in (kind, "all")
+        )
+        if closed or off:
+            print(f"{seed} {kind}: {found.feedback}; delay {told} of {late}", flush=True)
+    print(f"{'':12s} records  closed    told  off by more than one")
+    for kind in (*KINDS, "all"):
+        row = (counts[kind, name] for name in ("records", "closed", "told", "off"))
+        print(f"{kind:12s}" + "".join(f"{value:8d}" for value in row))
+
+
+if __name__ == "__main__":
+    main()
