@@ -124,6 +124,13 @@ def _regression(structure: PolynomialStructure, data: SampledChannels) -> Search
         theta, known = four_stage(structure, data)
         found = _linear(structure, theta, known.covariance, degrees, "instruments", skip)
         return replace(found, freedom=known.freedom, colour=known.colour, agreement=known.agreement)
+    if degrees < 1:
+        raise DataError(
+            "the records leave no errors beside the coefficients",
+            found=f"{made.n_rows} equations of {made.theta.size} coefficients",
+            needed="more equations than coefficients",
+            action="lower the orders, or take longer records",
+        )
     covariance = made.sum_of_squares / degrees * inverse_square(made.factor)
     return _linear(structure, made.theta, covariance, degrees, "regression", skip)
 
