@@ -15,7 +15,8 @@ from flightid.conditioning.kinematics import OUTPUTS, UNITS, KinematicModel, rot
 from flightid.conventions import STANDARD_GRAVITY_M_S2
 from flightid.errors import DataError, OptionError, SingularError, UnitError, UnknownNameError
 from flightid.record import Record
-from flightid.uncertainty.residual_noise import autoregression, periodogram
+from flightid.uncertainty.periodograms import periodogram
+from flightid.uncertainty.residual_noise import autoregression
 from tests.closeness import assert_close
 
 TRUTH = {

@@ -11,7 +11,8 @@ from scipy.signal import lfilter
 from flightid.conditioning import check_consistency
 from flightid.conditioning.kinematics import INPUTS, KinematicModel
 from flightid.uncertainty.input_noise import white_deviation
-from flightid.uncertainty.residual_noise import autoregression, periodogram
+from flightid.uncertainty.periodograms import periodogram
+from flightid.uncertainty.residual_noise import autoregression
 from tests.closeness import assert_close
 from tests.truth.test_consistency import FORCES, TRUTH, flight
 

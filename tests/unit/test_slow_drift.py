@@ -11,14 +11,14 @@ from scipy.signal import lfilter
 
 import flightid as fid
 from flightid.uncertainty.driven_noise import driven_products
+from flightid.uncertainty.periodograms import periodogram
 from flightid.uncertainty.residual_noise import (
     Autoregression,
     _fitted,
     _lags,
     autoregression,
-    periodogram,
 )
-from flightid.uncertainty.slow_drift import FASTEST, SLOWEST, Drift, _is_slow, _parted
+from flightid.uncertainty.slow_drift import FASTEST, SLOWEST, Drift, _parted, is_slow
 from tests.closeness import assert_close
 from tests.strangers import noises, output_error
 
@@ -74,7 +74,7 @@ def test_a_look_is_worth_one_and_a_half_deviations(excess: float, *, slow: bool)
     # Four half cycles of n samples are eight bins of twice the length: a deviation is four.
     ratio = np.ones(1001)
     ratio[2] += excess
-    assert _is_slow(ratio, 1000, 2000) is slow
+    assert is_slow(ratio, 1000, 2000) is slow
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -8,7 +8,7 @@ the same for every hold.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, Self
 
@@ -30,15 +30,16 @@ from flightid.models import GreyBoxModel
 from flightid.record import Record
 from flightid.record.hold import InputHold
 from flightid.responses import FrequencyResponse
-from flightid.uncertainty.blocks import RecordBlock
 from flightid.uncertainty.foretold import expected_gain, likelihood_gain
-from flightid.uncertainty.triangle import triangle_of_rows
+from flightid.uncertainty.triangle import triangle_of_parts
 
 Array = NDArray[np.float64]
 RIDGE = 1e-9
 """Added to the power of what is left, as white noise."""
 FAR = 100.0
 """Residual over an output's deviation beyond which a model follows nothing."""
+AT_ONCE = 1 << 16
+"""Rows that are turned into a triangle together."""
 LAGS = 20
 """Of the filters that take colour out."""
 STEPS = 2
@@ -229,22 +230,28 @@ def _steps(
 ) -> list[Array]:
     """Least squares: changes of the shared parameters and of each record's own numbers."""
     weights = 1.0 / np.where(sizes > 0.0, sizes, 1.0)
-    blocks, rests = [], []
-    for rest, slope in zip(left, slopes, strict=True):
-        white = slope * weights[:, None, None]
-        rests.append((rest * weights[:, None]).ravel())
-        blocks.append(RecordBlock.of(white[:, :, :n_free], white[:, :, n_free:], rest))
-    # The triangle holds all that least squares ask, of as many rows as there are numbers.
-    columns = np.vstack(
-        [np.column_stack([each.projected, rest]) for each, rest in zip(blocks, rests, strict=True)]
-    )
-    triangle = triangle_of_rows(columns)
-    shared = np.linalg.lstsq(triangle[:, :-1], triangle[:, -1])[0]
+    # Triangles hold all that least squares ask, of as many rows as there are numbers.
+    triangles = [
+        triangle_of_parts(_weighed(rest, slope, weights, n_free))
+        for rest, slope in zip(left, slopes, strict=True)
+    ]
+    n_own = [each.shape[1] - n_free - 1 for each in triangles]
+    whole = triangle_of_parts(each[m:, m:] for each, m in zip(triangles, n_own, strict=True))
+    shared = np.linalg.lstsq(whole[:, :-1], whole[:, -1])[0]
     found = []
-    for block, rest in zip(blocks, rests, strict=True):
-        inner = block.basis.T @ rest - block.shared_on_own @ shared
-        found.append(np.concatenate([shared, np.linalg.lstsq(block.triangle, inner)[0]]))
+    for each, m in zip(triangles, n_own, strict=True):
+        inner = each[:m, -1] - each[:m, m:-1] @ shared
+        found.append(np.concatenate([shared, np.linalg.lstsq(each[:m, :m], inner)[0]]))
     return found
+
+
+def _weighed(left: Array, slopes: Array, weights: Array, n_free: int) -> Iterator[Array]:
+    """Rows of a record: own numbers' slopes, the shared ones', what is left."""
+    for rest, slope, weight in zip(left, slopes, weights, strict=True):
+        for begin in range(0, len(rest), AT_ONCE):
+            rows = slice(begin, begin + AT_ONCE)
+            parts = slope[rows, n_free:], slope[rows, :n_free], rest[rows]
+            yield weight * np.column_stack(parts)
 
 
 def _free_values(numbers: OwnNumbers) -> Array:

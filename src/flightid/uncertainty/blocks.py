@@ -9,8 +9,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.uncertainty.fitted_directions import FittedDirections
 from flightid.uncertainty.parts import LEAST_INFORMATION, RecordParts
-from flightid.uncertainty.residual_noise import Autoregression, FittedDirections
+from flightid.uncertainty.residual_noise import Autoregression
 
 Array = NDArray[np.float64]
 AT_ONCE = 4096
@@ -55,6 +56,10 @@ class RecordBlock:
         shares = _information(self.projected).reshape(self.residual.shape)
         return middle_of(shares.sum(axis=0))
 
+    def of_output(self, output: int) -> tuple[Array, Array]:
+        """Rows of one output: `basis` and `projected`, (n_samples, k) each."""
+        return _of_output(self.basis, self, output), _of_output(self.projected, self, output)
+
     @classmethod
     def of(cls, shared: Array, own: Array, residual: Array) -> RecordBlock:
         """From sensitivities by shared parameters and by own numbers, (n_outputs, n_samples, k)."""
@@ -65,15 +70,23 @@ class RecordBlock:
         projected = shared - basis @ on_own if own.size else shared
         return cls(projected, on_own, basis, triangle, residual)
 
-    def along(self, directions: Array) -> RecordBlock:
-        """The same by combinations of the parameters, one a column."""
+    def along(self, directions: Array, *, overwrite: bool = False) -> RecordBlock:
+        """The same by combinations of the parameters, one a column.
+
+        With `overwrite` in the memory of this block's sensitivities, which are then no longer its.
+        """
+        half = self.middle
         answering = None if self.answering is None else self.answering @ directions
+        turned = self.projected if overwrite else np.empty_like(self.projected)
+        for begin in range(0, len(turned), AT_ONCE):
+            rows = slice(begin, begin + AT_ONCE)
+            turned[rows] = self.projected[rows] @ directions
         return replace(
             self,
-            projected=self.projected @ directions,
+            projected=turned,
             shared_on_own=self.shared_on_own @ directions,
             answering=answering,
-            half=self.middle,
+            half=half,
         )
 
 
@@ -132,7 +145,7 @@ def _of_output(part: Array, block: RecordBlock, output: int) -> Array:
 
 def _halves(block: RecordBlock, output: int) -> Array:
     """[basis, projected in the first half, projected in the second] of one output, (n, m + 2 n)."""
-    own, shared = (_of_output(part, block, output) for part in (block.basis, block.projected))
+    own, shared = block.of_output(output)
     m, count, half = own.shape[1], shared.shape[1], block.middle
     wide = np.zeros((len(shared), m + 2 * count))
     wide[:, :m] = own
@@ -143,7 +156,7 @@ def _halves(block: RecordBlock, output: int) -> Array:
 
 def _squares_of_halves(block: RecordBlock, output: int) -> Array:
     """Products of `_halves`, of which one is zero where the other is not."""
-    own, shared = (_of_output(part, block, output) for part in (block.basis, block.projected))
+    own, shared = block.of_output(output)
     m, count, half = own.shape[1], shared.shape[1], block.middle
     found = np.zeros((m + 2 * count, m + 2 * count))
     found[:m, :m] = own.T @ own
@@ -234,9 +247,7 @@ def _flight(answers: Array, block: RecordBlock) -> RecordParts:
     scores, square = np.zeros((2, count)), np.zeros((2, count, count))
     on_own = np.zeros((block.basis.shape[1], 2, count))
     for output, residual in enumerate(block.residual):
-        shared, answer, own = (
-            _of_output(part, block, output) for part in (block.projected, answering, block.basis)
-        )
+        (own, shared), answer = block.of_output(output), _of_output(answering, block, output)
         for place, rows in enumerate((slice(None, block.middle), slice(block.middle, None))):
             # A half meets what answers there alone.
             scores[place] += residual[rows] @ shared[rows]

@@ -31,12 +31,12 @@ from flightid.uncertainty.blocks import (
     rest_of,
 )
 from flightid.uncertainty.fitted_correlation import FitResponse, FittedCorrelation
+from flightid.uncertainty.fitted_directions import FittedDirections
 from flightid.uncertainty.input_noise import InputNoise
+from flightid.uncertainty.periodograms import periodogram
 from flightid.uncertainty.residual_noise import (
     Autoregression,
-    FittedDirections,
     noise_models,
-    periodogram,
 )
 from flightid.uncertainty.triangle import triangle_of_rows
 
@@ -158,6 +158,7 @@ def residual_covariance(
     inputs: Sequence[Array] | None = None,
     *,
     coloured: bool = True,
+    overwrite: bool = False,
 ) -> ResidualCovariance:
     """Covariance of estimates by the colour of their residuals.
 
@@ -174,6 +175,8 @@ def residual_covariance(
         By record: tested for what they foretell of the residuals.
     coloured : bool
         False takes residuals for white, of the power that they have.
+    overwrite : bool
+        Whether the sensitivities of the blocks may be lost, which saves as much memory again.
 
     Returns
     -------
@@ -203,7 +206,7 @@ def residual_covariance(
     triangle = triangle_of(blocks, None if beside is None else beside.slopes)
     root = _inverse_root(triangle)
     # In directions of unit information squares keep their digits, however nearly singular it is.
-    whitened = [block.along(root) for block in blocks]
+    whitened = [block.along(root, overwrite=overwrite) for block in blocks]
     slopes = None if beside is None else beside.along(root)
     inner = _gain(slopes, whitened)
     half = root @ inner
@@ -222,7 +225,7 @@ def residual_covariance(
         brought = slopes.slopes @ half.T
         shared = shared + brought.T @ brought
     if noise is not None:
-        brought = _of_walks(blocks[0], *noise) @ turned.T
+        brought = _of_walks(whitened[0], *noise) @ half.T
         shared = shared + brought.T @ brought
     own, crossed = [], []
     for block, each, m in zip(blocks, answers, sizes, strict=True):
@@ -242,9 +245,7 @@ def residual_covariance(
     # Random walks from noise of inputs join whatever parts a record is cut into.
     compared = []
     if noise is None:
-        compared = flights_of(
-            [_turned_back(each, triangle, m) for each, m in zip(apart, sizes, strict=True)], blocks
-        )
+        compared = [flight.along(triangle) for flight in flights_of(apart, whitened)]
     rest = rest_of(compared, beside)
     tested = () if inputs is None else _tested(whitened, models, answers, inner, slopes, inputs)
     agreed = compare_parts(compared, turned, _lifted(shared, white), freedom, rest)
@@ -351,14 +352,6 @@ def _gain(beside: JointResiduals | None, blocks: Sequence[RecordBlock]) -> Array
         return np.eye(count)
     follows = beside.slopes.T @ (beside.slopes - beside.total)
     return np.asarray(np.linalg.inv(np.eye(count) - follows), dtype=np.float64)
-
-
-def _turned_back(apart: Array, triangle: Array, m: int) -> Array:
-    """Squares of `noise_heard` by the parameters, from those along directions of a triangle."""
-    turn = np.eye(apart.shape[1])
-    for half in np.split(np.arange(m, len(turn)), 2):
-        turn[np.ix_(half, half)] = triangle
-    return np.asarray(turn.T @ apart @ turn)
 
 
 def _walks(taken: FittedDirections, noise: InputNoise, whitener: Array) -> Array:

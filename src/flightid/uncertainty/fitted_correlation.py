@@ -111,7 +111,7 @@ class FitResponse:
         plain, found = np.asarray(sum(squares)), []
         for output, noise in enumerate(self.models):
             heard = [
-                np.column_stack([_parts(block, output), block.residual[output]])
+                np.column_stack([*block.of_output(output), block.residual[output]])
                 for block in self.blocks
             ]
             met = [u.products(x) for u, x in zip(lagged, heard, strict=True)]
@@ -162,8 +162,8 @@ class FitResponse:
         for place, (own, square, answer) in enumerate(zip(met, squares, self.answers, strict=True)):
             taken = np.vstack([own[: len(own) - 1 - n], through])
             if not noise.is_white:
-                u, x = columns[place], _parts(self.blocks[place], output)
-                whole = noise.squared(np.concatenate([u.T, x.T]).T)
+                u, parts = columns[place], self.blocks[place].of_output(output)
+                whole = noise.squared(np.concatenate([u.T, *(x.T for x in parts)]).T)
                 k = u.shape[1]
                 heard, cross = whole[:k, :k], whole[:k, k:] @ taken
             else:
@@ -219,9 +219,3 @@ def _quadratic(raw: Array, covariance: Array, squares: Array) -> tuple[float, in
         return None
     along = axes[:, kept].T @ (raw / size)
     return float(np.sum(along**2 / spread[kept])), int(np.count_nonzero(kept))
-
-
-def _parts(block: RecordBlock, output: int) -> Array:
-    """Rows of one output: basis of the own numbers, then projected sensitivities."""
-    whole = np.concatenate([block.basis, block.projected], axis=1)
-    return np.asarray(whole.reshape(*block.residual.shape, -1)[output])

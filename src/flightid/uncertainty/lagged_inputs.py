@@ -71,7 +71,9 @@ class LaggedInputs:
     @cached_property
     def _totals(self) -> Array:
         """Sums of inputs at their lags, before means are taken out."""
-        return np.asarray(self._with_lags(np.ones((self.centred.shape[1], 1)))[0])
+        last = self.centred[:, ::-1][:, : self.n_lags - 1]
+        dropped = np.concatenate([np.zeros((len(last), 1)), np.cumsum(last, axis=1)], axis=1)
+        return np.asarray((self.centred.sum(axis=1)[:, None] - dropped).ravel())
 
     @cached_property
     def _padded(self) -> Array:

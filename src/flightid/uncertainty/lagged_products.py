@@ -17,6 +17,8 @@ Array = NDArray[np.float64]
 Places = NDArray[np.intp]
 RIDGE = 1e-11
 """Added to columns of unit length: noise 110 dB below each channel."""
+AT_ONCE = 8192
+"""Samples that are met by all lags together: they stay in the cache."""
 UNEVEN = 1e-3
 """Share of a channel's largest power at any lag below which one of it is rounding of the others."""
 
@@ -137,10 +139,12 @@ def products_with_past(news: Sequence[Array], records: Sequence[Array], longest:
     -------
     ndarray, shape (longest + 1, n_channels, n_news)
     """
-    both = list(zip(news, records, strict=True))
     found = np.zeros((longest + 1, len(records[0]), len(news[0])))
-    for lag in range(longest + 1):
-        for new, rows in both:
-            stop = rows.shape[1] - lag
-            found[lag] += rows[:, stop - new.shape[1] : stop] @ new.T
+    for new, rows in zip(news, records, strict=True):
+        ahead = rows.shape[1] - new.shape[1]
+        for begin in range(0, new.shape[1], AT_ONCE):
+            here = np.ascontiguousarray(new[:, begin : begin + AT_ONCE].T)
+            first = ahead + begin
+            for lag in range(longest + 1):
+                found[lag] += rows[:, first - lag : first - lag + len(here)] @ here
     return found

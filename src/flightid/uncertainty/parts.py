@@ -50,6 +50,14 @@ class RecordParts:
             self.noise.sum(axis=(0, 2))[None, :, None],
         )
 
+    def along(self, directions: Array) -> RecordParts:
+        """The same by combinations of the parameters, one a column."""
+        return RecordParts(
+            self.scores @ directions,
+            directions.T @ self.information @ directions,
+            np.einsum("kiml,ij,lp->kjmp", self.noise, directions, directions, optimize=True),
+        )
+
     def of(self, count: int) -> RecordParts:
         """The same of the first parameters alone."""
         return RecordParts(

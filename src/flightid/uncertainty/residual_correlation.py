@@ -11,11 +11,11 @@ import scipy
 from numpy.typing import NDArray
 
 from flightid.errors import DataError, OptionError, ShapeError
+from flightid.uncertainty.periodograms import periodogram
 from flightid.uncertainty.quantiles import half_width
 from flightid.uncertainty.residual_noise import (
     LARGEST_ORDER,
     autoregression,
-    periodogram,
 )
 
 Array = NDArray[np.float64]

@@ -18,7 +18,9 @@ from numpy.typing import NDArray
 
 from flightid._native import autoregression_weights
 from flightid.uncertainty.driven_noise import driven_products
-from flightid.uncertainty.slow_drift import Drift, apart
+from flightid.uncertainty.fitted_directions import FittedDirections, WhiteNoiseLoss
+from flightid.uncertainty.periodograms import leaking, pooled, transform_length
+from flightid.uncertainty.slow_drift import Drift, apart, is_slow, n_slow_bins
 
 Array = NDArray[np.float64]
 LARGEST_ORDER = 20
@@ -192,11 +194,12 @@ def autoregression(
 
     Example
     -------
+    >>> from flightid.uncertainty.periodograms import periodogram
     >>> white = np.random.default_rng(0).standard_normal((4000, 1))
     >>> autoregression(periodogram(white), 4000).autocovariance(3).round(1)
     array([1., 0., 0.])
     """
-    length = _length(n) if length is None else length
+    length = transform_length(n) if length is None else length
     model = _fitted(power, n, length)
     if known is None:
         fast, drift = apart(model, power, n, length, lambda part: _fitted(part, n, length))
@@ -224,51 +227,9 @@ def _fitted(power: Array, n: int, length: int) -> Autoregression:
     return Autoregression(lags, weights, n, length)
 
 
-def periodogram(columns: Array, length: int | None = None) -> Array:
-    """Mean periodogram of columns (n, k), zero-padded to the next fast length from 2 n."""
-    n = columns.shape[0]
-    transform = scipy.fft.rfft(columns, _length(n) if length is None else length, axis=0)
-    return np.asarray(np.mean(np.abs(transform) ** 2, axis=1) / n)
-
-
-def pooled(records: Sequence[Array], length: int) -> Array:
-    """Mean periodogram of records (n, k) of several lengths, by their samples."""
-    total = sum(len(each) for each in records)
-    return np.asarray(sum(len(each) * periodogram(each, length) for each in records) / total)
-
-
-def _length(n: int) -> int:
-    """Fast transform length with room for all lags of n samples."""
-    return int(scipy.fft.next_fast_len(2 * n, real=True))
-
-
-def _leaking(spectrum: Array, lengths: Sequence[int], length: int) -> Array:
-    """Mean periodogram of records with this spectrum: lag k is seen n - k times in n."""
-    k = np.arange(max(lengths))
-    seen = sum(np.maximum(n - k, 0) for n in lengths) / sum(lengths)
-    lags = scipy.fft.irfft(spectrum, length)[: k.size] * seen
-    return np.asarray(2 * scipy.fft.rfft(lags, length).real - lags[0])
-
-
 def _lags(power: Array, length: int, largest: int) -> Array:
     """Autocovariance at lags 0 to `largest` from a zero-padded periodogram."""
     return np.asarray(scipy.fft.irfft(power, length)[: largest + 1])
-
-
-@dataclass(frozen=True)
-class FittedDirections:
-    """Orthonormal directions along which a fit takes noise out of one record's residuals.
-
-    Attributes
-    ----------
-    own : ndarray, shape (n_outputs, n, n_own)
-        Of numbers that belong to this record.
-    shared : ndarray, shape (n_outputs, n, n_shared)
-        Of parameters; orthonormal over all records together.
-    """
-
-    own: Array
-    shared: Array
 
 
 def noise_models(
@@ -299,13 +260,12 @@ def noise_models(
     array([1., 0.])
     """
     lengths = [each.shape[1] for each in residuals]
-    total, length, n_outputs = sum(lengths), _length(max(lengths)), residuals[0].shape[0]
+    total, length, n_outputs = sum(lengths), transform_length(max(lengths)), residuals[0].shape[0]
     outputs = range(n_outputs)
     seen = np.array([pooled([each[o][:, None] for each in residuals], length) for o in outputs])
-    directions = [
-        [_transform(part, length) for part in np.concatenate([each.own, each.shared], axis=2)]
-        for each in taken
-    ]
+    if known is None and (white := _white_models(seen, taken, total, length)) is not None:
+        return white
+    directions = [[_transform(part, length) for part in each.together] for each in taken]
     lost = np.zeros_like(seen)
     models: list[Autoregression] = []
     for round_ in range(RESTORATIONS + 1):
@@ -320,7 +280,38 @@ def noise_models(
             # White noise has one lag, which ends with no record.
             if not model.is_white:
                 spectrum = model.spectrum()
-                lost[o] += spectrum - _leaking(spectrum, lengths, length)
+                lost[o] += spectrum - leaking(spectrum, lengths, length)
+    return models
+
+
+def _white_models(
+    seen: Array, taken: Sequence[FittedDirections], total: int, length: int
+) -> list[Autoregression] | None:
+    """The rounds of `noise_models` where all noise is white in each of them; else None.
+
+    First lags and slowest bins of a periodogram tell a white model.
+    """
+    count, bins = min(LARGEST_ORDER, total // 20) + 1, n_slow_bins(total, length)
+    lags = np.array([_lags(power, length, count - 1) for power in seen])
+    slow, directions = seen[:, :bins], None
+    models = _all_white(lags, slow, total, length)
+    for _ in range(RESTORATIONS):
+        if models is None:
+            return None
+        directions = directions or WhiteNoiseLoss.of(taken, length, count, slow.shape[1])
+        more, lower = directions.of_levels(np.array([model.lags[0] for model in models]))
+        models = _all_white(lags + more / total, slow + lower / total, total, length)
+    return models
+
+
+def _all_white(lags: Array, slow: Array, n: int, length: int) -> list[Autoregression] | None:
+    models = []
+    for own, power in zip(lags, slow, strict=True):
+        weights, sound = autoregression_weights(own, n)
+        level = max(float(own[0]), np.finfo(float).tiny)
+        if weights.size or not sound or is_slow(power / level, n, length):
+            return None
+        models.append(Autoregression(own, weights, n, length))
     return models
 
 

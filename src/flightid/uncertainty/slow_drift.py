@@ -131,7 +131,7 @@ def apart(
     Estimation and information in stationary time series, Arkiv foer Matematik 2(23).
     """
     level = np.maximum(plain.spectrum(), np.finfo(float).tiny)
-    if not _is_slow(power / level, n, length):
+    if not is_slow(power / level, n, length):
         return plain, None
     whole = np.maximum(power, 0.0)
     count = max(2, 1 + round(np.log(FASTEST * n / SLOWEST) / np.log(STEP)))
@@ -182,8 +182,23 @@ def _criterion(spectrum: Array, numbers: int, whole: Array, n: int) -> float:
     return float(-n * np.mean(fit) - numbers * np.log(n))
 
 
-def _is_slow(ratio: Array, n: int, length: int) -> bool:
-    """Whether octaves of the slowest bins hold more power than a model gives them."""
+def n_slow_bins(n: int, length: int) -> int:
+    """How many of the first bins `is_slow` looks at."""
+    return max(OCTAVES) * length // n + 1
+
+
+def is_slow(ratio: Array, n: int, length: int) -> bool:
+    """Whether octaves of the slowest bins hold more power than a model gives them.
+
+    Parameters
+    ----------
+    ratio : ndarray
+        Power over the model's, at the first bins: `n_slow_bins` of them, or all.
+    n : int
+        Number of samples.
+    length : int
+        Of the transform.
+    """
     sums = np.cumsum(ratio - 1.0)
     last = (np.array(OCTAVES) * length) // n
     last = last[last < len(ratio)]

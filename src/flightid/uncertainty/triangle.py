@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -43,3 +45,18 @@ def triangle_of_rows(columns: Array) -> Array:
         for first in range(0, len(blocks), AT_ONCE)
     ]
     return triangle_of_rows(np.concatenate([*parts, columns[len(blocks) * rows :]]))
+
+
+def triangle_of_parts(parts: Iterable[Array]) -> Array:
+    """The same of rows that come part by part, so that long columns need not stand anywhere.
+
+    Parameters
+    ----------
+    parts : iterable of ndarray, each shape (n, k)
+
+    Example
+    -------
+    >>> np.abs(triangle_of_parts([np.array([[3.0]]), np.array([[4.0]])]))
+    array([[5.]])
+    """
+    return triangle_of_rows(np.concatenate([triangle_of_rows(part) for part in parts]))

@@ -32,6 +32,11 @@ from flightid.identification.output_error.equation_records import (
     judge_runs,
     segmented_starts,
 )
+from flightid.identification.output_error.free_runs import (
+    keeping_outputs,
+    runs_by_record,
+    runs_of_own,
+)
 from flightid.identification.output_error.process_noise import TURBULENT, judge_process_noise
 from flightid.identification.records.findings import judge_channels, judge_fit
 from flightid.identification.records.options import RecordOptions, chosen
@@ -51,7 +56,6 @@ from flightid.identification.withheld_intervals import without_intervals
 from flightid.models import GreyBoxModel, StateSpaceModel
 from flightid.models.state_space.first_sample import first_outputs
 from flightid.record import Channel, Record, Step
-from flightid.uncertainty.agreement import Agreement
 from flightid.uncertainty.blocks import JointResiduals
 from flightid.version import VERSION
 
@@ -146,7 +150,9 @@ def conclude(
     best = groups[0][0]
     fitted = _with_estimates(model, best)
     own = [start.filled(end) for start, end in zip(prepared.own, best.own, strict=True)]
-    runs = [run_with_slopes(fitted, prepared, runs_of, k, numbers) for k, numbers in enumerate(own)]
+    ran = own
+    outputs: list[Array] = []
+    runs = keeping_outputs(runs_by_record(fitted, prepared, runs_of, ran), outputs)
     if runs_of is not None:
         own = [runs_of.start(fitted, prepared, k, numbers) for k, numbers in enumerate(own)]
         setup = [*setup, *judge_runs(runs_of)]
@@ -159,35 +165,15 @@ def conclude(
         []
         if not judged() or (runs_of is not None and runs_of.is_segmented)
         else judge_process_noise(
-            fitted, prepared.arrays, _free_runs(prepared, runs, best.noise, known.agreement)
+            fitted,
+            prepared.arrays,
+            outputs
+            if known.agreement.freedom is None
+            else runs_of_own(prepared, runs_by_record(fitted, prepared, runs_of, ran), best.noise),
         )
     )
-    fit = _assemble(fitted, prepared, options, groups, runs, known, setup, noise)
+    fit = _assemble(fitted, prepared, options, groups, outputs, known, setup, noise)
     return without_intervals(fit, TURBULENT) if noise else fit
-
-
-def _free_runs(
-    prepared: RecordSet,
-    runs: Sequence[tuple[Array, Array]],
-    noise: Array,
-    agreement: Agreement,
-) -> list[Array]:
-    """Free runs beside which noise on the states is looked for.
-
-    Where records differ, each at its own estimates, one step of Gauss and Newton from the common
-    ones: what vehicles differ by follows the model's modes too, and is no turbulence.
-    """
-    if agreement.freedom is None:
-        return [outputs for outputs, _ in runs]
-    whitener = np.linalg.inv(np.linalg.cholesky(noise))
-    found = []
-    for (_, measured, _), (outputs, slopes) in zip(prepared.arrays, runs, strict=True):
-        white = np.tensordot(whitener, slopes, axes=1).reshape(measured.size, -1)
-        size = np.linalg.norm(white, axis=0)
-        size = np.where(size > 0.0, size, 1.0)
-        residual = (whitener @ (measured - outputs)).ravel()
-        found.append(outputs + slopes @ (np.linalg.lstsq(white / size, residual)[0] / size))
-    return found
 
 
 def searched(
@@ -310,13 +296,13 @@ def _held_start(
 
 def _fitted_records(
     prepared: RecordSet,
-    runs: Sequence[tuple[Array, Array]],
+    runs: Sequence[Array],
     found: RecordStatistics,
 ) -> tuple[FittedRecord, ...]:
     model = prepared.model
     result = []
     for place, record in enumerate(prepared.records):
-        outputs = runs[place][0] + prepared.offsets[place]
+        outputs = runs[place] + prepared.offsets[place]
         known = record.channels
         channels = [known[name] for name in model.inputs]
         channels += [
@@ -336,7 +322,7 @@ def _assemble(
     prepared: RecordSet,
     options: RecordOptions,
     groups: Sequence[Sequence[RecordEnd]],
-    runs: Sequence[tuple[Array, Array]],
+    runs: Sequence[Array],
     found: RecordStatistics,
     setup: Sequence[Finding],
     noise: Sequence[Finding],

@@ -8,7 +8,7 @@ autocovariance replaces "white" in the covariance of the estimates.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,6 +32,8 @@ from flightid.uncertainty.fitted_correlation import FittedCorrelation
 Array = NDArray[np.float64]
 Own = tuple[dict[str, Estimate], dict[str, Estimate], dict[str, Estimate]]
 UNDETERMINED = "the record does not tell it apart from the others of its own numbers"
+AT_ONCE = 4096
+"""Samples that are whitened together: they stay in the cache."""
 AT_BOUND = "at bound: the record would move it further"
 
 
@@ -90,7 +92,7 @@ def record_statistics(
     prepared: RecordSet,
     own: Sequence[OwnNumbers],
     determined: Sequence[Sequence[bool]],
-    runs: Sequence[tuple[Array, Array]],
+    runs: Iterable[tuple[Array, Array]],
     noise: Array,
     limit: float,
     beside: JointResiduals | None = None,
@@ -99,7 +101,8 @@ def record_statistics(
     """Standard errors, bounds and correlations of a fit to records.
 
     `beside` concerns residuals of other data that were fitted together with the records, `starts`
-    initial states that were held at a measurement: its noise adds to the covariance.
+    initial states that were held at a measurement: its noise adds to the covariance. The slopes of
+    `runs` are lost: what is made of them takes their memory.
 
     Raises
     ------
@@ -119,16 +122,16 @@ def record_statistics(
     for (_, measured, _), (outputs, slopes), kept in zip(
         prepared.arrays, runs, determined, strict=True
     ):
-        white = np.tensordot(whitener, slopes, axes=1)
         residual = _limited(whitener @ (measured - outputs), limit)
-        shared, rest = white[:, :, : len(free)][:, :, inner], white[:, :, len(free) :]
-        blocks.append(RecordBlock.of(shared, rest[:, :, np.array(kept, dtype=bool)], residual))
+        shared, rest = np.split(_whitened(whitener, slopes), [len(free)], axis=2)
+        blocks.append(RecordBlock.of(_kept(shared, inner), _kept(rest, np.array(kept)), residual))
     other = None if beside is None else beside.of(inner)
     triangle = triangle_of(blocks, None if other is None else other.slopes)
     require_identifiable(names, triangle)
     inputs = [each[0] for each in prepared.arrays] if judged() else None
-    known = residual_covariance(blocks, other, inputs=inputs, coloured=judged())
-    covariance = known.covariance + _of_starts(starts, blocks, whitener, known.white)
+    held = _of_starts(starts, blocks, whitener)
+    known = residual_covariance(blocks, other, inputs=inputs, coloured=judged(), overwrite=True)
+    covariance = known.covariance + known.white @ held @ known.white.T
     moved = None
     if other is not None and other.bias is not None:
         moved = np.asarray(known.white @ (other.slopes.T @ other.bias))
@@ -167,17 +170,32 @@ def _of_starts(
     starts: Sequence[HeldStart | None],
     blocks: Sequence[RecordBlock],
     whitener: Array,
-    inverse: Array,
 ) -> Array:
-    """What the noise of measured initial states adds to the covariance of the parameters."""
-    total = np.zeros_like(inverse)
+    """What the noise of measured initial states adds to the covariance of the scores."""
+    count = blocks[0].projected.shape[1]
+    total = np.zeros((count, count))
     for start, block in zip(starts, blocks, strict=False):
         if start is None:
             continue
         white = np.tensordot(whitener, start.slopes, axes=1)
-        moved = inverse @ block.projected.T @ white.reshape(len(block.projected), -1)
+        moved = block.projected.T @ white.reshape(len(block.projected), -1)
         total += moved @ start.covariance @ moved.T
     return total
+
+
+def _whitened(whitener: Array, slopes: Array) -> Array:
+    """Slopes (n_outputs, n_samples, k) whitened across outputs, in place."""
+    for begin in range(0, slopes.shape[1], AT_ONCE):
+        here = slopes[:, begin : begin + AT_ONCE]
+        here[:] = np.tensordot(whitener, here, axes=1)
+    return slopes
+
+
+def _kept(slopes: Array, places: NDArray[np.bool_]) -> Array:
+    """Some columns."""
+    if np.all(places):
+        return slopes  # no copy: long records are large
+    return slopes[:, :, places.astype(bool)]
 
 
 def _limited(residual: Array, limit: float) -> Array:

@@ -1,0 +1,106 @@
+"""What a fit takes of white noise, against the covariance of what it leaves, written out."""
+
+from __future__ import annotations
+
+import tracemalloc
+
+import numpy as np
+import pytest
+from benchmarks.output_error import N, two_rates, two_rates_record
+from numpy.typing import NDArray
+
+import flightid as fid
+from flightid.uncertainty import residual_noise
+from flightid.uncertainty.fitted_directions import (
+    FittedDirections,
+    WhiteNoiseLoss,
+    slow_transforms,
+)
+from flightid.uncertainty.residual_noise import noise_models
+from tests.closeness import assert_close
+
+Array = NDArray[np.float64]
+SEED = 3
+"""Of noise without slow power, by chance."""
+
+
+def _directions(lengths: tuple[int, ...], n_outputs: int, m: int, k: int) -> list[FittedDirections]:
+    """Orthonormal over all records, own ones within each."""
+    random = np.random.default_rng(5)
+    own, shared = [], []
+    for n in lengths:
+        rows = np.cumsum(random.standard_normal((n_outputs * n, m + k)), axis=0)
+        basis = np.linalg.qr(rows[:, :m])[0] if m else rows[:, :0]
+        own.append(basis.reshape(n_outputs, n, m))
+        shared.append(rows[:, m:] - basis @ (basis.T @ rows[:, m:]))
+    ends = np.cumsum([len(each) for each in shared])[:-1]
+    parts = np.split(np.linalg.qr(np.vstack(shared))[0], ends)
+    return [
+        FittedDirections(each, part.reshape(n_outputs, -1, k))
+        for each, part in zip(own, parts, strict=True)
+    ]
+
+
+def test_lags_and_power_are_those_of_the_covariance_that_is_left() -> None:
+    lengths, n_outputs, m, k, n_lags, length = (40, 23), 2, 2, 3, 6, 128
+    taken, levels = _directions(lengths, n_outputs, m, k), np.array([2.0, 0.3])
+    whole = np.concatenate(
+        [np.zeros((n_outputs * sum(lengths), m * len(lengths))), np.zeros((126, k))], axis=1
+    )
+    places, begin = [], 0
+    for r, (n, each) in enumerate(zip(lengths, taken, strict=True)):
+        rows = slice(begin, begin + n_outputs * n)
+        whole[rows, r * m : (r + 1) * m] = each.own.reshape(-1, m)
+        whole[rows, m * len(lengths) :] = each.shared.reshape(-1, k)
+        places += [[(begin + o * n, n) for o in range(n_outputs)]]
+        begin += n_outputs * n
+    noise = np.diag(np.concatenate([np.repeat(levels, n) for n in lengths]))
+    left = np.eye(len(whole)) - whole @ whole.T
+    lost = noise - left @ noise @ left
+    lags, power = np.zeros((n_outputs, n_lags)), np.zeros((n_outputs, 9))
+    for record in places:
+        for o, (first, n) in enumerate(record):
+            block = lost[first : first + n, first : first + n]
+            lags[o] += [np.trace(block, offset=lag) for lag in range(n_lags)]
+            waves = np.exp(-2j * np.pi * np.outer(np.arange(9), np.arange(n)) / length)
+            power[o] += np.einsum("bt,ts,bs->b", waves, block, waves.conj()).real
+    found = WhiteNoiseLoss.of(taken, length, n_lags, 9).of_levels(levels)
+    assert_close(found[0], lags, atol=1e-12, why="rounding")
+    assert_close(found[1], power, atol=1e-11, why="rounding of sums of 40 samples")
+
+
+@pytest.mark.parametrize("n", [1, 700, 120_001])
+def test_slow_bins_are_those_of_the_whole_transform(n: int) -> None:
+    columns = np.random.default_rng(n).standard_normal((n, 2))
+    length = 2 * n + 130
+    whole = np.fft.rfft(columns, length, axis=0)[:65]
+    found = slow_transforms(columns, length, 65)
+    assert_close(found, whole, atol=1e-11 * np.sqrt(n), why="terms of the series that are left out")
+
+
+def test_white_noise_has_the_models_that_all_transforms_give(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    taken, random = _directions((900, 2500), 2, 2, 4), np.random.default_rng(SEED)
+    residuals = [random.standard_normal((2, n)) for n in (900, 2500)]
+    with monkeypatch.context() as patch:
+        patch.delattr(residual_noise, "_lost")  # transforms of all directions are not asked for
+        found = noise_models(residuals, taken)
+    with monkeypatch.context() as patch:
+        patch.setattr(residual_noise, "_white_models", lambda *_: None)
+        expected = noise_models(residuals, taken)
+    for one, other in zip(found, expected, strict=True):
+        assert one.is_white
+        assert other.is_white
+        assert_close(one.lags, other.lags, atol=1e-13, why="rounding of two ways")
+
+
+def test_a_record_is_fitted_in_less_than_five_times_its_sensitivities() -> None:
+    record = two_rates_record(1)
+    tracemalloc.start()
+    try:
+        fid.identify(two_rates(), record, initial_state="trim", output_bias=False)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 5.0 * 8 * 2 * 8 * N  # bytes, outputs, parameters; 8 times with whole copies
