@@ -42,6 +42,12 @@ def _fields() -> dict[str, type[Options]]:
     help="Fly this law: a TOML file of [[block]] tables, as [[loop.block]] in a study.",
 )
 @click.option(
+    "--augmentation",
+    "law",
+    metavar="NAME|FILE",
+    help="Fly this law: dase, or a TOML file of [[axis]] tables of limited authority.",
+)
+@click.option(
     "--write",
     "target",
     type=WRITTEN,
@@ -54,6 +60,7 @@ def command(
     values: tuple[str, ...],
     gains: Path | None,
     blocks: Path | None,
+    law: str | None,
     target: Path | None,
     as_json: bool,
     **options: Any,  # noqa: ANN401 — read from the fields
@@ -73,14 +80,20 @@ def command(
     if target is not None and target.suffix not in (".parquet", ".nc"):
         raise click.UsageError(f"--write: {target.name} ends in neither .parquet nor .nc")
     asked = FlyOptions(**given_options(FlyOptions, options, "a flight"))
-    if gains is not None and blocks is not None:
-        raise click.UsageError("--gains and --blocks move the same inputs: give one of them")
+    if sum(each is not None for each in (gains, blocks, law)) > 1:
+        raise click.UsageError(
+            "--gains, --blocks and --augmentation move the same inputs: give one of them"
+        )
     source = load_source(model, axis, values)
     around: GainController | BlockController | None = None
     if gains is not None:
         around = _gains(gains, source, 1.0 / asked.step_s(source))
     elif blocks is not None:
         around = _blocks(blocks, source, asked.step_s(source))
+    elif law is not None:
+        from flightid.study.loop_blocks import law_controller
+
+        around = law_controller(law, source, asked.step_s(source))
     if around is not None and around.commands:
         note(f"The pilot commands {', '.join(around.commands)} too")
     # Who ends the flight by a signal keeps it, as Ctrl-C does.

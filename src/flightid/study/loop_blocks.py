@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 from flightid.control import loops
-from flightid.errors import StudyError
+from flightid.control.laws.augmentation import augmentation_law
+from flightid.control.stepped.block_controller import BlockController
+from flightid.errors import StudyError, UnitError, UnknownNameError
 
 KINDS = {
     make.__name__: make
@@ -73,3 +76,55 @@ def made_block(entry: Mapping[str, Any], where: str = "study file, [[loop.block]
             needed=", ".join(inspect.signature(make).parameters),
         ) from error
     return make(**given)
+
+
+def law_controller(
+    law: str | Path | Mapping[str, Any],
+    model: Any,  # noqa: ANN401 — its channels are all that is asked of it
+    sample_time_s: float,
+) -> BlockController:
+    """An augmentation law around a model, one frame at a time.
+
+    Parameters
+    ----------
+    law : str, path-like or mapping
+        As `augmentation_law` takes it.
+    model : Model or LinearSystem
+    sample_time_s : float
+        Of a frame, s.
+
+    Raises
+    ------
+    OptionError
+        There is no such law.
+    UnknownNameError
+        The law moves or reads what the model has not.
+    UnitError
+        The model has it in another unit: gains hold for theirs alone.
+
+    Example
+    -------
+    >>> from flightid import load_model
+    >>> law_controller("dase", load_model("ah64_hover"), 0.01).commands
+    ()
+    """
+    made = augmentation_law(law)
+    for kind, needed, there in (
+        ("input", [axis.input for axis in made.axes], model.inputs),
+        ("output", made.sensors, model.outputs),
+    ):
+        if missing := [name for name in needed if name not in there]:
+            raise UnknownNameError(
+                f"the law {made.name!r} needs an {kind} that the model has not",
+                found=", ".join(missing),
+                needed=f"of {', '.join(there)}",
+                action="write a law with [[axis]] tables for this model's channels",
+            )
+    for axis in made.axes:
+        read = {axis.input: axis.unit, axis.rate: "rad/s"}
+        read |= {axis.attitude: "rad"} if axis.attitude else {}
+        for name, unit in read.items():
+            if (found := model.units.get(name, unit)) != unit:
+                raise UnitError(f"{name!r} of the law {made.name!r}", found=found, needed=unit)
+    blocks = [made_block(table, made.name) for table in made.tables()]
+    return BlockController(blocks, model, sample_time_s)

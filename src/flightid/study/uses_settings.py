@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from flightid.control.closed_loop.close_loop import DRAWS
+from flightid.control.laws.augmentation import augmentation_law
 from flightid.dynamics.rotor.options import RotorOptions
 from flightid.errors import OptionError, StudyError
 from flightid.export.options import FORMATS
@@ -68,6 +69,9 @@ class LoopSettings(Options):
     )
     block: tuple[Mapping[str, Any], ...] = option(
         (), doc="Blocks of the controller: kind, a function of flightid.loops, and its arguments."
+    )
+    augmentation: str | None = option(
+        None, doc="Law in place of blocks: dase, or a TOML file of [[axis]] tables."
     )
     band_rad_s: tuple[float, float] | None = option(
         None, unit="rad/s", forms=(SPAN, NOTHING), above=0.0, doc="Where margins are looked for."
@@ -142,11 +146,16 @@ def _export(reader: TableReader) -> ExportSettings:
 
 def _loop(reader: TableReader) -> LoopSettings:
     made = read_table(LoopSettings, reader)
+    if made.augmentation is not None and not (made.gains or made.block):
+        return replace(made, block=tuple(augmentation_law(made.augmentation).tables()))
     for each in made.block:
         made_block(each)
-    if bool(made.gains) == bool(made.block):
-        needed = "gains by input and output, or [[loop.block]]s"
-        problem = "stands beside blocks" if made.block else "is missing"
-        found = "both" if made.block else "none"
+    if made.augmentation is not None or bool(made.gains) == bool(made.block):
+        needed = "gains by input and output, or [[loop.block]]s, or augmentation"
+        both = bool(made.gains and made.block)
+        beside = made.augmentation is not None
+        problem = "stands beside blocks" if both else "is missing"
+        problem = "stands beside an augmentation" if beside and not both else problem
+        found = "both" if both or beside else "none"
         raise reader.error("gains", problem, found=found, needed=needed)
     return made
