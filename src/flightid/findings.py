@@ -2,10 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
+from typing import Protocol, TypeVar
 
 from flightid.conventions import Light
 from flightid.surface import spoken
+
+
+class Statement(Protocol):
+    """Whatever states a fact under a code."""
+
+    @property
+    def code(self) -> str:
+        """Stable identifier."""
+        ...
+
+    @property
+    def message(self) -> str:
+        """What was found."""
+        ...
+
+
+Said = TypeVar("Said", bound=Statement)
 
 
 @dataclass(frozen=True)
@@ -64,6 +83,26 @@ def worst(findings: list[Finding] | tuple[Finding, ...]) -> Light:
     order = (Light.RED, Light.AMBER, Light.UNKNOWN, Light.GREEN)
     lights = {finding.light for finding in findings}
     return next((light for light in order if light in lights), Light.GREEN)
+
+
+def unsaid(findings: Iterable[Said], others: Iterable[Said]) -> list[Said]:
+    """Findings whose fact no other one states: not its code, nor its sentence up to the numbers.
+
+    Example
+    -------
+    >>> known = Finding("saturated", Light.AMBER, "C3 is at its lower limit 1220 for 27 % of it")
+    >>> again = Finding("motor-at-lower", Light.AMBER, "C3 is at its lower limit for 27 % of it")
+    >>> other = Finding("motor-at-lower", Light.AMBER, "C4 is at its lower limit for 22 % of it")
+    >>> unsaid([again, other], [known]) == [other]
+    True
+    """
+    known = list(others)
+    codes = {each.code for each in known}
+    return [
+        each for each in findings
+        if each.code not in codes
+        and not any(one.message.startswith(each.message.partition(" for ")[0]) for one in known)
+    ]  # fmt: skip
 
 
 def counted(number: int, noun: str) -> str:

@@ -15,6 +15,7 @@ from flightid.app.kept_parts import kept_overview, kept_review
 from flightid.app.own_folders import shown_name
 from flightid.app.schemas import FlightScreen, LeftOut, Listing, LogItem
 from flightid.app.workspace import Workspace
+from flightid.findings import unsaid
 from flightid.version import VERSION
 
 MOST_LOOKED_AT = 200
@@ -51,12 +52,17 @@ def add_log_routes(app: FastAPI, backstage: Backstage) -> None:
         path = known_log(workspace, log)
         for kind in OF_FLIGHT:
             workers.ensure(kind, log, path)
+        overview, review = kept_overview(workspace, log), kept_review(workspace, log)
+        if overview is not None and review is not None:
+            # Both look at one log: what the first says the second does not repeat.
+            alone = unsaid(review.verdicts, overview.verdicts)
+            review = review.model_copy(update={"verdicts": alone})
         return FlightScreen(
             id=log,
             name=path.name,
             path=path.relative_to(workspace.folder).as_posix(),
-            overview=kept_overview(workspace, log),
-            review=kept_review(workspace, log),
+            overview=overview,
+            review=review,
             jobs=workers.of_log(log),
         )
 
