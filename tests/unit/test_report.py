@@ -286,3 +286,17 @@ def test_headings_tell_their_meaning_on_hover() -> None:
     page = to_html(Document("Glossary", "", (Section("Fits", (TableBlock(table),)),)))
     assert page.count("<abbr title=") == 1
     assert "How far a model lies from the measured responses" in page
+
+
+def test_long_tables_fold_after_the_answer_and_small_pictures_stand_two_abreast() -> None:
+    rows = tuple((f"parameter {n}", float(n)) for n in range(21))
+    table = TableBlock(Table("Long", (Column("name"), Column("value")), rows))
+    short = TableBlock(Table("Short", (Column("name"), Column("value")), rows[:20]))
+    one = Figure({"data": [], "layout": {"xaxis": {}, "yaxis": {}}}, "one plot")
+    two = Figure({"data": [], "layout": {"xaxis": {}, "xaxis2": {}}}, "two plots")
+    answer = Section("Result", (table,))
+    page = to_html(Document("T", "", (answer, Section("More", (table, short, one, two, one, one)))))
+    assert page.count("<caption>Long</caption>") == page.count("<summary>Long</summary>") == 1
+    assert page.count("<caption>Short</caption>") == 1
+    assert page.count('class="half"') == 2, "the first stands alone: what follows has two plots"
+    assert page.count("<td class=n>") == 21 + 21 + 20

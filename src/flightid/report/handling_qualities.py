@@ -14,21 +14,25 @@ from flightid.report.figures import figure_block
 from flightid.uncertainty.quantiles import interval_words, shown
 
 
-def handling_qualities_blocks(found: HandlingQualities) -> tuple[Block, ...]:
+def handling_qualities_blocks(
+    found: HandlingQualities, *, folded: bool = False
+) -> tuple[Block, ...]:
     """Verdicts and table, a chart for each requirement with two numbers, and a curve by axis.
 
     Parameters
     ----------
     found : HandlingQualities
+    folded : bool
+        Open the charts on demand.
 
     Returns
     -------
     tuple of Block
     """
-    return (*result_blocks(found), *_charts(found.ratings), *_curves(found))
+    return (*result_blocks(found), *_charts(found.ratings, folded), *_curves(found))
 
 
-def _charts(ratings: tuple[Rating, ...]) -> list[Block]:
+def _charts(ratings: tuple[Rating, ...], folded: bool) -> list[Block]:
     made: list[Block] = []
     for rating in ratings:
         chart = rating.chart
@@ -37,7 +41,7 @@ def _charts(ratings: tuple[Rating, ...]) -> list[Block]:
         case = f" ({chart.case})" if chart.case else ""
         words = interval_words(shown())
         said = f"{chart.standard}: {chart.title}{case}; estimate with its {words} region. "
-        made.append(figure_block(level_chart(rating), (said + chart.doubt).strip()))
+        made.append(figure_block(level_chart(rating), (said + chart.doubt).strip(), folded=folded))
     return made
 
 

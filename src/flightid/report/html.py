@@ -11,6 +11,7 @@ import base64
 import gzip
 import hashlib
 import json
+from collections.abc import Sequence
 from functools import cache
 from importlib.resources import files
 from typing import Any
@@ -23,7 +24,7 @@ from flightid.report.content import Document, Figure
 from flightid.report.glossary import GLOSSARY
 from flightid.report.json import to_dict
 from flightid.report.shared_arrays import SharedArrays
-from flightid.table import Column, Table
+from flightid.table import Cell, Column, Table
 from flightid.version import VERSION
 
 DEFAULT_HEIGHT_PX = 420
@@ -33,6 +34,11 @@ MANY_PLOTS = 8
 """Plots of a picture above which a phone scrolls it."""
 LONG_CELL = 20
 """Letters of a cell above which its column keeps its width and the table scrolls instead."""
+LONG_TABLE = 20
+"""Rows of a table above which it opens on demand, in any section but the first."""
+LEAST_GAP = 3
+"""Empty cells at the end of a row that are joined to one."""
+CLASSES = {"number": " class=n", "long": " class=l", "text": ""}
 _VALUE = Column("value", digits=6)
 
 
@@ -89,17 +95,19 @@ class _Numbering:
 
     def section(self, values: dict[str, Any]) -> dict[str, Any]:
         self._sections += 1
+        opening = self._sections == 1
         return {
             **values,
             "id": f"part-{self._sections}",
-            "blocks": [self._block(block) for block in values["blocks"]],
+            "blocks": _abreast([self._block(each, opening) for each in values["blocks"]]),
             "sections": [self.section(inner) for inner in values["sections"]],
         }
 
-    def _block(self, values: dict[str, Any]) -> dict[str, Any]:
+    def _block(self, values: dict[str, Any], opening: bool) -> dict[str, Any]:
         match values["kind"]:
             case "table":
-                return {**values, **_shown_table(values)}
+                long = len(values["rows"]) > LONG_TABLE and not opening
+                return {**values, **_shown_table(values), "folded": values["folded"] or long}
             case "key_values":
                 shown = [(key, _VALUE.show(value)) for key, value in values["items"]]
                 return {**values, "items": shown}
@@ -116,10 +124,24 @@ class _Numbering:
                     "spec_id": self._first.setdefault(text, place),
                     "height": int(spec.get("layout", {}).get("height") or DEFAULT_HEIGHT_PX),
                     "wide": _is_wide(spec.get("layout", {})),
+                    "half": False,
                     "packed": "gzip" if small else "no",
                     "payload": Markup(_gzipped(text.encode()) if small else text),
                 }
         return values
+
+
+def _abreast(blocks: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Mark pictures of one plot that follow another such: two of them share a line."""
+    small = [
+        each["kind"] == "figure" and not each["folded"] and not each["wide"]
+        and "xaxis2" not in each["spec"].get("layout", {})
+        for each in blocks
+    ]  # fmt: skip
+    for place, each in enumerate(blocks):
+        if small[place] and (any(small[max(place - 1, 0) : place]) or any(small[place + 1 :][:1])):
+            each["half"] = True
+    return blocks
 
 
 def _is_wide(layout: dict[str, Any]) -> bool:
@@ -138,12 +160,20 @@ def _shown_table(values: dict[str, Any]) -> dict[str, Any]:
         {
             "name": column.name,
             "unit": column.unit,
-            "kind": kind,
+            "kind": Markup(CLASSES[kind]),
             "meaning": GLOSSARY.get(column.name, ""),
         }
         for column, kind in zip(columns, kinds, strict=True)
     ]
-    return {"columns": headings, "rows": table.shown()}
+    rows = [_joined(*both) for both in zip(table.rows, table.shown(), strict=True)]
+    return {"columns": headings, "rows": rows}
+
+
+def _joined(cells: Sequence[Cell], shown: list[str]) -> dict[str, object]:
+    """A row whose last empty cells are one, as in a triangle of correlations."""
+    known = max((place for place, cell in enumerate(cells, 1) if cell is not None), default=0)
+    gap = len(cells) - known if len(cells) - known >= LEAST_GAP else 0
+    return {"cells": shown[: len(shown) - gap], "gap": gap}
 
 
 def _script_json(values: object) -> str:

@@ -16,7 +16,7 @@ from flightid.report.content import Block, Figure, Section, TableBlock
 from flightid.report.figures import figure_block
 from flightid.validation import Comparison, Mismatch, Verification
 
-SHOWN = 2
+SHOWN = 1
 """Records whose pictures are open; those of others open on demand."""
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from itertools import islice
 from typing import TYPE_CHECKING
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flightid.conventions import Light
-from flightid.findings import Finding
+from flightid.findings import Finding, unsaid
 from flightid.options import Options
 from flightid.plot.consistency import consistency
 from flightid.plot.fit import EstimateBar, parameter_intervals
@@ -50,6 +51,10 @@ if TYPE_CHECKING:
     from flightid.uncertainty.estimate import Estimate
 
 
+BESIDE = (", reference", ", response")
+"""Ends of names of what stands beside a model: its charts open on demand."""
+FEW_RECORDS = 4
+"""Records whose histories are open."""
 MANY = 20
 """Intervals above which their picture opens on demand."""
 
@@ -116,7 +121,11 @@ def _uses(study: StudyResults) -> Iterator[Section]:
 def _qualities(study: StudyResults) -> Iterator[Section]:
     if study.qualities:
         parts = (
-            section_of(f"Handling qualities of “{name}”", handling_qualities_blocks, found)
+            section_of(
+                f"Handling qualities of “{name}”",
+                partial(handling_qualities_blocks, folded=name.endswith(BESIDE)),
+                found,
+            )
             for name, found in study.qualities.items()
         )
         yield Section("Handling qualities", (), tuple(parts))
@@ -252,7 +261,10 @@ def _flight(study: StudyResults, review: FlightReview) -> Iterator[Block]:
             "band, and dashed as the identified models have it."
         )
         yield figure_block(measured_and_predicted(review, designs), shown)
-    yield from flight_blocks(review, repeats=True, glance=False)
+    # What the inspection says of the same log stands in its own section.
+    said = () if study.inspection is None else study.inspection.findings
+    alone = replace(review, findings=tuple(unsaid(review.findings, said)))
+    yield from flight_blocks(alone, repeats=True, glance=False)
 
 
 def _used(study: StudyResults) -> dict[str, list[tuple[Record, Sequence[str]]]]:
@@ -285,7 +297,7 @@ def _source_blocks(study: StudyResults) -> Iterator[Block]:
     if declared:
         yield Lights(declared)
     if study.inspection is None:
-        yield TableBlock(_record_table(study))
+        yield TableBlock(_record_table(study), folded=len(study.records) > FEW_RECORDS)
         return
     yield Lights(study.inspection.findings)
     first, *others = study.inspection.tables()[1:]

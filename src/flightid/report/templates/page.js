@@ -50,6 +50,38 @@
   const recolour = (text) =>
     isDark() ? lighter.reduce((now, [from, to]) => now.replaceAll(from, to), text) : text;
 
+  // On a phone panels that lie side by side come one below another, column after column.
+  const phone = matchMedia("(max-width: 600px)");
+  function stack(layout, place) {
+    place.parentElement.classList.toggle("wide", "width" in layout);
+    const axes = (letter) => Object.entries(layout).filter(([name]) => new RegExp(`^${letter}axis\\d*$`).test(name))
+      .map(([name, axis]) => ({ id: name.replace("axis", ""), axis, domain: axis.domain ?? [0, 1] }));
+    const across = axes("x"), up = axes("y");
+    const sides = new Map(across.map(({ domain }) => [domain[0].toFixed(3), domain]));
+    const columns = [...sides.values()].sort((a, b) => a[0] - b[0]), count = columns.length;
+    if (count < 2) return;
+    const column = (x) => Math.max(0, columns.findLastIndex(([from]) => from <= x + 1e-3));
+    const lower = (y, place) => (count - 1 - place + y) / count;
+    for (const { axis, domain } of up) {
+      const beside = across.find(({ id }) => id === (axis.anchor ?? "x"));
+      const place = column(beside?.domain[0] ?? 0);
+      const first = up.find((one) => one.domain[0] === domain[0] && one.axis.title?.text);
+      if (place && first) { axis.title = first.axis.title; axis.showticklabels = first.axis.showticklabels; }
+      axis.domain = domain.map((y) => lower(y, place));
+    }
+    for (const note of [...layout.annotations ?? [], ...layout.images ?? []]) {
+      if (note.xref !== "paper" || note.yref !== "paper") continue;
+      const place = column(note.x), [from, to] = columns[place];
+      note.x = (note.x - from) / (to - from);
+      note.y = lower(note.y, place);
+    }
+    across.forEach(({ axis }) => { axis.domain = [0, 1]; });
+    if (layout.legend?.y > 1) layout.legend.y = 1 + (layout.legend.y - 1) / count;
+    const frame = (layout.margin?.t ?? 0) + (layout.margin?.b ?? 0);
+    layout.height = count * ((layout.height ?? place.clientHeight) - frame) + frame;
+    place.style.height = `${layout.height}px`;
+  }
+
   async function draw(place) {
     const holder = document.querySelector(`script[data-plot="${place.dataset.spec}"]`);
     const source = recolour(await text(holder));
@@ -63,6 +95,7 @@
     spec.layout.modebar = { bgcolor: "rgba(0,0,0,0)", color: style.getPropertyValue("--unknown").trim(),
       activecolor: style.getPropertyValue("--ink").trim() };
     spec.layout.autosize = true;
+    if (phone.matches) stack(spec.layout, place);
     if (place.clientWidth < 520) {
       spec.layout.margin = { ...spec.layout.margin, l: 52, r: 8 };
       spec.layout.font.size = 11;
