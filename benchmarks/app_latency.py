@@ -17,9 +17,10 @@ from pathlib import Path
 import numpy as np
 from tests.sweep_log import SweepFlight
 
-from flightid.app import work
+from flightid.app import gain_work, work
 from flightid.app.pyramid import Pyramid, view
 from flightid.app.study_edits import KeyEdit
+from flightid.errors import FlightidError
 
 REPEATS = 50
 
@@ -55,6 +56,29 @@ def drags(log: Path, folder: Path) -> None:
     print(f"band let go → bars of its windows:  {medians(lambda k: drag(k, True))}")
 
 
+def sliders(log: Path, folder: Path) -> None:
+    """A gain moved, where the log tells the gains that flew."""
+    study = folder / "studies" / "a.toml"
+    text = study.read_text()
+    begun = time.process_time()
+    try:
+        found = gain_work.make_gains(study, text, [])
+    except FlightidError as error:
+        print(f"gain slider → margins: not measured, {log.name}: {error}")
+        return
+    print(f"study to gains, all axes:           {time.process_time() - begun:.2f} s")
+    axis = found["axes"][0]
+    values = {each["name"]: each["value"] for each in axis["sliders"]}
+    first = next(iter(values))
+
+    def move(number: int) -> None:
+        moved = values | {first: values[first] * (1.0 - 0.002 * number)}
+        gain_work.move_axis(study, text, [], axis["axis"], moved)
+
+    move(0)
+    print(f"gain slider → margins, all charts:  {medians(move)}")
+
+
 def zooms() -> None:
     """A long channel."""
     n = 10_000_000
@@ -72,4 +96,5 @@ if __name__ == "__main__":
         given = [Path(each) for each in sys.argv[1:]]
         path = given[0] if given else SweepFlight(rate_hz=100.0, sweep_s=130.0).write(Path(name))
         drags(path, Path(name))
+        sliders(path, Path(name))
     zooms()

@@ -1,4 +1,4 @@
-import type { Edit, FieldGroup, FlightScreen, GainFile, Job, Listing, LogItem, StudyText } from "./types";
+import type { CompareRequest, ComparisonPart, Edit, FieldGroup, FlightScreen, GainFile, Job, Listing, LogItem, PlanPart, PlanRequest, StudyText } from "./types";
 
 /** A refusal of the server, in its own words. */
 export class Refusal extends Error {
@@ -48,6 +48,8 @@ export const flight = (log: string) => json<FlightScreen>(`/api/logs/${log}`);
 export const fields = (log: string) => json<FieldGroup[]>(`/api/logs/${log}/fields`);
 export const study = (log: string) => json<StudyText | null>(`/api/studies/${log}`);
 export const gainFiles = (log: string) => json<GainFile[]>(`/api/studies/${log}/gains`);
+export const compare = (asked: CompareRequest) => json<ComparisonPart>("/api/comparisons", sent("POST", asked));
+export const plan = (asked: PlanRequest) => json<PlanPart>("/api/plans", sent("POST", asked));
 export const jobs = () => json<Job[]>("/api/jobs");
 export const cancel = (id: string) => json<Job[]>(`/api/jobs/${id}`, { method: "DELETE" });
 export const again = (job: Job) => json<Job[]>("/api/jobs", sent("POST", job));

@@ -1,7 +1,9 @@
 import type { Component } from "svelte";
+import Compare from "../screens/Compare.svelte";
 import Flight from "../screens/Flight.svelte";
 import Gains from "../screens/Gains.svelte";
 import Library from "../screens/Library.svelte";
+import Plan from "../screens/Plan.svelte";
 import Response from "../screens/Response.svelte";
 import type { Study } from "./study.svelte";
 
@@ -32,4 +34,6 @@ export const SCREENS: Screen[] = [
   { name: "flight", title: "Flight", component: Flight, ofLog: true, needsStudy: false, shows: ({ log }) => Boolean(log) },
   { name: "response", title: "Response", component: Response, ofLog: true, needsStudy: true, shows: hasModels },
   { name: "gains", title: "Gains", component: Gains, ofLog: true, needsStudy: true, shows: hasModels },
+  { name: "compare", title: "Compare", component: Compare, ofLog: true, needsStudy: false, shows: ({ log }) => Boolean(log) },
+  { name: "plan", title: "Plan", component: Plan, ofLog: true, needsStudy: false, shows: ({ log }) => Boolean(log) },
 ];

@@ -28,6 +28,46 @@ export interface AxisGains {
   findings: ShownFinding[];
 }
 
+/** A number of a loop on both sides, and their difference with its interval. */
+export interface ChangeRow {
+  loop: string;
+  name: string;
+  unit: string;
+  before: number | null;
+  before_95: [number, number] | null;
+  after: number | null;
+  after_95: [number, number] | null;
+  difference: number | null;
+  difference_95: [number, number] | null;
+  significant: boolean;
+}
+
+/** Both sides. */
+export interface CompareRequest {
+  before: ComparedSide;
+  after: ComparedSide;
+}
+
+/** A flight, or a part of it; as the first side also the promise of its study. */
+export interface ComparedSide {
+  log: string;
+  span_s: [number, number] | null;
+  promised: boolean;
+}
+
+/** A comparison. */
+export interface ComparisonPart {
+  names: [string, string];
+  promised: boolean;
+  light: "green" | "amber" | "red" | "unknown";
+  rows: ChangeRow[];
+  settings: [string, string, string][];
+  steps: LoopSteps[];
+  findings: ShownFinding[];
+  following: GainFile | null;
+  back: GainFile | null;
+}
+
 /** One key and its value; None takes it out. */
 export interface Edit {
   path: (string | number)[];
@@ -153,6 +193,13 @@ export interface LogItem {
   light: "green" | "amber" | "red" | "unknown" | null;
 }
 
+/** Steps of one loop on both sides. */
+export interface LoopSteps {
+  loop: string;
+  before: StepCurve;
+  after: StepCurve;
+}
+
 /** A number of a loop over all plants, beside that of the flown gains. */
 export interface MarginRow {
   loop: string;
@@ -191,6 +238,55 @@ export interface Overview {
   blocks: StripBlock[];
   events: StripEvent[];
   has_study: boolean;
+}
+
+/** A plan of the next flight. */
+export interface PlanPart {
+  title: string;
+  verdict: string;
+  light: "green" | "amber" | "red" | "unknown";
+  rows: PlanRow[];
+  battery: string;
+  logging: string;
+  findings: ShownFinding[];
+  files: GainFile[];
+  refusal: string;
+}
+
+/** A plan of the next flight of the vehicle of a log. */
+export interface PlanRequest {
+  log: string;
+  wishes: PlanWishes;
+}
+
+/** The sweep of an axis, and what the log will show of it. */
+export interface PlanRow {
+  axis: string;
+  amplitude: number | null;
+  size: string;
+  unit: string;
+  low_hz: number | null;
+  high_hz: number | null;
+  duration_s: number | null;
+  runs: number;
+  command_percent: number | null;
+  rate_deg_s: number | null;
+  attitude_deg: number | null;
+  coherence: number | null;
+  measured: boolean;
+  settings: Record<string, number>;
+}
+
+/** Options of ``flightid plan``; those that are None are as usual. */
+export interface PlanWishes {
+  axes: string[] | null;
+  band_rad_s: [number, number] | null;
+  amplitude: number | null;
+  duration_s: number | null;
+  n_records: number | null;
+  control: number | null;
+  rate_rad_s: number | null;
+  attitude_rad: number | null;
 }
 
 /** A request on the socket: what the page shows under edits that are not written yet. */

@@ -61,8 +61,10 @@ def make_gains(study: Path, text: str, edits: Sequence[KeyEdit]) -> Mapping[str,
     refused = {each.finding for each in tuning.refused}
     return GainsPart(
         axes=axes,
-        refused=[RefusedGains(axis=r.axis, finding=_shown(r.finding)) for r in tuning.refused],
-        findings=[_shown(f) for f in tuning.findings if f not in single | refused],
+        refused=[
+            RefusedGains(axis=r.axis, finding=shown_finding(r.finding)) for r in tuning.refused
+        ],
+        findings=[shown_finding(f) for f in tuning.findings if f not in single | refused],
         n_steps=max((len(each.stages) for each in tuning.sound), default=0),
         left_out=dict(tuning.left_out),
         refusal=_refusal(tuning),
@@ -184,7 +186,7 @@ def _axis(
             for each in design.stages
         ],
         filters=[f"{each.name} {each.old:g} to {each.value:g}" for each in design.filters],
-        findings=[_shown(each) for each in design.findings],
+        findings=[shown_finding(each) for each in design.findings],
     )
 
 
@@ -249,7 +251,8 @@ def _plain(values: np.ndarray) -> list[float]:
     return [float(f"{each:.{DIGITS}g}") for each in values.tolist()]
 
 
-def _shown(finding: Finding) -> ShownFinding:
+def shown_finding(finding: Finding) -> ShownFinding:
+    """A finding as the page is told it."""
     return ShownFinding(
         code=finding.code,
         light=light_of(finding.light),

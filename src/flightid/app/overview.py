@@ -105,7 +105,7 @@ def review_of(review: FlightReview) -> ReviewPart:
     }
     return ReviewPart(
         light=light_of(review.verdict),
-        steps=[_step(each) for each in told],
+        steps=[step_curve(each) for each in told],
         verdicts=_verdicts(review.findings, ()),
         untold=untold,
     )
@@ -192,7 +192,8 @@ def _shows(block: TimelineBlock, code: str) -> bool:
     return block.kind in kinds.split()
 
 
-def _step(loop: LoopResponse) -> StepCurve:
+def step_curve(loop: LoopResponse) -> StepCurve:
+    """A step of a loop as the page is told it."""
     low, high = loop.band()
     known: Mapping[str, str] = {each.name: each.text for each in loop.readings}
     return StepCurve(

@@ -11,6 +11,7 @@ from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 
 from flightid.app.backstage import Backstage
+from flightid.app.compare_routes import add_compare_routes
 from flightid.app.field_routes import add_field_routes
 from flightid.app.gain_answers import add_gain_routes
 from flightid.app.job_routes import add_job_routes
@@ -30,6 +31,7 @@ ROUTES: tuple[Callable[[FastAPI, Backstage], None], ...] = (
     add_job_routes,
     add_study_routes,
     add_gain_routes,
+    add_compare_routes,
     add_socket,
 )
 """One module each; a new subject adds its own."""

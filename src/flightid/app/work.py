@@ -194,3 +194,8 @@ def _with_intervals(curve: ResponseCurve, response: FrequencyResponse) -> Respon
             "reason": band.reason,
         }
     )
+
+
+def kept_log(path: Path) -> Log:
+    """A log that this process holds open."""
+    return _log(path, KEPT)

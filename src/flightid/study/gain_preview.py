@@ -43,26 +43,55 @@ def preview_tuning(
         A stage refuses its data.
     """
     with speaking(as_key):
-        settings = read_settings(Path(path))
-        if settings.flight is not None:
-            raise StudyError(
-                "a preview takes a log or records, and this study flies first",
-                needed="[log] or [[record]]",
-                action="flightid run writes the log of the flight; name that",
-            )
-        names = tuple(model.name for model in settings.models)
-        tasks = [load_task(each, names) for each in settings.models]
-        runner = StageRunner(cache)
-        taken = take(settings, tasks, None, Path(path).parent, runner)
-        staged = identify_models(
-            tasks, taken.records, taken.inspection, settings.reduce, runner, lambda *_: None
-        )
+        settings, runner, log, staged = _identified(Path(path), cache)
         wanted = settings.tune or TuneSettings()
         if wanted.controller is None and wanted.options.by_hand and not wanted.has_other_filters:
             alone = replace(wanted, options=replace(wanted.options, by_hand=None))
-            found = runner.stage("tuning", tune_models, staged, taken.log, alone)
+            found = runner.stage("tuning", tune_models, staged, log, alone)
             if found.value is not None:
-                return runner.stage(
-                    "gains by hand", tune_by_hand, staged, taken.log, wanted, found
-                ).value
-        return runner.stage("tuning", tune_models, staged, taken.log, wanted).value
+                inputs = (staged, log, wanted, found)
+                held: Tuning = runner.stage("gains by hand", tune_by_hand, *inputs).value
+                return held
+        tuned: Tuning | None = runner.stage("tuning", tune_models, staged, log, wanted).value
+        return tuned
+
+
+def preview_fits(path: str | Path, *, cache: MutableMapping[str, Any] | None = None) -> list[Any]:
+    """Fits of a study file, as the whole run would make them.
+
+    Parameters
+    ----------
+    path : str or Path
+        Study file of a log or of records.
+    cache : mutable mapping of str to object, optional
+        As in `run_study`.
+
+    Raises
+    ------
+    StudyError
+        The study cannot be carried out as written, or would have to fly first.
+    FlightidError
+        A stage refuses its data.
+    """
+    with speaking(as_key):
+        *_, staged = _identified(Path(path), cache)
+        return [each.value.fit for each in staged if each.value.fit is not None]
+
+
+def _identified(path: Path, cache: MutableMapping[str, Any] | None) -> tuple[Any, ...]:
+    """Settings, what carries stages out, the log, and all models."""
+    settings = read_settings(path)
+    if settings.flight is not None:
+        raise StudyError(
+            "a preview takes a log or records, and this study flies first",
+            needed="[log] or [[record]]",
+            action="flightid run writes the log of the flight; name that",
+        )
+    names = tuple(model.name for model in settings.models)
+    tasks = [load_task(each, names) for each in settings.models]
+    runner = StageRunner(cache)
+    taken = take(settings, tasks, None, path.parent, runner)
+    staged = identify_models(
+        tasks, taken.records, taken.inspection, settings.reduce, runner, lambda *_: None
+    )
+    return settings, runner, taken.log, staged

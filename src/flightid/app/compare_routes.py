@@ -1,0 +1,57 @@
+"""Answers about comparisons and plans: two sides, the next flight, its card."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import FastAPI, HTTPException, Query, Response
+from pydantic import ValidationError
+
+from flightid.app import compare_work
+from flightid.app.backstage import Backstage, LogName, known_log, made
+from flightid.app.compare_schemas import (
+    CompareRequest,
+    ComparisonPart,
+    PlanPart,
+    PlanRequest,
+    PlanWishes,
+)
+from flightid.app.guard import SANDBOXED
+from flightid.app.studies import text_of
+
+
+def add_compare_routes(app: FastAPI, backstage: Backstage) -> None:
+    """Answer what the screens Compare and Plan ask."""
+    workspace, workers = backstage.workspace, backstage.workers
+
+    @app.post("/api/comparisons")
+    async def compare(asked: CompareRequest) -> ComparisonPart:
+        before = known_log(workspace, asked.before.log)
+        after = known_log(workspace, asked.after.log)
+        study, text = workspace.study_path(asked.before.log), ""
+        if asked.before.promised:
+            if backstage.studies.path(asked.before.log) is None:
+                raise HTTPException(404, "This log has no study that could promise anything.")
+            text = text_of(study)
+        sides = (asked.before, asked.after)
+        inputs = (compare_work.make_comparison, before, after, sides, study, text)
+        return ComparisonPart(**await made(workers.tuned(*inputs)))
+
+    @app.post("/api/plans")
+    async def plan(asked: PlanRequest) -> PlanPart:
+        log = known_log(workspace, asked.log)
+        return PlanPart(
+            **await made(workers.tuned(compare_work.make_plan, log, asked.wishes.given()))
+        )
+
+    @app.get("/api/plans/{log}/card", response_class=Response)
+    async def card(log: LogName, wishes: Annotated[str, Query(max_length=2000)] = "{}") -> Response:
+        path = known_log(workspace, log)
+        try:
+            given = PlanWishes.model_validate_json(wishes).given()
+        except ValidationError as error:
+            raise HTTPException(422, "The wishes are none that a plan knows.") from error
+        page = await made(workers.tuned(compare_work.make_card, path, given))
+        return Response(
+            page, media_type="text/html", headers={"content-security-policy": SANDBOXED}
+        )

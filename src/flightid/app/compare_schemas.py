@@ -1,0 +1,120 @@
+"""What the page and the server tell each other of comparisons and plans."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import Field
+
+from flightid.app.gain_schemas import GainFile
+from flightid.app.schemas import Light, Message, ShownFinding, StepCurve
+
+
+class ComparedSide(Message):
+    """A flight, or a part of it; as the first side also the promise of its study."""
+
+    log: str
+    span_s: tuple[float, float] | None = None
+    promised: bool = False
+
+
+class CompareRequest(Message):
+    """Both sides."""
+
+    before: ComparedSide
+    after: ComparedSide
+
+
+class ChangeRow(Message):
+    """A number of a loop on both sides, and their difference with its interval."""
+
+    loop: str
+    name: str
+    unit: str
+    before: float | None
+    before_95: tuple[float, float] | None
+    after: float | None
+    after_95: tuple[float, float] | None
+    difference: float | None
+    difference_95: tuple[float, float] | None
+    significant: bool
+
+
+class LoopSteps(Message):
+    """Steps of one loop on both sides."""
+
+    loop: str
+    before: StepCurve
+    after: StepCurve
+
+
+class ComparisonPart(Message):
+    """A comparison."""
+
+    names: tuple[str, str]
+    promised: bool
+    light: Light
+    rows: list[ChangeRow]
+    settings: list[tuple[str, str, str]]
+    steps: list[LoopSteps]
+    findings: list[ShownFinding]
+    following: GainFile | None
+    back: GainFile | None
+
+
+class PlanWishes(Message):
+    """Options of ``flightid plan``; those that are None are as usual."""
+
+    axes: list[str] | None = Field(None, max_length=8)
+    band_rad_s: tuple[float, float] | None = None
+    amplitude: float | None = None
+    duration_s: float | None = None
+    n_records: int | None = None
+    control: float | None = None
+    rate_rad_s: float | None = None
+    attitude_rad: float | None = None
+
+    def given(self) -> dict[str, Any]:
+        """What was asked for."""
+        asked = self.model_dump(exclude_none=True)
+        return asked | ({"axes": tuple(self.axes)} if self.axes else {})
+
+
+class PlanRequest(Message):
+    """A plan of the next flight of the vehicle of a log."""
+
+    log: str
+    wishes: PlanWishes
+
+
+class PlanRow(Message):
+    """The sweep of an axis, and what the log will show of it."""
+
+    axis: str
+    amplitude: float | None
+    size: str
+    unit: str
+    low_hz: float | None
+    high_hz: float | None
+    duration_s: float | None
+    runs: int
+    command_percent: float | None
+    rate_deg_s: float | None
+    attitude_deg: float | None
+    coherence: float | None
+    measured: bool
+    settings: dict[str, float]
+
+
+class PlanPart(Message):
+    """A plan of the next flight."""
+
+    title: str
+    verdict: str
+    light: Light
+    rows: list[PlanRow]
+    battery: str
+    logging: str
+    findings: list[ShownFinding]
+    files: list[GainFile]
+    refusal: str

@@ -1,0 +1,195 @@
+"""Comparisons and plans in a worker: what `flightid compare` and `flightid plan` say."""
+
+from __future__ import annotations
+
+import json
+import math
+import tempfile
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from flightid.app import gain_work
+from flightid.app.compare_schemas import (
+    ChangeRow,
+    ComparedSide,
+    ComparisonPart,
+    LoopSteps,
+    PlanPart,
+    PlanRow,
+)
+from flightid.app.gain_schemas import GainFile
+from flightid.app.gain_work import shown_finding
+from flightid.app.overview import light_of, step_curve
+from flightid.app.own_folders import draft_of
+from flightid.app.work import KEPT, kept_log
+from flightid.errors import FlightidError
+from flightid.files import sha256_of_file
+from flightid.findings import worst
+from flightid.planning.plan import plan_flight
+from flightid.planning.result import DEGREES, AxisSweep, SweepPlan
+from flightid.report.flight_card import card_html
+from flightid.review.before_after import compare_flights, compare_with_promise
+from flightid.review.changes import LoopChange
+from flightid.review.comparison import FlightComparison
+from flightid.review.flight import review_flight
+from flightid.review.next_step import FlownStep, flown_step
+from flightid.study.gain_preview import preview_fits
+from flightid.uncertainty.estimate import Reading
+
+
+def make_comparison(
+    before: Path, after: Path, sides: tuple[ComparedSide, ComparedSide], study: Path, text: str
+) -> Mapping[str, Any]:
+    """A promise of a study and a flight, or two flights or parts of flights."""
+    if not sides[0].promised:
+        both = (_reviewed(before, sides[0]), _reviewed(after, sides[1]))
+        return _part(compare_flights(*both), None).model_dump()
+    with draft_of(study, text) as draft:
+        fits = preview_fits(draft, cache=KEPT)
+    log = kept_log(after)
+    made = compare_with_promise(fits, log)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        _written(study, text, folder)
+        step = flown_step([folder], log.parameters)
+        if step is not None:
+            plain = FlownStep(Path(step.flown.name), _named(step.following), _named(step.back))
+            made = replace(made, findings=(*made.findings, plain.finding(kept=made.kept)))
+        return _part(made, step).model_dump()
+
+
+def _written(study: Path, text: str, folder: Path) -> None:
+    """The gains of the study, where it has any that may be flown."""
+    try:
+        files = gain_work.make_files(study, text)
+    except FlightidError:
+        return
+    for each in files:
+        (folder / each["name"]).write_text(each["text"], encoding="utf-8")
+
+
+def _named(path: Path | None) -> Path | None:
+    return None if path is None else Path(path.name)
+
+
+def _reviewed(path: Path, side: ComparedSide) -> Any:  # noqa: ANN401 - a review
+    key = f"review of {sha256_of_file(path)} {side.span_s}"
+    if key not in KEPT:
+        span = {} if side.span_s is None else {"span_s": side.span_s}
+        KEPT[key] = review_flight(kept_log(path), **span)
+    return KEPT[key]
+
+
+def _part(made: FlightComparison, step: FlownStep | None) -> ComparisonPart:
+    later = {each.name: each for each in made.after if each.is_told}
+    pairs = [(each, later[each.name]) for each in made.before if each.name in later]
+    return ComparisonPart(
+        names=made.names,
+        promised=made.promised,
+        light=light_of(worst(made.findings)),
+        rows=[_row(each, each.key in made.significant) for each in made.changes],
+        settings=[
+            *((n, f"{old:.5g}", f"{new:.5g}") for n, (old, new) in made.gains.items()),
+            *((n, old, new) for n, (old, new) in made.filters.items()),
+        ],
+        steps=[
+            LoopSteps(loop=a.name, before=step_curve(a), after=step_curve(b))
+            for a, b in pairs
+            if a.is_told
+        ],
+        findings=[shown_finding(each) for each in made.findings],
+        following=_file(None if step is None else step.following),
+        back=_file(None if step is None else step.back),
+    )
+
+
+def _file(path: Path | None) -> GainFile | None:
+    return None if path is None else GainFile(name=path.name, text=path.read_text(encoding="utf-8"))
+
+
+def _row(change: LoopChange, significant: bool) -> ChangeRow:
+    factor, unit = change.shown_unit
+
+    def value(of: Reading) -> float | None:
+        return None if of.value is None else factor * of.value
+
+    def ends(of: Reading) -> tuple[float, float] | None:
+        found = of.interval(0.95)
+        if found is None or not all(map(math.isfinite, found)):
+            return None
+        return factor * found[0], factor * found[1]
+
+    return ChangeRow(
+        loop=change.loop,
+        name=change.name,
+        unit=unit,
+        before=value(change.before),
+        before_95=ends(change.before),
+        after=value(change.after),
+        after_95=ends(change.after),
+        difference=value(change.difference),
+        difference_95=ends(change.difference),
+        significant=significant,
+    )
+
+
+def make_plan(log: Path, options: dict[str, Any]) -> Mapping[str, Any]:
+    """The next flight of the vehicle of a log."""
+    plan = _plan(log, options)
+    files: list[GainFile] = []
+    refusal = "" if plan.is_go else "no-go: nothing is written that a vehicle could load"
+    if plan.is_go:
+        with tempfile.TemporaryDirectory() as folder:
+            files = [
+                GainFile(name=each.name, text=each.read_text(encoding="utf-8"))
+                for each in plan.write(folder)
+            ]
+    return PlanPart(
+        title=plan.title,
+        verdict=plan.verdict,
+        light=light_of(worst(plan.findings)),
+        rows=[_sweep(each, plan.n_records) for each in plan.sweeps],
+        battery=plan.flight_time.words,
+        logging=plan.logging,
+        findings=[shown_finding(each) for each in plan.findings],
+        files=files,
+        refusal=refusal,
+    ).model_dump()
+
+
+def make_card(log: Path, options: dict[str, Any]) -> str:
+    """The card to print."""
+    return card_html(_plan(log, options))
+
+
+def _plan(log: Path, options: dict[str, Any]) -> SweepPlan:
+    key = f"plan of {sha256_of_file(log)} {json.dumps(options, sort_keys=True)}"
+    if key not in KEPT:
+        KEPT[key] = plan_flight(kept_log(log), **options)
+    made: SweepPlan = KEPT[key]
+    return made
+
+
+def _sweep(sweep: AxisSweep, runs: int) -> PlanRow:
+    told = None if sweep.plan is None else sweep.plan.axes[0]
+    guess = sweep.guess
+    full = None if guess is None else guess.vehicle.full_command
+    plan = sweep.plan
+    return PlanRow(
+        axis=sweep.axis,
+        amplitude=sweep.amplitude,
+        size=sweep.size,
+        unit="" if plan is None else plan.excitation.unit,
+        low_hz=None if plan is None else plan.band_rad_s[0] / math.tau,
+        high_hz=None if plan is None else plan.band_rad_s[1] / math.tau,
+        duration_s=None if plan is None else plan.excitation.duration_s,
+        runs=runs,
+        command_percent=None if told is None or not full else 100.0 * told.peak_control / full,
+        rate_deg_s=None if told is None else DEGREES * told.peak_rate_rad_s,
+        attitude_deg=None if told is None else DEGREES * told.peak_attitude_rad,
+        coherence=sweep.coherence,
+        measured=guess is not None and guess.measured,
+        settings={each.name: each.value for each in sweep.changes},
+    )
