@@ -14,6 +14,7 @@ import pytest
 import flightid as fid
 from flightid.cli.program import run
 from flightid.errors import DataError, OptionError, UnknownNameError
+from flightid.simulation.noise import linear_disturbance
 from flightid.simulation.realtime import MOST_A_FRAME, UdpLink, fly_in_real_time, fly_model
 from flightid.simulation.stepper import Stepper
 from tests.closeness import assert_close
@@ -42,6 +43,30 @@ class FakeClock:
 
 def stick(t: float, outputs: object) -> dict[str, float]:
     return {"u": 0.1 * np.sin(3.0 * t) + 0.05}
+
+
+def test_gusts_and_noise_in_the_loop_are_those_of_a_simulation() -> None:
+    """The same draws: an unstable vehicle under gusts, sample by sample and all at once."""
+    helicopter = fid.load_model("ah64_hover")
+    noise = fid.Noise(
+        sensor={"q": 0.01}, process={"p": 0.02}, gusts={"u": (3.0, 2.0), "w": (1.0, 1.0)}, seed=7
+    )
+    stepper = Stepper(helicopter, STEP_S, noise=noise)
+    session = fly_in_real_time(
+        stepper, lambda t, seen: {"lon": 0.1}, duration_s=12.0, clock=FakeClock()
+    )
+    calm = fly_in_real_time(
+        Stepper(helicopter, STEP_S), lambda t, seen: {"lon": 0.1}, duration_s=12.0,
+        clock=FakeClock(),
+    )  # fmt: skip
+    found = session.record.matrix(stepper.outputs) - calm.record.matrix(stepper.outputs)
+    wanted = linear_disturbance(helicopter, noise, STEP_S, 600) + noise.on_sensors(
+        stepper.outputs, 600
+    )
+    scale = np.abs(wanted).max(axis=1, keepdims=True)
+    assert_close(found / scale, wanted / scale, atol=1e-9, why="the same recursion and draws")
+    with pytest.raises(UnknownNameError, match="gravity"):
+        Stepper(helicopter, STEP_S, noise=fid.Noise(gusts={"gravity": (1.0, 1.0)}))
 
 
 def test_linear_flight_is_exact() -> None:

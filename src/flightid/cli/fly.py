@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from flightid.cli.option_fields import OptionsCommand, given_options
+from flightid.cli.option_fields import OptionsCommand, parted
 from flightid.cli.output import WRITTEN, emit, json_option, note
 from flightid.cli.records import FILES
 from flightid.cli.sources import load_source, model_argument, model_options
@@ -21,9 +21,10 @@ if TYPE_CHECKING:
 
 
 def _fields() -> dict[str, type[Options]]:
+    from flightid import Noise
     from flightid.simulation.fly_options import FlyOptions
 
-    return {"a flight": FlyOptions}
+    return {"a flight": FlyOptions, "noise": Noise}
 
 
 @click.command(cls=OptionsCommand, fields_of=_fields)
@@ -71,7 +72,7 @@ def command(
     library model. Inputs come as JSON datagrams such as {"lat": 0.1}, outputs go to a cockpit
     each frame.
     """
-    from flightid import write_records
+    from flightid import Noise, write_records
     from flightid.simulation.fly_options import FlyOptions
     from flightid.simulation.realtime import fly_model
 
@@ -79,7 +80,11 @@ def command(
         raise click.UsageError(f"--write: there is no folder {target.parent}; make it first")
     if target is not None and target.suffix not in (".parquet", ".nc"):
         raise click.UsageError(f"--write: {target.name} ends in neither .parquet nor .nc")
-    asked = FlyOptions(**given_options(FlyOptions, options, "a flight"))
+    of_flight, of_noise = parted(options, _fields())
+    if set(of_noise) == {"seed"}:
+        raise click.UsageError("--seed is of noise: give --sensor, --process or --gust too")
+    asked = FlyOptions(**of_flight)
+    noise = Noise(**of_noise) if of_noise else None
     if sum(each is not None for each in (gains, blocks, law)) > 1:
         raise click.UsageError(
             "--gains, --blocks and --augmentation move the same inputs: give one of them"
@@ -99,7 +104,7 @@ def command(
     # Who ends the flight by a signal keeps it, as Ctrl-C does.
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
-        session = fly_model(source, asked, controller=around, say=note)
+        session = fly_model(source, asked, controller=around, noise=noise, say=note)
     finally:
         signal.signal(signal.SIGTERM, before)
     if target is not None:

@@ -147,6 +147,51 @@ def linear_disturbance(
             )
         draws = noise.stream(1).standard_normal((n_samples, system.order)).T
         return np.asarray(c @ run_recursion(a, sizes[:, None] * draws))
+    moved = moving_air(model, noise, sample_time_s)
+    n = system.order
+    draws = _draws(noise, n, len(noise.gusts), n_samples)
+    start = np.concatenate([np.zeros(n), moved.start])
+    return np.asarray(moved.seen @ run_recursion(moved.transition, moved.root @ draws, start))
+
+
+@dataclass(frozen=True)
+class MovingAir:
+    """Process noise and gusts of a linear model as one recursion, z' = transition z + root draw.
+
+    Attributes
+    ----------
+    transition, root : ndarray, shape (n + m, n + m)
+        Of the model's n states and m gusts, over a sample.
+    seen : ndarray, shape (n_outputs, n + m)
+        Outputs of both.
+    start : ndarray, shape (m,)
+        Gusts in their steady state.
+    """
+
+    transition: Array
+    root: Array
+    seen: Array
+    start: Array
+
+
+def moving_air(model: LinearModel, noise: Noise, sample_time_s: float) -> MovingAir:
+    """The recursion behind `linear_disturbance`, for whoever flies on without an end.
+
+    Raises
+    ------
+    UnknownNameError
+        There is no such state.
+    OptionError
+        Gusts on a sampled system, whose states have no rates.
+    """
+    system = linear_system(model)
+    _require_known("state", (*noise.process, *noise.gusts), system.states)
+    if system.is_discrete:
+        raise OptionError(
+            "gusts need the rates of a continuous model", found=", ".join(noise.gusts)
+        )
+    a, _, c, _, _ = system.state_space()
+    sizes = np.array([noise.process.get(name, 0.0) for name in system.states])
     n = system.order
     columns = [system.states.index(name) for name in noise.gusts]
     times = np.array([time_s for _, time_s in noise.gusts.values()])
@@ -156,10 +201,8 @@ def linear_disturbance(
     seen = np.hstack([c, -felt[:, columns]])
     density = np.diag(np.concatenate([sizes**2, 2.0 * steady**2 / times]))
     transition, covariance = sampled_noise(whole, density, sample_time_s)
-    draws = _draws(noise, n, len(times), n_samples)
-    start = np.concatenate([np.zeros(n), steady * noise.stream(2).standard_normal(len(times))])
-    root = _root(covariance)
-    return np.asarray(seen @ run_recursion(transition, root @ draws, start))
+    start = steady * noise.stream(2).standard_normal(len(times))
+    return MovingAir(transition, _root(covariance), seen, start)
 
 
 def sampled_noise(a: Array, density: Array, sample_time_s: float) -> tuple[Array, Array]:

@@ -17,6 +17,7 @@ from flightid.errors import DataError, OptionError
 from flightid.record import Record
 from flightid.result import Result
 from flightid.simulation.fly_options import FlyOptions
+from flightid.simulation.noise import Noise
 from flightid.simulation.stepper import Controller, Stepper
 from flightid.table import Column, Table
 
@@ -177,6 +178,7 @@ def fly_model(
     options: FlyOptions,
     *,
     controller: Controller | None = None,
+    noise: Noise | None = None,
     say: Callable[[str], None] | None = None,
 ) -> FlownSession:
     """Fly a model beside the clock, its pilot and its cockpit on the other ends of UDP.
@@ -187,6 +189,8 @@ def fly_model(
     options : FlyOptions
     controller : Controller, optional
         Moves inputs beside the pilot.
+    noise : Noise, optional
+        Gusts, process and sensor noise of a linear model.
     say : callable, optional
         Takes a sentence on where it listens, and one on what it could not deliver.
 
@@ -206,7 +210,7 @@ def fly_model(
     """
     stepper = Stepper(
         model, options.step_s(model), feedback=options.gains, limits=options.bounds,
-        controller=controller,
+        controller=controller, noise=noise,
     )  # fmt: skip
     heard = None if options.listen is None else (options.host, options.listen)
     with UdpLink(stepper.inputs, listen=heard, send=options.cockpit, style=options.style) as link:

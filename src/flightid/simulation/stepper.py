@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Protocol
+from typing import Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError, OptionError, UnknownNameError
-from flightid.models import LinearSystem, NarxModel, StateSpaceModel
-from flightid.models.model import linear_system
+from flightid.models import LinearModel, LinearSystem, NarxModel, StateSpaceModel
+from flightid.models.model import linear_system, model_of
+from flightid.simulation.noise import Noise, moving_air
 from flightid.simulation.nonlinear import run_equations, start_of
 
 Array = NDArray[np.float64]
@@ -47,6 +48,8 @@ class Stepper:
         Lowest and highest value of an input, after the augmentation.
     controller : Controller, optional
         Beside the feedback; its commands are inputs too.
+    noise : Noise, optional
+        Gusts, process and sensor noise, of a linear model: the draws of `simulate` with this seed.
 
     Raises
     ------
@@ -71,11 +74,19 @@ class Stepper:
         feedback: Mapping[str, Mapping[str, float]] | None = None,
         limits: Mapping[str, tuple[float, float]] | None = None,
         controller: Controller | None = None,
+        noise: Noise | None = None,
     ) -> None:
         if not (np.isfinite(sample_time_s) and sample_time_s > 0.0):
             raise OptionError("the sample time is not positive", found=sample_time_s)
         self.sample_time_s = sample_time_s
         self._plant = _plant(model, sample_time_s)
+        self._air: _Air | None = None
+        if noise is not None:
+            if not isinstance(self._plant, _Samples):
+                raise OptionError(
+                    "noise is flown on linear models alone", found=repr(model), needed="linear"
+                )
+            self._air = _Air(cast("LinearModel", model_of(model)), noise, sample_time_s)
         moved, self.outputs = self._plant.inputs, self._plant.outputs
         commands = () if controller is None else controller.commands
         self._moved, self._controller = moved, controller
@@ -128,6 +139,9 @@ class Stepper:
                 driven[self._moved.index(name)] += value
         driven = np.clip(driven, self._low, self._high)
         found = self._plant.step(driven)
+        if self._air is not None and isinstance(self._plant, _Samples):
+            found = found + self._air.outputs()
+            self._plant.push(self._air.step())
         if not np.all(np.abs(found) < 1e30):
             raise DataError("the model diverges", found=str(dict(inputs)))
         self._last = found
@@ -183,6 +197,37 @@ class _Samples:
         y = self._c @ self._x + self._d @ u
         self._x = self._a @ self._x + self._b @ u
         return np.asarray(y)
+
+    def push(self, states: Array) -> None:
+        """Add to the model's own states, which stand first."""
+        self._x[: len(states)] += states
+
+
+class _Air:
+    """Gusts and noise one sample at a time; states that feel them are the plant's own."""
+
+    def __init__(self, model: LinearModel, noise: Noise, sample_time_s: float) -> None:
+        self._moving = moving_air(model, noise, sample_time_s)
+        self._n = len(self._moving.transition) - len(noise.gusts)
+        self._gusts = self._moving.start
+        self._white, self._blown, self._sensed = (noise.stream(k) for k in (1, 2, 0))
+        self._blown.standard_normal(len(noise.gusts))
+        outputs = linear_system(model).outputs
+        noise.on_sensors(outputs, 0)
+        self._errors = np.array([noise.sensor.get(name, 0.0) for name in outputs])
+
+    def outputs(self) -> Array:
+        """What outputs hold of this instant's gusts and sensors' errors, beside the states."""
+        felt = self._moving.seen[:, self._n :] @ self._gusts
+        return np.asarray(felt + self._errors * self._sensed.standard_normal(len(felt)))
+
+    def step(self) -> Array:
+        """Move the air on; what that adds to the states of the next sample."""
+        m, n = self._moving, self._n
+        draws = [self._white.standard_normal(n), self._blown.standard_normal(len(self._gusts))]
+        kick = m.root @ np.concatenate(draws) + m.transition[:, n:] @ self._gusts
+        self._gusts = kick[n:]
+        return np.asarray(kick[:n])
 
 
 class _Equations:
