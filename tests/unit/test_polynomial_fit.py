@@ -294,6 +294,32 @@ def test_data_that_cannot_be_fitted():
         fid.identify(asked, [record, degrees])
 
 
+@pytest.mark.parametrize(
+    ("asked", "lengths"),
+    [
+        # Each record gives its samples less the longest lag, less one for its own level.
+        (P.arx(["u", "v"], "y", na=3, nb=1), (4, 4, 9)),
+        # The noise model of instruments costs each record one more.
+        (P.arx(["u"], "y", na=1, nb=1, method="iv4"), (4, 4)),
+    ],
+    ids=["least squares", "instruments"],
+)
+def test_coefficients_that_leave_no_errors_are_refused(asked, lengths):
+    random = np.random.default_rng(0)
+
+    def record(n):
+        u, v, y = random.standard_normal((3, n))
+        return fid.Record.from_arrays(
+            0.1 * np.arange(n), inputs={"u": u, "v": v}, outputs={"y": y}, hold="zero"
+        )
+
+    with pytest.raises(DataError, match="leave no errors"):
+        fid.identify(asked, [record(n) for n in lengths], loop="open")
+    # One sample more in a record leaves one error: bars, and none of them nothing.
+    fit = fid.identify(asked, [record(n) for n in (*lengths[:-1], lengths[-1] + 1)], loop="open")
+    assert all(each.stderr > 1e-9 for each in fit.parameters.values())
+
+
 def test_instruments_that_fail_say_so():
     record = flown(ARMAX, 22)
     twice = record.replace({"u": np.sin(0.5 * np.arange(400))})

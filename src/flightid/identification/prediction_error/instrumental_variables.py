@@ -14,6 +14,7 @@ from flightid.identification.prediction_error.linear_regression import (
     reflected,
     regress,
     regress_structure,
+    require_errors,
 )
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.models.sampled.channels import SampledChannels
@@ -35,7 +36,7 @@ def four_stage(
     Raises
     ------
     DataError
-        The instruments do not tell the coefficients apart.
+        The instruments do not tell the coefficients apart, or leave no errors beside them.
 
     Reference
     ---------
@@ -91,6 +92,8 @@ def _instruments(
         regressors, instruments, target = (
             np.concatenate([row - row.mean(axis=0) for row in rows]) for rows in about
         )
+    levels = sum(n > start for n in data.lengths) if data.levels else 0
+    require_errors(target.size - levels, regressors.shape[1])
     product = instruments.T @ regressors
     scale = np.outer(np.linalg.norm(instruments, axis=0), np.linalg.norm(regressors, axis=0))
     if np.any(scale == 0.0) or np.linalg.cond(product / scale) > 1e13:

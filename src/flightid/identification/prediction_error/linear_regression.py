@@ -217,6 +217,23 @@ def require_independent(regression: LinearRegression, structure: PolynomialStruc
         )
 
 
+def require_errors(n_rows: int, n_coefficients: int) -> None:
+    """Refuse equations that coefficients meet exactly: nothing is left to judge them by.
+
+    Raises
+    ------
+    DataError
+        No more equations than coefficients.
+    """
+    if n_rows <= n_coefficients:
+        raise DataError(
+            "the records leave no errors beside the coefficients",
+            found=f"{n_rows} equations of {n_coefficients} coefficients",
+            needed="more equations than coefficients",
+            action="lower the orders, or take longer records",
+        )
+
+
 def reflected(polynomial: Array) -> Array:
     """A polynomial in q⁻¹ that can be divided by: roots outside the unit circle moved inside.
 

@@ -28,6 +28,7 @@ from flightid.identification.prediction_error.likelihoods import End, likeliest
 from flightid.identification.prediction_error.linear_regression import (
     inverse_square,
     regress_structure,
+    require_errors,
     require_independent,
 )
 from flightid.identification.prediction_error.part_blocks import (
@@ -124,13 +125,7 @@ def _regression(structure: PolynomialStructure, data: SampledChannels) -> Search
         theta, known = four_stage(structure, data)
         found = _linear(structure, theta, known.covariance, degrees, "instruments", skip)
         return replace(found, freedom=known.freedom, colour=known.colour, agreement=known.agreement)
-    if degrees < 1:
-        raise DataError(
-            "the records leave no errors beside the coefficients",
-            found=f"{made.n_rows} equations of {made.theta.size} coefficients",
-            needed="more equations than coefficients",
-            action="lower the orders, or take longer records",
-        )
+    require_errors(made.n_rows, made.theta.size)
     covariance = made.sum_of_squares / degrees * inverse_square(made.factor)
     return _linear(structure, made.theta, covariance, degrees, "regression", skip)
 
