@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import shutil
+import subprocess
 import sys
 import tempfile
 import threading
@@ -16,7 +17,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from pictures import MAXIMUM_BYTES, PICTURES
+from pictures import MAXIMUM_BYTES, PICTURES, ROOT
 from PIL import Image
 from playwright.sync_api import Page, sync_playwright
 
@@ -73,6 +74,18 @@ def response(page: Page) -> None:
     photograph(page, "app-response.png")
 
 
+def records(page: Page, folder: Path) -> None:
+    """The screen of a rig's records, its study written."""
+    rig = ROOT / "examples" / "twin_rotor_linear" / "fly.py"
+    subprocess.run([sys.executable, rig, folder / "rig"], check=True, capture_output=True)
+    page.click("nav >> text=Logs")
+    names = ("u1_prbs", "u1_doublet_pitch")
+    page.set_input_files("input[type=file]", [folder / "rig" / f"{name}.csv" for name in names])
+    page.click("text=Write the study")
+    page.locator("#content .box").first.wait_for(timeout=120_000)
+    photograph(page, "app-records.png")
+
+
 def main(log: Path) -> None:
     """Take all pictures."""
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as tools:
@@ -87,6 +100,7 @@ def main(log: Path) -> None:
             page.wait_for_selector("tbody a")
             flight(page)
             response(page)
+            records(page, Path(folder))
             browser.close()
 
 

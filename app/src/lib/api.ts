@@ -1,4 +1,4 @@
-import type { CompareRequest, ComparisonPart, Edit, FieldGroup, FlightScreen, GainFile, Job, Listing, LogItem, PlanPart, PlanRequest, StudyText } from "./types";
+import type { CompareRequest, ComparisonPart, Edit, FieldGroup, FlightScreen, GainFile, Job, Listing, LogItem, PlanPart, PlanRequest, ProposedStudy, RigItem, RigScreen, RunScreen, StudyText } from "./types";
 
 /** A refusal of the server, in its own words. */
 export class Refusal extends Error {
@@ -59,10 +59,16 @@ export const replace = (log: string, etag: string, text: string) =>
   json<StudyText>(`/api/studies/${log}`, sent("POST", { text }, { "if-match": etag }));
 
 /** Send a file as it lies on the disk; `seen` hears how much of it has gone. */
-export function upload(file: File, seen: (share: number) => void): Promise<LogItem> {
+export const upload = (file: File, seen: (share: number) => void) =>
+  put<LogItem>(`/api/logs?name=${encodeURIComponent(file.name)}`, file, seen);
+/** The same for a file of columns; `rig` names the set that it joins. */
+export const uploadRecords = (file: File, rig: string, seen: (share: number) => void) =>
+  put<RigItem>(`/api/records?name=${encodeURIComponent(file.name)}&rig=${rig}`, file, seen);
+
+function put<T>(path: string, file: File, seen: (share: number) => void): Promise<T> {
   return new Promise((resolve, reject) => {
     const request = new XMLHttpRequest();
-    request.open("PUT", `/api/logs?name=${encodeURIComponent(file.name)}`);
+    request.open("PUT", path);
     request.setRequestHeader("content-type", "application/octet-stream");
     request.upload.onprogress = (event) => seen(event.loaded / Math.max(1, event.total));
     request.onerror = () => reject(new Refusal(0, "The file could not be sent."));
@@ -81,6 +87,21 @@ export function upload(file: File, seen: (share: number) => void): Promise<LogIt
   });
 }
 
+type Reading = { time_column?: string | null; sample_time_s?: number | null };
+const asked = (reading: Reading) => new URLSearchParams(Object.entries(reading).filter(([, each]) => each).map(([key, each]) => [key, String(each)]));
+export const rigs = () => json<RigItem[]>("/api/records");
+export const rig = (id: string, reading: Reading) => json<RigScreen>(`/api/records/${id}?${asked(reading)}`);
+export const propose = (id: string, body: unknown) => json<ProposedStudy>(`/api/records/${id}/study`, sent("POST", body));
+export const lastRun = (log: string) => json<RunScreen>(`/api/runs/${log}`);
+export const run = (log: string) => json<RunScreen>(`/api/runs/${log}`, sent("POST", {}));
+export const runFigure = (log: string, number: number) => json<{ data: object[]; layout: Record<string, any> }>(`/api/runs/${log}/figures/${number}`);
+export async function rigView(id: string, file: string, manoeuvre: string, series: string[], span: [number, number], columns: number, reading: Reading) {
+  const query = asked(reading);
+  for (const name of series) query.append("series", name);
+  for (const [key, value] of Object.entries({ file, manoeuvre, start_s: span[0], stop_s: span[1], columns: Math.max(10, Math.round(columns)) })) query.set(key, String(value));
+  return rowsOf(await (await ask(`/api/records/${id}/view?${query}`)).arrayBuffer());
+}
+
 /** Series over a span: time, then a row each; NaN breaks a line, infinity says "no sample here". */
 export async function view(
   log: string,
@@ -93,7 +114,10 @@ export async function view(
   query.set("start_s", String(span[0]));
   query.set("stop_s", String(span[1]));
   query.set("columns", String(Math.max(10, Math.round(columns))));
-  const bytes = await (await ask(`/api/logs/${log}/view?${query}`)).arrayBuffer();
+  return rowsOf(await (await ask(`/api/logs/${log}/view?${query}`)).arrayBuffer());
+}
+
+function rowsOf(bytes: ArrayBuffer): Float64Array[] {
   const [points, rows] = new Float64Array(bytes, 0, 2);
   return Array.from({ length: rows }, (_, row) => new Float64Array(bytes, 16 + row * points * 8, points));
 }

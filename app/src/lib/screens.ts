@@ -4,7 +4,10 @@ import Flight from "../screens/Flight.svelte";
 import Gains from "../screens/Gains.svelte";
 import Library from "../screens/Library.svelte";
 import Plan from "../screens/Plan.svelte";
+import Records from "../screens/Records.svelte";
+import Report from "../screens/Report.svelte";
 import Response from "../screens/Response.svelte";
+import Verify from "../screens/Verify.svelte";
 import type { Study } from "./study.svelte";
 
 /** What every screen is given: the log of the address, its study, and the rest of the address. */
@@ -28,12 +31,18 @@ export interface Screen {
 
 const hasModels = ({ log, study }: Given) => Boolean(log && study?.models.length);
 
+/** Whether the address is that of records of a rig, which have no flight. */
+const ofRecords = ({ study }: Given) => location.hash.startsWith("#/records/") || Boolean(study?.file?.settings.record);
+
 /** In the order of the links; the first is where the address says nothing else. */
 export const SCREENS: Screen[] = [
   { name: "logs", title: "Logs", component: Library, ofLog: false, needsStudy: false, shows: () => true },
-  { name: "flight", title: "Flight", component: Flight, ofLog: true, needsStudy: false, shows: ({ log }) => Boolean(log) },
+  { name: "flight", title: "Flight", component: Flight, ofLog: true, needsStudy: false, shows: (given) => Boolean(given.log) && !ofRecords(given) },
   { name: "response", title: "Response", component: Response, ofLog: true, needsStudy: true, shows: hasModels },
   { name: "gains", title: "Gains", component: Gains, ofLog: true, needsStudy: true, shows: hasModels },
-  { name: "compare", title: "Compare", component: Compare, ofLog: true, needsStudy: false, shows: ({ log }) => Boolean(log) },
-  { name: "plan", title: "Plan", component: Plan, ofLog: true, needsStudy: false, shows: ({ log }) => Boolean(log) },
+  { name: "compare", title: "Compare", component: Compare, ofLog: true, needsStudy: false, shows: (given) => Boolean(given.log) && !ofRecords(given) },
+  { name: "plan", title: "Plan", component: Plan, ofLog: true, needsStudy: false, shows: (given) => Boolean(given.log) && !ofRecords(given) },
+  { name: "records", title: "Records", component: Records, ofLog: true, needsStudy: false, shows: (given) => Boolean(given.log) && ofRecords(given) },
+  { name: "verify", title: "Verify", component: Verify, ofLog: true, needsStudy: true, shows: hasModels },
+  { name: "report", title: "Report", component: Report, ofLog: true, needsStudy: true, shows: hasModels },
 ];

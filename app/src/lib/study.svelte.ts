@@ -53,6 +53,12 @@ export class Study {
     return this.#store(edits, () => api.change(this.log, this.file!.etag, edits));
   }
 
+  /** Put a whole text in place, as a proposal made anew; it can be taken back. */
+  async replace(text: string): Promise<boolean> {
+    if (!this.file) return false;
+    return this.#store([], () => api.replace(this.log, this.file!.etag, text));
+  }
+
   async undo() {
     const text = this.#before.at(-1);
     if (text === undefined || !this.file) return;

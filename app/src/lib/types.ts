@@ -154,7 +154,7 @@ export interface GainsQuestion {
 /** Long work: its state, and where it can be asked for again. */
 export interface Job {
   id: string;
-  kind: "overview" | "review";
+  kind: "overview" | "review" | "run";
   log: string;
   state: "waiting" | "done" | "failed" | "cancelled" | "interrupted";
   reason: string;
@@ -289,6 +289,13 @@ export interface PlanWishes {
   attitude_rad: number | null;
 }
 
+/** The study that `flightid new` writes for records; empty where they carry no model. */
+export interface ProposedStudy {
+  text: string;
+  models: string[];
+  said: string[];
+}
+
 /** A request on the socket: what the page shows under edits that are not written yet. */
 export interface Question {
   request: number;
@@ -364,6 +371,96 @@ export interface ReviewPart {
   steps: StepCurve[];
   verdicts: ShownFinding[];
   untold: Record<string, [string, string]>;
+}
+
+/** A column as it stands in a file. */
+export interface RigColumn {
+  name: string;
+  unit: string;
+  samples: number;
+  least: number | null;
+  most: number | null;
+}
+
+/** What was found in the samples of a channel, and where. */
+export interface RigFault {
+  channel: string;
+  code: string;
+  light: "green" | "amber" | "red" | "unknown";
+  message: string;
+  action: string;
+  span_s: [number, number] | null;
+}
+
+/** A file: its columns, and the manoeuvres in it or why none can be read. */
+export interface RigFile {
+  name: string;
+  columns: RigColumn[];
+  notes: string[];
+  manoeuvres: RigManoeuvre[];
+  error: string;
+}
+
+/** A set of record files. */
+export interface RigItem {
+  id: string;
+  name: string;
+  files: number;
+  size: number;
+  has_study: boolean;
+}
+
+/** A record that a file holds. */
+export interface RigManoeuvre {
+  name: string;
+  start_s: number;
+  stop_s: number;
+  rate_hz: number;
+  channels: Record<string, string>;
+  faults: RigFault[];
+}
+
+/** What `flightid new` is asked: roles of columns where their names do not tell. */
+export interface RigProposal {
+  time_column: string | null;
+  sample_time_s: number | null;
+  inputs: string[];
+  outputs: string[];
+  units: Record<string, string>;
+}
+
+/** How files are read, where they do not tell: as in `[defaults.record]` of a study. */
+export interface RigReading {
+  time_column: string | null;
+  sample_time_s: number | null;
+}
+
+/** A set of record files, and the roles that names and units tell. */
+export interface RigScreen {
+  id: string;
+  files: RigFile[];
+  inputs: string[];
+  outputs: string[];
+  untold: string;
+  jobs: Job[];
+}
+
+/** What a run of the study made: its report as a tree, figures by their number. */
+export interface RunPart {
+  etag: string;
+  folder: string;
+  title: string;
+  verdict: "green" | "amber" | "red" | "unknown";
+  tally: string;
+  seconds: number;
+  figures: number;
+  sections: Record<string, unknown>[];
+}
+
+/** The last run that ended, and the one that goes on. */
+export interface RunScreen {
+  run: RunPart | null;
+  jobs: Job[];
 }
 
 /** A finding, with the spans of the flight that it speaks of. */

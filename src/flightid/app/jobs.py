@@ -19,7 +19,7 @@ from typing import Any
 
 from pebble import ProcessExpired, ProcessPool
 
-from flightid.app import work
+from flightid.app import run_work, work
 from flightid.app.kept_parts import kept_part
 from flightid.app.own_folders import own_folder, read_plain
 from flightid.app.schemas import Job
@@ -43,11 +43,19 @@ def _review(workspace: Workspace, log: str, path: Path) -> tuple[object, ...]:
     return work.make_review, path, workspace.result_path(log, "review.json")
 
 
+def _run(workspace: Workspace, log: str, path: Path) -> tuple[object, ...]:
+    result = workspace.result_path(log, "run.json")
+    return run_work.make_run, path, result.parent, result
+
+
 WORK: dict[str, Callable[[Workspace, str, Path], tuple[object, ...]]] = {
     "overview": _overview,
     "review": _review,
+    "run": _run,
 }
 """Call and inputs of each kind of job (`Job.kind`); its result is a part of `kept_parts.PARTS`."""
+REPEATED = ("run",)
+"""Kinds whose result depends on the study: asked for again, they are done again."""
 
 
 class Workers:
@@ -104,7 +112,8 @@ class Workers:
         """Begin a job, unless its result is there, it runs, or it failed and nobody asks again."""
         name = f"{kind}-{log}"
         known = self._jobs.get(name)
-        if kept_part(self._workspace, log, kind) is not None:
+        repeats = again and kind in REPEATED
+        if not repeats and kept_part(self._workspace, log, kind) is not None:
             return
         if known is not None and known.state == "waiting":
             return

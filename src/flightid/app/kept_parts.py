@@ -6,10 +6,11 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from flightid.app.run_schemas import RunPart
 from flightid.app.schemas import FieldGroup, Message, Overview, ReviewPart
 from flightid.app.workspace import Workspace
 
-PARTS: dict[str, type[Message]] = {"overview": Overview, "review": ReviewPart}
+PARTS: dict[str, type[Message]] = {"overview": Overview, "review": ReviewPart, "run": RunPart}
 
 
 def kept_overview(workspace: Workspace, log: str) -> Overview | None:

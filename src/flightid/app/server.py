@@ -19,6 +19,8 @@ from flightid.app.jobs import Workers
 from flightid.app.live import add_socket
 from flightid.app.log_routes import add_log_routes
 from flightid.app.page_routes import add_page_routes
+from flightid.app.rig_routes import add_rig_routes
+from flightid.app.run_routes import add_run_routes
 from flightid.app.studies import Studies
 from flightid.app.study_routes import add_study_routes
 from flightid.app.workspace import Workspace
@@ -32,6 +34,8 @@ ROUTES: tuple[Callable[[FastAPI, Backstage], None], ...] = (
     add_study_routes,
     add_gain_routes,
     add_compare_routes,
+    add_rig_routes,
+    add_run_routes,
     add_socket,
 )
 """One module each; a new subject adds its own."""

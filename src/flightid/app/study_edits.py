@@ -97,7 +97,7 @@ def _apply(document: Any, edit: KeyEdit) -> None:  # noqa: ANN401 - a parsed doc
             place.append(tomlkit.table())
         place = place[key]
     if edit.value is None:
-        if last in place:
+        if isinstance(last, int) or last in place:
             del place[last]
     elif isinstance(last, int) and last == len(place):
         place.append(tomlkit.item(edit.value))

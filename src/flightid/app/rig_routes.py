@@ -1,0 +1,127 @@
+"""Answers about records of a rig: which there are, what is in them, a view, their study."""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+import math
+from contextlib import suppress
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from fastapi import FastAPI, HTTPException, Query, Request, Response
+
+from flightid.app import rig_work
+from flightid.app.backstage import Backstage, LogName, made
+from flightid.app.field_routes import MOST_COLUMNS, MOST_SERIES
+from flightid.app.guard import UPLOAD_BYTES
+from flightid.app.own_folders import is_link
+from flightid.app.pyramid import Pyramid, view
+from flightid.app.rig_schemas import ProposedStudy, RigItem, RigProposal, RigReading, RigScreen
+from flightid.app.rigs import Rigs
+from flightid.app.study_edits import write_study
+
+
+def add_rig_routes(app: FastAPI, backstage: Backstage) -> None:
+    """Answer what the screen of records asks."""
+    workspace, workers, studies = backstage.workspace, backstage.workers, backstage.studies
+    rigs = Rigs(workspace)
+
+    @app.get("/api/records")
+    async def listing() -> list[RigItem]:
+        known = await asyncio.to_thread(rigs.ids)
+        return [_item(rigs, backstage, each) for each in known]
+
+    @app.put("/api/records")
+    async def upload(
+        request: Request,
+        name: Annotated[str, Query(max_length=300)],
+        rig: Annotated[str, Query(max_length=16)] = "",
+    ) -> RigItem:
+        if int(request.headers.get("content-length", 0)) > UPLOAD_BYTES:
+            raise HTTPException(413)
+        return _item(rigs, backstage, await rigs.take(name, request.stream(), rig))
+
+    @app.get("/api/records/{rig}")
+    async def screen(rig: LogName, reading: Annotated[RigReading, Query()]) -> RigScreen:
+        paths = _known(rigs, rig)
+        told = await made(workers.live(rig_work.make_rig, paths, _options(reading)))
+        return RigScreen(id=rig, jobs=workers.of_log(rig), **told)
+
+    @app.post("/api/records/{rig}/study")
+    async def propose(rig: LogName, asked: RigProposal) -> ProposedStudy:
+        paths, target = _known(rigs, rig), workspace.study_path(rig)
+        roles = {"inputs": asked.inputs, "outputs": asked.outputs}
+        reading = _options(asked) | ({"units": asked.units} if asked.units else {})
+        call = workers.live(rig_work.propose, paths, target.parent, roles, reading)
+        proposed = ProposedStudy(**await made(call))
+        if proposed.text and studies.path(rig) is None:
+            await asyncio.to_thread(write_study, target, proposed.text)
+        return proposed
+
+    @app.get("/api/records/{rig}/view", response_class=Response)
+    async def seen(
+        rig: LogName,
+        file: Annotated[str, Query(max_length=300)],
+        manoeuvre: Annotated[str, Query(max_length=300)],
+        series: Annotated[list[str], Query(min_length=1, max_length=MOST_SERIES)],
+        start_s: float,
+        stop_s: float,
+        columns: Annotated[int, Query(ge=10, le=MOST_COLUMNS)],
+        time_column: Annotated[str | None, Query(max_length=300)] = None,
+        sample_time_s: Annotated[float | None, Query(gt=0.0)] = None,
+    ) -> Response:
+        if not (math.isfinite(start_s) and math.isfinite(stop_s) and start_s < stop_s):
+            raise HTTPException(422, "A span needs two instants, the first before the last.")
+        path = next((each for each in _known(rigs, rig) if each.name == file), None)
+        if path is None:
+            raise HTTPException(404, "The records hold no such file.")
+        options = _options(RigReading(time_column=time_column, sample_time_s=sample_time_s))
+        levels = [await _levels(backstage, rig, path, manoeuvre, each, options) for each in series]
+        table = await asyncio.to_thread(view, levels, (start_s, stop_s), columns)
+        head = np.array(table.shape[::-1], np.float64)
+        return Response(head.tobytes() + table.tobytes(), media_type="application/octet-stream")
+
+
+async def _levels(
+    backstage: Backstage,
+    rig: str,
+    path: Path,
+    manoeuvre: str,
+    channel: str,
+    options: dict[str, Any],
+) -> Pyramid:
+    """Levels of a channel, made where they are not there yet."""
+    said = repr((path.name, path.stat().st_mtime_ns, manoeuvre, channel, sorted(options.items())))
+    name = hashlib.sha256(said.encode()).hexdigest()[:24]
+    target = backstage.workspace.result_path(rig, f"{name}.npy").with_suffix(".npy")
+    with suppress(OSError, ValueError, IndexError, EOFError):
+        if not is_link(target):
+            return await asyncio.to_thread(Pyramid.read, target)
+    work = (rig_work.make_rig_pyramid, path, manoeuvre, channel, options, target)
+    await made(backstage.workers.live(*work))
+    return await asyncio.to_thread(Pyramid.read, target)
+
+
+def _options(reading: RigReading) -> dict[str, Any]:
+    told = {"time_column": reading.time_column, "sample_time_s": reading.sample_time_s}
+    return {key: value for key, value in told.items() if value is not None}
+
+
+def _known(rigs: Rigs, rig: str) -> list[Path]:
+    paths = rigs.files(rig)
+    if not paths:
+        raise HTTPException(404, "The workspace holds no such records.")
+    return paths
+
+
+def _item(rigs: Rigs, backstage: Backstage, rig: str) -> RigItem:
+    paths = _known(rigs, rig)
+    return RigItem(
+        id=rig,
+        name=paths[0].name if len(paths) == 1 else f"{paths[0].name} and {len(paths) - 1} more",
+        files=len(paths),
+        size=sum(path.stat().st_size for path in paths),
+        has_study=backstage.studies.path(rig) is not None,
+    )

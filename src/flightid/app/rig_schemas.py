@@ -1,0 +1,93 @@
+"""What page and server tell each other of records of a rig; numbers in SI but where a unit says."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from flightid.app.schemas import Job, Light, Message
+
+
+class RigItem(Message):
+    """A set of record files."""
+
+    id: str
+    name: str
+    files: int
+    size: int
+    has_study: bool
+
+
+class RigColumn(Message):
+    """A column as it stands in a file."""
+
+    name: str
+    unit: str
+    samples: int
+    least: float | None
+    most: float | None
+
+
+class RigFault(Message):
+    """What was found in the samples of a channel, and where."""
+
+    channel: str
+    code: str
+    light: Light
+    message: str
+    action: str
+    span_s: tuple[float, float] | None
+
+
+class RigManoeuvre(Message):
+    """A record that a file holds."""
+
+    name: str
+    start_s: float
+    stop_s: float
+    rate_hz: float
+    channels: dict[str, str]
+    faults: list[RigFault]
+
+
+class RigFile(Message):
+    """A file: its columns, and the manoeuvres in it or why none can be read."""
+
+    name: str
+    columns: list[RigColumn]
+    notes: list[str]
+    manoeuvres: list[RigManoeuvre]
+    error: str = ""
+
+
+class RigReading(Message):
+    """How files are read, where they do not tell: as in `[defaults.record]` of a study."""
+
+    time_column: str | None = None
+    sample_time_s: float | None = Field(None, gt=0.0)
+
+
+class RigProposal(RigReading):
+    """What `flightid new` is asked: roles of columns where their names do not tell."""
+
+    inputs: list[str] = Field(default_factory=list, max_length=64)
+    outputs: list[str] = Field(default_factory=list, max_length=64)
+    units: dict[str, str] = Field(default_factory=dict)
+
+
+class RigScreen(Message):
+    """A set of record files, and the roles that names and units tell."""
+
+    id: str
+    files: list[RigFile]
+    inputs: list[str]
+    outputs: list[str]
+    untold: str
+    jobs: list[Job]
+
+
+class ProposedStudy(Message):
+    """The study that `flightid new` writes for records; empty where they carry no model."""
+
+    text: str
+    models: list[str]
+    said: list[str]

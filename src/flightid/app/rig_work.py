@@ -1,0 +1,127 @@
+"""What the workers do with records of a rig: columns, manoeuvres, faults, levels, a study."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from flightid.app.overview import light_of
+from flightid.app.own_folders import is_link
+from flightid.app.pyramid import Pyramid
+from flightid.app.rig_schemas import ProposedStudy, RigColumn, RigFault, RigFile, RigManoeuvre
+from flightid.app.work import KEPT
+from flightid.conventions import Light
+from flightid.errors import FlightidError, UnknownNameError
+from flightid.record import Record, read_records
+from flightid.record.checks import CHECK, checked_history
+from flightid.record.contents import table_contents
+from flightid.study.proposal import propose_study
+from flightid.study.proposal.columns import columns_of
+from flightid.study.stage_runner import StageRunner
+
+SHOWN = 200
+"""Faults of a manoeuvre that are told."""
+
+
+def make_rig(paths: Sequence[Path], reading: Mapping[str, Any]) -> dict[str, Any]:
+    """Files with columns, manoeuvres and what was found in them; roles that their names tell."""
+    files = [_file(path, reading) for path in paths]
+    records = [r for path in paths for r in _quietly(path, reading)]
+    inputs: tuple[str, ...] = ()
+    outputs: tuple[str, ...] = ()
+    untold = ""
+    if records:
+        try:
+            told = columns_of(records, (), ())
+            inputs, outputs = told.inputs, told.outputs
+        except FlightidError as error:
+            untold = str(error)
+    return {
+        "files": [each.model_dump() for each in files],
+        "inputs": list(inputs),
+        "outputs": list(outputs),
+        "untold": untold,
+    }
+
+
+def propose(
+    paths: Sequence[Path], folder: Path, asked: Mapping[str, Any], reading: Mapping[str, Any]
+) -> dict[str, Any]:
+    """The study that `flightid new` writes for these files."""
+    made = propose_study(paths, folder=folder, cache=KEPT, **asked, **reading)
+    missed = [f"{each.message}" for each in made.findings]
+    text = made.text if made.models else ""
+    return ProposedStudy(
+        text=text, models=list(made.models), said=[*made.said, *missed]
+    ).model_dump()
+
+
+def make_rig_pyramid(
+    path: Path, manoeuvre: str, channel: str, reading: Mapping[str, Any], result: Path
+) -> None:
+    """Write a channel of a manoeuvre with its levels."""
+    found = [each for each in _records(path, reading) if each.name == manoeuvre]
+    if not found or channel not in found[0]:
+        raise UnknownNameError("the records hold no such channel", found=f"{manoeuvre}: {channel}")
+    if not is_link(result):
+        Pyramid.of(found[0].time_s, found[0][channel]).write(result)
+
+
+def _records(path: Path, reading: Mapping[str, Any]) -> list[Record]:
+    return StageRunner(KEPT).stage("records", _read, path, dict(reading)).value
+
+
+def _read(path: Path, reading: Mapping[str, Any]) -> list[Record]:
+    return read_records(path, **reading)
+
+
+def _quietly(path: Path, reading: Mapping[str, Any]) -> list[Record]:
+    try:
+        return _records(path, reading)
+    except FlightidError:
+        return []
+
+
+def _file(path: Path, reading: Mapping[str, Any]) -> RigFile:
+    columns: list[RigColumn] = []
+    notes: list[str] = []
+    manoeuvres: list[RigManoeuvre] = []
+    said = ""
+    try:
+        table = table_contents(path)
+        columns = [_column(row) for row in table.rows]
+        notes = [each for each in table.notes if not each.startswith("Next:")]
+        manoeuvres = [_manoeuvre(each) for each in _records(path, reading)]
+    except FlightidError as error:
+        said = str(error)
+    return RigFile(name=path.name, columns=columns, notes=notes, manoeuvres=manoeuvres, error=said)
+
+
+def _column(row: tuple[Any, ...]) -> RigColumn:
+    name, unit, samples, _, least, most = row
+    return RigColumn(name=name, unit=unit or "", samples=samples, least=least, most=most)
+
+
+def _manoeuvre(record: Record) -> RigManoeuvre:
+    steps = [step.options for step in checked_history(record) if step.operation == CHECK]
+    return RigManoeuvre(
+        name=str(record.name),
+        start_s=float(record.time_s[0]),
+        stop_s=float(record.time_s[-1]),
+        rate_hz=record.sample_rate_hz,
+        channels={name: record.unit(name) for name in record.channels},
+        faults=[_fault(each) for each in steps[:SHOWN]],
+    )
+
+
+def _fault(options: Mapping[str, Any]) -> RigFault:
+    start, stop = options["start_s"], options["stop_s"]
+    return RigFault(
+        channel=str(options["channel"]),
+        code=str(options["code"]),
+        light=light_of(Light(str(options["light"]))),
+        message=str(options["found"]),
+        action=str(options["action"] or ""),
+        span_s=None if start is None or stop is None else (float(start), float(stop)),
+    )

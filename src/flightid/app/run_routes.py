@@ -1,0 +1,107 @@
+"""Answers about a study that is run whole: its state, pictures, report, everything as a zip."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import tempfile
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import IO
+
+from fastapi import FastAPI, HTTPException, Response
+from fastapi.responses import StreamingResponse
+
+from flightid.app.backstage import Backstage, LogName
+from flightid.app.guard import REPORT_POLICY
+from flightid.app.kept_parts import kept_part
+from flightid.app.own_folders import is_link, read_plain
+from flightid.app.run_schemas import RunPart, RunScreen
+from flightid.app.run_work import FIGURES
+from flightid.plot.graph_objects import plotting_library
+from flightid.study.run import named_paths
+from flightid.study.settings import read_settings
+
+CHUNK = 1 << 16
+
+
+def add_run_routes(app: FastAPI, backstage: Backstage) -> None:
+    """Answer what screens of results ask."""
+    workspace, workers = backstage.workspace, backstage.workers
+
+    def kept(log: str) -> tuple[RunPart, Path]:
+        """The last run, and its folder; 404 where there is none."""
+        found = kept_part(workspace, log, "run")
+        if not isinstance(found, RunPart):
+            raise HTTPException(404, "This study was not run yet.")
+        folder = workspace.result_path(log, "run.json").parent / found.folder
+        if is_link(folder) or not folder.is_dir():
+            raise HTTPException(404, "What the run wrote is gone; run the study again.")
+        return found, folder
+
+    @app.get("/api/runs/{log}")
+    async def screen(log: LogName) -> RunScreen:
+        found = await asyncio.to_thread(kept_part, workspace, log, "run")
+        jobs = [job for job in workers.of_log(log) if job.kind == "run"]
+        return RunScreen(run=found if isinstance(found, RunPart) else None, jobs=jobs)
+
+    @app.post("/api/runs/{log}")
+    async def run(log: LogName) -> RunScreen:
+        path = backstage.studies.path(log)
+        if path is None:
+            raise HTTPException(404, "There is no study to run.")
+        workers.ensure("run", log, path, again=True)
+        return await screen(log)
+
+    @app.get("/api/runs/{log}/figures/{number}")
+    async def figure(log: LogName, number: int) -> Response:
+        found, folder = kept(log)
+        text = await asyncio.to_thread(read_plain, folder.with_name(f"{folder.name}-{FIGURES}"))
+        if not 0 <= number < found.figures:
+            raise HTTPException(404, "There is no such picture.")
+        spec = json.dumps(json.loads(text)[number])
+        return Response(spec, media_type="application/json")
+
+    @app.get("/api/runs/{log}/report")
+    async def report(log: LogName) -> Response:
+        _, folder = kept(log)
+        text = await asyncio.to_thread(read_plain, folder / "report.html")
+        headers = {"content-security-policy": REPORT_POLICY}
+        return Response(text, media_type="text/html; charset=utf-8", headers=headers)
+
+    @app.get("/api/runs/{log}/zip")
+    async def everything(log: LogName) -> StreamingResponse:
+        _, folder = kept(log)
+        packed = await asyncio.to_thread(_packed, backstage, log, folder)
+        headers = {"content-disposition": f'attachment; filename="flightid-{log}.zip"'}
+        return StreamingResponse(_pieces(packed), media_type="application/zip", headers=headers)
+
+    @app.get("/plotly.js")
+    async def plotly() -> Response:
+        text = await asyncio.to_thread(plotting_library)
+        return Response(text, media_type="text/javascript; charset=utf-8")
+
+
+def _packed(backstage: Backstage, log: str, folder: Path) -> IO[bytes]:
+    """Study, data and results under the paths of the workspace, so that the study runs again."""
+    workspace, study = backstage.workspace, backstage.workspace.study_path(log)
+    held = [study]
+    for path in dict.fromkeys(named_paths(read_settings(study))):
+        place = (path if path.is_absolute() else study.parent / path).resolve()
+        if place.is_file() and place.is_relative_to(workspace.folder):
+            held.append(place)
+    packed = tempfile.TemporaryFile()  # noqa: SIM115 - closed when it has been sent
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        for path in dict.fromkeys(held):
+            archive.write(path, path.relative_to(workspace.folder).as_posix())
+        for path in sorted(each for each in folder.rglob("*") if each.is_file()):
+            archive.write(path, f"studies/{log}-output/{path.relative_to(folder).as_posix()}")
+    packed.seek(0)
+    return packed
+
+
+def _pieces(packed: IO[bytes]) -> Iterator[bytes]:
+    with packed:
+        while piece := packed.read(CHUNK):
+            yield piece

@@ -1,0 +1,27 @@
+"""What page and server tell each other of a study that was run whole."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from flightid.app.schemas import Job, Light, Message
+
+
+class RunPart(Message):
+    """What a run of the study made: its report as a tree, figures by their number."""
+
+    etag: str
+    folder: str
+    title: str
+    verdict: Light
+    tally: str
+    seconds: float
+    figures: int
+    sections: list[dict[str, Any]]
+
+
+class RunScreen(Message):
+    """The last run that ended, and the one that goes on."""
+
+    run: RunPart | None
+    jobs: list[Job]

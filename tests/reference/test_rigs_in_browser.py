@@ -1,0 +1,92 @@
+"""Records of a rig in a real Chromium: from dropped tables to a verified model and its report."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from pathlib import Path
+
+import numpy as np
+
+import flightid as fid
+from tests.reference.test_app_in_browser import Desk, _findings, desk
+
+__all__ = ["desk"]
+
+
+def _write(folder: Path) -> list[Path]:
+    """Two manoeuvres of a sampled second-order rig with an outlier, in volts and radians."""
+    made = []
+    for place, (name, n) in enumerate((("prbs", 700), ("steps", 260))):
+        draw = np.random.default_rng(place)
+        drive = np.repeat(np.sign(draw.standard_normal(n // 5 + 1)), 5)[:n] * (1.0 - 0.4 * place)
+        angle = np.zeros(n)
+        for k in range(2, n):
+            angle[k] = 1.6 * angle[k - 1] - 0.8 * angle[k - 2] + 0.05 * drive[k - 1]
+        angle += 0.002 * draw.standard_normal(n)
+        angle[n // 2] += 3.0 * (place == 1)
+        rows = zip(np.arange(n) * 0.1, drive, angle, strict=True)
+        lines = [
+            "time [s],drive [V],swing [rad]",
+            *(f"{t:.3f},{u:.6g},{y:.6g}" for t, u, y in rows),
+        ]
+        path = folder / f"{name}.csv"
+        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        made.append(path)
+    return made
+
+
+def test_from_dropped_tables_to_a_report(desk: Desk, tmp_path: Path) -> None:
+    """Roles by hand, the study, one key, a run that equals `run_study`, the page and the zip."""
+    window = desk.open()
+    page = window.page
+    page.wait_for_selector(".empty")
+    page.set_input_files("input[type=file]", _write(tmp_path))
+    page.locator("select[aria-label='Role of drive']").wait_for()
+    page.select_option("select[aria-label='Role of drive']", "input")
+    page.select_option("select[aria-label='Role of swing']", "output")
+    page.locator(".uplot canvas").nth(1).wait_for()
+    page.select_option("#place", label="steps.csv: steps")
+    page.locator(".fault", has_text="swing").first.wait_for()
+    page.click("text=Write the study")
+    page.locator("#content .box").wait_for()
+    rig = page.url.rpartition("/")[2]
+    study = desk.folder / "studies" / f"{rig}.toml"
+    assert desk.study["model"][0]["inputs"] == ["drive"]
+    page.select_option(".box select >> nth=0", "arx")
+    page.locator("pre .changed", has_text='structure = "arx"').wait_for()
+    page.fill("label:has-text('na') input", "2")
+    page.press("label:has-text('na') input", "Tab")
+    page.locator("pre .changed", has_text="na = 2").wait_for()
+    page.click("text=Fit and verify")
+    page.wait_for_selector("text=Fit again")
+    page.locator(".box .js-plotly-plot").first.wait_for()
+    said = _findings(page)
+    # The run of the page is that of the verb, to the last digit.
+    again = fid.run_study(study, output=tmp_path / "again").output / "results.json"
+    (shown,) = (desk.folder / ".flightid" / "results" / rig).glob("run-*/results.json")
+    assert json.loads(shown.read_text("utf-8")) == json.loads(again.read_text("utf-8"))
+    page.click("nav >> text=Verify")
+    page.click("[aria-label=Part] >> text=Residual tests")
+    page.locator(".js-plotly-plot").first.wait_for()
+    said += _findings(page)
+    page.click("nav >> text=Report")
+    said += _findings(page)
+    with page.expect_download() as taken:
+        page.click("text=Everything as one zip")
+    with zipfile.ZipFile(taken.value.path()) as archive:
+        archive.extractall(tmp_path / "zip")
+    repeated = fid.run_study(tmp_path / "zip" / "studies" / study.name, output=tmp_path / "third")
+    assert (
+        repeated.identified[0].fit.cost
+        == fid.run_study(study, output=tmp_path / "again").identified[0].fit.cost
+    )
+    with page.expect_popup() as opened:
+        page.click("text=Open the report")
+    report = opened.value
+    report.wait_for_selector(".js-plotly-plot")
+    assert report.evaluate("origin") == "null"  # it cannot reach the page
+    report.close()
+    assert not said
+    assert not window.complaints
+    page.close()

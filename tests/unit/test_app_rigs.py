@@ -1,0 +1,80 @@
+"""Records of a rig in the workspace: sets of files, by the hash of the first."""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import pytest
+
+from flightid.app.guard import POLICY, REPORT_POLICY, _dressed
+from flightid.app.rig_work import make_rig
+from flightid.app.rigs import Rigs
+from flightid.app.study_edits import KeyEdit, edited
+from flightid.app.workspace import Workspace
+from flightid.errors import FileFormatError, OptionError
+
+TABLE = b"t,u,y\n0,1,2\n1,0,3\n2,1,1\n"
+
+
+async def _pieces(content: bytes) -> AsyncIterator[bytes]:
+    yield content[:5]
+    yield content[5:]
+
+
+def test_files_of_a_rig_stay_together_and_nothing_else_enters(tmp_path: Path) -> None:
+    rigs = Rigs(Workspace(tmp_path))
+
+    def take(name: str, content: bytes, rig: str = "") -> str:
+        return asyncio.run(rigs.take(name, _pieces(content), rig))
+
+    first = take("../a.csv", TABLE)
+    assert first == hashlib.sha256(TABLE).hexdigest()[:16]
+    assert take("a.csv", TABLE + b"3,1,1\n", first) == take("a.csv", TABLE, first) == first
+    assert [path.name[:2] for path in rigs.files(first)] == ["a ", "a."]
+    assert rigs.ids() == [first]
+    with pytest.raises(FileFormatError):
+        take("a.mat", b"no MATLAB file")
+    with pytest.raises(OptionError, match="no file can be added"):
+        take("b.csv", TABLE, "0" * 16)
+    (tmp_path / "records" / first / "planted.csv").symlink_to("/etc/passwd")
+    assert "planted.csv" not in [path.name for path in rigs.files(first)]
+    assert rigs.files("../../etc") == []
+
+
+def test_a_file_without_time_says_so_and_reads_with_a_sample_time(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("u,y\n" + "".join(f"{k % 2},{k}\n" for k in range(40)), encoding="utf-8")
+    told = make_rig([path], {})
+    assert "sample_time_s" in told["files"][0]["error"]
+    assert not told["files"][0]["manoeuvres"]
+    told = make_rig([path], {"sample_time_s": 0.5})
+    assert told["files"][0]["manoeuvres"][0]["stop_s"] == 19.5
+    assert (told["inputs"], told["outputs"]) == (["u"], ["y"])
+
+
+def test_a_table_of_a_list_is_taken_out() -> None:
+    text = "[[model]]\nname = 'A'\n\n[[model]]\nname = 'B'\n"
+    assert edited(text, [KeyEdit(("model", 0), None)]).strip() == "[[model]]\nname = 'B'"
+
+
+def test_only_the_report_has_another_policy() -> None:
+    """No answer but the report can loosen the policy of the page."""
+
+    def policy(given: str) -> bytes:
+        heard: list[dict[bytes, bytes]] = []
+
+        async def send(message: dict[str, object]) -> None:
+            heard.append(dict(message["headers"]))  # type: ignore[call-overload]
+
+        headers = [(b"content-security-policy", given.encode())]
+        start = {"type": "http.response.start", "headers": headers}
+        asyncio.run(_dressed(send)(start))  # type: ignore[arg-type]
+        return heard[0][b"content-security-policy"]
+
+    assert policy("default-src *") == POLICY.encode()
+    assert policy(REPORT_POLICY) == REPORT_POLICY.encode()
+    assert REPORT_POLICY.startswith("sandbox ")
+    assert "allow-same-origin" not in REPORT_POLICY
