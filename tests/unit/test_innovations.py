@@ -12,8 +12,10 @@ import flightid as fid
 from flightid import _native
 from flightid.errors import DataError, ModelError, OptionError
 from flightid.identification.subspace.matrices import own_columns, run_columns
+from flightid.identification.subspace.roots import may_reach_circle
 from flightid.models.sampled.recursion import run_recursion
 from flightid.plot.subspace import singular_values
+from flightid.uncertainty.quantiles import half_width
 from tests.closeness import assert_close
 from tests.innovations_records import PAIR, SINGLE, flown
 
@@ -366,3 +368,39 @@ def test_columns_of_a_start_are_run_until_they_died_out():
     assert_close(found, whole, why="a state below rounding", rtol=0.0, atol=1e-18)
     assert not found[450:, :, :2].any()
     assert found[450:, :, 2].any()
+
+
+def test_a_predictor_reaches_the_circle_by_its_determinant_not_by_clustered_eigenvalues():
+    b, k = np.ones((1, 1)), np.array([[0.4]])
+    single = M(("u",), ("y",), 0.1, [[0.9]], b, [[1.0]], None, k)
+    # Of one state a - k c = 0.5: at the circle where 1.96 of its errors reach 0.5.
+    for stderr, reaches in ((0.254, False), (0.256, True)):
+        covariance = np.diag([stderr**2, 0.0, 0.0, 0.0])
+        assert may_reach_circle(single, covariance, direct=False) is reaches
+    # A delay of three samples: its eigenvalues are 0, 0 and 0, and move by the cube root.
+    shift = np.eye(3, k=1) + 1e-6 * np.eye(3)[[2, 0, 1]]
+    late = M(("u",), ("y",), 0.1, shift, np.eye(3)[:, 2:], np.eye(3)[:1], None, np.zeros((3, 1)))
+    covariance = np.diag(np.r_[np.full(9, 0.01**2), np.zeros(9)])
+    assert not may_reach_circle(late, covariance, direct=False)
+    drawn = np.random.default_rng(1).normal(0.0, 0.01, (2000, 3, 3)) + shift
+    assert np.abs(np.linalg.eigvals(drawn)).max() < 0.5
+    edge = M(("u",), ("y",), 0.1, -b, b, b, None, np.zeros((1, 1)))
+    assert may_reach_circle(edge, np.zeros((4, 4)), direct=False)
+
+
+@pytest.mark.parametrize("direct", [False, True])
+def test_the_determinant_moves_as_the_entries_of_all_matrices_move_it(direct):
+    r = np.random.default_rng(5)
+    made = [0.3 * r.standard_normal(s) for s in ((3, 3), (3, 2), (2, 3), (2, 2), (3, 2))]
+    way = [r.standard_normal(each.shape) for each in made]
+
+    def log_determinants(by):
+        a, _, c, _, k = (one + by * other for one, other in zip(made, way, strict=True))
+        return np.log([abs(np.linalg.det(end * np.eye(3) - a + k @ c)) for end in (1.0, -1.0)])
+
+    slope = np.abs(log_determinants(1e-6) - log_determinants(-1e-6)).max() / 2e-6
+    free = [each.ravel() for n, each in enumerate(way) if direct or n != 3]
+    model = M(("u", "v"), ("y", "z"), 0.1, *made)
+    for size, reaches in ((0.999, False), (1.001, True)):
+        line = np.concatenate(free) * size / (half_width() * slope)
+        assert may_reach_circle(model, np.outer(line, line), direct=direct) is reaches

@@ -34,7 +34,7 @@ from flightid.identification.subspace.refined_order import refined_order, scaled
 from flightid.identification.subspace.roots import (
     innovations_gains,
     innovations_roots,
-    predictor_reach,
+    may_reach_circle,
 )
 from flightid.models.innovations.model import InnovationsModel
 from flightid.models.innovations.prediction import free_run
@@ -111,7 +111,7 @@ def _assemble(
     covariance = None if times is None else _in_units(structure, found, size, times)
     direct = bool(structure.direct)
     plain = _in_units(structure, found, size, 1.0)
-    at_circle = plain is not None and predictor_reach(model, plain, direct=direct) >= 1.0
+    at_circle = plain is not None and may_reach_circle(model, plain, direct=direct)
     covariance = None if at_circle else covariance
     spread = Errors(model.sample_time_s, covariance, found.degrees)
     roots = innovations_roots(model, spread, direct=direct)

@@ -79,27 +79,39 @@ def innovations_gains(
     return found
 
 
-def predictor_reach(model: InnovationsModel, covariance: Array, *, direct: bool) -> float:
-    """Largest size of a real eigenvalue of A - K C, a 95 % half-width further out.
+def may_reach_circle(model: InnovationsModel, covariance: Array, *, direct: bool) -> bool:
+    """Whether a real eigenvalue of A - K C may lie on the unit circle, or lies beyond it.
 
-    It is a zero of the noise model: see `prediction_error.roots.farthest`.
+    It is a zero of the noise model: see `prediction_error.roots.farthest`. What is judged is
+    det(e I - A + K C) at e = 1 and -1 against its own error, not each eigenvalue: states that only
+    hold a delay put several at zero, and eigenvalues beside each other move by the root of what
+    their product moves by.
+
+    Parameters
+    ----------
+    model : InnovationsModel
+    covariance : ndarray
+        Of the entries of A, B, C, (D,) K row by row, in the model's units.
+    direct : bool
+        Whether D was fitted.
+
+    Reference
+    ---------
+    Jacobi's formula: d ln det M = tr(M⁻¹ dM).
     """
-    a, _, c, _, k = model.matrices
-    solved: Any = scipy.linalg.eig(a - k @ c, left=True, right=True)
-    reach = 0.0
-    for z, left, right in zip(solved[0], solved[1].conj().T, solved[2].T, strict=True):
-        if z.imag != 0.0:
-            continue
-        across = left @ right
-        slopes = [np.zeros(matrix.shape, dtype=np.complex128) for matrix in model.matrices]
-        slopes[0] += np.outer(left, right)
-        slopes[2] -= np.outer(k.T @ left, right)
-        slopes[4] -= np.outer(left, c @ right)
-        rate = np.concatenate([s.ravel() for n, s in enumerate(slopes) if direct or n != 3])
-        outwards = np.real(np.conj(z) / (abs(z) or 1.0) * rate / (across or np.inf))
-        spread = float(np.sqrt(max(outwards @ covariance @ outwards, 0.0)))
-        reach = max(reach, abs(z) + half_width() * spread)
-    return float(reach)
+    a, b, c, d, k = model.matrices
+    predictor = a - k @ c
+    found = np.linalg.eigvals(predictor)
+    if np.any(np.abs(found[found.imag == 0.0]) >= 1.0):
+        return True
+    for end in (1.0, -1.0):
+        inverse = np.linalg.inv(end * np.eye(model.order) - predictor)
+        of_b, of_d = np.zeros(b.shape), np.zeros(d.shape if direct else (0, 0))
+        slopes = inverse.T, of_b, -(inverse @ k).T, of_d, -(c @ inverse).T
+        rate = np.concatenate([each.ravel() for each in slopes])
+        if half_width() ** 2 * float(rate @ covariance @ rate) >= 1.0:
+            return True
+    return False
 
 
 def _poles(model: InnovationsModel, *, direct: bool) -> Iterator[tuple[complex, Complex | None]]:
