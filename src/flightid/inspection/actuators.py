@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +32,7 @@ class Actuators:
     time_s : ndarray, shape (n,)
         Stamps, s.
     values : ndarray, shape (n_motors, n)
-        Commands, in the unit of the limits.
+        Commands, in the unit of the limits; in single precision where that is exact.
     low, high : float
         Limits between which the mixer may move them in flight.
     """
@@ -39,7 +40,7 @@ class Actuators:
     message: str
     names: tuple[str, ...]
     time_s: NDArray[np.float64]
-    values: NDArray[np.float64]
+    values: NDArray[Any]
     low: float
     high: float
 
@@ -105,7 +106,7 @@ def _moving(
     for name in names:
         column = log.table(table.name, table.instance)[name]
         if np.any(test(column)):
-            found[name] = column
+            found[name] = _short(column)
     return found
 
 
@@ -134,5 +135,17 @@ def _limits(
 
 
 def _made(table: LogTable, motors: dict[str, Array], low: float, high: float) -> Actuators:
-    values = np.nan_to_num(np.array([*motors.values()]), copy=False, nan=low)
-    return Actuators(table.name, tuple(motors), table.time_s, values, low, high)
+    columns = [_short(np.nan_to_num(column, nan=low)) for column in motors.values()]
+    values = np.empty((len(columns), columns[0].size), np.result_type(*columns))
+    for row, column in zip(values, columns, strict=True):
+        row[:] = column
+    # Limits of double precision: comparisons with short values are then made in it.
+    limits = np.float64(low), np.float64(high)
+    return Actuators(table.name, tuple(motors), table.time_s, values, *limits)
+
+
+def _short(column: NDArray[Any]) -> NDArray[Any]:
+    """A column in single precision, where that is exact."""
+    with np.errstate(over="ignore"):
+        short = column.astype(np.float32)
+    return short if np.array_equal(short, column, equal_nan=True) else column

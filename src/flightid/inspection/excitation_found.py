@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from flightid.inspection.axes import axes_of
 from flightid.inspection.betaflight_chirps import chirps
-from flightid.inspection.signals import Signal, Span, find, inside
+from flightid.inspection.signals import Signal, Span, find, place_of
 from flightid.inspection.stamps import log_span
 from flightid.inspection.thresholds import RESTING_RATE
 from flightid.logs import Log, SidRun
@@ -71,12 +71,15 @@ def excitations(log: Log, spans: tuple[Span, ...]) -> tuple[FoundExcitation, ...
     flying = bool(spans)
     spans = spans or (log_span(log),)
     for axis, names in axes_of(log.vehicle).items():
-        set_point, rate = find(log, names.set_point), find(log, names.rate)
-        for span in spans:
-            if any(e.is_injected and _overlap(span, e) for e in found):
-                continue
+        asked = [s for s in spans if not any(e.is_injected and _overlap(s, e) for e in found)]
+        # One signal after the other: of a long log two are much to hold.
+        set_point = find(log, names.set_point) if asked else None
+        shapes = [_shape(set_point, axis, span) for span in asked]
+        del set_point
+        rate = find(log, names.rate) if None in shapes else None
+        for span, shape in zip(asked, shapes, strict=True):
             moved = _plain(log, span) if flying else ("hand", "moved on the ground")
-            manoeuvre = _shape(set_point, axis, span) or _motion(rate, axis, span, *moved)
+            manoeuvre = shape or _motion(rate, axis, span, *moved)
             found += [manoeuvre] if manoeuvre is not None else []
     return tuple(found)
 
@@ -141,8 +144,8 @@ def _shape(signal: Signal | None, axis: str, span: Span) -> FoundExcitation | No
     """Sweep or steps in a set-point."""
     if signal is None:
         return None
-    mask = inside(signal.time_s, [span])
-    stamps, values = signal.time_s[mask], signal.values[mask]
+    part = place_of(signal.time_s, [span])
+    stamps, values = signal.time_s[part], signal.values[part]
     if stamps.size < 20 or np.std(values) < RESTING_RATE.value:
         return None
     centred = values - np.median(values)
@@ -159,8 +162,8 @@ def _shape(signal: Signal | None, axis: str, span: Span) -> FoundExcitation | No
 
 def _sweep(stamps: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[float, float] | None:
     """First and last frequency, Hz, where the half periods shrink (or grow) steadily."""
-    level = 0.3 * float(np.percentile(np.abs(values), 90))
-    state = np.where(values > level, 1, np.where(values < -level, -1, 0))
+    level = 0.3 * float(np.percentile(np.abs(values), 90, overwrite_input=True))
+    state = (values > level).astype(np.int8) - (values < -level)
     known = np.flatnonzero(state)
     turns = known[1:][np.diff(state[known]) != 0]
     if turns.size < 2 * SWEEP_CYCLES:

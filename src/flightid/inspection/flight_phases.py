@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -118,9 +119,9 @@ def _mean_motor(log: Log, actuators: Actuators | None) -> Signal | None:
     """Mean command of a multirotor's motors as a share of their range, in place of a throttle."""
     if actuators is None or log.vehicle == "plane" or actuators.time_s.size < 2:
         return None
-    share = (actuators.values - actuators.low) / (actuators.high - actuators.low)
     good = believable(actuators.time_s)
-    values = share.mean(axis=0)[good]
+    mean = np.asarray(np.mean(actuators.values, axis=0, dtype=np.float64))[good]
+    values = (mean - actuators.low) / (actuators.high - actuators.low)
     return Signal("thrust", actuators.time_s[good], values, "1", f"mean of {actuators.message}")
 
 
@@ -139,15 +140,16 @@ def _spans(time_s: NDArray[np.float64], mask: NDArray[np.bool_]) -> list[Span]:
     longest = 0.5 * SHORTEST_SEGMENT.value
     if time_s.size > 1:
         steps = np.diff(time_s)
-        silent = steps > max(longest, GAP_FACTOR.value * float(np.median(steps)))
-        pieces = np.split(np.arange(time_s.size), np.flatnonzero(silent) + 1)
+        usual = float(np.median(steps, overwrite_input=True))
+        silent = np.flatnonzero(np.diff(time_s) > max(longest, GAP_FACTOR.value * usual)) + 1
+        pieces = [slice(*ends) for ends in pairwise((0, *silent.tolist(), time_s.size))]
     else:
-        pieces = [np.arange(time_s.size)]
+        pieces = [slice(None)]
     return [span for piece in pieces for span in _runs(time_s[piece], mask[piece], longest)]
 
 
 def _runs(time_s: NDArray[np.float64], mask: NDArray[np.bool_], longest_s: float) -> list[Span]:
-    edges = np.diff(np.concatenate([[0], mask.astype(np.int8), [0]]))
+    edges = np.diff(mask.astype(np.int8), prepend=np.int8(0), append=np.int8(0))
     starts, stops = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
     spans: list[Span] = []
     for start, stop in zip(time_s[starts], time_s[stops], strict=True):

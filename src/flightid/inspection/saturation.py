@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from flightid.inspection.actuators import Actuators
 from flightid.inspection.axes import axes_of
-from flightid.inspection.signals import Span, find, inside
+from flightid.inspection.signals import Span, find, inside, place_of
 from flightid.inspection.thresholds import GYRO_RANGE
 from flightid.logs import Log
 
@@ -96,8 +96,8 @@ def _motors(actuators: Actuators | None, spans: tuple[Span, ...]) -> Iterator[Li
         return
     slack, time_s = EDGE * (actuators.high - actuators.low), actuators.time_s[mask]
     low, high = f"lower limit {actuators.low:.4g}", f"upper limit {actuators.high:.4g}"
-    for name, values in zip(actuators.names, actuators.values[:, mask], strict=True):
-        label = f"{actuators.message}.{name}"
+    for name, whole in zip(actuators.names, actuators.values, strict=True):
+        label, values = f"{actuators.message}.{name}", whole[mask]
         yield LimitContact(label, low, time_s, values <= actuators.low + slack)
         yield LimitContact(label, high, time_s, values >= actuators.high - slack)
 
@@ -107,10 +107,10 @@ def _commands(log: Log, spans: tuple[Span, ...]) -> Iterator[LimitContact]:
         signal = find(log, axis.command)
         if signal is None or signal.unit != "1":
             continue
-        mask = inside(signal.time_s, spans)
-        touched = np.abs(signal.values[mask]) >= 1.0 - EDGE
+        part = place_of(signal.time_s, spans)
+        touched = np.abs(signal.values[part]) >= 1.0 - EDGE
         if touched.size:
-            yield LimitContact(signal.label, "mixer limit 1", signal.time_s[mask], touched)
+            yield LimitContact(signal.label, "mixer limit 1", signal.time_s[part], touched)
 
 
 def _gyroscopes(log: Log, spans: tuple[Span, ...]) -> Iterator[LimitContact]:
@@ -118,11 +118,11 @@ def _gyroscopes(log: Log, spans: tuple[Span, ...]) -> Iterator[LimitContact]:
         signal = find(log, axis.rate)
         if signal is None:
             continue
-        mask = inside(signal.time_s, spans)
-        touched = np.abs(signal.values[mask]) >= GYRO_RANGE.value
+        part = place_of(signal.time_s, spans)
+        touched = np.abs(signal.values[part]) >= GYRO_RANGE.value
         if touched.size:
             limit = "gyroscope range 2000 deg/s"
-            yield LimitContact(signal.label, limit, signal.time_s[mask], touched)
+            yield LimitContact(signal.label, limit, signal.time_s[part], touched)
     if "VIBE" in log and "Clip" in log.messages["VIBE"].fields:
         table = log.table("VIBE", (log.messages["VIBE"].instances or (None,))[0])
         mask = inside(table.time_s, spans)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.inspection.axes import axes_of
-from flightid.inspection.signals import Signal, Span, inside, places
+from flightid.inspection.signals import Signal, Span, place_of, places
 from flightid.inspection.thresholds import SKEW_CORRELATION
 from flightid.logs import Log
 from flightid.uncertainty.quantiles import half_width
@@ -79,9 +79,9 @@ def _skew(
     quantity: str, first: Signal, second: Signal, spans: tuple[Span, ...]
 ) -> StreamSkew | None:
     slow, fast = sorted((first, second), key=lambda signal: signal.rate_hz)
-    mask = inside(slow.time_s, spans)
-    stamps, values = slow.time_s[mask], slow.values[mask]
-    if stamps.size < 50 or np.std(values) == 0:
+    part = place_of(slow.time_s, spans)
+    stamps, values = slow.time_s[part], slow.values[part]
+    if stamps.size < 50 or np.ptp(values) == 0:
         return None
     every = max(1, stamps.size // ENOUGH)
     stamps, values = stamps[::every], values[::every]

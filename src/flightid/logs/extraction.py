@@ -90,8 +90,9 @@ def extract(
         )
     table = _table(log, source)
     time_s = _stamps(table, source)
-    values = _values(table, source)
-    values = convert(values, _unit(table, source, channel), channel.unit) * source.factor
+    values = convert(_values(table, source), _unit(table, source, channel), channel.unit)
+    if source.factor != 1.0:
+        values *= source.factor
     if channel.unwrap:
         values = _unwrapped(values)
     if span_s is not None:
@@ -122,7 +123,8 @@ def _values(table: LogTable, source: ChannelSource) -> NDArray[np.float64]:
     if source.angle is not None:
         turned = _euler(source.angle, *fields)
         return TURNED[source.angle](turned) if source.frame == "enu" else turned
-    total = np.asarray(np.sum(fields, axis=0), np.float64)
+    # One field is not copied: of a large log each copy counts.
+    total = fields[0] if len(fields) == 1 else np.asarray(np.sum(fields, axis=0), np.float64)
     if source.phase_scale is not None:
         return np.where(total == 0.0, 0.0, np.cos(total / source.phase_scale))
     return total

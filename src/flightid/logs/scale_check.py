@@ -121,8 +121,10 @@ def _streams(log: LogContents, channels: ChannelMap, name: str) -> Iterator[tupl
         except (MissingColumnError, UnitError):
             continue
         good = np.isfinite(samples.time_s) & np.isfinite(samples.values)
-        time_s, values = samples.time_s[good], samples.values[good]
-        if time_s.size > SAMPLES_IN_WINDOW and np.all(np.diff(time_s) > 0.0):
+        time_s, values = samples.time_s, samples.values
+        if not np.all(good):
+            time_s, values = time_s[good], values[good]
+        if time_s.size > SAMPLES_IN_WINDOW and np.all(time_s[1:] > time_s[:-1]):
             yield str(source), (time_s, values)
 
 
@@ -131,7 +133,7 @@ def _edges(streams: list[Stream], span_s: tuple[float, float] | None) -> Array |
     stop = min(float(time_s[-1]) for time_s, _ in streams)
     if span_s is not None:
         start, stop = max(start, span_s[0]), min(stop, span_s[1])
-    slowest = max(float(np.median(np.diff(time_s))) for time_s, _ in streams)
+    slowest = max(float(np.median(np.diff(time_s), overwrite_input=True)) for time_s, _ in streams)
     window = max(WINDOW_S, SAMPLES_IN_WINDOW * slowest)
     count = min(MOST_WINDOWS, int((stop - start) / window)) if stop > start else 0
     if count < FEWEST_WINDOWS:
