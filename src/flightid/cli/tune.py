@@ -41,7 +41,7 @@ def _fields() -> dict[str, type[Options]]:
     "files",
     nargs=-1,
     required=True,
-    metavar="LOG | RECORDS... | STUDY | MODEL...",
+    metavar="LOG | RECORDS... | STUDY | MODEL... | FLEET",
     type=click.Path(exists=True, path_type=Path),
 )
 @click.option(
@@ -60,6 +60,11 @@ def _fields() -> dict[str, type[Options]]:
     type=WRITTEN,
     help="Parameter file to write, for example gains.param; every step with its way back.",
 )
+@click.option(
+    "--type",
+    "type_name",
+    help="Of a fleet: vehicle type whose models are pooled; default: the only one.",
+)
 @click.option("--overwrite", is_flag=True, help="Replace parameter files that exist.")
 @click.option("--all", "whole", is_flag=True, help="Print every table, not one screen of them.")
 @level_option
@@ -69,13 +74,14 @@ def command(
     log: Path | None,
     output: Path | None,
     target: Path | None,
+    type_name: str | None,
     overwrite: bool,
     whole: bool,
     level: float | None,
     as_json: bool,
     **options: Any,  # noqa: ANN401 — read from the fields
 ) -> None:
-    """Tune the autopilot that LOG was flown with, from the log alone, a STUDY or fitted MODELs.
+    """Tune the autopilot that LOG was flown with: from the log, a STUDY, fitted MODELs or a FLEET.
 
     Of a LOG, or of RECORDS of a rig, the study that they ask for is written beside the results
     first, as `flightid run` does.
@@ -85,11 +91,13 @@ def command(
     gains.toml then, or gains.c for code.
 
     A MODEL is a .toml file, the JSON of a fit, or the output folder of a study, all models of which
-    are taken. The table [tune] of the study holds requirements and options; what is given here goes
-    before it, and without either the usual ones apply. Gains keep their margins for every plant
-    that the data allow. An axis that its data do not allow, or whose gains have a red verdict, is
-    refused by name and left out of the files, which say so; axes that one model couples are written
-    together or not at all. The exit code is then 1. --accept-red writes all that there is.
+    are taken. A FLEET is a fleet file or the folder of its catalogue: its models are pooled
+    over all vehicles of a type, and the gains hold for the next one. The table [tune] of the
+    study holds requirements and options; what is given here goes before it, and without either
+    the usual ones apply. Gains keep their margins for every plant that the data allow. An axis
+    that its data do not allow, or whose gains have a red verdict, is refused by name and left
+    out of the files, which say so; axes that one model couples are written together or not at
+    all. The exit code is then 1. --accept-red writes all that there is.
     """
     from flightid.study.tuning import TuneSettings
 
@@ -98,10 +106,12 @@ def command(
     study = None
     *parts, data = parted(options, _fields())
     asked = {name: each for part in parts for name, each in part.items()}
-    if _holds_models(files):
+    fleet = _fleet(files, type_name)
+    if fleet is not None or _holds_models(files):
         for name in data:
             raise click.UsageError(f"--{name} belongs to a log or records")
-        tuning, refused = _of_models(files, log, TuneSettings().changed(asked)), []
+        settings = TuneSettings().changed(asked)
+        tuning, refused = _of_models(files, log, settings, fleet, type_name), []
     else:
         from flightid.study import run_study
 
@@ -198,10 +208,28 @@ def _show(tuning: Tuning, level: float | None) -> None:
         click.echo(f"\n{tuning.closed_table()}")
 
 
-def _of_models(files: tuple[Path, ...], log: Path | None, settings: TuneSettings) -> Tuning | None:
+def _fleet(files: tuple[Path, ...], type_name: str | None) -> Path | None:
+    """The fleet file or catalogue that is given; None where none is."""
+    from flightid.fleet.type_models import is_fleet
+
+    found = [file for file in files if is_fleet(file)]
+    if found and len(files) > 1:
+        raise click.UsageError(f"{found[0]} is a fleet: it is tuned alone")
+    if not found and type_name is not None:
+        raise click.UsageError("--type belongs to a fleet: its file, or the folder of a catalogue")
+    return found[0] if found else None
+
+
+def _of_models(
+    files: tuple[Path, ...],
+    log: Path | None,
+    settings: TuneSettings,
+    fleet: Path | None,
+    type_name: str | None,
+) -> Tuning | None:
     from flightid import read_log
     from flightid.models.saved_files import models_of
-    from flightid.study.tuning import tune_files
+    from flightid.study.tuning import tune_files, tune_loaded
 
     if log is None and settings.controller is None:
         named = " ".join(quote(str(file)) for file in files)
@@ -210,5 +238,14 @@ def _of_models(files: tuple[Path, ...], log: Path | None, settings: TuneSettings
             f"--controller: flightid tune {named} --log LOG, flightid tune {named} "
             f"--controller {USUAL}"
         )
-    found = [path for file in files for path in (models_of(file) if file.is_dir() else [file])]
-    return tune_files(found, None if log is None else read_log(log), settings)
+    flown = None if log is None else read_log(log)
+    if fleet is None:
+        found = [path for file in files for path in (models_of(file) if file.is_dir() else [file])]
+        return tune_files(found, flown, settings)
+    from flightid.fleet import type_models
+
+    models = type_models(fleet, type_name=type_name)
+    for name, model in models.items():
+        pooled = model.estimated.provenance
+        note(f"{name}: {pooled['flights']} flights of {pooled['vehicles']} vehicles, pooled")
+    return tune_loaded(models.values(), flown, settings)

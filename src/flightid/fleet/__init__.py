@@ -7,6 +7,7 @@ from flightid.fleet.reporting import ask_fleet, fleet_report
 from flightid.fleet.run import FleetRun, run_fleet
 from flightid.fleet.settings import FleetSettings, read_fleet
 from flightid.fleet.status import FleetStatus, fleet_status
+from flightid.fleet.type_models import type_models
 
 __all__ = [
     "Catalogue",
@@ -21,6 +22,7 @@ __all__ = [
     "propose_fleet",
     "read_fleet",
     "run_fleet",
+    "type_models",
 ]
 
 

@@ -19,6 +19,7 @@ from flightid.fleet.fitted_points import response_rows
 from flightid.fleet.parameter_words import meaning
 from flightid.identification import Fit
 from flightid.logs import Log
+from flightid.models.save import model_as_toml
 from flightid.review import FlightReview
 from flightid.study import Study
 from flightid.uncertainty.estimate import Reading
@@ -54,6 +55,7 @@ def study_rows(study: Study, log: Log | None) -> dict[str, list[Row]]:
         common = {"model": item.name, "light": str(fit.evidence.light)}
         for name, made in _of_fit(fit, log).items():
             rows.setdefault(name, []).extend({**common, **row} for row in made)
+        rows.setdefault("models", []).append({**common, "file": model_as_toml(fit)})
         told = ({**common, **row} for row in response_rows(fit, item.response))
         rows.setdefault("responses", []).extend(told)
     if study.review is not None:

@@ -110,14 +110,33 @@ def tune_files(
     Tuning or None
         None where no model is of a rate to its command.
     """
-    models: dict[str, object] = {}
-    loaded = list(map(load_model, files))
+    return tune_loaded(map(load_model, files), log, settings)
+
+
+def tune_loaded(models: Iterable[Model], log: Log | None, settings: TuneSettings) -> Tuning | None:
+    """Tune the axes of models as `tune_files` does.
+
+    Parameters
+    ----------
+    models : iterable of model
+        The first of an axis counts.
+    log : Log or None
+        The flight, which holds the gains that flew; a PID of its own needs none.
+    settings : TuneSettings
+
+    Returns
+    -------
+    Tuning or None
+        None where no model is of a rate to its command.
+    """
+    first: dict[str, object] = {}
+    loaded = list(models)
     if settings.controller is not None:
         return _controllers([(model, ()) for model in loaded], settings.controller, settings)
     for model in loaded:
         for axis in _axes(model):
-            models.setdefault(axis, model)
-    return _tuned(models, _flight(log), settings, {}) if models else None
+            first.setdefault(axis, model)
+    return _tuned(first, _flight(log), settings, {}) if first else None
 
 
 def _axes(model: Model) -> list[str]:

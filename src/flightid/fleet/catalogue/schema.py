@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-SCHEMA = "flightid.fleet/2"
+SCHEMA = "flightid.fleet/3"
 """Version of all tables: columns are added or changed under a new number only."""
 
 TEXT = "VARCHAR"
@@ -135,6 +135,11 @@ COVARIANCES = _table(
         "lower", NUMBERS, "Lower triangle with diagonal, row by row: n (n + 1) / 2 numbers."
     ),
 )
+FITTED_MODELS = _table(
+    "models",
+    "Every fitted model as its file: structure, covariance, bands, evidence, model error.",
+    FleetColumn("file", TEXT, "TOML that `load_model` reads; `flightid tune` pools them."),
+)
 RESPONSES = _table(
     "responses",
     "Measured responses at the points that a fit used, the bias of their estimator taken out.",
@@ -210,6 +215,7 @@ _ALL = (
     LOGS,
     PARAMETERS,
     COVARIANCES,
+    FITTED_MODELS,
     RESPONSES,
     MODES,
     MARGINS,
