@@ -1,7 +1,8 @@
 """What a run of a fleet loses where something is ended with -9 at random, or the disk is full.
 
 Each row: logs in the catalogue when it happened, how the run ended, what was there afterwards, and
-what the next run still had to take. Lost is what had been told as done and is not in the catalogue.
+what the next run still had to take. Lost are logs that were in the catalogue when it happened and
+are not there afterwards; failed, those that stand in it as failures at the end.
 FLIGHTID_FLEET_LOGS says how many logs a run has (default 40, refused at once; every fourth real).
 """
 
@@ -32,9 +33,9 @@ def run() -> Table:
     faults: dict[str, Callable[[Path, int, random.Random], tuple[object, ...]]] = {
         "log process": _killed("process"),
         "worker": _killed("worker"),
-        "nanny": _killed("nanny"),
-        "client": _killed("client"),
-        "scheduler, by tcp": _scheduler,
+        "client, with scheduler and nannies": _killed("client"),
+        "nanny, by tcp": _by_address("nanny"),
+        "scheduler, by tcp": _by_address("scheduler"),
         "full disk": _full_disk,
         "hanging and greedy logs": _misbehaved,
     }
@@ -43,11 +44,13 @@ def run() -> Table:
         with tempfile.TemporaryDirectory() as folder:
             try:
                 rows.append((name, *fault(Path(folder), count, draws)))
-            except (OSError, subprocess.SubprocessError) as error:
-                rows.append((name, None, str(error)[:60], None, None, None, None))
+            except (OSError, subprocess.SubprocessError, AssertionError, DataError) as error:
+                rows.append((name, None, str(error)[:80], *(None,) * 5))
+            print(*rows[-1], sep="  ", flush=True)
     columns = (
         *(Column("ended"), Column("done then"), Column("exit code"), Column("done after")),
         *(Column("lost"), Column("taken by the next run"), Column("its time", "s", 3)),
+        Column("failed"),
     )
     return Table(f"Faults in runs of {count} logs", columns, tuple(rows))
 
@@ -79,29 +82,44 @@ def _done(path: Path) -> int:
         return 0
 
 
-def _until(path: Path, running: subprocess.Popen[bytes], count: int) -> int:
-    """Wait until so many logs are done, or the run is over; how many there are."""
+def _logs(path: Path) -> set[str]:
+    """Digests of the logs in the catalogue."""
+    try:
+        with fleet.open(path) as catalogue:
+            return {log for (log,) in catalogue.query("SELECT log FROM logs").fetchall()}
+    except DataError:
+        return set()
+
+
+def _until(path: Path, running: subprocess.Popen[bytes], count: int) -> set[str]:
+    """Wait until so many logs are done, or the run is over; which."""
     deadline = monotonic() + PATIENCE_S
-    while (done := _done(path)) < count and running.poll() is None and monotonic() < deadline:
+    while _done(path) < count and running.poll() is None and monotonic() < deadline:
         sleep(0.05)
-    return done
+    return _logs(path)
 
 
 def _finished(
-    path: Path, running: subprocess.Popen[bytes], then: int, count: int
+    path: Path, running: subprocess.Popen[bytes], then: set[str], count: int
 ) -> tuple[object, ...]:
-    code = running.wait(timeout=PATIENCE_S)
-    after = _done(path)
+    """How the run ended, and what the next one took."""
+    try:
+        code = running.wait(timeout=PATIENCE_S)
+    except subprocess.TimeoutExpired:
+        running.kill()
+        raise
+    after = _logs(path)
     begun = monotonic()
     again = fleet.run_fleet(path, workers=2)
     took_s = monotonic() - begun
     assert _done(path) == count, f"{_done(path)} of {count} logs in the catalogue at the end"
     with fleet.open(path) as catalogue:
-        ((rows, logs),) = catalogue.query(
-            "SELECT count(*), count(DISTINCT log) FROM logs"
+        ((rows, logs, failed),) = catalogue.query(
+            "SELECT count(*), count(DISTINCT log), count_if(outcome = 'failed') FROM logs"
         ).fetchall()
     assert rows == logs, "a log counts twice"
-    return then, code, after, max(then - after, 0), sum(again.outcomes.values()), took_s
+    taken = sum(again.outcomes.values())
+    return len(then), code, len(after), len(then - after), taken, took_s, failed
 
 
 def _killed(victim: str) -> Callable[[Path, int, random.Random], tuple[object, ...]]:
@@ -117,7 +135,7 @@ def _killed(victim: str) -> Callable[[Path, int, random.Random], tuple[object, .
 
 
 def _victims(pid: int, kind: str) -> list[int]:
-    """Processes of a run on a cluster of this machine; its nannies are threads of the client."""
+    """Processes of a run on a cluster of this machine: scheduler and nannies are the client's."""
     import psutil  # noqa: PLC0415 - comes with Dask
 
     below = psutil.Process(pid).children(recursive=True)
@@ -135,20 +153,27 @@ def _dask(*arguments: str) -> subprocess.Popen[bytes]:
     return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
 
-def _scheduler(folder: Path, count: int, draws: random.Random) -> tuple[object, ...]:
-    path, port = _fleet(folder, count), draws.randrange(20_000, 30_000)
-    address = f"tcp://127.0.0.1:{port}"
-    scheduler = _dask("scheduler", "--host", "127.0.0.1", "--port", str(port))
-    worker = _dask("worker", address, "--nthreads", "1", "--death-timeout", "30")
-    try:
-        running = _begun(path, "--scheduler", address)
-        then = _until(path, running, draws.randrange(2, count // 2))
-        scheduler.kill()
-        return _finished(path, running, then, count)
-    finally:
-        for process in (scheduler, worker):
-            process.kill()
-            process.wait()
+def _by_address(victim: str) -> Callable[[Path, int, random.Random], tuple[object, ...]]:
+    """Scheduler and two workers, each with its nanny, as processes of their own."""
+
+    def fault(folder: Path, count: int, draws: random.Random) -> tuple[object, ...]:
+        path, port = _fleet(folder, count), draws.randrange(20_000, 30_000)
+        address = f"tcp://127.0.0.1:{port}"
+        scheduler = _dask("scheduler", "--host", "127.0.0.1", "--port", str(port))
+        own = ("worker", address, "--nthreads", "1", "--death-timeout", "30")
+        nannies = [_dask(*own) for _ in range(2)]
+        try:
+            running = _begun(path, "--scheduler", address)
+            then = _until(path, running, draws.randrange(2, count // 2))
+            (scheduler if victim == "scheduler" else nannies[0]).kill()
+            return _finished(path, running, then, count)
+        finally:
+            for process in (*nannies, scheduler):
+                process.terminate()
+            for process in (*nannies, scheduler):
+                process.wait(timeout=60)
+
+    return fault
 
 
 def _full_disk(folder: Path, count: int, draws: random.Random) -> tuple[object, ...]:
@@ -163,7 +188,7 @@ def _full_disk(folder: Path, count: int, draws: random.Random) -> tuple[object, 
         path.write_text(path.read_text().replace('study = "study.toml"', place))
         running = _begun(path, "--workers", "2")
         running.wait(timeout=PATIENCE_S)
-        then = _done(path)
+        then = _logs(path)
         subprocess.run(["mount", "-o", "remount,size=64m", str(disk)], check=True)
         return _finished(path, running, then, count)
     finally:

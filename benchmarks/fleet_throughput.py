@@ -3,6 +3,8 @@
 FLIGHTID_FLEET_LOGS says how many logs are flown (default 40; 1,000 take half an hour). The
 processor time of a log by itself is measured inside the process that takes it, where nothing of the
 fleet is; what a run costs beyond their sum is its overhead, that of starting processes apart.
+Processor time of a run is that of its processes, each read while it lives: a run whose client is
+ended with -9 has its row too, of what was done until then, and is named so.
 """
 
 from __future__ import annotations
@@ -13,7 +15,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import threading
+from dataclasses import dataclass
 from pathlib import Path
 from time import monotonic, sleep
 
@@ -30,25 +32,42 @@ SAMPLE = 20
 
 
 def run() -> Table:
-    """One and two workers, and the plain loop, over the same logs."""
+    """One and two workers, two clients, and the plain loop, over the same logs."""
     count = int(os.environ.get("FLIGHTID_FLEET_LOGS", "40"))
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         flown(folder, count)
         rows = [_plain(folder / "fleet.toml")]
-        start_s = _start(folder)
-        runs = (2, 1) if count <= 200 else (2,)
-        rows += [_taken(folder, workers, start_s) for workers in runs]
+        starts = {each: _start(folder, *each) for each in ((2, 1), (1, 1), (1, 2))}
+        for each, start in starts.items() if count <= 200 else [((2, 1), starts[2, 1])]:
+            rows.append(_taken(folder, *each, start))
     columns = (
         *(Column("run"), Column("logs"), Column("fitted")),
         *(Column("wall", "s", 4), Column("processor", "s", 4), Column("logs a minute", "", 3)),
         *(Column("a log alone", "s", 3), Column("overhead", "%", 2)),
         *(Column("memory a worker", "MB", 3), Column("catalogue", "MB", 3)),
     )
-    note = (
-        f"Starting a cluster of two workers and their processes took {start_s:.1f} s of processor."
+    told = "; ".join(
+        f"{_named(*each)}: {start.wall_s:.1f} s, {start.used_s:.1f} s of processor"
+        for each, start in starts.items()
     )
+    note = f"Wall, processor and logs a minute are without starting, which took {told}."
     return Table("Fleet beside a plain loop", columns, tuple(rows), (note,))
+
+
+@dataclass(frozen=True)
+class Usage:
+    """What a run took: times, the largest worker's memory, how its clients ended."""
+
+    wall_s: float
+    used_s: float
+    most_bytes: int
+    codes: tuple[int, ...]
+
+
+def _named(workers: int, clients: int) -> str:
+    each = f"{workers} worker{'s' * (workers > 1)}"
+    return each if clients == 1 else f"{clients} clients of {each}"
 
 
 def flown(folder: Path, count: int) -> Path:
@@ -82,38 +101,55 @@ def _plain(path: Path) -> tuple[object, ...]:
     return ("plain loop", n, fitted, wall_s, used_s, rate, used_s / n, None, None, None)
 
 
-def _start(folder: Path) -> float:
-    """Processor time of a run over logs that are refused at once: processes, libraries, cluster."""
+def _start(folder: Path, workers: int, clients: int) -> Usage:
+    """A run over logs that are refused at once: processes, libraries, cluster."""
     place = folder / "start"
     (place / "logs").mkdir(parents=True)
     for name in ("fleet.toml", "study.toml"):
         shutil.copy(folder / name, place)
     for number in range(4):
         (place / "logs" / f"V{number:02}-20260301.bin").write_bytes(b"no log %d" % number)
-    return _run(place / "fleet.toml", 2)[1]
+    found = _run(place / "fleet.toml", workers, clients)
+    shutil.rmtree(place)
+    return found
 
 
-def _run(path: Path, workers: int) -> tuple[float, float, int]:
-    """Wall and processor time of a run in a process of its own, and the largest worker's memory."""
-    begun, used, most = monotonic(), _used(), 0
+def _run(path: Path, workers: int, clients: int) -> Usage:
+    """A run in processes of its own, all clients at once."""
+    begun = monotonic()
     command = [sys.executable, "-m", "flightid", "fleet", "run", str(path)]
-    running = subprocess.Popen(
-        [*command, "--workers", str(workers)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    running = [
+        subprocess.Popen(
+            [*command, "--workers", str(workers)],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        for _ in range(clients)
+    ]
+    used, most = dict[tuple[int, float], float](), 0
+    while any(each.poll() is None for each in running):
+        for each in running:
+            most = max(most, _workers_bytes(each.pid))
+            used |= _times(each.pid)
+        sleep(0.25)
+    return Usage(
+        monotonic() - begun, sum(used.values()), most, tuple(each.wait() for each in running)
     )
-    over = threading.Event()
 
-    def watch() -> None:
-        nonlocal most
-        while not over.is_set():
-            most = max(most, _workers_bytes(running.pid))
-            sleep(2.0)
 
-    watcher = threading.Thread(target=watch, daemon=True)
-    watcher.start()
-    running.wait()
-    over.set()
-    watcher.join()
-    return monotonic() - begun, _used() - used, most
+def _times(pid: int) -> dict[tuple[int, float], float]:
+    """Processor time so far of a process and of all below it, each by itself."""
+    import psutil  # noqa: PLC0415 - comes with Dask
+
+    found = {}
+    try:
+        top = psutil.Process(pid)
+        for each in (top, *top.children(recursive=True)):
+            times = each.cpu_times()
+            found[each.pid, each.create_time()] = times.user + times.system
+    except psutil.Error:
+        return found
+    return found
 
 
 def _workers_bytes(pid: int) -> int:
@@ -131,16 +167,23 @@ def _workers_bytes(pid: int) -> int:
     return most
 
 
-def _taken(folder: Path, workers: int, start_s: float) -> tuple[object, ...]:
+def _taken(folder: Path, workers: int, clients: int, start: Usage) -> tuple[object, ...]:
     path = folder / "fleet.toml"
-    wall_s, used_s, most = _run(path, workers)
+    usage = _run(path, workers, clients)
     status = fleet.fleet_status(path)
     with fleet.open(path) as catalogue:
-        ((alone_s,),) = catalogue.query("SELECT sum(processor_s) FROM logs").fetchall()
+        ((alone_s, rows, logs),) = catalogue.query(
+            "SELECT sum(processor_s), count(*), count(DISTINCT log) FROM logs"
+        ).fetchall()
+    assert rows == logs, "a log counts twice"
     size = status.n_bytes / 1e6
     n, fitted = status.n_logs, status.outcomes.get("fitted", 0)
-    overhead = 100.0 * ((used_s - start_s) / alone_s - 1.0)
+    wall_s, used_s = usage.wall_s - start.wall_s, usage.used_s - start.used_s
+    overhead = 100.0 * (used_s / alone_s - 1.0)
     shutil.rmtree(read_fleet(path).catalogue)
-    name = f"{workers} worker{'s' * (workers > 1)}"
+    name = _named(workers, clients)
+    if any(usage.codes):
+        name = f"{name}, ended with {', '.join(map(str, usage.codes))}"
     rate = 60.0 * n / wall_s
-    return (name, n, fitted, wall_s, used_s, rate, alone_s / n, overhead, most / 1e6, size)
+    most = usage.most_bytes / 1e6
+    return (name, n, fitted, wall_s, used_s, rate, alone_s / n, overhead, most, size)

@@ -25,7 +25,7 @@ STARTED = {
     "reference/test_report_in_browser.py": 1,
     "unit/test_cli_program.py": 3,
     "unit/test_commit_subject.py": 2,
-    "unit/test_fleet_cluster.py": 2,  # a scheduler and clients to kill, nightly
+    "unit/test_fleet_cluster.py": 3,  # a scheduler, clients to kill, two at once; nightly
     "unit/test_output_error_routes.py": 1,  # another number of threads
     "unit/test_plain_pid.py": 1,
     "unit/test_realtime.py": 1,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import datetime
+import ipaddress
 import json
 import os
 import shutil
@@ -10,7 +12,9 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -36,13 +40,15 @@ def fleet_of(folder: Path, n_logs: int) -> Path:
     return folder / "fleet.toml"
 
 
-def dask(*arguments: str) -> subprocess.Popen[bytes]:
+def dask(*arguments: str, **surroundings: str) -> subprocess.Popen[bytes]:
     command = [sys.executable, "-m", "distributed.cli.dask_scheduler"]
     if arguments[0] == "worker":
         command = [sys.executable, "-m", "distributed.cli.dask_worker", *arguments[1:]]
     else:
         command += arguments[1:]
-    return subprocess.Popen(command, stderr=subprocess.DEVNULL, env=os.environ | CLEAN)
+    return subprocess.Popen(
+        command, stderr=subprocess.DEVNULL, env=os.environ | CLEAN | surroundings
+    )
 
 
 @pytest.fixture
@@ -81,6 +87,78 @@ def test_a_scheduler_that_exists_is_used_and_its_death_is_told(
     with pytest.raises((DataError, OptionError)):
         run_fleet(fleet, scheduler=address)
     assert run_fleet(fleet, workers=1).outcomes == {"refused": 1}
+
+
+def certificates(folder: Path) -> dict[str, str]:
+    """An authority and a certificate for this machine, as Dask's configuration names them."""
+    x509 = pytest.importorskip("cryptography.x509")
+    primitives = "cryptography.hazmat.primitives"
+    hashes, serialization, ec = (
+        import_module(f"{primitives}.{name}")
+        for name in ("hashes", "serialization", "asymmetric.ec")
+    )
+
+    def made(name: str, issuer: tuple[Any, Any] | None) -> tuple[Any, Any]:
+        key = ec.generate_private_key(ec.SECP256R1())
+        own = x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, name)])
+        by, signed_by = (own, key) if issuer is None else (issuer[0].subject, issuer[1])
+        now = datetime.datetime.now(datetime.UTC)
+        builder = x509.CertificateBuilder(
+            by, own, key.public_key(), x509.random_serial_number(),
+            now - datetime.timedelta(days=1), now + datetime.timedelta(days=1),
+        )  # fmt: skip
+        basic = x509.BasicConstraints(ca=issuer is None, path_length=None)
+        hosts = x509.SubjectAlternativeName([x509.IPAddress(ipaddress.ip_address("127.0.0.1"))])
+        builder = builder.add_extension(basic, critical=True).add_extension(hosts, critical=False)
+        return builder.sign(signed_by, hashes.SHA256()), key
+
+    authority = made("authority", None)
+    host, key = made("127.0.0.1", authority)
+    pem = serialization.Encoding.PEM
+    plain = (serialization.PrivateFormat.PKCS8, serialization.NoEncryption())
+    (folder / "ca.pem").write_bytes(authority[0].public_bytes(pem))
+    (folder / "host.pem").write_bytes(host.public_bytes(pem))
+    (folder / "host.key").write_bytes(key.private_bytes(pem, *plain))
+    names = {"ca-file": "ca.pem"}
+    for role in ("scheduler", "worker", "client"):
+        names |= {f"{role}.cert": "host.pem", f"{role}.key": "host.key"}
+    return {key: str(folder / name) for key, name in names.items()}
+
+
+@pytest.mark.nightly
+def test_a_tls_scheduler_takes_logs_of_whoever_has_a_certificate_alone(tmp_path: Path) -> None:
+    config = pytest.importorskip("dask.config")
+    told = {f"distributed.comm.tls.{key}": name for key, name in certificates(tmp_path).items()}
+    marks = {".": "__", "-": "_"}
+    named = {
+        "DASK_" + "".join(marks.get(letter, letter) for letter in key).upper(): name
+        for key, name in told.items()
+    }
+    file = tmp_path / "scheduler.json"
+    options = ("--scheduler-file", str(file))
+    host = ("--no-dashboard", "--protocol", "tls", "--host", "127.0.0.1")
+    worker = ("worker", *options, "--nthreads", "1", "--no-dashboard", "--death-timeout", "60")
+    processes = [dask("scheduler", *options, *host, **named), dask(*worker, **named)]
+    try:
+        deadline = time.monotonic() + 60
+        while not file.exists():
+            assert time.monotonic() < deadline
+            time.sleep(0.1)
+        address = json.loads(file.read_text())["address"]
+        assert address.startswith("tls://127.0.0.1:")
+        (tmp_path / "fleet").mkdir()
+        fleet = fleet_of(tmp_path / "fleet", 4)
+        with pytest.raises(OptionError, match=r"certificate|tls|no scheduler answers"):
+            run_fleet(fleet, scheduler=address)
+        with config.set(told):
+            done = run_fleet(fleet, scheduler=address)
+        assert done.outcomes == {"refused": 4}
+        assert [each.code for each in done.findings] == []
+    finally:
+        for process in processes:
+            process.terminate()
+        for process in processes:
+            process.wait(timeout=30)
 
 
 @pytest.mark.nightly
@@ -138,6 +216,26 @@ def _below(pid: int, kind: str) -> list[int]:
         return [number for number, yes in is_log.items() if yes]
     parents = {each.ppid() for each in below if is_log[each.pid]}
     return [number for number in parents if number != pid]
+
+
+@pytest.mark.nightly
+def test_two_clients_on_one_catalogue_lose_no_log_and_count_none_twice(tmp_path: Path) -> None:
+    fleet = fleet_of(tmp_path, 24)
+    path = fleet.read_text().replace("time_s = 300", "time_s = 300\ncompact_every = 5")
+    fleet.write_text(path)
+    command = [sys.executable, "-m", "flightid", "fleet", "run", str(fleet), "--workers", "1"]
+    clients = [
+        subprocess.Popen(command, env=os.environ | CLEAN, stdout=subprocess.PIPE) for _ in range(2)
+    ]
+    said = [client.communicate(timeout=300)[0].decode() for client in clients]
+    assert [client.returncode for client in clients] == [0, 0], said
+    with open_catalogue(fleet) as catalogue:
+        found = catalogue.query(
+            "SELECT count(*), count(DISTINCT log), count_if(outcome = 'refused') FROM logs"
+        ).fetchall()
+    assert found == [(24, 24, 24)]
+    assert fleet_status(fleet).quarantine == ()
+    assert run_fleet(fleet, workers=1).kept == 24
 
 
 @pytest.mark.nightly
