@@ -150,7 +150,15 @@ def _first_rows(path: Path, encoding: str) -> tuple[list[str], list[str], str, l
 
 
 def _cells(row: str, delimiter: str) -> list[str]:
-    cells = next(csv.reader([row], delimiter=delimiter, skipinitialspace=True), [])
+    try:
+        cells = next(csv.reader([row], delimiter=delimiter, skipinitialspace=True), [])
+    except csv.Error as error:
+        raise FileFormatError(
+            "a row of the file cannot be cut into cells",
+            found=f"{error}, in a row of {len(row)} characters",
+            needed=f"cells of at most {csv.field_size_limit()} characters",
+            action="look at the first rows: a text is no heading or a quote does not end",
+        ) from error
     return [cell.strip() for cell in cells]
 
 
