@@ -20,6 +20,7 @@ from flightid.responses.arithmetic import add_delay
 from flightid.responses.store import read_response, write_response
 from flightid.simulation.model_outputs import systems_of
 from tests.closeness import assert_close
+from tests.strangers import gains
 from tests.strangers.responses import fly_feedthrough
 
 RATE_HZ = 100.0
@@ -327,3 +328,15 @@ def test_intervals_of_one_clean_sweep_cover_the_truth() -> None:
     low, high = binom.ppf([0.0005, 0.9995], n_flights, 0.95) / n_flights
     assert np.all((covered >= low) & (covered <= high)), covered
     assert 0.93 <= covered.mean() <= 0.97, covered
+
+
+@pytest.mark.nightly
+def test_a_cost_that_rises_by_chance_does_not_cost_the_intervals():
+    # A loop with gusts, of another simulator: the corrected fit costs 60 % more, all of it noise.
+    seed, flight = 5001, gains.drawn(5001)
+    data = [gains.record(flight, seed + gains.OTHER * k) for k in range(flight.sweeps)]
+    response = fid.estimate_response(data, inputs="tau_phi", outputs="p", estimator="instrument")
+    fit = fid.identify(gains.structure_of(flight.structure), response)
+    damping = fit.parameters["Lp"]
+    assert damping.stderr is not None
+    assert abs(damping.value - flight.craft.about["damping"]) < 2.0 * damping.stderr

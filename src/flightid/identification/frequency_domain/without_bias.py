@@ -41,8 +41,8 @@ NOISE = 1.1
 """Ratio of the cost with the estimator inside to that without, up to which it may be noise."""
 CHANCE = 4.0
 """Mean square of misfits over their errors up to which a cost that rose is chance: neighbouring
-points share their errors, so few of them are independent. Not where errors are those of what the
-model leaves: a wrong model has large ones."""
+points share their errors, so few of them are independent. Errors are those that the response was
+measured with: those of what the model leaves are large where it is wrong."""
 MISFIT = 10.0
 """Mean square of misfits over their errors from which on another start is tried."""
 
@@ -133,17 +133,20 @@ class _Minimum:
 
 @dataclass(frozen=True)
 class _Judgement:
-    """An end of the search, the errors of the points there, and the mean square of misfits."""
+    """An end of the search, the errors of the points there, and the mean square of misfits.
+
+    Misfits count by those errors, and by what the response was measured with.
+    """
 
     found: SearchOutcome
     errors: ErrorModel
     misfit: float
-    of_residuals: bool
+    as_measured: float
 
     @property
     def is_chance(self) -> bool:
         """Whether errors that do not come from this model explain its misfits."""
-        return not self.of_residuals and self.misfit <= CHANCE
+        return self.as_measured <= CHANCE
 
     @classmethod
     def of(cls, objective: Objective, found: SearchOutcome) -> _Judgement:
@@ -153,15 +156,21 @@ class _Judgement:
         errors = objective.errors
         if known is not None:
             errors = error_model(replace(correction.data, errors=known), selected)
-        shares = [
-            np.abs(estimate - each.response) ** 2 / np.maximum(variance, TINY)
-            for estimate, each, variance in zip(
-                found.estimates, selected, variances(selected, errors), strict=True
-            )
-            if variance is not None
-        ]
-        misfit = float(np.mean(np.concatenate(shares))) if shares else np.inf
-        return cls(found, errors, misfit, known is not None)
+        misfits = (_misfit(objective, found, each) for each in (errors, objective.errors))
+        return cls(found, errors, *misfits)
+
+
+def _misfit(objective: Objective, found: SearchOutcome, errors: ErrorModel) -> float:
+    """Mean square of what the estimator makes of the model less the response, over errors."""
+    selected = objective.selected
+    shares = [
+        np.abs(estimate - each.response) ** 2 / np.maximum(variance, TINY)
+        for estimate, each, variance in zip(
+            found.estimates, selected, variances(selected, errors), strict=True
+        )
+        if variance is not None
+    ]
+    return float(np.mean(np.concatenate(shares))) if shares else np.inf
 
 
 def _searches(objective: Objective, minimum: Sequence[DenseEnd]) -> list[_Minimum]:
