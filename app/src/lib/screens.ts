@@ -1,6 +1,7 @@
 import type { Component } from "svelte";
 import Compare from "../screens/Compare.svelte";
 import Flight from "../screens/Flight.svelte";
+import Fly from "../screens/Fly.svelte";
 import Gains from "../screens/Gains.svelte";
 import Library from "../screens/Library.svelte";
 import Plan from "../screens/Plan.svelte";
@@ -45,4 +46,5 @@ export const SCREENS: Screen[] = [
   { name: "records", title: "Records", component: Records, ofLog: true, needsStudy: false, shows: (given) => Boolean(given.log) && ofRecords(given) },
   { name: "verify", title: "Verify", component: Verify, ofLog: true, needsStudy: true, shows: hasModels },
   { name: "report", title: "Report", component: Report, ofLog: true, needsStudy: true, shows: hasModels },
+  { name: "fly", title: "Fly", component: Fly, ofLog: false, needsStudy: false, shows: () => true },
 ];

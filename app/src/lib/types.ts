@@ -68,6 +68,18 @@ export interface ComparisonPart {
   back: GainFile | null;
 }
 
+/** Handling qualities of a flight, by the decision tree.
+
+Each answer is one of its three questions; the rating lies in what they leave. */
+export interface CooperHarperRating {
+  controllable: boolean;
+  adequate: boolean | null;
+  satisfactory: boolean | null;
+  rating: number;
+  task: string;
+  comment: string;
+}
+
 /** One key and its value; None takes it out. */
 export interface Edit {
   path: (string | number)[];
@@ -95,6 +107,99 @@ export interface FlightScreen {
   overview: Overview | null;
   review: ReviewPart | null;
   jobs: Job[];
+}
+
+/** A flight of the workspace. */
+export interface FlownItem {
+  id: string;
+  vehicle: string;
+  title: string;
+  law: boolean;
+  finished: boolean;
+  path: string;
+  rating: CooperHarperRating | null;
+}
+
+/** A vehicle to fly. */
+export interface FlyChoice {
+  name: string;
+  title: string;
+  note: string;
+  inputs: FlyInput[];
+  outputs: Record<string, string>;
+  law: string;
+  law_sensors: string[];
+  rate_hz: number;
+}
+
+/** An instant of a flight, as it is shown. */
+export interface FlyFrame {
+  time_s: number;
+  number: number;
+  outputs: Record<string, number>;
+  driven: Record<string, number>;
+  added: Record<string, number>;
+  late_frames: number;
+  sweeping: boolean;
+}
+
+/** An input of a vehicle, and the axis of the hand that moves it. */
+export interface FlyInput {
+  hand: "pitch" | "roll" | "yaw" | "heave";
+  name: string;
+  unit: string;
+  reach: number;
+  law_limit: number | null;
+}
+
+/** What the socket tells: a frame, a state with its words, or a flight that was kept. */
+export interface FlyNews {
+  frame: FlyFrame | null;
+  state: "ready" | "flying" | "paused" | "ended" | "refused" | null;
+  words: string;
+  kept: string | null;
+}
+
+/** Pause, go on, end. */
+export interface FlyOrder {
+  do: "pause" | "resume" | "end";
+}
+
+/** Begin a flight; while one is flown, end it and begin anew. */
+export interface FlyStart {
+  do: string;
+  vehicle: string;
+  law: boolean;
+  gusts: boolean;
+  actuator_delay_s: number;
+  display_delay_s: number;
+  stick_rad_s: number | null;
+  seed: number;
+}
+
+/** Where the hand is; numbers rise, and come back with the frame that has flown it. */
+export interface FlyStick {
+  do: string;
+  number: number;
+  stick: Record<string, number>;
+}
+
+/** Add a sweep to an input; left out: end it. */
+export interface FlySweep {
+  do: string;
+  input: string | null;
+  amplitude: number;
+  low_rad_s: number;
+  high_rad_s: number;
+  duration_s: number;
+}
+
+/** Augmentation, gusts and sensors, in flight. */
+export interface FlySwitch {
+  do: string;
+  law: boolean;
+  gusts: boolean;
+  failures: Record<string, "frozen" | "zero" | "biased">;
 }
 
 /** A parameter file. */

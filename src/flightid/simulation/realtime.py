@@ -40,6 +40,10 @@ class Clock(Protocol):
         """Wait."""
 
 
+class EndOfFlight(Exception):  # noqa: N818 — no error, as StopIteration is none
+    """Raised by a pilot, or by who is shown the outputs: the flight ends and is kept."""
+
+
 class SystemClock:
     """The machine's monotonic clock."""
 
@@ -65,7 +69,7 @@ class FlownSession(Result, schema="flightid.flown_session/1", untold={"record": 
     worst_late_s : float
         Longest delay of a frame, s.
     stopped : bool
-        Whether an interrupt ended it before its time.
+        Whether an interrupt or its pilot ended it before its time.
     options : mapping of str to object
         As they were used; empty where the loop was driven by hand.
     """
@@ -104,7 +108,8 @@ def fly_in_real_time(
 ) -> FlownSession:
     """Step a model beside a clock; frames that come late are counted, none is left out.
 
-    An interrupt (Ctrl-C) ends the flight: what was flown until then is returned.
+    An interrupt (Ctrl-C), or `EndOfFlight` raised by the pilot or by `show`, ends the flight: what
+    was flown until then is returned.
 
     Parameters
     ----------
@@ -126,6 +131,8 @@ def fly_in_real_time(
         The model diverges, or the pilot gives what is no number.
     UnknownNameError
         The pilot moves what is no input.
+    KeyboardInterrupt, EndOfFlight
+        Before two frames were flown.
 
     Example
     -------
@@ -161,7 +168,7 @@ def fly_in_real_time(
             flown = k + 1
             if show is not None:
                 show(k * step, outputs)
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, EndOfFlight):
         if flown < FEWEST_FRAMES:
             raise
     record = Record.from_arrays(

@@ -51,6 +51,11 @@ class Stepper:
     noise : Noise, optional
         Gusts, process and sensor noise, of a linear model: the draws of `simulate` with this seed.
 
+    Attributes
+    ----------
+    calm : bool
+        Set it and gusts and process noise go on unfelt; errors of the sensors stay.
+
     Raises
     ------
     OptionError
@@ -81,6 +86,7 @@ class Stepper:
         self.sample_time_s = sample_time_s
         self._plant = _plant(model, sample_time_s)
         self._air: _Air | None = None
+        self.calm = False
         if noise is not None:
             if not isinstance(self._plant, _Samples):
                 raise OptionError(
@@ -140,8 +146,10 @@ class Stepper:
         driven = np.clip(driven, self._low, self._high)
         found = self._plant.step(driven)
         if self._air is not None and isinstance(self._plant, _Samples):
-            found = found + self._air.outputs()
-            self._plant.push(self._air.step())
+            found = found + self._air.outputs(calm=self.calm)
+            kick = self._air.step()
+            if not self.calm:
+                self._plant.push(kick)
         if not np.all(np.abs(found) < 1e30):
             raise DataError("the model diverges", found=str(dict(inputs)))
         self._last = found
@@ -216,9 +224,9 @@ class _Air:
         noise.on_sensors(outputs, 0)
         self._errors = np.array([noise.sensor.get(name, 0.0) for name in outputs])
 
-    def outputs(self) -> Array:
+    def outputs(self, *, calm: bool) -> Array:
         """What outputs hold of this instant's gusts and sensors' errors, beside the states."""
-        felt = self._moving.seen[:, self._n :] @ self._gusts
+        felt = self._moving.seen[:, self._n :] @ self._gusts * (not calm)
         return np.asarray(felt + self._errors * self._sensed.standard_normal(len(felt)))
 
     def step(self) -> Array:

@@ -1,0 +1,112 @@
+import { Refusal } from "./api";
+import type { CooperHarperRating, FlownItem, FlyChoice, FlyFrame, FlyNews, FlyStart, FlySweep, FlySwitch } from "./types";
+
+export type Hand = "pitch" | "roll" | "yaw" | "heave";
+export type Sticks = Record<Hand, number>;
+type State = "closed" | "ready" | "flying" | "paused" | "ended" | "refused";
+const KEPT_S = 20;
+
+async function json<T>(path: string, body?: unknown): Promise<T> {
+  const sent: RequestInit = body === undefined ? {} : { method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify(body) };
+  const answer = await fetch(path, { credentials: "same-origin", ...sent });
+  const told = await answer.json();
+  if (answer.ok) return told;
+  throw new Refusal(answer.status, typeof told.error === "string" ? told.error : typeof told.detail === "string" ? told.detail : "The server refused this.");
+}
+export const vehicles = () => json<FlyChoice[]>("/api/fly/vehicles");
+export const flights = () => json<FlownItem[]>("/api/fly/flights");
+export const finish = (id: string) => json<FlownItem[]>(`/api/fly/flights/${id}/finish`, {});
+export const rate = (id: string, rating: CooperHarperRating) => json<FlownItem[]>(`/api/fly/flights/${id}/rating`, rating);
+
+/** One instant of the strip: time, stick of the hand, attitude. */
+export interface Trace {
+  time_s: number;
+  stick: Sticks;
+  phi: number;
+  theta: number;
+}
+
+/** A flight: its socket, the newest frame, and the last seconds for the strip. */
+export class Flying {
+  state: State = $state("closed");
+  words = $state("");
+  kept: string | null = $state(null);
+  /** From a stick that was sent to the frame that has flown it, ms, smoothed. */
+  latency = $state(0);
+  frame: FlyFrame | null = null;
+  heading = 0;
+  traces: Trace[] = [];
+  #socket: WebSocket | null = null;
+  #number = 0;
+  #sent = new Map<number, number>();
+  #stick: Sticks = { pitch: 0, roll: 0, yaw: 0, heave: 0 };
+  #closed = false;
+
+  open() {
+    const socket = new WebSocket(`ws://${location.host}/api/fly`);
+    this.#socket = socket;
+    socket.onmessage = (event) => this.#hear(JSON.parse(event.data));
+    socket.onclose = () => {
+      if (this.#closed) return;
+      if (this.state === "flying" || this.state === "paused") this.words = "The line to the server broke; what was flown is kept.";
+      const refused = this.state === "refused";
+      this.state = refused ? "refused" : "closed";
+      setTimeout(() => !this.#closed && this.open(), refused ? 4000 : 1500);
+    };
+  }
+
+  close() {
+    this.#closed = true;
+    this.#socket?.close();
+  }
+
+  #hear(news: FlyNews) {
+    if (news.frame) {
+      const before = this.frame?.time_s ?? 0;
+      this.frame = news.frame;
+      const { outputs, time_s, number } = news.frame;
+      this.heading += (outputs.r ?? 0) * Math.max(0, time_s - before);
+      this.traces.push({ time_s, stick: { ...this.#stick }, phi: outputs.phi ?? 0, theta: outputs.theta ?? 0 });
+      while (this.traces.length && this.traces[0].time_s < time_s - KEPT_S) this.traces.shift();
+      const begun = this.#sent.get(number);
+      if (begun !== undefined) {
+        const took = performance.now() - begun;
+        this.latency = this.latency ? 0.9 * this.latency + 0.1 * took : took;
+        for (const each of this.#sent.keys()) if (each <= number) this.#sent.delete(each);
+      }
+      return;
+    }
+    if (news.words) this.words = news.words;
+    if (news.state === "refused" && (this.state === "flying" || this.state === "paused")) return;
+    if (news.state) this.state = news.state;
+    if (news.state === "ended" || news.state === "paused") this.#sent.clear();
+    if (news.kept) this.kept = news.kept;
+  }
+
+  #send(order: object) {
+    if (this.#socket?.readyState === WebSocket.OPEN) this.#socket.send(JSON.stringify(order));
+  }
+
+  start(asked: Omit<FlyStart, "do">) {
+    this.words = "";
+    this.traces = [];
+    this.heading = 0;
+    this.frame = null;
+    this.latency = 0;
+    this.#sent.clear();
+    this.#send({ do: "start", ...asked });
+  }
+
+  /** Tell where the hand is, if it has moved. */
+  stick(to: Sticks) {
+    if ((Object.keys(to) as Hand[]).every((each) => to[each] === this.#stick[each]) && this.#number) return;
+    this.#stick = { ...to };
+    if (this.state !== "flying") return;
+    this.#sent.set(++this.#number, performance.now());
+    this.#send({ do: "stick", number: this.#number, stick: to });
+  }
+
+  switch(asked: Omit<FlySwitch, "do">) { this.#send({ do: "switch", ...asked }); }
+  sweep(asked: Omit<FlySweep, "do">) { this.words = ""; this.#send({ do: "sweep", ...asked }); }
+  order(what: "pause" | "resume" | "end") { this.#send({ do: what }); }
+}

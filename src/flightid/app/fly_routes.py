@@ -1,0 +1,219 @@
+"""Answers of the screen Fly: a socket of its own, and the flights that the workspace keeps."""
+
+from __future__ import annotations
+
+import asyncio
+from contextlib import suppress
+from pathlib import Path
+from typing import Annotated
+
+from fastapi import FastAPI, HTTPException, Response, WebSocket, WebSocketDisconnect
+from pydantic import Field, TypeAdapter, ValidationError
+
+from flightid.app.backstage import Backstage
+from flightid.app.fly_deck import RATE_HZ, FlightDeck
+from flightid.app.fly_journal import (
+    RECORD,
+    finish_flight,
+    flight_folder,
+    keep_rating,
+    kept_flights,
+)
+from flightid.app.fly_schemas import (
+    CooperHarperRating,
+    FlownItem,
+    FlyChoice,
+    FlyInput,
+    FlyNews,
+    FlyOrder,
+    FlyStart,
+    FlyStick,
+    FlySweep,
+    FlySwitch,
+)
+from flightid.app.fly_vehicles import VEHICLES, FlyVehicle
+from flightid.app.own_folders import is_link
+from flightid.control.laws.augmentation import augmentation_law
+from flightid.errors import FlightidError
+
+FlyCommand = FlyStart | FlyStick | FlySwitch | FlySweep | FlyOrder
+COMMANDS: TypeAdapter[FlyCommand] = TypeAdapter(Annotated[FlyCommand, Field(discriminator="do")])
+MOST_WORDS = 1 << 12
+TAKEN = "A flight is under way in another window; end it there first."
+MOST_RECORD_BYTES = 256 << 20
+
+
+def add_fly_routes(app: FastAPI, backstage: Backstage) -> None:
+    """Answer what the screen Fly asks."""
+    workspace = backstage.workspace.folder
+    deck = FlightDeck(workspace)
+    choices = [_choice(each) for each in VEHICLES]
+
+    @app.get("/api/fly/vehicles")
+    def vehicles() -> list[FlyChoice]:
+        return choices
+
+    @app.get("/api/fly/flights")
+    def flights() -> list[FlownItem]:
+        flown = deck.flight.id if deck.flight is not None else ""
+        found = []
+        for each in kept_flights(workspace):
+            if each["id"] == flown:
+                continue
+            with suppress(ValidationError):
+                if each["rating"] is not None:
+                    each["rating"] = CooperHarperRating.model_validate(each["rating"])
+                found.append(FlownItem(**each))
+        return found
+
+    @app.post("/api/fly/flights/{flight}/finish")
+    def finish(flight: str) -> list[FlownItem]:
+        folder = _known(workspace, flight)
+        if deck.flight is not None and deck.flight.id == flight:
+            raise HTTPException(409, "This flight is still flown.")
+        if not (folder / RECORD).is_file():
+            finish_flight(folder)
+        return flights()
+
+    @app.post("/api/fly/flights/{flight}/rating")
+    def rate(flight: str, rating: CooperHarperRating) -> list[FlownItem]:
+        keep_rating(_known(workspace, flight), rating.model_dump())
+        return flights()
+
+    @app.get("/api/fly/flights/{flight}/record", response_class=Response)
+    def record(flight: str) -> Response:
+        path = _known(workspace, flight) / RECORD
+        if is_link(path) or not path.is_file() or path.stat().st_size > MOST_RECORD_BYTES:
+            raise HTTPException(404, "This flight has no record.")
+        attached = {"content-disposition": f'attachment; filename="{flight}.nc"'}
+        return Response(path.read_bytes(), media_type="application/x-netcdf", headers=attached)
+
+    _add_socket(app, deck)
+
+
+def _add_socket(app: FastAPI, deck: FlightDeck) -> None:
+    @app.websocket("/api/fly")
+    async def fly(socket: WebSocket) -> None:
+        await socket.accept()
+        if not deck.enter(socket):
+            await socket.send_text(FlyNews(state="refused", words=TAKEN).model_dump_json())
+            await socket.close(1013)
+            return
+        news = NewestFrame(asyncio.get_running_loop())
+        side = asyncio.create_task(_tell(socket, news))
+        try:
+            news.put(FlyNews(state="ready"))
+            while True:
+                words = await socket.receive_text()
+                if len(words) > MOST_WORDS:
+                    await socket.close(1009)
+                    break
+                await _obey(deck, COMMANDS.validate_json(words), news)
+        except ValueError:
+            await socket.close(1007)
+        except (WebSocketDisconnect, RuntimeError):
+            pass
+        finally:
+            await asyncio.to_thread(deck.leave, socket)
+            side.cancel()
+            with suppress(asyncio.CancelledError, WebSocketDisconnect, RuntimeError):
+                await side
+
+
+class NewestFrame:
+    """News on their way: states in their order, of frames the newest alone.
+
+    Parameters
+    ----------
+    loop : asyncio.AbstractEventLoop
+        In which they are waited for.
+    """
+
+    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
+        self._loop, self._there = loop, asyncio.Event()
+        self._frame: FlyNews | None = None
+        self._states: list[FlyNews] = []
+
+    def put(self, news: FlyNews) -> None:
+        """Tell, from any thread."""
+        with suppress(RuntimeError):  # the server has ended
+            self._loop.call_soon_threadsafe(self._put, news)
+
+    def _put(self, news: FlyNews) -> None:
+        if news.frame is not None:
+            self._frame = news
+        else:
+            self._states.append(news)
+        self._there.set()
+
+    async def get(self) -> list[FlyNews]:
+        """What is new."""
+        await self._there.wait()
+        self._there.clear()
+        found = [*([] if self._frame is None else [self._frame]), *self._states]
+        self._frame, self._states = None, []
+        return found
+
+
+async def _tell(socket: WebSocket, news: NewestFrame) -> None:
+    while True:
+        for each in await news.get():
+            await socket.send_text(each.model_dump_json(exclude_none=True))
+
+
+async def _obey(deck: FlightDeck, asked: FlyCommand, news: NewestFrame) -> None:
+    flight = deck.flight
+    try:
+        if isinstance(asked, FlyStart):
+            await asyncio.to_thread(deck.start, asked, news.put)
+            news.put(FlyNews(state="flying"))
+        elif flight is None:
+            return
+        elif isinstance(asked, FlyStick):
+            flight.hold(asked)
+        elif isinstance(asked, FlySwitch):
+            flight.switch(asked)
+        elif isinstance(asked, FlySweep):
+            flight.sweep(asked)
+        elif asked.do == "pause":
+            flight.clock.stop()
+            news.put(FlyNews(state="paused"))
+        elif asked.do == "resume":
+            flight.clock.start()
+            news.put(FlyNews(state="flying"))
+        else:
+            await asyncio.to_thread(deck.stop)
+    except (FlightidError, OSError) as error:
+        news.put(FlyNews(state="refused", words=str(error)))
+
+
+def _choice(vehicle: FlyVehicle) -> FlyChoice:
+    model = vehicle.model
+    units = {name: str(unit) for name, unit in model.units.items()}
+    law = augmentation_law(vehicle.law) if vehicle.law else None
+    limits = {axis.input: axis.limit for axis in law.axes} if law else {}
+    return FlyChoice(
+        name=vehicle.name,
+        title=vehicle.title,
+        note=vehicle.note,
+        inputs=[
+            FlyInput(
+                hand=hand,  # type: ignore[arg-type]
+                name=name,
+                unit=units[name],
+                reach=abs(most),
+                law_limit=limits.get(name),
+            )
+            for hand, (name, most) in vehicle.travel.items()
+        ],
+        outputs={name: units[name] for name in model.outputs},
+        law=vehicle.law,
+        law_sensors=list(law.sensors) if law else [],
+        rate_hz=RATE_HZ,
+    )
+
+
+def _known(workspace: Path, flight: str) -> Path:
+    if not any(each["id"] == flight for each in kept_flights(workspace)):
+        raise HTTPException(404, "The workspace holds no such flight.")
+    return flight_folder(workspace, flight)

@@ -1,0 +1,145 @@
+"""What the page and the server tell each other of a flight in real time."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from flightid.app.schemas import Message
+
+Fraction = Annotated[float, Field(ge=-1.0, le=1.0)]
+SensorFailure = Literal["frozen", "zero", "biased"]
+Hand = Literal["pitch", "roll", "yaw", "heave"]
+
+
+class FlyInput(Message):
+    """An input of a vehicle, and the axis of the hand that moves it."""
+
+    hand: Hand
+    name: str
+    unit: str
+    reach: float
+    law_limit: float | None
+
+
+class FlyChoice(Message):
+    """A vehicle to fly."""
+
+    name: str
+    title: str
+    note: str
+    inputs: list[FlyInput]
+    outputs: dict[str, str]
+    law: str
+    law_sensors: list[str]
+    rate_hz: float
+
+
+class FlyStart(Message):
+    """Begin a flight; while one is flown, end it and begin anew."""
+
+    do: Literal["start"] = "start"
+    vehicle: str
+    law: bool = True
+    gusts: bool = False
+    actuator_delay_s: float = Field(default=0.0, ge=0.0, le=0.5)
+    display_delay_s: float = Field(default=0.0, ge=0.0, le=0.5)
+    stick_rad_s: float | None = Field(default=None, ge=3.0, le=100.0)
+    seed: int = Field(default=0, ge=0, le=1 << 31)
+
+
+class FlyStick(Message):
+    """Where the hand is; numbers rise, and come back with the frame that has flown it."""
+
+    do: Literal["stick"] = "stick"
+    number: int = Field(ge=0)
+    stick: dict[Hand, Fraction]
+
+
+class FlySwitch(Message):
+    """Augmentation, gusts and sensors, in flight."""
+
+    do: Literal["switch"] = "switch"
+    law: bool
+    gusts: bool
+    failures: dict[str, SensorFailure] = Field(default_factory=dict, max_length=16)
+
+
+class FlySweep(Message):
+    """Add a sweep to an input; left out: end it."""
+
+    do: Literal["sweep"] = "sweep"
+    input: str | None = None
+    amplitude: float = Field(default=0.1, gt=0.0, le=100.0)
+    low_rad_s: float = Field(default=0.5, gt=0.0)
+    high_rad_s: float = Field(default=15.0, gt=0.0)
+    duration_s: float = Field(default=60.0, ge=2.0, le=300.0)
+
+
+class FlyOrder(Message):
+    """Pause, go on, end."""
+
+    do: Literal["pause", "resume", "end"]
+
+
+class FlyFrame(Message):
+    """An instant of a flight, as it is shown."""
+
+    time_s: float
+    number: int
+    outputs: dict[str, float]
+    driven: dict[str, float]
+    added: dict[str, float]
+    late_frames: int
+    sweeping: bool
+
+
+class CooperHarperRating(Message):
+    """Handling qualities of a flight, by the decision tree.
+
+    Each answer is one of its three questions; the rating lies in what they leave.
+    """
+
+    controllable: bool
+    adequate: bool | None = None
+    satisfactory: bool | None = None
+    rating: int = Field(ge=1, le=10)
+    task: str = Field(default="", max_length=300)
+    comment: str = Field(default="", max_length=4000)
+
+    @model_validator(mode="after")
+    def _in_the_tree(self) -> CooperHarperRating:
+        if self.rating not in self.left:
+            raise ValueError(f"these answers leave {self.left[0]} to {self.left[-1]}")
+        return self
+
+    @property
+    def left(self) -> tuple[int, ...]:
+        """Ratings that the answers leave."""
+        if not self.controllable:
+            return (10,)
+        if not self.adequate:
+            return (7, 8, 9)
+        return (1, 2, 3) if self.satisfactory else (4, 5, 6)
+
+
+class FlownItem(Message):
+    """A flight of the workspace."""
+
+    id: str
+    vehicle: str
+    title: str
+    law: bool
+    finished: bool
+    path: str
+    rating: CooperHarperRating | None
+
+
+class FlyNews(Message):
+    """What the socket tells: a frame, a state with its words, or a flight that was kept."""
+
+    frame: FlyFrame | None = None
+    state: Literal["ready", "flying", "paused", "ended", "refused"] | None = None
+    words: str = ""
+    kept: str | None = None
