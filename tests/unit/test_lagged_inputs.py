@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flightid.uncertainty.lagged_inputs import LaggedInputs
+from flightid.uncertainty.lagged_products import explained
 from flightid.uncertainty.triangle import ROWS, triangle_of_rows
 from tests.closeness import assert_close
 
@@ -21,6 +22,16 @@ def test_products_are_those_of_the_columns() -> None:
     assert_close(squares, expected, atol=1e-13, why="sums of 300 products")
     expected = heard.T @ columns / size
     assert_close(lagged.products(heard) / size, expected, atol=1e-12, why="sums of 300 products")
+
+
+def test_products_that_lost_their_last_digits_still_explain() -> None:
+    """Three columns that are one, and products off by 1e-9: indefinite, so no Cholesky factor."""
+    column = np.random.default_rng(0).standard_normal(200)
+    products = np.full((3, 3), column @ column)
+    products[0, 1] = products[1, 0] = (1.0 + 1e-9) * products[0, 0]
+    target = 2.0 * column
+    found = explained(products, np.full((3, 1), column @ target))
+    assert_close(found, target @ target, rtol=1e-6, why="all of it is explained")
 
 
 def test_a_triangle_holds_all_rows() -> None:

@@ -96,8 +96,15 @@ def _solved(products: Array, aims: Array) -> Array:
     size = np.where(size > 0.0, size, 1.0)
     scaled = products / np.outer(size, size)
     scaled.flat[:: size.size + 1] += RIDGE
-    factor = scipy.linalg.cho_factor(scaled, overwrite_a=True)
-    return np.asarray(scipy.linalg.cho_solve(factor, aims / size[:, None]) / size[:, None])
+    aims = aims / size[:, None]
+    try:
+        found = scipy.linalg.cho_solve(scipy.linalg.cho_factor(scaled), aims)
+    except np.linalg.LinAlgError:
+        # Differences of products lose what columns that are almost combinations have of their own.
+        value, vector = np.linalg.eigh(scaled)
+        kept = value > RIDGE
+        found = (vector[:, kept] / value[kept]) @ (vector[:, kept].T @ aims)
+    return np.asarray(found / size[:, None])
 
 
 def left_by_past(records: Sequence[Array], weights: Array) -> list[Array]:
