@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -24,6 +24,15 @@ class Reading:
     value: float
     stderr: float | None = None
     interval95: tuple[float, float] | None = None
+    amounts: Mapping[str, float] = field(default_factory=dict)
+    """By how much each other hold would move it, as said beside a light that is not green."""
+
+    def holds_as(self, hold: str) -> bool | None:
+        """Whether the interval, or the same moved by the amount of a hold, holds the truth."""
+        if self.interval95 is None:
+            return None
+        low, high = (end - self.truth for end in self.interval95)
+        return any(low <= -by <= high for by in (0.0, self.amounts.get(hold, 0.0)))
 
     @property
     def holds(self) -> bool | None:
@@ -61,6 +70,9 @@ class Case:
 
     name: str
     fly: Callable[[int], Trial]
+    true_hold: str = ""
+    """Of inputs that were told otherwise: the amount of this hold is to reach the truth, for bars
+    are those of the word where the data do not contradict it."""
 
 
 @dataclass(frozen=True)
@@ -70,10 +82,10 @@ class Tally:
     name: str
     trials: tuple[Trial, ...]
 
-    def coverage(self, quantity: str | None = None) -> tuple[float, int]:
+    def coverage(self, quantity: str | None = None, *, true_hold: str = "") -> tuple[float, int]:
         """Share of intervals that hold the truth, and how many intervals there were."""
         held = [
-            r.holds
+            r.holds_as(true_hold) if true_hold else r.holds
             for t in self.trials
             for r in t.readings
             if r.holds is not None and quantity in (None, r.name)
@@ -152,11 +164,19 @@ def fit_trial(fit: Callable[[], fid.Fit], truth: Mapping[str, float]) -> Trial:
         return Trial(refusal=str(error), seconds=time.perf_counter() - begun)
     seconds = time.perf_counter() - begun
     readings = [
-        Reading(name, value, float(p.value), p.stderr, p.interval95)
+        Reading(name, value, float(p.value), p.stderr, p.interval95, amounts_of(result, name))
         for name, value in truth.items()
         if (p := result.parameters.get(name)) is not None
     ]
     return Trial(tuple(readings), str(result.evidence.light), seconds)
+
+
+def amounts_of(fit: fid.Fit, name: str) -> dict[str, float]:
+    """What a fit says other holds would add to an estimate; nothing where its light is green."""
+    others = fit.provenance.get("other_holds")
+    if str(fit.evidence.light) == "green" or not isinstance(others, Mapping):
+        return {}
+    return {hold: float(each["shift"].get(name, 0.0)) for hold, each in others.items()}
 
 
 def count(case: Case, runs: int, *, first_seed: int = 0, jobs: int = 1) -> Tally:

@@ -155,6 +155,7 @@ CASES = tuple(
             told=told if isinstance(told, bool) else told[shape],
             method=method,
         ),
+        true_hold=TRUE_HOLDS[shape] if name == "told wrong" else "",
     )
     for method in METHODS
     for shape in TRUE_HOLDS

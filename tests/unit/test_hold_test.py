@@ -127,6 +127,26 @@ def test_two_levels_bear_out_steps_unless_the_data_say_lines(told: holds.Hold | 
     assert lights == ["amber", "green"]
 
 
+def test_standing_samples_bear_out_steps_unless_data_that_have_a_say_lean_to_lines(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Lines and steps through the same levels of half a second, both told as steps."""
+    monkeypatch.setattr(holds, "NOISE", 0.1)
+    monkeypatch.setattr(holds, "held", holds.steps)
+    leant: list[list[fid.Finding]] = [[], []]
+    lights = []
+    for seed in range(900, 912):
+        wrong = fid.identify(holds.model(), holds.flight(seed, "straight", told="zero"))
+        lights.append(str(wrong.evidence.light))
+        right = fid.identify(holds.model(), holds.flight(seed, "held", told="zero"))
+        leant[0].extend(_said_on_a_word(wrong))
+        leant[1].extend(_said_on_a_word(right))
+    # Of wrong words 4 were green before, each beside a delay that missed.
+    assert lights.count("green") <= 2
+    assert len(leant[0]) >= 2 > len(leant[1])
+    assert all("jump bear out, but the outputs fit" in each.message for each in leant[0])
+
+
 def _relay(random: np.random.Generator, n: int) -> np.ndarray:
     return 0.05 * np.sign(np.cumprod(np.where(random.random(n) < 0.15, -1.0, 1.0)))
 

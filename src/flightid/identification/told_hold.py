@@ -6,6 +6,7 @@ said as an amount; where neither data nor samples bear it out, the light is not 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from enum import Enum
@@ -28,6 +29,14 @@ MATERIAL = 0.66
 """Standard errors by which bars reach a rival with a fifth more of length; beyond, it is a word."""
 COULD_TELL = 1.0
 """Expected gain of likelihood from which bars of rough samples reach steps that fit better."""
+AUDIBLE, MILD = 0.3, 1.0
+"""Expected gain of likelihood from which data have a say beside samples that stand still and jump,
+and standard deviations of a gain that 1 of 6 right words exceeds: the test there."""
+UNPROVEN = "hold-unproven"
+PROOF = (
+    "prove it: let the same device send steps of several samples or two levels, or sample faster, "
+    "so that the data can tell, or bring the autopilot's log; another declaration proves nothing"
+)
 WHOSE = {
     DECLARED: "as was declared", RECORDED: "as the records say", SEEN: "as their two levels say",
 }  # fmt: skip
@@ -95,8 +104,34 @@ def _judged(
     likely = [each for each in matter if each.is_likely]
     if by_maker or not likely:
         return None, []
+    if held.hold == "zero" and witness_of("zero", rivals) is Witness.SAMPLES:
+        return _on_samples(likely, whose)
     furthest = max(likely, key=lambda each: (each.is_open, each.moved))
     return _on_a_word(furthest, held.hold, rivals, whose)
+
+
+def _on_samples(likely: Sequence[OtherHold], whose: str) -> tuple[Finding | None, list[OtherHold]]:
+    """Steps that samples bear out: they stand unless data that have a say lean elsewhere."""
+    leaning = [each for each in likely if _leans(each)]
+    if not leaning:
+        return None, []
+    best = max(leaning, key=lambda each: each.gain or 0.0)
+    finding = Finding(
+        UNPROVEN,
+        Light.AMBER,
+        f"inputs are {BETWEEN['zero']} between samples {whose}, as samples that stand still and "
+        f"jump bear out, but the outputs fit {BETWEEN[best.hold]} as well or better (log-"
+        f"likelihood {best.gain:+.2g}): were they so, {best.parameter} would be "
+        f"{best.moved:.2g} standard errors away{best.by}",
+        PROOF,
+    )
+    return finding, [best] if best.expected >= COULD_TELL and (best.gain or 0.0) > 0.0 else []
+
+
+def _leans(other: OtherHold) -> bool:
+    """Whether data that have a say would be as good for it by chance in 1 of 6 flights alone."""
+    chance = MILD * math.sqrt(2.0 * other.expected) - other.expected
+    return other.gain is not None and other.expected >= AUDIBLE and other.gain > chance
 
 
 def _on_a_word(
@@ -104,8 +139,6 @@ def _on_a_word(
 ) -> tuple[Finding | None, list[OtherHold]]:
     """What rests on a hold that the data neither bear out nor contradict."""
     witness = witness_of(taken, rivals)
-    if witness is Witness.SAMPLES and taken == "zero":
-        return None, []
     said = (
         f"inputs are {BETWEEN[taken]} between samples {whose}; the data cannot tell: were they "
         f"{BETWEEN[other.hold]}, {other.parameter} would be {other.moved:.2g} standard errors "
@@ -117,11 +150,10 @@ def _on_a_word(
         return Finding(ON_A_WORD, Light.GREEN, f"{said}, which the intervals reach"), [other]
     return (
         Finding(
-            "hold-unproven",
+            UNPROVEN,
             Light.AMBER,
             f"{said}; intervals are those of that word",
-            "see how the input was made: drive it with steps of several samples or two levels, or "
-            "sample it faster, and the data can tell",
+            PROOF,
         ),
         [],
     )
