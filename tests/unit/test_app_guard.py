@@ -10,7 +10,15 @@ import pytest
 
 pytest.importorskip("fastapi", reason="the extra app is not installed")
 
-from flightid.app.guard import DOCUMENT_BYTES, HEADERS, POLICY, UPLOAD_BYTES, Guard, Session
+from flightid.app.guard import (
+    DOCUMENT_BYTES,
+    HEADERS,
+    POLICY,
+    SANDBOXED,
+    UPLOAD_BYTES,
+    Guard,
+    Session,
+)
 
 PORT = 8123
 SESSION = Session(PORT)
@@ -182,6 +190,46 @@ def test_cookies_of_other_pages_lock_nobody_out() -> None:
             assert _asked({"cookie": line})[0] == 200
         assert _asked({"cookie": f"x{COOKIE}; {other}"})[0] == 401
         assert _asked({"cookie": f'a="; {SESSION.cookie}={SESSION.secret}x; "; {other}'})[0] == 401
+
+
+def test_a_document_that_is_handed_over_whole_is_sandboxed_and_nothing_else_is_let_out() -> None:
+    def answered(*given: tuple[bytes, bytes]) -> list[str]:
+        """Policies of an answer whose application sets these headers."""
+        said = Messages()
+
+        async def inner(scope: Any, receive: Any, send: Any) -> None:
+            await send({"type": "http.response.start", "status": 200, "headers": list(given)})
+
+        async def send(message: MutableMapping[str, Any]) -> None:
+            said.append(message)
+
+        head = [(n.encode(), v.encode()) for n, v in OURS.items()]
+        scope = {
+            "type": "http",
+            "method": "GET",
+            "path": "/x",
+            "query_string": b"",
+            "headers": head,
+        }
+        asyncio.run(Guard(inner, SESSION)(scope, _nothing, send))
+        names = [n for n, _ in said[0]["headers"]]
+        assert all(names.count(each.encode()) == 1 for each in HEADERS)
+        return [v.decode() for n, v in said[0]["headers"] if n == b"content-security-policy"]
+
+    policy = b"content-security-policy"
+    assert answered() == [POLICY]
+    assert answered((policy, SANDBOXED.encode())) == [SANDBOXED]
+    for loose in (b"script-src *", SANDBOXED.encode() + b" ", b"", b"sandbox allow-scripts"):
+        assert answered((policy, loose)) == [POLICY]
+        assert answered((policy, SANDBOXED.encode()), (policy, loose)) == [SANDBOXED]
+    parts = [part.split() for part in SANDBOXED.split(";")]
+    assert ["sandbox"] in parts  # without a word behind it: no script, no form, no origin of ours
+    assert ["default-src", "'none'"] in parts
+    assert not any(part[0].startswith(("script-src", "connect-src")) for part in parts)
+
+
+async def _nothing() -> MutableMapping[str, Any]:
+    return {"type": "http.request", "body": b"", "more_body": False}
 
 
 def test_a_second_host_is_refused() -> None:

@@ -80,8 +80,8 @@ def test_what_is_written_is_read_back(tmp_path: Path) -> None:
     assert np.all(np.diff(made.time_s) > 0.0)
     read = Pyramid.read(made.write(tmp_path / "channel.npy"))
     for mine, theirs in zip(
-        (made.time_s, made.values, made.broken, *made.levels),
-        (read.time_s, read.values, read.broken, *read.levels),
+        (made.time_s, made.values, made.breaks, *made.levels),
+        (read.time_s, read.values, read.breaks, *read.levels),
         strict=True,
     ):
         np.testing.assert_array_equal(mine, theirs)

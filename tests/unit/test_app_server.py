@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import http.client
 import json
+import re
 import shutil
 import threading
 import time
@@ -12,6 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import numpy as np
 import pytest
@@ -23,13 +25,16 @@ from websockets.sync.client import connect
 
 from flightid import FrequencyResponse, run_study
 from flightid.app import work
-from flightid.app.guard import POLICY, Session
+from flightid.app.guard import POLICY, SANDBOXED, Session
 from flightid.app.jobs import Workers
 from flightid.app.schemas import Job
+from flightid.app.server import make_server
 from flightid.app.serving import bound_socket, server_of
 from flightid.app.study_edits import KeyEdit, edited
 from flightid.app.workspace import Workspace
 from flightid.errors import OptionError
+from flightid.vehicles import fly
+from flightid.vehicles.ardupilot_log import write_ardupilot_log
 from tests.sweep_log import SweepFlight
 
 Answer = tuple[int, Any, dict[str, str]]
@@ -175,6 +180,91 @@ def test_requests_that_a_stranger_makes_on_the_wire(browser: Browser, flown: Flo
     with pytest.raises(OptionError, match="the port cannot be taken"):
         bound_socket(bound.getsockname()[1])
     bound.close()
+
+
+def test_every_route_is_behind_the_guard(browser: Browser) -> None:
+    """Whatever a module of routes adds is refused to strangers before it is asked."""
+    app = make_server(browser.workspace, {})
+    asked = [
+        (method, re.sub(r"{[^}]+}", "x", route.path))
+        for route in app.routes
+        for method in sorted(getattr(route, "methods", None) or ())
+        if route.path not in ("/", "/{name:path}")
+    ]
+    new = {("POST", "/api/comparisons"), ("POST", "/api/plans"), ("GET", "/api/plans/x/card")}
+    assert new | {("GET", "/api/studies/x/gains")} < set(asked)
+    tries = {
+        403: [{"Origin": "http://127.0.0.1:1"}, {"Sec_Fetch_Site": "cross-site"}],
+        421: [{"Host": "evil.example"}],
+        401: [{"Cookie": ""}],
+    }
+    for method, path in asked:
+        body = {} if method in ("POST", "PATCH") else b"x" if method == "PUT" else None
+        for status, heads in tries.items():
+            assert {browser.ask(path, method, body, **head)[0] for head in heads} == {status}, path
+        if body is not None:  # a form of a foreign page could send this
+            kind = {"Content_Type": "text/plain"}
+            assert browser.ask(path, method, body, **kind)[0] == 415, path
+
+
+def test_gains_comparisons_and_plans_refuse_what_is_not_there(
+    browser: Browser, flown: Flown
+) -> None:
+    status, told, _ = browser.ask(f"/api/studies/{flown.log}/gains")
+    assert (status, list(told)) == (422, ["detail"])  # this vehicle logs no gains: nothing to fly
+    assert browser.ask(f"/api/studies/{'0' * 16}/gains")[0] == 404
+    here: dict[str, Any] = {"log": flown.log, "span_s": None, "promised": False}
+    for before, after, status in (
+        ({**here, "log": "none"}, here, 404),
+        (here, {**here, "log": "../x"}, 404),
+        (here, {"span_s": [0, 1]}, 422),
+        ({**here, "span_s": [40.0, 30.0]}, {**here, "span_s": [30.0, 40.0]}, 422),
+    ):
+        asked = {"before": before, "after": after}
+        assert browser.ask("/api/comparisons", "POST", asked)[0] == status, asked
+    for wishes, status in (({"amplitude": "x"}, 422), ({"axes": ["sideways"]}, 422)):
+        assert browser.ask("/api/plans", "POST", {"log": flown.log, "wishes": wishes})[0] == status
+    assert browser.ask("/api/plans", "POST", {"log": "none", "wishes": {}})[0] == 404
+    for wishes in ("{", "[]", '{"amplitude": "x"}', "9" * 3000):
+        place = f"/api/plans/{flown.log}/card?wishes={quote(wishes)}"
+        status, _, headers = browser.ask(place)
+        assert (status, headers["content-security-policy"]) == (422, POLICY)
+
+
+def test_a_card_is_sandboxed_and_a_plan_follows_what_is_typed(
+    browser: Browser, tmp_path: Path
+) -> None:
+    flight = write_ardupilot_log(fly(duration_s=20.0), tmp_path / "a.bin").read_bytes()
+    name = quote("<img src=x onerror=alert(1)>.bin")
+    log = browser.ask(f"/api/logs?name={name}", "PUT", flight)[1]["id"]
+    wishes = {"amplitude": 0.05, "axes": ["roll"]}
+    status, plan, headers = browser.ask("/api/plans", "POST", {"log": log, "wishes": wishes})
+    assert (status, headers["content-security-policy"]) == (200, POLICY), plan
+    ((axis, amplitude),) = [(row["axis"], row["amplitude"]) for row in plan["rows"]]
+    assert (axis, amplitude) == ("roll", pytest.approx(0.05, rel=1e-6))
+    assert bool(plan["files"]) is not bool(plan["refusal"])
+    place = f"/api/plans/{log}/card?wishes={quote(json.dumps(wishes))}"
+    status, page, headers = browser.ask(place)
+    assert (status, headers["content-security-policy"]) == (200, SANDBOXED)
+    assert headers["content-type"].startswith("text/html")
+    assert headers["x-content-type-options"] == "nosniff"
+    assert not re.search(rb"<script|<img src=x|\son\w+=", page.lower())
+    assert b"0.05 of full" in page
+
+
+def test_a_tuning_holds_up_neither_a_comparison_nor_a_plan(tmp_path: Path) -> None:
+    async def asked() -> list[str]:
+        workers, done = Workers(Workspace(tmp_path)), []
+        calls = (workers.tuned, workers.compared, workers.planned, workers.live)
+        slow = [each(time.sleep, 8.0 if each == workers.tuned else 0.0) for each in calls]
+        names = {asyncio.ensure_future(c): f.__name__ for f, c in zip(calls, slow, strict=True)}
+        for name in asyncio.as_completed(names):
+            await name
+            done.append(next(n for task, n in names.items() if task.done() and n not in done))
+        workers.stop()
+        return done
+
+    assert asyncio.run(asked())[-1] == "tuned"
 
 
 def test_any_field_is_drawn_at_any_zoom(browser: Browser, flown: Flown) -> None:

@@ -254,6 +254,7 @@ export interface GainsQuestion {
   edits: Edit[];
   axis: string;
   values: Record<string, number>;
+  responses: boolean;
 }
 
 /** Long work: its state, and where it can be asked for again. */

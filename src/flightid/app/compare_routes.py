@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import asyncio
 from typing import Annotated
 
 from fastapi import FastAPI, HTTPException, Query, Response
 from pydantic import ValidationError
 
-from flightid.app import compare_work
+from flightid.app import compare_work, gain_work
 from flightid.app.backstage import Backstage, LogName, known_log, made
 from flightid.app.compare_schemas import (
     CompareRequest,
@@ -35,13 +36,22 @@ def add_compare_routes(app: FastAPI, backstage: Backstage) -> None:
             text = text_of(study)
         sides = (asked.before, asked.after)
         inputs = (compare_work.make_comparison, before, after, sides, study, text)
-        return ComparisonPart(**await made(workers.tuned(*inputs)))
+        if not asked.before.promised:
+            return ComparisonPart(**await made(workers.compared(*inputs)))
+        # Which step flew rests on the study's gains; a study without any may still promise.
+        told, (files, refusal, _) = await asyncio.gather(
+            made(workers.compared(*inputs)),
+            workers.tuned(gain_work.make_files, study, text),
+        )
+        if not refusal:
+            told = await made(workers.compared(*inputs, files))
+        return ComparisonPart(**told)
 
     @app.post("/api/plans")
     async def plan(asked: PlanRequest) -> PlanPart:
         log = known_log(workspace, asked.log)
         return PlanPart(
-            **await made(workers.tuned(compare_work.make_plan, log, asked.wishes.given()))
+            **await made(workers.planned(compare_work.make_plan, log, asked.wishes.given()))
         )
 
     @app.get("/api/plans/{log}/card", response_class=Response)
@@ -51,7 +61,7 @@ def add_compare_routes(app: FastAPI, backstage: Backstage) -> None:
             given = PlanWishes.model_validate_json(wishes).given()
         except ValidationError as error:
             raise HTTPException(422, "The wishes are none that a plan knows.") from error
-        page = await made(workers.tuned(compare_work.make_card, path, given))
+        page = await made(workers.planned(compare_work.make_card, path, given))
         return Response(
             page, media_type="text/html", headers={"content-security-policy": SANDBOXED}
         )

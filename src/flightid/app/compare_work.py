@@ -5,12 +5,11 @@ from __future__ import annotations
 import json
 import math
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from flightid.app import gain_work
 from flightid.app.compare_schemas import (
     ChangeRow,
     ComparedSide,
@@ -24,7 +23,6 @@ from flightid.app.gain_work import shown_finding
 from flightid.app.overview import light_of, step_curve
 from flightid.app.own_folders import draft_of
 from flightid.app.work import KEPT, kept_log
-from flightid.errors import FlightidError
 from flightid.files import sha256_of_file
 from flightid.findings import worst
 from flightid.planning.plan import plan_flight
@@ -40,34 +38,35 @@ from flightid.uncertainty.estimate import Reading
 
 
 def make_comparison(
-    before: Path, after: Path, sides: tuple[ComparedSide, ComparedSide], study: Path, text: str
+    before: Path,
+    after: Path,
+    sides: tuple[ComparedSide, ComparedSide],
+    study: Path,
+    text: str,
+    files: Sequence[Mapping[str, str]] = (),
 ) -> Mapping[str, Any]:
-    """A promise of a study and a flight, or two flights or parts of flights."""
+    """A promise of a study and a flight, or two flights or parts of flights.
+
+    `files` are those of the study's tuning, one of which may have flown.
+    """
     if not sides[0].promised:
         both = (_reviewed(before, sides[0]), _reviewed(after, sides[1]))
         return _part(compare_flights(*both), None).model_dump()
-    with draft_of(study, text) as draft:
-        fits = preview_fits(draft, cache=KEPT)
-    log = kept_log(after)
-    made = compare_with_promise(fits, log)
+    key = f"promise of {sha256_of_file(after)} {study} {text}"
+    if key not in KEPT:
+        with draft_of(study, text) as draft:
+            fits = preview_fits(draft, cache=KEPT)
+        KEPT[key] = compare_with_promise(fits, kept_log(after))
+    made: FlightComparison = KEPT[key]
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        _written(study, text, folder)
-        step = flown_step([folder], log.parameters)
+        for each in files:
+            (folder / each["name"]).write_text(each["text"], encoding="utf-8")
+        step = flown_step([folder], kept_log(after).parameters)
         if step is not None:
             plain = FlownStep(Path(step.flown.name), _named(step.following), _named(step.back))
             made = replace(made, findings=(*made.findings, plain.finding(kept=made.kept)))
         return _part(made, step).model_dump()
-
-
-def _written(study: Path, text: str, folder: Path) -> None:
-    """The gains of the study, where it has any that may be flown."""
-    try:
-        files = gain_work.make_files(study, text)
-    except FlightidError:
-        return
-    for each in files:
-        (folder / each["name"]).write_text(each["text"], encoding="utf-8")
 
 
 def _named(path: Path | None) -> Path | None:

@@ -26,7 +26,13 @@ async def answer_gains(question: Question, backstage: Backstage) -> GainsAnswer:
     edits = [KeyEdit(tuple(each.path), each.value) for each in question.edits]
     if question.axis:
         values, refusal, seconds = await backstage.workers.tuned(
-            gain_work.move_axis, path, text, edits, question.axis, question.values
+            gain_work.move_axis,
+            path,
+            text,
+            edits,
+            question.axis,
+            question.values,
+            question.responses,
         )
         told = None if refusal else AxisGains(**values)
         return GainsAnswer(

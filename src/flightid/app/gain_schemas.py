@@ -113,6 +113,8 @@ class GainsQuestion(Question):
     kind: Literal["gains"] = "gains"
     axis: str = ""
     values: dict[str, float] = Field(default_factory=dict, max_length=16)
+    responses: bool = True
+    """Also time responses, which a hand that moves a slider does not wait for."""
 
 
 class GainsAnswer(Reply):

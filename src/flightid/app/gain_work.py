@@ -72,7 +72,12 @@ def make_gains(study: Path, text: str, edits: Sequence[KeyEdit]) -> Mapping[str,
 
 
 def move_axis(
-    study: Path, text: str, edits: Sequence[KeyEdit], axis: str, values: Mapping[str, float]
+    study: Path,
+    text: str,
+    edits: Sequence[KeyEdit],
+    axis: str,
+    values: Mapping[str, float],
+    responses: bool = True,
 ) -> Mapping[str, Any]:
     """One axis with other gains, judged by the plants that are kept."""
     whole = edited(text, edits) if edits else text
@@ -81,7 +86,8 @@ def move_axis(
     KEPT[key] = tuning
     for design in tuning.designs:
         if design.axis == axis:
-            return _axis(design, move_gains(design, values), {}, values).model_dump()
+            moved = move_gains(design, values, responses=responses)
+            return _axis(design, moved, {}, values).model_dump()
     raise UnknownNameError(
         "no gains of this axis", found=axis, needed=", ".join(d.axis for d in tuning.designs)
     )

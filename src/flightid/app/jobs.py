@@ -1,7 +1,7 @@
 """Long work in processes beside the server: started once, cancelled for good, found again.
 
-Three pools. One process keeps logs open for what a hand waits for, one plants of tunings; others
-take what lasts seconds.
+A pool for each that may not hold up another. One process keeps logs open for what a hand waits
+for, one plants of tunings, one what is compared, one what is planned; others take jobs of seconds.
 What is running stands in a file, so that a killed server offers it again.
 """
 
@@ -77,6 +77,8 @@ class Workers:
         made: dict[str, Any] = {"context": context, "initializer": work.limit_memory}
         self._live = ProcessPool(max_workers=1, **made)
         self._tuning = ProcessPool(max_workers=1, **made)
+        self._compared = ProcessPool(max_workers=1, **made)
+        self._planned = ProcessPool(max_workers=1, **made)
         self._long = ProcessPool(max_workers=max(1, (os.cpu_count() or 2) - 1), **made)
         self._folder = own_folder(workspace.folder, ".flightid", "jobs")
         for job in _interrupted(self._folder):
@@ -90,9 +92,10 @@ class Workers:
 
     def stop(self) -> None:
         """End all processes."""
-        for pool in (self._live, self._tuning, self._long):
+        pools = (self._live, self._tuning, self._compared, self._planned, self._long)
+        for pool in pools:
             pool.stop()
-        for pool in (self._live, self._tuning, self._long):
+        for pool in pools:
             pool.join()
 
     def listen(self, listener: Listener) -> Callable[[], None]:
@@ -151,6 +154,14 @@ class Workers:
     async def tuned(self, call: Callable[..., Any], *inputs: object) -> tuple[Any, str, float]:
         """The same in the process that keeps plants of tunings, where seconds hold up no drag."""
         return await _awaited(self._tuning, LONGEST_S, call, *inputs)
+
+    async def compared(self, call: Callable[..., Any], *inputs: object) -> tuple[Any, str, float]:
+        """The same for comparisons: no tuning holds them up."""
+        return await _awaited(self._compared, LONGEST_S, call, *inputs)
+
+    async def planned(self, call: Callable[..., Any], *inputs: object) -> tuple[Any, str, float]:
+        """The same for plans."""
+        return await _awaited(self._planned, LONGEST_S, call, *inputs)
 
     def _soon(self, call: Callable[..., None], *inputs: object) -> None:
         if self._loop is not None and not self._loop.is_closed():

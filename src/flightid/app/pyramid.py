@@ -18,6 +18,7 @@ from flightid.files import write_atomically
 
 Array = NDArray[np.float64]
 BASE, FACTOR = 64, 8
+FORMAT = 2
 FINE = 4
 """A block is at most this part of a column, so that no sample is drawn a column away."""
 GAP_FACTOR = 8.0
@@ -36,15 +37,15 @@ class Pyramid:
     ----------
     time_s, values : ndarray, shape (n,)
         Stamps, increasing, s; values, NaN where missing.
-    broken : ndarray of bool, shape (n,)
-        Whether the line ends behind a sample: it is missing, or a gap follows.
+    breaks : ndarray of int, shape (n_breaks,)
+        Samples behind which the line ends, increasing: one is missing, or a gap follows.
     levels : tuple of ndarray, shape (3, n_blocks)
         Least value, largest value, and whether the line is broken, by block of each level.
     """
 
     time_s: Array
     values: Array
-    broken: NDArray[np.bool_]
+    breaks: NDArray[np.int64]
     levels: tuple[Array, ...]
 
     @classmethod
@@ -60,49 +61,78 @@ class Pyramid:
         >>> [level.shape[1] for level in made.levels]
         [16, 2]
         """
+        time_s, values = np.asarray(time_s, np.float64), np.asarray(values, np.float64)
         stamped = np.isfinite(time_s)
-        time_s, values = time_s[stamped], np.asarray(values, np.float64)[stamped]
-        if np.any(np.diff(time_s) < 0.0):
+        if not stamped.all():
+            time_s, values = time_s[stamped], values[stamped]
+        steps = np.diff(time_s)
+        if steps.size and steps.min() < 0.0:
             order = np.argsort(time_s, kind="stable")
             time_s, values = time_s[order], values[order]
-        values = np.where(np.isfinite(values), values, np.nan)
-        steps = np.diff(time_s)
+            steps = np.diff(time_s)
+        known = np.isfinite(values)
+        broken = ~known
+        if broken.any():
+            values = np.where(known, values, np.nan)
         usual = float(np.median(steps[:: 1 + steps.size // SAMPLED])) if steps.size else 0.0
-        broken = np.isnan(values)
-        broken[:-1] |= steps > GAP_FACTOR * usual if usual > 0.0 else False
+        if usual > 0.0:
+            broken[:-1] |= steps > GAP_FACTOR * usual
+        breaks = np.flatnonzero(broken)
         levels: list[Array] = []
-        rows: tuple[Array, Array, Array] = (values, values, broken.astype(np.float64))
-        while rows[0].size > FACTOR:
+        low, high, size = values, values, BASE
+        while low.size > FACTOR:
             factor = FACTOR if levels else BASE
-            low, high, ends = rows
-            rows = (
-                _blocks(low, factor, np.minimum, np.fmin),
-                _blocks(high, factor, np.maximum, np.fmax),
-                _blocks(ends, factor, np.maximum, np.fmax),
-            )
-            levels.append(np.stack(rows))
-        return cls(time_s, values, broken, tuple(levels))
+            low = _blocks(low, factor, np.minimum, np.fmin)
+            high = _blocks(high, factor, np.maximum, np.fmax)
+            ends = np.zeros(low.size)
+            ends[breaks // size] = 1.0
+            levels.append(np.stack([low, high, ends]))
+            size *= FACTOR
+        return cls(time_s, values, breaks, tuple(levels))
 
     def write(self, path: Path) -> Path:
         """Write the channel and its levels as one array of doubles, row after row."""
-        rows = [self.time_s, self.values, self.broken, *self.levels]
-        shapes = [len(rows), *(int(row.shape[-1]) for row in rows)]
-        flat = np.concatenate([np.asarray(row, np.float64).ravel() for row in (shapes, *rows)])
-        return write_atomically(path, lambda file: np.save(file, flat))
+        rows = [self.time_s, self.values, self.breaks.astype(np.float64), *self.levels]
+        sizes = np.array([FORMAT, len(rows), *(row.shape[-1] for row in rows)], np.float64)
+        count = sizes.size + sum(row.size for row in rows)
+        head = {"descr": "<f8", "fortran_order": False, "shape": (count,)}
+
+        def put(temporary: Path) -> None:
+            with temporary.open("wb") as file:
+                np.lib.format.write_array_header_1_0(file, head)
+                for row in (sizes, *rows):
+                    file.write(np.ascontiguousarray(row, "<f8").data)
+
+        return write_atomically(path, put)
 
     @classmethod
     def read(cls, path: Path) -> Pyramid:
-        """Open what was written; parts are read from the disk as they are looked at."""
+        """Open what was written; parts are read from the disk as they are looked at.
+
+        Raises
+        ------
+        ValueError
+            It was written by another version, or not whole.
+        """
         flat = np.load(path, mmap_mode="r", allow_pickle=False)
-        count = int(flat[0])
-        sizes = [int(size) for size in flat[1 : 1 + count]]
-        place, rows = 1 + count, []
+        if flat[0] != FORMAT:
+            raise ValueError(f"not a channel of this format: {path.name}")
+        count = int(flat[1])
+        sizes = [int(size) for size in flat[2 : 2 + count]]
+        place, rows = 2 + count, []
         for number, size in enumerate(sizes):
             height = 1 if number < 3 else 3
             row = flat[place : place + height * size]
             rows.append(row if height == 1 else row.reshape(3, size))
             place += height * size
-        return cls(rows[0], rows[1], rows[2] > 0.5, tuple(rows[3:]))
+        return cls(rows[0], rows[1], rows[2].astype(np.int64), tuple(rows[3:]))
+
+    def broken_in(self, start: int, stop: int) -> NDArray[np.bool_]:
+        """Whether the line ends behind each of some samples, shape (stop − start,)."""
+        first, last = np.searchsorted(self.breaks, (start, stop))
+        broken = np.zeros(stop - start, np.bool_)
+        broken[self.breaks[first:last] - start] = True
+        return broken
 
     def samples_in(self, start_s: float, stop_s: float) -> tuple[int, int]:
         """First sample of a span, and the one behind its last; a neighbour on each side too."""
@@ -126,9 +156,9 @@ class Pyramid:
             if BASE * FACTOR**number * FINE <= mean:
                 size, level = BASE * FACTOR**number, each
         if level is None:
-            cut = slice(int(index[0]), int(index[-1]))
-            values = self.values[cut]
-            level = np.stack([values, values, self.broken[cut]]).astype(np.float64)
+            start, stop = int(index[0]), int(index[-1])
+            values = self.values[start:stop]
+            level = np.stack([values, values, self.broken_in(start, stop).astype(np.float64)])
             index = index - index[0]
         blocks = np.minimum(-(-index // size), level.shape[1])
         return _reduced(level, blocks)
@@ -208,7 +238,7 @@ def _exact(pyramids: Sequence[Pyramid], ranges: Sequence[tuple[int, int]]) -> Ar
     parts = []
     for each, (start, stop) in zip(pyramids, ranges, strict=True):
         time_s, values = np.array(each.time_s[start:stop]), np.array(each.values[start:stop])
-        ends = np.flatnonzero(each.broken[start:stop][:-1] & ~np.isnan(values[:-1]))
+        ends = np.flatnonzero(each.broken_in(start, stop)[:-1] & ~np.isnan(values[:-1]))
         middles = 0.5 * (time_s[ends] + time_s[ends + 1])
         time_s = np.insert(time_s, ends + 1, middles)
         parts.append((time_s, np.insert(values, ends + 1, np.nan)))

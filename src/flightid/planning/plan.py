@@ -20,7 +20,6 @@ from flightid.inspection.advice import LOG_BITS, set_bits
 from flightid.inspection.advice import logging as logging_of
 from flightid.inspection.flight_phases import flight_phases
 from flightid.logs import Log, read_log
-from flightid.planning.axis_guess import guess_axis
 from flightid.planning.flight_findings import flight_findings
 from flightid.planning.flight_time import flight_time
 from flightid.planning.flown_axis import FlownAxis
@@ -29,6 +28,7 @@ from flightid.planning.options import PlanOptions
 from flightid.planning.procedures import PROCEDURES, Procedure, procedure_of
 from flightid.planning.result import AxisSweep, SweepPlan
 from flightid.planning.settings import SID_AXES, log_family, settings_of, unsized_s
+from flightid.planning.told_axes import told_axis
 from flightid.review.loops import loop_rate_hz as logged_loop_rate_hz
 
 USUAL_LOOP_HZ = 400.0
@@ -146,7 +146,7 @@ def plan_flight(
         if procedure.how in ("mode", "stick"):
             loop = _loop(procedure, axis, opened, rate_hz)
             enters = procedure.entry(axis)
-            guess = guess_axis(axis, loop, procedure.kind, enters, opened, spans)
+            guess = told_axis(axis, loop, procedure.kind, enters, opened, spans)
             swept = replace(guess.vehicle, loop=_while_swept(procedure, loop))
             guess = replace(guess, vehicle=swept)
             made = _sweep(procedure, axis, swept, asked)

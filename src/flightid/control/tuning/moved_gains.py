@@ -48,7 +48,9 @@ class MovedGains:
     loops: Mapping[str, Complex]
 
 
-def move_gains(design: PidDesign, values: Mapping[str, float]) -> MovedGains:
+def move_gains(
+    design: PidDesign, values: Mapping[str, float], *, responses: bool = True
+) -> MovedGains:
     """Judge other gains by the plants of a design, the loops of the other axes as they stand.
 
     Parameters
@@ -57,6 +59,8 @@ def move_gains(design: PidDesign, values: Mapping[str, float]) -> MovedGains:
         Of an autopilot's axis.
     values : mapping of str to float
         By the autopilot's names; those that are not named are those of the design.
+    responses : bool
+        Also time responses, which take longer than all margins.
 
     Raises
     ------
@@ -106,7 +110,7 @@ def move_gains(design: PidDesign, values: Mapping[str, float]) -> MovedGains:
         beside,
         met,
         short,
-        _bands(design, loop) if bool(judged.stable[0, 0]) else (),
+        _bands(design, loop) if responses and bool(judged.stable[0, 0]) else (),
         problem.plants.omega_rad_s,
         curves,
     )
