@@ -148,7 +148,7 @@ def test_a_tls_scheduler_takes_logs_of_whoever_has_a_certificate_alone(tmp_path:
         assert address.startswith("tls://127.0.0.1:")
         (tmp_path / "fleet").mkdir()
         fleet = fleet_of(tmp_path / "fleet", 4)
-        with pytest.raises(OptionError, match=r"certificate|tls|no scheduler answers"):
+        with pytest.raises(OptionError, match="no certificate for the scheduler"):
             run_fleet(fleet, scheduler=address)
         with config.set(told):
             done = run_fleet(fleet, scheduler=address)

@@ -21,6 +21,7 @@ from flightid.fleet.opening import current_store
 from flightid.fleet.settings import read_fleet
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
 from flightid.fleet.statistics.population import estimate_population
+from flightid.identification.frequency_domain.model_curves import curves_of
 from flightid.identification.model_error import ModelErrorBound
 from flightid.models.estimated import EstimateProvenance
 from flightid.models.load import load_model
@@ -68,6 +69,13 @@ def record(number: int, row: np.ndarray, type_name: str, light: str = "green") -
         for i, name in enumerate(NAMES)
     ]
     lower = lower_triangle(np.diag(ERRORS**2).tolist())
+    (points,) = curves_of(model, [omega])
+    rows["responses"] = [
+        of_model
+        | {"output": "p", "input": "tau_phi", "unit": "rad/s", "omega_rad_s": omega.tolist()}
+        | {"real": points.real.tolist(), "imag": points.imag.tolist()}
+        | {"random_error": np.full(9, 0.02).tolist()}
+    ]
     rows["covariances"] = [of_model | {"names": list(NAMES), "lower": lower}]
     return LogRecord(log, rows)
 
@@ -105,6 +113,16 @@ def test_the_pooled_model_is_that_of_the_estimates(tmp_path: Path) -> None:
     assert found.estimated.bands == {"p/tau_phi": (pytest.approx(1.25), 90.0)}
     assert found.estimated.provenance["flights"] == VEHICLES * FLIGHTS
     assert max(found.estimated.model_errors["p/tau_phi"]["bound"]) == pytest.approx(0.05)
+
+
+def test_a_joint_fit_takes_the_points_of_the_catalogue(tmp_path: Path) -> None:
+    """Points without noise lie on the fits: what is estimated is the mean of these."""
+    fleet = fleet_of(tmp_path, "quad")
+    joint, apart = (type_models(fleet, joint=each)["Roll"] for each in (True, False))
+    for name in NAMES:
+        assert joint.parameters[name].value == pytest.approx(apart.parameters[name].value, rel=0.05)
+        assert joint.parameters[name].value != apart.parameters[name].value
+    assert joint.estimated.bands == apart.estimated.bands
 
 
 def test_tune_takes_a_fleet_file_and_the_folder_of_its_catalogue(tmp_path: Path) -> None:

@@ -65,6 +65,11 @@ def _fields() -> dict[str, type[Options]]:
     "type_name",
     help="Of a fleet: vehicle type whose models are pooled; default: the only one.",
 )
+@click.option(
+    "--joint-fit",
+    is_flag=True,
+    help="Of a fleet: fit the responses of all flights together, in place of pooling their fits.",
+)
 @click.option("--overwrite", is_flag=True, help="Replace parameter files that exist.")
 @click.option("--all", "whole", is_flag=True, help="Print every table, not one screen of them.")
 @level_option
@@ -75,6 +80,7 @@ def command(
     output: Path | None,
     target: Path | None,
     type_name: str | None,
+    joint_fit: bool,
     overwrite: bool,
     whole: bool,
     level: float | None,
@@ -106,12 +112,14 @@ def command(
     study = None
     *parts, data = parted(options, _fields())
     asked = {name: each for part in parts for name, each in part.items()}
-    fleet = _fleet(files, type_name)
+    fleet = _fleet(
+        files, "--type" if type_name is not None else "--joint-fit" if joint_fit else None
+    )
     if fleet is not None or _holds_models(files):
         for name in data:
             raise click.UsageError(f"--{name} belongs to a log or records")
         settings = TuneSettings().changed(asked)
-        tuning, refused = _of_models(files, log, settings, fleet, type_name), []
+        tuning, refused = _of_models(files, log, settings, fleet, type_name, joint_fit), []
     else:
         from flightid.study import run_study
 
@@ -208,15 +216,15 @@ def _show(tuning: Tuning, level: float | None) -> None:
         click.echo(f"\n{tuning.closed_table()}")
 
 
-def _fleet(files: tuple[Path, ...], type_name: str | None) -> Path | None:
+def _fleet(files: tuple[Path, ...], given: str | None) -> Path | None:
     """The fleet file or catalogue that is given; None where none is."""
     from flightid.fleet.type_models import is_fleet
 
     found = [file for file in files if is_fleet(file)]
     if found and len(files) > 1:
         raise click.UsageError(f"{found[0]} is a fleet: it is tuned alone")
-    if not found and type_name is not None:
-        raise click.UsageError("--type belongs to a fleet: its file, or the folder of a catalogue")
+    if not found and given is not None:
+        raise click.UsageError(f"{given} belongs to a fleet: its file, or a catalogue's folder")
     return found[0] if found else None
 
 
@@ -226,6 +234,7 @@ def _of_models(
     settings: TuneSettings,
     fleet: Path | None,
     type_name: str | None,
+    joint_fit: bool,
 ) -> Tuning | None:
     from flightid import read_log
     from flightid.models.saved_files import models_of
@@ -244,7 +253,7 @@ def _of_models(
         return tune_files(found, flown, settings)
     from flightid.fleet import type_models
 
-    models = type_models(fleet, type_name=type_name)
+    models = type_models(fleet, type_name=type_name, joint=joint_fit)
     for name, model in models.items():
         pooled = model.estimated.provenance
         note(f"{name}: {pooled['flights']} flights of {pooled['vehicles']} vehicles, pooled")

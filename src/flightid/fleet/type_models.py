@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from flightid.errors import DataError, FlightidError
 from flightid.fleet.opening import CURRENT, open_catalogue
 from flightid.fleet.statistics.answers import RED, TypeAnswers, answer_questions
+from flightid.fleet.statistics.joint_fit import FlightPoints, MeasuredPoints, fit_population
 from flightid.fleet.statistics.pooling import pooled_model
 from flightid.models.kinds import model_from_description
 from flightid.reading import parse_toml, read_toml
@@ -17,7 +20,8 @@ from flightid.reading import parse_toml, read_toml
 if TYPE_CHECKING:
     from flightid.fleet.catalogue.catalogue import Catalogue
 
-POOLED = ("parameters", "covariances", "models")
+Row = Mapping[str, Any]
+POOLED = ("parameters", "covariances", "models", "responses")
 
 
 def is_fleet(path: Path) -> bool:
@@ -30,7 +34,9 @@ def is_fleet(path: Path) -> bool:
         return False
 
 
-def type_models(place: str | Path, *, type_name: str | None = None) -> dict[str, Any]:
+def type_models(
+    place: str | Path, *, type_name: str | None = None, joint: bool = False
+) -> dict[str, Any]:
     """Pool the models of a type over its vehicles, straight from a catalogue.
 
     Every model of the study becomes one whose covariance is that of the next vehicle, with the
@@ -43,6 +49,10 @@ def type_models(place: str | Path, *, type_name: str | None = None) -> dict[str,
         Fleet file, or folder or address of a catalogue.
     type_name : str, optional
         Which type; default: the only one.
+    joint : bool
+        Whether the measured responses of all flights are fitted together (`fit_population`), in
+        place of pooling the estimates of their fits: flights that tell little by themselves count
+        with what they tell.
 
     Returns
     -------
@@ -63,7 +73,8 @@ def type_models(place: str | Path, *, type_name: str | None = None) -> dict[str,
 
     Reference
     ---------
-    Those of `flightid.fleet.statistics.pooling.pooled_model`.
+    Those of `flightid.fleet.statistics.pooling.pooled_model` and
+    `flightid.fleet.statistics.joint_fit.fit_population`.
 
     Example
     -------
@@ -74,14 +85,15 @@ def type_models(place: str | Path, *, type_name: str | None = None) -> dict[str,
     """
     with open_catalogue(place) as catalogue:
         chosen = _chosen(catalogue, type_name).replace("'", "''")
-        rows: dict[str, list[Mapping[str, Any]]] = {"logs": [], "covariates": []}
+        rows: dict[str, list[Row]] = {"logs": [], "covariates": []}
         for name in POOLED:
             told = catalogue.query(
                 f"SELECT * FROM {name} WHERE type = '{chosen}' AND light <> '{RED}'"
             )
             rows[name] = [dict(zip(told.columns, row, strict=True)) for row in told.fetchall()]
     answers = answer_questions(rows, drift=False, outliers=False)
-    return {each.model: _pooled(each, rows["models"]) for each in answers.types}
+    points = rows["responses"] if joint else None
+    return {each.model: _pooled(each, rows["models"], points) for each in answers.types}
 
 
 def _chosen(catalogue: Catalogue, type_name: str | None) -> str:
@@ -101,18 +113,18 @@ def _chosen(catalogue: Catalogue, type_name: str | None) -> str:
     )
 
 
-def _pooled(answers: TypeAnswers, rows: list[Mapping[str, Any]]) -> Any:  # noqa: ANN401 — any kind of model
+def _pooled(answers: TypeAnswers, rows: Sequence[Row], points: Sequence[Row] | None) -> Any:  # noqa: ANN401 — any kind of model
     """One model of a type, from the files of the flights that count."""
     name = f"{answers.model} of type {answers.type_name}"
     if answers.population is None:
         raise DataError("a type cannot be pooled", found=f"{name}: {'; '.join(answers.reasons)}")
     flights = set(answers.data.flights)
-    members: list[Any] = [
-        model_from_description(parse_toml(row["file"], "a model file", name))
+    members: dict[str, Any] = {
+        row["log"]: model_from_description(parse_toml(row["file"], "a model file", name))
         for row in rows
         if row["model"] == answers.model and row["log"] in flights
-    ]
-    shapes = {_shape(each) for each in members}
+    }
+    shapes = {_shape(each) for each in members.values()}
     if len(shapes) != 1:
         raise DataError(
             "flights of a type were fitted with different structures",
@@ -120,7 +132,37 @@ def _pooled(answers: TypeAnswers, rows: list[Mapping[str, Any]]) -> Any:  # noqa
             needed="one structure for all",
             action="name a study with that model in the fleet file: [fleet] study",
         )
-    return pooled_model(answers.population, replace(members[0], estimated=None), members)
+    plain = replace(next(iter(members.values())), estimated=None)
+    population = answers.population
+    if points is not None:
+        mine = [row for row in points if row["model"] == answers.model]
+        told = [_flight_points(plain, log, members[log], mine) for log in sorted(members)]
+        population = fit_population(plain, told, answers.type_name)
+    return pooled_model(population, plain, list(members.values()))
+
+
+def _flight_points(plain: Any, log: str, member: Any, rows: Sequence[Row]) -> FlightPoints:  # noqa: ANN401
+    """What one flight measured, with what its own fit knew."""
+    mine = [row for row in rows if row["log"] == log]
+    free, known = [each.name for each in plain.parameters.free], member.estimated
+    covariance = None
+    if known.covariance is not None and set(free) <= set(known.names):
+        places = [known.names.index(name) for name in free]
+        covariance = known.covariance[np.ix_(places, places)]
+    return FlightPoints(
+        str(mine[0]["vehicle"]) if mine else "",
+        log,
+        {
+            f"{row['output']}/{row['input']}": MeasuredPoints(
+                np.array(row["omega_rad_s"]),
+                np.array(row["real"]) + 1j * np.array(row["imag"]),
+                np.array(row["random_error"]),
+            )
+            for row in mine
+        },
+        np.array([member.parameters[name].value for name in free]),
+        covariance,
+    )
 
 
 def _shape(model: Any) -> str:  # noqa: ANN401 — any kind of model

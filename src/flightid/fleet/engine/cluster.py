@@ -181,6 +181,13 @@ def _client(distributed: Any, workers: int | None, scheduler: str | None) -> Ite
                 needed="the address of one that runs",
                 action="start one: dask scheduler; then dask worker ADDRESS on every machine",
             ) from error
+        except TypeError as error:  # Of Dask, where tls:// is asked for and no certificate named.
+            raise OptionError(
+                "no certificate for the scheduler",
+                found=f"{scheduler}: {error}"[:300],
+                needed="distributed.comm.tls: ca-file, and client.cert and client.key",
+                action="name them in Dask's configuration, or in DASK_DISTRIBUTED__COMM__TLS__…",
+            ) from error
         stack.enter_context(client)
         stack.enter_context(client.as_current())
         yield client
