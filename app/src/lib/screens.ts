@@ -4,6 +4,7 @@ import Flight from "../screens/Flight.svelte";
 import Fly from "../screens/Fly.svelte";
 import Gains from "../screens/Gains.svelte";
 import Library from "../screens/Library.svelte";
+import Model from "../screens/Model.svelte";
 import Plan from "../screens/Plan.svelte";
 import Records from "../screens/Records.svelte";
 import Report from "../screens/Report.svelte";
@@ -44,6 +45,7 @@ export const SCREENS: Screen[] = [
   { name: "compare", title: "Compare", component: Compare, ofLog: true, needsStudy: false, shows: (given) => Boolean(given.log) && !ofRecords(given) },
   { name: "plan", title: "Plan", component: Plan, ofLog: true, needsStudy: false, shows: (given) => Boolean(given.log) && !ofRecords(given) },
   { name: "records", title: "Records", component: Records, ofLog: true, needsStudy: false, shows: (given) => Boolean(given.log) && ofRecords(given) },
+  { name: "model", title: "Model", component: Model, ofLog: true, needsStudy: true, shows: hasModels },
   { name: "verify", title: "Verify", component: Verify, ofLog: true, needsStudy: true, shows: hasModels },
   { name: "report", title: "Report", component: Report, ofLog: true, needsStudy: true, shows: hasModels },
   { name: "fly", title: "Fly", component: Fly, ofLog: false, needsStudy: false, shows: () => true },

@@ -321,6 +321,33 @@ export interface MarginRow {
   flown_worst: number | null;
 }
 
+/** A model of a study, or why there is none; both empty where it has no equations. */
+export interface ModelJudged {
+  model: ShownModel | null;
+  error: string;
+}
+
+/** Measured against predicted with the values of sliders. */
+export interface ModelPrediction {
+  curves: PredictedCurve[];
+  responses: PredictedResponse[];
+  refusal: string;
+}
+
+/** A model of a study as it would be with these edits. */
+export interface ModelRequest {
+  model: string;
+  edits: Edit[];
+}
+
+/** A library model or file to put into model `place` of a study; behind the last: beside. */
+export interface ModelUse {
+  place: number;
+  template: string;
+  axis: string | null;
+  columns: Record<string, string>;
+}
+
 /** A loop broken at the output, for the chart of Nichols. */
 export interface NicholsCurve {
   name: string;
@@ -344,6 +371,21 @@ export interface Overview {
   blocks: StripBlock[];
   events: StripEvent[];
   has_study: boolean;
+}
+
+/** What a model file says, or why it is none, with the line where that stands. */
+export interface OwnJudged {
+  model: ShownModel | null;
+  error: string;
+  line: number | null;
+  template: string;
+}
+
+/** A model file as it is written in the editor; kept where a study shall name it. */
+export interface OwnModel {
+  name: string;
+  text: string;
+  keep: boolean;
 }
 
 /** A plan of the next flight. */
@@ -393,6 +435,50 @@ export interface PlanWishes {
   control: number | null;
   rate_rad_s: number | null;
   attitude_rad: number | null;
+}
+
+/** One output on one record: extremes by column of what was measured and predicted. */
+export interface PredictedCurve {
+  record: string;
+  output: string;
+  unit: string;
+  time_s: number[];
+  measured: number[];
+  predicted: number[];
+  theil: number;
+  rms_error: number;
+}
+
+/** One response of the model at the frequencies of the measured one. */
+export interface PredictedResponse {
+  output: string;
+  input: string;
+  unit: string;
+  omega_rad_s: number[];
+  gain: number[];
+  phase_rad: number[];
+  measured_gain: number[];
+  measured_phase_rad: number[];
+  coherence: number[];
+}
+
+/** Its answer; `processor_s` is what the worker took for it. */
+export interface PredictionAnswer {
+  request: number;
+  error: string | null;
+  seconds: number;
+  prediction: ModelPrediction | null;
+  processor_s: number;
+}
+
+/** A prediction with values of some parameters. */
+export interface PredictionQuestion {
+  request: number;
+  kind: string;
+  log: string;
+  edits: Edit[];
+  model: string;
+  values: Record<string, number>;
 }
 
 /** The study that `flightid new` writes for records; empty where they carry no model. */
@@ -569,6 +655,13 @@ export interface RunScreen {
   jobs: Job[];
 }
 
+/** Two sides in the grammar of model files; a transfer function carries its delay, s. */
+export interface ShownEquation {
+  left: string;
+  right: string;
+  delay: string;
+}
+
 /** A finding, with the spans of the flight that it speaks of. */
 export interface ShownFinding {
   code: string;
@@ -576,6 +669,37 @@ export interface ShownFinding {
   message: string;
   action: string;
   spans_s: [number, number][];
+}
+
+/** A model with equations: what it says of itself. */
+export interface ShownModel {
+  key: string;
+  title: string;
+  kind: "transfer" | "state-space";
+  axes: string[];
+  inputs: Record<string, string>;
+  outputs: Record<string, string>;
+  equations: ShownEquation[];
+  definitions: ShownEquation[];
+  measured: ShownEquation[];
+  notes: string[];
+  parameters: ShownParameter[];
+  source: string;
+  note: string;
+}
+
+/** A parameter under the study's overrides; `start` is what the model's own file says. */
+export interface ShownParameter {
+  name: string;
+  value: number | null;
+  start: number | null;
+  unit: string;
+  low: number | null;
+  high: number | null;
+  free: boolean;
+  tie: string | null;
+  note: string;
+  changed: boolean;
 }
 
 /** The closed rate loop of an axis from ordinary flying. */
@@ -631,6 +755,13 @@ export interface TimeCurve {
   low: number[];
   high: number[];
   flown: number[] | null;
+}
+
+/** The keys of a study that put a model into it. */
+export interface UseEdits {
+  edits: Edit[];
+  name: string;
+  error: string;
 }
 
 /** A study file to put in place of another. */

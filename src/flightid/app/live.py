@@ -14,6 +14,8 @@ from pydantic import ValidationError
 from flightid.app.backstage import Backstage
 from flightid.app.gain_answers import answer_gains
 from flightid.app.gain_schemas import GainsQuestion
+from flightid.app.model_routes import answer_prediction
+from flightid.app.model_schemas import PredictionQuestion
 from flightid.app.response_answers import answer_response
 from flightid.app.schemas import Job, JobNews, Question, Reply, ResponseQuestion
 
@@ -31,6 +33,7 @@ class Answerer:
 ANSWERERS: dict[str, Answerer] = {
     "response": Answerer(ResponseQuestion, answer_response),
     "gains": Answerer(GainsQuestion, answer_gains),
+    "prediction": Answerer(PredictionQuestion, answer_prediction),
 }
 """By kind; a screen that asks while a hand drags adds its own."""
 

@@ -19,6 +19,7 @@ from flightid.app.job_routes import add_job_routes
 from flightid.app.jobs import Workers
 from flightid.app.live import add_socket
 from flightid.app.log_routes import add_log_routes
+from flightid.app.model_routes import add_model_routes
 from flightid.app.page_routes import add_page_routes
 from flightid.app.rig_routes import add_rig_routes
 from flightid.app.run_routes import add_run_routes
@@ -38,6 +39,7 @@ ROUTES: tuple[Callable[[FastAPI, Backstage], None], ...] = (
     add_rig_routes,
     add_run_routes,
     add_fly_routes,
+    add_model_routes,
     add_socket,
 )
 """One module each; a new subject adds its own."""

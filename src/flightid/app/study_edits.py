@@ -92,7 +92,10 @@ def _apply(document: Any, edit: KeyEdit) -> None:  # noqa: ANN401 - a parsed doc
     for number, key in enumerate(parents):
         following = edit.path[number + 1]
         if isinstance(key, str) and key not in place:
-            place.append(key, tomlkit.aot() if isinstance(following, int) else tomlkit.table())
+            # Beside `parameters.T_m = {…}` a header would open a table of the whole document.
+            inline = number > 0 and edit.path[number - 1] == "parameters"
+            made = tomlkit.inline_table() if inline else tomlkit.table()
+            place.append(key, tomlkit.aot() if isinstance(following, int) else made)
         elif isinstance(key, int) and key == len(place):
             place.append(tomlkit.table())
         place = place[key]

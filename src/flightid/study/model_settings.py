@@ -29,6 +29,7 @@ class ParameterOverride(Options):
     minimum: float | None = option(None, doc="Lower bound.")
     maximum: float | None = option(None, doc="Upper bound.")
     free: bool | None = option(None, doc="Whether it is estimated.")
+    tie: str | None = option(None, doc="Formula of other parameters that gives its value.")
 
 
 @dataclass(frozen=True, kw_only=True)
