@@ -246,4 +246,9 @@ def test_the_pole_zero_map_has_ellipses():
     fit = fid.identify(P.armax("u", "y", na=2, nb=2, nc=2), flown(ARMAX, 11, noise=0.3))
     figure = plot.pole_zero(fit)
     # The circle, two clouds, an ellipse for each pole of the pair and for the zero.
-    assert len(figure.data) == 6
+    assert [len([t for t in figure.data if t.xaxis == axis]) for axis in ("x", "x2")] == [6, 6]
+    # Beside them the same near: the ellipse of the upper pole fills what it did not.
+    near = next(iter(figure.select_xaxes(col=2))).range
+    edge = [t for t in figure.data if t.xaxis == "x2" and t.name == "poles" and t.mode == "lines"]
+    assert near[0] < min(edge[0].x) < max(edge[0].x) < near[1]
+    assert np.ptp(edge[0].x) > 0.1 * np.ptp(near)

@@ -24,6 +24,8 @@ def test_power_and_shares_are_those_of_the_input() -> None:
     assert_close(power, np.var(record["da"]), rtol=0.05, why="Parseval, smoothed by third octaves")
     named = {axis.title.text for axis in fid.plot.input_figure(record).select_xaxes()}
     assert {"da [deg]", "frequency [rad/s]"} <= named
+    ticks = next(iter(fid.plot.input_figure(record).select_xaxes(col=1))).ticktext
+    assert "10<br>1.6 Hz" in ticks
 
 
 def test_inputs_that_rest_are_left_out() -> None:

@@ -110,6 +110,9 @@ def promised_margins(designs: Sequence[PidDesign]) -> go.PlotFigure:
             for _, each in cases
         ]
         labels = [_label(*each) for each in cases]
+        if not cases:
+            _say_without_limit(made, name, column, rows)
+            continue
         bars = go.Bar(
             x=[each.worst for _, each in cases], y=labels, orientation="h", width=0.6,
             name="worst vehicle, new gains", showlegend=column == 1, legendgroup="new",
@@ -153,6 +156,24 @@ def promised_margins(designs: Sequence[PidDesign]) -> go.PlotFigure:
     made.update_yaxes(showticklabels=False, col=2)
     made.update_layout(hovermode="closest")
     return made
+
+
+def _say_without_limit(made: go.PlotFigure, name: str, column: int, rows: Sequence[str]) -> None:
+    """A panel whose loops all lack a crossing says so; an axis without a trace has no place."""
+    unseen = go.Scatter(
+        x=[0.0] * len(rows), y=list(rows), mode="markers", showlegend=False, hoverinfo="skip",
+        name=name, marker={"opacity": 0.0},
+    )  # fmt: skip
+    made.add_trace(unseen, 1, column)
+    made.add_annotation(
+        1, column, text=f"no vehicle's loop has a finite {name}", x=0.5, y=0.5, showarrow=False
+    )
+    ends = {f"{axis}ref": f"{axis}{column if column > 1 else ''} domain" for axis in "xy"}
+    made.layout["annotations"][-1].merge(ends)
+    made.update_xaxes(
+        title_text=look.axis_title(name, "dB" if column > 1 else "deg"), showticklabels=False,
+        range=[0.0, 1.0], row=1, col=column,
+    )  # fmt: skip
 
 
 def has_both(review: FlightReview, designs: Sequence[PidDesign]) -> bool:

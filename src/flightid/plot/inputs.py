@@ -12,6 +12,7 @@ from flightid.plot import look
 from flightid.record import Record
 
 FREQUENCIES, BINS = 200, 40
+TURN = 2 * np.pi
 FAINTEST_DB = 60.0
 """How far below its peak a spectrum is drawn."""
 
@@ -65,8 +66,13 @@ def input_figure(record: Record, inputs: Iterable[str] | None = None) -> go.Plot
         made.update_yaxes(title_text="share of samples [%]", row=row, col=2)
         made.update_xaxes(title_text=look.axis_title(name, unit), row=row, col=2)
         made.update_yaxes(title_text=f"{name} [{squared}]", row=row, col=1)
-    decades = [(t, f"{t:g}") for t in look.LOG_TICKS if np.log10(t) % 1.0 == 0.0]
+    decades = [
+        (t, f"{t:g}<br>{t / TURN:.2g} Hz") for t in look.LOG_TICKS if np.log10(t) % 1.0 == 0.0
+    ]
     for axis in made.select_xaxes(col=1):
         axis.type, (axis.tickvals, axis.ticktext) = "log", zip(*decades, strict=True)
     made.update_xaxes(title_text="frequency [rad/s]", row=max(1, len(names)), col=1)
+    # Two lines of tick labels stand above the title.
+    made.update_xaxes(title_standoff=4, col=1)
+    made.update_layout(margin={"b": 65})
     return made

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.identification import Fit, ImpulseResponse
+from flightid.identification.prediction_error.roots import FittedRoot
 from flightid.identification.subspace.roots import ALL
 from flightid.plot import graph_objects as go
 from flightid.plot import look
@@ -14,6 +17,8 @@ from flightid.validation import OrderScan
 from flightid.validation.order_scan.edges import Structure
 from flightid.validation.order_scan.result import words_of
 
+LEAST_ZOOM, MARGIN, SMALLEST = 1.5, 1.3, 1e-4
+"""How much closer a second look at the poles has to be, its room about them, least half width."""
 HIGHEST = 3.0
 """Errors beyond this many times the smallest are drawn at the upper edge."""
 
@@ -90,6 +95,8 @@ def order_scan(scan: OrderScan, taken: Structure | None = None) -> go.PlotFigure
 def pole_zero(fit: Fit, response: str | None = None) -> go.PlotFigure:
     """Draw poles and zeros in the z plane with 95 % ellipses, and the unit circle.
 
+    Beside it the poles' own corner of the upper half plane, where they lie close together.
+
     Parameters
     ----------
     fit : Fit
@@ -103,25 +110,60 @@ def pole_zero(fit: Fit, response: str | None = None) -> go.PlotFigure:
     """
     name = response or f"{fit.model.outputs[0]}/{fit.model.inputs[0]}"
     within = [root for root in fit.details.roots if root.response in (name, ALL)]
-    made = look.figure(1, height_px=560)
-    angle = np.linspace(0.0, 2 * np.pi, 181)
-    made.add_trace(
-        look.line("unit circle", np.cos(angle), np.sin(angle), colour=look.LINE, width=1.0)
+    box = _around_poles(within)
+    reach = min(max([1.15, *(abs(root.z) * 1.1 for root in within)]), 3.0)
+    zooms = box is not None and box[1] < reach / LEAST_ZOOM
+    made = look.figure(1, 2 if zooms else 1, shared_x=False, height_px=480 if zooms else 560)
+    for column in (1, 2)[: 1 + zooms]:
+        _add_roots(made, within, column)
+        made.update_xaxes(title_text="real", col=column)
+    made.update_yaxes(title_text="imaginary", col=1)
+    made.update_xaxes(range=[-reach, reach], col=1)
+    made.update_yaxes(range=[-reach, reach], scaleanchor="x", col=1)
+    if zooms and box is not None:
+        centre, half = box
+        made.update_xaxes(range=[centre.real - half, centre.real + half], col=2)
+        made.update_yaxes(range=[centre.imag - half, centre.imag + half], scaleanchor="x2", col=2)
+    made.update_layout(hovermode="closest")
+    return made
+
+
+def _around_poles(within: Sequence[FittedRoot]) -> tuple[complex, float] | None:
+    """Middle and half the width of a square about the poles of one half plane, ellipses too."""
+    edges: list[NDArray[np.float64]] = []
+    for root in within:
+        if root.kind != "pole":
+            continue
+        z = complex(root.z.real, abs(root.z.imag))
+        known = root.covariance is not None
+        x, y = _ellipse(z, root.covariance, 1.0) if known else (z.real, z.imag)
+        edges.append(np.array([np.min(x), np.max(x), np.min(y), np.max(y)]))
+    if not edges:
+        return None
+    low_x, _, low_y, _ = np.min(edges, axis=0)
+    _, high_x, _, high_y = np.max(edges, axis=0)
+    half = MARGIN * 0.5 * max(high_x - low_x, high_y - low_y)
+    return complex(0.5 * (low_x + high_x), 0.5 * (low_y + high_y)), max(float(half), SMALLEST)
+
+
+def _add_roots(made: go.PlotFigure, within: Sequence[FittedRoot], column: int) -> None:
+    angle = np.linspace(0.0, 2 * np.pi, 181 if column == 1 else 1441)
+    legend = column == 1
+    circle = look.line(
+        "unit circle", np.cos(angle), np.sin(angle), colour=look.LINE, width=1.0, legend=legend
     )
+    made.add_trace(circle, 1, column)
     styles = {"pole": ("x", look.MODEL), "zero": ("circle-open", look.RIVAL)}
     for kind, (symbol, colour) in styles.items():
         shown = [root for root in within if root.kind == kind]
         places = [z for root in shown for z in _both(root.z)]
-        made.add_trace(
-            go.Scatter(
-                x=[z.real for z in places],
-                y=[z.imag for z in places],
-                name=f"{kind}s",
-                legendgroup=kind,
-                mode="markers",
-                marker={"color": colour, "symbol": symbol, "size": 10, "line": {"width": 2}},
-            )
-        )
+        cloud = go.Scatter(
+            x=[z.real for z in places], y=[z.imag for z in places], name=f"{kind}s",
+            legendgroup=kind, mode="markers", showlegend=legend and bool(places),
+            marker={"color": colour, "symbol": symbol, "size": 10 if legend else 7,
+                    "line": {"width": 2 if legend else 1}},
+        )  # fmt: skip
+        made.add_trace(cloud, 1, column)
         for root in shown:
             if root.covariance is None:
                 continue
@@ -129,14 +171,7 @@ def pole_zero(fit: Fit, response: str | None = None) -> go.PlotFigure:
                 x, y = _ellipse(z, root.covariance, sign)
                 edge = look.line(f"{kind}s", x, y, colour=colour, width=1.0, legend=False)
                 edge.merge({"legendgroup": kind, "hoverinfo": "skip"})
-                made.add_trace(edge)
-    look.label_axes(made, x="real", y=["imaginary"])
-    reach = max([1.15, *(abs(root.z) * 1.1 for root in within)])
-    reach = min(reach, 3.0)
-    made.update_xaxes(range=[-reach, reach])
-    made.update_yaxes(range=[-reach, reach], scaleanchor="x")
-    made.update_layout(hovermode="closest")
-    return made
+                made.add_trace(edge, 1, column)
 
 
 def _both(z: complex) -> list[complex]:

@@ -170,6 +170,7 @@ def spectrum_comparison(item: SpectrumComparison) -> go.PlotFigure:
     titles = [_density_title(name, item.units[name]) for name in item.outputs]
     look.label_axes(made, x="frequency [rad/s]", y=titles, log_x=True)
     made.update_yaxes(type="log")
+    look.hertz_above(made)
     return made
 
 

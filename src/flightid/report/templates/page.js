@@ -61,11 +61,15 @@
     const columns = [...sides.values()].sort((a, b) => a[0] - b[0]), count = columns.length;
     if (count < 2) return;
     const column = (x) => Math.max(0, columns.findLastIndex(([from]) => from <= x + 1e-3));
-    const lower = (y, place) => (count - 1 - place + y) / count;
+    const frame = (layout.margin?.t ?? 0) + (layout.margin?.b ?? 0);
+    const panel = (layout.height ?? place.clientHeight) - frame, between = 80;
+    const inner = count * panel + (count - 1) * between;
+    const lower = (y, place) => ((count - 1 - place) * (panel + between) + y * panel) / inner;
     for (const { axis, domain } of up) {
       const beside = across.find(({ id }) => id === (axis.anchor ?? "x"));
       const place = column(beside?.domain[0] ?? 0);
-      const first = up.find((one) => one.domain[0] === domain[0] && one.axis.title?.text);
+      const level = up.filter((one) => one.domain[0] === domain[0]);
+      const first = level.find((one) => one.axis.title?.text) ?? level[0];
       if (place && first) { axis.title = first.axis.title; axis.showticklabels = first.axis.showticklabels; }
       axis.domain = domain.map((y) => lower(y, place));
     }
@@ -76,9 +80,8 @@
       note.y = lower(note.y, place);
     }
     across.forEach(({ axis }) => { axis.domain = [0, 1]; });
-    if (layout.legend?.y > 1) layout.legend.y = 1 + (layout.legend.y - 1) / count;
-    const frame = (layout.margin?.t ?? 0) + (layout.margin?.b ?? 0);
-    layout.height = count * ((layout.height ?? place.clientHeight) - frame) + frame;
+    if (layout.legend?.y > 1) layout.legend.y = 1 + (layout.legend.y - 1) * panel / inner;
+    layout.height = inner + frame;
     place.style.height = `${layout.height}px`;
   }
 

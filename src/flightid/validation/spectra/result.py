@@ -171,6 +171,7 @@ class SpectrumComparison(Result, schema="flightid.spectrum_comparison/1"):
             Column("output"),
             Column("measured peak", "rad/s", 3),
             Column("model's peak", "rad/s", 3),
+            Column("measured frequency", "Hz", 3),
             Column("measured density", digits=3),
             Column("model's density", digits=3),
         )
@@ -179,6 +180,7 @@ class SpectrumComparison(Result, schema="flightid.spectrum_comparison/1"):
                 peak.output,
                 peak.omega_rad_s,
                 peak.predicted_rad_s,
+                None if peak.omega_rad_s is None else peak.omega_rad_s / (2.0 * np.pi),
                 peak.density,
                 peak.predicted_density,
             )
