@@ -91,7 +91,7 @@ def tests_of(
     """Whiteness of the errors that count, and their independence of the inputs."""
     return innovation_tests(
         [row[None] for row in counted],
-        [data.inputs[:, span][:, skip:] for span in data.spans],
+        [data.external[:, span][:, skip:] for span in data.spans],
         [data.output[None, span] for span in data.spans],
         spent(structure),
     )

@@ -29,6 +29,7 @@ from flightid.identification.prediction_error.coefficient_covariance import (
     tests_of,
 )
 from flightid.identification.prediction_error.details import FitScore, PolynomialDetails
+from flightid.identification.prediction_error.excited_inputs import with_excitations
 from flightid.identification.prediction_error.findings import (
     CANCELS,
     cancelling,
@@ -68,6 +69,7 @@ def fit_polynomial(structure: PolynomialStructure, data: Record | Sequence[Recor
     records = as_records(data)
     channels = gather_channels(records, structure.output, structure.inputs, structure.offsets)
     channels.require_change()
+    channels = with_excitations(structure, channels, records)
     (taken, found), choice = optimum(structure, channels)
     return replace(_assemble(taken, records, channels, found, choice), structure=taken)
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from flightid.errors import DataError
 from flightid.identification.prediction_error.coloured_errors import instrumental_covariance
+from flightid.identification.prediction_error.excited_inputs import noise_free_inputs
 from flightid.identification.prediction_error.linear_regression import (
     reflected,
     regress,
@@ -31,7 +32,8 @@ def four_stage(
     """Coefficients of A y = B u + v with v of any colour, and their covariance.
 
     Least squares; instruments from its noise-free output; a long noise model of what is left; the
-    same instruments again, everything filtered by that model. Consistent in open loop.
+    same instruments again, everything filtered by that model. Consistent in open loop, and in a
+    closed one where the channels hold what was injected: instruments are then what it alone moves.
 
     Raises
     ------
@@ -40,17 +42,18 @@ def four_stage(
 
     Reference
     ---------
-    Ljung, *System Identification*, 2nd ed., section 15.3, eqs. 15.20 to 15.27.
+    Ljung, *System Identification*, 2nd ed., section 15.3, eqs. 15.20 to 15.27; Gilson & Van den
+    Hof, Automatica 41 (2005), 241-249.
     """
-    first = regress_structure(structure, data).shortest
-    second, _ = _instruments(structure, data, first, np.ones(1))
+    first, moved = regress_structure(structure, data).shortest, noise_free_inputs(data)
+    second, _ = _instruments(structure, data, first, np.ones(1), moved)
     left = _left(structure, data, second)
     none = np.empty((0, left.size))
     # Longer than Ljung's na + nb: what a short noise model leaves coloured falsifies the intervals.
     room = sum(data.lengths) // ROWS_PER_LAG
     degree = min(structure.na + max(structure.nb, default=0) + SPARE_LAGS, max(room, 1))
     noise = regress(left, none, data.lengths, degree, [], [], levels=data.levels).shortest
-    return _instruments(structure, data, second, np.concatenate([[1.0], noise]))
+    return _instruments(structure, data, second, np.concatenate([[1.0], noise]), moved)
 
 
 def _filtered(above: Array, below: Array, row: Array, spans: Sequence[slice]) -> Array:
@@ -71,20 +74,25 @@ def _left(structure: PolynomialStructure, data: SampledChannels, theta: Array) -
 
 
 def _instruments(
-    structure: PolynomialStructure, data: SampledChannels, theta: Array, whitener: Array
+    structure: PolynomialStructure,
+    data: SampledChannels,
+    theta: Array,
+    whitener: Array,
+    moved: Array,
 ) -> tuple[Array, ResidualCovariance]:
     below = reflected(np.concatenate([[1.0], theta[: structure.na]]))
     clean = np.zeros_like(data.output)
-    for row, b in zip(data.inputs, _numerators(structure, theta), strict=True):
+    for row, b in zip(moved, _numerators(structure, theta), strict=True):
         clean += _filtered(b, below, row, data.spans)
     signals = [
         _filtered(whitener, np.ones(1), row, data.spans)
-        for row in (data.output, clean, *data.inputs)
+        for row in (data.output, clean, *data.inputs, *moved)
     ]
     # Before this row the filter has not seen the equation with all its lags.
     start = structure.longest_lag + whitener.size - 1
-    regressors = _columns(structure, data, signals[0], signals[2:], start)
-    instruments = _columns(structure, data, signals[1], signals[2:], start)
+    m = len(data.inputs)
+    regressors = _columns(structure, data, signals[0], signals[2 : 2 + m], start)
+    instruments = _columns(structure, data, signals[1], signals[2 + m :], start)
     target = np.concatenate([signals[0][span][start:] for span in data.spans])
     ends = np.cumsum([n - start for n in data.lengths])[:-1]
     if data.levels:

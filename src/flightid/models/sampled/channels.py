@@ -51,6 +51,8 @@ class SampledChannels:
     sample_time_s : float
     levels : bool
         Whether a constant of each record is left to be fitted: a mean is no trim.
+    excitations : ndarray, shape (n_excitations, n_samples), or None
+        What was injected into a closed loop, without its mean, where a fit goes by way of it.
 
     Example
     -------
@@ -67,6 +69,12 @@ class SampledChannels:
     units: Mapping[str, str]
     sample_time_s: float
     levels: bool = False
+    excitations: Array | None = None
+
+    @property
+    def external(self) -> Array:
+        """What errors must not go with: the excitations, or without them the inputs."""
+        return self.inputs if self.excitations is None else self.excitations
 
     @property
     def spans(self) -> tuple[slice, ...]:

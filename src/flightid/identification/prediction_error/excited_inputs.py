@@ -1,0 +1,81 @@
+"""What injected excitations make of the inputs in a closed loop: instruments that know no noise."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from flightid.identification.prediction_error.linear_regression import reflected, regress
+from flightid.models.polynomial.structure import PolynomialStructure
+from flightid.models.sampled.channels import SampledChannels
+from flightid.record import Record
+from flightid.record.hold import common_loop
+
+Array = NDArray[np.float64]
+LONGEST, ROWS_PER_COEFFICIENT = 30, 20
+"""Most lags of the regression from excitation to input, and rows that each coefficient has."""
+
+
+def with_excitations(
+    structure: PolynomialStructure, data: SampledChannels, records: Sequence[Record]
+) -> SampledChannels:
+    """The channels with what was injected, where instruments need it and the records hold it.
+
+    They need it where a loop was closed, or nothing tells that it was open: in a closed loop the
+    inputs carry the noise. A loop that is known to be open keeps its inputs, which tell more.
+
+    Parameters
+    ----------
+    structure : PolynomialStructure
+    data : SampledChannels
+        Of the records.
+    records : sequence of Record
+    """
+    names = records[0].excitations
+    alike = all(each.excitations == names for each in records)
+    known = common_loop([each.input_shape for each in records])
+    if structure.method != "iv4" or known == "open" or not alike:
+        return data
+    if len(names) < len(structure.inputs):
+        return data
+    rows = [np.concatenate([each[n] - each[n].mean() for each in records]) for n in names]
+    moved = [row for row in rows if np.ptp(row) > 0.0]
+    return replace(data, excitations=np.array(moved)) if len(moved) >= len(names) else data
+
+
+def noise_free_inputs(data: SampledChannels) -> Array:
+    """Inputs as the excitations alone move them, shape (n_inputs, n_samples).
+
+    A long regression of each input on its own past and the excitations, run free from rest. How
+    good it is moves the variance of estimates by instruments, not their consistency. Without
+    excitations the inputs themselves.
+
+    Reference
+    ---------
+    Gilson & Van den Hof, "Instrumental variable methods for closed-loop system identification",
+    Automatica 41 (2005), 241-249; Söderström & Stoica (1989), section 10.4.
+    """
+    injected = data.excitations
+    if injected is None:
+        return data.inputs
+    n = len(injected)
+    room = sum(data.lengths) // (ROWS_PER_COEFFICIENT * (n + 1))
+    degree = max(1, min(LONGEST, room, min(data.lengths) // 4))
+    return np.array([_driven(row, injected, data, degree) for row in data.inputs])
+
+
+def _driven(row: Array, injected: Array, data: SampledChannels, degree: int) -> Array:
+    n = len(injected)
+    theta = regress(
+        row, injected, data.lengths, degree, [degree] * n, [0] * n, levels=data.levels
+    ).shortest
+    below = reflected(np.concatenate([[1.0], theta[:degree]]))
+    made = np.zeros_like(row)
+    for moved, above in zip(injected, np.split(theta[degree:], n), strict=True):
+        for span in data.spans:
+            made[span] += scipy.signal.lfilter(above, below, moved[span])
+    return made
