@@ -23,9 +23,12 @@ def looped(seed: int, *, n: int = 2000, noise: float = 0.3, shown: bool = True) 
         x[k] = 1.5 * x[k - 1] - 0.7 * x[k - 2] + 0.5 * u[k - 1] + 0.3 * u[k - 2]
         y[k] = x[k] + drift[k]
         u[k] = r[k] - GAIN * y[k]
-    known = {"excitations": {"r": r}} if shown else {}
     return fid.Record.from_arrays(
-        np.arange(n) * 0.1, inputs={"u": u}, outputs={"y": y}, loop="closed", **known
+        np.arange(n) * 0.1,
+        inputs={"u": u},
+        outputs={"y": y},
+        excitations={"r": r} if shown else {},
+        loop="closed",
     )
 
 

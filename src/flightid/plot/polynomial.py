@@ -135,8 +135,9 @@ def _around_poles(within: Sequence[FittedRoot]) -> tuple[complex, float] | None:
         if root.kind != "pole":
             continue
         z = complex(root.z.real, abs(root.z.imag))
-        known = root.covariance is not None
-        x, y = _ellipse(z, root.covariance, 1.0) if known else (z.real, z.imag)
+        x, y = np.array([z.real]), np.array([z.imag])
+        if root.covariance is not None:
+            x, y = _ellipse(z, root.covariance, 1.0)
         edges.append(np.array([np.min(x), np.max(x), np.min(y), np.max(y)]))
     if not edges:
         return None
