@@ -21,6 +21,7 @@ def fleet_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     from flightid.fleet.catalogue.record import LogRecord  # noqa: PLC0415
     from flightid.fleet.opening import current_store  # noqa: PLC0415
     from flightid.fleet.settings import read_fleet  # noqa: PLC0415
+    from tests.fleet_types import fleet_of  # noqa: PLC0415
 
     folder = tmp_path_factory.mktemp("fleet-examples")
     (folder / "fleet.toml").write_text(FLEET)
@@ -32,6 +33,7 @@ def fleet_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for log in [each["log"] for each in rows["logs"]]:
         own = {name: [e for e in table if e["log"] == log] for name, table in rows.items()}
         write_loose(store, LogRecord(log, own))
+    fleet_of(folder, "quad", name="types.toml")
     return folder
 
 

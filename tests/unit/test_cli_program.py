@@ -152,7 +152,7 @@ def test_a_wrong_command_names_the_right_one(
         "plan quadrotor": "flightid plan --vehicle quad\n",
         "tune flight.bin": "flightid tune flight.BIN\n",
         "fleet run flight.BIN": "one log: flightid run flight.BIN",
-        "tune rig-study.toml": "flightid tune rig-study.toml --controller pi_d",
+        "tune rig-study.toml": "gains of a PID of its own, --controller pi_d",
         "compare rig-output": "flightid compare A B",
         "compare a.param rig-output": "flightid compare MODEL --gains a.param",
         "modes a.param": "name it as --gains a.param",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -21,6 +22,7 @@ from flightid.fleet.catalogue.loose import loose_logs, loose_name, write_loose
 from flightid.fleet.catalogue.parts import MANIFEST, PARTS, KnownLogs, read_parts
 from flightid.fleet.catalogue.record import LogRecord
 from flightid.fleet.catalogue.store import FolderStore
+from flightid.fleet.engine.address_space import bounded_memory
 from flightid.fleet.opening import open_catalogue, opened_store
 
 
@@ -287,3 +289,15 @@ def test_questions_end_in_time_and_answers_at_a_length(tmp_path: Path) -> None:
             catalogue.query("SELECT * FROM logs", most_rows=2)
         found = catalogue.query("SELECT * FROM logs", most_rows=3)
         assert len(found.fetchall()) == len(found.fetchall()) == 3
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="no bound elsewhere")
+def test_a_question_on_the_command_line_cannot_take_the_memory(tmp_path: Path) -> None:
+    resource = pytest.importorskip("resource")
+    before = resource.getrlimit(resource.RLIMIT_AS)
+    with Catalogue(filled(tmp_path, range(1))) as catalogue, bounded_memory():
+        with pytest.raises(MemoryError):
+            bytearray(1 << 40)
+        with pytest.raises(OptionError, match=r"cannot answer|too long"):
+            catalogue.query("SELECT unnest(range(2000000000))", time_s=5.0)
+    assert resource.getrlimit(resource.RLIMIT_AS) == before

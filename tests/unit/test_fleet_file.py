@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import pytest
@@ -129,3 +130,15 @@ def test_a_folder_gets_a_fleet_file_that_says_what_was_chosen(tmp_path: Path) ->
     (tmp_path / "none").mkdir()
     with pytest.raises(StudyError, match="no log in this folder"):
         propose_fleet(tmp_path / "none")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems refuse such names themselves")
+def test_a_folder_of_any_name_gives_a_file_that_reads(tmp_path: Path) -> None:
+    for name in ("a\x7fb", "quo\"te'", "line\nbreak"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "V01-1.bin").write_bytes(b"")
+        assert read_fleet(propose_fleet(tmp_path / name).write()).words.title == name
+    for refused in ("n" * 245, "a\udcff"):
+        (tmp_path / refused).mkdir()
+        with pytest.raises(StudyError, match="no name to call a fleet by"):
+            propose_fleet(tmp_path / refused)

@@ -1,4 +1,4 @@
-import type { CompareRequest, ComparisonPart, Edit, FieldGroup, FlightScreen, GainFile, Job, Listing, LogItem, ModelJudged, OwnJudged, OwnModel, PlanPart, PlanRequest, ProposedStudy, RigItem, RigScreen, RunScreen, ShownModel, StudyText, UseEdits } from "./types";
+import type { CompareRequest, ComparisonPart, Edit, FieldGroup, FlightScreen, GainFile, Job, Listing, LogItem, ModelAnswer, OwnModelAnswer, OwnModel, PlanPart, PlanRequest, ProposedStudy, RigItem, RigScreen, RunScreen, ShownModel, StudyText, UseEdits } from "./types";
 
 /** A refusal of the server, in its own words. */
 export class Refusal extends Error {
@@ -51,9 +51,9 @@ export const gainFiles = (log: string) => json<GainFile[]>(`/api/studies/${log}/
 export const compare = (asked: CompareRequest) => json<ComparisonPart>("/api/comparisons", sent("POST", asked));
 export const plan = (asked: PlanRequest) => json<PlanPart>("/api/plans", sent("POST", asked));
 export const library = () => json<ShownModel[]>("/api/library");
-export const model = (log: string, name: string, edits: Edit[] = []) => json<ModelJudged>(`/api/models/${log}`, sent("POST", { model: name, edits }));
+export const model = (log: string, name: string, edits: Edit[] = []) => json<ModelAnswer>(`/api/models/${log}`, sent("POST", { model: name, edits }));
 export const useModel = (log: string, body: unknown) => json<UseEdits>(`/api/models/${log}/use`, sent("POST", body));
-export const ownModel = (log: string, name: string, text: string, keep: boolean) => json<OwnJudged>(`/api/models/${log}/own`, sent("POST", { name, text, keep }));
+export const ownModel = (log: string, name: string, text: string, keep: boolean) => json<OwnModelAnswer>(`/api/models/${log}/own`, sent("POST", { name, text, keep }));
 export const ownText = (log: string, name: string) => json<OwnModel>(`/api/models/${log}/own/${encodeURIComponent(name)}`);
 export const jobs = () => json<Job[]>("/api/jobs");
 export const cancel = (id: string) => json<Job[]>(`/api/jobs/${id}`, { method: "DELETE" });

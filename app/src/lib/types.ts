@@ -322,7 +322,7 @@ export interface MarginRow {
 }
 
 /** A model of a study, or why there is none; both empty where it has no equations. */
-export interface ModelJudged {
+export interface ModelAnswer {
   model: ShownModel | null;
   error: string;
 }
@@ -373,19 +373,19 @@ export interface Overview {
   has_study: boolean;
 }
 
-/** What a model file says, or why it is none, with the line where that stands. */
-export interface OwnJudged {
-  model: ShownModel | null;
-  error: string;
-  line: number | null;
-  template: string;
-}
-
 /** A model file as it is written in the editor; kept where a study shall name it. */
 export interface OwnModel {
   name: string;
   text: string;
   keep: boolean;
+}
+
+/** What a model file says, or why it is none, with the line where that stands. */
+export interface OwnModelAnswer {
+  model: ShownModel | null;
+  error: string;
+  line: number | null;
+  template: string;
 }
 
 /** A plan of the next flight. */

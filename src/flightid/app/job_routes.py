@@ -18,7 +18,10 @@ def add_job_routes(app: FastAPI, backstage: Backstage) -> None:
 
     @app.post("/api/jobs")
     async def again(job: Job) -> list[Job]:
-        workers.ensure(job.kind, job.log, known_log(workspace, job.log), again=True)
+        path = backstage.studies.path(job.log) if job.kind == "run" else None
+        if job.kind == "run" and path is None:
+            raise HTTPException(404, "There is no study to run.")
+        workers.ensure(job.kind, job.log, path or known_log(workspace, job.log), again=True)
         return workers.all()
 
     @app.delete("/api/jobs/{name}")

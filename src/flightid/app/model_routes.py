@@ -11,11 +11,11 @@ from fastapi import FastAPI, HTTPException
 from flightid.app import model_prediction, model_work
 from flightid.app.backstage import Backstage, LogName, made
 from flightid.app.model_schemas import (
-    ModelJudged,
+    ModelAnswer,
     ModelRequest,
     ModelUse,
-    OwnJudged,
     OwnModel,
+    OwnModelAnswer,
     PredictionAnswer,
     PredictionQuestion,
     ShownModel,
@@ -68,11 +68,11 @@ def add_model_routes(app: FastAPI, backstage: Backstage) -> None:
         return library
 
     @app.post("/api/models/{log}")
-    async def model(log: LogName, asked: ModelRequest) -> ModelJudged:
+    async def model(log: LogName, asked: ModelRequest) -> ModelAnswer:
         edits = [KeyEdit(tuple(each.path), each.value) for each in asked.edits]
         work = (model_work.make_model, *study_of(log), edits, asked.model)
         told, refusal, _ = await workers.live(*work)
-        return ModelJudged(model=told, error=refusal)
+        return ModelAnswer(model=told, error=refusal)
 
     @app.post("/api/models/{log}/use")
     async def use(log: LogName, asked: ModelUse) -> UseEdits:
@@ -81,9 +81,9 @@ def add_model_routes(app: FastAPI, backstage: Backstage) -> None:
         return UseEdits(error=refusal) if refusal else UseEdits(**told)
 
     @app.post("/api/models/{log}/own")
-    async def own(log: LogName, asked: OwnModel) -> OwnJudged:
+    async def own(log: LogName, asked: OwnModel) -> OwnModelAnswer:
         study_of(log)
-        judged: OwnJudged = await made(workers.live(model_work.judge_own, asked.text))
+        judged: OwnModelAnswer = await made(workers.live(model_work.judge_own, asked.text))
         if judged.model is None or not asked.keep:
             return judged
         # Named by its content: another text is another key of the study, and undo works.

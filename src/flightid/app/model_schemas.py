@@ -74,7 +74,7 @@ class UseEdits(Message):
     error: str = ""
 
 
-class ModelJudged(Message):
+class ModelAnswer(Message):
     """A model of a study, or why there is none; both empty where it has no equations."""
 
     model: ShownModel | None = None
@@ -89,7 +89,7 @@ class OwnModel(Message):
     keep: bool = False
 
 
-class OwnJudged(Message):
+class OwnModelAnswer(Message):
     """What a model file says, or why it is none, with the line where that stands."""
 
     model: ShownModel | None = None

@@ -8,7 +8,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from flightid.app.model_schemas import OwnJudged, ShownModel, UseEdits
+from flightid.app.model_schemas import OwnModelAnswer, ShownModel, UseEdits
 from flightid.app.own_folders import draft_of
 from flightid.app.schemas import Edit
 from flightid.app.shown_models import AXES, axes_of, shown_model, shown_parameter
@@ -114,14 +114,14 @@ def _edits(
     return edits
 
 
-def judge_own(text: str) -> OwnJudged:
+def judge_own(text: str) -> OwnModelAnswer:
     """A model file as written: the model, or what is wrong and on which line."""
     try:
         content = parse_toml(text, "the model file", "the editor")
         axis = "roll" if isinstance(content.get("axes"), dict) else None
-        return OwnJudged(model=_shown_of(text, axis))
+        return OwnModelAnswer(model=_shown_of(text, axis))
     except FlightidError as error:
-        return OwnJudged(error=str(error), line=line_of(str(error), text))
+        return OwnModelAnswer(error=str(error), line=line_of(str(error), text))
 
 
 def _shown_of(text: str, axis: str | None) -> ShownModel:

@@ -6,12 +6,23 @@ and its results are known as those of a log are.
 
 from __future__ import annotations
 
+import asyncio
 import hashlib
+import os
+import stat
 from collections.abc import AsyncIterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from flightid.app.own_folders import is_link, made_name, new_file, own_folder
+from flightid.app.own_folders import (
+    BINARY,
+    NO_LINK,
+    NO_WAIT,
+    is_link,
+    made_name,
+    new_file,
+    own_folder,
+)
 from flightid.app.workspace import HIDDEN, ID, Workspace, plain_name
 from flightid.errors import OptionError
 from flightid.files import flush
@@ -94,7 +105,7 @@ class Rigs:
             flush(temporary)
             made = rig or digest.hexdigest()[:16]
             folder = own_folder(self.workspace.folder, FOLDER, made)
-            temporary.replace(_free(folder, plain, digest.hexdigest()))
+            temporary.replace(await asyncio.to_thread(_free, folder, plain, digest.hexdigest()))
             flush(folder)
         return made
 
@@ -106,6 +117,18 @@ def _is_named(plain: str) -> bool:
 def _free(folder: Path, plain: str, digest: str) -> Path:
     """The name itself, or one with part of the hash where another file has it."""
     path = folder / plain
-    if not path.exists() or hashlib.sha256(path.read_bytes()).hexdigest() == digest:
+    if not os.path.lexists(path) or _holds(path, digest):
         return path
     return folder / f"{path.stem} {digest[:6]}{path.suffix}"
+
+
+def _holds(path: Path, digest: str) -> bool:
+    """Whether a plain file has that hash; a pipe or device that was planted is not waited for."""
+    try:
+        handle = os.open(path, os.O_RDONLY | NO_LINK | NO_WAIT | BINARY)
+    except OSError:
+        return False
+    with os.fdopen(handle, "rb") as stream:
+        if not stat.S_ISREG(os.fstat(handle).st_mode):
+            return False
+        return hashlib.file_digest(stream, "sha256").hexdigest() == digest

@@ -16,14 +16,16 @@ from fastapi.responses import StreamingResponse
 from flightid.app.backstage import Backstage, LogName
 from flightid.app.guard import REPORT_POLICY
 from flightid.app.kept_parts import kept_part
-from flightid.app.own_folders import is_link, read_plain
+from flightid.app.own_folders import is_link, read_plain, shown_name
 from flightid.app.run_schemas import RunPart, RunScreen
 from flightid.app.run_work import FIGURES
 from flightid.plot.graph_objects import plotting_library
+from flightid.study.output import WRITTEN
 from flightid.study.run import named_paths
 from flightid.study.settings import read_settings
 
 CHUNK = 1 << 16
+ELSEWHERE = "The study names files outside the folder of the page, or missing ones:"
 
 
 def add_run_routes(app: FastAPI, backstage: Backstage) -> None:
@@ -36,7 +38,7 @@ def add_run_routes(app: FastAPI, backstage: Backstage) -> None:
         if not isinstance(found, RunPart):
             raise HTTPException(404, "This study was not run yet.")
         folder = workspace.result_path(log, "run.json").parent / found.folder
-        if is_link(folder) or not folder.is_dir():
+        if is_link(folder) or not folder.is_dir() or not (folder / WRITTEN).is_file():
             raise HTTPException(404, "What the run wrote is gone; run the study again.")
         return found, folder
 
@@ -60,7 +62,10 @@ def add_run_routes(app: FastAPI, backstage: Backstage) -> None:
         text = await asyncio.to_thread(read_plain, folder.with_name(f"{folder.name}-{FIGURES}"))
         if not 0 <= number < found.figures:
             raise HTTPException(404, "There is no such picture.")
-        spec = json.dumps(json.loads(text)[number])
+        try:
+            spec = json.dumps(json.loads(text)[number], allow_nan=False)
+        except (ValueError, TypeError, LookupError, RecursionError) as error:
+            raise HTTPException(404, "This picture is broken; run the study again.") from error
         return Response(spec, media_type="application/json")
 
     @app.get("/api/runs/{log}/report")
@@ -86,17 +91,25 @@ def add_run_routes(app: FastAPI, backstage: Backstage) -> None:
 def _packed(backstage: Backstage, log: str, folder: Path) -> IO[bytes]:
     """Study, data and results under the paths of the workspace, so that the study runs again."""
     workspace, study = backstage.workspace, backstage.workspace.study_path(log)
-    held = [study]
+    held: list[Path] = [study]
+    elsewhere: list[Path] = []
     for path in dict.fromkeys(named_paths(read_settings(study))):
         place = (path if path.is_absolute() else study.parent / path).resolve()
-        if place.is_file() and place.is_relative_to(workspace.folder):
-            held.append(place)
+        inside = place.is_file() and place.is_relative_to(workspace.folder)
+        (held if inside else elsewhere).append(place)
     packed = tempfile.TemporaryFile()  # noqa: SIM115 - closed when it has been sent
-    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+    # Stamps before 1980 have no place in a zip: the nearest is taken.
+    deflated = zipfile.ZIP_DEFLATED
+    with zipfile.ZipFile(packed, "w", deflated, strict_timestamps=False) as archive:
         for path in dict.fromkeys(held):
-            archive.write(path, path.relative_to(workspace.folder).as_posix())
+            archive.write(path, shown_name(path.relative_to(workspace.folder).as_posix()))
+        if elsewhere:
+            names = "".join(f"{shown_name(path)}\n" for path in dict.fromkeys(elsewhere))
+            archive.writestr("NOT_IN_HERE.txt", f"{ELSEWHERE}\n{names}")
         for path in sorted(each for each in folder.rglob("*") if each.is_file()):
-            archive.write(path, f"studies/{log}-output/{path.relative_to(folder).as_posix()}")
+            if not is_link(path):
+                name = shown_name(path.relative_to(folder).as_posix())
+                archive.write(path, f"studies/{log}-output/{name}")
     packed.seek(0)
     return packed
 

@@ -4,14 +4,19 @@ from __future__ import annotations
 
 from typing import Any
 
+from pydantic import Field
+
 from flightid.app.schemas import Job, Light, Message
+
+RUN = r"^run-[0-9a-f]{16}$"
+"""Name of the folder of a run: nothing that leads elsewhere."""
 
 
 class RunPart(Message):
     """What a run of the study made: its report as a tree, figures by their number."""
 
     etag: str
-    folder: str
+    folder: str = Field(pattern=RUN)
     title: str
     verdict: Light
     tally: str

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from flightid.app.overview import light_of
+from flightid.app.own_folders import is_link
 from flightid.app.run_schemas import RunPart
 from flightid.app.study_edits import etag_of
 from flightid.app.work import KEPT
@@ -24,6 +25,8 @@ def make_run(study: Path, folder: Path, result: Path) -> None:
     etag = etag_of(study.read_text(encoding="utf-8"))
     begun = time.perf_counter()
     name = f"run-{etag.strip(chr(34))[:16]}"
+    if is_link(folder / name):  # Planted: a run would take, and later delete, what it leads to.
+        (folder / name).unlink()
     made = run_study(study, output=folder / name, cache=KEPT)
     figures: list[Any] = []
     tree = to_dict(made.document)
@@ -43,7 +46,15 @@ def make_run(study: Path, folder: Path, result: Path) -> None:
     write_atomically(result, part.model_dump_json())
     for other in folder.glob("run-*"):
         if not other.name.startswith(name) and other.name != result.name:
-            shutil.rmtree(other) if other.is_dir() else other.unlink()
+            _remove(other)
+
+
+def _remove(other: Path) -> None:
+    """Remove what an earlier run left; of a link, the link alone."""
+    if is_link(other) or not other.is_dir():
+        other.unlink(missing_ok=True)
+    else:
+        shutil.rmtree(other, ignore_errors=True)
 
 
 def _take_figures(section: dict[str, Any], figures: list[Any]) -> None:

@@ -124,8 +124,9 @@ def query(
     Nothing but the catalogue can be read, and nothing can be changed.
     """
     from flightid import fleet
+    from flightid.fleet.engine.address_space import bounded_memory
 
-    with fleet.open(place, earlier=earlier) as catalogue:
+    with fleet.open(place, earlier=earlier) as catalogue, bounded_memory():
         answer = catalogue.answer(sql, time_s=time_s, most_rows=most_rows)
     if as_json:
         emit_values(answer.to_dict()["rows"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 from collections import Counter
 from collections.abc import Sequence
@@ -19,6 +20,8 @@ from flightid.logs import read_log
 NAMED = re.compile(r"^([A-Za-z]+[-_]?[0-9]+)[-_.]")
 PATTERN = "^([A-Za-z]+[-_]?[0-9]+)[-_.]"
 """What file names begin with that name their vehicle: V07-2026-03-01.bin."""
+MOST_NAME = 200
+"""Bytes of a folder's name: the file beside it has a longer one, of 255 at most."""
 LOOKED_AT = 3
 """Logs that are read for the id inside them."""
 
@@ -94,6 +97,7 @@ def propose_fleet(place: str | Path) -> FleetProposal:
     ('logs-fleet.toml', '2 logs')
     """
     folder = Path(place).absolute()
+    _require_name(folder)
     logs = find_logs([str(folder)])
     if not logs:
         raise StudyError(
@@ -114,6 +118,23 @@ def propose_fleet(place: str | Path) -> FleetProposal:
     return FleetProposal(
         folder.with_name(f"{folder.name}-fleet.toml"), _text(folder, rule, said), said
     )
+
+
+def _require_name(folder: Path) -> None:
+    """A fleet file is named by its folder."""
+    encoded = os.fsencode(folder.name)
+    try:
+        encoded.decode("utf-8")
+        told = 0 < len(encoded) <= MOST_NAME
+    except UnicodeDecodeError:
+        told = False
+    if not told:
+        raise StudyError(
+            "this folder has no name to call a fleet by",
+            found=os.fsencode(folder).decode("utf-8", "replace"),
+            needed=f"a name in UTF-8 of 1 to {MOST_NAME} bytes",
+            action="rename it, or put its logs into a folder that has one",
+        )
 
 
 def _rule(folder: Path, logs: Sequence[LogAddress]) -> tuple[VehicleRules, str]:
@@ -141,16 +162,16 @@ def _id_inside(address: LogAddress) -> str | None:
 
 
 def _text(folder: Path, rule: VehicleRules, said: Sequence[str]) -> str:
-    quoted = json.dumps  # A JSON string is a TOML string.
+    name = json.dumps(folder.name, ensure_ascii=False).replace("\x7f", "\\u007f")
     lines = [
         "# Written by flightid fleet run; docs/fleet.md describes every key. Change it freely."
     ]
-    lines += [f"# Chosen: {each}." for each in said]
+    lines += [f"# Chosen: {' '.join(each.split())}." for each in said]
     lines += [
         "",
         "[fleet]",
-        f"title = {quoted(folder.name, ensure_ascii=False)}",
-        f"logs = [{quoted(folder.name, ensure_ascii=False)}]  # folders, globs and addresses",
+        f"title = {name}",
+        f"logs = [{name}]  # folders, globs and addresses",
         '# study = "study.toml"  # every log goes through it; flightid new LOG writes one',
         "# reports = true  # keep the page of every log",
         "",

@@ -79,9 +79,9 @@ def type_models(
     Example
     -------
     >>> import flightid as fid
-    >>> pooled = fid.fleet.type_models("fleet.toml", type_name="quad")
-    >>> pooled["roll"].estimated
-    EstimateProvenance(2 numbers with covariance, by population)
+    >>> pooled = fid.fleet.type_models("types.toml", type_name="quad")
+    >>> pooled["Roll"].estimated.method
+    'population'
     """
     with open_catalogue(place) as catalogue:
         chosen = _chosen(catalogue, type_name).replace("'", "''")

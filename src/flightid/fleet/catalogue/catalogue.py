@@ -15,6 +15,7 @@ from flightid.fleet.catalogue.newest import LOOSE, VersionRecords, older_records
 from flightid.fleet.catalogue.parts import TablePart
 from flightid.fleet.catalogue.schema import TABLES, FleetTable
 from flightid.fleet.catalogue.store import ObjectStore, Store
+from flightid.reading import memory_budget
 from flightid.table import Cell, Column, Table
 
 PURPOSE = "queries of a catalogue"
@@ -107,6 +108,7 @@ class Catalogue:
         folders = ", ".join("'" + place.replace("'", "''") + "/'" for place in places)
         for setting in (
             f"allowed_directories = [{folders}]",
+            f"memory_limit = '{memory_budget() >> 20}MiB'",
             "temp_directory = ''",  # Nothing is written where somebody happens to work.
             "autoinstall_known_extensions = false",
             "autoload_known_extensions = false",
@@ -123,7 +125,8 @@ class Catalogue:
         sql : str
             In DuckDB's dialect, over the tables of `tables`.
         time_s : float
-            Longest time for it, s.
+            Longest time for it, s; looked at between DuckDB's steps, of which one that makes a
+            single huge value is not interrupted (``flightid fleet query`` bounds its memory too).
         most_rows : int
             Longest answer.
 
