@@ -212,8 +212,18 @@ def test_an_upset_ends_a_flight_and_an_empty_one_leaves_nothing(tmp_path: Path) 
     flight.wait()
     assert "Upset: phi" in news[-1].words
     assert news[-1].kept
-    short = deck.start(FlyStart(vehicle="r50_hover"), news.append)
+    aloft: list[str | None] = []
+
+    def tell(told: FlyNews) -> None:
+        news.append(told)
+        if told.state == "ended":
+            aloft.append(deck.flown())
+
+    short = deck.start(FlyStart(vehicle="r50_hover"), tell)
+    assert deck.flown() == short.id
     deck.leave("a")
+    # Whoever hears of the end and asks for the list at once finds the flight in it.
+    assert aloft == [None]
     assert news[-1].state == "ended"
     assert (news[-1].kept is None) == (not short.folder.exists())
     assert deck.enter("b")

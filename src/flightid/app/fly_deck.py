@@ -113,6 +113,7 @@ class PilotedFlight:
         self._stick: dict[str, float] = {}
         self._ends, self._reason = False, ""
         self._late = 0
+        self.over = False
         self._due: float | None = None
         self._display: deque[FlyFrame | None] = deque(
             [None] * round(seat.display_delay_s * RATE_HZ)
@@ -244,6 +245,7 @@ class PilotedFlight:
                 drop_flight(self.folder)
         except (FlightidError, OSError) as error:
             self._reason = f"{self._reason} The record could not be written: {error}".strip()
+        self.over = True  # before the page hears of it: it asks for the list at once
         self._tell(FlyNews(state="ended", words=self._reason, kept=kept))
 
 
@@ -279,6 +281,11 @@ class FlightDeck:
         self.flight = PilotedFlight(self.workspace, asked, tell)
         self.flight.begin()
         return self.flight
+
+    def flown(self) -> str | None:
+        """Which flight is in the air; None where the last one is kept, or fell."""
+        flight = self.flight
+        return None if flight is None or flight.over else flight.id
 
     def stop(self) -> None:
         """End what is flown."""

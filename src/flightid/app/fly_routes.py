@@ -55,7 +55,7 @@ def add_fly_routes(app: FastAPI, backstage: Backstage) -> None:
 
     @app.get("/api/fly/flights")
     def flights() -> list[FlownItem]:
-        flown = deck.flight.id if deck.flight is not None else ""
+        flown = deck.flown()
         found = []
         for each in kept_flights(workspace):
             if each["id"] == flown:
@@ -69,7 +69,7 @@ def add_fly_routes(app: FastAPI, backstage: Backstage) -> None:
     @app.post("/api/fly/flights/{flight}/finish")
     def finish(flight: str) -> list[FlownItem]:
         folder = _known(workspace, flight)
-        if deck.flight is not None and deck.flight.id == flight:
+        if deck.flown() == flight:
             raise HTTPException(409, "This flight is still flown.")
         if not (folder / RECORD).is_file():
             finish_flight(folder)
