@@ -19,8 +19,10 @@ from flightid.app import run_work
 from flightid.app.kept_parts import kept_part
 from flightid.app.rigs import Rigs
 from flightid.app.run_routes import _packed
+from flightid.app.studies import Studies
 from flightid.app.study_edits import etag_of
 from flightid.app.workspace import Workspace
+from flightid.errors import StudyError
 from flightid.report.content import Document
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="links need a right of their own there")
@@ -102,3 +104,13 @@ def test_a_zip_follows_no_link_and_says_what_it_lacks(tmp_path: Path) -> None:
         names = archive.namelist()
         assert str(far) in archive.read("NOT_IN_HERE.txt").decode()
     assert [each.rpartition("/")[2] for each in names] == [study.name, "NOT_IN_HERE.txt", "old.txt"]
+
+
+def test_a_study_behind_a_link_is_neither_run_nor_packed(tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path)
+    (tmp_path / "theirs.toml").write_text("[study]\n")
+    workspace.study_path("0" * 16).symlink_to(tmp_path / "theirs.toml")
+    with pytest.raises(StudyError, match="is a link"):
+        Studies(workspace).opened("0" * 16)
+    with pytest.raises(StudyError, match="no study"):
+        Studies(workspace).opened("../x")

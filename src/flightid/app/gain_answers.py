@@ -17,10 +17,7 @@ async def answer_gains(question: Question, backstage: Backstage) -> GainsAnswer:
     """Gains as the study would give them with these edits; an axis alone where it moves."""
     assert isinstance(question, GainsQuestion)
     try:
-        path = backstage.studies.path(question.log)
-        if path is None:
-            return GainsAnswer(request=question.request, error="This log has no study.")
-        text = text_of(path)
+        path, text = backstage.studies.opened(question.log)
     except FlightidError as error:
         return GainsAnswer(request=question.request, error=str(error))
     edits = [KeyEdit(tuple(each.path), each.value) for each in question.edits]

@@ -36,10 +36,7 @@ async def answer_prediction(question: Question, backstage: Backstage) -> Predict
     """Measured against predicted with the values of sliders."""
     assert isinstance(question, PredictionQuestion)
     try:
-        path = backstage.studies.path(question.log)
-        if path is None:
-            return PredictionAnswer(request=question.request, error="There is no study.")
-        text = text_of(path)
+        path, text = backstage.studies.opened(question.log)
     except FlightidError as error:
         return PredictionAnswer(request=question.request, error=str(error))
     edits = [KeyEdit(tuple(each.path), each.value) for each in question.edits]

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
-
 from flightid.app import work
 from flightid.app.backstage import Backstage
 from flightid.app.schemas import Question, ResponseAnswer, ResponsePart, ResponseQuestion
-from flightid.app.studies import text_of
 from flightid.app.study_edits import KeyEdit
 from flightid.errors import FlightidError
 
@@ -15,13 +12,8 @@ from flightid.errors import FlightidError
 async def answer_response(question: Question, backstage: Backstage) -> ResponseAnswer:
     """Responses as the study would give them with these edits."""
     assert isinstance(question, ResponseQuestion)
-    path = None
-    with suppress(Exception):
-        path = backstage.studies.path(question.log)
-    if path is None:
-        return ResponseAnswer(request=question.request, error="This log has no study.")
     try:
-        text = text_of(path)
+        path, text = backstage.studies.opened(question.log)
     except FlightidError as error:
         return ResponseAnswer(request=question.request, error=str(error))
     edits = [KeyEdit(tuple(each.path), each.value) for each in question.edits]

@@ -53,6 +53,7 @@ def add_run_routes(app: FastAPI, backstage: Backstage) -> None:
         path = backstage.studies.path(log)
         if path is None:
             raise HTTPException(404, "There is no study to run.")
+        backstage.studies.opened(log)  # refuses a link before a run follows it
         workers.ensure("run", log, path, again=True)
         return await screen(log)
 
@@ -78,6 +79,7 @@ def add_run_routes(app: FastAPI, backstage: Backstage) -> None:
     @app.get("/api/runs/{log}/zip")
     async def everything(log: LogName) -> StreamingResponse:
         _, folder = kept(log)
+        backstage.studies.opened(log)
         packed = await asyncio.to_thread(_packed, backstage, log, folder)
         headers = {"content-disposition": f'attachment; filename="flightid-{log}.zip"'}
         return StreamingResponse(_pieces(packed), media_type="application/zip", headers=headers)

@@ -12,7 +12,7 @@ from flightid.app.own_folders import read_plain
 from flightid.app.python_lines import python_lines
 from flightid.app.schemas import Edits, StudyText, WholeText
 from flightid.app.study_edits import KeyEdit, edited, etag_of, write_study
-from flightid.app.workspace import Workspace
+from flightid.app.workspace import ID, Workspace
 from flightid.errors import FlightidError, StudyError
 from flightid.reading import DOCUMENT_BYTES, read_toml
 from flightid.study.settings import read_settings
@@ -34,6 +34,19 @@ class Studies:
         """Study file of a log; None where there is none."""
         path = self._workspace.study_path(log)
         return path if path.is_file() else None
+
+    def opened(self, log: str) -> tuple[Path, str]:
+        """Study file of a log and its text, for work that needs both.
+
+        Raises
+        ------
+        StudyError
+            There is none, or `text_of` refuses it: a link is not followed.
+        """
+        path = self.path(log) if ID.fullmatch(log) else None
+        if path is None:
+            raise StudyError("there is no study of this log or these records", found=log)
+        return path, text_of(path)
 
     def read(self, log: str) -> StudyText | None:
         """The study file with what the page reads off it; None where there is none."""

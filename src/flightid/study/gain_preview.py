@@ -8,12 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from flightid.control.tuning.result import Tuning
-from flightid.errors import StudyError
 from flightid.study.pipeline import identify_models
-from flightid.study.settings import read_settings
+from flightid.study.previewed import PreviewedStudy
 from flightid.study.stage_runner import StageRunner
 from flightid.study.taking import take
-from flightid.study.task import load_task
 from flightid.study.tuning import TuneSettings, tune_by_hand, tune_models
 from flightid.surface import as_key, speaking
 
@@ -80,17 +78,9 @@ def preview_fits(path: str | Path, *, cache: MutableMapping[str, Any] | None = N
 
 def _identified(path: Path, cache: MutableMapping[str, Any] | None) -> tuple[Any, ...]:
     """Settings, what carries stages out, the log, and all models."""
-    settings = read_settings(path)
-    if settings.flight is not None:
-        raise StudyError(
-            "a preview takes a log or records, and this study flies first",
-            needed="[log] or [[record]]",
-            action="flightid run writes the log of the flight; name that",
-        )
-    names = tuple(model.name for model in settings.models)
-    tasks = [load_task(each, names) for each in settings.models]
-    runner = StageRunner(cache)
-    taken = take(settings, tasks, None, path.parent, runner)
+    study, runner = PreviewedStudy.of(path), StageRunner(cache)
+    settings, tasks = study.settings, study.tasks()
+    taken = take(settings, tasks, None, study.folder, runner)
     staged = identify_models(
         tasks, taken.records, taken.inspection, settings.reduce, runner, lambda *_: None
     )

@@ -7,16 +7,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from flightid.errors import StudyError, UnknownNameError
 from flightid.models import GreyBoxModel
 from flightid.record import Record
 from flightid.responses import FrequencyResponse
 from flightid.study.model_settings import ModelSettings
 from flightid.study.pipeline import responses_of
-from flightid.study.settings import Settings, read_settings
+from flightid.study.previewed import PreviewedStudy
 from flightid.study.stage_runner import StageRunner
 from flightid.study.taking import take
-from flightid.study.task import Task, load_task
+from flightid.study.task import Task
 from flightid.surface import as_key, speaking
 
 
@@ -72,29 +71,16 @@ def preview_model(
         A value lies outside its bounds, or a tie is wrong.
     """
     with speaking(as_key):
-        settings = read_settings(Path(path))
-        names = tuple(each.name for each in settings.models)
-        if model not in names:
-            raise UnknownNameError(
-                "the study has no such model", found=model, needed="one of " + ", ".join(names)
-            )
-        tasks = [load_task(each, names) for each in settings.models if data or each.name == model]
-        task = next(each for each in tasks if each.settings.name == model)
+        study = PreviewedStudy.of(path)
+        task = study.task(model)
         if not data:
             return ModelPreview(task.settings, task.model)
-        return _with_data(settings, tasks, task, Path(path).parent, StageRunner(cache))
+        return _with_data(study, task, StageRunner(cache))
 
 
-def _with_data(
-    settings: Settings, tasks: list[Task], task: Task, folder: Path, runner: StageRunner
-) -> ModelPreview:
-    if settings.flight is not None:
-        raise StudyError(
-            "a preview takes a log or records, and this study flies first",
-            needed="[log] or [[record]]",
-            action="flightid run writes the log of the flight; name that",
-        )
-    records = take(settings, tasks, None, folder, runner, inspects=False).records
+def _with_data(study: PreviewedStudy, task: Task, runner: StageRunner) -> ModelPreview:
+    tasks = study.tasks()
+    records = take(study.settings, tasks, None, study.folder, runner, inspects=False).records
     made = responses_of(task, records, runner)
     wanted = task.settings.verify or task.settings.identify
     return ModelPreview(

@@ -7,15 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from flightid.errors import StudyError, UnknownNameError
 from flightid.responses import FrequencyResponse
 from flightid.study.model_settings import ModelSettings
 from flightid.study.pipeline import Records, responses_of
-from flightid.study.settings import Settings, read_settings
+from flightid.study.previewed import PreviewedStudy
 from flightid.study.stage_runner import StageRunner
 from flightid.study.stages import estimate
 from flightid.study.taking import take
-from flightid.study.task import Task, load_task
+from flightid.study.task import Task
 from flightid.surface import as_key, speaking
 
 
@@ -69,34 +68,12 @@ def preview_responses(
         A stage refuses its data.
     """
     with speaking(as_key):
-        settings = read_settings(Path(path))
-        if settings.flight is not None:
-            raise StudyError(
-                "a preview takes a log or records, and this study flies first",
-                needed="[log] or [[record]]",
-                action="flightid run writes the log of the flight; name that",
-            )
-        runner = StageRunner(cache)
-        tasks = [
-            load_task(each, tuple(m.name for m in settings.models)) for each in settings.models
-        ]
-        task = _named(settings, tasks, model)
-        folder = Path(path).parent
-        records = take(settings, tasks, None, folder, runner, inspects=False).records
+        study, runner = PreviewedStudy.of(path), StageRunner(cache)
+        task, tasks = study.task(model), study.tasks()
+        records = take(study.settings, tasks, None, study.folder, runner, inspects=False).records
         made = responses_of(task, records, runner)
         wide = _around(task, records, runner) if around and made else None
         return ResponsePreview(task.settings, {n: each.value for n, each in made.items()}, wide)
-
-
-def _named(settings: Settings, tasks: list[Task], model: str) -> Task:
-    for task in tasks:
-        if task.settings.name == model:
-            return task
-    raise UnknownNameError(
-        "the study has no such model",
-        found=model,
-        needed="one of " + ", ".join(each.name for each in settings.models),
-    )
 
 
 def _around(task: Task, records: Records, runner: StageRunner) -> FrequencyResponse:
