@@ -22,7 +22,7 @@ from flightid.app.run_routes import _packed
 from flightid.app.studies import Studies
 from flightid.app.study_edits import etag_of
 from flightid.app.workspace import Workspace
-from flightid.errors import StudyError
+from flightid.errors import OptionError, StudyError
 from flightid.report.content import Document
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="links need a right of their own there")
@@ -110,7 +110,7 @@ def test_a_study_behind_a_link_is_neither_run_nor_packed(tmp_path: Path) -> None
     workspace = Workspace(tmp_path)
     (tmp_path / "theirs.toml").write_text("[study]\n")
     workspace.study_path("0" * 16).symlink_to(tmp_path / "theirs.toml")
-    with pytest.raises(StudyError, match="is a link"):
+    with pytest.raises(OptionError, match="is a link"):
         Studies(workspace).opened("0" * 16)
     with pytest.raises(StudyError, match="no study"):
         Studies(workspace).opened("../x")
