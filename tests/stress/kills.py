@@ -14,6 +14,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 
 from tests.autotune_log import write_ardupilot
@@ -72,6 +73,17 @@ def loss(path: Path, before: dict[str, bytes]) -> str:
     return "" if all(after.values()) else "empty files"
 
 
+def tell(
+    verbs: Sequence[str], kills: Counter[str], within: Counter[str], lost: Counter[str]
+) -> None:
+    """The table, as far as the count has come."""
+    for verb in verbs:
+        print(f"{verb:9}{kills[verb]:4} kills{within[verb]:4} before its end{lost[verb]:3} lost")
+    print(
+        f"{kills.total()} kills, {within.total()} before the end, {lost.total()} losses", flush=True
+    )
+
+
 def main() -> int:
     """Kill each verb in turn; a table of kills, those before the end, and losses."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -89,22 +101,24 @@ def main() -> int:
             begun = time.monotonic()
             subprocess.run([*PROGRAM, *words], check=True, stdout=-3, stderr=-3)
             spans[verb], before[verb] = time.monotonic() - begun, contents(path)
-        for kill in range(asked.kills):
-            verb = verbs[kill % len(verbs)]
-            words, path = known[verb]
-            made = subprocess.Popen([*PROGRAM, *words], stdout=-3, stderr=-3)
-            time.sleep(chance.uniform(0.3, 1.1) * spans[verb])
-            made.kill()
-            kills[verb] += 1
-            within[verb] += made.wait() < 0
-            if told := loss(path, before[verb]):
-                losses[verb] += 1
-                print(kill, verb, told, flush=True)
-        for verb in verbs:
-            print(
-                f"{verb:9}{kills[verb]:4} kills{within[verb]:4} before its end{losses[verb]:3} lost"
-            )
-    print(f"{asked.kills} kills, {losses.total()} losses")
+        try:
+            for kill in range(asked.kills):
+                verb = verbs[kill % len(verbs)]
+                words, path = known[verb]
+                made = subprocess.Popen([*PROGRAM, *words], stdout=-3, stderr=-3)
+                time.sleep(chance.uniform(0.3, 1.1) * spans[verb])
+                made.kill()
+                kills[verb] += 1
+                within[verb] += made.wait() < 0
+                if told := loss(path, before[verb]):
+                    losses[verb] += 1
+                    print(kill, verb, told, flush=True)
+                # A count that is cut off (it takes half an hour) still says how far it came.
+                if (kill + 1) % 20 == 0:
+                    tell(verbs, kills, within, losses)
+        except KeyboardInterrupt:
+            print("interrupted", flush=True)
+        tell(verbs, kills, within, losses)
     return 1 if losses else 0
 
 
