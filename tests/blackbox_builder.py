@@ -165,9 +165,9 @@ def _guess(predictor: int, place: int, rows: Sequence[Sequence[int]]) -> int:
     return 2 * last[place] - older[place] if predictor == 2 else _halved(last[place] + older[place])
 
 
-def frame(letter: str, rows: Sequence[Sequence[int]]) -> bytes:
+def frame(letter: str, rows: Sequence[Sequence[int]], fields: Sequence[Field] = FIELDS) -> bytes:
     """One frame of the loop: this row, the one before and the one before that."""
-    rules = [known.whole if letter == "I" else known.line for known in FIELDS]
+    rules = [known.whole if letter == "I" else known.line for known in fields]
     left = [
         _wrapped(int(rows[0][place]) - _guess(predictor, place, rows))
         for place, (predictor, _) in enumerate(rules)
@@ -188,16 +188,16 @@ def frame(letter: str, rows: Sequence[Sequence[int]]) -> bytes:
     return out
 
 
-def header(settings: Mapping[str, str] = SETTINGS) -> bytes:
+def header(settings: Mapping[str, str] = SETTINGS, fields: Sequence[Field] = FIELDS) -> bytes:
     """The text before the frames."""
     lines = [START, *(f"H {name}:{value}" for name, value in settings.items())]
     lines += [
-        "H Field I name:" + ",".join(known.name for known in FIELDS),
-        "H Field I signed:" + ",".join(str(known.signed) for known in FIELDS),
-        "H Field I predictor:" + ",".join(str(known.whole[0]) for known in FIELDS),
-        "H Field I encoding:" + ",".join(str(known.whole[1]) for known in FIELDS),
-        "H Field P predictor:" + ",".join(str(known.line[0]) for known in FIELDS),
-        "H Field P encoding:" + ",".join(str(known.line[1]) for known in FIELDS),
+        "H Field I name:" + ",".join(known.name for known in fields),
+        "H Field I signed:" + ",".join(str(known.signed) for known in fields),
+        "H Field I predictor:" + ",".join(str(known.whole[0]) for known in fields),
+        "H Field I encoding:" + ",".join(str(known.whole[1]) for known in fields),
+        "H Field P predictor:" + ",".join(str(known.line[0]) for known in fields),
+        "H Field P encoding:" + ",".join(str(known.line[1]) for known in fields),
         "H Field S name:flightModeFlags,stateFlags",
         "H Field S signed:0,0",
         "H Field S predictor:0,0",
@@ -206,22 +206,27 @@ def header(settings: Mapping[str, str] = SETTINGS) -> bytes:
     return "\n".join(lines).encode() + b"\n"
 
 
-def blackbox(columns: Mapping[str, np.ndarray], settings: Mapping[str, str] = SETTINGS) -> bytes:
+def blackbox(
+    columns: Mapping[str, np.ndarray],
+    settings: Mapping[str, str] = SETTINGS,
+    fields: Sequence[Field] = FIELDS,
+) -> bytes:
     """A flight with every second loop of a controller logged, as ``P interval:1/2`` says.
 
-    Fields that are not given are zero; ``loopIteration`` is made here.
+    Fields that are not given are zero; ``loopIteration`` is made here. The motors stand where
+    those of `FIELDS` do.
     """
     n = len(columns["time"])
-    table = np.zeros((n, len(FIELDS)), np.int64)
-    for place, known in enumerate(FIELDS):
+    table = np.zeros((n, len(fields)), np.int64)
+    for place, known in enumerate(fields):
         if known.name in columns:
             table[:, place] = columns[known.name]
     table[:, 0] = 2 * np.arange(n)
     rows = table.tolist()
-    out = [header(settings), b"S" + unsigned(2) + unsigned(0)]
+    out = [header(settings, fields), b"S" + unsigned(2) + unsigned(0)]
     last = older = rows[0]
     for row in rows:
         whole = row[0] % INTERVAL == 0
-        out.append(frame("I" if whole else "P", (row, last, older)))
+        out.append(frame("I" if whole else "P", (row, last, older), fields))
         last, older = row, row if whole else last
     return b"".join([*out, END])
