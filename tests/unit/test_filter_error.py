@@ -12,9 +12,11 @@ import flightid as fid
 from flightid import _native
 from flightid.errors import FitError
 from flightid.identification.filter_error import search
+from flightid.identification.filter_error.gust_score import Score, score
 from flightid.identification.filter_error.gusts import Gust
 from flightid.identification.filter_error.innovations import FilteredData, InnovationsProblem
 from flightid.identification.filter_error.steady_filter import ContinuousPoint, steady_filter
+from flightid.identification.multistart import DenseEnd
 from tests.closeness import assert_close
 from tests.regression_flights import fly, noisy, short_period, values
 from tests.strangers import gusts
@@ -140,15 +142,58 @@ def test_slopes_of_a_gust_are_exact() -> None:
         assert_close(gradient[place], central, rtol=2e-6, atol=1e-6, why="central differences")
 
 
+def test_the_score_of_a_gust_is_the_slope_by_its_density() -> None:
+    """Central differences of a likelihood that is even in the deviation; the null's own size."""
+    problem, start = _problem(short_period())
+    gust = Gust(0, np.array([True, True]), np.array([False, False, True]), 0.02, 0.4)
+    gusty = replace(problem, gust=gust)
+    found = gusty.residuals(np.concatenate([start, [-6.0, 0.0]]), with_slopes=True)
+    end = DenseEnd(start, float(found[0] @ found[0]), 0, "step", found[0], found[1][:, :-2])
+    scored = score(gusty, end)
+
+    def cost(square: float) -> float:
+        logs = [0.5 * np.log(square), 0.0]
+        moved, _ = gusty.residuals(np.concatenate([start, logs]), with_slopes=False)
+        return float(moved @ moved)
+
+    by_square = found[1][:, -2] / (2.0 * np.exp(-12.0))
+    central = (cost(1.1e-5) - cost(0.9e-5)) / 2e-6
+    assert_close(2.0 * by_square @ found[0], central, rtol=2e-3, why="slope at 6e-6, not 1e-5")
+    # What the step of all unknowns would gain, less what the step without a gust would.
+    both = np.column_stack([end.jacobian, by_square])
+    left = [
+        r @ r
+        for r in (
+            found[0] - j @ np.linalg.lstsq(j, found[0], rcond=1e-12)[0]
+            for j in (both, end.jacobian)
+        )
+    ]
+    wanted = problem.n_measured * (left[1] - left[0]) / end.cost
+    assert abs(scored.gain) >= wanted * (1.0 - 1e-6)
+
+
 def test_a_gust_felt_as_the_velocity_is_found_and_unbends_its_derivatives() -> None:
     """SciPy's flight in Dryden's gust: white noise alone misses Zw by five standard errors."""
-    record, starts = gusts.flight(4, 1.0, 0.3), []
+    record, starts, scored = gusts.flight(4, 1.0, 0.3), [], []
+    kept, test = search.minimise, search.score
     with pytest.MonkeyPatch.context() as patch:
-        kept = search.minimise
         patch.setattr(search, "minimise", lambda *a, **b: starts.append(a[1]) or kept(*a, **b))
+        patch.setattr(search, "score", lambda *a: scored.append(test(*a)) or scored[-1])
         fit = fid.identify(gusts.model(), record, method="filter_error")
+    # Three candidates are told apart without a search: one of them alone is searched for.
+    assert len(scored) == 3
+    assert sorted(each.gain for each in scored)[1] < 4.0 < 30.0 < scored[0].gain
+    tried = [x for x in starts if len(x) == len(scored[0].start)]
+    assert np.array_equal(tried[0], scored[0].start)
+    with pytest.MonkeyPatch.context() as patch:  # a step that leads nowhere: anew, hardly any noise
+        patch.setattr(search, "minimise", lambda *a, **b: starts.append(a[1]) or kept(*a, **b))
+        patch.setattr(search, "score", lambda *a: _led_astray(test(*a)))
+        anew = fid.identify(gusts.model(), record, method="filter_error")
     begun = [each.value for each in gusts.model().parameters.free]
     assert any(np.array_equal(x[:5], begun) and np.all(x[5:7] < -6.0) for x in starts)
+    for name in gusts.TRUTH:
+        one, other = fit.parameters[name], anew.parameters[name]
+        assert abs(one.value - other.value) < 0.01 * one.stderr
     white = fid.identify(gusts.model(), record, method="filter_error", gust_states=False)
     heave, bent = fit.parameters["Zw"], white.parameters["Zw"]
     truth = gusts.TRUTH["Zw"]
@@ -164,3 +209,10 @@ def test_a_gust_felt_as_the_velocity_is_found_and_unbends_its_derivatives() -> N
     tests = fid.residual_tests(fit)
     assert tests.horizon == "one step ahead"
     assert all(test.counts for test in tests.tests)
+
+
+def _led_astray(scored: Score) -> Score:
+    """The same test, its step to where all noise is as large as it may be."""
+    start = scored.start.copy()
+    start[5:] = np.append(scored.problem.reach[:-2], [6.0, -6.0])
+    return replace(scored, start=start)

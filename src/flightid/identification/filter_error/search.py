@@ -9,7 +9,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.identification.filter_error.gusts import GUST_UNKNOWNS, candidates
+from flightid.identification.filter_error.gust_score import Score, score
+from flightid.identification.filter_error.gusts import GUST_UNKNOWNS, Gust, candidates
 from flightid.identification.filter_error.innovations import InnovationsProblem
 from flightid.identification.multistart import DenseEnd
 from flightid.identification.records.held_model import LinearPoint
@@ -23,6 +24,8 @@ CALM = -3.0
 """Logarithm of all process noise, over its first guess, below which there may be none."""
 STILL = 0.7
 """Part of its reach by which all process noise is lowered where a gust is tried in its place."""
+REACHED = 5.0
+"""Times its score test's gain that a search for a gust may gain: where one paid, up to 2.3."""
 NEAR = 0.01
 """Gain of a last step in −2 ln p before gusts are tried or left: far less than they must gain."""
 
@@ -88,17 +91,20 @@ def with_gust(
 ) -> tuple[InnovationsProblem, list[list[DenseEnd]]]:
     """The problem and its ends, with a gust state where the likelihood asks for one.
 
-    Each candidate continues from the best end for a few iterations, and begins anew with hardly any
-    white noise: at the former it explains the gust, and where it has run to its reach nothing moves
-    it, so that half of that is the most. The likeliest goes on until it is `NEAR` its end, and to
-    that end if it gains more than its two unknowns may by chance (BIC): it replaces all others
-    then. A test of the innovations alone would not do: a gust as long as the vehicle's own motion
-    bends its derivatives and leaves hardly any colour. Nothing is tried where no state has noise.
-    An end that is only `NEAR` is followed to its end where no gust replaces it.
+    At the best end a score test tells of each candidate, without a search, how far −2 ln p falls
+    as the gust grows from nothing. A search gains up to a few times that: candidates whose gain
+    times `REACHED` does not pay for their unknowns, or is below what a likelier one gained, are
+    left. The others begin where the test's own step leads, and anew with hardly any white noise
+    where that did not pay. The likeliest goes on until it is `NEAR` its end, and to that end if it
+    gains more than its two unknowns may by chance (BIC): it replaces all others then. A test of the
+    innovations' colour would not do: a gust as long as the vehicle's own motion bends its
+    derivatives and leaves hardly any colour. Nothing is tried where no state has noise. An end that
+    is only `NEAR` is followed to its end where no gust replaces it.
 
     Reference
     ---------
-    Schwarz (1978), Annals of Statistics 6; Ljung, *System Identification*, 2nd ed., §16.4.
+    Schwarz (1978), Annals of Statistics 6; Ljung, *System Identification*, 2nd ed., §16.4; Rao
+    (1948), Proc. Cambridge Philosophical Society 44 (score test).
     """
     noisy = slice(problem.n_free, problem.n_free + len(problem.noisy))
     if np.all(groups[0][0].x[noisy] < CALM):
@@ -106,34 +112,55 @@ def with_gust(
     end = groups[0][0]
     if np.all(end.x[noisy] <= -problem.reach[: len(problem.noisy)] + 1e-6):
         return problem, groups
+    needed = GUST_UNKNOWNS * math.log(problem.n_measured)
+    scored = [score(replace(problem, gust=gust), end) for gust in _gusts(problem, end)]
+    best: tuple[float, InnovationsProblem, DenseEnd] | None = None
+    for each in sorted(scored, key=lambda each: -each.gain):
+        if REACHED * each.gain < max(needed, best[0] if best else 0.0):
+            break
+        found = _tried(each, end, needed, limits)
+        if found is not None and (best is None or found[0] > best[0]):
+            best = (found[0], each.problem, found[1])
+    if best is None:
+        return problem, _followed(problem, groups, limits)
+    _, tried, begun = best
+    if not begun.is_converged:
+        begun = minimise(tried, begun.x, limits, enough=NEAR)
+    if _gained(tried, end, begun) <= needed:
+        return problem, _followed(problem, groups, limits)
+    return tried, [[minimise(tried, begun.x, limits)]]
+
+
+def _gusts(problem: InnovationsProblem, end: DenseEnd) -> list[Gust]:
+    """Candidates, by the motion that the filter sees."""
     filtered = [found for found, _ in problem.records(end.x, with_slopes=False)]
     values = problem.model.parameters.independent_values()
     values[problem.model.parameters.free_indices] = end.x[: problem.n_free]
     states = np.sqrt(np.mean([np.var(each.states, axis=0) for each in filtered], axis=0))
     step = min(each.sample_time_s for each in problem.data)
     longest = max(each.outputs.shape[1] * each.sample_time_s for each in problem.data)
-    here = end.x.copy()
-    here[noisy] = np.minimum(here[noisy], 0.5 * problem.reach[: len(problem.noisy)])
-    calm = here.copy()
+    return candidates(LinearPoint.of(problem.model, values), states, step, longest)
+
+
+def _tried(
+    scored: Score, end: DenseEnd, needed: float, limits: SearchBounds
+) -> tuple[float, DenseEnd] | None:
+    """What a few iterations gain in −2 ln p, from the test's step and, where needed, anew."""
+    problem, found = scored.problem, []
+    calm = end.x.copy()
     calm[: problem.n_free] = [each.value for each in problem.model.parameters.free]
-    calm[noisy] = -STILL * problem.reach[: len(problem.noisy)]
-    trials = []
-    for gust in candidates(LinearPoint.of(problem.model, values), states, step, longest):
-        tried = replace(problem, gust=gust)
-        for x in (here, calm):
-            start = np.concatenate([x, np.zeros(GUST_UNKNOWNS)])
-            if np.all(np.isfinite(tried.residuals(start, with_slopes=False)[0])):
-                first = minimise(tried, start, limits, iterations=TRIAL_ITERATIONS, enough=NEAR)
-                trials.append((tried, first))
-    if not trials:
-        return problem, _followed(problem, groups, limits)
-    tried, begun = min(trials, key=lambda trial: trial[1].cost)
-    if not begun.is_converged:
-        begun = minimise(tried, begun.x, limits, enough=NEAR)
-    total = problem.n_measured
-    if total * np.log(end.cost / begun.cost) <= GUST_UNKNOWNS * np.log(total):
-        return problem, _followed(problem, groups, limits)
-    return tried, [[minimise(tried, begun.x, limits)]]
+    calm[problem.n_free :][: len(problem.noisy)] = -STILL * problem.reach[: len(problem.noisy)]
+    for start in (scored.start, np.concatenate([calm, np.zeros(GUST_UNKNOWNS)])):
+        if np.all(np.isfinite(problem.residuals(start, with_slopes=False)[0])):
+            tried = minimise(problem, start, limits, iterations=TRIAL_ITERATIONS, enough=NEAR)
+            found.append((_gained(problem, end, tried), tried))
+            if found[-1][0] > needed:
+                break
+    return max(found, key=lambda each: each[0]) if found else None
+
+
+def _gained(problem: InnovationsProblem, end: DenseEnd, tried: DenseEnd) -> float:
+    return problem.n_measured * math.log(end.cost / tried.cost)
 
 
 def _followed(
