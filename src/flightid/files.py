@@ -146,3 +146,24 @@ def flush(path: Path) -> None:
         os.fsync(handle)
     finally:
         os.close(handle)
+
+
+def process_lives(process: int) -> bool:
+    """Whether a process of this machine lives, one of another user too.
+
+    On Windows a signal 0 would end it: there every process is taken for living.
+
+    Example
+    -------
+    >>> process_lives(os.getpid())
+    True
+    """
+    if os.name == "nt":
+        return True
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except OSError:
+        return True
+    return True

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import IO
 
 from flightid.errors import OptionError
-from flightid.files import STALE_S
+from flightid.files import STALE_S, process_lives
 
 NO_LINK: int = getattr(os, "O_NOFOLLOW", 0)
 BINARY: int = getattr(os, "O_BINARY", 0)
@@ -161,20 +161,8 @@ def clear_left(folder: Path) -> None:
             continue
         with suppress(OSError):
             aged = time.time() - entry.stat(follow_symlinks=False).st_mtime > STALE_S
-            if aged or not _lives(int(made[1])):
+            if aged or not process_lives(int(made[1])):
                 Path(entry.path).unlink()
-
-
-def _lives(process: int) -> bool:
-    if os.name == "nt":
-        return True  # there a signal 0 ends the process; an hour of silence tells
-    try:
-        os.kill(process, 0)
-    except (ProcessLookupError, OverflowError):
-        return False
-    except PermissionError:
-        return True
-    return True
 
 
 def shown_name(path: Path | str) -> str:

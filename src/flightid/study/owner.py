@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 from flightid.errors import FileFormatError
+from flightid.files import process_lives
 from flightid.reading import bounded_bytes, parse_json
 
 OWNER = ".owner.json"
@@ -38,14 +39,4 @@ def is_owned(folder: Path) -> bool:
     is_here = isinstance(note, dict) and note.get("machine") == platform.node()
     if not is_here or not isinstance(process, int) or os.name == "nt":
         return time.time() - folder.stat().st_mtime < UNKNOWN_S
-    return _lives(process)
-
-
-def _lives(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except (ProcessLookupError, OverflowError):
-        return False
-    except OSError:
-        return True
-    return True
+    return process_lives(process)
