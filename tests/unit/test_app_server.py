@@ -5,8 +5,10 @@ from __future__ import annotations
 import asyncio
 import http.client
 import json
+import os
 import re
 import shutil
+import signal
 import threading
 import time
 from collections.abc import Iterator
@@ -265,6 +267,24 @@ def test_a_tuning_holds_up_neither_a_comparison_nor_a_plan(tmp_path: Path) -> No
         return done
 
     assert asyncio.run(asked())[-1] == "tuned"
+
+
+def test_a_worker_killed_without_work_is_replaced(tmp_path: Path) -> None:
+    async def asked(workers: Workers) -> int:
+        process, refusal, _ = await workers.live(os.getpid)
+        assert not refusal
+        return int(process)
+
+    async def killed() -> list[int]:
+        workers, processes = Workers(Workspace(tmp_path)), []
+        for _ in range(2):
+            processes.append(await asked(workers))
+            os.kill(processes[-1], signal.SIGKILL)
+        processes.append(await asked(workers))
+        await asyncio.to_thread(workers.stop)
+        return processes
+
+    assert len(set(asyncio.run(killed()))) == 3
 
 
 def test_any_field_is_drawn_at_any_zoom(browser: Browser, flown: Flown) -> None:

@@ -9,17 +9,18 @@ from __future__ import annotations
 
 import asyncio
 import json
-import multiprocessing
 import os
 from collections.abc import Callable
 from concurrent.futures import CancelledError, Future
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from pebble import ProcessExpired, ProcessPool
+from pebble import ProcessExpired
 
 from flightid.app import run_work, work
+from flightid.app.crew import Crew
 from flightid.app.kept_parts import kept_part
 from flightid.app.own_folders import own_folder, read_plain
 from flightid.app.schemas import Job
@@ -72,14 +73,8 @@ class Workers:
         self._futures: dict[str, Future[Any]] = {}
         self._listeners: list[Listener] = []
         self._loop: asyncio.AbstractEventLoop | None = None
-        # A process of its own state: a fork of one with threads may hold a lock for good.
-        context = multiprocessing.get_context("spawn")
-        made: dict[str, Any] = {"context": context, "initializer": work.limit_memory}
-        self._live = ProcessPool(max_workers=1, **made)
-        self._tuning = ProcessPool(max_workers=1, **made)
-        self._compared = ProcessPool(max_workers=1, **made)
-        self._planned = ProcessPool(max_workers=1, **made)
-        self._long = ProcessPool(max_workers=max(1, (os.cpu_count() or 2) - 1), **made)
+        self._live, self._tuning, self._compared, self._planned = (Crew() for _ in range(4))
+        self._long = Crew(max(1, (os.cpu_count() or 2) - 1))
         self._folder = own_folder(workspace.folder, ".flightid", "jobs")
         for job in _interrupted(self._folder):
             self._jobs[job.id] = job
@@ -87,16 +82,16 @@ class Workers:
     def start(self) -> None:
         """Load the workers before anybody waits for them; call it inside the event loop."""
         self._loop = asyncio.get_running_loop()
-        for pool in (self._live, self._long):
-            pool.schedule(work.warm)
+        for crew in (self._live, self._long):
+            crew.schedule(work.warm)
 
     def stop(self) -> None:
         """End all processes."""
-        pools = (self._live, self._tuning, self._compared, self._planned, self._long)
-        for pool in pools:
-            pool.stop()
-        for pool in pools:
-            pool.join()
+        crews = (self._live, self._tuning, self._compared, self._planned, self._long)
+        for crew in crews:
+            crew.stop()
+        for crew in crews:
+            crew.join()
 
     def listen(self, listener: Listener) -> Callable[[], None]:
         """Hear of every change of a job; returns what ends it."""
@@ -131,7 +126,7 @@ class Workers:
             return
         write_atomically(self._folder / f"{name}.json", job.model_dump_json())
         self._jobs[name] = job
-        future = self._long.schedule(work.answered, args=inputs, timeout=LONGEST_S)
+        future = self._long.schedule(work.answered, *inputs, timeout_s=LONGEST_S)
         self._futures[name] = future
         self._tell(job)
         future.add_done_callback(lambda done: self._soon(self._ended, name, done))
@@ -172,7 +167,7 @@ class Workers:
             return
         try:
             _, refusal, _ = future.result()
-        except (CancelledError, TimeoutError, ProcessExpired) as error:
+        except (CancelledError, TimeoutError, ProcessExpired, BrokenProcessPool) as error:
             refusal = f"the work ended early: {type(error).__name__}"
         except Exception as error:
             refusal = f"a fault in flightid: {type(error).__name__}: {error}"
@@ -191,17 +186,21 @@ class Workers:
 
 
 async def _awaited(
-    pool: ProcessPool, patience_s: float, call: Callable[..., Any], *inputs: object
+    crew: Crew, patience_s: float, call: Callable[..., Any], *inputs: object
 ) -> tuple[Any, str, float]:
-    """Result of a call in a pool, or the sentence of its refusal."""
-    future = pool.schedule(work.answered, args=(call, *inputs), timeout=patience_s)
-    try:
-        made: tuple[Any, str, float] = await asyncio.wrap_future(future)
-    except TimeoutError:
-        return None, f"This took more than {patience_s:.0f} s and was ended.", patience_s
-    except ProcessExpired:
-        return None, "The worker ended; the file may need more memory than is allowed.", 0.0
-    return made
+    """Result of a call in a process, or the sentence of its refusal."""
+    for _ in range(2):
+        future = crew.schedule(work.answered, call, *inputs, timeout_s=patience_s)
+        try:
+            made: tuple[Any, str, float] = await asyncio.wrap_future(future)
+        except TimeoutError:
+            return None, f"This took more than {patience_s:.0f} s and was ended.", patience_s
+        except ProcessExpired:
+            return None, "The worker ended; the file may need more memory than is allowed.", 0.0
+        except BrokenProcessPool:
+            continue  # a worker was killed while it had no work: another takes this
+        return made
+    return None, "The worker was ended twice.", 0.0
 
 
 def _interrupted(folder: Path) -> list[Job]:
