@@ -1,0 +1,228 @@
+"""Every screen of one flight in Chromium, by keyboard: gains, flight after, plan, model, report.
+
+Each is looked at as axe-core does, in both colours; each control is reached by Tab; on a phone
+nothing is wider than the screen.
+"""
+
+from __future__ import annotations
+
+import tomllib
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from flightid.control.autopilots.parameter_files import read_parameters
+from flightid.vehicles import Autopilot, PilotDoublet, SidActivation, fly
+from flightid.vehicles.ardupilot_log import write_ardupilot_log
+from tests.reference.test_app_in_browser import WAIT_MS, Desk, Window, _findings, desk
+
+__all__ = ["desk"]
+SLOW_MS = 5 * WAIT_MS
+MOST_TABS = 500
+PHONE = {"width": 390, "height": 844}
+REACHED = """() => { window.reached = new Set();
+  document.addEventListener("focusin", (event) => window.reached.add(event.target)); }"""
+AT_THE_END = "document.activeElement === document.body"
+LEFT = """() => {
+  const can = "a[href], button, input, select, summary, textarea, [role=slider], [role=button]";
+  const seen = (each) =>
+    each.checkVisibility({ visibilityProperty: true }) && each.getClientRects().length;
+  const told = (each) =>
+    (each.getAttribute("aria-label") || each.textContent || each.id || each.tagName).trim();
+  const all = [...document.querySelectorAll("body *")].filter(seen);
+  const controls = all.filter((each) => each.matches(can) && !each.disabled);
+  const pressed = all.filter((each) =>
+    ["pointer", "ew-resize", "grab"].includes(getComputedStyle(each).cursor)
+    && !each.closest(`${can}, label, [tabindex='0']`) && !each.querySelector(can));
+  return [...controls.filter((each) => !window.reached.has(each)), ...pressed].map(told);
+}"""
+CROWDED = """() => document.documentElement.scrollWidth - document.documentElement.clientWidth"""
+
+
+def _flown(folder: Path, name: str, gains: Path | None = None) -> Path:
+    """A flight of the rig's quadrotor: roll swept for half a minute, then moved by stick."""
+    sweep = SidActivation(
+        axis=10, start_s=5.0, magnitude=0.15, start_hz=0.15, stop_hz=12.0,
+        fade_in_s=3.0, record_s=30.0, fade_out_s=1.0, leave_after_s=40.0,
+    )  # fmt: skip
+    sticks = [
+        PilotDoublet("roll", start_s=47.0 + 3.37 * k, amplitude=0.25, width_s=0.3 + 0.25 * (k % 3))
+        for k in range(10)
+    ]
+    autopilot = Autopilot().with_parameters({} if gains is None else read_parameters(gains))
+    flight = fly(runs=[sweep], doublets=sticks, autopilot=autopilot, log_every=2, seed=1)
+    return write_ardupilot_log(flight, folder / name)
+
+
+def _looked_at(page: Any) -> list[str]:
+    """What is wrong with a screen: findings of axe, controls out of reach, a phone too narrow."""
+    said = _findings(page)
+    page.evaluate(REACHED)
+    for _ in range(2):  # to the end, and once around
+        for _ in range(MOST_TABS):
+            page.keyboard.press("Tab")
+            if page.evaluate(AT_THE_END):
+                break
+    said += [f"not reached by Tab: {each}" for each in page.evaluate(LEFT)]
+    wide = page.viewport_size
+    page.set_viewport_size(PHONE)
+    page.wait_for_timeout(300)
+    if more := page.evaluate(CROWDED):
+        said.append(f"{more} px wider than a phone")
+    page.set_viewport_size(wide)
+    return [f"{page.url.split('/')[4]}: {each}" for each in said]
+
+
+def _study(desk: Desk, name: str) -> tuple[str, dict[str, Any]]:
+    """A log by its name, and its study."""
+    (log,) = (desk.folder / "logs").glob(f"*/{name}")
+    text = (desk.folder / "studies" / f"{log.parent.name}.toml").read_text("utf-8")
+    return log.parent.name, tomllib.loads(text)
+
+
+def _opened(page: Any, screen: str) -> None:
+    page.locator("nav a", has_text=screen).press("Enter")
+
+
+def _saved(page: Any, button: str, folder: Path) -> Path:
+    """What a button or link downloads, pressed by keyboard."""
+    with page.expect_download() as told:
+        page.get_by_text(button, exact=True).press("Enter")
+    target = folder / str(told.value.suggested_filename)
+    told.value.save_as(target)
+    return target
+
+
+def _watched(desk: Desk, place: str = "") -> Window:
+    window = desk.open(place)
+    window.page.set_default_timeout(SLOW_MS)
+    return window
+
+
+def test_from_a_dropped_log_to_gains_and_the_flight_with_them(desk: Desk, tmp_path: Path) -> None:
+    """Without typing: flown, tuned, downloaded, flown again, compared with what was promised."""
+    window = _watched(desk)
+    page = window.page
+    page.wait_for_selector(".drop")
+    page.set_input_files("input[type=file]", _flown(tmp_path, "first.bin"))
+    page.wait_for_selector(".cards")
+    page.locator(".sweep").first.press("Enter")
+    page.get_by_role("button", name="fit Roll rate").wait_for()
+    said = _looked_at(page)
+    _opened(page, "Gains")
+    page.get_by_role("button", name="Download step 1").wait_for()
+    step = _saved(page, "Download step 1 of 2", tmp_path)
+    new, old = read_parameters(step), read_parameters(_saved(page, "Its way back", tmp_path))
+    assert set(old) == set(new)
+    assert old["ATC_RAT_RLL_P"] == pytest.approx(0.09)
+    assert new["ATC_RAT_RLL_P"] > 1.1 * old["ATC_RAT_RLL_P"]
+    said += _looked_at(page)
+    # At the end of its slider: red, and nothing to download on the page or behind it.
+    slider = page.locator("input[type=range]").first
+    name = str(slider.get_attribute("id")).removeprefix("slider-")
+    slider.press("End")
+    page.get_by_text("not met:").wait_for()
+    page.get_by_text("Nothing to download").wait_for()
+    log, study = _study(desk, "first.bin")
+    assert name in study["tune"]["by_hand"]
+    assert not page.get_by_role("button", name="Download step").count()
+    assert page.evaluate(f"fetch('/api/studies/{log}/gains').then((told) => told.status)") == 422
+    said += _findings(page)
+    page.get_by_role("button", name="As found").press("Enter")
+    page.get_by_role("button", name="Download step 1").wait_for()
+    assert _saved(page, "Download step 1 of 2", tmp_path).read_bytes() == step.read_bytes()
+    said += _compared(page, _flown(tmp_path, "second.bin", step), tmp_path)
+    said += _planned(page)
+    assert said == []
+    assert all("422" in each for each in window.complaints)
+    page.close()
+
+
+def _compared(page: Any, second: Path, folder: Path) -> list[str]:
+    """The flight with step 1 beside what the model promises of it, then beside the one before."""
+    _opened(page, "Compare")
+    page.locator("select[aria-label='Flight after']").wait_for()
+    page.set_input_files("input[type=file]", second)
+    page.locator("section[aria-label=Verdict]").wait_for()
+    assert page.locator("section[aria-label=Numbers] tbody tr").count() >= 4
+    assert "ATC_RAT_RLL_P" in _saved(page, "Download the way back", folder).read_text("utf-8")
+    said = _looked_at(page)
+    page.get_by_role("button", name="how it flew").press("Enter")
+    page.get_by_text("before (95 %)").wait_for()
+    return said + _findings(page)
+
+
+def _planned(page: Any) -> list[str]:
+    """The next flight: an amplitude typed, its card; a sweep too small is no-go."""
+    _opened(page, "Plan")
+    amplitude = page.locator("td[data-label=Amplitude]")
+    amplitude.first.wait_for()
+    page.fill("#amplitude", "0.05")
+    page.press("#amplitude", "Tab")
+    amplitude.filter(has_text="0.05 of full").first.wait_for()
+    said = _looked_at(page)
+    with page.expect_popup() as told:
+        page.get_by_role("link", name="The card to print").press("Enter")
+    told.value.wait_for_load_state()
+    assert "0.05 of full" in told.value.inner_text("body")
+    told.value.close()
+    page.fill("#amplitude", "0.0001")
+    page.press("#amplitude", "Tab")
+    page.locator("h1", has_text="no-go").wait_for()
+    assert not page.locator("section[aria-label='To take along'] button").count()
+    page.locator("section[aria-label='What is asked for'] button", has_text="Undo").press("Enter")
+    amplitude.filter(has_text="0.05 of full").first.wait_for()
+    return said
+
+
+def test_from_a_cell_of_a_model_to_its_report(desk: Desk, tmp_path: Path) -> None:
+    """A start value edited, a faulty line told, the study run, read, and taken as one zip."""
+    log, _ = _study(desk, "first.bin")
+    window = _watched(desk, f"#/model/{log}")
+    page = window.page
+    cell = page.locator("table input[type=number], table input[type=text]").first
+    cell.wait_for()
+    name = str(cell.get_attribute("aria-label")).removeprefix("Start of ")
+    before = cell.input_value()
+    cell.fill("1e9")
+    cell.press("Tab")
+    page.locator("td .error", has_text="outside its bounds").wait_for()
+    cell.fill(str(0.9 * float(before)))
+    cell.press("Tab")
+    page.locator("pre .changed", has_text=name).wait_for()
+    kept = _study(desk, "first.bin")[1]["model"][0]["parameters"]
+    assert kept[name]["value"] == pytest.approx(0.9 * float(before))
+    page.locator("[aria-label='Prediction'] canvas").first.wait_for()
+    page.locator("summary", has_text="A model of your own").press("Enter")
+    own = page.get_by_label("Model file", exact=True)
+    own.fill(own.input_value().replace('unit = "s"', 'unit = "m"'))
+    page.locator("#own-said .error", has_text="Line").wait_for()
+    said = _looked_at(page)
+    page.get_by_role("button", name="Undo").press("Enter")
+    page.locator("pre", has_text=f"{name} = {{").wait_for(state="detached")
+    page.get_by_role("button", name="Fit and verify").press("Enter")
+    page.get_by_role("group", name="Part of the fit").wait_for()
+    said += _findings(page)
+    _opened(page, "Verify")
+    parts = page.get_by_role("group", name="Part", exact=True).get_by_role("button")
+    parts.first.wait_for()
+    for k in range(parts.count()):
+        parts.nth(k).press("Enter")
+        page.locator("main figure .js-plotly-plot, main table").first.wait_for()
+        said += _looked_at(page) if k == 0 else _findings(page)
+    _opened(page, "Report")
+    page.get_by_role("link", name="Open the report").wait_for()
+    said += _looked_at(page)
+    packed = zipfile.ZipFile(_saved(page, "Everything as one zip", tmp_path))
+    assert f"studies/{log}.toml" in packed.namelist()
+    assert any(each.endswith("report.html") for each in packed.namelist())
+    with page.expect_popup() as told:
+        page.get_by_role("link", name="Open the report").press("Enter")
+    told.value.wait_for_load_state()
+    assert told.value.locator("h1").first.inner_text()
+    told.value.close()
+    assert said == []
+    assert not window.complaints
+    page.close()
