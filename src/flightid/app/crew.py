@@ -7,8 +7,9 @@ refuses everything until the server ends.
 from __future__ import annotations
 
 import multiprocessing
+import threading
 from collections.abc import Callable
-from concurrent.futures import Future
+from concurrent.futures import Future, InvalidStateError
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from typing import Any
@@ -16,6 +17,9 @@ from typing import Any
 from pebble import ProcessPool
 
 from flightid.app import work
+
+WATCH_S = 0.5
+"""Between looks at pools that may have broken."""
 
 
 class Crew:
@@ -29,36 +33,60 @@ class Crew:
 
     def __init__(self, size: int = 1) -> None:
         self._size = size
-        self._pool = self._begun()
+        self._lock = threading.Lock()
+        self._begun: dict[Future[Any], ProcessPool] = {}
+        self._ended = threading.Event()
+        self._pool = self._made()
+        threading.Thread(target=self._watch, daemon=True).start()
 
     def schedule(
         self, call: Callable[..., Any], *inputs: object, timeout_s: float | None = None
     ) -> Future[Any]:
         """Begin work; its future fails as those of pebble do: TimeoutError, ProcessExpired.
 
+        It fails with BrokenProcessPool where a process was killed before it took the work.
+
         Raises
         ------
         BrokenProcessPool
             Processes cannot be started at all.
         """
-        for _ in range(2):
-            with suppress(RuntimeError):
-                future: Future[Any] = self._pool.schedule(call, args=inputs, timeout=timeout_s)
-                return future
-            self.stop()
-            self.join()
-            self._pool = self._begun()
+        with self._lock:
+            for _ in range(2):
+                with suppress(RuntimeError):
+                    future: Future[Any] = self._pool.schedule(call, args=inputs, timeout=timeout_s)
+                    self._begun[future] = self._pool
+                    return future
+                self._replace()
         raise BrokenProcessPool("no worker can be started")
 
     def stop(self) -> None:
         """End all of them, with what they do; `join` waits for it."""
+        self._ended.set()
         self._pool.stop()
 
     def join(self) -> None:
         """Wait until all that were stopped have ended."""
         self._pool.join()
 
-    def _begun(self) -> ProcessPool:
+    def _watch(self) -> None:
+        """Fail what a broken pool has taken: of its queue nothing is ever heard again."""
+        while not self._ended.wait(WATCH_S):
+            with self._lock:
+                self._begun = {f: pool for f, pool in self._begun.items() if not f.done()}
+                lost = [future for future, pool in self._begun.items() if not pool.active]
+                if lost and not self._ended.is_set() and not self._pool.active:
+                    self._replace()
+            for future in lost:
+                with suppress(InvalidStateError):
+                    future.set_exception(BrokenProcessPool("a worker was killed"))
+
+    def _replace(self) -> None:
+        self._pool.stop()
+        self._pool.join()
+        self._pool = self._made()
+
+    def _made(self) -> ProcessPool:
         # A process of its own state: a fork of one with threads may hold a lock for good.
         context = multiprocessing.get_context("spawn")
         return ProcessPool(max_workers=self._size, context=context, initializer=work.limit_memory)
