@@ -66,3 +66,8 @@ class Light(StrEnum):
     AMBER = "amber"
     RED = "red"
     UNKNOWN = "unknown"
+
+    @property
+    def words(self) -> str:
+        """What people read: ``"not judged"`` where scripts read ``"unknown"``."""
+        return "not judged" if self is Light.UNKNOWN else self.value

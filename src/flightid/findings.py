@@ -59,7 +59,7 @@ class Finding:
 
     def __str__(self) -> str:
         """Verdict, message and action on one line."""
-        return f"[{self.light}] {self.message}" + (f" — {self.action}" if self.action else "")
+        return f"[{self.light.words}] {self.message}" + (f" — {self.action}" if self.action else "")
 
     def to_dict(self) -> dict[str, str]:
         """Plain values.

@@ -176,7 +176,11 @@ def test_sampled_models_are_turned_to_continuous_time() -> None:
     late = fid.PolynomialModel(("u",), "y", 0.1, f=[[1, -0.5]], b=[[0.0, 0.0, 0.0, 1.0]])
     delays = [m.named.character for m in fid.modes(late) if m.root == 0.0]
     assert delays == ["delay of one sample"] * len(delays)
-    assert delays
+    assert len(delays) == 3
+    rows = fid.modes(late).table().rows
+    assert [(row[0], row[-1]) for row in rows[1:]] == [
+        ("3 poles at the origin", "delays of one sample each")
+    ]
 
 
 def test_black_box_fits_have_intervals_like_their_roots() -> None:

@@ -294,6 +294,14 @@ def test_a_missing_file_is_named(folder: Path) -> None:
     text = units_in_mat(LINEAR).replace("rig.mat", "gone.mat")
     with pytest.raises(StudyError, match="the file of record 'unseen' is not there"):
         fid.run_study(written(folder, text), output=folder / "gone")
+    # What makes records is named where the study's own first lines name it, all files in one error.
+    opened = "# A rig.\n# `python fly.py records` writes\n# them.\n" + text.replace(
+        "rig.csv", "lost.csv"
+    )
+    said = re.escape(f"making them (cd {folder} && python fly.py records), or correct path")
+    with pytest.raises(StudyError, match=said) as raised:
+        fid.run_study(written(folder, opened), output=folder / "gone")
+    assert str(raised.value).count("python fly.py") == 1
 
 
 @pytest.mark.usefixtures("no_report")

@@ -43,7 +43,7 @@ def note_of(made: Proposal) -> None:
     for text in made.said:
         note(text)
     for finding in made.findings:
-        note(f"{finding.light}: {finding.message}")
+        note(f"{finding.light.words}: {finding.message}")
 
 
 def is_study(files: Sequence[Path]) -> bool:

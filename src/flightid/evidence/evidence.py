@@ -203,7 +203,7 @@ class Evidence(Result, schema="flightid.evidence/1"):
     def lines(self) -> tuple[str, ...]:
         """The light, every reason for which it is not green, and limits, one a line."""
         reasons = [f for f in self.findings if f.light is not Light.GREEN]
-        said = [f"[{f.light}] {f.message}" for f in reasons]
+        said = [f"[{f.light.words}] {f.message}" for f in reasons]
         return (f"Light: {self.light}.", *said, *(f"{limit}." for limit in self.limits))
 
     @property

@@ -15,7 +15,7 @@ def verdict_lines(findings: Iterable[Finding]) -> str:
     given: set[str] = set()
     lines = []
     for finding in findings:
-        lines += wrapped(f"{finding.light}: {finding.message}", WIDTH, later="    ")
+        lines += wrapped(f"{finding.light.words}: {finding.message}", WIDTH, later="    ")
         if finding.action and finding.action not in given:
             given.add(finding.action)
             lines += wrapped(f"do: {finding.action}", WIDTH, first="    ", later="        ")

@@ -261,7 +261,9 @@ def _held(channel: _ExaminedChannel) -> SampleFault | None:
         f"{name} repeats its samples: it changes every {found.samples} rows, so that it was "
         f"measured {found.samples} times slower than it is stored, and lags by half of that"
     )
-    action = f"resample the record to every {found.samples}th row (resample_to_s)"
+    places = {2: "second", 3: "third"}
+    place = places.get(found.samples, f"{found.samples}th")
+    action = f"resample the record to every {place} row (resample_to_s)"
     ends = np.array([0, values.size - 1])
     return channel.fault(ends, ("samples-repeated", Light.AMBER, said, action))
 

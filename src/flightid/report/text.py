@@ -83,7 +83,7 @@ def _block(block: Block) -> list[str]:
 def _lights(block: Lights) -> list[str]:
     lines = [block.title] if block.title else []
     for finding in block.findings:
-        head = f"{f'[{finding.light}]':<10} "
+        head = f"{f'[{finding.light.words}]':<10} "
         body = finding.message + (f" — {finding.action}" if finding.action else "")
         lines += wrapped(body, WIDTH, first=head, later=" " * len(head))
     return lines or ["Nothing was judged."]

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import re
+import shlex
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields, replace
 from glob import glob, has_magic
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -20,10 +23,10 @@ from flightid.record.hold import HOLDS, LOOPS
 from flightid.record.options import TableOptions
 from flightid.record.store import RECORD_COLUMN
 from flightid.record.time_columns import is_time_unit, unit_in_name
-from flightid.study.error_list import ErrorList
 from flightid.study.reading import TableReader, read_table
 
 UNKNOWN = InputShape()
+_COMMAND = re.compile(r"`(python [^`]+)`")
 ALL = "*"
 """Manoeuvre that stands for all of a file."""
 
@@ -93,29 +96,53 @@ def _paths(reader: TableReader, folder: Path, names: Iterable[str]) -> tuple[Pat
     return tuple(dict.fromkeys(found))
 
 
-def require_files(files: Iterable[RecordFile]) -> None:
+def require_files(files: Iterable[RecordFile], source: Path) -> None:
     """See before any work that every file is there.
+
+    Parameters
+    ----------
+    files : iterable of RecordFile
+    source : Path
+        The study.
 
     Raises
     ------
     StudyError
-        Some are not; the message names all of them.
+        Some are not; the message names all of them, and what the study says that makes them.
     """
-    collected = ErrorList()
+    missing: dict[Path, str] = {}
     for file in files:
         for path in (*file.paths, *map(Path, file.join)):
-            collected.read(_require_file, None, file.name, path)
-    collected.finish()
+            if not path.exists():
+                missing.setdefault(path, file.name)
+    if not missing:
+        return
+    one = len(missing) == 1
+    raise StudyError(
+        f"the file of record {next(iter(missing.values()))!r} is not there"
+        if one
+        else f"{len(missing)} files of records are not there",
+        found=", ".join(map(str, missing)),
+        needed="a file" if one else "files",
+        action=f"{made_by(source)}correct path of its [[record]]",
+    )
 
 
-def _require_file(name: str, path: Path) -> None:
-    if not path.exists():
-        raise StudyError(
-            f"the file of record {name!r} is not there",
-            found=str(path),
-            needed="a file",
-            action="correct path of its [[record]]",
-        )
+def made_by(source: Path) -> str:
+    """What the comment at the top of a study names for making its files, in words; or nothing.
+
+    Parameters
+    ----------
+    source : Path
+        The study, on whose first lines a command stands as ```python fly.py```.
+    """
+    lines = takewhile(lambda line: line.startswith("#"), source.read_text("utf-8").splitlines())
+    opening = " ".join(line.removeprefix("#").strip() for line in lines)
+    command = _COMMAND.search(opening)
+    if command is None:
+        return ""
+    folder = "" if source.parent == Path() else f"cd {shlex.quote(str(source.parent))} && "
+    return f"run what the study's first lines name for making them ({folder}{command[1]}), or "
 
 
 def declared(record: Record, shape: InputShape) -> Record:

@@ -26,7 +26,7 @@ from flightid.study.record_files import require_files
 from flightid.study.settings import read_settings
 from flightid.study.stage_runner import StageResult, StageRunner
 from flightid.study.study import Study
-from flightid.study.taking import take
+from flightid.study.taking import require_log, take
 from flightid.study.task import load_task
 from flightid.study.tuning import TuneSettings, tune_models
 from flightid.study.uses import use_models
@@ -110,7 +110,9 @@ def _run(
     require_replaceable(final, reads)
     names = tuple(model.name for model in settings.models)
     collected = ErrorList()
-    collected.read(require_files, None, settings.record_files if log is None else ())
+    collected.read(require_files, None, settings.record_files if log is None else (), source)
+    if log is None and settings.log is not None:
+        collected.read(require_log, None, settings.log, source)
     tasks = list(collected.each(settings.models, load_task, names))
     collected.finish()
     rated = settings.qualities

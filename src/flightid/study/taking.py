@@ -19,7 +19,7 @@ from flightid.logs.to_record import EXCITATION
 from flightid.record import Channel, Record, Step
 from flightid.study.conditioning import Conditioning, condition, outliers_first
 from flightid.study.flight import FlightPlan
-from flightid.study.record_files import declared, load_records
+from flightid.study.record_files import declared, load_records, made_by
 from flightid.study.settings import Segment, Settings
 from flightid.study.stage_runner import StageResult, StageRunner
 from flightid.study.task import Task
@@ -153,19 +153,33 @@ def _obtain_log(
 ) -> tuple[Path, Truth | None]:
     """Path of the log: the one given, the one the study names, or one that is flown now."""
     if given is not None or settings.flight is None:
-        return given or _required(settings.log), None
+        return given or require_log(settings.log), None
     flight = runner.stage("flight", FlightPlan.fly, settings.flight).value
     write_ardupilot_log(flight, folder / FLIGHT_LOG)
     return folder / FLIGHT_LOG, Truth.of_flight(flight)
 
 
-def _required(path: Path | None) -> Path:
+def require_log(path: Path | None, source: Path | None = None) -> Path:
+    """The log of a study, which is there.
+
+    Parameters
+    ----------
+    path : Path or None
+    source : Path, optional
+        The study, whose first lines may name what makes the log.
+
+    Raises
+    ------
+    StudyError
+        It is not.
+    """
     if path is None or not path.exists():
+        made = "" if source is None else made_by(source)
         raise StudyError(
             "the log of the study is not there",
             found=None if path is None else str(path),
             needed="a file, or the folder of a bag",
-            action="correct [log] path, or name a log with --log",
+            action=f"{made}correct [log] path, or name a log with --log",
         )
     return path
 

@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 from flightid.dynamics.modes.names import NamedMode
 from flightid.errors import UnknownNameError
 from flightid.findings import Finding
+from flightid.models.sampled.discrete_modes import AT_ORIGIN
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Reading
 from flightid.uncertainty.quantiles import interval_words, shown
 
+EACH_ONE_SAMPLE = "delays of one sample each"
 LEAST_SHOWN = 0.01
 """Participation below which the table of participations leaves a state out."""
 
@@ -285,8 +287,9 @@ class Modes(Result, schema="flightid.modes/1"):
             Column(interval_words(level), "s"),
             Column("character and participation"),
         )
-        rows = tuple(_row(mode, level) for mode in self.modes)
-        table = Table(f"Modes of {self.name}", columns, rows, self._notes(level))
+        rows = [_row(mode, level) for mode in self.modes if mode.reason != AT_ORIGIN]
+        rows += _delay_rows([mode for mode in self.modes if mode.reason == AT_ORIGIN], level)
+        table = Table(f"Modes of {self.name}", columns, tuple(rows), self._notes(level))
         return table.without_empty_columns()
 
     def _notes(self, level: float) -> tuple[str, ...]:
@@ -296,7 +299,9 @@ class Modes(Result, schema="flightid.modes/1"):
         else:
             words = interval_words(level)
             notes.append(f"± is half a {words} interval; the last times have their whole interval.")
-            notes += [f"{m.name}: {m.reason}." for m in self.modes if m.reason]
+            notes += [
+                f"{m.name}: {m.reason}." for m in self.modes if m.reason and m.reason != AT_ORIGIN
+            ]
         if self.sample_time_s is not None:
             notes.append(f"From the z plane by s = ln z / T, T = {self.sample_time_s:.4g} s.")
         return (*notes, *map(str, self.findings))
@@ -352,6 +357,15 @@ class Modes(Result, schema="flightid.modes/1"):
         stable = "stable" if self.is_stable else "unstable"
         plural = "" if count == 1 else "s"
         return f"Modes({self.name!r}: {count} eigenvalue{plural}{least}, {stable})"
+
+
+def _delay_rows(found: list[Mode], level: float) -> list[tuple[Cell, ...]]:
+    """Poles at the origin, which have no numbers of their own, in one row."""
+    rows = [_row(mode, level) for mode in found[:1]]
+    if len(found) > 1:
+        name = f"{len(found)} poles at the origin"
+        return [(name, *row[1:-1], EACH_ONE_SAMPLE) for row in rows]
+    return rows
 
 
 def _values(quantities: list[Reading]) -> NDArray[np.float64]:
