@@ -1,5 +1,6 @@
 """Blackbox logs: every encoding and predictor against a writer that shares no code."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -217,3 +218,65 @@ def test_fields_that_take_no_bytes_do_not_fill_memory(tmp_path: Path) -> None:
     log = open_blackbox(path)
     assert sum(info.count for info in log.messages.values()) * 201 <= 16 * 110_000
     assert "more values" in log.skipped[-1].reason
+
+
+def _asked(kind: int, rc: float, rc_rate: float, rate: float, expo: float) -> float:
+    """Rate set-point of one stick, deg/s, as `fc/rc.c` of the firmware has it, line by line."""
+    size, e = abs(rc), expo / 100.0
+    factor = 1.0 / min(max(1.0 - size * rate / 100.0, 0.01), 1.0)
+    if kind == 0:
+        curved = rc * size**3 * e + rc * (1.0 - e) if expo else rc
+        slope = rc_rate / 100.0
+        if slope > 2.0:
+            slope += 14.54 * (slope - 2.0)
+        return 200.0 * slope * curved * (factor if rate else 1.0)
+    if kind == 1:
+        curved = (1.0 + 0.01 * expo * (rc * rc - 1.0)) * rc
+        return 10.0 * rc_rate * curved * (1.0 + size * rate * 0.01)
+    if kind == 2:
+        return 2000.0 * factor * (rc**3 * e + rc * (1.0 - e)) * rc_rate / 1000.0
+    if kind == 3:
+        curved = size * (rc**5 * e + rc * (1.0 - e))
+        return rc * rc_rate * 10.0 + max(0.0, rate * 10.0 - rc_rate * 10.0) * curved
+    centre, most = rc_rate * 2.0, max(rate * 10.0, rc_rate * 2.0)
+    share = (most / centre - 1.0) / (most / centre)
+    curved = size**3 * e + size * (1.0 - e)
+    return rc * centre / min(max(1.0 - curved * share, 0.01), 1.0)
+
+
+CURVE_NAMES = ("Betaflight", "RaceFlight", "KISS", "Actual", "Quick")
+OLD = tuple(replace(known, name=known.name.replace("setpoint", "debug")) for known in FIELDS)
+RATES = ((220, 70, 10), (70, 60, 40), (100, 70, 30), (7, 67, 54), (90, 67, 20))
+
+
+@pytest.mark.parametrize("kind", range(5))
+def test_set_points_that_were_not_logged_are_those_of_the_sticks(tmp_path: Path, kind: int) -> None:
+    """Betaflight 3 logs rcCommand and P terms: the firmware's curve between, and its proof."""
+    n, rng = 3000, np.random.default_rng(kind)
+    sticks = np.cumsum(rng.standard_normal((3, n)), axis=1)
+    sticks = np.round(480.0 * sticks / np.abs(sticks).max(axis=1, keepdims=True)).astype(int)
+    wanted = np.array([[_asked(kind, rc / 500.0, *RATES[kind]) for rc in row] for row in sticks])
+    wanted = np.clip(wanted, -1998.0, 1998.0)
+    rate = np.zeros_like(wanted)
+    for k in range(1, n):
+        rate[:, k] = rate[:, k - 1] + 0.05 * (wanted[:, k - 1] - rate[:, k - 1])
+    rate = np.round(rate + rng.standard_normal((3, n)))
+    columns = {"time": 10_000_000 + 500 * np.arange(n)}
+    for k in range(3):
+        columns |= {f"rcCommand[{k}]": sticks[k], f"gyroADC[{k}]": rate[k].astype(int)}
+        columns[f"axisP[{k}]"] = np.round(0.032029 * 45 * (wanted[k] - rate[k])).astype(int)
+    rates = dict(zip(("rc_rates", "rates", "rc_expo"), map(str, RATES[kind]), strict=True))
+    settings = {**SETTINGS, "Firmware revision": "Betaflight 3.5.7 (c0ffee) STM32F405"}
+    settings |= {name: ",".join([number] * 3) for name, number in rates.items()}
+    exact = np.radians(wanted) * np.array([[1.0], [-1.0], [-1.0]])
+    for told in ({"rates_type": str(kind)}, {}):
+        log = _open(tmp_path, blackbox(columns, settings | told, OLD))
+        found = [np.asarray(log.record()[name]) for name in ("p_ref", "q_ref", "r_ref")]
+        np.testing.assert_allclose(found, exact, rtol=1e-9, atol=1e-9)
+        said = next(f.message for f in log.findings if f.code == "set-points-of-sticks")
+        assert CURVE_NAMES[kind] in said
+    # A vehicle that levels itself asks for other rates: its P terms give that away.
+    columns["axisP[0]"] = np.roll(columns["axisP[0]"], 800)
+    other = _open(tmp_path, blackbox(columns, settings, OLD))
+    assert "no-set-points" in {f.code for f in other.findings}
+    assert "setpoint[0]" not in other.table("main").columns

@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 import struct
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from flightid.conventions import Light
 from flightid.errors import LogFormatError
 from flightid.findings import Finding, counted
 from flightid.logs.blackbox.settings import settings_of
+from flightid.logs.blackbox.stick_rates import stick_rates
 from flightid.logs.source import ByteRange, Event, Gap
 from flightid.logs.table_source import Array, MessageRows, TableSource
 from flightid.reading import bounded_bytes, memory_budget, within_memory
@@ -39,6 +41,8 @@ WING = ("fwAltP", "fwPosP")
 """Fields that INAV logs of fixed wings alone."""
 FINE = (*RATES, "setpoint[", "rcCommand[")
 """Fields that ``blackbox_high_resolution`` stores ten times as fine."""
+STICKS = ("rcCommand", "gyroADC", "axisP")
+SET_POINTS = ("setpoint[0]", "setpoint[1]", "setpoint[2]")
 FORCES, VOLTAGE, CURRENT = "accSmooth[", "vbatLatest", "amperageLatest"
 BATTERY = {(4, 0): (0.01, 0.01), (3, 2): (0.1, 0.01), (3, 1): (0.1, None)}
 """V and A of one count since a version of Betaflight, the newest first; before: raw readings."""
@@ -68,6 +72,7 @@ def open_blackbox(path: Path) -> TableSource:
     header = dict(native.headers())
     scales, untold = _scales(header)
     tables = dict(_tables(native, scales, untold))
+    tables, sticks = _with_set_points(tables, header)
     lost = [ByteRange(*part) for part in native.skipped()]
     return TableSource(
         "betaflight",
@@ -80,6 +85,7 @@ def open_blackbox(path: Path) -> TableSource:
         gaps=_gaps(tables[LOOP].time_s) if LOOP in tables else (),
         findings=(
             *_left_out(native, untold),
+            *sticks,
             *_findings(native, lost, len(data), taken, len(flights)),
         ),
     )
@@ -99,6 +105,47 @@ def _tables(
             if not column.startswith(tuple(untold))
         }
         yield name, MessageRows(units, read, native.stamps_us(name) / 1e6)
+
+
+def _with_set_points(
+    tables: dict[str, MessageRows], header: Mapping[str, str]
+) -> tuple[dict[str, MessageRows], list[Finding]]:
+    """Rate set-points made of the sticks, of a Betaflight that logged none."""
+    rows = tables.get(LOOP)
+    needed = [f"{name}[{axis}]" for name in STICKS for axis in range(3)]
+    is_betaflight = _VERSION.search(header.get("Firmware revision", ""))
+    if rows is None or not is_betaflight or {*SET_POINTS} & {*rows.units}:
+        return tables, []
+    if not {*needed} <= {*rows.units}:
+        return tables, []
+    commands, rates, p_terms = (
+        np.array([rows.read(f"{name}[{axis}]") for axis in range(3)]) for name in STICKS
+    )
+    found = stick_rates(commands, rates, p_terms, settings_of(header))
+    if found is None or not found.is_borne_out:
+        why = "its header tells no rates" if found is None else (
+            f"rates by {found.curve}'s curve explain {100.0 * max(found.explained, 0.0):.0f} % of "
+            "its P terms: the vehicle levelled itself, or rates were changed in flight"
+        )  # fmt: skip
+        lacking = Finding(
+            "no-set-points",
+            Light.AMBER,
+            f"the log holds no rate set-points, and none can be made of rcCommand: {why}",
+            "fly in acro with one rate profile, or update to Betaflight 4, which logs set-points",
+        )
+        return tables, [lacking]
+    made = dict(zip(SET_POINTS, found.set_points, strict=True))
+
+    def read(column: str) -> Array:
+        return made[column] if column in made else rows.read(column)
+
+    said = (
+        f"rate set-points are not logged: they are made of rcCommand by {found.curve}'s rates of "
+        f"the header, which explain {100.0 * found.explained:.1f} % of the controller's P terms"
+    )
+    units = {**rows.units, **dict.fromkeys(made, "1")}
+    whole = {**tables, LOOP: replace(rows, units=units, read=read)}
+    return whole, [Finding("set-points-of-sticks", Light.GREEN, said)]
 
 
 def _scaled(
