@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from flightid.plot import look
+from flightid.plot.record import Panel, Trace, time_histories
 from flightid.report.content import Document, Section
 from flightid.report.figures import figure_block
 from flightid.report.html import to_html
@@ -26,6 +27,7 @@ QUIET = [
     "--disable-sync",
     "--run-all-compositor-stages-before-draw",
     "--virtual-time-budget=20000",
+    "--window-size=500,3000",
 ]
 
 
@@ -41,9 +43,12 @@ def _drawn(page: Path, profile: Path) -> str:
 @pytest.mark.skipif(BROWSER is None, reason="no Chromium on this machine")
 @pytest.mark.parametrize("packed", [True, pytest.param(False, marks=pytest.mark.nightly)])
 def test_plots_draw_from_disk(tmp_path: Path, packed: bool) -> None:
-    made = look.figure()
-    made.add_trace(look.line("roll rate", np.arange(9.0), np.arange(9.0) ** 2, colour=look.MODEL))
-    block = figure_block(made, "A parabola.")
+    titles = [f"signal {k}" for k in range(9)]
+    made = time_histories(
+        [Panel(title, (Trace("roll rate", np.arange(9.0), np.arange(9.0), look.MODEL),))
+         for title in titles]
+    )  # fmt: skip
+    block = figure_block(made, "Lines.")
     page = tmp_path / "report.html"
     page.write_text(to_html(Document("Title", "", (Section("S", (block,)),)), packed=packed))
     # Plots are drawn when a frame shows them; a headless browser on a busy machine may dump a page
@@ -56,3 +61,5 @@ def test_plots_draw_from_disk(tmp_path: Path, packed: bool) -> None:
     else:
         pytest.fail(f"no plot was drawn in {ATTEMPTS} attempts: {shown[-2000:]}")
     assert 'id="plain" hidden' in shown
+    # On a phone's width the two columns stand below each other, each panel under its own title.
+    assert [after.count(f">{title}<") for title in titles] == [1] * len(titles)

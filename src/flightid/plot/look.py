@@ -127,7 +127,7 @@ def _empty(
 def label_axes(
     made: go.PlotFigure, *, x: str, y: Sequence[str], column: int = 1, log_x: bool = False
 ) -> None:
-    """Title the axes of one column; only the lowest x axis carries the title.
+    """Title the axes of one column; only the lowest x axis carries the title, and numbers.
 
     Parameters
     ----------
@@ -149,7 +149,8 @@ def label_axes(
     for axis in below if log_x else ():
         axis.type, axis.tickvals, axis.ticktext = "log", LOG_TICKS, LOG_LABELS
         axis.minor.showgrid, axis.tickfont.size = False, 11
-    below[len(y) - 1].title.text = x
+    lowest = below[len(y) - 1]
+    lowest.title.text, lowest.showticklabels = x, True
 
 
 def hertz_above(made: go.PlotFigure) -> None:
