@@ -44,11 +44,11 @@ def test_each_vehicle_has_the_light_that_its_truth_asks_for(answers: FleetAnswer
     }
     assert len(lights) == 12
     assert lights["v00"].light is Light.RED
-    assert "Ltphi changed by -15 % (-" in lights["v00"].message
+    assert "roll control power changed by -15 % (-" in lights["v00"].message
     assert lights["v01"].light is Light.AMBER
-    assert "v01: Ltphi " in lights["v01"].message
+    assert "v01: roll control power " in lights["v01"].message
     assert " % above the type, " in lights["v01"].message
-    assert "Lp normal" in lights["v01"].message
+    assert "roll damping normal" in lights["v01"].message
     assert lights["v02"].light is Light.RED
     sound = [each for name, each in lights.items() if name not in ("v00", "v01", "v02")]
     assert all(each.light is Light.GREEN for each in sound), sound
@@ -88,7 +88,7 @@ def test_the_correlation_of_a_fit_is_carried_on(answers: FleetAnswers) -> None:
 def test_the_page_tells_events_slopes_and_refused_logs(answers: FleetAnswers) -> None:
     document = fleet_document(answers, "Survey fleet")
     tables = {b.table.title: b.table for b in document.walk() if isinstance(b, TableBlock)}
-    event = next(row for row in tables["Events"].rows if row[2] == "Ltphi")
+    event = next(row for row in tables["Events"].rows if row[2] == "roll control power")
     assert event[:2] == ("motor replaced", "v02")
     low, high = event[4], event[5]
     assert isinstance(low, float)
@@ -97,8 +97,9 @@ def test_the_page_tells_events_slopes_and_refused_logs(answers: FleetAnswers) ->
     refused = tables["By reason"]
     assert refused.rows[0][:3] == (2, "refused", "rate-too-low")
     assert "set LOG_BITMASK to log RATE at 400 Hz" in refused.rows[0]
-    slope = next(r for r in tables["What covariates explain"].rows if r[0] == "Ltphi")
-    assert slope[2] == pytest.approx(0.02 * 140.0, rel=0.25)
+    slope = next(r for r in tables["What covariates explain"].rows if r[0] == "roll control power")
+    assert slope[2] == "rad/s^2"
+    assert slope[3] == pytest.approx(0.02 * 140.0, rel=0.25)
     assert sum(isinstance(block, Figure) for block in document.walk()) == 2
     page = to_html(document)
     assert "Survey fleet" in page
@@ -156,20 +157,24 @@ def test_the_command_answers_a_fleet_file_from_its_catalogue(tmp_path: Path) -> 
     assert found.exit_code == 1, found.output
     assert "<title>Survey" in page.read_text()
     text = CliRunner().invoke(command, ["report", str(path)]).output
-    assert "v00: Ltphi changed by -1" in text
-    assert "new propellers  v02      Ltphi" in text
-    assert " Lp " not in text
+    assert "v00: roll control power changed by -1" in text
+    assert "new propellers  v02      roll control power" in text
+    assert "roll damping" not in text
 
 
 def test_the_page_speaks_in_words_and_says_how_a_level_changed() -> None:
     rows = fleet_rows(3)
     for each in rows["parameters"]:
-        each["meaning"] = {"Lp": "roll damping", "Ltphi": "roll control power"}[each["name"]]
-    text = to_text(fleet_document(answer_questions(rows, covariates=["battery"])))
-    said = " ".join(text.split())
-    assert "v00: roll control power changed by -15 % (-" in said
+        each["meaning"] = {"Lp": "roll damping", "Ltphi": "push of the motors"}[each["name"]]
+    document = fleet_document(answer_questions(rows, events=[MOTOR], covariates=["battery"]))
+    said = " ".join(to_text(document).split())
+    assert "v00: push of the motors changed by -15 % (-" in said
     assert ") at once" in said
     assert re.search(
-        "v01: roll control power [0-9]+ % above the type, .*; roll damping normal", said
+        "v01: push of the motors [0-9]+ % above the type, .*; roll damping normal", said
     )
-    assert "Ltphi is roll control power" in said
+    # A symbol stands once, beside its words in the table of the type, and in no picture.
+    assert said.count("Ltphi") == 1
+    pictures = [str(each.spec) for each in document.walk() if isinstance(each, Figure)]
+    assert all("push of the motors" in each and "Ltphi" not in each for each in pictures)
+    assert re.search(r"\d[ %]* < 0.0001 (a step|drift|changed)", said), "a chance of 1e-50"

@@ -12,6 +12,7 @@ from flightid.fleet.pictures import history_picture, type_picture
 from flightid.fleet.statistics.answers import FleetAnswers, Row, TypeAnswers, fitted_share
 from flightid.fleet.statistics.change_kind import DRIFT, STEP
 from flightid.fleet.statistics.drift import FleetDrift, ParameterHistory
+from flightid.fleet.statistics.multiple_testing import chance_cell
 from flightid.fleet.statistics.repeats import RepeatScatter
 from flightid.report.content import Block, Document, Lights, Paragraph, Section, TableBlock
 from flightid.report.figures import figure_block
@@ -113,52 +114,50 @@ def _change_words(history: ParameterHistory, labels: Mapping[str, str]) -> str:
 def _type_blocks(each: TypeAnswers) -> Iterator[Block]:
     for reason in each.reasons:
         yield Paragraph(f"Not answered: {reason}.")
-    if each.labels:
-        named = (f"{name} is {words}" for name, words in sorted(each.labels.items()))
-        yield Paragraph(f"In words: {', '.join(named)}.")
     if each.population is not None:
-        yield TableBlock(each.population.summary())
+        yield TableBlock(each.population.summary(labels=each.labels))
         caption = (
             "Every vehicle's own estimate with its interval, and, shaded, where the next vehicle "
             f"lies with {interval_words(shown())}."
         )
-        yield figure_block(type_picture(each.population), caption)
+        yield figure_block(type_picture(each.population, each.labels), caption)
     if each.outliers is not None:
         many = len(each.outliers.vehicles) > SHOWN
         yield TableBlock(each.outliers.summary(each.labels), folded=many and not each.outliers.odd)
     if each.drift is not None:
-        yield from _drift_blocks(each.drift)
+        yield from _drift_blocks(each.drift, each.labels)
 
 
-def _drift_blocks(drift: FleetDrift) -> Iterator[Block]:
-    yield Lights(tuple(_errors_light(each) for each in drift.repeats), "Errors of the estimates")
-    slopes = _slopes(drift)
+def _drift_blocks(drift: FleetDrift, labels: Mapping[str, str]) -> Iterator[Block]:
+    lights = tuple(_errors_light(each, labels.get(each.name, each.name)) for each in drift.repeats)
+    yield Lights(lights, "Errors of the estimates")
+    slopes = _slopes(drift, labels)
     if slopes.rows:
         yield TableBlock(slopes)
-    yield TableBlock(drift.summary())
-    events = _events(drift)
+    yield TableBlock(drift.summary(labels=labels))
+    events = _events(drift, labels)
     if events.rows:
         yield TableBlock(events)
     ranked = sorted(drift.histories, key=lambda one: 2.0 if one.chance is None else one.chance)
     if ranked:
         caption = (
             "Estimates of flights with their intervals, what covariates explain taken out; the "
-            "level behind them; orange where it changed, and when. The least likely come first."
+            "level behind them; orange where it changed, and when. Drawn are the least likely ones."
         )
-        yield figure_block(history_picture(ranked[:SHOWN]), caption)
+        yield figure_block(history_picture(ranked[:SHOWN], labels), caption)
 
 
-def _errors_light(scatter: RepeatScatter) -> Finding:
+def _errors_light(scatter: RepeatScatter, name: str) -> Finding:
     ends = scatter.understated_ends(shown())
     if ends is None:
         return Finding(
             "repeats",
             Light.UNKNOWN,
-            f"{scatter.name}: no vehicle flew twice on a day, so its errors are taken as stated",
+            f"{name}: no vehicle flew twice on a day, so its errors are taken as stated",
             "fly some vehicles twice a day: scatter beyond the errors would count as change",
         )
     words = (
-        f"{scatter.name}: flights of one day scatter {scatter.understated:.2f} times their errors "
+        f"{name}: flights of one day scatter {scatter.understated:.2f} times their errors "
         f"({ends[0]:.2f} to {ends[1]:.2f}; χ² {scatter.chi2:.0f} of {scatter.freedom})"
     )
     if scatter.errors_hold:
@@ -167,30 +166,37 @@ def _errors_light(scatter: RepeatScatter) -> Finding:
     return Finding("repeats", Light.AMBER, words, act)
 
 
-def _slopes(drift: FleetDrift) -> Table:
+def _slopes(drift: FleetDrift, labels: Mapping[str, str]) -> Table:
     rows: list[tuple[Cell, ...]] = []
+    units = {each.name: each.unit for each in drift.histories if each.unit != "1"}
     for name, effects in drift.slopes.items():
         for each in effects:
             low, high = each.interval(shown()) or (None, None)
-            rows.append((name, each.name, each.value, low, high, each.reason or None))
+            told = (labels.get(name, name), each.name, units.get(name), each.value)
+            rows.append((*told, low, high, each.reason or None))
     words = interval_words(shown())
     columns = (
-        *(Column("parameter"), Column("covariate"), Column("change a unit", digits=3)),
+        *(Column("parameter"), Column("covariate"), Column("unit"), Column("change", digits=3)),
         *(Column(f"{words} low", digits=3), Column(f"{words} high", digits=3), Column("note")),
     )
-    notes = tuple(f"{n} flights do not tell {k}." for k, n in drift.covariates_missing.items())
+    notes = (
+        "Change of the parameter for one unit of a number, or for that word instead of the "
+        "commonest.",
+        *(f"{n} flights do not tell {k}." for k, n in drift.covariates_missing.items()),
+    )
     return Table("What covariates explain", columns, tuple(rows), notes).without_empty_columns()
 
 
-def _events(drift: FleetDrift) -> Table:
+def _events(drift: FleetDrift, labels: Mapping[str, str]) -> Table:
     rows: list[tuple[Cell, ...]] = []
     for history in drift.histories:
         for each in history.events:
             low, high = each.percent.interval(shown()) or (None, None)
             event = each.event.what
             value, reason = each.percent.value, each.percent.reason or None
+            name = labels.get(history.name, history.name)
             rows.append(
-                (event, history.vehicle, history.name, value, low, high, each.chance, reason)
+                (event, history.vehicle, name, value, low, high, chance_cell(each.chance), reason)
             )
     words = interval_words(shown())
     columns = (

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
+from collections.abc import Mapping
 
 AXES = {"phi": "roll", "theta": "pitch", "psi": "yaw"}
 RATES = {"p": "roll", "q": "pitch", "r": "yaw"}
@@ -45,3 +47,25 @@ def meaning(name: str, note: str = "") -> str | None:
         return f"{axis} damping" if moment == axis else f"{moment} moment by {axis} rate"
     clause = re.split(r"[;,.(]", note, maxsplit=1)[0].strip()
     return clause if 0 < len(clause) <= LONGEST else None
+
+
+def told_apart(meanings: Mapping[str, str | None]) -> dict[str, str]:
+    """Words of parameters by name; where several would read alike, each has its name behind.
+
+    Parameters
+    ----------
+    meanings : mapping of str to str or None
+        What the catalogue says of each; None: by its usual name, if it has one.
+
+    Example
+    -------
+    >>> told_apart({"Lp": None, "k1": "stiffness", "k2": "stiffness", "k3": None})
+    {'Lp': 'roll damping', 'k1': 'stiffness (k1)', 'k2': 'stiffness (k2)'}
+    """
+    words = {name: said or meaning(name) for name, said in meanings.items()}
+    counts = Counter(words.values())
+    return {
+        name: said if counts[said] == 1 else f"{said} ({name})"
+        for name, said in words.items()
+        if said
+    }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import datetime
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -17,13 +17,17 @@ COLUMNS = 3
 ROW_PX = 190
 
 
-def history_picture(histories: Sequence[ParameterHistory]) -> go.PlotFigure:
+def history_picture(
+    histories: Sequence[ParameterHistory], labels: Mapping[str, str] | None = None
+) -> go.PlotFigure:
     """Small multiples: flights with intervals, the level behind them, when it changed.
 
     Parameters
     ----------
     histories : sequence of ParameterHistory
         At least one.
+    labels : mapping of str to str, optional
+        Parameters in words.
     """
     columns = min(COLUMNS, len(histories))
     rows = -(-len(histories) // columns)
@@ -31,11 +35,12 @@ def history_picture(histories: Sequence[ParameterHistory]) -> go.PlotFigure:
     made.update_layout(hovermode="closest", showlegend=False)
     for number, each in enumerate(histories):
         row, column = number // columns + 1, number % columns + 1
-        _history(made, each, row, column)
+        name = (labels or {}).get(each.name, each.name)
+        _history(made, each, name, row, column)
     return made
 
 
-def _history(made: go.PlotFigure, each: ParameterHistory, row: int, column: int) -> None:
+def _history(made: go.PlotFigure, each: ParameterHistory, name: str, row: int, column: int) -> None:
     at = [_date(instant) for instant in each.time_s]
     colour = look.ORANGE if each.is_alarm else look.BLUE
     half = half_width(shown()) * np.sqrt(each.variances)
@@ -49,7 +54,7 @@ def _history(made: go.PlotFigure, each: ParameterHistory, row: int, column: int)
         mode="markers",
         marker={"color": look.BLACK, "size": 4},
         showlegend=False,
-        hovertemplate=f"{each.vehicle}<br>%{{x}}<br>{each.name} %{{y:.4g}}<extra></extra>",
+        hovertemplate=f"{each.vehicle}<br>%{{x}}<br>{name} %{{y:.4g}}<extra></extra>",
     )
     made.add_trace(points, row, column)
     if each.is_alarm and each.changed_s is not None:
@@ -76,7 +81,7 @@ def _history(made: go.PlotFigure, each: ParameterHistory, row: int, column: int)
         )
     made.update_xaxes(row=row, col=column, type="date", nticks=3, tickformat="%Y-%m-%d")
     unit = "" if each.unit == "1" else each.unit
-    title = look.axis_title(f"{each.vehicle}: {each.name}", unit)
+    title = look.axis_title(f"{each.vehicle}: {name}", unit)
     made.update_yaxes(row=row, col=column, title_text=title, title_font={"size": 11})
 
 
@@ -84,12 +89,14 @@ def _date(instant: float) -> str:
     return datetime.datetime.fromtimestamp(instant, datetime.UTC).strftime("%Y-%m-%d %H:%M:%S")
 
 
-def type_picture(population: Population) -> go.PlotFigure:
+def type_picture(population: Population, labels: Mapping[str, str] | None = None) -> go.PlotFigure:
     """Each vehicle's own estimate in percent of the type's mean, and where the next one lies.
 
     Parameters
     ----------
     population : Population
+    labels : mapping of str to str, optional
+        Parameters in words.
     """
     names = [n for n in population.names if population.parameters[n].mean.value != 0.0]
     columns = min(COLUMNS, max(len(names), 1))
@@ -112,7 +119,7 @@ def type_picture(population: Population) -> go.PlotFigure:
             low, high = ((end - mean) * percent for end in ends)
             band = look.band("next", edge, np.full(2, low), np.full(2, high), colour=look.GREEN)
             made.add_traces(band, row, column)
-        labels = [population.data.members[there[n]] for n in order]
+        vehicles = [population.data.members[there[n]] for n in order]
         made.add_trace(
             go.Scatter(
                 x=place,
@@ -121,7 +128,7 @@ def type_picture(population: Population) -> go.PlotFigure:
                     "type": "data", "array": half_width(shown()) * errors[order] * percent,
                     "thickness": 1, "width": 0, "color": look.LINE,
                 },
-                text=labels,
+                text=vehicles,
                 mode="markers",
                 marker={"color": look.BLUE, "size": 5},
                 showlegend=False,
@@ -131,6 +138,11 @@ def type_picture(population: Population) -> go.PlotFigure:
             column,
         )  # fmt: skip
         title = "beside the mean [%]" if column == 1 else ""
-        made.update_xaxes(row=row, col=column, title_text=f"{name}: vehicles", showticklabels=False)
+        made.update_xaxes(
+            row=row,
+            col=column,
+            title_text=f"{(labels or {}).get(name, name)}: vehicles",
+            showticklabels=False,
+        )
         made.update_yaxes(row=row, col=column, title_text=title)
     return made

@@ -11,6 +11,7 @@ import numpy as np
 
 from flightid.errors import FlightidError
 from flightid.fleet.catalogue.schema import FITTED, from_lower_triangle
+from flightid.fleet.parameter_words import told_apart
 from flightid.fleet.statistics.covariates import Covariate
 from flightid.fleet.statistics.drift import FleetDrift, find_drift
 from flightid.fleet.statistics.events import FleetEvent
@@ -115,7 +116,7 @@ def answer_questions(
             one = replace(one, drift=find_drift(flights, explained, events))
         elif drift:
             one = replace(one, reasons=(*one.reasons, UNDATED))
-        labels = {e["name"]: e["meaning"] for e in mine if e.get("meaning")}
+        labels = told_apart({each["name"]: each.get("meaning") for each in mine})
         answers.append(replace(one, labels=labels))
     return FleetAnswers(tuple(answers), tuple(rows["logs"]), undated)
 

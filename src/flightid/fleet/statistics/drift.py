@@ -20,7 +20,7 @@ from flightid.fleet.statistics.events import EventEffect, FleetEvent, event_effe
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
 from flightid.fleet.statistics.largest_step import FEWEST, StepScan, scan_steps
 from flightid.fleet.statistics.local_level import LocalLevel, follow_level
-from flightid.fleet.statistics.multiple_testing import FALSE_SHARE, corrected
+from flightid.fleet.statistics.multiple_testing import FALSE_SHARE, chance_cell, corrected
 from flightid.fleet.statistics.neighbours import neighbour_factor, variances_with_odd_ones
 from flightid.fleet.statistics.repeats import RepeatScatter, repeat_scatter
 from flightid.fleet.statistics.wandering import wandering_chance
@@ -144,8 +144,11 @@ class FleetDrift(Result, schema="flightid.fleet_drift/1"):
         """Histories and alarms."""
         return f"FleetDrift({len(self.histories)} histories, {len(self.alarms)} changed)"
 
-    def summary(self, *, level: float | None = None) -> Table:
-        """One row an alarm."""
+    def summary(
+        self, *, level: float | None = None, labels: Mapping[str, str] | None = None
+    ) -> Table:
+        """One row an alarm, its parameter in words where there are any."""
+        named = labels or {}
         level = shown(level)
         words = interval_words(level)
         columns = (
@@ -155,7 +158,7 @@ class FleetDrift(Result, schema="flightid.fleet_drift/1"):
             Column(f"{words} low", "%", digits=3),
             Column(f"{words} high", "%", digits=3),
             Column("share of false alarms", digits=2),
-            Column("by"),
+            Column("how"),
         )
         rows: list[tuple[Cell, ...]] = []
         for each in self.alarms:
@@ -163,20 +166,22 @@ class FleetDrift(Result, schema="flightid.fleet_drift/1"):
             rows.append(
                 (
                     each.vehicle,
-                    each.name,
+                    named.get(each.name, each.name),
                     each.change_percent.value,
                     low,
                     high,
-                    each.false_share,
+                    chance_cell(each.false_share),
                     each.kind,
                 )
             )
         asked = sum(each.chance is not None for each in self.histories)
         note = (
-            f"{asked} histories asked, at most {FALSE_SHARE:.0%} of the alarms false "
+            f"{asked} histories asked, at most {100 * FALSE_SHARE:.0f} % of the alarms false "
             "(Benjamini and Hochberg)."
         )
-        odd = ", ".join(f"{n} of {name}" for name, n in self.odd_flights.items() if n)
+        odd = ", ".join(
+            f"{n} of {named.get(name, name)}" for name, n in self.odd_flights.items() if n
+        )
         notes = (
             note,
             *((f"Flights far off those beside them count for less: {odd}.",) if odd else ()),

@@ -6,10 +6,24 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flightid.errors import DataError
+from flightid.table import Cell
 
 Array = NDArray[np.float64]
 FALSE_SHARE = 0.05
 """Share of false ones among all alarms of a fleet that is allowed."""
+LEAST = 1e-4
+"""Least chance that is shown as a number."""
+
+
+def chance_cell(chance: float | None) -> Cell:
+    """A chance as tables show it: what no count could tell from zero is no number.
+
+    Example
+    -------
+    >>> chance_cell(0.03), chance_cell(2e-31)
+    (0.03, '< 0.0001')
+    """
+    return chance if chance is None or chance >= LEAST else f"< {LEAST:.4f}"
 
 
 def corrected(chances: ArrayLike) -> Array:

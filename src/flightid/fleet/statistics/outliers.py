@@ -11,7 +11,7 @@ from scipy.special import fdtrc
 
 from flightid.fleet.statistics.flight_estimates import Flags, FlightEstimates
 from flightid.fleet.statistics.heterogeneity import VehicleEstimates
-from flightid.fleet.statistics.multiple_testing import FALSE_SHARE, corrected
+from flightid.fleet.statistics.multiple_testing import FALSE_SHARE, chance_cell, corrected
 from flightid.fleet.statistics.population import Population
 from flightid.fleet.statistics.spread_search import SpreadFit, search_spreads
 from flightid.result import Result
@@ -154,10 +154,17 @@ class FleetOutliers(Result, schema="flightid.fleet_outliers/1"):
             Column("what differs"),
         )
         rows: tuple[tuple[Cell, ...], ...] = tuple(
-            (each.vehicle, float(np.sqrt(each.distance2)), each.false_share, each.words(labels))
+            (
+                *(each.vehicle, float(np.sqrt(each.distance2))),
+                *(chance_cell(each.false_share), each.words(labels)),
+            )
             for each in self.vehicles
         )
-        notes = (self.reason,) if self.reason else ()
+        note = (
+            "Distance from what all other vehicles say of the next one, in its standard errors; at "
+            f"most {100 * FALSE_SHARE:.0f} % of the vehicles called unlike their type are not."
+        )
+        notes = (self.reason or note,)
         return Table(f"Vehicles of type “{self.type_name}”", columns, rows, notes)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -138,12 +139,15 @@ class Population(
             f"I² {most:.0f} % at most)"
         )
 
-    def summary(self, *, level: float | None = None) -> Table:
-        """One row a parameter: mean, spread, next vehicle."""
+    def summary(
+        self, *, level: float | None = None, labels: Mapping[str, str] | None = None
+    ) -> Table:
+        """One row a parameter, in words where there are any: mean, spread, next vehicle."""
         level = shown(level)
         words = interval_words(level)
         columns = (
             Column("parameter"),
+            Column("symbol"),
             Column("unit"),
             Column("mean"),
             Column(f"mean, {words} low"),
@@ -158,6 +162,7 @@ class Population(
             Column("vehicles"),
         )
         rows: list[tuple[Cell, ...]] = []
+        named = labels or {}
         for name, found in self.parameters.items():
             mean = found.mean.interval(level) or (None, None)
             spread = found.spread.interval(level) or (None, None)
@@ -165,7 +170,8 @@ class Population(
             unit = "" if found.mean.unit == "1" else found.mean.unit
             rows.append(
                 (
-                    *(name, unit, found.mean.value, *mean, found.spread.value, *spread, *following),
+                    *(named.get(name, name), name if name in named else None, unit),
+                    *(found.mean.value, *mean, found.spread.value, *spread, *following),
                     *(found.flight_spread.value, found.inconsistency_percent, found.n_vehicles),
                 )
             )
@@ -176,7 +182,8 @@ class Population(
             "normal distribution, longer where some lie further out: with few odd ones among many "
             "they hold the truth less often."
         )
-        return Table(f"Type “{self.type_name}”", columns, tuple(rows), (note,))
+        title = f"In common: type “{self.type_name}”"
+        return Table(title, columns, tuple(rows), (note,)).without_empty_columns()
 
 
 def estimate_population(
