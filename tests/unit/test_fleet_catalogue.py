@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import sys
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -19,6 +20,7 @@ from flightid.errors import DataError, OptionError
 from flightid.fleet.catalogue.catalogue import Catalogue
 from flightid.fleet.catalogue.compaction import MOST_SMALL, compact, merge, rewrite, set_aside
 from flightid.fleet.catalogue.loose import loose_logs, loose_name, write_loose
+from flightid.fleet.catalogue.on_time import TimedConnection
 from flightid.fleet.catalogue.parts import MANIFEST, PARTS, KnownLogs, read_parts
 from flightid.fleet.catalogue.record import LogRecord
 from flightid.fleet.catalogue.store import FolderStore
@@ -301,3 +303,37 @@ def test_a_question_on_the_command_line_cannot_take_the_memory(tmp_path: Path) -
         with pytest.raises(OptionError, match=r"cannot answer|too long"):
             catalogue.query("SELECT unnest(range(2000000000))", time_s=5.0)
     assert resource.getrlimit(resource.RLIMIT_AS) == before
+
+
+def test_a_question_that_lets_go_of_nothing_does_not_hold_whoever_asks(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """DuckDB looks at an interruption between steps alone; this stands for one endless step."""
+    monkeypatch.setattr("flightid.fleet.catalogue.on_time.GRACE_S", 0.05)
+    over, said = threading.Event(), []
+
+    class Connection:
+        def interrupt(self) -> None:
+            said.append("interrupted")
+
+        def close(self) -> None:
+            said.append("closed")
+
+    timed = TimedConnection(Connection())
+    assert timed.work_out(lambda: 3, 5.0) == 3
+    with pytest.raises(ZeroDivisionError):
+        timed.work_out(lambda: 1 // 0, 5.0)
+    with pytest.raises(TimeoutError, match=r"no answer after 0\.01 s"):
+        timed.work_out(over.wait, 0.01)
+    assert timed.is_held
+    with pytest.raises(TimeoutError, match="still being worked out"):
+        timed.work_out(lambda: 3, 5.0)
+    timed.close()
+    assert said == ["interrupted"]
+    over.set()
+    for _ in range(500):
+        if said[-1] == "closed":
+            break
+        time.sleep(0.01)
+    assert said == ["interrupted", "closed"]
+    assert timed.work_out(lambda: 3, 5.0) == 3

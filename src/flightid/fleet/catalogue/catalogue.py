@@ -12,6 +12,7 @@ from flightid.errors import DataError, OptionError
 from flightid.extras import extra_module
 from flightid.fleet.catalogue.compaction import tables_of
 from flightid.fleet.catalogue.newest import LOOSE, VersionRecords, older_records
+from flightid.fleet.catalogue.on_time import TimedConnection
 from flightid.fleet.catalogue.parts import TablePart
 from flightid.fleet.catalogue.schema import TABLES, FleetTable
 from flightid.fleet.catalogue.store import ObjectStore, Store
@@ -23,6 +24,8 @@ QUERY_S = 60.0
 """Longest time for one answer, s."""
 MOST_ANSWERED, MOST_SHOWN = 50_000_000, 100_000
 """Rows of an answer that is computed with, and of one that is shown."""
+MORE_TIME = "ask for less, or give it more time (--time-s)"
+HELD = "ask for no huge value; open the catalogue anew, for this one is held until it is made"
 ZONED = "TIMESTAMP WITH TIME ZONE"
 
 
@@ -49,8 +52,9 @@ class Catalogue:
     def __init__(self, store: Store, earlier: Sequence[Store] = ()) -> None:
         duckdb = extra_module("duckdb", PURPOSE)
         self._store = store
-        self._errors, self._interruption = duckdb.Error, duckdb.InterruptException
+        self._errors = duckdb.Error
         self._connection = duckdb.connect(":memory:")
+        self._timed = TimedConnection(self._connection)
         sets = [VersionRecords.of(each) for each in (store, *earlier)]
         self.broken = sets[0].broken
         older = older_records(sets)
@@ -125,8 +129,9 @@ class Catalogue:
         sql : str
             In DuckDB's dialect, over the tables of `tables`.
         time_s : float
-            Longest time for it, s; looked at between DuckDB's steps, of which one that makes a
-            single huge value is not interrupted (``flightid fleet query`` bounds its memory too).
+            Longest time for it, s. A step of DuckDB that makes one huge value cannot be ended: it
+            is left to itself, and the catalogue takes no other question until it is over; its
+            memory is not bounded here (``flightid fleet query`` bounds that too).
         most_rows : int
             Longest answer.
 
@@ -144,21 +149,18 @@ class Catalogue:
         """
         if not 0.0 < time_s <= threading.TIMEOUT_MAX:
             raise OptionError("no time for an answer", found=f"{time_s:g} s", needed="above 0 s")
-        clock = threading.Timer(time_s, self._connection.interrupt)
-        clock.daemon = True
-        clock.start()
         try:
-            found = self._asked(sql).limit(most_rows + 1).to_arrow_table()
-        except self._interruption as error:
+            found = self._timed.work_out(
+                lambda: self._asked(sql).limit(most_rows + 1).to_arrow_table(), time_s
+            )
+        except TimeoutError as error:
             raise OptionError(
                 "the question takes too long",
-                found=f"no answer after {time_s:g} s",
-                action="ask for less, or give it more time (--time-s)",
+                found=str(error),
+                action=HELD if self._timed.is_held else MORE_TIME,
             ) from error
         except self._errors as error:
             raise OptionError("the catalogue cannot answer this", found=str(error)) from error
-        finally:
-            clock.cancel()
         if found.num_rows > most_rows:
             raise OptionError(
                 "the answer is too long",
@@ -227,7 +229,7 @@ class Catalogue:
 
     def close(self) -> None:
         """Let go of it."""
-        self._connection.close()
+        self._timed.close()
 
     def __enter__(self) -> Self:
         return self
