@@ -316,3 +316,20 @@ def test_an_address_has_one_record_that_counts(
     assert [each.code for each in again.findings] == ["replaced-records"]
     assert fleet_status(tmp_path / "fleet.toml").outcomes == {"refused": 1}
     assert run_fleet(tmp_path / "fleet.toml").kept == 1
+
+
+def test_one_content_under_three_names_is_one_log(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "fleet.toml").write_text("[fleet]\ntitle = 't'\nlogs = ['.']\n")
+    for name in ("a.bin", "b.bin", "c.bin"):
+        (tmp_path / name).write_bytes(b"the same")
+    monkeypatch.setattr("flightid.fleet.run.find_spec", lambda _: None)
+    # Two at once may both be taken, the third then is known: either way there is one.
+    done = run_fleet(tmp_path / "fleet.toml", workers=1)
+    assert (done.found, done.kept, done.outcomes) == (3, 0, {"refused": 1})
+    assert [each.code for each in done.findings] == ["copied-logs"]
+    assert done.findings[0].message.startswith("2 logs with the bytes of another")
+    assert fleet_status(tmp_path / "fleet.toml").outcomes == {"refused": 1}
+    again = run_fleet(tmp_path / "fleet.toml", workers=1)
+    assert (again.found, again.kept, again.outcomes, again.findings) == (3, 3, {}, ())

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from flightid.conventions import Light
 from flightid.errors import DataError, OptionError
-from flightid.findings import Finding
+from flightid.findings import Finding, counted
 from flightid.fleet.addresses import LogAddress, find_logs
 from flightid.fleet.catalogue.compaction import (
     compact,
@@ -152,18 +152,18 @@ def _run(path: str | Path, workers: int | None, scheduler: str | None, *, retry:
     aside = set_aside(store)
     addresses = find_logs([settings.place(place) for place in settings.words.logs])
     missing, earlier = _missing(store, addresses, tables, retry=retry)
-    counts, findings = Counter[str](), list(_findings(scheduler, addresses))
-    replaced, seen = set[str](), set[str]()
+    findings = list(_findings(scheduler, addresses))
+    replaced, taken = set[str](), _Contents()
     run = _Run(settings, tables, store, order, workers, scheduler)
     with progress(len(missing), settings.path.stem) as advance:
         for outcome in run.outcomes(orders(missing, tables)):
-            counts[outcome.outcome] += 1
+            taken.add(outcome)
             replaced |= earlier.get(outcome.order.address.address, set())
-            seen.add(outcome.log)
             advance()
-    replaced -= seen
+    replaced -= taken.outcomes.keys()
     _forget(store, replaced)
     run.tidy(1)
+    counts = taken.counts()
     kept = len(addresses) - len(missing) + counts.pop(KNOWN, 0)
     if aside:
         text = (
@@ -173,7 +173,42 @@ def _run(path: str | Path, workers: int | None, scheduler: str | None, *, retry:
     if replaced:
         text = f"{len(replaced)} earlier records count no more: their logs have other bytes now"
         findings.append(Finding("replaced-records", Light.GREEN, text))
-    return FleetRun(settings.catalogue, len(addresses), kept, dict(counts), tuple(findings))
+    findings += taken.findings()
+    return FleetRun(settings.catalogue, len(addresses), kept, counts, tuple(findings))
+
+
+class _Contents:
+    """What became of each content: several names of the same bytes are one log."""
+
+    def __init__(self) -> None:
+        self.outcomes: dict[str, str] = {}
+        self._first: dict[str, str] = {}
+        self._copies = Counter[str]()
+        self._example = ""
+
+    def add(self, outcome: LogOutcome) -> None:
+        """Note an outcome; of copies that one counts which is not merely known."""
+        log, name = outcome.log, outcome.order.address.name
+        if log in self._first:
+            self._copies[log] += 1
+            self._example = f"{name} is {self._first[log]}"
+        self._first.setdefault(log, name)
+        if self.outcomes.get(log, KNOWN) == KNOWN:
+            self.outcomes[log] = outcome.outcome
+
+    def counts(self) -> dict[str, int]:
+        """Logs by outcome, each content once; by every name those that the catalogue had."""
+        found = Counter(self.outcomes.values())
+        found[KNOWN] += sum(n for log, n in self._copies.items() if self.outcomes[log] == KNOWN)
+        return dict(found)
+
+    def findings(self) -> Iterator[Finding]:
+        """That some were taken under several names."""
+        fresh = sum(n for log, n in self._copies.items() if self.outcomes[log] != KNOWN)
+        if fresh:
+            text = f"{counted(fresh, 'log')} with the bytes of another: each content counts once"
+            action = "remove copies: their record has vehicle and date by one of the names"
+            yield Finding("copied-logs", Light.AMBER, f"{text} ({self._example})", action)
 
 
 @dataclass(frozen=True)
