@@ -30,6 +30,9 @@ SETTINGS = {
     "distributed.worker.profile.enabled": False,
     "distributed.admin.tick.interval": "200ms",
     "distributed.admin.system-monitor.interval": "5s",
+    # The port for pages opens whether there are any or not: nothing is served there.
+    "distributed.scheduler.http.routes": [],
+    "distributed.worker.http.routes": [],
 }
 SILENCE_S = 10.0
 """Time without a result after which the workers are counted."""
@@ -166,6 +169,8 @@ def _client(distributed: Any, workers: int | None, scheduler: str | None) -> Ite
                 threads_per_worker=1,
                 processes=True,
                 dashboard_address=None,
+                # Any free port; 8787 is warned of where a second run takes it.
+                scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},
                 host="127.0.0.1",
                 memory_limit=0,
                 silence_logs="ERROR",
