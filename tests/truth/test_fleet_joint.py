@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from flightid.errors import DataError
+from flightid.errors import DataError, FitError
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
 from flightid.fleet.statistics.joint_fit import FlightPoints, MeasuredPoints, fit_population
 from flightid.fleet.statistics.population import Population, estimate_population
@@ -117,3 +117,26 @@ def test_its_intervals_hold_where_half_of_the_flights_tell_little() -> None:
     assert np.mean(held) == pytest.approx(0.95, abs=0.03)
     size = [np.sqrt(np.mean(each**2, axis=0)) for each in (joint, apart)]
     assert np.all(size[0] < 1.05 * size[1]), size
+
+
+@pytest.mark.slow
+def test_it_gains_where_three_of_four_flights_are_short() -> None:
+    """Of 40 fleets 38 settle, errors of means are 0.81, 0.93, 0.86 and 0.80 of pooled fits'."""
+    errors, held = [], []
+    for seed in range(100, 140):
+        flights = fleet(seed, 8, 4, (0.05, 0.25, 0.25, 0.25), (60.0, 10.0, 10.0, 10.0))
+        try:
+            found = fit_population(MODEL, flights)
+        except FitError:
+            continue
+        errors.append([found.spreads.mean - MEAN, by_fits(flights).spreads.mean - MEAN])
+        following = MEAN + SPREAD * np.random.default_rng(10**6 + seed).normal(size=4)
+        for name, truth, spread in zip(NAMES, following, SPREAD, strict=True):
+            one = found.parameters[name]
+            ends = [each.interval95 or (0.0, 0.0) for each in (one.next_vehicle, one.spread)]
+            told = zip(ends, (truth, spread), strict=True)
+            held.append([low <= value <= high for (low, high), value in told])
+    assert len(errors) >= 36
+    joint, pooled = np.sqrt(np.mean(np.square(errors), axis=0))
+    assert np.all(joint < 0.97 * pooled), joint / pooled
+    assert np.all(np.mean(held, axis=0) > 0.9), np.mean(held, axis=0)
