@@ -33,11 +33,11 @@ async function ask(path: string, options: RequestInit = {}): Promise<Response> {
   return answer.ok ? answer : refused(answer);
 }
 
-async function json<T>(path: string, options: RequestInit = {}): Promise<T> {
+export async function json<T>(path: string, options: RequestInit = {}): Promise<T> {
   return (await ask(path, options)).json();
 }
 
-const sent = (method: string, body: unknown, headers: Record<string, string> = {}) => ({
+export const sent = (method: string, body: unknown, headers: Record<string, string> = {}) => ({
   method,
   headers: { "content-type": "application/json", ...headers },
   body: JSON.stringify(body),

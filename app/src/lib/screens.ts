@@ -1,5 +1,6 @@
 import type { Component } from "svelte";
 import Compare from "../screens/Compare.svelte";
+import Fleet from "../screens/Fleet.svelte";
 import Flight from "../screens/Flight.svelte";
 import Fly from "../screens/Fly.svelte";
 import Gains from "../screens/Gains.svelte";
@@ -17,6 +18,8 @@ export interface Given {
   log: string;
   study: Study | null;
   name: string;
+  /** What stands behind the name: a vehicle of a fleet. */
+  inner: string;
 }
 
 /** A screen: its word in the address, what it is called, and when its link is there. */
@@ -48,5 +51,6 @@ export const SCREENS: Screen[] = [
   { name: "model", title: "Model", component: Model, ofLog: true, needsStudy: true, shows: hasModels },
   { name: "verify", title: "Verify", component: Verify, ofLog: true, needsStudy: true, shows: hasModels },
   { name: "report", title: "Report", component: Report, ofLog: true, needsStudy: true, shows: hasModels },
+  { name: "fleet", title: "Fleet", component: Fleet, ofLog: false, needsStudy: false, shows: () => true },
   { name: "fly", title: "Fly", component: Fly, ofLog: false, needsStudy: false, shows: () => true },
 ];

@@ -99,6 +99,139 @@ export interface FieldGroup {
   fields: Record<string, string>;
 }
 
+/** A flight of a vehicle; `here` is its log in the workspace, where the page has it. */
+export interface FleetFlight {
+  log: string;
+  flown_at: string;
+  light: string;
+  address: string;
+  outcome: string;
+  here: string | null;
+}
+
+/** A parameter of a vehicle over time, with the level behind it and when it changed. */
+export interface FleetHistory {
+  vehicle: string;
+  type: string;
+  model: string;
+  name: string;
+  unit: string;
+  label: string;
+  time_s: number[];
+  values: number[];
+  half: number[];
+  level: number[];
+  low: number[];
+  high: number[];
+  changed: boolean;
+  kind: string;
+  words: string;
+  changed_s: [number, number] | null;
+  events: [number, string][];
+  logs: string[];
+}
+
+/** A fleet file or a catalogue of the workspace. */
+export interface FleetItem {
+  id: string;
+  path: string;
+  is_file: boolean;
+}
+
+/** All fleets, and folders that could be one. */
+export interface FleetListing {
+  fleets: FleetItem[];
+  folders: LogFolder[];
+}
+
+/** The answers of a fleet, as its report gives them. */
+export interface FleetPart {
+  title: string;
+  words: string;
+  level: number;
+  vehicles: FleetVehicle[];
+  types: FleetType[];
+  histories: FleetHistory[];
+  refused: FleetTable;
+  undated: number;
+}
+
+/** The fleet file that was written, and what was chosen. */
+export interface FleetProposed {
+  fleet: FleetItem;
+  said: string[];
+}
+
+/** One SELECT. */
+export interface FleetQuery {
+  sql: string;
+}
+
+/** Its answer, whole; `seconds` are of the worker. */
+export interface FleetRows {
+  columns: string[];
+  rows: ((string | number | number | boolean | null)[])[];
+  seconds: number;
+}
+
+/** What the last run of a fleet from the page did. */
+export interface FleetRunPart {
+  found: number;
+  kept: number;
+  outcomes: Record<string, number>;
+  said: string[];
+}
+
+/** A fleet: its file, how far it is, and its jobs. */
+export interface FleetScreen {
+  fleet: FleetItem;
+  text: string;
+  outcomes: Record<string, number>;
+  found: number | null;
+  words: string;
+  run: FleetRunPart | null;
+  jobs: Job[];
+}
+
+/** A folder right below the workspace, as `flightid fleet run FOLDER` takes it. */
+export interface FleetStart {
+  folder: string;
+}
+
+/** Rows as they are shown. */
+export interface FleetTable {
+  title: string;
+  columns: string[];
+  units: string[];
+  digits: number[];
+  rows: ((string | number | number | boolean | null)[])[];
+  notes: string[];
+}
+
+/** What is known of one model of one type. */
+export interface FleetType {
+  name: string;
+  model: string;
+  reasons: string[];
+  labels: Record<string, string>;
+  tables: FleetTable[];
+}
+
+/** A vehicle with its light. */
+export interface FleetVehicle {
+  name: string;
+  types: string[];
+  flights: number;
+  finding: ShownFinding;
+}
+
+/** One vehicle: its flights and the histories of its parameters. */
+export interface FleetVehiclePart {
+  name: string;
+  flights: FleetFlight[];
+  histories: FleetHistory[];
+}
+
 /** Everything known of a log; parts that are being made are None. */
 export interface FlightScreen {
   id: string;
@@ -260,7 +393,7 @@ export interface GainsQuestion {
 /** Long work: its state, and where it can be asked for again. */
 export interface Job {
   id: string;
-  kind: "overview" | "review" | "run";
+  kind: "overview" | "review" | "run" | "fleet";
   log: string;
   state: "waiting" | "done" | "failed" | "cancelled" | "interrupted";
   reason: string;
@@ -283,6 +416,12 @@ export interface Listing {
   version: string;
   logs: LogItem[];
   left_out: LeftOut[];
+}
+
+/** A folder of logs of which a fleet can be made. */
+export interface LogFolder {
+  name: string;
+  logs: number;
 }
 
 /** A log of the workspace; what an overview tells is there once it was made. */

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import asyncio
+
 from fastapi import FastAPI, HTTPException
 
 from flightid.app.backstage import Backstage, known_log
+from flightid.app.fleet_routes import sound_fleet
 from flightid.app.schemas import Job
 
 
@@ -19,6 +22,8 @@ def add_job_routes(app: FastAPI, backstage: Backstage) -> None:
     @app.post("/api/jobs")
     async def again(job: Job) -> list[Job]:
         path = backstage.studies.path(job.log) if job.kind == "run" else None
+        if job.kind == "fleet":
+            path = (await asyncio.to_thread(sound_fleet, workspace, job.log)).path
         if job.kind == "run" and path is None:
             raise HTTPException(404, "There is no study to run.")
         workers.ensure(job.kind, job.log, path or known_log(workspace, job.log), again=True)

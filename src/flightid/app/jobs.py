@@ -1,7 +1,8 @@
 """Long work in processes beside the server: started once, cancelled for good, found again.
 
 A pool for each that may not hold up another. One process keeps logs open for what a hand waits
-for, one plants of tunings, one what is compared, one what is planned; others take jobs of seconds.
+for, one plants of tunings, one what is compared, one what is planned, one catalogues of fleets, one
+runs fleets; others take jobs of seconds.
 What is running stands in a file, so that a killed server offers it again.
 """
 
@@ -19,7 +20,7 @@ from typing import Any
 
 from pebble import ProcessExpired
 
-from flightid.app import run_work, work
+from flightid.app import fleet_work, run_work, work
 from flightid.app.crew import Crew
 from flightid.app.kept_parts import kept_part
 from flightid.app.own_folders import own_folder, read_plain
@@ -27,6 +28,7 @@ from flightid.app.schemas import Job
 from flightid.app.workspace import Workspace
 from flightid.errors import FlightidError
 from flightid.files import write_atomically
+from flightid.fleet.catalogue.catalogue import QUERY_S
 
 LONGEST_S = 900.0
 """Of a job; a hand's request may take `PATIENCE_S`."""
@@ -49,14 +51,23 @@ def _run(workspace: Workspace, log: str, path: Path) -> tuple[object, ...]:
     return run_work.make_run, path, result.parent, result
 
 
+def _fleet(workspace: Workspace, log: str, path: Path) -> tuple[object, ...]:
+    return fleet_work.make_fleet, path, workspace.result_path(log, "fleet.json")
+
+
 WORK: dict[str, Callable[[Workspace, str, Path], tuple[object, ...]]] = {
     "overview": _overview,
     "review": _review,
     "run": _run,
+    "fleet": _fleet,
 }
 """Call and inputs of each kind of job (`Job.kind`); its result is a part of `kept_parts.PARTS`."""
-REPEATED = ("run",)
-"""Kinds whose result depends on the study: asked for again, they are done again."""
+REPEATED = ("run", "fleet")
+"""Kinds whose result depends on a file of the user: asked for again, they are done again."""
+ENDLESS = ("fleet",)
+"""Kinds that take as long as they take, in a process of their own."""
+QUESTION_S = QUERY_S + 15.0
+"""Longest time for a question to a catalogue: what DuckDB does not stop ends with its process."""
 
 
 class Workers:
@@ -74,6 +85,7 @@ class Workers:
         self._listeners: list[Listener] = []
         self._loop: asyncio.AbstractEventLoop | None = None
         self._live, self._tuning, self._compared, self._planned = (Crew() for _ in range(4))
+        self._asked, self._fleets = Crew(), Crew()
         self._long = Crew(max(1, (os.cpu_count() or 2) - 1))
         self._folder = own_folder(workspace.folder, ".flightid", "jobs")
         for job in _interrupted(self._folder):
@@ -87,7 +99,8 @@ class Workers:
 
     def stop(self) -> None:
         """End all processes."""
-        crews = (self._live, self._tuning, self._compared, self._planned, self._long)
+        short = (self._live, self._tuning, self._compared, self._planned, self._asked)
+        crews = (*short, self._fleets, self._long)
         for crew in crews:
             crew.stop()
         for crew in crews:
@@ -126,7 +139,8 @@ class Workers:
             return
         write_atomically(self._folder / f"{name}.json", job.model_dump_json())
         self._jobs[name] = job
-        future = self._long.schedule(work.answered, *inputs, timeout_s=LONGEST_S)
+        crew, longest = (self._fleets, None) if kind in ENDLESS else (self._long, LONGEST_S)
+        future = crew.schedule(work.answered, *inputs, timeout_s=longest)
         self._futures[name] = future
         self._tell(job)
         future.add_done_callback(lambda done: self._soon(self._ended, name, done))
@@ -157,6 +171,14 @@ class Workers:
     async def planned(self, call: Callable[..., Any], *inputs: object) -> tuple[Any, str, float]:
         """The same for plans."""
         return await _awaited(self._planned, LONGEST_S, call, *inputs)
+
+    async def asked(self, call: Callable[..., Any], *inputs: object) -> tuple[Any, str, float]:
+        """The same for catalogues of fleets, whose answers that process holds."""
+        return await _awaited(self._asked, LONGEST_S, call, *inputs)
+
+    async def questioned(self, call: Callable[..., Any], *inputs: object) -> tuple[Any, str, float]:
+        """The same for one question to a catalogue: whatever it does, it ends."""
+        return await _awaited(self._asked, QUESTION_S, call, *inputs)
 
     def _soon(self, call: Callable[..., None], *inputs: object) -> None:
         if self._loop is not None and not self._loop.is_closed():

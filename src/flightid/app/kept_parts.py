@@ -6,11 +6,17 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from flightid.app.fleet_schemas import FleetRunPart
 from flightid.app.run_schemas import RunPart
 from flightid.app.schemas import FieldGroup, Message, Overview, ReviewPart
 from flightid.app.workspace import Workspace
 
-PARTS: dict[str, type[Message]] = {"overview": Overview, "review": ReviewPart, "run": RunPart}
+PARTS: dict[str, type[Message]] = {
+    "overview": Overview,
+    "review": ReviewPart,
+    "run": RunPart,
+    "fleet": FleetRunPart,
+}
 
 
 def kept_overview(workspace: Workspace, log: str) -> Overview | None:

@@ -114,7 +114,7 @@ class Job(Message):
     """Long work: its state, and where it can be asked for again."""
 
     id: str
-    kind: Literal["overview", "review", "run"]
+    kind: Literal["overview", "review", "run", "fleet"]
     log: str
     state: Literal["waiting", "done", "failed", "cancelled", "interrupted"]
     reason: str = ""

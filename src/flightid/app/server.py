@@ -13,6 +13,7 @@ from fastapi.exceptions import RequestValidationError
 from flightid.app.backstage import Backstage
 from flightid.app.compare_routes import add_compare_routes
 from flightid.app.field_routes import add_field_routes
+from flightid.app.fleet_routes import add_fleet_routes
 from flightid.app.fly_routes import add_fly_routes
 from flightid.app.gain_answers import add_gain_routes
 from flightid.app.job_routes import add_job_routes
@@ -40,6 +41,7 @@ ROUTES: tuple[Callable[[FastAPI, Backstage], None], ...] = (
     add_run_routes,
     add_fly_routes,
     add_model_routes,
+    add_fleet_routes,
     add_socket,
 )
 """One module each; a new subject adds its own."""

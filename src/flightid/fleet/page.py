@@ -34,17 +34,19 @@ def fleet_document(answers: FleetAnswers, title: str = "Fleet") -> Document:
     answers : FleetAnswers
     title : str
     """
-    fitted, every = fitted_share(answers.logs)
-    vehicles = {name for each in answers.types for name in each.data.members}
-    words = (
-        f"{counted(every, 'log')}, {fitted} with a model, of {counted(len(vehicles), 'vehicle')}"
-    )
     sections = [
         Section("Vehicles", tuple(_vehicles(answers))),
         *(Section(_type_title(each), tuple(_type_blocks(each))) for each in answers.types),
         Section("Logs that could not be used", tuple(_refused(answers.logs))),
     ]
-    return Document(title, words, tuple(sections), f"Made by flightid {VERSION}.")
+    return Document(title, fleet_words(answers), tuple(sections), f"Made by flightid {VERSION}.")
+
+
+def fleet_words(answers: FleetAnswers) -> str:
+    """How large a fleet is, in one line."""
+    fitted, every = fitted_share(answers.logs)
+    vehicles = {name for each in answers.types for name in each.data.members}
+    return f"{counted(every, 'log')}, {fitted} with a model, of {counted(len(vehicles), 'vehicle')}"
 
 
 def _type_title(each: TypeAnswers) -> str:
@@ -54,7 +56,7 @@ def _type_title(each: TypeAnswers) -> str:
 def _vehicles(answers: FleetAnswers) -> Iterator[Block]:
     """One light a vehicle: changed is red, unlike its type amber."""
     found = {
-        name: _light(name, answers.types)
+        name: vehicle_light(name, answers.types)
         for name in sorted({name for each in answers.types for name in each.data.members})
     }
     if not found:
@@ -85,12 +87,13 @@ def _counts(found: Sequence[Finding]) -> Iterator[Finding]:
         yield Finding("vehicles-unknown", Light.UNKNOWN, words, MORE)
 
 
-def _light(vehicle: str, types: Sequence[TypeAnswers]) -> Finding:
+def vehicle_light(vehicle: str, types: Sequence[TypeAnswers]) -> Finding:
+    """Light of one vehicle: changed is red, unlike its type amber."""
     said, light = [], Light.GREEN
     for each in types:
         for history in each.drift.alarms if each.drift is not None else ():
             if history.vehicle == vehicle:
-                said.append(_change_words(history, each.labels))
+                said.append(change_words(history, each.labels))
                 light = Light.RED
         for one in each.outliers.odd if each.outliers is not None else ():
             if one.vehicle == vehicle:
@@ -102,7 +105,8 @@ def _light(vehicle: str, types: Sequence[TypeAnswers]) -> Finding:
     return Finding("vehicle", light, f"{vehicle}: {'; '.join(said)}", act)
 
 
-def _change_words(history: ParameterHistory, labels: Mapping[str, str]) -> str:
+def change_words(history: ParameterHistory, labels: Mapping[str, str]) -> str:
+    """What changed, by how much, in words."""
     change = history.change_percent
     ends = change.interval(shown())
     size = "" if change.value is None else f" by {change.value:+.2g} %"
@@ -212,10 +216,13 @@ def _events(drift: FleetDrift, labels: Mapping[str, str]) -> Table:
 
 
 def _refused(logs: Sequence[Row]) -> Iterator[Block]:
+    table = refused_table(logs)
+    yield TableBlock(table) if table.rows else Paragraph("Every log gave a model.")
+
+
+def refused_table(logs: Sequence[Row]) -> Table:
+    """Logs without a model by reason, with what to change; no rows where every one has a model."""
     left = [each for each in logs if each["outcome"] != "fitted"]
-    if not left:
-        yield Paragraph("Every log gave a model.")
-        return
     counts = Counter((each["outcome"], each["reason"] or "") for each in left)
     rows: list[tuple[Cell, ...]] = []
     for (outcome, reason), number in counts.most_common():
@@ -225,4 +232,4 @@ def _refused(logs: Sequence[Row]) -> Iterator[Block]:
         *(Column("logs"), Column("outcome"), Column("reason"), Column("in words")),
         *(Column("what to change"), Column("for example")),
     )
-    yield TableBlock(Table("By reason", columns, tuple(rows)).without_empty_columns())
+    return Table("By reason", columns, tuple(rows)).without_empty_columns()

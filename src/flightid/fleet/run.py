@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields, replace
 from importlib.util import find_spec
+from multiprocessing import current_process
 from pathlib import Path
 
 from flightid.conventions import Light
@@ -337,7 +338,9 @@ class _Run:
                 yield self._counted(self._failed(outcome) if outcome.outcome == KILLED else outcome)
 
     def _taken(self, logs: list[LogOrder], workers: int | None) -> Iterable[LogOutcome]:
-        if self.scheduler is not None or (find_spec("distributed") and len(logs) > 1):
+        # A worker of a server may have no children but by a shell's call, which plain runs make.
+        clustered = find_spec("distributed") and not current_process().daemon
+        if self.scheduler is not None or (clustered and len(logs) > 1):
             return run_cluster(self.order, logs, workers, self.scheduler)
         return run_plain(self.order, logs, workers)
 
