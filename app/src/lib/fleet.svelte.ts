@@ -1,9 +1,9 @@
 import * as api from "./api";
 import { live } from "./live.svelte";
-import type { FleetListing, FleetPart, FleetProposed, FleetRows, FleetScreen, FleetVehiclePart } from "./types";
+import type { FleetListing, FleetPart, FleetDraft, FleetRows, FleetScreen, FleetVehiclePart } from "./types";
 
 export const fleets = () => api.json<FleetListing>("/api/fleets");
-export const propose = (folder: string) => api.json<FleetProposed>("/api/fleets", api.sent("POST", { folder }));
+export const propose = (folder: string) => api.json<FleetDraft>("/api/fleets", api.sent("POST", { folder }));
 export const query = (id: string, sql: string) => api.json<FleetRows>(`/api/fleets/${id}/query`, api.sent("POST", { sql }));
 const EVERY_MS = 2000;
 

@@ -99,6 +99,12 @@ export interface FieldGroup {
   fields: Record<string, string>;
 }
 
+/** The fleet file that was written, and what was chosen. */
+export interface FleetDraft {
+  fleet: FleetItem;
+  said: string[];
+}
+
 /** A flight of a vehicle; `here` is its log in the workspace, where the page has it. */
 export interface FleetFlight {
   log: string;
@@ -152,14 +158,8 @@ export interface FleetPart {
   vehicles: FleetVehicle[];
   types: FleetType[];
   histories: FleetHistory[];
-  refused: FleetTable;
+  refused: FleetSheet;
   undated: number;
-}
-
-/** The fleet file that was written, and what was chosen. */
-export interface FleetProposed {
-  fleet: FleetItem;
-  said: string[];
 }
 
 /** One SELECT. */
@@ -193,13 +193,8 @@ export interface FleetScreen {
   jobs: Job[];
 }
 
-/** A folder right below the workspace, as `flightid fleet run FOLDER` takes it. */
-export interface FleetStart {
-  folder: string;
-}
-
 /** Rows as they are shown. */
-export interface FleetTable {
+export interface FleetSheet {
   title: string;
   columns: string[];
   units: string[];
@@ -208,13 +203,18 @@ export interface FleetTable {
   notes: string[];
 }
 
+/** A folder right below the workspace, as `flightid fleet run FOLDER` takes it. */
+export interface FleetStart {
+  folder: string;
+}
+
 /** What is known of one model of one type. */
 export interface FleetType {
   name: string;
   model: string;
   reasons: string[];
   labels: Record<string, string>;
-  tables: FleetTable[];
+  tables: FleetSheet[];
 }
 
 /** A vehicle with its light. */

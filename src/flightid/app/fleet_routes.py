@@ -11,10 +11,10 @@ from fastapi import FastAPI, HTTPException, Query
 from flightid.app import fleet_work
 from flightid.app.backstage import Backstage, made
 from flightid.app.fleet_schemas import (
+    FleetDraft,
     FleetItem,
     FleetListing,
     FleetPart,
-    FleetProposed,
     FleetQuery,
     FleetRows,
     FleetRunPart,
@@ -51,13 +51,13 @@ def add_fleet_routes(app: FastAPI, backstage: Backstage) -> None:
         return await asyncio.to_thread(_listing, workspace)
 
     @app.post("/api/fleets")
-    async def propose(asked: FleetStart) -> FleetProposed:
+    async def propose(asked: FleetStart) -> FleetDraft:
         if asked.folder not in log_folders(workspace):
             raise HTTPException(404, "There is no such folder of logs right below the workspace.")
         work = (fleet_work.propose, workspace.folder / asked.folder)
         name, said = await made(workers.asked(*work))
         found = next(each for each in known_fleets(workspace) if each.shown == name)
-        return FleetProposed(fleet=_item(found), said=said)
+        return FleetDraft(fleet=_item(found), said=said)
 
     @app.get("/api/fleets/{fleet}")
     async def screen(fleet: str) -> FleetScreen:

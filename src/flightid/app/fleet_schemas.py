@@ -40,14 +40,14 @@ class FleetStart(Message):
     folder: str = Field(min_length=1, max_length=300)
 
 
-class FleetProposed(Message):
+class FleetDraft(Message):
     """The fleet file that was written, and what was chosen."""
 
     fleet: FleetItem
     said: list[str]
 
 
-class FleetTable(Message):
+class FleetSheet(Message):
     """Rows as they are shown."""
 
     title: str
@@ -97,7 +97,7 @@ class FleetType(Message):
     model: str
     reasons: list[str]
     labels: dict[str, str]
-    tables: list[FleetTable]
+    tables: list[FleetSheet]
 
 
 class FleetPart(Message):
@@ -109,7 +109,7 @@ class FleetPart(Message):
     vehicles: list[FleetVehicle]
     types: list[FleetType]
     histories: list[FleetHistory]
-    refused: FleetTable
+    refused: FleetSheet
     undated: int
 
 

@@ -14,7 +14,7 @@ from flightid.app.fleet_schemas import (
     FleetHistory,
     FleetPart,
     FleetRunPart,
-    FleetTable,
+    FleetSheet,
     FleetType,
     FleetVehicle,
     FleetVehiclePart,
@@ -171,8 +171,8 @@ def _type(each: TypeAnswers) -> FleetType:
     )  # fmt: skip
 
 
-def _table(table: Table) -> FleetTable:
-    return FleetTable(
+def _table(table: Table) -> FleetSheet:
+    return FleetSheet(
         title=table.title,
         columns=[each.name for each in table.columns],
         units=[each.unit or "" for each in table.columns],
