@@ -14,6 +14,7 @@ from time import process_time
 
 import numpy as np
 from numpy.typing import NDArray
+from tests.bcg_trials import log_ratios
 
 from flightid.fleet.statistics.drift import find_drift
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
@@ -29,13 +30,6 @@ COLUMNS = (
     *(Column("question"), Column("found"), Column("needed"), Column("of")),
     Column("processor", "s", 3),
 )
-# Colditz et al., JAMA 271 (1994): cases and others, vaccinated and not, of 13 trials.
-BCG = np.array([
-    [4, 119, 11, 128], [6, 300, 29, 274], [3, 228, 11, 209], [62, 13536, 248, 12619],
-    [33, 5036, 47, 5761], [180, 1361, 372, 1079], [8, 2537, 10, 619], [505, 87886, 499, 87892],
-    [29, 7470, 45, 7232], [17, 1699, 65, 1600], [186, 50448, 141, 27197], [5, 2493, 3, 2338],
-    [27, 16886, 29, 17825],
-])  # fmt: skip
 
 
 def run() -> Table:
@@ -55,10 +49,7 @@ def _row(begun: float, question: str, found: str, needed: str, of: str) -> Row:
 def _peers() -> Iterator[Row]:
     """The published meta-analysis, and the same numbers by PyMARE and statsmodels."""
     begun = process_time()
-    cases, others, controls, rest = BCG.T
-    ratio = np.log(cases / (cases + others)) - np.log(controls / (controls + rest))
-    variance = 1 / cases - 1 / (cases + others) + 1 / controls - 1 / (controls + rest)
-    trials = [f"{i:02}" for i in range(13)]
+    trials, ratio, variance = log_ratios()
     data = FlightEstimates.of(["a"], trials, ratio[:, None], variance[:, None, None])
     found = estimate_population(data)
     one = found.parameters["a"]

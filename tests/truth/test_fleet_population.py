@@ -10,21 +10,11 @@ from flightid.fleet.statistics.flight_estimates import FlightEstimates
 from flightid.fleet.statistics.heterogeneity import VehicleEstimates
 from flightid.fleet.statistics.population import Population, estimate_population
 from flightid.fleet.statistics.restricted_likelihood import RestrictedLikelihood
-
-# Colditz et al., JAMA 271 (1994): cases and others, vaccinated and not, of 13 trials.
-BCG = np.array([
-    [4, 119, 11, 128], [6, 300, 29, 274], [3, 228, 11, 209], [62, 13536, 248, 12619],
-    [33, 5036, 47, 5761], [180, 1361, 372, 1079], [8, 2537, 10, 619], [505, 87886, 499, 87892],
-    [29, 7470, 45, 7232], [17, 1699, 65, 1600], [186, 50448, 141, 27197], [5, 2493, 3, 2338],
-    [27, 16886, 29, 17825],
-])  # fmt: skip
+from tests.bcg_trials import log_ratios
 
 
 def _bcg() -> Population:
-    cases, others, controls, rest = BCG.T
-    ratio = np.log(cases / (cases + others)) - np.log(controls / (controls + rest))
-    variance = 1 / cases - 1 / (cases + others) + 1 / controls - 1 / (controls + rest)
-    trials = [f"{i:02}" for i in range(13)]
+    trials, ratio, variance = log_ratios()
     return estimate_population(
         FlightEstimates.of(["log ratio"], trials, ratio[:, None], variance[:, None, None])
     )
