@@ -38,6 +38,8 @@ def test_the_page_says_of_a_fleet_what_its_report_says(tmp_path: Path) -> None:
     low, high = population.parameters["Ltphi"].next_vehicle.interval95 or (np.nan, np.nan)
     row = dict(zip(kind.tables[0].columns, kind.tables[0].rows[1], strict=True))
     assert (row["next vehicle low"], row["next vehicle high"]) == (low, high)
+    assert (row["parameter"], row["symbol"]) == ("roll control power", "Ltphi")
+    assert {each[1] for each in kind.tables[-1].rows} <= set(kind.labels.values())
     drift = answers.types[0].drift
     assert drift is not None
     first = part.histories[0]

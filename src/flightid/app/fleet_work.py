@@ -160,11 +160,11 @@ def _finding(found: Finding) -> ShownFinding:
 
 
 def _type(each: TypeAnswers) -> FleetType:
-    tables = [] if each.population is None else [each.population.summary()]
+    tables = [] if each.population is None else [each.population.summary(labels=each.labels)]
     if each.outliers is not None:
         tables.append(each.outliers.summary(each.labels))
     if each.drift is not None:
-        tables.append(each.drift.summary())
+        tables.append(each.drift.summary(labels=each.labels))
     return FleetType(
         name=each.type_name, model=each.model, reasons=list(each.reasons),
         labels=dict(each.labels), tables=[_table(table) for table in tables],
