@@ -13,6 +13,7 @@ from flightid import errors
 from flightid.dynamics.modes.modes import UNFITTED
 from flightid.dynamics.modes.participation import eigenpairs
 from flightid.models.sampled.discrete_modes import NO_COUNTERPART
+from flightid.study.estimate_tables import modes_cells
 from flightid.uncertainty.roots import UNSIGNED
 from tests.closeness import assert_close
 
@@ -180,6 +181,10 @@ def test_sampled_models_are_turned_to_continuous_time() -> None:
     rows = fid.modes(late).table().rows
     assert [(row[0], row[-1]) for row in rows[1:]] == [
         ("3 poles at the origin", "delays of one sample each")
+    ]
+    assert [row[0] for row in modes_cells(fid.modes(late))] == [
+        fid.modes(late).modes[0].named.character,
+        "3 delays of one sample each",
     ]
 
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from flightid.dynamics.modes.modes import modes
+from flightid.dynamics.modes.result import EACH_ONE_SAMPLE, delays_apart
 from flightid.errors import ModelError
 from flightid.identification import PolynomialDetails
 from flightid.models import NarxStructure, PolynomialStructure
@@ -196,11 +197,20 @@ def short_modes_table(items: Iterable[ModelResults]) -> Table:
         if item.fit is None or not isinstance(item.fit.details, PolynomialDetails):
             continue
         with suppress(ModelError):
-            rows += [(item.name, *_mode_cells(mode)) for mode in modes(item.fit)]
+            rows += [(item.name, *cells) for cells in modes_cells(modes(item.fit))]
     note = f"±: half of the {interval_words(shown())} interval."
     made = Table("Modes", columns, tuple(rows)).without_empty_columns()
     told = any(column.name == "±" for column in made.columns)
     return replace(made, notes=(note,)) if told else made
+
+
+def modes_cells(found: Iterable[Mode]) -> Iterator[tuple[Cell, ...]]:
+    """A row a mode; poles at the origin, which differ in nothing, in one."""
+    moving, delays = delays_apart(found)
+    yield from map(_mode_cells, moving)
+    if delays:
+        words = f"{len(delays)} {EACH_ONE_SAMPLE}" if len(delays) > 1 else delays[0].named.character
+        yield (words, *[None] * 7)
 
 
 def _mode_cells(mode: Mode) -> tuple[Cell, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -287,8 +287,8 @@ class Modes(Result, schema="flightid.modes/1"):
             Column(interval_words(level), "s"),
             Column("character and participation"),
         )
-        rows = [_row(mode, level) for mode in self.modes if mode.reason != AT_ORIGIN]
-        rows += _delay_rows([mode for mode in self.modes if mode.reason == AT_ORIGIN], level)
+        moving, delays = delays_apart(self.modes)
+        rows = [_row(mode, level) for mode in moving] + _delay_rows(delays, level)
         table = Table(f"Modes of {self.name}", columns, tuple(rows), self._notes(level))
         return table.without_empty_columns()
 
@@ -299,9 +299,7 @@ class Modes(Result, schema="flightid.modes/1"):
         else:
             words = interval_words(level)
             notes.append(f"± is half a {words} interval; the last times have their whole interval.")
-            notes += [
-                f"{m.name}: {m.reason}." for m in self.modes if m.reason and m.reason != AT_ORIGIN
-            ]
+            notes += [f"{m.name}: {m.reason}." for m in delays_apart(self.modes)[0] if m.reason]
         if self.sample_time_s is not None:
             notes.append(f"From the z plane by s = ln z / T, T = {self.sample_time_s:.4g} s.")
         return (*notes, *map(str, self.findings))
@@ -357,6 +355,21 @@ class Modes(Result, schema="flightid.modes/1"):
         stable = "stable" if self.is_stable else "unstable"
         plural = "" if count == 1 else "s"
         return f"Modes({self.name!r}: {count} eigenvalue{plural}{least}, {stable})"
+
+
+def delays_apart(found: Iterable[Mode]) -> tuple[list[Mode], list[Mode]]:
+    """Modes that move, and poles at the origin, which tables show in one row.
+
+    Example
+    -------
+    >>> delays_apart([])
+    ([], [])
+    """
+    modes = list(found)
+    return (
+        [mode for mode in modes if mode.reason != AT_ORIGIN],
+        [mode for mode in modes if mode.reason == AT_ORIGIN],
+    )
 
 
 def _delay_rows(found: list[Mode], level: float) -> list[tuple[Cell, ...]]:
