@@ -8,8 +8,8 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from flightid.dynamics.modes.delays import EACH_ONE_SAMPLE, delays_apart
 from flightid.dynamics.modes.modes import modes
-from flightid.dynamics.modes.result import EACH_ONE_SAMPLE, delays_apart
 from flightid.errors import ModelError
 from flightid.identification import PolynomialDetails
 from flightid.models import NarxStructure, PolynomialStructure

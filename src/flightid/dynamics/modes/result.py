@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.dynamics.modes.delays import EACH_ONE_SAMPLE, delays_apart
 from flightid.dynamics.modes.names import NamedMode
 from flightid.errors import UnknownNameError
 from flightid.findings import Finding
-from flightid.models.sampled.discrete_modes import AT_ORIGIN
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Reading
 from flightid.uncertainty.quantiles import interval_words, shown
 
-EACH_ONE_SAMPLE = "delays of one sample each"
 LEAST_SHOWN = 0.01
 """Participation below which the table of participations leaves a state out."""
 
@@ -355,21 +354,6 @@ class Modes(Result, schema="flightid.modes/1"):
         stable = "stable" if self.is_stable else "unstable"
         plural = "" if count == 1 else "s"
         return f"Modes({self.name!r}: {count} eigenvalue{plural}{least}, {stable})"
-
-
-def delays_apart(found: Iterable[Mode]) -> tuple[list[Mode], list[Mode]]:
-    """Modes that move, and poles at the origin, which tables show in one row.
-
-    Example
-    -------
-    >>> delays_apart([])
-    ([], [])
-    """
-    modes = list(found)
-    return (
-        [mode for mode in modes if mode.reason != AT_ORIGIN],
-        [mode for mode in modes if mode.reason == AT_ORIGIN],
-    )
 
 
 def _delay_rows(found: list[Mode], level: float) -> list[tuple[Cell, ...]]:
