@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -24,6 +25,9 @@ DOCUMENT_BYTES = 1 << 20
 DEEPEST = 64
 LONGEST_NUMBER = 300
 """Digits of an integer; what has more is no double."""
+_PART = r"""(?:[A-Za-z0-9_-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+"""
+_DEEP_KEY = re.compile(rf"(?<![A-Za-z0-9_-]){_PART}(?:\.[ \t]*+{_PART}){{{DEEPEST}}}")
+"""More parts than a table may be deep: Python's reader takes time and memory by their square."""
 
 
 def memory_budget() -> int:
@@ -238,6 +242,8 @@ def parse_toml(
     """
     try:
         text = content if isinstance(content, str) else content.decode("utf-8")
+        if _DEEP_KEY.search(text):
+            raise ValueError(f"a key of more than {DEEPEST} parts")
         table = tomllib.loads(text)
         _require_plain(table)
     # Integers of thousands of digits are a plain ValueError in Python.

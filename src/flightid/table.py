@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass, field
 from html import escape
 
+from flightid.wrapping import without_controls
+
 Cell = str | float | int | bool | None
 
 
@@ -140,9 +142,9 @@ class Table:
         return Table(self.title, self.columns, rows, (*below, *self.notes))
 
     def to_text(self) -> str:
-        """Plain text with aligned columns."""
-        headings = [column.heading for column in self.columns]
-        body = self.shown()
+        """Plain text with aligned columns; what a terminal would obey is shown as a mark."""
+        headings = [_told(column.heading) for column in self.columns]
+        body = [[_told(cell) for cell in row] for row in self.shown()]
         widths = [max(map(len, cells)) for cells in zip(headings, *body, strict=True)]
 
         def line(cells: list[str]) -> str:
@@ -152,7 +154,8 @@ class Table:
             ).rstrip()
 
         rule = "  ".join("-" * width for width in widths)
-        lines = [self.title, line(headings), rule, *map(line, body), *self.notes]
+        around = [without_controls(text) for text in (self.title, *self.notes)]
+        lines = [around[0], line(headings), rule, *map(line, body), *around[1:]]
         return "\n".join(text for text in lines if text)
 
     def to_dict(self) -> dict[str, object]:
@@ -184,3 +187,8 @@ class Table:
             f"<table><caption>{escape(self.title)}</caption>"
             f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>{notes}"
         )
+
+
+def _told(cell: str) -> str:
+    """A cell in one line, without what a terminal would obey."""
+    return without_controls(cell.replace("\n", " "))

@@ -1,4 +1,4 @@
-"""Text in lines of one width, in which file names and commands stay whole."""
+"""Text in lines of one width, in which file names and commands stay whole and nothing is obeyed."""
 
 from __future__ import annotations
 
@@ -10,6 +10,20 @@ GLUE = "\ue000"
 ARGUMENT = r"(?: --?[a-z][\w-]*(?: (?!-)[^\s,;:]+)?| [A-Z]+\b| [^\s,;:]*[./_\d][^\s,;:]*)"
 COMMAND = re.compile(rf"flightid [a-z][a-z-]*{ARGUMENT}*")
 """A verb with options, their values, files and placeholders, up to the first other word."""
+
+CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
+"""What terminals obey, and what turns the direction of text."""
+
+
+def without_controls(text: str) -> str:
+    r"""Text of strangers as a terminal may show it; lines and tabs stay.
+
+    Example
+    -------
+    >>> without_controls("V1\x1b[31m") == "V1\N{REPLACEMENT CHARACTER}[31m"
+    True
+    """
+    return CONTROL.sub("\N{REPLACEMENT CHARACTER}", text)
 
 
 def wrapped(text: str, width: int, *, first: str = "", later: str = "") -> list[str]:

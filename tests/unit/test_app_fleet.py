@@ -17,7 +17,7 @@ from flightid.app import fleet_work
 from flightid.app.fleet_schemas import FleetPart, FleetRunPart
 from flightid.app.fleets import checked_fleet, fleet_of, known_fleets, log_folders
 from flightid.app.workspace import Workspace
-from flightid.errors import OptionError
+from flightid.errors import OptionError, StudyError
 from tests.closeness import assert_close
 from tests.fleet_workspace import write_fleet
 from tests.sweep_log import SweepFlight
@@ -98,10 +98,16 @@ def test_a_fleet_that_leads_out_of_the_workspace_is_refused(tmp_path: Path) -> N
     for name, words in (sound | leading).items():
         (folder / f"{name}.toml").write_text(f'[fleet]\ntitle = "t"\n{words}\n')
     (folder / "planted.toml").symlink_to(folder / "whole.toml")
+    (folder / "loop").symlink_to(folder / "loop")
+    leading["loop"] = 'logs = ["logs"]\ncatalogue = "loop/x"'
+    (folder / "loop.toml").write_text(f'[fleet]\ntitle = "t"\n{leading["loop"]}\n')
+    (folder / "bad.toml").write_text('[fleet]\ntitle = "t"\nlogs = ["a\\u0000b"]\n')
     (folder / "study.toml").write_text('[study]\ntitle = "no fleet"\n')
     workspace = Workspace(folder)
     found = {each.path.stem: each for each in known_fleets(workspace)}
-    assert set(found) == {*sound, *leading}
+    assert set(found) == {*sound, *leading, "bad"}
+    with pytest.raises(StudyError, match="zero byte"):  # and harms no other fleet
+        checked_fleet(workspace, found.pop("bad"))
     for name, place in found.items():
         assert fleet_of(workspace, place.id) == place
         if name in sound:

@@ -333,3 +333,34 @@ def test_one_content_under_three_names_is_one_log(
     assert fleet_status(tmp_path / "fleet.toml").outcomes == {"refused": 1}
     again = run_fleet(tmp_path / "fleet.toml", workers=1)
     assert (again.found, again.kept, again.outcomes, again.findings) == (3, 3, {}, ())
+
+
+def test_tables_of_vehicles_and_flights_reach_every_log(fleet: Path, tmp_path: Path) -> None:
+    """A worker has no tables beside it: their lines come with each log."""
+    (log, *_) = sorted((fleet.parent / "logs").glob("V00-*.bin"))
+    (tmp_path / "logs").mkdir()
+    shutil.copy(log, tmp_path / "logs")
+    shutil.copy(fleet.parent / "study.toml", tmp_path)
+    (tmp_path / "tails.csv").write_text("id,vehicle,payload_kg\nV00,N\x1b[31m1,0.4\n")
+    (tmp_path / "flights.csv").write_text(f"log,flown_at\n{log.name},2026-02-03T10:00\n")
+    words = (
+        '[fleet]\ntitle = "t"\nlogs = ["logs"]\nstudy = "study.toml"\n[vehicles]\nby = "name"\n'
+        'pattern = "(V[0-9]+)"\ntable = "tails.csv"\nflight_table = "flights.csv"\n'
+    )
+    (tmp_path / "fleet.toml").write_text(words)
+    assert run_fleet(tmp_path / "fleet.toml", workers=1).outcomes == {"fitted": 1}
+    with open_catalogue(tmp_path / "fleet.toml") as catalogue:
+        answer = catalogue.answer("select vehicle, flown_at from logs")
+    assert answer.rows[0][0] == "N\x1b[31m1"
+    assert "2026-02-03 10:00" in str(answer)
+    assert "\x1b" not in str(answer)  # a terminal obeys no name
+
+
+def test_a_run_in_which_all_fails_says_so(fleet: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def dead(order: RunOrder, logs: list[LogOrder], workers: int | None) -> list[LogOutcome]:
+        return [LogOutcome(each, "failed", each.address.address) for each in logs]
+
+    monkeypatch.setattr("flightid.fleet.run.find_spec", lambda name: None)
+    monkeypatch.setattr("flightid.fleet.run.run_plain", dead)
+    done = run_fleet(fleet)
+    assert [each.code for each in done.findings if each.light == "red"] == ["all-failed"]

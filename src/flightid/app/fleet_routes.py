@@ -56,7 +56,11 @@ def add_fleet_routes(app: FastAPI, backstage: Backstage) -> None:
             raise HTTPException(404, "There is no such folder of logs right below the workspace.")
         work = (fleet_work.propose, workspace.folder / asked.folder)
         name, said = await made(workers.asked(*work))
-        found = next(each for each in known_fleets(workspace) if each.shown == name)
+        found = next((each for each in known_fleets(workspace) if each.shown == name), None)
+        if found is None:
+            raise HTTPException(
+                422, f"{name} is written, but there are too many fleets to list it."
+            )
         return FleetDraft(fleet=_item(found), said=said)
 
     @app.get("/api/fleets/{fleet}")

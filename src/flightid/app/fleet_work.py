@@ -27,6 +27,7 @@ from flightid.findings import Finding
 from flightid.fleet import ask_fleet, propose_fleet, read_fleet, run_fleet
 from flightid.fleet import open as open_fleet
 from flightid.fleet.engine.address_space import bounded_memory
+from flightid.fleet.opening import names_fleet_file
 from flightid.fleet.page import change_words, fleet_words, refused_table, vehicle_light
 from flightid.fleet.statistics.answers import FleetAnswers, TypeAnswers
 from flightid.fleet.statistics.drift import ParameterHistory
@@ -118,7 +119,7 @@ def _answers(place: Path) -> FleetAnswers:
 
 def _stamp(place: Path) -> str:
     """What changes where a fleet file or its catalogue does."""
-    is_file = place.suffix == ".toml"
+    is_file = names_fleet_file(place)
     catalogue = Path(read_fleet(place).catalogue) if is_file else place
     listed = (
         (path.as_posix(), path.stat().st_size, path.stat().st_mtime_ns)
@@ -129,11 +130,11 @@ def _stamp(place: Path) -> str:
 
 
 def _level(place: Path) -> float | None:
-    return read_fleet(place).questions.level if place.suffix == ".toml" else None
+    return read_fleet(place).questions.level if names_fleet_file(place) else None
 
 
 def _title(place: Path) -> str:
-    return read_fleet(place).words.title if place.suffix == ".toml" else place.name
+    return read_fleet(place).words.title if names_fleet_file(place) else place.name
 
 
 def _vehicle(name: str, types: Sequence[TypeAnswers]) -> FleetVehicle:

@@ -14,6 +14,7 @@ from flightid.app.own_folders import is_link, read_plain
 from flightid.app.workspace import ID, Workspace
 from flightid.errors import FlightidError, OptionError
 from flightid.fleet import read_fleet
+from flightid.fleet.engine.order import study_files
 from flightid.fleet.settings import FleetSettings
 
 DEEPEST = 3
@@ -59,7 +60,7 @@ def known_fleets(workspace: Workspace) -> list[FleetPlace]:
             break
     owned = set[Path]()
     for path in files:
-        with suppress(FlightidError, OSError):
+        with suppress(FlightidError, OSError, RuntimeError):  # the last: a link to itself
             owned.add(Path(read_fleet(path).catalogue).resolve())
     alone = [each.parent for each in catalogues if each.parent.resolve() not in owned]
     return [
@@ -97,6 +98,8 @@ def checked_fleet(workspace: Workspace, place: FleetPlace) -> FleetSettings | No
         if "://" in each:
             raise _outside(each)
         _require_inside(workspace.folder, each, Path(each))
+    for path in study_files(settings):
+        _require_inside(workspace.folder, str(path), path)
     return settings
 
 
@@ -150,7 +153,11 @@ def _require_inside(folder: Path, said: str, path: Path) -> None:
         if WILD.search(part):
             break
         plain /= part
-    if ".." in path.parts[len(plain.parts) :] or not plain.resolve().is_relative_to(folder):
+    try:
+        is_within = plain.resolve().is_relative_to(folder)
+    except (RuntimeError, OSError):  # links that end nowhere
+        is_within = False
+    if ".." in path.parts[len(plain.parts) :] or not is_within:
         raise _outside(said)
 
 

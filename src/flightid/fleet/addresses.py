@@ -130,7 +130,12 @@ def _of_file(path: Path) -> LogAddress:
 
 def _remote(place: str) -> Iterator[LogAddress]:
     fsspec = extra_module("fsspec", "the address of logs")
-    fs, path = fsspec.core.url_to_fs(place)
+    try:
+        fs, path = fsspec.core.url_to_fs(place)
+    except (ValueError, ImportError) as error:
+        raise StudyError(
+            "no way to this address is known", found=f"{place}: {error}", needed="as s3://bucket/"
+        ) from error
     if any(letter in path for letter in WILD):
         infos: list[dict[str, Any]] = list(fs.glob(path, detail=True).values())
     elif fs.isfile(path):

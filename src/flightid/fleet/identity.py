@@ -27,7 +27,8 @@ LEAP_S = 18
 DATES = re.compile(r"(20\d\d)[-_]?(0[1-9]|1[0-2])[-_]?(0[1-9]|[12]\d|3[01])")
 UNIX_GPS = (("vehicle_gps_position", "time_utc_usec"), ("sensor_gps", "time_utc_usec"))
 OWN = {"id", "vehicle", "type", "log", "flown_at"}
-TABLE_ROWS = 1_000_000
+TABLE_CELLS = 20_000_000
+"""Of a table: what a line lacks counts, for its reader fills it in."""
 
 
 @dataclass(frozen=True)
@@ -109,21 +110,34 @@ def _table(folder: Path, name: str | None, key: str) -> dict[str, dict[str, str]
     """Lines of a CSV by one of its columns."""
     if name is None:
         return {}
-    path, found = folder / name, dict[str, dict[str, str]]()
+    path = folder / name
     if path.stat().st_size > 256 * DOCUMENT_BYTES:
         raise StudyError(f"{name} is too long for a table of a fleet", needed="at most 256 MiB")
     with path.open(newline="", encoding="utf-8-sig", errors="replace") as stream:
-        reader = csv.DictReader(stream)
-        if key not in (reader.fieldnames or ()):
+        try:
+            return _lines(csv.DictReader(stream), name, key)
+        except csv.Error as error:
+            raise StudyError(f"{name} is no table of a fleet", found=str(error)) from error
+
+
+def _lines(reader: csv.DictReader[str], name: str, key: str) -> dict[str, dict[str, str]]:
+    found = dict[str, dict[str, str]]()
+    columns = reader.fieldnames or ()
+    if key not in columns:
+        raise StudyError(
+            f"{name}: its first line names no column {key!r}",
+            found=", ".join(columns)[:200] or "nothing",
+        )
+    for n, row in enumerate(reader):
+        if n * len(columns) > TABLE_CELLS:
             raise StudyError(
-                f"{name}: its first line names no column {key!r}",
-                found=", ".join(reader.fieldnames or ()) or "nothing",
+                f"{name} is too long for a table of a fleet",
+                needed=f"at most {TABLE_CELLS:,} cells, of lines that lack some too",
             )
-        for row in reader:
-            own = row.pop(key) or ""
-            if own in found:
-                raise StudyError(f"{name}: two lines have one {key}", found=own)
-            found[own] = {column: text for column, text in row.items() if column and text}
+        own = row.pop(key) or ""
+        if own in found:
+            raise StudyError(f"{name}: two lines have one {key}", found=own)
+        found[own] = {column: text for column, text in row.items() if column and text}
     return found
 
 

@@ -12,6 +12,7 @@ from flightid.fleet.catalogue.parts import BROKEN_JSON
 from flightid.fleet.catalogue.store import Store, store_at
 from flightid.fleet.engine.order import recipe
 from flightid.fleet.settings import FleetSettings, read_fleet
+from flightid.reading import DOCUMENT_BYTES
 
 CURRENT = "fleet.json"
 RECIPE = re.compile("[0-9a-f]{12}")
@@ -60,8 +61,18 @@ def open_catalogue(place: str | Path, *, earlier: bool = False) -> Catalogue:
 
 def catalogue_place(place: str | Path) -> str:
     """Folder or address of a catalogue, which a fleet file names."""
-    text = str(place)
-    return read_fleet(text).catalogue if text.endswith(".toml") else text
+    return read_fleet(place).catalogue if names_fleet_file(place) else str(place)
+
+
+def names_fleet_file(place: str | Path) -> bool:
+    """Whether a place is a fleet file; a folder may end in .toml too.
+
+    Example
+    -------
+    >>> names_fleet_file("fleet.toml"), names_fleet_file("fleet-catalogue")
+    (True, False)
+    """
+    return str(place).endswith(".toml") and not Path(place).is_dir()
 
 
 def current_store(settings: FleetSettings) -> Store:
@@ -72,7 +83,14 @@ def current_store(settings: FleetSettings) -> Store:
     content = json.dumps(note, indent=1).encode()
     if not (outer.exists(CURRENT) and outer.read(CURRENT) == content):
         outer.write(CURRENT, content)
-    return store_at(f"{settings.catalogue.rstrip('/')}/{own}")
+    place = f"{settings.catalogue.rstrip('/')}/{own}"
+    if Path(place).is_symlink():
+        raise DataError(
+            "the folder of a catalogue is a link: nothing is written through it",
+            found=place,
+            action="remove the link, or name what it leads to as the catalogue",
+        )
+    return store_at(place)
 
 
 def opened_store(place: str) -> Store:
@@ -84,7 +102,10 @@ def opened_store(place: str) -> Store:
         There is no catalogue at this place.
     """
     try:
-        note = json.loads(store_at(place).read(CURRENT))
+        store = store_at(place)
+        if (store.n_bytes(CURRENT) or 0) > DOCUMENT_BYTES:
+            raise ValueError(f"{CURRENT} is longer than any that a run writes")
+        note = json.loads(store.read(CURRENT))
         own = str(note["current"])
         if not own.isalnum():
             raise ValueError(own)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from flightid.fleet.opening import open_catalogue
+from flightid.fleet.opening import names_fleet_file, open_catalogue
 from flightid.fleet.page import fleet_document
 from flightid.fleet.settings import FleetQuestions, FleetSettings, read_fleet
 from flightid.fleet.statistics.answers import FleetAnswers, answer_questions
@@ -106,7 +106,7 @@ def fleet_report(place: str | Path) -> Document:
 
 
 def _settings(place: str | Path) -> FleetSettings | None:
-    return read_fleet(place) if str(place).endswith(".toml") else None
+    return read_fleet(place) if names_fleet_file(place) else None
 
 
 def _events(settings: FleetSettings) -> list[FleetEvent]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from importlib.util import find_spec
 from multiprocessing import current_process
@@ -175,6 +175,7 @@ def _run(path: str | Path, workers: int | None, scheduler: str | None, *, retry:
         text = f"{len(replaced)} earlier records count no more: their logs have other bytes now"
         findings.append(Finding("replaced-records", Light.GREEN, text))
     findings += taken.findings()
+    findings += _all_failed(counts)
     return FleetRun(settings.catalogue, len(addresses), kept, counts, tuple(findings))
 
 
@@ -298,6 +299,14 @@ def _findings(scheduler: str | None, addresses: list[LogAddress]) -> Iterator[Fi
             "there is no log at the places of the fleet file",
             "name folders, globs or addresses in [fleet] logs",
         )
+
+
+def _all_failed(counts: Mapping[str, int]) -> Iterator[Finding]:
+    """That a run brought nothing but failures: the fault is hardly in the logs then."""
+    if counts.get(FAILED) and counts[FAILED] == sum(counts.values()):
+        text = f"{counted(counts[FAILED], 'log')} taken, and every one failed"
+        action = "see the table failures for why, then flightid fleet run with --retry"
+        yield Finding("all-failed", Light.RED, text, action)
 
 
 def _no_space(found: str) -> DataError:

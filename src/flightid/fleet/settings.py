@@ -174,7 +174,10 @@ def instant_of(text: str) -> datetime.datetime:
     found = datetime.datetime.fromisoformat(text.strip())
     if found.tzinfo is None:
         return found
-    return found.astimezone(datetime.UTC).replace(tzinfo=None)
+    try:
+        return found.astimezone(datetime.UTC).replace(tzinfo=None)
+    except OverflowError as error:
+        raise ValueError("beyond the first or last year of a calendar") from error
 
 
 def read_fleet(path: str | Path) -> FleetSettings:
@@ -200,7 +203,21 @@ def read_fleet(path: str | Path) -> FleetSettings:
     ...     read_fleet(path).words.logs
     ('logs', 's3://bucket/2026/')
     """
-    source = Path(path)
+    return _read(Path(path), tables=True)
+
+
+def read_order(path: Path) -> FleetSettings:
+    """The same in a worker, to which tables beside the file were sent as lines of each log.
+
+    Raises
+    ------
+    StudyError
+        As `read_fleet`, but for the tables.
+    """
+    return _read(path, tables=False)
+
+
+def _read(source: Path, *, tables: bool) -> FleetSettings:
     values = read_toml(source, f"the {SUBJECT}", StudyError)
     root, collected = TableReader(values, TOP, SUBJECT), ErrorList()
     words = collected.read(_table, None, FleetWords, root, "fleet")
@@ -213,8 +230,10 @@ def read_fleet(path: str | Path) -> FleetSettings:
     for event in events:
         collected.read(_require_date, None, event)
     collected.read(_require_rule, None, vehicles)
-    named = (None if words is None else words.study, vehicles.table, vehicles.flight_table)
-    for name in filter(None, named):
+    if words is not None:
+        collected.read(_require_names, None, words)
+    beside = (vehicles.table, vehicles.flight_table) if tables else ()
+    for name in filter(None, (None if words is None else words.study, *beside)):
         collected.read(_require_file, None, source.parent / name)
     collected.finish(SUBJECT)
     assert words is not None
@@ -247,9 +266,10 @@ def _require_rule(rules: VehicleRules) -> None:
         return
     try:
         groups = re.compile(rules.pattern).groups
-    except re.error as error:
+    except (re.error, OverflowError, RecursionError) as error:
         raise StudyError(
-            "fleet file, [vehicles]: pattern is no regular expression", found=str(error)
+            "fleet file, [vehicles]: pattern is no regular expression",
+            found=str(error) or "groups nested too deeply",
         ) from error
     if groups < 1:
         raise StudyError(
@@ -259,6 +279,13 @@ def _require_rule(rules: VehicleRules) -> None:
         )
 
 
+def _require_names(words: FleetWords) -> None:
+    """Places that a system can have: none of them holds the byte that ends a name."""
+    for each in (*words.logs, words.catalogue or ""):
+        if "\0" in each:
+            raise StudyError("fleet file, [fleet]: no name may hold a zero byte", found=repr(each))
+
+
 def _require_file(path: Path) -> None:
-    if not path.is_file():
+    if "\0" in str(path) or not path.is_file():
         raise StudyError("fleet file: a file that it names is not there", found=str(path))

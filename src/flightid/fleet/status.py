@@ -11,7 +11,7 @@ from flightid.fleet.addresses import find_logs
 from flightid.fleet.catalogue.loose import QUARANTINE, loose_logs, read_loose
 from flightid.fleet.catalogue.parts import PARTS, KnownLogs, read_parts
 from flightid.fleet.catalogue.store import Store
-from flightid.fleet.opening import catalogue_place, opened_store
+from flightid.fleet.opening import catalogue_place, names_fleet_file, opened_store
 from flightid.fleet.settings import read_fleet
 from flightid.result import Result
 from flightid.table import Column, Table
@@ -93,7 +93,7 @@ def fleet_status(place: str | Path) -> FleetStatus:
     """
     where = catalogue_place(place)
     found = None
-    if str(place).endswith(".toml"):
+    if names_fleet_file(place):
         settings = read_fleet(place)
         found = len(find_logs([settings.place(each) for each in settings.words.logs]))
     return _counted(opened_store(where), where, found)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from typing import assert_never
 
 from flightid.report.content import (
@@ -16,10 +15,9 @@ from flightid.report.content import (
     TableBlock,
 )
 from flightid.table import Column, Table
-from flightid.wrapping import wrapped
+from flightid.wrapping import without_controls, wrapped
 
 WIDTH = 100
-_CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
 _VALUE = Column("value", digits=6)
 
 
@@ -43,7 +41,7 @@ def to_text(document: Document) -> str:
         parts += ["", *_section(section, level=1)]
     if document.footer:
         parts += ["", document.footer]
-    return _CONTROL.sub("\N{REPLACEMENT CHARACTER}", "\n".join(parts)) + "\n"
+    return without_controls("\n".join(parts)) + "\n"
 
 
 def _verdict(document: Document) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 from collections.abc import Iterator
@@ -10,9 +11,13 @@ from pathlib import Path
 from typing import Any, Protocol
 from urllib.parse import unquote, urlsplit
 
+from flightid.errors import DataError
 from flightid.extras import extra_module
 from flightid.files import sha256_of_file, write_atomically
 from flightid.fleet.addresses import LOCAL
+
+MOST_BYTES = 1 << 30
+"""Of one file that is read whole: parts hold a million rows at most."""
 
 
 class Store(Protocol):
@@ -91,11 +96,14 @@ class FolderStore:
 
     def read(self, name: str) -> bytes:
         """All bytes of a file; FileNotFoundError where there is none."""
-        return Path(self.root, name).read_bytes()
+        path = Path(self.root, name)
+        if path.stat().st_size > MOST_BYTES:
+            raise OSError(errno.EFBIG, f"longer than {MOST_BYTES} B", str(path))
+        return path.read_bytes()
 
     def write(self, name: str, content: bytes) -> None:
         """Write a file whole or not at all: temporary name, fsync, rename."""
-        path = Path(self.root, name)
+        path = self._own(name)
         path.parent.mkdir(parents=True, exist_ok=True)
         write_atomically(path, content)
 
@@ -118,8 +126,8 @@ class FolderStore:
 
     def remove(self, name: str) -> None:
         """Remove a file or a folder, there or not."""
-        path = Path(self.root, name)
-        if path.is_dir():
+        path = self._own(name)
+        if path.is_dir() and not path.is_symlink():
             shutil.rmtree(path, ignore_errors=True)
         else:
             path.unlink(missing_ok=True)
@@ -127,6 +135,17 @@ class FolderStore:
     def path(self, name: str) -> str:
         """A file's path."""
         return str(Path(self.root, name))
+
+    def _own(self, name: str) -> Path:
+        """Where a file is written or removed: through no link that was laid below the root."""
+        path = Path(self.root, name)
+        if path.parent.resolve() != (Path(self.root).resolve() / name).parent:
+            raise DataError(
+                "a link in a catalogue leads elsewhere: nothing is written through it",
+                found=str(path.parent),
+                action="remove the link",
+            )
+        return path
 
 
 class ObjectStore:

@@ -24,7 +24,7 @@ from flightid.fleet.catalogue.store import store_at
 from flightid.fleet.engine.order import KNOWN, SCRATCH, STORAGE, LogOrder, RunOrder
 from flightid.fleet.identity import FleetTables
 from flightid.fleet.run_one import FULL, LogTask, run_one
-from flightid.fleet.settings import read_fleet
+from flightid.fleet.settings import read_order
 
 ORPHAN = 3
 """Exit code of a child whose parent is gone."""
@@ -88,7 +88,7 @@ def _ready(
 ) -> Callable[[dict[str, Any]], dict[str, Any]]:
     """What takes one log, everything that all need loaded before the first."""
     order = RunOrder(**values)
-    settings = read_fleet(order.unpack(folder))
+    settings = read_order(order.unpack(folder))
     store = store_at(order.place)
     known = KnownLogs(store, read_parts(store)[0])
     reports = None if order.reports is None else Path(order.reports)
