@@ -3,17 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from typing import Protocol, TypeVar
 
 from flightid.models.sampled.discrete_modes import AT_ORIGIN
-
-if TYPE_CHECKING:
-    from flightid.dynamics.modes.result import Mode
 
 EACH_ONE_SAMPLE = "delays of one sample each"
 
 
-def delays_apart(found: Iterable[Mode]) -> tuple[list[Mode], list[Mode]]:
+class Lacking(Protocol):
+    """A mode that says why it has no numbers."""
+
+    @property
+    def reason(self) -> str:
+        """Empty where it has them."""
+
+
+Found = TypeVar("Found", bound=Lacking)
+
+
+def delays_apart(found: Iterable[Found]) -> tuple[list[Found], list[Found]]:
     """Modes that move, and poles at the origin, which tables show in one row.
 
     Example
