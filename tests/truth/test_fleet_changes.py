@@ -173,6 +173,34 @@ def test_changes_are_found_with_their_size(change: float, power: float) -> None:
     assert 0.91 <= np.mean(held) <= 0.99
 
 
+@pytest.mark.parametrize(("fleets", "n"), [(3, 24), pytest.param(12, 12, marks=pytest.mark.slow)])
+def test_the_size_of_a_drift_is_all_of_it(fleets: int, n: int) -> None:
+    """Levels that fall by 30 % from some flight on: a best step would tell two thirds of it."""
+    held: dict[str, list[bool]] = {}
+    told = []
+    for seed in range(fleets):
+        rng = np.random.default_rng(seed)
+        start, k = np.repeat(rng.integers(0, n // 2, 40), n), np.tile(np.arange(n), 40)
+        fallen = 0.3 * np.clip((k - start) / (n - 1 - start), 0.0, 1.0)
+        errors = rng.uniform(0.02, 0.05, 40 * n)
+        values = np.repeat(1.0 + 0.1 * rng.normal(size=40), n) * (1.0 - fallen)
+        values += errors * rng.normal(size=40 * n)
+        names = np.repeat([f"{i:03}" for i in range(40)], n).tolist()
+        data = FlightEstimates.of(
+            ["gain"], names, values[:, None], (errors**2)[:, None, None], time_s=DAY_S * k
+        )
+        for each in find_drift(data).alarms:
+            low, high = each.change_percent.interval95 or (0.0, 0.0)
+            held.setdefault(each.kind, []).append(low <= -30.0 <= high)
+            if each.kind == "drift":
+                told.append(each.change_percent.value)
+                assert each.changed_s is not None
+                assert each.changed_s[1] == each.time_s[-1]
+    assert len(held["drift"]) > 0.85 * 40 * fleets
+    assert 0.90 <= np.mean(held["drift"]) <= 0.99
+    assert np.mean(told) == pytest.approx(-30.0, abs=1.0)
+
+
 @pytest.mark.slow
 def test_a_change_of_many_beside_a_new_firmware_is_not_laid_on_the_others() -> None:
     found = find_drift(*_fleet(13, 500, change=0.1, changed=200, explained=True))

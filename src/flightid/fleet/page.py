@@ -111,7 +111,9 @@ def change_words(history: ParameterHistory, labels: Mapping[str, str]) -> str:
     ends = change.interval(shown())
     size = "" if change.value is None else f" by {change.value:+.2g} %"
     around = "" if ends is None else f" ({ends[0]:+.2g} to {ends[1]:+.2g} %)"
-    how = {STEP: " at once", DRIFT: " by and by"}.get(history.kind, "")
+    how = {STEP: " at once", DRIFT: " by and by, the last flight beside those before"}.get(
+        history.kind, ""
+    )
     return f"{labels.get(history.name, history.name)} changed{size}{around}{how}"
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.fleet.statistics.change_kind import change_kind
+from flightid.fleet.statistics.change_kind import DRIFT, STEP, change_kind
 from flightid.fleet.statistics.covariates import (
     Covariate,
     CovariateDesign,
@@ -18,7 +18,14 @@ from flightid.fleet.statistics.covariates import (
 )
 from flightid.fleet.statistics.events import EventEffect, FleetEvent, event_effect
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
-from flightid.fleet.statistics.largest_step import FEWEST, StepScan, scan_steps
+from flightid.fleet.statistics.largest_step import (
+    FEWEST,
+    SHORTEST,
+    StepScan,
+    scan_changes,
+    scan_drifts,
+    scan_steps,
+)
 from flightid.fleet.statistics.local_level import LocalLevel, follow_level
 from flightid.fleet.statistics.multiple_testing import FALSE_SHARE, chance_cell, corrected
 from flightid.fleet.statistics.neighbours import neighbour_factor, variances_with_odd_ones
@@ -63,6 +70,8 @@ class ParameterHistory:
         flights.
     change_percent : Estimate
         Largest step, percent of the level before it, with its interval over all places it may have.
+        Of an alarm that is drift: the last flight beside the level before it began, of a movement
+        that is steady from then on; where flights do not tell which: of both, as well as each fits.
     changed_s : tuple of float or None
         Last flight before the step and first behind it at the earliest and latest place, s.
     false_share : float or None
@@ -98,6 +107,10 @@ class ParameterHistory:
     def is_alarm(self) -> bool:
         """Whether it changed, false alarms of the whole fleet accounted for."""
         return self.false_share is not None and self.false_share <= FALSE_SHARE
+
+
+Asked = tuple[ParameterHistory, Array, Array]
+"""A history, and values with their covariance as they are tested: slopes are those of others."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -224,7 +237,7 @@ def find_drift(
     The modules of `flightid.fleet.statistics` name those of each test.
     """
     design = design_covariates(covariates or {})
-    histories: list[ParameterHistory] = []
+    histories: list[Asked] = []
     slopes: dict[str, tuple[Reading, ...]] = {}
     bare = [fit_covariates(data, i, design, _variances(data, i)) for i in range(len(data.names))]
     explained = _explained(data, design, bare)
@@ -265,7 +278,7 @@ def _history(
     fitted: CovariateSlopes,
     errors: Array,
     events: Sequence[FleetEvent],
-) -> ParameterHistory | None:
+) -> Asked | None:
     rows = np.flatnonzero((data.member_of == data.members.index(vehicle)) & data.known[:, i])
     if not len(rows):
         return None
@@ -292,7 +305,8 @@ def _history(
             if event.concerns(vehicle)
         ),
     )
-    return bare if len(rows) < FEWEST else _tested(bare, tested, covariance)
+    found = bare if len(rows) < FEWEST else _tested(bare, tested, covariance)
+    return found, tested, covariance
 
 
 def _own_slopes(values: Array, variances: Array, x: Array, slope: Array, error: Array) -> Array:
@@ -321,17 +335,33 @@ def _tested(history: ParameterHistory, values: Array, covariance: Array) -> Para
     )
 
 
-def _judged(histories: Sequence[ParameterHistory]) -> tuple[ParameterHistory, ...]:
+def _judged(asked: Sequence[Asked]) -> tuple[ParameterHistory, ...]:
     """Every history with its share of false alarms among all."""
-    chances = [each.chance for each in histories]
+    chances = [each.chance for each, *_ in asked]
     shares = iter(corrected([chance for chance in chances if chance is not None]))
     judged = (
         each if chance is None else replace(each, false_share=float(next(shares)))
-        for each, chance in zip(histories, chances, strict=True)
+        for (each, *_), chance in zip(asked, chances, strict=True)
     )
-    return tuple(replace(e, kind=_kind(e)) if e.is_alarm else e for e in judged)
+    return tuple(
+        _named(each, *tested) if each.is_alarm else each
+        for each, (_, *tested) in zip(judged, asked, strict=True)
+    )
 
 
-def _kind(history: ParameterHistory) -> str:
-    """Whether an alarm is a step or drift, as far as its flights tell."""
-    return change_kind(history.values, np.diag(history.variances), history.time_s)
+def _named(history: ParameterHistory, values: Array, covariance: Array) -> ParameterHistory:
+    """An alarm as a step or drift, as far as its flights tell, with the size of that."""
+    kind = change_kind(values, covariance, history.time_s)
+    named = replace(history, kind=kind)
+    change = history.change_percent
+    if kind == STEP or change.value is None or history.time_s[0] >= history.time_s[-SHORTEST]:
+        return named
+    drift = scan_drifts(values, covariance, history.time_s)
+    scan = drift if kind == DRIFT else scan_changes(values, covariance, history.time_s)
+    percent = 100.0 * scan.size / abs(scan.level)
+    size = Estimate(history.name, percent, "%", ends=StepEnds(scan))
+    if kind != DRIFT:
+        return replace(named, change_percent=size)
+    began = drift.place_ends()[0] - SHORTEST + 1
+    spanned = (float(history.time_s[began]), float(history.time_s[-1]))
+    return replace(named, change_percent=size, changed_s=spanned)

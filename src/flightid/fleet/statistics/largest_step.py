@@ -152,20 +152,78 @@ def scan_steps(values: Array, covariance: Array) -> StepScan:
     Hawkins, *J. Am. Stat. Assoc.* 72 (1977), 180–186; Worsley, *J. Am. Stat. Assoc.* 74 (1979),
     365–367.
     """
+    return _scan(values, covariance, _steps(len(values)))
+
+
+def _steps(n: int) -> Array:
+    """Column by column: the flights behind each place."""
+    return np.tri(n, n - 1, -1)[:, SHORTEST - 1 : n - SHORTEST]
+
+
+def scan_drifts(values: Array, covariance: Array, time_s: Array) -> StepScan:
+    """Estimate a steady movement from every flight on to the last, by generalised least squares.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        In order of time.
+    covariance : ndarray, shape (n, n)
+        Of their errors.
+    time_s : ndarray, shape (n,)
+        Ascending.
+
+    Returns
+    -------
+    StepScan
+        Its sizes are whole changes, of the last flight beside the level before the movement; its
+        first place is the first flight.
+
+    Raises
+    ------
+    ShapeError, DataError
+        As `scan_steps`; or all flights are of one instant.
+
+    Example
+    -------
+    >>> days = np.arange(9.0)
+    >>> scan = scan_drifts(np.maximum(days - 2.0, 0.0), 1e-4 * np.eye(9), days)
+    >>> round(scan.size, 6), [round(end, 2) for end in scan.size_ends()]
+    (6.0, [5.98, 6.02])
+    """
+    return _scan(values, covariance, _ramps(time_s))
+
+
+def scan_changes(values: Array, covariance: Array, time_s: Array) -> StepScan:
+    """Steps, then steady movements, as `scan_steps` and `scan_drifts` have them, in one scan.
+
+    Its interval weighs both kinds by how well they fit; a change may be either.
+    """
+    return _scan(values, covariance, np.hstack([_steps(len(values)), _ramps(time_s)]))
+
+
+def _ramps(time_s: Array) -> Array:
+    """Column by column: the part of a whole movement at each flight."""
+    starts = time_s[: len(time_s) - SHORTEST]
+    starts = starts[starts < time_s[-SHORTEST:].min()]
+    if not len(starts):
+        raise DataError("a drift needs flights at several times", needed=f"{FEWEST} or more")
+    return np.asarray(np.maximum(time_s[:, None] - starts, 0.0) / (time_s[-1] - starts))
+
+
+def _scan(values: Array, covariance: Array, shapes: Array) -> StepScan:
+    """Each shape at its size, beside a level."""
     n = len(values)
     if covariance.shape != (n, n):
         raise ShapeError("a covariance of the series", found=covariance.shape, needed=(n, n))
     if n < FEWEST:
         raise DataError("a step needs several flights", found=n, needed=f"{FEWEST} or more")
-    # Column by column: the flights behind each place.
-    behind = np.tri(n, n - 1, -1)[:, SHORTEST - 1 : n - SHORTEST]
     try:
         root = np.linalg.cholesky(covariance)
     except np.linalg.LinAlgError as error:
         raise DataError(
             "the errors of a series have no positive covariance", needed="a positive definite one"
         ) from error
-    whitened = np.linalg.solve(root, np.column_stack([np.ones(n), values, behind]))
+    whitened = np.linalg.solve(root, np.column_stack([np.ones(n), values, shapes]))
     one, y, steps = whitened[:, 0], whitened[:, 1], whitened[:, 2:]
     total = one @ one
     steps_alone = steps - np.outer(one, one @ steps) / total
