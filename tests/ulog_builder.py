@@ -83,7 +83,9 @@ def flight(samples: int = 50) -> UlogBuilder:
     built.format("esc:uint16_t rpm;uint8_t[2] _padding0;float volt;")
     built.format("power:uint64_t timestamp;esc[2] esc;char[4] name;bool ok;uint8_t[3] _padding0;")
     built.format("gyro:uint64_t timestamp;float[3] xyz;")
-    built.info("char[3] sys_name", b"PX4").info("uint32_t ver_sw_release", bytes([255, 3, 14, 1]))
+    built.info("char[3] sys_name", b"PX4").info("char[20] sys_uuid", b"00060000000035353237").info(
+        "uint32_t ver_sw_release", bytes([255, 3, 14, 1])
+    )
     built.multi_info("char[2] perf", b"ab", False).multi_info("char[2] perf", b"cd", True)
     built.parameter("MC_ROLL_P", 6.5).parameter("MAV_TYPE", 2)
     built.default(1, "MC_ROLL_P", 6.0).default(3, "MAV_TYPE", 0)

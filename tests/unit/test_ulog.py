@@ -68,6 +68,7 @@ def test_parameters_changes_defaults_lines_and_information(tmp_path: Path) -> No
     }
     assert [event.text for event in log.events[:2]] == ["info: hello", "warning: tagged"]
     assert source.info["sys_name"] == "PX4"
+    assert log.board == "00060000000035353237"
     assert source.multi_info == {"perf": [["ab", "cd"]]}
     assert (log.firmware, log.vehicle, log.kind) == ("PX4 v1.14.3", "copter", "px4")
     assert [round(gap.duration_s, 6) for gap in log.gaps] == [0.012] * 5

@@ -18,8 +18,6 @@ from flightid.logs import Log
 from flightid.reading import DOCUMENT_BYTES
 from flightid.units import DIMENSIONLESS, convert
 
-BOARD = re.compile(r"\b([0-9A-F]{8} [0-9A-F]{8} [0-9A-F]{8})$")
-"""The unique number of the processor, as ArduPilot writes it at the start of a log."""
 SERIAL = "BRD_SERIAL_NUM"
 GPS_EPOCH = datetime.datetime(1980, 1, 6)
 LEAP_S = 18
@@ -183,9 +181,7 @@ def _id_in(log: Log, parameter: str | None) -> str | None:
     serial = log.parameters.get(SERIAL, 0.0)
     if serial:
         return f"{serial:.10g}"
-    texts = (event.text for event in log.events if event.kind == "text")
-    boards = (match.group(1) for text in texts if (match := BOARD.search(text)))
-    return next(boards, None)
+    return log.board or None
 
 
 def _type(log: Log | None) -> str | None:

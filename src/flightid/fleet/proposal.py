@@ -138,9 +138,11 @@ def _require_name(folder: Path) -> None:
 
 
 def _rule(folder: Path, logs: Sequence[LogAddress]) -> tuple[VehicleRules, str]:
-    ids = [found for each in logs[:LOOKED_AT] if (found := _id_inside(each))]
+    seen = logs[:LOOKED_AT]
+    ids = [found for each in seen if (found := _id_inside(each))]
     if ids:
-        return VehicleRules(), f"the id inside the logs (such as {ids[0]})"
+        told = f"{len(ids)} of the {len(seen)} looked at have one, such as {ids[0]}"
+        return VehicleRules(), f"the id inside the logs ({told})"
     folders = Counter(PurePosixPath(each.address).parent for each in logs)
     if len(folders) > 1 and Path(next(iter(folders))) != folder:
         return VehicleRules(by="folder"), f"the {len(folders)} folders that they lie in"

@@ -51,6 +51,11 @@ class LogContents(Result, schema="flightid.log/1"):
         """Firmware and version as logged; empty where the log does not tell."""
         return self._source.firmware
 
+    @property
+    def board(self) -> str:
+        """Unique number of the autopilot's processor; empty where the log does not tell."""
+        return self._source.board
+
     @cached_property
     def messages(self) -> dict[str, MessageInfo]:
         """Message types that have rows, by name, in the order of the file's own tables."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
@@ -200,6 +201,20 @@ def changes_among(rows: Iterable[tuple[float | None, str, float]]) -> list[Param
     return changes
 
 
+BOARD = re.compile(r"\b([0-9A-F]{8} [0-9A-F]{8} [0-9A-F]{8})$")
+
+
+def board_of(texts: Iterable[str]) -> str:
+    """The unique number of the processor, as ArduPilot says it at the start of a flight.
+
+    Example
+    -------
+    >>> board_of(["ArduCopter V4.5.1", "CubeOrange 0034003B 34385106 36373936"])
+    '0034003B 34385106 36373936'
+    """
+    return next((found.group(1) for text in texts if (found := BOARD.search(text))), "")
+
+
 class LogSource(Protocol):
     """A log file of one format, opened. `Log` adds everything that formats have in common.
 
@@ -218,6 +233,10 @@ class LogSource(Protocol):
     @property
     def firmware(self) -> str:
         """Firmware and version as logged; empty where the log does not tell."""
+
+    @property
+    def board(self) -> str:
+        """Unique number of the autopilot's processor; empty where the log does not tell."""
 
     @property
     def messages(self) -> Mapping[str, MessageInfo]:

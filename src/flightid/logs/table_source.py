@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from flightid.errors import MissingColumnError
 from flightid.findings import Finding
-from flightid.logs.source import ByteRange, Event, Gap, MessageInfo, ParameterChange
+from flightid.logs.source import ByteRange, Event, Gap, MessageInfo, ParameterChange, board_of
 
 Array = NDArray[np.float64]
 
@@ -71,6 +71,11 @@ class TableSource:
     skipped: Sequence[ByteRange] = ()
     gaps: Sequence[Gap] = ()
     findings: Sequence[Finding] = ()
+
+    @cached_property
+    def board(self) -> str:
+        """Unique number of the processor, of the texts that it sent."""
+        return board_of(event.text for event in self.events if event.kind == "text")
 
     @cached_property
     def messages(self) -> Mapping[str, MessageInfo]:

@@ -24,7 +24,15 @@ from flightid.logs.dataflash.field_units import (
     UNITS,
     undeclared_units,
 )
-from flightid.logs.source import ByteRange, Event, Gap, MessageInfo, ParameterChange, changes_among
+from flightid.logs.source import (
+    ByteRange,
+    Event,
+    Gap,
+    MessageInfo,
+    ParameterChange,
+    board_of,
+    changes_among,
+)
 from flightid.units import DIMENSIONLESS
 
 GAP_S = 0.2
@@ -228,6 +236,11 @@ class DataflashSource:
         """First text message that names a vehicle and a version."""
         texts = self.texts("MSG", "Message", None) if self._has("MSG", "Message") else []
         return next((text for text in texts if _VERSION.match(text)), "")
+
+    @cached_property
+    def board(self) -> str:
+        """Unique number of the processor, of the first text that ends in one."""
+        return board_of(self.texts("MSG", "Message", None) if self._has("MSG", "Message") else ())
 
     @cached_property
     def vehicle(self) -> str | None:

@@ -97,6 +97,11 @@ class UlogSource:
         return f"{name} {str(self.info.get('ver_sw', ''))[:8]}".strip()
 
     @cached_property
+    def board(self) -> str:
+        """Unique number of the processor, ``sys_uuid``."""
+        return str(self.info.get("sys_uuid", "")).rstrip("\0")
+
+    @cached_property
     def messages(self) -> Mapping[str, MessageInfo]:
         """Topics that have rows, in order of announcement."""
         rows: dict[str, dict[int, int]] = {}
