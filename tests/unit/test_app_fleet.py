@@ -5,6 +5,8 @@ from __future__ import annotations
 import multiprocessing
 import os
 from pathlib import Path
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 import pytest
@@ -13,7 +15,7 @@ pytest.importorskip("fastapi", reason="the extra app is not installed")
 pytest.importorskip("duckdb", reason="the extra fleet is not installed")
 
 import flightid as fid
-from flightid.app import fleet_work
+from flightid.app import fleet_routes, fleet_work
 from flightid.app.fleet_schemas import FleetPart, FleetRunPart
 from flightid.app.fleets import checked_fleet, fleet_of, known_fleets, log_folders
 from flightid.app.workspace import Workspace
@@ -21,6 +23,9 @@ from flightid.errors import OptionError, StudyError
 from tests.closeness import assert_close
 from tests.fleet_workspace import write_fleet
 from tests.sweep_log import SweepFlight
+
+if TYPE_CHECKING:
+    from flightid.app.backstage import Backstage
 
 
 def test_the_page_says_of_a_fleet_what_its_report_says(tmp_path: Path) -> None:
@@ -129,6 +134,10 @@ def test_a_folder_of_logs_becomes_a_fleet_that_a_worker_runs(tmp_path: Path) -> 
     name, said = fleet_work.propose(tmp_path / "day")
     assert (name, said[0]) == ("day-fleet.toml", "2 logs")
     assert log_folders(workspace) == {}
+    (place,) = known_fleets(workspace)
+    idle = SimpleNamespace(workspace=workspace, workers=SimpleNamespace(of_log=lambda log: []))
+    fresh = fleet_routes._screen(cast("Backstage", idle), place)
+    assert (fresh.words, fresh.outcomes) == ("", {})  # words would keep it from being run
     # Pools of the page may have daemons for workers: those may not start Dask's processes.
     for each in (tmp_path / "day").iterdir():
         each.write_bytes(b"no log at all: " + each.name.encode())

@@ -36,6 +36,7 @@ from flightid.app.own_folders import read_plain
 from flightid.app.workspace import Workspace
 from flightid.errors import FlightidError
 from flightid.fleet import fleet_status
+from flightid.fleet.opening import has_catalogue
 
 
 def add_fleet_routes(app: FastAPI, backstage: Backstage) -> None:
@@ -139,9 +140,11 @@ def _screen(backstage: Backstage, place: FleetPlace) -> FleetScreen:
     outcomes: dict[str, int] = {}
     found, words = None, ""
     try:
-        checked_fleet(workspace, place)
-        status = fleet_status(place.path)
-        outcomes, found = dict(status.outcomes), status.found
+        settings = checked_fleet(workspace, place)
+        # A fleet that was never run has nothing to count, which is no fault.
+        if settings is None or has_catalogue(settings.catalogue):
+            status = fleet_status(place.path)
+            outcomes, found = dict(status.outcomes), status.found
     except (FlightidError, OSError) as error:
         words = str(error)
     part = kept_part(workspace, place.id, "fleet")

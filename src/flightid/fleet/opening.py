@@ -93,6 +93,11 @@ def current_store(settings: FleetSettings) -> Store:
     return store_at(place)
 
 
+def has_catalogue(place: str) -> bool:
+    """Whether a run has begun a catalogue there."""
+    return store_at(place).exists(CURRENT)
+
+
 def opened_store(place: str) -> Store:
     """The store of a catalogue that a run has noted as the one to be opened.
 
