@@ -30,37 +30,31 @@ def test_nothing_is_written_through_a_link_in_a_catalogue(tmp_path: Path) -> Non
     assert [path.name for path in victim.iterdir()] == ["a.json"]
 
 
-@pytest.mark.parametrize(
-    "words",
-    [
-        '[fleet]\ntitle="t"\nlogs=["l"]\n[vehicles]\nby="name"\npattern="(a{99999999999999})"',
-        '[fleet]\ntitle="t"\nlogs=["l"]\n[vehicles]\nby="name"\npattern="'
-        + "(" * 3000
-        + ")" * 3000
-        + '"',
-        '[fleet]\ntitle="t"\nlogs=["l"]\n[[event]]\ndate="0001-01-01T00:00+23:59"\nwhat="x"',
-        '[fleet]\ntitle="t"\nlogs=["l"]\ncatalogue="a\\u0000b"',
-        '[fleet]\ntitle="t"\nlogs=["a\\u0000b"]',
-        "[fleet]\n" + ".".join("a" * 20_000) + "=1",
-    ],
-)
-def test_hostile_fleet_files_are_refused_in_words(words: str, tmp_path: Path) -> None:
-    (tmp_path / "fleet.toml").write_text(words)
-    with pytest.raises(StudyError):
-        read_fleet(tmp_path / "fleet.toml")
+NAMES = '[fleet]\ntitle="t"\nlogs=["l"]\n[vehicles]\nby="name"\npattern="'
+HOSTILE = {
+    NAMES + '(a{99999999999999})"': "no regular expression",
+    NAMES + "(" * 3000 + ")" * 3000 + '"': "no regular expression",
+    '[fleet]\ntitle="t"\nlogs=["l"]\n[[event]]\ndate="0001-01-01T00:00+23:59"\nwhat="x"': "date",
+    '[fleet]\ntitle="t"\nlogs=["l"]\ncatalogue="a\\u0000b"': "zero byte",
+    '[fleet]\ntitle="t"\nlogs=["a\\u0000b"]': "zero byte",
+    "[fleet]\n" + ".".join("a" * 20_000) + "=1": "more than 64 parts",
+}
+TABLES = ("id,vehicle\n7," + "x" * 200_000, "id,a,b\n" + "\n".join(map(str, range(40))))
 
 
-@pytest.mark.parametrize(
-    "lines", ["id,vehicle\n7," + "x" * 200_000, "id,a,b\n" + "\n".join(map(str, range(40)))]
-)
-def test_hostile_tables_are_refused_in_words(
-    lines: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_hostile_fleet_files_and_tables_are_refused_in_words(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    file, table = tmp_path / "fleet.toml", tmp_path / "t.csv"
+    for words, said in HOSTILE.items():
+        file.write_text(words)
+        with pytest.raises(StudyError, match=said):
+            read_fleet(file)
     monkeypatch.setattr(identity, "TABLE_CELLS", 100)
-    (tmp_path / "t.csv").write_text(lines)
-    words = '[fleet]\ntitle="t"\nlogs=["zzz://x"]\n[vehicles]\ntable="t.csv"'
-    (tmp_path / "fleet.toml").write_text(words)
-    with pytest.raises(StudyError, match=r"no table of a fleet|too long"):
-        read_tables(read_fleet(tmp_path / "fleet.toml"))
+    file.write_text('[fleet]\ntitle="t"\nlogs=["zzz://x"]\n[vehicles]\ntable="t.csv"')
+    for lines, said in zip(TABLES, ("no table of a fleet", "too long"), strict=True):
+        table.write_text(lines)
+        with pytest.raises(StudyError, match=said):
+            read_tables(read_fleet(file))
     with pytest.raises(StudyError, match="no way to this address"):
         find_logs(["zzz://x"])
