@@ -14,6 +14,7 @@ from flightid.conventions import Light
 from flightid.evidence.data_checks import sample_checks
 from flightid.record import Record
 from flightid.record.checks import data_findings, record_findings
+from flightid.vehicles import PilotDoublet, QuadrotorParameters, fly
 
 N = 3000
 TIME_S = np.arange(N) / 100.0
@@ -82,6 +83,50 @@ def test_a_pulse_between_the_levels_of_an_input_is_no_spike() -> None:
     assert record_findings(record) == ()
     beyond = Record.from_arrays(TIME_S, inputs={"u": np.where(np.arange(N) == 50, 99.0, ROLL)})
     assert [finding.code for finding in record_findings(beyond)] == ["spikes"]
+
+
+def flown(log_every: int, **damaged: np.ndarray) -> Record:
+    """A flight whose pilot steps the stick: the derivative throws the torque for a few samples."""
+    doublet = PilotDoublet("roll", start_s=2.0, amplitude=0.2, width_s=0.8)
+    quick = QuadrotorParameters(maximum_thrust_n=23.0, motor_lag_s=0.03)
+    flight = fly(
+        duration_s=8.0, doublets=[doublet], vehicle=quick, log_every=log_every, seed=13
+    ).record()
+    groups = {
+        group: {name: damaged.get(name, flight[name]) for name in names}
+        for group, names in (("inputs", flight.inputs), ("outputs", flight.outputs))
+    }
+    return Record.from_arrays(flight.time_s, **groups)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("log_every", [4, 8, 16])
+def test_the_edges_of_a_pilots_doublet_are_no_spikes_and_damage_still_is(log_every: int) -> None:
+    healthy = flown(log_every)
+    assert record_findings(healthy) == ()
+    place = healthy.n_samples - 60 // log_every - 20
+    for name in ("tau_phi", "p"):
+        hit = np.array(healthy[name])
+        hit[place : place + 2] += 3.0 * np.ptp(hit)
+        (found,) = record_findings(flown(log_every, **{name: hit}))
+        assert found.code == "spikes"
+        assert f" of {name} " in found.message
+
+
+def test_a_lone_pulse_of_two_samples_is_not_several_of_one_height() -> None:
+    pulse = np.where(np.isin(np.arange(N), [50, 51]), 99.0, ROLL)
+    record = Record.from_arrays(TIME_S, inputs={"u": pulse})
+    assert [finding.code for finding in record_findings(record)] == ["spikes"]
+
+
+def test_a_quick_output_answers_steps_but_damage_that_a_loop_answers_is_damage() -> None:
+    steps = np.repeat(np.sign(np.sin(np.arange(1.0, 11.0) ** 2)), N // 10)
+    answer = lfilter([0.0, 1.0, -1.0], [1.0, -0.3], steps - steps[0]) + 0.002 * NOISE[0]
+    rig = Record.from_arrays(TIME_S, inputs={"u": steps}, outputs={"y": answer})
+    assert record_findings(rig) == ()
+    hit = np.where(np.isin(np.arange(N), [700, 1900]), 5.0, 0.1 * NOISE[1])
+    fed_back = lfilter([-0.5], [1.0, -0.6], hit)
+    loop = Record.from_arrays(TIME_S, inputs={"u": fed_back}, outputs={"y": hit})
+    assert "spikes" in [finding.code for finding in record_findings(loop, ["y"])]
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.record.angle_units import angle_unit_faults
 from flightid.record.channel import Channel
+from flightid.record.commanded_edges import Surroundings
 from flightid.record.history import Step
 from flightid.record.record import Record
 from flightid.record.sample_faults import Array, SampleFault, sample_faults
@@ -53,11 +54,12 @@ def entry_steps(
 
     Channels beside them, which nobody takes, bear witness to the units of those that enter.
     """
+    around = Surroundings(tuple((c.role, time_s, samples) for c, time_s, samples in entering))
     found = [
         fault
         for channel, time_s, samples in entering
         for fault in sample_faults(
-            channel.name, time_s, samples, unit=channel.unit, role=channel.role
+            channel.name, time_s, samples, unit=channel.unit, role=channel.role, around=around
         )
     ]
     known = (*entering, *beside)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from flightid.conventions import Light, Role
 from flightid.findings import Finding, counted
+from flightid.record.commanded_edges import Surroundings, answered, answers
 from flightid.record.outlying import distances, none_stands_out, spread_of
 from flightid.record.repeats import found_staircase
 from flightid.units import DIMENSIONLESS, is_convertible, si_base
@@ -34,6 +35,7 @@ REPEATED, ABRUPT = 0.01, 0.25
 the median one."""
 LIMIT_SHARE, LIMIT_RUN, LIMIT_RUNS, LEVELS = 0.01, 3, 3, 30
 TURN = 2.0 * np.pi
+ALONE = Surroundings()
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,13 @@ class SampleFault:
 
 
 def sample_faults(
-    name: str, time_s: Array, samples: Array, *, unit: str, role: Role
+    name: str,
+    time_s: Array,
+    samples: Array,
+    *,
+    unit: str,
+    role: Role,
+    around: Surroundings = ALONE,
 ) -> list[SampleFault]:
     """Examine the samples of one channel on its own stamps, before anything is resampled.
 
@@ -67,6 +75,8 @@ def sample_faults(
     unit : str
     role : Role
         Inputs may step, stand still and meet limits: they are examined for spikes and wraps alone.
+    around : Surroundings
+        What else was recorded then: edges of a command and what answers them are no spikes.
 
     Returns
     -------
@@ -88,7 +98,7 @@ def sample_faults(
         checks = [_input_spikes, _wraps]
     else:
         checks = [_spikes, _wraps, _dead, _held, _clipped]
-    channel = _ExaminedChannel(name, stamps, values, unit)
+    channel = _ExaminedChannel(name, stamps, values, unit, role, around)
     return [fault for check in checks if (fault := check(channel))]
 
 
@@ -100,11 +110,27 @@ class _ExaminedChannel:
     stamps: Array
     values: Array
     unit: str
+    role: Role
+    around: Surroundings
 
     @cached_property
     def alone(self) -> tuple[NDArray[np.intp], Array, float]:
         """Samples alone; distances of all from the median of their neighbours; their spread."""
         return _alone(self.values)
+
+    @cached_property
+    def spikes(self) -> NDArray[np.intp]:
+        """Samples alone, without edges of commands and what answers them."""
+        at, _, _ = self.alone
+        if not at.size:
+            return at
+        own = self.stamps, self.values
+        explained = (
+            answered(own, at, self.around.signals(Role.OUTPUT))
+            if self.role is Role.INPUT
+            else answers(own, at, self.around.signals(Role.INPUT, Role.EXCITATION))
+        )
+        return at[~explained]
 
     @cached_property
     def steps(self) -> Array:
@@ -150,13 +176,14 @@ def _alone(values: Array) -> tuple[NDArray[np.intp], Array, float]:
 
 
 def _input_spikes(channel: _ExaminedChannel) -> SampleFault | None:
-    """Spikes beyond all else that the input does; those of one height, or from rest, are pulses."""
-    values = channel.values
-    at, _, _ = channel.alone
+    """Spikes beyond all else that the input does; pulses have one height, or begin at rest."""
+    values, at = channel.values, channel.spikes
     rest = np.delete(values, at)
     range_ = float(np.ptp(rest))
-    pulses = at.size > 1 and float(np.ptp(values[at])) < HARMFUL * range_
-    if not at.size or range_ == 0.0 or pulses:
+    if not at.size or range_ == 0.0:
+        return None
+    several = bool(np.any(np.diff(at) > HALF_WIDTH))
+    if several and float(np.ptp(values[at])) < HARMFUL * range_:
         return None
     margin = HARMFUL * range_
     beyond = (values[at] < rest.min() - margin) | (values[at] > rest.max() + margin)
@@ -165,7 +192,7 @@ def _input_spikes(channel: _ExaminedChannel) -> SampleFault | None:
 
 def _spikes(channel: _ExaminedChannel) -> SampleFault | None:
     name, stamps, values = channel.name, channel.stamps, channel.values
-    at, away, spread = channel.alone
+    at, (_, away, spread) = channel.spikes, channel.alone
     if not at.size:
         return None
     share = float(np.sum(away[at] ** 2) / np.sum((values - np.median(values)) ** 2))
@@ -175,14 +202,23 @@ def _spikes(channel: _ExaminedChannel) -> SampleFault | None:
         f"{float(np.max(away[at])):.3g}{channel.of_unit} from the neighbours at most "
         f"({100 * share:.0f} % of the channel's variance; the first at {stamps[at[0]]:.6g} s)"
     )
-    # Between the spikes and all others, so that what is advised takes out these and no more.
-    others = max(float(np.max(np.delete(away, at))), 1e-3 * float(np.min(away[at])))
-    deviations = float(np.sqrt(np.min(away[at]) * others)) / spread if spread > 0.0 else FAR
-    action = (
+    action = _spike_action(away[at], np.delete(away, at), spread)
+    return channel.fault(at, ("spikes", light, said, action))
+
+
+def _spike_action(heights: Array, others: Array, spread: float) -> str:
+    """What takes out the spikes and no more: a threshold between them and all others."""
+    least, most = float(np.min(heights)), float(np.max(others))
+    if most >= least:
+        return (
+            "cut the record before and after: what bridges them would bridge edges of the commands"
+        )
+    between = float(np.sqrt(least * max(most, 1e-3 * least)))
+    deviations = between / spread if spread > 0.0 else FAR
+    return (
         f"bridge them where they are read: [[conditioning]] outliers = {{ deviations = "
         f"{deviations:.0f} }} in a study, conditioning.remove_outliers in Python"
     )
-    return channel.fault(at, ("spikes", light, said, action))
 
 
 def _wraps(channel: _ExaminedChannel) -> SampleFault | None:
