@@ -9,6 +9,7 @@ export default defineConfig({
     emptyOutDir: true,
     target: "es2022",
     modulePreload: { polyfill: false },
+    chunkSizeWarningLimit: 600, // kB: three.js, fetched by the screen Fly alone
     rollupOptions: {
       output: {
         entryFileNames: "page.js",

@@ -9,9 +9,8 @@ from scipy import stats
 pytest.importorskip("fastapi", reason="the extra app is not installed")
 
 import flightid as fid
-from flightid.app.fly_deck import RATE_HZ
 from flightid.app.fly_loop import FlySwitches, PilotedVehicle
-from flightid.app.fly_vehicles import fly_vehicle
+from flightid.app.fly_vehicles import RATE_HZ, fly_vehicle
 from flightid.excitation.sweep import sweep
 
 AH64 = fly_vehicle("ah64_hover")

@@ -13,7 +13,7 @@ import pytest
 pytest.importorskip("fastapi", reason="the extra app is not installed")
 
 import flightid as fid
-from flightid.app.fly_deck import RATE_HZ, FlightDeck, PauseClock, PilotedFlight
+from flightid.app.fly_deck import FlightDeck, PauseClock, PilotedFlight
 from flightid.app.fly_journal import (
     FLIGHTS,
     JOURNAL,
@@ -31,7 +31,7 @@ from flightid.app.fly_schemas import (
     FlySweep,
     FlySwitch,
 )  # fmt: skip
-from flightid.app.fly_vehicles import VEHICLES, fly_vehicle
+from flightid.app.fly_vehicles import RATE_HZ, VEHICLES, fly_vehicle
 from flightid.simulation.stepper import Stepper
 from flightid.study.loop_blocks import law_controller
 from tests.closeness import assert_close

@@ -1,5 +1,5 @@
 import { Refusal } from "./api";
-import type { CooperHarperRating, FlownItem, FlyChoice, FlyFrame, FlyNews, FlyStart, FlySweep, FlySwitch } from "./types";
+import type { CooperHarperRating, FlownItem, FlyChoice, FlyFrame, FlyNews, FlyStart, FlySweep, FlySwitch, OwnVehicles } from "./types";
 
 export type Hand = "pitch" | "roll" | "yaw" | "heave";
 export type Sticks = Record<Hand, number>;
@@ -14,6 +14,7 @@ async function json<T>(path: string, body?: unknown): Promise<T> {
   throw new Refusal(answer.status, typeof told.error === "string" ? told.error : typeof told.detail === "string" ? told.detail : "The server refused this.");
 }
 export const vehicles = () => json<FlyChoice[]>("/api/fly/vehicles");
+export const ownVehicles = () => json<OwnVehicles>("/api/fly/own");
 export const flights = () => json<FlownItem[]>("/api/fly/flights");
 export const finish = (id: string) => json<FlownItem[]>(`/api/fly/flights/${id}/finish`, {});
 export const rate = (id: string, rating: CooperHarperRating) => json<FlownItem[]>(`/api/fly/flights/${id}/rating`, rating);
@@ -34,7 +35,6 @@ export class Flying {
   /** From a stick that was sent to the frame that has flown it, ms, smoothed. */
   latency = $state(0);
   frame: FlyFrame | null = null;
-  heading = 0;
   traces: Trace[] = [];
   #socket: WebSocket | null = null;
   #number = 0;
@@ -62,11 +62,9 @@ export class Flying {
 
   #hear(news: FlyNews) {
     if (news.frame) {
-      const before = this.frame?.time_s ?? 0;
       this.frame = news.frame;
-      const { outputs, time_s, number } = news.frame;
-      this.heading += (outputs.r ?? 0) * Math.max(0, time_s - before);
-      this.traces.push({ time_s, stick: { ...this.#stick }, phi: outputs.phi ?? 0, theta: outputs.theta ?? 0 });
+      const { pose, time_s, number } = news.frame;
+      this.traces.push({ time_s, stick: { ...this.#stick }, phi: pose.phi, theta: pose.theta });
       while (this.traces.length && this.traces[0].time_s < time_s - KEPT_S) this.traces.shift();
       const begun = this.#sent.get(number);
       if (begun !== undefined) {
@@ -90,7 +88,6 @@ export class Flying {
   start(asked: Omit<FlyStart, "do">) {
     this.words = "";
     this.traces = [];
-    this.heading = 0;
     this.frame = null;
     this.latency = 0;
     this.#sent.clear();

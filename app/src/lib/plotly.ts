@@ -1,4 +1,4 @@
-type Plotly = { react: (place: HTMLElement, data: object[], layout: object, options: object) => Promise<void>; purge: (place: HTMLElement) => void };
+type Plotly = { react: (place: HTMLElement, data: object[], layout: object, options: object) => Promise<void>; relayout: (place: HTMLElement, moved: object) => Promise<void>; purge: (place: HTMLElement) => void };
 let library: Promise<Plotly> | null = null;
 
 /** The plotting library of the report, fetched when the first picture is drawn. */

@@ -253,11 +253,13 @@ export interface FlownItem {
   rating: CooperHarperRating | null;
 }
 
-/** A vehicle to fly. */
+/** A vehicle to fly; `name` is what `load_model` takes in the folder of the page. */
 export interface FlyChoice {
   name: string;
   title: string;
   note: string;
+  own: boolean;
+  gusts: boolean;
   inputs: FlyInput[];
   outputs: Record<string, string>;
   law: string;
@@ -268,6 +270,7 @@ export interface FlyChoice {
 /** An instant of a flight, as it is shown. */
 export interface FlyFrame {
   time_s: number;
+  pose: FlyPose;
   number: number;
   outputs: Record<string, number>;
   driven: Record<string, number>;
@@ -296,6 +299,16 @@ export interface FlyNews {
 /** Pause, go on, end. */
 export interface FlyOrder {
   do: "pause" | "resume" | "end";
+}
+
+/** Attitude, rad, and place, m, from the take-off and above the ground of the scenery. */
+export interface FlyPose {
+  phi: number;
+  theta: number;
+  psi: number;
+  north_m: number;
+  east_m: number;
+  height_m: number;
 }
 
 /** Begin a flight; while one is flown, end it and begin anew. */
@@ -525,6 +538,12 @@ export interface OwnModelAnswer {
   error: string;
   line: number | null;
   template: string;
+}
+
+/** Vehicles to fly of the folder, and why others of its models cannot be flown. */
+export interface OwnVehicles {
+  vehicles: FlyChoice[];
+  left_out: Record<string, string>;
 }
 
 /** A plan of the next flight. */

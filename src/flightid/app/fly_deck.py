@@ -6,6 +6,7 @@ import threading
 from collections import deque
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from dataclasses import asdict
 from pathlib import Path
 
 from flightid.app.fly_journal import (
@@ -17,13 +18,21 @@ from flightid.app.fly_journal import (
     new_flight_id,
 )
 from flightid.app.fly_loop import FlySwitches, PilotedVehicle, PilotSeat
-from flightid.app.fly_schemas import FlyFrame, FlyNews, FlyStart, FlyStick, FlySweep, FlySwitch
+from flightid.app.fly_schemas import (
+    FlyFrame,
+    FlyNews,
+    FlyPose,
+    FlyStart,
+    FlyStick,
+    FlySweep,
+    FlySwitch,
+)
+from flightid.app.fly_track import GroundTrack
 from flightid.app.fly_vehicles import FlyVehicle, fly_vehicle
 from flightid.errors import DataError, FlightidError, OptionError
 from flightid.excitation.sweep import sweep
 from flightid.simulation.realtime import Clock, EndOfFlight, SystemClock, fly_in_real_time
 
-RATE_HZ = 100.0
 LONGEST_S = 900.0
 UPSET_RAD = 1.3
 """Attitude at which a model about trim has long lost its meaning."""
@@ -91,23 +100,38 @@ class PilotedFlight:
         Takes news, in the thread of the loop.
     clock : Clock, optional
         Left out: the machine's.
+    vehicle : FlyVehicle, optional
+        Left out: that of the library which is asked for.
     """
 
     def __init__(
-        self, workspace: Path, asked: FlyStart, tell: Tell, clock: Clock | None = None
+        self,
+        workspace: Path,
+        asked: FlyStart,
+        tell: Tell,
+        clock: Clock | None = None,
+        vehicle: FlyVehicle | None = None,
     ) -> None:
-        self.vehicle: FlyVehicle = fly_vehicle(asked.vehicle)
+        self.vehicle = vehicle or fly_vehicle(asked.vehicle)
+        self.rate_hz = self.vehicle.rate_hz
+        self.loop_units = {n: str(unit) for n, unit in self.vehicle.model.units.items()}
         self.switches = FlySwitches(law=asked.law and bool(self.vehicle.law), gusts=asked.gusts)
         seat = PilotSeat(asked.actuator_delay_s, asked.display_delay_s, asked.stick_rad_s)
         self.clock, self._tell = PauseClock(clock), tell
         self.loop = PilotedVehicle(
-            self.vehicle, 1.0 / RATE_HZ, switches=self.switches, seat=seat, seed=asked.seed
+            self.vehicle, 1.0 / self.rate_hz, switches=self.switches, seat=seat, seed=asked.seed
+        )
+        self._track = GroundTrack(
+            {name: self.loop_units[name] for name in self.loop.outputs},
+            1.0 / self.rate_hz,
+            speed_m_s=self.vehicle.speed_m_s,
         )
         self.id = new_flight_id()
         self.folder = flight_folder(workspace, self.id)
         self._journal = FlightJournal(
-            self.folder, self._columns(), asked.model_dump(exclude={"do"}),
-            sample_time_s=1.0 / RATE_HZ,
+            self.folder, self._columns(),
+            asked.model_dump(exclude={"do"}) | {"title": self.vehicle.title},
+            sample_time_s=1.0 / self.rate_hz,
         )  # fmt: skip
         self._newest = self._flown = FlyStick(number=0, stick={})
         self._stick: dict[str, float] = {}
@@ -116,7 +140,7 @@ class PilotedFlight:
         self.over = False
         self._due: float | None = None
         self._display: deque[FlyFrame | None] = deque(
-            [None] * round(seat.display_delay_s * RATE_HZ)
+            [None] * round(seat.display_delay_s * self.rate_hz)
         )
         self._thread = threading.Thread(target=self._fly, name="flight", daemon=True)
 
@@ -168,17 +192,12 @@ class PilotedFlight:
                 band_rad_s=(asked.low_rad_s, asked.high_rad_s),
                 amplitude=asked.amplitude,
                 duration_s=asked.duration_s,
-                sample_rate_hz=RATE_HZ,
+                sample_rate_hz=self.rate_hz,
                 name=asked.input,
                 unit=self.loop_units[asked.input],
                 hold_cycles=1.0,
             )
         )
-
-    @property
-    def loop_units(self) -> Mapping[str, str]:
-        """Unit by channel."""
-        return {name: str(unit) for name, unit in self.vehicle.model.units.items()}
 
     def _columns(self) -> list[FlightColumn]:
         units = self.loop_units
@@ -209,7 +228,7 @@ class PilotedFlight:
         now = self.clock.now()
         if self._due is None:
             self._due = now - time_s
-        self._late += now - self._due - time_s > 1.0 / RATE_HZ
+        self._late += now - self._due - time_s > 1.0 / self.rate_hz
         self._flown = self._newest
         self._stick = self.vehicle.inputs(self._flown.stick)  # type: ignore[arg-type]
         return self._stick
@@ -222,6 +241,7 @@ class PilotedFlight:
         ])  # fmt: skip
         frame = FlyFrame.model_construct(
             time_s=time_s, number=self._flown.number, outputs=dict(outputs),
+            pose=FlyPose.model_construct(**asdict(self._track.moved(outputs))),
             driven=dict(loop.driven), added=dict(loop.added), late_frames=self._late,
             sweeping=loop.sweeping,
         )  # fmt: skip
@@ -255,10 +275,16 @@ class FlightDeck:
     Parameters
     ----------
     workspace : Path
+
+    Attributes
+    ----------
+    own : dict of str to FlyVehicle
+        Vehicles of the workspace that may be asked for, by name.
     """
 
     def __init__(self, workspace: Path) -> None:
         self.workspace = workspace
+        self.own: dict[str, FlyVehicle] = {}
         self._pilot: object = None
         self.flight: PilotedFlight | None = None
 
@@ -278,7 +304,8 @@ class FlightDeck:
     def start(self, asked: FlyStart, tell: Tell) -> PilotedFlight:
         """Begin a flight; what was flown before ends and is kept."""
         self.stop()
-        self.flight = PilotedFlight(self.workspace, asked, tell)
+        vehicle = self.own.get(asked.vehicle)
+        self.flight = PilotedFlight(self.workspace, asked, tell, vehicle=vehicle)
         self.flight.begin()
         return self.flight
 

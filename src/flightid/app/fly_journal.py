@@ -30,6 +30,7 @@ FLIGHTS, RECORD, JOURNAL, ABOUT, RATING = (
 )  # fmt: skip
 FLIGHT_ID = re.compile(r"[0-9]{8}-[0-9]{6}-[0-9a-f]{4}")
 FEWEST_ROWS = 10
+MOST_TITLE = 200
 EVERY_S = 1.0
 KINDS = ("input", "output", "excitation", "other")
 
@@ -196,14 +197,15 @@ def kept_flights(workspace: Path) -> list[dict[str, Any]]:
             continue
         try:
             about = about_flight(entry)
-            title = fly_vehicle(about["vehicle"]).title
+            title = about.get("title") or fly_vehicle(about["vehicle"]).title
         except FlightidError:
             continue
         done = (entry / RECORD).is_file()
         if not done and not (entry / JOURNAL).is_file():
             continue
         found.append({
-            "id": entry.name, "vehicle": about["vehicle"], "title": title, "finished": done,
+            "id": entry.name, "vehicle": about["vehicle"], "title": str(title)[:MOST_TITLE],
+            "finished": done,
             "law": bool(about.get("law", False)), "rating": kept_rating(entry),
             "path": f"{FLIGHTS}/{entry.name}/{RECORD if done else JOURNAL}",
         })  # fmt: skip

@@ -148,14 +148,14 @@ class PilotedVehicle(Stepper):
         if vehicle.law:
             self._law = law_controller(vehicle.law, model, sample_time_s)
         late = round(made.actuator_delay_s / sample_time_s)
-        self._late = DelayLine(late, dict.fromkeys(self.inputs, 0.0))
+        self._late = DelayLine(late, self.rest)
         self._hands = _hands(self.inputs, sample_time_s, made)
         self._reach = vehicle.reach
         self._sweep: dict[str, NDArray[np.float64]] = {}
         self._swept_frames = 0
         self._seen = dict.fromkeys(self.outputs, 0.0)
-        self.driven = dict.fromkeys(self.inputs, 0.0)
-        self.swept, self.added = dict(self.driven), dict(self.driven)
+        self.driven = dict(self.rest)
+        self.swept, self.added = (dict.fromkeys(self.inputs, 0.0) for _ in range(2))
 
     @property
     def sweeping(self) -> bool:
@@ -182,10 +182,10 @@ class PilotedVehicle(Stepper):
             told = self._law.step(moved, self._sensors.heard(self._seen))
             if self._switches.law:
                 self.added |= told
-        wanted = {
-            name: min(reach, max(-reach, moved[name] + self.added[name]))
-            for name, reach in self._reach.items()
-        }
+        # A hand moves from trim; what it does not reach rests there.
+        wanted = dict(self.rest)
+        for name, reach in self._reach.items():
+            wanted[name] += min(reach, max(-reach, moved[name] + self.added[name]))
         self.driven = self._late.passed(wanted)
         self.calm = not self._switches.gusts
         self._seen = super().step(self.driven)

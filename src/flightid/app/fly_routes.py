@@ -10,8 +10,8 @@ from typing import Annotated
 from fastapi import FastAPI, HTTPException, Response, WebSocket, WebSocketDisconnect
 from pydantic import Field, TypeAdapter, ValidationError
 
-from flightid.app.backstage import Backstage
-from flightid.app.fly_deck import RATE_HZ, FlightDeck
+from flightid.app.backstage import Backstage, made
+from flightid.app.fly_deck import FlightDeck
 from flightid.app.fly_journal import (
     RECORD,
     finish_flight,
@@ -23,17 +23,17 @@ from flightid.app.fly_schemas import (
     CooperHarperRating,
     FlownItem,
     FlyChoice,
-    FlyInput,
     FlyNews,
     FlyOrder,
     FlyStart,
     FlyStick,
     FlySweep,
     FlySwitch,
+    OwnVehicles,
 )
-from flightid.app.fly_vehicles import VEHICLES, FlyVehicle
+from flightid.app.fly_shelf import choice_of, make_shelf, model_files
+from flightid.app.fly_vehicles import VEHICLES
 from flightid.app.own_folders import is_link
-from flightid.control.laws.augmentation import augmentation_law
 from flightid.errors import FlightidError
 
 FlyCommand = FlyStart | FlyStick | FlySwitch | FlySweep | FlyOrder
@@ -47,11 +47,19 @@ def add_fly_routes(app: FastAPI, backstage: Backstage) -> None:
     """Answer what the screen Fly asks."""
     workspace = backstage.workspace.folder
     deck = FlightDeck(workspace)
-    choices = [_choice(each) for each in VEHICLES]
+    library = [choice_of(each) for each in VEHICLES]
 
     @app.get("/api/fly/vehicles")
     def vehicles() -> list[FlyChoice]:
-        return choices
+        return library
+
+    @app.get("/api/fly/own")
+    async def own() -> OwnVehicles:
+        # Models of a folder may be a stranger's: a worker with limits reads and tries them.
+        found = await asyncio.to_thread(model_files, backstage.workspace)
+        shelf = await made(backstage.workers.live(make_shelf, found))
+        deck.own = {each.name: each for each in shelf.vehicles}
+        return OwnVehicles(vehicles=shelf.choices, left_out=shelf.left_out)
 
     @app.get("/api/fly/flights")
     def flights() -> list[FlownItem]:
@@ -185,32 +193,6 @@ async def _obey(deck: FlightDeck, asked: FlyCommand, news: NewestFrame) -> None:
             await asyncio.to_thread(deck.stop)
     except (FlightidError, OSError) as error:
         news.put(FlyNews(state="refused", words=str(error)))
-
-
-def _choice(vehicle: FlyVehicle) -> FlyChoice:
-    model = vehicle.model
-    units = {name: str(unit) for name, unit in model.units.items()}
-    law = augmentation_law(vehicle.law) if vehicle.law else None
-    limits = {axis.input: axis.limit for axis in law.axes} if law else {}
-    return FlyChoice(
-        name=vehicle.name,
-        title=vehicle.title,
-        note=vehicle.note,
-        inputs=[
-            FlyInput(
-                hand=hand,  # type: ignore[arg-type]
-                name=name,
-                unit=units[name],
-                reach=abs(most),
-                law_limit=limits.get(name),
-            )
-            for hand, (name, most) in vehicle.travel.items()
-        ],
-        outputs={name: units[name] for name in model.outputs},
-        law=vehicle.law,
-        law_sensors=list(law.sensors) if law else [],
-        rate_hz=RATE_HZ,
-    )
 
 
 def _known(workspace: Path, flight: str) -> Path:

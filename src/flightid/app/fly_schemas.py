@@ -24,11 +24,13 @@ class FlyInput(Message):
 
 
 class FlyChoice(Message):
-    """A vehicle to fly."""
+    """A vehicle to fly; `name` is what `load_model` takes in the folder of the page."""
 
     name: str
     title: str
     note: str
+    own: bool
+    gusts: bool
     inputs: list[FlyInput]
     outputs: dict[str, str]
     law: str
@@ -36,11 +38,18 @@ class FlyChoice(Message):
     rate_hz: float
 
 
+class OwnVehicles(Message):
+    """Vehicles to fly of the folder, and why others of its models cannot be flown."""
+
+    vehicles: list[FlyChoice]
+    left_out: dict[str, str]
+
+
 class FlyStart(Message):
     """Begin a flight; while one is flown, end it and begin anew."""
 
     do: Literal["start"] = "start"
-    vehicle: str
+    vehicle: str = Field(max_length=300)
     law: bool = True
     gusts: bool = False
     actuator_delay_s: float = Field(default=0.0, ge=0.0, le=0.5)
@@ -83,10 +92,22 @@ class FlyOrder(Message):
     do: Literal["pause", "resume", "end"]
 
 
+class FlyPose(Message):
+    """Attitude, rad, and place, m, from the take-off and above the ground of the scenery."""
+
+    phi: float
+    theta: float
+    psi: float
+    north_m: float
+    east_m: float
+    height_m: float
+
+
 class FlyFrame(Message):
     """An instant of a flight, as it is shown."""
 
     time_s: float
+    pose: FlyPose
     number: int
     outputs: dict[str, float]
     driven: dict[str, float]

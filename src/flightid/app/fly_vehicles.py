@@ -5,8 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from flightid import Noise, StateSpaceModel, load_model
+from flightid import Noise, load_model
 from flightid.errors import UnknownNameError
+from flightid.models import Model
+
+RATE_HZ = 100.0
+"""Frames a second of a model in continuous time."""
 
 STICKS = ("pitch", "roll", "yaw", "heave")
 """Axes of a hand: pulled, to the right, right pedal, up; each from -1 to 1."""
@@ -19,7 +23,7 @@ class FlyVehicle:
     Attributes
     ----------
     name : str
-        In the library.
+        As `load_model` takes it: in the library, or a file of the workspace, from its folder.
     title : str
     travel : mapping of str to (str, float)
         By axis of the hand the model's input, and its value at the stop, in its unit; negative
@@ -32,6 +36,12 @@ class FlyVehicle:
         Augmentation of the library; empty: there is none for it.
     note : str
         What a pilot should know.
+    rate_hz : float
+        Frames a second; a sampled model has its own.
+    speed_m_s : float
+        Trim speed forward, which the model's outputs do not hold; the scenery passes by with it.
+    path : str
+        Of the model's file; empty: it is in the library.
     """
 
     name: str
@@ -41,13 +51,14 @@ class FlyVehicle:
     sensor: Mapping[str, float] = field(default_factory=dict)
     law: str = ""
     note: str = ""
+    rate_hz: float = RATE_HZ
+    speed_m_s: float = 0.0
+    path: str = ""
 
     @property
-    def model(self) -> StateSpaceModel:
+    def model(self) -> Model:
         """The model itself."""
-        made = load_model(self.name)
-        assert isinstance(made, StateSpaceModel)
-        return made
+        return load_model(self.path or self.name)
 
     @property
     def reach(self) -> dict[str, float]:
@@ -61,8 +72,10 @@ class FlyVehicle:
             for axis, (name, most) in self.travel.items()
         }
 
-    def noise(self, seed: int) -> Noise:
-        """Gusts and errors of its sensors."""
+    def noise(self, seed: int) -> Noise | None:
+        """Gusts and errors of its sensors; None where none are known of it."""
+        if not (self.gusts or self.sensor):
+            return None
         return Noise(gusts=dict(self.gusts), sensor=dict(self.sensor), seed=seed)
 
 
@@ -97,6 +110,7 @@ VEHICLES = (
         {"beta": (0.03, 1.0)},
         {**dict.fromkeys(("p", "r", "phi", "beta"), 0.002), "ay": 0.1},
         note="Dutch roll to excite with the pedals; the stick does not pitch it.",
+        speed_m_s=53.645,
     ),
 )
 """A new vehicle is a new entry."""
