@@ -8,7 +8,7 @@ from tests.stress.runs import bad_bars, run
 
 BROKE = (
     367, 420, 620, 777, 891, 1090, 1365, 1655, 3256, 3437, 4209, 4674, 9255, 11944, 16738, 17154,
-    22366, 28002,
+    22366, 28002, 66651,
 )  # fmt: skip
 """Seeds that once ended in an untyped error or in a standard error of zero."""
 

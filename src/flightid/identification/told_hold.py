@@ -92,7 +92,9 @@ def _judged(
     if doubts:
         best = max(doubts, key=lambda each: each.gain or 0.0)
         return contradicted(best, held.hold, whose), [best]
-    steps = next((each for each in matter if each.hold == "zero" and each.is_open), None)
+    # Samples that stand still and jump are a witness of their own: less than odds of 400 to 1
+    # against steps does not outweigh them.
+    steps = next((each for each in matter if each.hold == "zero" and each.is_likely), None)
     by_maker = rivals.made_by("simulate")
     if steps is not None and not by_maker:
         finding = steps_told_otherwise(steps, rivals, whose)
@@ -189,7 +191,8 @@ def steps_told_otherwise(steps: OtherHold, rivals: Rivals, whose: str) -> Findin
     for record in rivals.records:
         for name in rivals.fit.model.inputs:
             stairs: object = found_staircase(record[name])
-            if stairs is None and is_rough(record[name]) and (steps.gain or 0.0) > -DOUBTFUL:
+            alike = steps.is_open and (steps.gain or 0.0) > -DOUBTFUL
+            if stairs is None and alike and is_rough(record[name]):
                 stairs = "moves from sample to sample as a device's steps do, and steps fit alike"
             if stairs is not None:
                 return Finding(

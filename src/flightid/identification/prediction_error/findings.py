@@ -84,6 +84,8 @@ def _ending(minima: Sequence[LocalMinimum], reason: str) -> list[Finding]:
 
 
 def _beside(best: LocalMinimum, other: LocalMinimum) -> str:
+    if not best.objective > 0.0:
+        return "follows the records to the last digit, the next does not"
     ratio = other.objective / best.objective
     if ratio >= 1.0:
         return f"is {ratio:.4g} times below the next"
