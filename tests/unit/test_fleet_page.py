@@ -58,12 +58,13 @@ def test_vehicles_too_few_to_be_judged_are_grey_and_not_green() -> None:
     rows = fleet_rows(3)
     mine = [row for row in rows["parameters"] if row["vehicle"] in ("v03", "v04")]
     logs = set({row["vehicle"]: row["log"] for row in mine}.values())
-    few = {key: [e for e in rows[key] if e.get("log") in logs] for key in rows if key != "logs"}
-    found = fleet_document(answer_questions({**few, "logs": rows["logs"]})).findings
+    few = {key: [e for e in rows[key] if e.get("log") in logs] for key in rows}
+    found = fleet_document(answer_questions(few)).findings
     lights = [each for each in found if each.code == "vehicle"]
     assert [each.light for each in lights] == [Light.UNKNOWN, Light.UNKNOWN]
     for each in lights:
-        assert "cannot tell whether it changed (fewer than" in each.message
+        assert "cannot tell whether it changed (of its 1 flight with model" in each.message
+        assert "” 1 counts, 6 are needed)" in each.message
         assert "cannot tell whether it is like its type (" in each.message
         assert "no change" not in each.message
 
@@ -71,8 +72,8 @@ def test_vehicles_too_few_to_be_judged_are_grey_and_not_green() -> None:
 def test_a_long_history_without_a_type_is_no_green_light() -> None:
     rows = fleet_rows(3)
     logs = {e["log"] for e in rows["parameters"] if e["vehicle"] in ("v03", "v04")}
-    some = {key: [e for e in rows[key] if e.get("log") in logs] for key in rows if key != "logs"}
-    found = fleet_document(answer_questions({**some, "logs": rows["logs"]})).findings
+    some = {key: [e for e in rows[key] if e.get("log") in logs] for key in rows}
+    found = fleet_document(answer_questions(some)).findings
     (first, _) = [each for each in found if each.code == "vehicle"]
     assert first.light is Light.UNKNOWN
     assert first.message.startswith("v03: no change; cannot tell whether it is like its type (")
@@ -95,7 +96,7 @@ def test_the_page_tells_events_slopes_and_refused_logs(answers: FleetAnswers) ->
     assert isinstance(high, float)
     assert low < 10.0 < high
     refused = tables["By reason"]
-    assert refused.rows[0][:3] == (2, "refused", "rate-too-low")
+    assert refused.rows[0][:3] == (2, "refused", "rate too low")
     assert "set LOG_BITMASK to log RATE at 400 Hz" in refused.rows[0]
     slope = next(r for r in tables["What covariates explain"].rows if r[0] == "roll control power")
     assert slope[2] == "rad/s^2"
@@ -132,9 +133,27 @@ def test_one_vehicle_has_a_history_but_no_type() -> None:
 
 def test_a_catalogue_without_models_says_so() -> None:
     rows = fleet_rows(6, 0)
-    assert "No vehicle has a model with intervals." in to_text(
-        fleet_document(answer_questions(rows))
-    )
+    said = to_text(fleet_document(answer_questions(rows)))
+    assert "3 logs, 0 with a model, of vehicles that nothing names" in said
+    assert "No vehicle has a model with intervals: see below what to change." in said
+    for each in rows["logs"]:
+        each["vehicle"] = "v07"
+    said = to_text(fleet_document(answer_questions(rows)))
+    assert "3 logs, 0 with a model, of 1 vehicle" in said
+    assert "[not judged] v07: none of its 3 logs gave a model that counts" in said
+
+
+def test_vehicles_stand_worst_first_and_no_line_is_wider_than_a_screen() -> None:
+    rows = fleet_rows(3)
+    rows["logs"] = [*rows["logs"], {**rows["logs"][-1], "vehicle": "aa", "message": "why " * 200}]
+    document = fleet_document(answer_questions(rows))
+    found = [each.light for each in document.findings if each.code == "vehicle"]
+    order = [Light.RED, Light.AMBER, Light.UNKNOWN, Light.GREEN]
+    assert found == sorted(found, key=order.index)
+    assert {Light.RED, Light.UNKNOWN} < set(found)
+    text = to_text(document)
+    refused = text[text.index("Logs that could not be used") :]
+    assert max(map(len, refused.split("\n"))) <= 100
 
 
 def test_the_command_answers_a_fleet_file_from_its_catalogue(tmp_path: Path) -> None:

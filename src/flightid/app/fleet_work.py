@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +28,13 @@ from flightid.fleet import ask_fleet, propose_fleet, read_fleet, run_fleet
 from flightid.fleet import open as open_fleet
 from flightid.fleet.engine.address_space import bounded_memory
 from flightid.fleet.opening import names_fleet_file
-from flightid.fleet.page import change_words, fleet_words, refused_table, vehicle_light
+from flightid.fleet.page import (
+    change_words,
+    events_table,
+    fleet_vehicles,
+    fleet_words,
+    refused_table,
+)
 from flightid.fleet.statistics.answers import FleetAnswers, TypeAnswers
 from flightid.fleet.statistics.drift import ParameterHistory
 from flightid.table import Table
@@ -64,14 +70,15 @@ def answer_fleet(place: Path) -> dict[str, Any]:
     """The answers of a fleet's catalogue."""
     answers, level = _answers(place), _level(place)
     with showing(level):
-        names = sorted({name for each in answers.types for name in each.data.members})
         every = [(t, h) for t in answers.types if t.drift for h in t.drift.histories]
         every.sort(key=lambda pair: 2.0 if pair[1].chance is None else pair[1].chance)
         return FleetPart(
             title=_title(place),
             words=fleet_words(answers),
             level=shown(),
-            vehicles=[_vehicle(name, answers.types) for name in names],
+            vehicles=[
+                _vehicle(name, found, answers) for name, found in fleet_vehicles(answers).items()
+            ],
             types=[_type(each) for each in answers.types],
             histories=[_history(*pair) for pair in every[:SHOWN]],
             refused=_table(refused_table(answers.logs)),
@@ -137,8 +144,8 @@ def _title(place: Path) -> str:
     return read_fleet(place).words.title if names_fleet_file(place) else place.name
 
 
-def _vehicle(name: str, types: Sequence[TypeAnswers]) -> FleetVehicle:
-    mine = [each for each in types if name in each.data.members]
+def _vehicle(name: str, found: Finding, answers: FleetAnswers) -> FleetVehicle:
+    mine = [each for each in answers.types if name in each.data.members]
     flown = {
         flight
         for each in mine
@@ -149,7 +156,7 @@ def _vehicle(name: str, types: Sequence[TypeAnswers]) -> FleetVehicle:
         name=name,
         types=list(dict.fromkeys(each.type_name for each in mine)),
         flights=len(flown),
-        finding=_finding(vehicle_light(name, types)),
+        finding=_finding(found),
     )
 
 
@@ -166,6 +173,7 @@ def _type(each: TypeAnswers) -> FleetType:
         tables.append(each.outliers.summary(each.labels))
     if each.drift is not None:
         tables.append(each.drift.summary(labels=each.labels))
+        tables.append(events_table(each.drift, each.labels))
     return FleetType(
         name=each.type_name, model=each.model, reasons=list(each.reasons),
         labels=dict(each.labels), tables=[_table(table) for table in tables],

@@ -48,6 +48,7 @@ def run(
     missing. The exit code is 1 where no log was found, or every one that was taken failed.
     """
     from flightid.fleet import run_fleet
+    from flightid.fleet.reasons import reason_lines
 
     if fleet.is_dir():
         fleet = _proposed(fleet)
@@ -63,6 +64,8 @@ def run(
         click.echo(f"{done.found} logs, {done.kept} of them in the catalogue before")
         for outcome, number in sorted(done.outcomes.items()):
             click.echo(f"{number} {outcome}")
+        for line in reason_lines(done.reasons):
+            click.echo(line)
         note(f"Wrote {done.catalogue}")
     for finding in done.findings:
         note(str(finding))
@@ -89,8 +92,13 @@ def _proposed(folder: Path) -> Path:
 def status(place: str, as_json: bool) -> None:
     """Count the logs of a fleet file, or of a catalogue by its folder or address."""
     from flightid.fleet import fleet_status
+    from flightid.fleet.reasons import reason_lines
 
-    emit(fleet_status(place), as_json=as_json)
+    found = fleet_status(place)
+    emit(found, as_json=as_json)
+    if not as_json:
+        for line in reason_lines(found.reasons):
+            click.echo(line)
 
 
 @command.command("query", short_help="Answer one SELECT over the tables of the catalogue.")

@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from flightid.conventions import Light
-from flightid.findings import Finding
+from flightid.findings import Finding, counted
 from flightid.fleet.statistics.answers import UNDATED, TypeAnswers
-from flightid.fleet.statistics.drift import TOO_FEW
+from flightid.fleet.statistics.largest_step import FEWEST
 
 MORE = "log more flights of it, and of more vehicles of its type"
 
@@ -55,7 +55,18 @@ def _no_history(vehicle: str, each: TypeAnswers) -> str | None:
     if each.drift is None:
         return "its flights have no date" if UNDATED in each.reasons else None
     own = [one for one in each.drift.histories if one.vehicle == vehicle]
-    return "" if any(one.false_share is not None for one in own) else TOO_FEW
+    if any(one.false_share is not None for one in own):
+        return ""
+    return _too_few(vehicle, each, max((len(one.values) for one in own), default=0))
+
+
+def _too_few(vehicle: str, each: TypeAnswers, told: int) -> str:
+    """How many flights count, of how many with a model, and how many are needed."""
+    flown = sum(name == vehicle for name in each.data.vehicles)
+    which = f"of its {counted(flown, 'flight')} with model “{each.model}” {told}"
+    rest = "" if told == flown else " with a date and an interval"
+    verb = "counts" if told == 1 else "count"
+    return f"{which} {verb}{rest}, {FEWEST} are needed"
 
 
 def _no_type(vehicle: str, each: TypeAnswers) -> str | None:

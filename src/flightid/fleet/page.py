@@ -9,6 +9,7 @@ from flightid.conventions import Light
 from flightid.findings import Finding, counted
 from flightid.fleet.normality import MORE, quiet_light
 from flightid.fleet.pictures import history_picture, type_picture
+from flightid.fleet.reasons import grouped_reasons, reasons_table
 from flightid.fleet.statistics.answers import FleetAnswers, Row, TypeAnswers, fitted_share
 from flightid.fleet.statistics.change_kind import DRIFT, STEP
 from flightid.fleet.statistics.drift import FleetDrift, ParameterHistory
@@ -22,6 +23,7 @@ from flightid.version import VERSION
 
 SHOWN = 9
 """Histories drawn at most; those that changed come first."""
+ORDER = (Light.RED, Light.AMBER, Light.UNKNOWN, Light.GREEN)
 NAMED = 40
 """Vehicles with a light of their own; of more, those that are green are counted."""
 
@@ -45,8 +47,28 @@ def fleet_document(answers: FleetAnswers, title: str = "Fleet") -> Document:
 def fleet_words(answers: FleetAnswers) -> str:
     """How large a fleet is, in one line."""
     fitted, every = fitted_share(answers.logs)
-    vehicles = {name for each in answers.types for name in each.data.members}
-    return f"{counted(every, 'log')}, {fitted} with a model, of {counted(len(vehicles), 'vehicle')}"
+    vehicles = len(fleet_vehicles(answers))
+    whose = counted(vehicles, "vehicle") if vehicles else "vehicles that nothing names"
+    return f"{counted(every, 'log')}, {fitted} with a model, of {whose}"
+
+
+def fleet_vehicles(answers: FleetAnswers) -> dict[str, Finding]:
+    """Light of every vehicle, those without a model too, the worst first."""
+    flown = Counter(str(each["vehicle"]) for each in answers.logs if each["vehicle"] is not None)
+    members = {name for each in answers.types for name in each.data.members}
+    found = [
+        (name, vehicle_light(name, answers.types) if name in members else _bare(name, flown[name]))
+        for name in sorted(members | set(flown))
+    ]
+    return dict(sorted(found, key=lambda pair: ORDER.index(pair[1].light)))
+
+
+def _bare(vehicle: str, logs: int) -> Finding:
+    """Of a vehicle without a model that counts."""
+    words = f"none of its {logs} logs gave" if logs > 1 else "its log did not give"
+    said = f"{vehicle}: {words} a model that counts"
+    act = "see below what to change, by reason, and fly sweeps"
+    return Finding("vehicle", Light.UNKNOWN, said, act)
 
 
 def _type_title(each: TypeAnswers) -> str:
@@ -55,12 +77,10 @@ def _type_title(each: TypeAnswers) -> str:
 
 def _vehicles(answers: FleetAnswers) -> Iterator[Block]:
     """One light a vehicle: changed is red, unlike its type amber."""
-    found = {
-        name: vehicle_light(name, answers.types)
-        for name in sorted({name for each in answers.types for name in each.data.members})
-    }
+    found = fleet_vehicles(answers)
+    if not any(each.data.members for each in answers.types):
+        yield Paragraph("No vehicle has a model with intervals: see below what to change.")
     if not found:
-        yield Paragraph("No vehicle has a model with intervals.")
         return
     if len(found) <= NAMED:
         shown_lights = tuple(found.values())
@@ -78,12 +98,12 @@ def _vehicles(answers: FleetAnswers) -> Iterator[Block]:
 def _counts(found: Sequence[Finding]) -> Iterator[Finding]:
     """How many of a large fleet are normal, and of how many that cannot be told."""
     green = sum(each.light is Light.GREEN for each in found)
-    grey = sum(each.light is Light.UNKNOWN for each in found)
+    unjudged = sum(each.light is Light.UNKNOWN for each in found)
     if green:
         words = f"{green} vehicles neither changed nor are unlike"
         yield Finding("vehicles-normal", Light.GREEN, words)
-    if grey:
-        words = f"of {counted(grey, 'vehicle')} too little is known to call them normal"
+    if unjudged:
+        words = f"{counted(unjudged, 'vehicle')} not judged: too few flights or vehicles to tell"
         yield Finding("vehicles-unknown", Light.UNKNOWN, words, MORE)
 
 
@@ -141,7 +161,7 @@ def _drift_blocks(drift: FleetDrift, labels: Mapping[str, str]) -> Iterator[Bloc
     if slopes.rows:
         yield TableBlock(slopes)
     yield TableBlock(drift.summary(labels=labels))
-    events = _events(drift, labels)
+    events = events_table(drift, labels)
     if events.rows:
         yield TableBlock(events)
     ranked = sorted(drift.histories, key=lambda one: 2.0 if one.chance is None else one.chance)
@@ -193,7 +213,8 @@ def _slopes(drift: FleetDrift, labels: Mapping[str, str]) -> Table:
     return Table("What covariates explain", columns, tuple(rows), notes).without_empty_columns()
 
 
-def _events(drift: FleetDrift, labels: Mapping[str, str]) -> Table:
+def events_table(drift: FleetDrift, labels: Mapping[str, str]) -> Table:
+    """What was done, and by how much each parameter stepped then."""
     rows: list[tuple[Cell, ...]] = []
     for history in drift.histories:
         for each in history.events:
@@ -224,14 +245,4 @@ def _refused(logs: Sequence[Row]) -> Iterator[Block]:
 
 def refused_table(logs: Sequence[Row]) -> Table:
     """Logs without a model by reason, with what to change; no rows where every one has a model."""
-    left = [each for each in logs if each["outcome"] != "fitted"]
-    counts = Counter((each["outcome"], each["reason"] or "") for each in left)
-    rows: list[tuple[Cell, ...]] = []
-    for (outcome, reason), number in counts.most_common():
-        first = next(e for e in left if (e["outcome"], e["reason"] or "") == (outcome, reason))
-        rows.append((number, outcome, reason, first["message"], first["action"], first["address"]))
-    columns = (
-        *(Column("logs"), Column("outcome"), Column("reason"), Column("in words")),
-        *(Column("what to change"), Column("for example")),
-    )
-    return Table("By reason", columns, tuple(rows)).without_empty_columns()
+    return reasons_table(grouped_reasons(logs))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from importlib.util import find_spec
@@ -45,8 +44,11 @@ from flightid.fleet.engine.order import (
 from flightid.fleet.engine.plain import run_plain
 from flightid.fleet.identity import FleetTables, identify_log, read_tables
 from flightid.fleet.opening import current_store
+from flightid.fleet.reasons import RefusalReason
+from flightid.fleet.refusal import ACTIONS
 from flightid.fleet.run_one import FULL, made_record
 from flightid.fleet.settings import FleetSettings, read_fleet
+from flightid.fleet.taken import TakenContents
 from flightid.progress import progress
 from flightid.result import Result
 from flightid.table import Column, Table
@@ -67,6 +69,8 @@ class FleetRun(Result, schema="flightid.fleet_run/1"):
     outcomes : mapping of str to int
         Those that were taken, by outcome.
     findings : tuple of Finding
+    reasons : tuple of RefusalReason
+        Why those that were taken and gave no model did not, the commonest first.
 
     Example
     -------
@@ -79,6 +83,7 @@ class FleetRun(Result, schema="flightid.fleet_run/1"):
     kept: int
     outcomes: dict[str, int]
     findings: tuple[Finding, ...] = ()
+    reasons: tuple[RefusalReason, ...] = ()
 
     def summary(self) -> Table:
         """Table of the numbers."""
@@ -154,7 +159,7 @@ def _run(path: str | Path, workers: int | None, scheduler: str | None, *, retry:
     addresses = find_logs([settings.place(place) for place in settings.words.logs])
     missing, earlier = _missing(store, addresses, tables, retry=retry)
     findings = list(_findings(scheduler, addresses))
-    replaced, taken = set[str](), _Contents()
+    replaced, taken = set[str](), TakenContents()
     run = _Run(settings, tables, store, order, workers, scheduler)
     with progress(len(missing), settings.path.stem) as advance:
         for outcome in run.outcomes(orders(missing, tables)):
@@ -176,41 +181,9 @@ def _run(path: str | Path, workers: int | None, scheduler: str | None, *, retry:
         findings.append(Finding("replaced-records", Light.GREEN, text))
     findings += taken.findings()
     findings += _all_failed(counts)
-    return FleetRun(settings.catalogue, len(addresses), kept, counts, tuple(findings))
-
-
-class _Contents:
-    """What became of each content: several names of the same bytes are one log."""
-
-    def __init__(self) -> None:
-        self.outcomes: dict[str, str] = {}
-        self._first: dict[str, str] = {}
-        self._copies = Counter[str]()
-        self._example = ""
-
-    def add(self, outcome: LogOutcome) -> None:
-        """Note an outcome; of copies that one counts which is not merely known."""
-        log, name = outcome.log, outcome.order.address.name
-        if log in self._first:
-            self._copies[log] += 1
-            self._example = f"{name} is {self._first[log]}"
-        self._first.setdefault(log, name)
-        if self.outcomes.get(log, KNOWN) == KNOWN:
-            self.outcomes[log] = outcome.outcome
-
-    def counts(self) -> dict[str, int]:
-        """Logs by outcome, each content once; by every name those that the catalogue had."""
-        found = Counter(self.outcomes.values())
-        found[KNOWN] += sum(n for log, n in self._copies.items() if self.outcomes[log] == KNOWN)
-        return dict(found)
-
-    def findings(self) -> Iterator[Finding]:
-        """That some were taken under several names."""
-        fresh = sum(n for log, n in self._copies.items() if self.outcomes[log] != KNOWN)
-        if fresh:
-            text = f"{counted(fresh, 'log')} with the bytes of another: each content counts once"
-            action = "remove copies: their record has vehicle and date by one of the names"
-            yield Finding("copied-logs", Light.AMBER, f"{text} ({self._example})", action)
+    return FleetRun(
+        settings.catalogue, len(addresses), kept, counts, tuple(findings), taken.reasons()
+    )
 
 
 @dataclass(frozen=True)
@@ -376,6 +349,7 @@ class _Run:
             "outcome": FAILED,
             "reason": outcome.reason,
             "message": outcome.message,
+            "action": ACTIONS.get(outcome.reason),
             "models": 0,
             "attempts": outcome.order.attempts,
         }
@@ -388,7 +362,7 @@ class _Run:
         }
         rows = {"failures": [failure]}
         write_loose(self.store, made_record(outcome.log, identity, entry, rows))
-        return LogOutcome(outcome.order, FAILED, outcome.log, outcome.reason, outcome.message)
+        return replace(outcome, outcome=FAILED, action=ACTIONS.get(outcome.reason, ""))
 
     def tidy(self, at_least: int) -> None:
         """Compact where the libraries for it are installed; loose files count all the same."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import errno
 import hashlib
-import re
 import shutil
 import sys
 import tempfile
@@ -18,30 +17,31 @@ from pathlib import Path
 from typing import Any
 
 from flightid.conventions import Light
-from flightid.errors import FileFormatError, FlightidError
+from flightid.errors import FileFormatError
 from flightid.files import BLOCK_BYTES, sha256_of_file
 from flightid.findings import worst
 from flightid.fleet.addresses import LogAddress, open_address
 from flightid.fleet.catalogue.record import LogRecord
-from flightid.fleet.catalogue.schema import FAILED, FITTED, REFUSED, TABLES
+from flightid.fleet.catalogue.schema import FITTED, REFUSED, TABLES
 from flightid.fleet.identity import FleetTables, LogIdentity, identify_log
+from flightid.fleet.refusal import (
+    ACTIONS,
+    MESSAGE_LENGTH,
+    UNSUITED,
+    kind_of,
+    refusal,
+    unidentified,
+)
 from flightid.fleet.settings import FleetSettings
 from flightid.fleet.study_rows import study_rows, told_covariates, usable
-from flightid.logs import read_log
+from flightid.logs import Log, read_log
 from flightid.study import Study, run_study
-from flightid.study.proposal import Proposal, propose_study
+from flightid.study.proposal import propose_study
 
 ADDRESS, READING, STUDY, PROCESS = "address", "reading", "study", "process"
 Tell = Callable[[str, str], None]
 """Takes what was begun, and the digest of the log once it is known: ahead of what may kill."""
-MESSAGE_LENGTH = 2000
 FULL = {errno.ENOSPC, errno.EDQUOT, errno.EROFS}
-GRAVITY = (Light.RED, Light.AMBER, Light.UNKNOWN, Light.GREEN)
-SETTING = re.compile(r"\b[A-Z][A-Z0-9]+_[A-Z0-9_]+\b|\blog(ged|ging)?\b")
-"""An action that speaks of the logging, or of a parameter of the autopilot."""
-MOST_ACTIONS = 3
-MEMORY = "memory"
-"""Kind of a failure: more memory than the fleet allows one log."""
 
 
 @dataclass
@@ -113,6 +113,7 @@ def run_one(address: LogAddress, task: LogTask, *, attempts: int = 1) -> LogReco
     rows: dict[str, list[dict[str, Any]]] = {}
     identity = LogIdentity(None, None, None, None)
     entry: dict[str, Any] = {}
+    log: Log | None = None
     try:
         with tempfile.TemporaryDirectory(prefix="flightid-fleet-") as scratch:
             path = _fetched(address, Path(scratch), task, state)
@@ -133,7 +134,7 @@ def run_one(address: LogAddress, task: LogTask, *, attempts: int = 1) -> LogReco
     except Exception as error:
         if isinstance(error, OSError) and error.errno in FULL:
             raise
-        rows, entry = {}, entry | _refusal(error)
+        rows, entry = {}, entry | refusal(error, log)
         rows["failures"] = [_failure(error, state.stage, time.perf_counter() - begun)]
     rows["covariates"] = [*rows.get("covariates", ()), *told_covariates(identity.covariates)]
     entry |= {
@@ -225,7 +226,7 @@ def _studied(path: Path, output: Path, task: LogTask, state: Progress) -> Study:
         if study is None:
             made = propose_study((path,), folder=output.parent, cache=cache)
             if not made.models:
-                raise _unidentified(made)
+                raise unidentified(made)
             study = output.with_name("study.toml")
             made.write(study)
         found = run_study(study, output=output, log=path, cache=cache)
@@ -234,30 +235,6 @@ def _studied(path: Path, output: Path, task: LogTask, state: Progress) -> Study:
         task.reports.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(output / "report.html", place)
     return found
-
-
-class LogRefusalError(FlightidError):
-    """Why a log gives no model, by the code of the verdict that decided it."""
-
-    code = "no-model"
-
-
-def _unidentified(made: Proposal) -> LogRefusalError:
-    """The verdict that decided, and what to change: settings of the logging come first."""
-    seen = () if made.inspection is None else made.inspection.findings
-    bad = [each for each in (*seen, *made.findings) if each.light is not Light.GREEN]
-    # The worst decides; of several, the inspection's, which looks at how the log was written.
-    decisive = min(bad, key=lambda each: GRAVITY.index(each.light), default=None)
-    actions = [each.action for each in bad if each.action]
-    actions.sort(key=lambda action: SETTING.search(action) is None)
-    refusal = LogRefusalError(
-        "no model can be identified from this log",
-        found=None if decisive is None else decisive.message,
-        action="; ".join(list(dict.fromkeys(actions))[:MOST_ACTIONS]) or None,
-    )
-    if decisive is not None:
-        refusal.code = decisive.code
-    return refusal
 
 
 @contextlib.contextmanager
@@ -296,34 +273,15 @@ def _verdict(study: Study) -> dict[str, Any]:
         "light": str(Light.RED),
         "reason": told[0],
         "message": told[1],
-        "action": told[2] or None,
-    }
-
-
-def _refusal(error: Exception) -> dict[str, Any]:
-    """What the log's own row says of an error: flightid's own refuse a log, others fail."""
-    known = isinstance(error, FlightidError)
-    action = error.action if isinstance(error, FlightidError) else None
-    return {
-        "outcome": REFUSED if known else FAILED,
-        "reason": _kind(error),
-        "message": str(error)[:MESSAGE_LENGTH],
-        "action": action,
-        "models": 0,
+        "action": told[2] or ACTIONS.get(told[0], ACTIONS[UNSUITED]),
     }
 
 
 def _failure(error: Exception, stage: str, elapsed_s: float) -> dict[str, Any]:
     return {
-        "kind": _kind(error),
+        "kind": kind_of(error),
         "message": str(error)[:MESSAGE_LENGTH],
         "stage": stage,
         "elapsed_s": elapsed_s,
         "memory_bytes": peak_bytes(),
     }
-
-
-def _kind(error: Exception) -> str:
-    if isinstance(error, LogRefusalError):
-        return error.code
-    return MEMORY if isinstance(error, MemoryError) else type(error).__name__

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+from flightid.errors import OptionError
 from flightid.fleet.addresses import find_logs
+from flightid.fleet.catalogue.compaction import read_columns
 from flightid.fleet.catalogue.loose import QUARANTINE, loose_logs, read_loose
-from flightid.fleet.catalogue.parts import PARTS, KnownLogs, read_parts
+from flightid.fleet.catalogue.parts import PARTS, KnownLogs, TablePart, read_parts
 from flightid.fleet.catalogue.store import Store
 from flightid.fleet.opening import catalogue_place, names_fleet_file, opened_store
+from flightid.fleet.reasons import RefusalReason, grouped_reasons
 from flightid.fleet.settings import read_fleet
 from flightid.result import Result
 from flightid.table import Column, Table
@@ -35,6 +39,8 @@ class FleetStatus(Result, schema="flightid.fleet_status/1"):
         Records and parts that could not be read.
     n_bytes : int
         Size of parts and loose files, B.
+    reasons : tuple of RefusalReason
+        Why logs gave no model, the commonest first; of compacted ones where the extra is installed.
 
     Example
     -------
@@ -49,6 +55,7 @@ class FleetStatus(Result, schema="flightid.fleet_status/1"):
     loose: int
     quarantine: tuple[str, ...] = ()
     n_bytes: int = 0
+    reasons: tuple[RefusalReason, ...] = ()
 
     @property
     def n_logs(self) -> int:
@@ -107,9 +114,24 @@ def _counted(store: Store, where: str, found: int | None) -> FleetStatus:
     for part in parts:
         counts.update(part.outcomes)
     n_bytes = sum(size for part in parts for size in part.sizes.values())
+    told = list(_told(store, parts))
     for record in read_loose(store, loose):
         counts[record.outcome] += 1
+        told.append(record.rows["logs"][0])
         n_bytes += len(record.to_bytes())
     kept = (f"{QUARANTINE}/{name}" for name in sorted(store.names(QUARANTINE)))
     unusable = (*kept, *(f"{PARTS}/{name}" for name in broken))
-    return FleetStatus(where, found, dict(counts), len(parts), len(loose), unusable, n_bytes)
+    return FleetStatus(
+        where, found, dict(counts), len(parts), len(loose), unusable, n_bytes,
+        grouped_reasons(told),
+    )  # fmt: skip
+
+
+def _told(store: Store, parts: Sequence[TablePart]) -> Iterator[Mapping[str, Any]]:
+    """What became of the logs of parts; nothing without the library that reads them."""
+    names = ("outcome", "reason", "message", "action", "address")
+    try:
+        for row in read_columns(store, parts, "logs", names):
+            yield dict(zip(names, row, strict=True))
+    except OptionError:
+        return

@@ -147,6 +147,23 @@ def _chosen(
     return replace(chosen, channels=tuple(c for c in chosen.channels if not c.on_request))
 
 
+def _not_in_span(
+    log: LogContents, channel: MappedChannel, span_s: tuple[float, float] | None
+) -> DataError:
+    """That a channel ends before a span begins, or begins behind it; or was never sampled."""
+    whole = extract(log, channel, None)
+    message = whole.source.message
+    if span_s is None or whole.time_s.size < 2:
+        return DataError(f"channel {channel.name!r} has no samples", needed=f"rows of {message}")
+    first, last = float(whole.time_s[0]), float(whole.time_s[-1])
+    return DataError(
+        f"channel {channel.name!r} has no samples in the span",
+        found=f"{message} from {first:.1f} to {last:.1f} s",
+        needed=f"samples from {span_s[0]:g} to {span_s[1]:g} s",
+        action="name a span inside the log; where it is cut off, copy it again",
+    )
+
+
 def _found(
     log: LogContents, chosen: ChannelMap, span_s: tuple[float, float] | None, *, required: bool
 ) -> tuple[list[ChannelSamples], list[str]]:
@@ -163,11 +180,7 @@ def _found(
         item = extract(log, channel, span_s)
         if item.time_s.size < 2:
             if required:
-                raise DataError(
-                    f"channel {channel.name!r} has no samples in the span",
-                    found=f"{span_s}",
-                    needed=f"a span of the message {item.source.message}",
-                )
+                raise _not_in_span(log, channel, span_s)
             left_out.append(f"{channel.name} (no samples in the span)")
             continue
         found.append(item)

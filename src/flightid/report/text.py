@@ -14,7 +14,8 @@ from flightid.report.content import (
     Section,
     TableBlock,
 )
-from flightid.table import Column, Table
+from flightid.report.text_tables import folded_table
+from flightid.table import Column
 from flightid.wrapping import without_controls, wrapped
 
 WIDTH = 100
@@ -32,8 +33,8 @@ def to_text(document: Document) -> str:
     Returns
     -------
     str
-        Lines of at most 100 characters, tables excepted; control characters that a log may hold
-        are shown as ``\N{REPLACEMENT CHARACTER}`` so that no terminal obeys them.
+        Lines of at most 100 characters, tables of many numbers excepted; control characters that a
+        log may hold are shown as ``\N{REPLACEMENT CHARACTER}`` so that no terminal obeys them.
     """
     parts = [document.title, "=" * len(document.title)]
     parts += [line for line in (document.subtitle, _verdict(document)) if line]
@@ -67,8 +68,10 @@ def _block(block: Block) -> list[str]:
         case Lights():
             return _lights(block)
         case TableBlock(table):
-            bare = Table(table.title, table.columns, table.rows).to_text().split("\n")
-            return [*bare, *(line for note in table.notes for line in wrapped(note, WIDTH))]
+            return [
+                *folded_table(table, WIDTH),
+                *(line for note in table.notes for line in wrapped(note, WIDTH)),
+            ]
         case KeyValues():
             return _key_values(block)
         case Figure(caption=caption):

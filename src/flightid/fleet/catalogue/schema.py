@@ -95,7 +95,7 @@ LOGS = _table(
     FleetColumn("id", TEXT, "Of the vehicle, before the table of vehicles gave it a name."),
     FleetColumn("told", TEXT, "Digest of what the tables of vehicles and flights say of it."),
     FleetColumn("outcome", TEXT, "fitted, refused or failed."),
-    FleetColumn("reason", TEXT, "Code of what refused it, or class of the error; else null."),
+    FleetColumn("reason", TEXT, "Code of what refused it, such as not-a-log; else null."),
     FleetColumn("message", TEXT, "The same in words; else null."),
     FleetColumn(
         "action", TEXT, "What to do about it, such as a setting of the logging; else null."

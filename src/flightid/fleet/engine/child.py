@@ -110,7 +110,7 @@ def _ready(
                 raise
             return _full(error)
         entry = record.rows["logs"][0]
-        names = ("outcome", "log", "reason", "message", "memory_bytes")
+        names = ("outcome", "log", "reason", "message", "memory_bytes", "action")
         return {name: entry.get(name) for name in names}
 
     return take

@@ -105,6 +105,8 @@ class LogOutcome:
     signal : int or None
     elapsed_s : float
     memory_bytes : int or None
+    action : str
+        What to do about a log without a model.
     """
 
     order: LogOrder
@@ -116,6 +118,7 @@ class LogOutcome:
     signal: int | None = None
     elapsed_s: float = 0.0
     memory_bytes: int | None = None
+    action: str = ""
 
 
 KNOWN, KILLED, STORAGE = "known", "killed", "storage"

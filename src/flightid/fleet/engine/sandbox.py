@@ -199,6 +199,7 @@ def _outcome(order: LogOrder, said: Mapping[str, Any], log: str, elapsed_s: floa
         str(said.get("message") or ""),
         elapsed_s=elapsed_s,
         memory_bytes=said.get("memory_bytes"),
+        action=str(said.get("action") or ""),
     )
 
 

@@ -1,0 +1,105 @@
+"""Logs without a model by reason: how many, in words, what to do, and one of them as example."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+from flightid.fleet.catalogue.schema import FITTED, OUTCOMES
+from flightid.table import Cell, Column, Table
+from flightid.wrapping import wrapped
+
+WIDTH = 100
+
+
+@dataclass(frozen=True)
+class RefusalReason:
+    """Logs that one reason kept from a model.
+
+    Attributes
+    ----------
+    outcome : str
+        refused or failed.
+    reason : str
+        Code of it, as in the table of logs.
+    logs : int
+    message, action : str
+        Of the first of them: what was found, and what to do.
+    example : str
+        Its address.
+
+    Example
+    -------
+    >>> RefusalReason("refused", "not-a-log", 3, "it is a text").words
+    'not a log'
+    """
+
+    outcome: str
+    reason: str
+    logs: int = 1
+    message: str = ""
+    action: str = ""
+    example: str = ""
+
+    @property
+    def words(self) -> str:
+        """The code as people read it."""
+        return self.reason.replace("-", " ") or "no reason is known"
+
+    @property
+    def name(self) -> str:
+        """Last part of the address of the example."""
+        return self.example.rpartition("/")[2]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values."""
+        return asdict(self)
+
+
+def grouped_reasons(rows: Iterable[Mapping[str, Any]]) -> tuple[RefusalReason, ...]:
+    """Reasons of the logs without a model, the commonest first.
+
+    Parameters
+    ----------
+    rows : iterable of mapping
+        ``outcome``, ``reason``, ``message``, ``action`` and ``address`` of each log.
+    """
+    found: dict[tuple[str, str], RefusalReason] = {}
+    for row in rows:
+        outcome, reason = str(row["outcome"]), str(row["reason"] or "")
+        # Only what became of a log is a reason: what is known already, say, is none.
+        if outcome not in OUTCOMES or outcome == FITTED:
+            continue
+        told = found.get((outcome, reason))
+        if told is not None:
+            found[outcome, reason] = replace(told, logs=told.logs + 1)
+            continue
+        words = (str(row[key] or "") for key in ("message", "action", "address"))
+        found[outcome, reason] = RefusalReason(outcome, reason, 1, *words)
+    return tuple(sorted(found.values(), key=lambda each: -each.logs))
+
+
+def reason_lines(reasons: Iterable[RefusalReason]) -> list[str]:
+    """Lines of a terminal, at most 100 characters each: count, reason, example, what to do."""
+    lines = []
+    for each in reasons:
+        message = each.message.removeprefix(f"{each.name} ")
+        example = f" (such as {each.name}: {message})" if each.name else ""
+        said = f"{each.logs} {each.outcome}: {each.words}{example}"
+        lines += wrapped(said, WIDTH, first="  ", later="      ")
+        if each.action:
+            lines += wrapped(f"do: {each.action}", WIDTH, first="      ", later="          ")
+    return lines
+
+
+def reasons_table(reasons: Iterable[RefusalReason]) -> Table:
+    """One row a reason; no rows where every log has a model."""
+    rows: list[tuple[Cell, ...]] = [
+        (e.logs, e.outcome, e.words, e.message, e.action, e.name) for e in reasons
+    ]
+    columns = (
+        *(Column("logs"), Column("outcome"), Column("reason"), Column("in words")),
+        *(Column("what to change"), Column("for example")),
+    )
+    return Table("By reason", columns, tuple(rows)).without_empty_columns()

@@ -1,0 +1,154 @@
+"""Why a log gives no model, in words, and what to do: its reason is a code, never a class."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from flightid.conventions import Light
+from flightid.errors import (
+    DataError,
+    FileFormatError,
+    FitError,
+    FlightidError,
+    LogFormatError,
+    SingularError,
+    UnknownNameError,
+)
+from flightid.findings import Finding
+from flightid.fleet.catalogue.schema import FAILED, REFUSED
+from flightid.inspection import Inspection, inspect_log
+from flightid.logs import Log
+from flightid.study.proposal import Proposal
+
+MESSAGE_LENGTH = 2000
+MOST_ACTIONS = 3
+MEMORY, FAULT, FELL = "memory", "fault", "tipped-over"
+"""More memory than the fleet allows one log; an error that no log should raise; a fall."""
+GRAVITY = (Light.RED, Light.AMBER, Light.UNKNOWN, Light.GREEN)
+SETTING = re.compile(r"\b[A-Z][A-Z0-9]+_[A-Z0-9_]+\b|\blog(ged|ging)?\b")
+"""An action that speaks of the logging, or of a parameter of the autopilot."""
+CODES: tuple[tuple[type[Exception], str], ...] = (
+    (LogFormatError, "not-a-log"),
+    (FileFormatError, "not-a-log"),
+    (UnknownNameError, "not-in-the-log"),
+    (FitError, "no-fit"),
+    (SingularError, "no-fit"),
+    (DataError, "data-unusable"),
+)
+UNSUITED = "study-unsuited"
+"""Of all other errors of flightid's own: the study asks for what this log has not."""
+ACTIONS = {
+    "not-a-log": "take it out of the places of the fleet file, or copy the log again",
+    "not-in-the-log": "log what the study takes: flightid inspect shows what is in a log",
+    "no-fit": "flightid run STUDY --log LOG shows how far the fit came",
+    "data-unusable": "flightid inspect shows what is in a log; one that is shorter than the others "
+    "may be cut off: copy it again",
+    UNSUITED: "change the study, or give logs of this kind a fleet file of their own",
+    "time": "raise time_s in [limits] of the fleet file, then flightid fleet run --retry",
+    MEMORY: "raise memory_mib in [limits] of the fleet file, then flightid fleet run --retry",
+    "killed": "see whether the machine ran out of memory, then flightid fleet run --retry",
+    FAULT: "a fault of flightid and not of the log: report it with these words",
+}
+"""What to do where an error does not say it."""
+
+
+class LogRefusalError(FlightidError):
+    """Why a log gives no model, by the code of the verdict that decided it."""
+
+    code = "no-model"
+
+
+def kind_of(error: Exception) -> str:
+    """Class of an error as the table of failures names it."""
+    if isinstance(error, LogRefusalError):
+        return error.code
+    return MEMORY if isinstance(error, MemoryError) else type(error).__name__
+
+
+def refusal(error: Exception, log: Log | None) -> dict[str, Any]:
+    """What a log's own row says of an error: flightid's own refuse it, others fail.
+
+    Parameters
+    ----------
+    error : Exception
+    log : Log or None
+        The log where it could be read: what its inspection finds red comes first, for a study that
+        stops says where, and seldom why.
+    """
+    known = isinstance(error, FlightidError)
+    code = _code(error)
+    words, actions = str(error), []
+    if isinstance(error, FlightidError):
+        words = error.reason if error.needed is None else f"{error.reason}; needed {error.needed}"
+        actions = [error.action or ""]
+    elif code == FAULT:
+        words = f"{type(error).__name__}: {error}"
+    if known and log is not None and not isinstance(error, LogRefusalError):
+        seen = _inspected(log)
+        worst = decisive(seen)
+        if worst is not None:
+            code, words = worst.code, f"{worst.message}. The study stopped at this: {words}"
+            actions = [*(each.action for each in seen if each.light is worst.light), *actions]
+    return {
+        "outcome": REFUSED if known else FAILED,
+        "reason": code,
+        "message": words[:MESSAGE_LENGTH],
+        "action": joined(actions) or ACTIONS.get(code, ACTIONS[UNSUITED]),
+        "models": 0,
+    }
+
+
+def _code(error: Exception) -> str:
+    if isinstance(error, LogRefusalError):
+        return error.code
+    if not isinstance(error, FlightidError):
+        return MEMORY if isinstance(error, MemoryError) else FAULT
+    return next((code for kind, code in CODES if isinstance(error, kind)), UNSUITED)
+
+
+def _inspected(log: Log) -> tuple[Finding, ...]:
+    """What an inspection says against a log, a fall first; nothing where it cannot be made."""
+    try:
+        return against(inspect_log(log))
+    except (FlightidError, ArithmeticError, ValueError, np.linalg.LinAlgError):
+        return ()
+
+
+def against(inspection: Inspection | None) -> tuple[Finding, ...]:
+    """Findings that are not green, a fall first, for it comes before all that follows from it."""
+    seen = () if inspection is None else inspection.findings
+    bad = [each for each in seen if each.light is not Light.GREEN]
+    return tuple(sorted(bad, key=lambda each: each.code != FELL))
+
+
+def decisive(seen: Sequence[Finding]) -> Finding | None:
+    """What decides against a log whose study stopped: a fall, what is red, or no sweep."""
+    first = next((each for each in seen if each.code == FELL), None)
+    red = next((each for each in seen if each.light is Light.RED), None)
+    return first or red or next((each for each in seen if each.code == "no-model"), None)
+
+
+def unidentified(made: Proposal) -> LogRefusalError:
+    """The verdict that decided, and what to change: settings of the logging come first."""
+    bad = [*against(made.inspection)]
+    bad += [each for each in made.findings if each.light is not Light.GREEN]
+    # A fall comes first, then the worst; of several the inspection's, which looks at the logging.
+    worst = min(bad, key=lambda each: (each.code != FELL, GRAVITY.index(each.light)), default=None)
+    refused = LogRefusalError(
+        "no model can be identified from this log",
+        found=None if worst is None else worst.message,
+        action=joined(each.action for each in bad) or None,
+    )
+    if worst is not None:
+        refused.code = worst.code
+    return refused
+
+
+def joined(actions: Iterable[str]) -> str:
+    """What to do, settings of the logging first, each once and three at most."""
+    told = sorted(filter(None, actions), key=lambda action: SETTING.search(action) is None)
+    return "; ".join(list(dict.fromkeys(told))[:MOST_ACTIONS])

@@ -1,0 +1,91 @@
+"""Every log without a model says why in words, and what to do; no class of an error is a reason."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from flightid import errors
+from flightid.conventions import Light
+from flightid.findings import Finding
+from flightid.fleet import refusal as room
+from flightid.fleet.reasons import grouped_reasons, reason_lines
+from flightid.fleet.refusal import refusal
+from flightid.inspection import inspect_log
+from flightid.logs import Log, read_log
+from tests.sweep_log import SweepFlight
+
+FELL = Finding("tipped-over", Light.AMBER, "the vehicle falls over at 4.0 s", "look for the cause")
+SHORT = Finding("too-short", Light.RED, "16 s in the air", "fly at least 34 s an axis")
+STOPPED = errors.DataError("channel 'tau_phi' has no samples", needed="samples from 52 to 60 s")
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Log:
+    flown = SweepFlight(sweep_s=4.0, rate_hz=50.0).write(tmp_path_factory.mktemp("log"))
+    return read_log(flown)
+
+
+def own_errors() -> list[type[errors.FlightidError]]:
+    found = [each for each in vars(errors).values() if isinstance(each, type)]
+    return [each for each in found if issubclass(each, errors.FlightidError)]
+
+
+@pytest.mark.parametrize("kind", [*own_errors(), KeyError, MemoryError, RuntimeError])
+def test_no_error_is_told_by_its_class_or_without_what_to_do(kind: type[Exception]) -> None:
+    told = refusal(kind("it went wrong"), None)
+    assert told["reason"] == str(told["reason"]).lower()
+    assert kind.__name__ not in told["reason"]
+    assert "it went wrong" in told["message"] or kind is MemoryError
+    assert told["action"]
+    assert told["outcome"] == ("refused" if kind in own_errors() else "failed")
+
+
+def test_what_an_inspection_finds_comes_before_where_the_study_stopped(
+    log: Log, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen = inspect_log(log)
+    for findings, code in (((SHORT,), "too-short"), ((SHORT, FELL), "tipped-over")):
+        told = seen.with_findings(findings)
+        monkeypatch.setattr(room, "inspect_log", lambda _, told=told: told)
+        found = refusal(STOPPED, log)
+        assert found["reason"] == code
+        first = FELL if code == "tipped-over" else SHORT
+        assert found["message"].startswith(f"{first.message}. The study stopped at this: channel")
+        assert first.action in found["action"]
+    monkeypatch.setattr(room, "inspect_log", lambda _: seen.with_findings(()))
+    assert refusal(STOPPED, log)["reason"] == "data-unusable"
+
+
+def test_an_inspection_that_cannot_be_made_hides_no_refusal(
+    log: Log, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(_: Log) -> None:
+        raise errors.DataError("nothing to inspect")
+
+    monkeypatch.setattr(room, "inspect_log", broken)
+    assert refusal(STOPPED, log)["reason"] == "data-unusable"
+
+
+def test_a_span_beyond_the_log_says_where_the_log_ends(log: Log, tmp_path: Path) -> None:
+    with pytest.raises(errors.DataError, match=r"found RATE from [\d.]+ to [\d.]+ s") as told:
+        log.record(names=["p"], span_s=(900.0, 910.0))
+    assert "samples from 900 to 910 s" in str(told.value)
+    assert "copy it again" in str(told.value)
+
+
+def test_reasons_are_counted_with_an_example_and_what_to_do() -> None:
+    row = {"outcome": "refused", "reason": "not-a-log", "message": "an empty file"}
+    rows = [{**row, "action": "copy it again", "address": f"/far/{n}.bin"} for n in range(3)]
+    rows += [{**row, "outcome": "fitted"}, {**rows[0], "outcome": "failed", "reason": "time"}]
+    found = grouped_reasons(rows)
+    assert [(each.outcome, each.words, each.logs) for each in found] == [
+        ("refused", "not a log", 3),
+        ("failed", "time", 1),
+    ]
+    lines = reason_lines(found)
+    assert lines[:2] == [
+        "  3 refused: not a log (such as 0.bin: an empty file)",
+        "      do: copy it again",
+    ]
