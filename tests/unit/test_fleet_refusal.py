@@ -42,6 +42,15 @@ def test_no_error_is_told_by_its_class_or_without_what_to_do(kind: type[Exceptio
     assert told["outcome"] == ("refused" if kind in own_errors() else "failed")
 
 
+def test_an_empty_file_is_told_from_a_file_of_another_kind(tmp_path: Path) -> None:
+    for content, code in ((b"", "empty-file"), (b"time,roll rate\n0.0,0.1\n", "not-a-log")):
+        path = tmp_path / "V07.bin"
+        path.write_bytes(content)
+        with pytest.raises(errors.LogFormatError) as told:
+            read_log(path)
+        assert refusal(told.value, None)["reason"] == code
+
+
 def test_what_an_inspection_finds_comes_before_where_the_study_stopped(
     log: Log, monkeypatch: pytest.MonkeyPatch
 ) -> None:

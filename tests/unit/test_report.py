@@ -182,7 +182,7 @@ def test_text_html_and_json_show_the_same_numbers() -> None:
     shown = "1.235"
     assert shown in to_text(document)
     assert shown in "".join(_parsed(to_html(document)).text)
-    assert values["tally"] == "1 green, 1 amber, 1 red, 1 unknown"
+    assert values["tally"] == "1 green, 1 amber, 1 red, 1 not judged"
     for face in (to_text(document), to_html(document)):
         assert values["tally"] in face
 

@@ -149,7 +149,11 @@ def _type_blocks(each: TypeAnswers) -> Iterator[Block]:
         yield figure_block(type_picture(each.population, each.labels), caption)
     if each.outliers is not None:
         many = len(each.outliers.vehicles) > SHOWN
-        yield TableBlock(each.outliers.summary(each.labels), folded=many and not each.outliers.odd)
+        if each.outliers.vehicles:
+            table = each.outliers.summary(each.labels)
+            yield TableBlock(table, folded=many and not each.outliers.odd)
+        else:
+            yield Paragraph(f"No vehicle was held beside its type: {each.outliers.reason}.")
     if each.drift is not None:
         yield from _drift_blocks(each.drift, each.labels)
 

@@ -31,6 +31,8 @@ MEMORY, FAULT, FELL = "memory", "fault", "tipped-over"
 GRAVITY = (Light.RED, Light.AMBER, Light.UNKNOWN, Light.GREEN)
 SETTING = re.compile(r"\b[A-Z][A-Z0-9]+_[A-Z0-9_]+\b|\blog(ged|ging)?\b")
 """An action that speaks of the logging, or of a parameter of the autopilot."""
+EMPTY = "an empty file"
+"""What a reader of logs says that it found where there is no byte."""
 CODES: tuple[tuple[type[Exception], str], ...] = (
     (LogFormatError, "not-a-log"),
     (FileFormatError, "not-a-log"),
@@ -107,6 +109,8 @@ def _code(error: Exception) -> str:
         return error.code
     if not isinstance(error, FlightidError):
         return MEMORY if isinstance(error, MemoryError) else FAULT
+    if isinstance(error, LogFormatError) and error.found == EMPTY:
+        return "empty-file"
     return next((code for kind, code in CODES if isinstance(error, kind)), UNSUITED)
 
 

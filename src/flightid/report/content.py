@@ -188,4 +188,6 @@ class Document:
     def tally(self) -> str:
         """Verdicts counted, for example ``"3 green, 1 amber"``; empty where nothing was judged."""
         order = (Light.GREEN, Light.AMBER, Light.RED, Light.UNKNOWN)
-        return ", ".join(f"{self.count(light)} {light}" for light in order if self.count(light))
+        return ", ".join(
+            f"{self.count(light)} {light.words}" for light in order if self.count(light)
+        )
