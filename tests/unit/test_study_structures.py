@@ -19,6 +19,7 @@ from flightid.study.widened_scan import ROUNDS
 from flightid.validation.order_scan import trials
 from flightid.validation.order_scan.edges import EDGE
 from flightid.validation.order_scan.trials import OrderTrial
+from tests.closeness import assert_close
 
 T_S = 0.02
 
@@ -186,3 +187,45 @@ def test_of_any_kind_the_one_that_is_taken_goes_on(monkeypatch) -> None:
     told, _ = fit_structure(settings, ("u",), *parts)
     assert EDGE in {each.code for each in told.findings}
     assert told.covariance is None
+
+
+def slow_errors(seed: int, sample_time_s: float, low_hz: float = 0.05) -> fid.Record:
+    """A minute of a rising sweep of s² + 1.2 s + 5.76 after 0.08 s, by SciPy, and slow noise."""
+    random = np.random.default_rng(seed)
+    fine = sample_time_s / 50
+    time_s = sample_time_s * np.arange(round(60.0 / sample_time_s))
+    u = signal.chirp(time_s, low_hz, 60.0, 3.0, method="logarithmic")
+    late = round(0.08 / fine)
+    held = np.concatenate([np.zeros(late), np.repeat(u, 50)])[: 50 * len(u)]
+    num, den, _ = signal.cont2discrete(([5.76], [1.0, 1.2, 5.76]), fine)
+    y = signal.lfilter(num.ravel(), den, held)[::50]
+    noise = signal.lfilter([1.0], [1.0, -0.9], random.standard_normal(len(u)))
+    y += 0.05 * np.std(y) / np.std(noise) * noise
+    return fid.Record.from_arrays(time_s, inputs={"u": u}, outputs={"y": y}, hold="zero")
+
+
+@pytest.mark.parametrize(
+    ("seed", "sample_time_s", "orders"),
+    [
+        (2, 0.05, {"nb": (1, 2, 3), "nf": (2, 3), "nk": (1, 2, 3)}),
+        (10, 0.01, {"nb": (2, 3), "nf": (2, 3), "nk": (9, 12)}),
+    ],
+    ids=["inputs foretell the errors", "a pole and a zero cancel"],
+)
+def test_what_its_own_fit_doubts_is_left_for_another(
+    seed: int, sample_time_s: float, orders: dict[str, tuple[int, ...]]
+) -> None:
+    """15 s of slow motion chose what its fit refutes, slow errors a structure that is too rich."""
+    whole = slow_errors(seed, sample_time_s)
+    settings = StructureSettings(structure="oe", inputs=("u",), outputs=("y",), **orders)
+    fit, scan = fit_structure(
+        settings, ("u",), [whole.segment(30.0, 59.95)], [whole.segment(15.0, 30.0)]
+    )
+    taken = ranked(scan, "balanced")[0]
+    first = trials.fit_of(taken, [whole.segment(30.0, 59.95)])
+    assert first.covariance is None, "what the rule takes first"
+    assert fit.covariance is not None
+    known = [abs(mode.eigenvalue) for mode in fid.modes(fit).modes if mode.eigenvalue is not None]
+    assert_close(
+        min(known, key=lambda omega: abs(omega - 2.4)), 2.4, rtol=0.02, why="the mode of the rig"
+    )

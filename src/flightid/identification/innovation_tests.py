@@ -37,6 +37,10 @@ from flightid.uncertainty.residual_correlation import (
 )
 
 Array = NDArray[np.float64]
+ALIKE = 1.05
+"""Ratio of bars that is not worth a word."""
+INPUTS_IN_ERRORS = "inputs-in-errors"
+"""Code of errors that inputs foretell."""
 FALSE_ALARMS = 0.01
 """Share of good models that each of both tests calls wrong."""
 LAGS = 25
@@ -175,12 +179,15 @@ class InnovationTests:
         """
         bars = "they have no intervals"
         if times is not None:
-            bars = f"intervals are {times:.2g} times as long, to hold that"
+            longer = f"{times:.2g} times as long, to hold"
+            bars = (
+                f"intervals {f'are {longer}' if times > ALIKE else 'are long enough to hold'} that"
+            )
         if not self.is_independent:
             light = Light.RED if is_material(self.worth_percent) else Light.AMBER
             words = self.why_biased if times is None else f"{self.why_biased}; {bars}"
             action = action if self.slow is None else NOISE_MODEL
-            return [Finding("inputs-in-errors", light, words, action)]
+            return [Finding(INPUTS_IN_ERRORS, light, words, action)]
         if self.is_white or not biased:
             return []
         return [

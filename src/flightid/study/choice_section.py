@@ -48,8 +48,9 @@ def choice_blocks(item: ModelResults) -> tuple[Block, ...]:
         )
     if taken is not None and taken is not ranked(choice, structure.rule)[0]:
         words += (
-            ". Those before it have a pole and a zero that cancel within their errors, or their "
-            "search ended at no minimum or at one of several that fit as well"
+            ". Those before it have a pole and a zero that cancel within their errors, leave what "
+            "the inputs foretell, or their search ended at no minimum or at one of several "
+            "that fit as well"
         )
     lights = (Lights(item.choice_findings),) if item.choice_findings else ()
     table = choice.summary()

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
 from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.identification import Fit, identify
+from flightid.identification.innovation_tests import INPUTS_IN_ERRORS
 from flightid.identification.prediction_error.findings import CANCELLATION
 from flightid.models import InnovationsModel, NarxStructure, PolynomialModel, SubspaceStructure
 from flightid.models.polynomial.structure import PolynomialStructure
@@ -28,6 +30,9 @@ AS_GOOD = 0.10
 """Free-run errors that differ by less are alike: a minute of a slow mode tells them no better."""
 TRIED = 4
 """Structures that are fitted whole, at most, for one that `_is_clean`."""
+FURTHER, DOUBTED = 2, 0.3
+"""Of each sort beyond them where none is; how much worse their free runs may be."""
+BALANCED = "balanced"
 
 
 def fit_structure(
@@ -77,13 +82,24 @@ def _polynomial(
         orders: dict[str, Any] = {name: values[0] for name, values in settings.orders.items()}
         asked = PolynomialModel.general(inputs, output, **orders, **settings.options)
         return identify(asked, flown), None
-    wide, findings = widened(
-        scan,
-        lambda each: [trial.structure for trial in each.trials],
-        lambda each: ranked(each, settings.rule)[0].structure,
-        lambda each, structures: scan_further(each, structures, flown, unseen),
-    )
-    return doubted(_cleanest(wide, settings.rule, flown), findings), wide
+
+    def beyond(
+        scan: OrderScan, taken: Callable[[OrderScan], Structure]
+    ) -> tuple[OrderScan, tuple[Finding, ...]]:
+        return widened(
+            scan,
+            lambda each: [trial.structure for trial in each.trials],
+            taken,
+            lambda each, structures: scan_further(each, structures, flown, unseen),
+        )
+
+    wide, findings = beyond(scan, lambda each: ranked(each, settings.rule)[0].structure)
+    first = ranked(wide, settings.rule)[0].structure
+    fit = _cleanest(wide, settings.rule, flown)
+    delivered = fit.structure
+    if isinstance(delivered, PolynomialStructure) and delivered.orders_text != first.orders_text:
+        wide, findings = beyond(wide, lambda _: delivered)
+    return doubted(fit, findings), wide
 
 
 def _subspace(settings: StructureSettings, inputs: tuple[str, ...], flown: list[Record]) -> Fit:
@@ -113,22 +129,55 @@ def _largest(fit: Fit) -> int:
 
 
 def _cleanest(scan: OrderScan, choose: str, flown: list[Record]) -> Fit:
-    """The first of a rule's trials whose search ended well and that cancels no pole, or the first.
+    """The first of a rule's trials whose fit leaves no doubt of its structure, or the first of all.
 
     A search that ended at no minimum or at one of several as good, or a pole and its zero that
-    cancel, say little of a mode.
+    cancel, say little of a mode; errors that the inputs foretell say that dynamics are missing.
     """
-    fits = (
-        scan.best if trial is scan.trials[0] else fit_of(trial, flown)
-        for trial in ranked(scan, choose)[:TRIED]
-    )
-    first = next(fits)
-    return first if _is_clean(first) else next((fit for fit in fits if _is_clean(fit)), first)
+    order = ranked(scan, choose)
+    first = scan.best if order[0] is scan.trials[0] else fit_of(order[0], flown)
+    if _is_clean(first):
+        return first
+    others = order[1:TRIED]
+    if choose == BALANCED:
+        others += [each for each in _less_sure(scan, order[0]) if each not in others]
+    fits = (scan.best if each is scan.trials[0] else fit_of(each, flown) for each in others)
+    return next((fit for fit in fits if _is_clean(fit)), first)
 
 
 def _is_clean(fit: Fit) -> bool:
     doubts = {each.code for each in fit.findings if each.light is not Light.GREEN}
-    return is_settled(fit) and not doubts & {CANCELLATION, "local-minima"}
+    return is_settled(fit) and not doubts & {CANCELLATION, INPUTS_IN_ERRORS, "local-minima"}
+
+
+def _less_sure(scan: OrderScan, taken: OrderTrial) -> list[OrderTrial]:
+    """Structures beyond a rule's choice, for one that its own fit puts in doubt.
+
+    Those that are clearly likelier and run not much worse, for the records of the choice may be
+    short; and those with fewer coefficients that run as well: where errors are slow, likelihoods
+    of white errors differ by many times 6 for nothing, and chance takes a pole too many.
+    """
+    least = scan.trials[0].free_run_rms or 0.0
+    known = {
+        place: (_aicc(trial), trial.free_run_rms)
+        for place, trial in enumerate(scan.trials)
+        if trial.settled
+        and trial.free_run_rms is not None
+        and _has_zeros_of_sampling(trial.structure)
+    }
+    likelier, fewer = [], []
+    for place, (aicc, rms) in sorted(known.items(), key=lambda each: each[1]):
+        trial = scan.trials[place]
+        if aicc < _aicc(taken) - CLEAR and rms <= (1 + DOUBTED) * least:
+            likelier.append(trial)
+        elif (trial.n_parameters or 0) < (taken.n_parameters or 0) and rms <= (1 + AS_GOOD) * least:
+            fewer.append(trial)
+    return [*likelier[:FURTHER], *fewer[:FURTHER]]
+
+
+def _aicc(trial: OrderTrial) -> float:
+    known = None if trial.criteria is None else trial.criteria.aicc
+    return math.inf if known is None else known
 
 
 def ranked(scan: OrderScan, how: str) -> list[OrderTrial]:
@@ -157,7 +206,7 @@ def ranked(scan: OrderScan, how: str) -> list[OrderTrial]:
         and trial.free_run_rms is not None
         and trial.free_run_rms <= limit
     ]
-    order = _by_evidence(scan, alike) if how == "balanced" else alike
+    order = _by_evidence(scan, alike) if how == BALANCED else alike
     return [scan.trials[each[-1]] for each in order] or [first]
 
 

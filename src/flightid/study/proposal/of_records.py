@@ -27,7 +27,7 @@ from flightid.study.proposal.options import DataOptions, told
 from flightid.study.proposal.order_scans import ProposedScans, record_file
 from flightid.study.proposal.proposal import Proposal
 from flightid.study.stage_runner import StageRunner
-from flightid.study.structures import ranked
+from flightid.study.structures import AS_GOOD, ranked
 from flightid.surface import as_key, speaking
 
 KINDS = ("arx", "armax", "bj", "oe")
@@ -37,8 +37,6 @@ OF_VEHICLE = ("nb", "nf", "nk")
 """Orders of Box-Jenkins that are those of the best output error, whose noise models are tried."""
 FITTED, CHOSEN, ALONE = 0.6, 1.0, (0.5, 0.75)
 """Part of a record that is fitted, the rest ranks structures; and where it also has to verify."""
-AS_GOOD = 1.02
-"""Ratio of errors of free runs that does not rank structures."""
 SHORTEST = 0.1
 """Part of the longest manoeuvre's samples below which another is a rag between gaps."""
 RICHER = 2.0
@@ -357,7 +355,7 @@ def _structure(
     said = ", ".join(f"{kind} {reached[kind]:.3g}" for kind in KINDS if kind in reached)
     least = min(reached.values())
     # What comes last assumes least of the noise, so that its intervals hold for more of it.
-    good = [kind for kind in KINDS if reached.get(kind, math.inf) <= AS_GOOD * least]
+    good = [kind for kind in KINDS if reached.get(kind, math.inf) <= (1 + AS_GOOD) * least]
     return good[-1], f"{said} {unit}".rstrip(), of_kind[good[-1]]
 
 
