@@ -239,7 +239,9 @@ def test_a_model_that_its_data_do_not_allow_leaves_the_others(
     assert refused.fit is None
     assert "not identified" in refused.left_out[0].message
     assert any(finding.code == "model-refused" for finding in study.findings)
-    assert "1 of 3 models not to be used" in to_text(study.short)
+    said = " ".join(to_text(study.short).split())
+    assert "2 of 3 models to use" in said, "what serves comes first"
+    assert "not to be used, for what is said of it below: " in said
     with pytest.raises(FlightidError):
         run(folder, STUDY[: STUDY.index("[[record]]")] + BRIEF, cache)
 
@@ -255,6 +257,39 @@ def test_chirps_of_a_log_have_the_names_of_their_segments() -> None:
     assert made["roll chirp"].tolist() == flown["excitation"].tolist()
     assert not made["pitch chirp"].any()
     assert {made.channels[name].role for name in ("roll chirp", "pitch chirp")} == {Role.EXCITATION}
+
+
+def _promised(**fits: float) -> SimpleNamespace:
+    """A model of one run that no fit has seen, by how well each channel is predicted there."""
+    verdict = Finding("evidence", Light.GREEN, "holds")
+    fit = SimpleNamespace(
+        evidence=SimpleNamespace(verdict=verdict), average_cost=1.0, covariance=np.eye(1),
+        responses=(), model=SimpleNamespace(inputs=("u",), outputs=("y",)),
+    )  # fmt: skip
+    run = SimpleNamespace(fit_percent=fits)
+    settings = SimpleNamespace(structure=None)
+    return SimpleNamespace(
+        name="Hover", fit=fit, findings=(), on_unseen={"doublets": run}, settings=settings
+    )
+
+
+@pytest.mark.parametrize(
+    ("fits", "said"),
+    [
+        ({"p": 93.12, "q": 95.0}, "it predicts 93.1 to 95 % of motion that no fit has seen"),
+        (
+            {"u": -288.0, "p": 95.1, "q": 80.0},
+            "it predicts up to 95.1 % of motion that no fit has seen, 80 % at the median of 3 "
+            "channels; 1 no better than a constant would, u of “doublets” least",
+        ),
+        ({"u": -288.0}, "it predicts nothing of motion that no fit has seen"),
+    ],
+)
+def test_what_is_predicted_is_told_by_channels(fits: dict[str, float], said: str) -> None:
+    study = SimpleNamespace(
+        identified=[_promised(**fits)], faults=(), files=(), tuning=None, inspection=None
+    )
+    assert _models(study, "study.toml").message == f"1 model to use: {said}"  # type: ignore[arg-type]
 
 
 def test_no_model_is_none_to_use() -> None:

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from scipy.signal import cont2discrete, lfilter
 
+from flightid.cli.output import Exit
 from flightid.cli.program import run
-from flightid.errors import StudyError
+from flightid.errors import DataError, StudyError
 from flightid.study.settings import read_settings
 from flightid.study.tuning import TuneSettings, tune_models
 from tests.closeness import assert_close
@@ -124,6 +125,34 @@ def test_records_get_a_pid_of_its_own_with_their_modes(
     assert {"controller.c", "controller.toml"} <= {each.name for each in folder.iterdir()}
     assert run(["tune", str(folder)]) == 2
     assert f"flightid tune {folder} --controller pi_d" in capsys.readouterr().err
+
+
+def test_models_stand_where_there_are_no_gains(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Everything that was found is shown, and why there are no gains; the report lies there."""
+    random = np.random.default_rng(2)
+    u = np.repeat(random.choice([-1.0, 1.0], 100), 4)
+    y = lfilter([0.0, 0.2], [1.0, -0.8], u) + 0.05 * random.standard_normal(u.size)
+    rows = "".join(
+        f"{0.1 * k:.1f},{a},{b:.6g}\n" for k, (a, b) in enumerate(zip(u, y, strict=True))
+    )
+    (tmp_path / "rig.csv").write_text(f"time,u,y\n{rows}", encoding="utf-8")
+
+    def refuse(*_: object, **__: object) -> None:
+        raise DataError("planted", found="no errors", action="lower nf and nb by 1")
+
+    monkeypatch.setattr("flightid.study.tuning.tune_controller", refuse)
+    assert run(["tune", str(tmp_path / "rig.csv")]) == Exit.RED
+    said = capsys.readouterr()
+    assert "Models" in said.out
+    assert "predicts" in said.out
+    found = [line for line in said.out.splitlines() if "no gains: planted: found no errors" in line]
+    assert len(found) == 1
+    assert "lower nf and nb by 1" in said.out
+    assert "could not be made" not in said.out
+    assert "report.html" in said.err
+    assert (tmp_path / "rig-output" / "report.html").is_file()
 
 
 def test_records_alone_hold_no_gains() -> None:

@@ -11,6 +11,7 @@ import click
 from flightid.cli.option_fields import OptionsCommand, parted
 from flightid.cli.output import (
     WRITTEN,
+    Exit,
     emit_values,
     json_option,
     leave_by_verdict,
@@ -31,9 +32,16 @@ USUAL = "pi_d"
 
 
 def _fields() -> dict[str, type[Options]]:
-    from flightid.study.tuning import KINDS
+    from flightid.control.tuning.controller_options import ControllerOptions
+    from flightid.control.tuning.options import TuneOptions
+    from flightid.control.tuning.requirements import TuningRequirements
 
-    return dict(zip(("requirements", "tuning", "a controller"), KINDS, strict=True)) | of_data()
+    # As `flightid.study.tuning.KINDS` has them, which brings all that a run needs with it.
+    return {
+        "requirements": TuningRequirements,
+        "tuning": TuneOptions,
+        "a controller": ControllerOptions,
+    } | of_data()
 
 
 @click.command(cls=OptionsCommand, fields_of=_fields)
@@ -136,6 +144,10 @@ def command(
         tuning = study.tuning
         refused = [str(each).partition("] ")[2] for each in study.faults]
     if tuning is None:
+        if study is not None and refused and not as_json:
+            note(f"Wrote {study.output / 'report.html'}")
+            show_answer(study)
+            raise click.exceptions.Exit(Exit.RED)
         nothing = "there is no model of a rate that can be tuned"
         raise click.ClickException("; ".join(refused) or nothing)
     if as_json:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from shlex import quote
+from statistics import median
 from typing import TYPE_CHECKING
 
 from flightid.control.autopilots.parameter_files import parameter_suffix
@@ -15,7 +16,7 @@ from flightid.findings import Finding, counted, worst
 from flightid.report.content import Document, Lights, Section, TableBlock
 from flightid.study.elsewhere import red_elsewhere
 from flightid.study.estimate_tables import short_modes_table, structure_words
-from flightid.study.faults import CODE
+from flightid.study.faults import CODE, other_faults, tuning_fault
 from flightid.table import Cell, Column, Table
 
 if TYPE_CHECKING:
@@ -59,7 +60,8 @@ def answer_of(study: StudyResults, *, source: str | None = None) -> StudyAnswer:
     findings = [_models(study, source)]
     tuning = study.tuning
     if tuning is None:
-        return StudyAnswer(tuple(findings))
+        fault = tuning_fault(study.faults)
+        return StudyAnswer((*findings, *([] if fault is None else [fault])))
     findings.append(_gains(tuning, source))
     if study.gain_flight is not None:
         findings.append(_flown(study.gain_flight))
@@ -109,7 +111,8 @@ def short_document(study: StudyResults, document: Document) -> Document:
     """
     answer = answer_of(study, source=None if study.source is None else quote(str(study.source)))
     models = models_in_short(study.identified)
-    faults = (Lights(study.faults),) if study.faults else ()
+    others = other_faults(study.faults)
+    faults = (Lights(others),) if others else ()
     tables = tuple(map(TableBlock, answer.tables))
     roots = short_modes_table(study.identified)
     moving = (TableBlock(roots),) if roots.rows else ()
@@ -126,7 +129,7 @@ def short_document(study: StudyResults, document: Document) -> Document:
 
 
 def _models(study: StudyResults, source: str) -> Finding:
-    """What the models are worth together."""
+    """What the models are worth together: first what serves, then what does not."""
     lights = [in_short(item) for item in study.identified]
     if not lights:
         return Finding("answer", Light.UNKNOWN, "no model was asked for")
@@ -135,44 +138,71 @@ def _models(study: StudyResults, source: str) -> Finding:
         said = "no model was made, for the reasons named above: there is nothing to use"
         return Finding("answer", Light.UNKNOWN, said, action)
     light = worst(lights)
-    bad = [each for each in lights if each.light is Light.RED]
-    n, first = len(lights), next(each for each in lights if each.light is light)
-    unseen = [
-        value
-        for item in study.identified
-        for run in item.on_unseen.values()
-        for value in run.fit_percent.values()
-    ]
-    said = (
-        f"{counted(n, 'model')} to use" if not bad else f"{len(bad)} of {n} models not to be used"
-    )
-    if unseen and not bad:
-        ends = dict.fromkeys(f"{value:.3g}" for value in (min(unseen), max(unseen)))
-        what = f"{'it predicts' if n == 1 else 'they predict'} {' to '.join(ends)} %"
-        said += f": {what} of motion that no fit has seen"
-    elif bad:
-        named = (
-            item.name for each, item in zip(lights, study.identified, strict=True) if each in bad
-        )
-        said += f", for the reasons named with them: {', '.join(named)}"
-    if light is Light.AMBER:
-        said += "; each says what is to be doubted"
-    return Finding("answer", light, said, first.action if bad else _next(study, source))
+    pairs = list(zip(lights, study.identified, strict=True))
+    good = [item for each, item in pairs if each.light is not Light.RED]
+    bad = [(each, item) for each, item in pairs if each.light is Light.RED]
+    several = f"{len(good)} of {counted(len(pairs), 'model')}"
+    said = f"{several if bad else counted(len(good), 'model')} to use" if good else ""
+    said += _promise(good)
+    if any(each.light is Light.AMBER for each in lights):
+        said += "; each says what is to be doubted" if good else ""
+    if bad:
+        why = f"not to be used, for what is said of {'it' if len(bad) == 1 else 'each'} below"
+        said += f"{'; ' if said else ''}{why}: {', '.join(item.name for _, item in bad)}"
+    action = _next(study, source, good) if good else bad[0][0].action
+    return Finding("answer", light, said, action)
 
 
-def _next(study: StudyResults, source: str) -> str:
+def _promise(items: Sequence[ModelResults]) -> str:
+    """How much of what no fit has seen the models predict, channel by channel."""
+    fits = {
+        f"{name} of “{record}”": value
+        for item in items
+        for record, run in item.on_unseen.items()
+        for name, value in run.fit_percent.items()
+    }
+    if not fits:
+        return ""
+    they = "it predicts" if len(items) == 1 else "they predict"
+    values = sorted(fits.values())
+    unseen = "of motion that no fit has seen"
+    missed = sum(value <= 0.0 for value in values)
+    if not missed:
+        ends = dict.fromkeys(f"{value:.3g}" for value in (values[0], values[-1]))
+        return f": {they} {' to '.join(ends)} % {unseen}"
+    if missed == len(values):
+        return f": {they} nothing {unseen}"
+    middle = f"{median(values):.3g} % at the median of {len(values)} channels"
+    worse = f"{missed} no better than a constant would, {min(fits, key=fits.__getitem__)} least"
+    return f": {they} up to {values[-1]:.3g} % {unseen}, {middle}; {worse}"
+
+
+def _next(study: StudyResults, source: str, good: Sequence[ModelResults]) -> str:
     """What to do with models that serve."""
     if study.tuning is not None or any(each.code == CODE for each in study.faults):
         return ""
     if study.inspection is not None:
         return f"for gains: flightid tune {source}"
-    if all(item.fit is None or item.fit.covariance is None for item in study.identified):
+    if all(item.fit is None or item.fit.covariance is None for item in good):
         return "gains of a PID need a model whose errors are known: mend first what is named above"
-    models = [item.fit.model for item in study.identified if item.fit is not None]
+    models = [item.fit.model for item in good if item.fit is not None]
     loop = ""
     if all(len(each.inputs) + len(each.outputs) > 2 for each in models):
-        loop = f" --loops {models[0].outputs[0]}/{models[0].inputs[0]}"
+        loop = f" --loops {_loop_of(good)}"
     return f"for gains of a PID: flightid tune {source} --controller pi_d{loop}"
+
+
+def _loop_of(items: Sequence[ModelResults]) -> str:
+    """A loop worth closing: output and input whose response held over the widest band."""
+    fit = next(item.fit for item in items if item.fit is not None)
+    widths = {
+        each.name: each.omega_rad_s[-1] / each.omega_rad_s[0]
+        for each in fit.responses
+        if len(each.omega_rad_s)
+    }
+    if widths:
+        return max(widths, key=widths.__getitem__)
+    return f"{fit.model.outputs[0]}/{fit.model.inputs[0]}"
 
 
 def _gains(tuning: Tuning, source: str) -> Finding:

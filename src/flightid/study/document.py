@@ -34,7 +34,7 @@ from flightid.report.verification import prediction_picture
 from flightid.study.answer import answer_of, models_in_short
 from flightid.study.elsewhere import red_elsewhere
 from flightid.study.estimate_tables import model_table
-from flightid.study.faults import section_of, whole_section
+from flightid.study.faults import other_faults, section_of, whole_section
 from flightid.study.model_section import model_section
 from flightid.study.results import StudyResults
 from flightid.study.truth import recovered
@@ -212,8 +212,8 @@ def _result(study: StudyResults, *, sections: tuple[Section, ...] = ()) -> Itera
     yield from (TableBlock(table, folded=True) for table in promises)
     if study.settings.notes:
         yield Paragraph(study.settings.notes)
-    if study.faults:
-        yield Lights(study.faults)
+    if others := other_faults(study.faults):
+        yield Lights(others)
     yield models_in_short(study.identified)
     # A tied parameter follows another: it would count the same miss twice.
     inside = [

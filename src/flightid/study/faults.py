@@ -13,6 +13,9 @@ from flightid.report.content import Block, Lights, Section
 
 Value = TypeVar("Value")
 CODE = "part-failed"
+TUNING = "tuning"
+"""The part that the answer of a study tells itself."""
+FAILED = " could not be made: "
 
 
 @dataclass
@@ -63,6 +66,22 @@ class Faults:
         except Exception as error:
             self.findings.append(_named(what, error))
             return instead
+
+
+def tuning_fault(faults: Iterable[Finding]) -> Finding | None:
+    """Why there are no gains, with what to do, where they were asked for and could not be made."""
+    start = TUNING + FAILED
+    for each in faults:
+        if each.message.startswith(start):
+            why, _, action = each.message.removeprefix(start).partition(". Next: ")
+            action = each.action or action.removesuffix(".")
+            return Finding("gains", Light.RED, f"no gains: {why}", action)
+    return None
+
+
+def other_faults(faults: Iterable[Finding]) -> tuple[Finding, ...]:
+    """What failed besides the gains."""
+    return tuple(each for each in faults if not each.message.startswith(TUNING + FAILED))
 
 
 def blocks_until(
@@ -118,4 +137,4 @@ def _named(what: str, error: Exception) -> Finding:
     known = isinstance(error, FlightidError)
     reason = str(error) if known else f"{type(error).__name__}: {error}"
     action = "" if known else "report this fault of flightid; the rest of the study stands"
-    return Finding(CODE, Light.RED, f"{what} could not be made: {reason}", action)
+    return Finding(CODE, Light.RED, f"{what}{FAILED}{reason}", action)

@@ -17,7 +17,7 @@ from flightid.report.html import to_html
 from flightid.report.text import to_text
 from flightid.review import FlightReview, review_flight
 from flightid.study.error_list import ErrorList
-from flightid.study.faults import Faults
+from flightid.study.faults import TUNING, Faults
 from flightid.study.flight import fly_again
 from flightid.study.output import RESULTS, require_replaceable, whole_folder
 from flightid.study.pipeline import identify_models
@@ -132,7 +132,7 @@ def _run(
         tuned = None
         if wanted is not None:
             inputs = (runner, staged, taken.log, wanted)
-            tuned = faults.spare("tuning", _tuned, None, *inputs)
+            tuned = faults.spare(TUNING, _tuned, None, *inputs)
         tuning = None if tuned is None else tuned.value
         flown = None
         if settings.flight is not None and settings.fly is not None and tuning is not None:

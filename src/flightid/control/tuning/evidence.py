@@ -18,6 +18,7 @@ from flightid.findings import Finding
 from flightid.identification.fit import WITHHOLDING, Fit
 from flightid.identification.instrument_fit import instrument_fit
 from flightid.identification.model_error import ModelErrorBound
+from flightid.identification.prediction_error.findings import CANCELLATION
 from flightid.identification.simpler_structure import simpler_fit
 from flightid.identification.uncertain_of import evidence_behind, uncertain_of
 from flightid.models import InnovationsModel, PolynomialModel
@@ -33,6 +34,8 @@ SIMPLER = "simpler-structure"
 """Code of gains for a simpler structure than the one that was asked for."""
 BY_INSTRUMENT = "instrument-fit"
 """Code of gains for a fit by way of the excitation in place of one that a loop biases."""
+TAKING = (*WITHHOLDING, CANCELLATION)
+"""Codes of findings that took a covariance, and say what gives it back."""
 Array = NDArray[np.float64]
 
 
@@ -237,7 +240,7 @@ def _refusals(
 def _towards_errors(source: object, reason: str) -> str:
     """What gives a fit its covariance: what the finding that took it says, where one did."""
     for finding in getattr(source, "findings", ()):
-        took = finding.code in WITHHOLDING or finding.message.startswith(reason)
+        took = finding.code in TAKING or finding.message.startswith(reason)
         if took and finding.action:
             return str(finding.action)
     return "fit a measured response or records; or take nominal=True and keep margins"
