@@ -31,6 +31,15 @@ def test_help_and_version_load_no_numbers(flag: str) -> None:
     assert not loaded(flag) & (HEAVY | {"numpy", "scipy"})
 
 
+@pytest.mark.parametrize("verb", ["run", "tune"])
+def test_help_of_the_first_verbs_loads_options_alone(verb: str) -> None:
+    """1.5 s of processor time before the first line, where 0.3 do."""
+    found = loaded(verb, "--help")
+    assert "flightid.study.proposal.options" in found
+    heavy = HEAVY - {"flightid.study", "flightid.control"} | {"flightid.study.run"}
+    assert not found & heavy
+
+
 def test_inspect_loads_what_it_uses(tmp_path: Path) -> None:
     path = SweepFlight(sweep_s=8.0).write(tmp_path)
     found = loaded("--quiet", "inspect", str(path))

@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flightid.control.autopilots import AUTOPILOTS, AXES, AxisLoop, axis_loop
-from flightid.control.autopilots.axis_loop import Gyro
 from flightid.control.autopilots.filter_stages import pole_stage
 from flightid.control.autopilots.gyro_notches import ardupilot_notches, px4_notches
+from flightid.control.gyro import Gyro
 from tests.closeness import assert_close
 from tests.examples import examples
 

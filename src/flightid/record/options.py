@@ -7,7 +7,9 @@ from dataclasses import dataclass
 
 from flightid.options import Options, option
 from flightid.record.interpolation import Interpolation
-from flightid.record.store import RECORD_COLUMN
+
+RECORD_COLUMN = "record"
+"""Column that tells records of one file apart, where none is named."""
 
 
 @dataclass(frozen=True)

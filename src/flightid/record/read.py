@@ -23,13 +23,13 @@ from flightid.record.history import Step
 from flightid.record.hold import InputHold, InputShape, Loop
 from flightid.record.interpolation import Interpolation
 from flightid.record.joined_files import with_files
+from flightid.record.options import RECORD_COLUMN
 from flightid.record.record import Record
 from flightid.record.row_grids import ChannelColumn, RowGrid
 from flightid.record.rows import column_unit
 from flightid.record.selection import Names, pairs_of, refuse_columns, selected_records
 from flightid.record.source_rows import SourceRows, moves
 from flightid.record.stamps import mean_spacing_s
-from flightid.record.store import RECORD_COLUMN
 from flightid.record.tables import read_table
 from flightid.record.time_columns import USUAL, row_stamps, with_time, with_time_unit
 from flightid.record.validation import require_period

@@ -14,14 +14,13 @@ from flightid.errors import DataError, FileFormatError, OptionError
 from flightid.files import as_path, write_atomically
 from flightid.record.formats import netcdf, parquet
 from flightid.record.labels import RecordLabels, from_text, labels_of, to_text
+from flightid.record.options import RECORD_COLUMN
 from flightid.record.record import Record
 from flightid.record.several import as_records
 from flightid.record.validation import TIME
 
 if TYPE_CHECKING:
     import pyarrow as pa
-
-RECORD_COLUMN = "record"
 
 
 def write_records(records: Record | Sequence[Record], path: str | Path) -> Path:

@@ -9,8 +9,8 @@ import scipy
 from numpy.typing import NDArray
 
 from flightid.control.autopilots import AXES
-from flightid.control.autopilots.axis_loop import Gyro
 from flightid.control.autopilots.output_noise import GyroSpectrum
+from flightid.control.gyro import Gyro
 from flightid.inspection.signals import Signal, Span, find, inside
 from flightid.logs import Log
 from flightid.result import Result

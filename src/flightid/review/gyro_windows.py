@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.control.autopilots.axis_loop import Gyro
+from flightid.control.gyro import Gyro
 from flightid.inspection.signals import Signal, Span, inside, places
 from flightid.inspection.stamps import believable
 from flightid.logs import Log

@@ -15,38 +15,19 @@ from flightid.conventions import Role
 from flightid.errors import StudyError
 from flightid.logs.joinable import joinable
 from flightid.option_forms import NOTHING, SPAN
-from flightid.options import Options, option
+from flightid.options import option
 from flightid.record import InputShape, Record, read_records
 from flightid.record.derived import sources_of
 from flightid.record.formats.columns import channel_name
-from flightid.record.hold import HOLDS, LOOPS
-from flightid.record.options import TableOptions
-from flightid.record.store import RECORD_COLUMN
+from flightid.record.options import RECORD_COLUMN, TableOptions
 from flightid.record.time_columns import is_time_unit, unit_in_name
 from flightid.study.reading import TableReader, read_table
+from flightid.study.shape_options import ShapeOptions
 
 UNKNOWN = InputShape()
 _COMMAND = re.compile(r"`(python [^`]+)`")
 ALL = "*"
 """Manoeuvre that stands for all of a file."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class ShapeOptions(Options):
-    """What a table says of the inputs between samples, their repetition and the loop."""
-
-    hold: str | None = option(None, choices=HOLDS, doc="Inputs between samples.")
-    period_s: float | None = option(
-        None, unit="s", above=0.0, doc="Time after which the inputs repeat exactly."
-    )
-    loop: str | None = option(
-        None, choices=LOOPS, doc="Whether a loop was closed; default: a test decides."
-    )
-
-    @property
-    def shape(self) -> InputShape:
-        """The same as a record knows it."""
-        return InputShape(**{each.name: getattr(self, each.name) for each in fields(InputShape)})
 
 
 @dataclass(frozen=True)

@@ -24,10 +24,11 @@ from flightid.study.flight import FlightPlan, read_flight
 from flightid.study.model_settings import ModelSettings, placed, read_model
 from flightid.study.qualities_settings import QualitiesSettings, read_qualities
 from flightid.study.reading import TOP, TableReader, read_table
-from flightid.study.record_files import RecordFile, ShapeOptions, read_record_file
+from flightid.study.record_files import RecordFile, read_record_file
 from flightid.study.reducing import ReduceSettings, read_reduce
 from flightid.study.references import require_conditions, require_references
 from flightid.study.response_settings import ResponseSettings
+from flightid.study.shape_options import ShapeOptions
 from flightid.study.tuning import TuneSettings, read_tune
 from flightid.study.uses_settings import UsesSettings, read_uses
 from flightid.uncertainty.quantiles import LEVEL

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from flightid import _native
-from flightid.control.autopilots.axis_loop import AxisLoop, Gyro
+from flightid.control.autopilots.axis_loop import AxisLoop
 from flightid.control.autopilots.filter_stages import (
     FilterPath,
     FilterStage,
@@ -26,6 +26,7 @@ from flightid.control.autopilots.filters import (
     sections_response,
 )
 from flightid.control.autopilots.loop_run import LoopFlags, LoopRun, LoopState, samples
+from flightid.control.gyro import Gyro
 
 NOTCH_OFF = (0.0, 0.0, 0.0)
 PID_COLUMNS = ("Tar", "Err", "P", "I", "D", "FF", "DFF", "Dmod", "SRate")

@@ -6,7 +6,7 @@ from abc import abstractmethod
 from array import array
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import ClassVar, Literal, Self
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,11 +23,10 @@ from flightid.control.autopilots.filters import (
 from flightid.control.autopilots.loop_run import LoopFlags, LoopRun
 from flightid.control.autopilots.parameter_files import GainChange
 from flightid.control.autopilots.parameter_table import GainRange, gain_ranges
+from flightid.control.gyro import Gyro
 from flightid.errors import DataError, OptionError, UnknownNameError
 from flightid.result import Result
 from flightid.table import Column, Table
-
-Gyro = Literal["raw", "filtered"]
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from flightid.control.autopilots.axis_loop import AxisLoop, Gyro
+from flightid.control.autopilots.axis_loop import AxisLoop
 from flightid.control.autopilots.betaflight_filters import betaflight_filters
 from flightid.control.autopilots.filter_stages import FilterStage
 from flightid.control.autopilots.filters import (
@@ -25,6 +25,7 @@ from flightid.control.autopilots.loop_run import LoopFlags, LoopRun, samples
 from flightid.control.autopilots.notch_tracking import NotchTracking
 from flightid.control.autopilots.parameter_files import GainChange
 from flightid.control.autopilots.parameter_table import Axis, AxisParameters
+from flightid.control.gyro import Gyro
 from flightid.errors import DataError, OptionError
 
 P_SCALE, I_SCALE, D_SCALE = 0.032029, 0.244381, 0.000529

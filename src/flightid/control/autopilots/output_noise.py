@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.control.autopilots.axis_loop import AxisLoop, Gyro
+from flightid.control.autopilots.axis_loop import AxisLoop
+from flightid.control.gyro import Gyro
 
 Array = NDArray[np.float64]
 LEAST_POWER = 1e-3

@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from flightid.control.autopilots.axis_loop import AxisLoop, Gyro
+from flightid.control.autopilots.axis_loop import AxisLoop
 from flightid.control.autopilots.filters import (
     Omega,
     Response,
@@ -18,6 +18,7 @@ from flightid.control.autopilots.filters import (
 )
 from flightid.control.autopilots.loop_run import LoopFlags, LoopRun, samples
 from flightid.control.autopilots.parameter_table import GainRange
+from flightid.control.gyro import Gyro
 from flightid.table import Column, Table
 
 FORMS = {

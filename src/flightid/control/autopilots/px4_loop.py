@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from flightid import _native
-from flightid.control.autopilots.axis_loop import AxisLoop, Gyro
+from flightid.control.autopilots.axis_loop import AxisLoop
 from flightid.control.autopilots.filter_stages import FilterStage, pole_stage
 from flightid.control.autopilots.filters import (
     Omega,
@@ -19,6 +19,7 @@ from flightid.control.autopilots.filters import (
     one_pole_response,
 )
 from flightid.control.autopilots.loop_run import LoopFlags, LoopRun, samples
+from flightid.control.gyro import Gyro
 from flightid.errors import OptionError, ShapeError
 
 

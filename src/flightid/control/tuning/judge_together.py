@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.control.autopilots import AxisLoop
-from flightid.control.autopilots.axis_loop import Gyro
+from flightid.control.gyro import Gyro
 from flightid.control.margins.disk_geometry import gain_limits, phase_limit_deg
 from flightid.control.margins.disk_margin import alphas_of
 from flightid.control.margins.stability_count import unstable_poles

@@ -6,12 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from flightid.control.autopilots.axis_loop import Gyro
-from flightid.control.tuning.tune_pid import DRAWS
+from flightid.control.gyro import Gyro
 from flightid.options import Options, option
 
 OtherLoops = Literal["closed", "open"]
 TunedWith = Literal["flown", "suggested"]
+DRAWS = 300
+"""Plants drawn from the covariance for a search."""
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.control.autopilots import AxisLoop
-from flightid.control.autopilots.axis_loop import Gyro
+from flightid.control.gyro import Gyro
 from flightid.control.tuning.controller_paths import (
     ControllerPaths,
     has_angle_loop,

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.control.autopilots import AxisLoop
-from flightid.control.autopilots.axis_loop import Gyro
+from flightid.control.gyro import Gyro
 from flightid.control.tuning.axis_tuning import (
     AxisResult,
     Setting,
@@ -23,7 +23,7 @@ from flightid.control.tuning.evidence import Verdicts, gather
 from flightid.control.tuning.filter_choice import FilterChoice
 from flightid.control.tuning.flown_gains import GainsOfAxes, flown_loop, loops_of, require_known
 from flightid.control.tuning.judge_together import judge_together
-from flightid.control.tuning.options import OtherLoops
+from flightid.control.tuning.options import DRAWS, OtherLoops
 from flightid.control.tuning.pid_design import PidDesign
 from flightid.control.tuning.requirements import TuningRequirements
 from flightid.control.tuning.result import RefusedAxis, Tuning
@@ -31,7 +31,6 @@ from flightid.control.tuning.structure_error import Band
 from flightid.control.tuning.together import ClosedAxis, Together
 from flightid.control.tuning.tune_pid import (
     CHANNELS,
-    DRAWS,
     design_of,
     make_setting,
     naming_filters,

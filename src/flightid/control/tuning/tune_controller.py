@@ -14,11 +14,12 @@ from flightid.control.autopilots.pid_loop import PidLoop
 from flightid.control.tuning.axis_tuning import axis_steps, tune_axis
 from flightid.control.tuning.controller_options import WEIGHTS, ControllerOptions
 from flightid.control.tuning.evidence import TuningEvidence, Verdicts, gather
+from flightid.control.tuning.options import DRAWS
 from flightid.control.tuning.pid_design import PidDesign
 from flightid.control.tuning.requirements import TuningRequirements
 from flightid.control.tuning.responses import responses
 from flightid.control.tuning.structure_error import Band
-from flightid.control.tuning.tune_pid import DRAWS, SHOWN, design_of, make_setting, noise_density
+from flightid.control.tuning.tune_pid import SHOWN, design_of, make_setting, noise_density
 from flightid.conventions import Light
 from flightid.errors import DataError, ModelError, OptionError
 from flightid.findings import Finding

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from flightid.control.autopilots import AxisLoop
-from flightid.control.autopilots.axis_loop import Gyro
+from flightid.control.gyro import Gyro
 from flightid.control.margins.outside_band import beyond_findings
 from flightid.control.tuning.axis_tuning import (
     JUDGED_POINTS,
@@ -27,6 +27,7 @@ from flightid.control.tuning.evidence import TuningEvidence, Verdicts, gather
 from flightid.control.tuning.filter_choice import FilterChoice
 from flightid.control.tuning.findings import low_coherence, remarks, verdict
 from flightid.control.tuning.flown_gains import Gains, flown_loop, require_known
+from flightid.control.tuning.options import DRAWS
 from flightid.control.tuning.order_statistics import least_share
 from flightid.control.tuning.pid_design import PidDesign
 from flightid.control.tuning.requirements import TuningRequirements
@@ -40,7 +41,7 @@ from flightid.version import VERSION
 
 CHANNELS = {"roll": ("tau_phi", "p"), "pitch": ("tau_theta", "q"), "yaw": ("tau_psi", "r")}
 """Command and rate of each axis, as channel maps and library models name them."""
-DRAWS, SHOWN, MOVED = 300, 60, 12
+SHOWN, MOVED = 60, 12
 SEARCHED_SIZE = 1.25
 """Errors of structure in the search over those that judge it, whose directions it has not met."""
 ANSWER_S = 0.15

@@ -7,7 +7,7 @@ from typing import Any
 
 from flightid.options import Options, option
 from flightid.record.options import ReadOptions
-from flightid.study.record_files import ShapeOptions
+from flightid.study.shape_options import ShapeOptions
 
 
 @dataclass(frozen=True, kw_only=True)
