@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from pathlib import Path
 
 import click
 import pytest
@@ -70,6 +71,20 @@ def test_a_command_says_its_own_flags(name: str) -> None:
         said = str(OptionError(f"{name} has no meaning", action=f"give {name}=…"))
     flag = flags_of(name)[-1]
     assert said == f"{flag} has no meaning. Next: give {flag}."
+
+
+def test_a_command_names_a_file_as_it_was_given() -> None:
+    """What is copied from the screen works where the user stands."""
+    command = program.get_command(click.Context(program), "inspect")
+    assert command is not None
+    context = click.Context(command, parent=click.Context(program))
+    context.params = {"log": Path("my logs/day.bin"), "whole": False}
+    with context:
+        said = as_typed("flightid plan day.bin writes a card; flightid run other-day.bin; day.bin")
+        assert as_typed("flightid run day.bin.csv") == "flightid run day.bin.csv"
+    assert said == (
+        "flightid plan 'my logs/day.bin' writes a card; flightid run other-day.bin; day.bin"
+    )
 
 
 def test_what_a_user_wrote_is_no_option() -> None:

@@ -173,5 +173,5 @@ def test_the_command_tunes_with_suggested_filters_and_writes_them(tmp_path: Path
 
 def test_filters_that_change_nothing_are_not_advised() -> None:
     nothing: Any = SimpleNamespace(within_limit=True, axes=())
-    assert _advice("", "", nothing).startswith("balance propellers")
-    assert _advice("", "", None).startswith("balance propellers")
+    assert _advice("", "", nothing, "").startswith("balance propellers")
+    assert _advice("", "", None, "").startswith("balance propellers")

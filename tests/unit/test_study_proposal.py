@@ -194,10 +194,11 @@ def test_a_fall_comes_first_then_the_commands_that_go_on(tmp_path: Path) -> None
     missed = (Finding("no-model", Light.RED, "roll: no model, no sweep", "fly a sweep"),)
     said = Proposal((), (), missed, replace(looked, findings=(*looked.findings, fall))).refusal()
     todo = said.partition("What to do, the first first\n")[2].splitlines()
-    assert [line.split(":")[0] for line in todo[:4]] == [
-        "- look for its cause", "- flightid plan day.bin", "- flightid flight day.bin",
-        "- fly a sweep",
+    assert [line.split(":")[0] for line in todo[:2]] == [
+        "- look for its cause", "- flightid flight day.bin",
     ]  # fmt: skip
+    assert sum("flightid plan day.bin" in line for line in todo) == 1, "a command is said once"
+    assert any(line == "- fly a sweep" for line in todo)
 
 
 def test_records_without_times_take_a_sample_time_into_the_study(tmp_path: Path) -> None:

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from functools import cache
+from pathlib import Path
+from shlex import quote
 
 import click
 
@@ -30,7 +33,22 @@ def as_typed(text: str) -> str:
     text = held_in(text, "the model's file")
     made = replaced(GIVEN, lambda found: _given(found, known, program), text)
     made = replaced(NAME, lambda found: known.get(found[0], [found[0]])[-1], made)
-    return VERB.sub(lambda found: _verb(found, program), made)
+    return _reachable(VERB.sub(lambda found: _verb(found, program), made), here)
+
+
+def _reachable(text: str, here: click.Context) -> str:
+    """Commands that name a file of this one, with the path by which it was given."""
+    for path in _paths(here):
+        named = rf"(\bflightid [a-z-]+ ){re.escape(path.name)}(?![\w./-]*\w)"
+        way = quote(str(path)).replace("\\", r"\\")
+        text = re.sub(named, rf"\g<1>{way}", text)
+    return text
+
+
+def _paths(here: click.Context) -> Iterator[Path]:
+    for value in here.params.values():
+        several = value if isinstance(value, tuple) else (value,)
+        yield from (each for each in several if isinstance(each, Path))
 
 
 def _given(found: re.Match[str], known: dict[str, list[str]], program: click.Command) -> str:

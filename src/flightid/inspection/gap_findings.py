@@ -54,7 +54,7 @@ def _remedy(log: Log, gaps: list[Span]) -> str:
         return "use a faster card, or log less"
     if log.kind == "px4" or "DSF" in log:
         return (
-            f"the logger counts no lost samples there, so that no card is to blame: {logging(log)}"
+            f"{logging(log)}: the logger counts no lost samples there, so that no card is to blame"
         )
     return "the log does not tell whether the card or the autopilot left them out"
 

@@ -297,7 +297,7 @@ def _quality(log: Log, found: Inspection) -> list[Finding]:
                         "jitter",
                         Light.AMBER,
                         f"{rate.label} is logged with {100 * rate.jitter:.0f} % jitter",
-                        "records are resampled by their stamps; log at the full rate instead",
+                        "log at the full rate: records are resampled by their stamps",
                     )
                 )
     findings += [

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from flightid.control.autopilots.parameter_files import parameter_suffix
 from flightid.control.tuning.filter_choice import FilterChoice
 from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.review.filters import FilterReview
 from flightid.review.thresholds import OUTPUT_NOISE, PHASE_TO_WIN
 
-WRITE = "flightid flight LOG --write filters.param writes them with the way back"
 
+def filter_findings(filters: FilterReview, log: str, kind: str) -> Iterator[Finding]:
+    """Noise in the outputs, notches beside the peaks, and what better filters would do.
 
-def filter_findings(filters: FilterReview) -> Iterator[Finding]:
-    """Noise in the outputs, notches beside the peaks, and what better filters would do."""
+    `log` is the name of its file, `kind` who wrote it, as `Log.kind` has it.
+    """
     for text in filters.missed:
         yield Finding(
             "notches-miss",
@@ -30,6 +32,8 @@ def filter_findings(filters: FilterReview) -> Iterator[Finding]:
     choice = filters.choice
     told = "" if choice is None else ", ".join(f"{c.name} {c.value:g}" for c in choice.changes)
     words = "; ".join(filters.words())
+    file = f"filters{parameter_suffix(kind)}" if choice is not None else ""
+    way = f"flightid flight {log} --write {file} writes them with the way back"
     for use in noisy:
         assert use.noise is not None
         share = 100.0 * use.noise.total / use.full
@@ -38,7 +42,7 @@ def filter_findings(filters: FilterReview) -> Iterator[Finding]:
             Light.AMBER,
             f"noise of the gyroscope moves the {use.axis} output by {share:.2g} % of full command, "
             f"rms; {100.0 * limit:g} % is fine",
-            _advice(told, words, choice),
+            _advice(told, words, choice, way),
         )
     if noisy or choice is None or not choice.changes:
         return
@@ -48,14 +52,14 @@ def filter_findings(filters: FilterReview) -> Iterator[Finding]:
             "filters-slow",
             Light.GREEN,
             f"the filters may be faster: {told} ({words})",
-            WRITE,
+            way,
         )
 
 
-def _advice(told: str, words: str, choice: FilterChoice | None) -> str:
+def _advice(told: str, words: str, choice: FilterChoice | None, way: str) -> str:
     if choice is None or not told:
         return "balance propellers and damp the mount: no cut-off within its range does better"
     rest = "" if choice.within_limit else "; it is not enough: balance propellers, damp the mount"
     if min(each.phase_gained_deg for each in choice.axes) < -PHASE_TO_WIN.value:
         rest += "; tune the gains with them (flightid tune), or lower D instead"
-    return f"set {told} ({words}){rest}; {WRITE}"
+    return f"set {told} ({words}){rest}; {way}"

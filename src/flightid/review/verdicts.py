@@ -42,7 +42,7 @@ def _all(review: FlightReview) -> Iterator[Finding]:
             "vibration-unknown", Light.UNKNOWN, "the log holds no measure of vibration in the air"
         )
     yield from _noise(review)
-    yield from filter_findings(review.filters)
+    yield from filter_findings(review.filters, review.name, review.kind)
 
 
 def _noise(review: FlightReview) -> Iterator[Finding]:

@@ -13,6 +13,7 @@ from flightid.files import write_atomically
 from flightid.findings import Finding
 from flightid.inspection import Inspection
 from flightid.inspection.carried import carried_sentence
+from flightid.surface import spoken
 from flightid.wrapping import wrapped
 
 WIDTH = 100
@@ -70,17 +71,21 @@ class Proposal:
             said += ["", self.inspection.in_short()]
             noted = self.inspection.findings
             fallen = [each.action for each in noted if each.code == "tipped-over"]
-            actions = [*fallen, *self._next(), *actions, *(f.action for f in noted if f.action)]
+            found = [*actions, *(each.action for each in noted if each.action)]
+            planned = [each for each in found if "flightid plan" in each]
+            actions = [*fallen, *self._next(planned=bool(planned)), *planned, *found]
         said += ["", "What to do, the first first"] if actions else []
         said += [line for each in dict.fromkeys(actions) for line in _wrapped(f"- {each}")]
         return "\n".join(said)
 
-    def _next(self) -> Iterator[str]:
+    def _next(self, *, planned: bool) -> Iterator[str]:
         """Commands that go on from a log of a flight without a model."""
         if self.inspection is not None and self.inspection.phases.airborne:
             log = self.inspection.name
-            yield f"flightid plan {log}: the sweep to fly for a model, as this vehicle's parameters"
-            yield f"flightid flight {log}: what this flight tells without one: steps, motors, noise"
+            flight = f"flightid flight {log}: what this flight tells without a model"
+            yield spoken(f"{flight}: steps, motors, noise")
+            if not planned:
+                yield spoken(f"flightid plan {log}: the sweep to fly, as this vehicle's parameters")
 
     def write(self, path: str | Path) -> Path:
         """Write the study file; one that was changed by hand is never replaced.
