@@ -63,3 +63,40 @@ def test_plots_draw_from_disk(tmp_path: Path, packed: bool) -> None:
     assert 'id="plain" hidden' in shown
     # On a phone's width the two columns stand below each other, each panel under its own title.
     assert [after.count(f">{title}<") for title in titles] == [1] * len(titles)
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no Chromium on this machine")
+def test_paper_shows_all_plots_at_its_own_width(tmp_path: Path) -> None:
+    """A browser takes the page when the event is over: what is drawn later is a blank on paper."""
+    api = pytest.importorskip("playwright.sync_api")
+    time_s = np.linspace(0.0, 9.0, 400)
+    pictures = [
+        figure_block(
+            time_histories([Panel(f"s{k}", (Trace("a", time_s, np.sin(k * time_s), look.MODEL),))]),
+            f"Lines {k}.",
+            folded=k % 2 == 1,
+        )
+        for k in range(1, 9)
+    ]
+    file = tmp_path / "report.html"
+    file.write_text(to_html(Document("Title", "", (Section("S", tuple(pictures)),))))
+    with api.sync_playwright() as player:
+        browser = player.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
+        page = browser.new_page(viewport={"width": 1440, "height": 500}, color_scheme="dark")
+        page.goto(file.as_uri())
+        page.wait_for_selector(".main-svg", timeout=60_000)
+        page.wait_for_timeout(1500)
+        drawn, widths, paper = page.evaluate(
+            """() => {
+                const plots = [...document.querySelectorAll(".plot")];
+                const count = () => plots.filter((one) => one.querySelector(".main-svg")).length;
+                const before = count();
+                dispatchEvent(new Event("beforeprint"));
+                const wide = plots.map((one) => one.querySelector(".main-svg")?.clientWidth ?? 0);
+                return [before, wide, count()];
+            }"""
+        )
+        browser.close()
+    assert drawn < 8, "what is folded or below the screen is not drawn before"
+    assert paper == 8
+    assert max(widths) <= 690, "of a window 1440 px wide"

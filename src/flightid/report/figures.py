@@ -15,9 +15,10 @@ if TYPE_CHECKING:
 
 SINGLE_LIMIT = 3e38
 """Just inside the range of single precision."""
-ACROSS, OF_ITSELF = 2.0**-13, 2.0**-12
-"""Steps of a kept sample, in its curve's range and in its own size: a quarter of a screen's pixel,
-and 0.02 % of a number on a logarithmic axis. What lies below is noise that no packing shrinks."""
+ACROSS, OF_ITSELF = 2.0**-11, 2.0**-10
+"""Steps of a kept sample, in its curve's range and in its own size: a quarter of a pixel of a panel
+500 px high, and 0.1 % of a number on a logarithmic axis, below 0.01 dB. What lies beneath is noise
+that no packing shrinks."""
 
 
 def figure_block(figure: go.PlotFigure, caption: str, *, folded: bool = False) -> Figure:
@@ -54,7 +55,7 @@ def _as_seen(samples: NDArray[np.float64]) -> NDArray[np.float64]:
     Example
     -------
     >>> _as_seen(np.array([0.0, 0.1, 1000.0, np.nan])).tolist()
-    [0.0, 0.100006103515625, 1000.0, nan]
+    [0.0, 0.0999755859375, 1000.0, nan]
     """
     known = samples[np.isfinite(samples)]
     wide = float(np.ptp(known)) if known.size else 0.0

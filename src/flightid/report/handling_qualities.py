@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from flightid.dynamics.handling_qualities.handling_qualities import HandlingQualities
 from flightid.dynamics.handling_qualities.rating import Rating
 from flightid.plot.handling_qualities import (
@@ -9,7 +11,7 @@ from flightid.plot.handling_qualities import (
     level_chart,
 )
 from flightid.report.blocks import result_blocks
-from flightid.report.content import Block
+from flightid.report.content import Block, TableBlock
 from flightid.report.figures import figure_block
 from flightid.uncertainty.quantiles import interval_words, shown
 
@@ -23,13 +25,17 @@ def handling_qualities_blocks(
     ----------
     found : HandlingQualities
     folded : bool
-        Open the charts on demand.
+        Open the table and the charts on demand.
 
     Returns
     -------
     tuple of Block
     """
-    return (*result_blocks(found), *_charts(found.ratings, folded), *_curves(found))
+    judged = (
+        replace(each, folded=True) if folded and isinstance(each, TableBlock) else each
+        for each in result_blocks(found)
+    )
+    return (*judged, *_charts(found.ratings, folded), *_curves(found))
 
 
 def _charts(ratings: tuple[Rating, ...], folded: bool) -> list[Block]:

@@ -19,6 +19,7 @@ from typing import Any
 import jinja2
 from markupsafe import Markup
 
+from flightid.conventions import Light
 from flightid.plot.graph_objects import plotting_library
 from flightid.report.content import Document, Figure
 from flightid.report.glossary import GLOSSARY
@@ -34,7 +35,9 @@ MANY_PLOTS = 8
 """Plots of a picture above which a phone scrolls it."""
 LONG_CELL = 20
 """Letters of a cell above which its column keeps its width and the table scrolls instead."""
-LONG_TABLE = 20
+LONG_LIST, FEW_GOOD = 5, 2
+"""Verdicts of a list above which green ones open on demand, where there are more than a few."""
+LONG_TABLE = 12
 """Rows of a table above which it opens on demand, in any section but the first."""
 LEAST_GAP = 3
 """Empty cells at the end of a row that are joined to one."""
@@ -108,6 +111,8 @@ class _Numbering:
             case "table":
                 long = len(values["rows"]) > LONG_TABLE and not opening
                 return {**values, **_shown_table(values), "folded": values["folded"] or long}
+            case "lights":
+                return {**values, **_sorted_lights(values["findings"], opening=opening)}
             case "key_values":
                 shown = [(key, _VALUE.show(value)) for key, value in values["items"]]
                 return {**values, "items": shown}
@@ -129,6 +134,22 @@ class _Numbering:
                     "payload": Markup(_gzipped(text.encode()) if small else text),
                 }
         return values
+
+
+def _sorted_lights(findings: list[dict[str, Any]], *, opening: bool) -> dict[str, Any]:
+    """Verdicts to read, and those that are met, which open on demand where the list is long.
+
+    What several of a row say to do stands with the first of them.
+    """
+    above = [None, *(each["action"] for each in findings)]
+    told = [
+        {**each, "action": "" if each["action"] == said else each["action"]}
+        for each, said in zip(findings, above, strict=False)
+    ]
+    good = [each for each in told if each["light"] == Light.GREEN]
+    if opening or len(told) <= LONG_LIST or len(good) <= FEW_GOOD:
+        return {"findings": told, "good": []}
+    return {"findings": [each for each in told if each not in good], "good": good}
 
 
 def _abreast(blocks: list[dict[str, Any]]) -> list[dict[str, Any]]:

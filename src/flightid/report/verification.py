@@ -17,7 +17,7 @@ from flightid.report.figures import figure_block
 from flightid.validation import Comparison, Mismatch, Verification
 
 SHOWN = 1
-"""Records whose pictures are open; those of others open on demand."""
+"""Records, and pairs of envelopes, whose pictures are open; those of others open on demand."""
 
 
 def verification_blocks(result: Verification | Comparison) -> tuple[Block, ...]:
@@ -98,8 +98,9 @@ def _envelopes(result: Verification | Comparison) -> tuple[Block, ...]:
         figure_block(
             mismatch_comparison(items, pair),
             f"{pair}: models over flight inside the envelopes of maximum unnoticed added dynamics.",
+            folded=place >= SHOWN,
         )
-        for pair in _shared_pairs(items.values())
+        for place, pair in enumerate(_shared_pairs(items.values()))
     )
 
 

@@ -32,7 +32,7 @@ from flightid.report.handling_qualities import handling_qualities_blocks
 from flightid.report.tuning import gain_flight_blocks, tuning_section
 from flightid.report.verification import prediction_picture
 from flightid.study.answer import answer_of, models_in_short
-from flightid.study.elsewhere import red_elsewhere
+from flightid.study.elsewhere import BESIDE, red_elsewhere
 from flightid.study.estimate_tables import model_table
 from flightid.study.faults import other_faults, section_of, whole_section
 from flightid.study.model_section import model_section
@@ -51,8 +51,6 @@ if TYPE_CHECKING:
     from flightid.uncertainty.estimate import Estimate
 
 
-BESIDE = (", reference", ", response")
-"""Ends of names of what stands beside a model: its charts open on demand."""
 FEW_RECORDS = 4
 """Records whose histories are open."""
 MANY = 20

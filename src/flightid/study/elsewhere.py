@@ -9,6 +9,8 @@ from flightid.conventions import Light
 from flightid.findings import Finding, worst
 from flightid.report.content import Lights, Section
 
+BESIDE = (", reference", ", response")
+"""Ends of names of what stands beside a model: it is not what the reader identified."""
 MOST = 3
 """Reasons that are named; the others are counted."""
 
@@ -31,6 +33,8 @@ def red_elsewhere(answer: Iterable[Finding], sections: Iterable[Section]) -> tup
 
 
 def _red(section: Section) -> Iterator[Finding]:
+    if section.title.rstrip("”").endswith(BESIDE):
+        return
     for block in section.blocks:
         if isinstance(block, Lights) and not block.repeats:
             for each in block.findings:

@@ -5,6 +5,7 @@
   const isDark = () => (root.dataset.theme || (systemDark.matches ? "dark" : "light")) === "dark";
   const plots = [...document.querySelectorAll(".plot")];
   const drawn = new Set();
+  const PAPER_PX = 680; // A4 without its margins, narrower than US letter
   let library = null;
 
   // Long texts and the arrays are stored as gzip in base64.
@@ -91,31 +92,47 @@
     place.style.height = `${layout.height}px`;
   }
 
-  async function draw(place) {
-    const holder = document.querySelector(`script[data-plot="${place.dataset.spec}"]`);
-    const source = recolour(await text(holder));
-    const spec = JSON.parse(source, filled(source.includes('"stored":') ? await arrays() : null));
+  // What a plot needs is unpacked ahead of its drawing, for paper does not wait.
+  const texts = new Map();
+  let plotly = null, all = null;
+  async function prepare(place) {
+    const name = place.dataset.spec;
+    library ??= unpack();
+    plotly = await library;
+    if (texts.has(name)) return;
+    const source = await text(document.querySelector(`script[data-plot="${name}"]`));
+    if (source.includes('"stored":')) all = await arrays();
+    texts.set(name, source);
+  }
+
+  function paint(place, paper = false) {
+    const source = texts.get(place.dataset.spec);
+    const spec = JSON.parse(paper ? source : recolour(source), filled(all));
     const style = getComputedStyle(root);
-    spec.layout.font = { ...spec.layout.font, color: style.getPropertyValue("--ink").trim() };
-    spec.layout.hoverlabel = {
-      bgcolor: style.getPropertyValue("--raised").trim(),
-      font: { color: style.getPropertyValue("--ink").trim() },
-    };
+    const ink = paper ? "#000" : style.getPropertyValue("--ink").trim();
+    spec.layout.font = { ...spec.layout.font, color: ink };
+    spec.layout.hoverlabel = { bgcolor: style.getPropertyValue("--raised").trim(), font: { color: ink } };
     spec.layout.modebar = { bgcolor: "rgba(0,0,0,0)", color: style.getPropertyValue("--unknown").trim(),
-      activecolor: style.getPropertyValue("--ink").trim() };
-    spec.layout.autosize = true;
-    if (phone.matches) stack(spec.layout, place);
-    if (place.clientWidth < 520) {
+      activecolor: ink };
+    spec.layout.autosize = !paper;
+    if (paper) {
+      spec.layout.width = PAPER_PX;
+      place.style.height = `${spec.layout.height ?? place.clientHeight}px`;
+    } else if (phone.matches) stack(spec.layout, place);
+    if (!paper && place.clientWidth < 520) {
       spec.layout.margin = { ...spec.layout.margin, l: 52, r: 8 };
       spec.layout.font.size = 11;
     }
     const options = { responsive: true, displaylogo: false, displayModeBar: place.clientWidth < 520 ? false : "hover", scrollZoom: false,
       modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"],
       toImageButtonOptions: { format: "svg", filename: place.id } };
-    library ??= unpack();
-    const plotly = await library;
-    await plotly.react(place, spec.data, spec.layout, options);
     drawn.add(place);
+    return plotly.react(place, spec.data, spec.layout, options);
+  }
+
+  async function draw(place) {
+    await prepare(place);
+    await paint(place);
   }
 
   const apologise = () => { document.getElementById("plain").hidden = false; };
@@ -129,11 +146,16 @@
       }
     }, { rootMargin: "600px" });
     plots.forEach((place) => near.observe(place));
-    // Paper shows all plots, in ink for white paper.
+    const idle = window.requestIdleCallback ?? setTimeout;
+    addEventListener("load", () => idle(async () => {
+      for (const place of plots) await prepare(place).catch(apologise);
+    }));
+    // Paper shows all plots at its own width, in ink for white paper, and waits for none of them.
     addEventListener("beforeprint", () => {
       document.querySelectorAll("details").forEach((part) => { part.open = true; });
-      plots.filter((place) => !drawn.has(place)).forEach(show);
+      plots.forEach((place) => texts.has(place.dataset.spec) ? paint(place, true) : show(place));
     });
+    addEventListener("afterprint", redraw);
   }
 
   const button = document.getElementById("theme");
