@@ -272,4 +272,6 @@ def test_the_next_step_of_a_model_with_two_inputs_can_be_taken(
     assert run([*said[1].split(), "--loop-rate-hz", "20", "--draws", "6"]) == 0
     assert "gains of y" in capsys.readouterr().out
     assert run([*said[1].split()[:-1], "y/v"]) == 1
-    assert "name one: --loops y/u" in capsys.readouterr().err
+    told = capsys.readouterr()
+    assert "name one: --loops y/u" in told.out
+    assert "report.html" in told.err

@@ -292,6 +292,19 @@ def test_what_is_predicted_is_told_by_channels(fits: dict[str, float], said: str
     assert _models(study, "study.toml").message == f"1 model to use: {said}"  # type: ignore[arg-type]
 
 
+def test_what_was_left_out_is_no_model_to_use() -> None:
+    left = Finding("left-out", Light.UNKNOWN, "p/da is left out")
+    none = SimpleNamespace(
+        name="p/da", fit=None, findings=(left,), on_unseen={}, left_out=(left,), settings=None
+    )
+    study = SimpleNamespace(
+        identified=[_promised(p=93.0), none], faults=(), files=(), tuning=None, inspection=None
+    )
+    said = _models(study, "study.toml").message  # type: ignore[arg-type]
+    assert said.startswith("1 of 2 models to use: it predicts 93 %"), said
+    assert said.endswith("none of p/da, as said below")
+
+
 def test_no_model_is_none_to_use() -> None:
     left = Finding("left-out", Light.UNKNOWN, "p/da is left out")
     item = SimpleNamespace(name="p", fit=None, findings=(left,), on_unseen={}, left_out=(left,))

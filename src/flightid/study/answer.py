@@ -139,13 +139,16 @@ def _models(study: StudyResults, source: str) -> Finding:
         return Finding("answer", Light.UNKNOWN, said, action)
     light = worst(lights)
     pairs = list(zip(lights, study.identified, strict=True))
-    good = [item for each, item in pairs if each.light is not Light.RED]
+    none = [item.name for each, item in pairs if item.fit is None and each.light is not Light.RED]
+    good = [item for each, item in pairs if each.light is not Light.RED and item.fit is not None]
     bad = [(each, item) for each, item in pairs if each.light is Light.RED]
     several = f"{len(good)} of {counted(len(pairs), 'model')}"
-    said = f"{several if bad else counted(len(good), 'model')} to use" if good else ""
+    said = f"{several if bad or none else counted(len(good), 'model')} to use" if good else ""
     said += _promise(good)
     if any(each.light is Light.AMBER for each in lights):
         said += "; each says what is to be doubted" if good else ""
+    if none:
+        said += f"{'; ' if said else ''}none of {', '.join(none)}, as said below"
     if bad:
         why = f"not to be used, for what is said of {'it' if len(bad) == 1 else 'each'} below"
         said += f"{'; ' if said else ''}{why}: {', '.join(item.name for _, item in bad)}"
