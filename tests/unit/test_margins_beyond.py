@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
 import flightid as fid
 from flightid.conventions import Light
+from tests.strangers import hover
+from tests.strangers.gains import NAMES
 
 
 @pytest.mark.parametrize(("top", "said"), [(15.0, True), (3000.0, False)])
@@ -28,3 +32,44 @@ def test_margins_above_the_band_are_named_with_their_frequency(top: float, said:
         margin = promised.nominal
         room = float(re.search(r"by ([\d.]+) dB", each.message).group(1))
         assert 0.0 < room <= margin + 0.1, "the margin is taken above the band: it is room too"
+
+
+def test_a_frame_above_the_band_takes_no_promised_gain_margin() -> None:
+    """The model lacks a frame at 13 Hz that its band, up to 64 rad/s, cannot show."""
+    truth = {"effect": 74.0, "damping": -2.0, "motor_s": 0.052, "delay": 4}
+    known = hover.vehicle("motor lag", **truth)
+    plant = fid.LinearSystem(
+        known.a, known.b[:, None], np.eye(3)[[1]], [[0.0]], ("tau_phi",), ("p",),
+        [known.delay * hover.STEP_S],
+    )  # fmt: skip
+    values = {NAMES[n]: v for n, v in {"p": 0.05, "i": 0.05, "d": 7e-4, "angle_p": 4.0}.items()}
+    loop = fid.axis_loop("arducopter", "roll", loop_rate_hz=1 / hover.STEP_S)
+    asked = {"gains": loop.with_gains(values), "gyro": "raw", "nominal": True, "draws": 1}
+    design = fid.tune_pid(plant, band_rad_s=(1.0, 64.0), **asked)
+    promised = {
+        name: design.worst_case("rate loop", name).worst
+        for name in ("gain margin", "sensitivity peak")
+    }
+    nominal = design.worst_case("rate loop", "gain margin").nominal
+    assert 6.0 <= promised["gain margin"] < nominal - 5.0
+    for share, w in ((0.25, 83.0), (0.35, 70.0)):
+        craft = hover.vehicle("flexible frame", frame=(w, 0.02, share), **truth)
+        new = hover.Gains(**{key: design.gains[name] for key, name in NAMES.items()})
+        flown = hover.Axis(replace(craft, gyro_hz=loop.gains["INS_GYRO_FILTER"]), new).loops()
+        _, room = hover.margins(flown["rate loop"])
+        assert room < nominal - 1.0, "the frame takes some of what the model alone has"
+        assert room >= promised["gain margin"]
+        assert 1.0 / np.abs(1.0 + flown["rate loop"]).min() <= promised["sensitivity peak"]
+
+
+def test_where_a_resonance_may_leave_less_than_is_required_nothing_is_promised() -> None:
+    plant = fid.load_model("rate_motor_lag").with_values(
+        {"Ltphi": 140.0, "Lp": -4.0, "T_m": 0.05, "tau": 0.02}
+    )
+    asked = fid.ControllerOptions(controller="pi", loop_rate_hz=200.0)
+    design = fid.tune_controller(plant, controller=asked, nominal=True, band_rad_s=(0.1, 40.0))
+    (said,) = (each for each in design.findings if each.code == "margin-beyond-band")
+    assert "nothing is known above the 40 rad/s" in said.message
+    for name in ("gain margin", "sensitivity peak", "disturbance peak"):
+        assert design.worst_case("loop", name).worst is None
+    assert design.worst_case("loop", "phase margin").worst is not None

@@ -298,7 +298,7 @@ def _margin_table(designs: tuple[PidDesign, ...]) -> Table:
     note = f"Required: {asked.phase_margin_deg:g} deg{angle} and {asked.gain_margin_db:g} dB."
     notes = [note]
     if any(f.code == "margin-beyond-band" for each in designs for f in each.findings):
-        notes.append("–: read above the band to which the model was shown to hold; not promised.")
+        notes.append("–: not promised, for what lies above the band to which the model was shown.")
     what = "rig" if any(isinstance(each.loop, PidLoop) for each in designs) else "vehicle"
     title = f"Margins of the worst {what} that the data allow"
     return Table(title, tuple(columns), tuple(rows), tuple(notes)).without_empty_columns()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -36,6 +37,25 @@ class DrawnEnds:
         """Lower and upper end at a level."""
         low, high = map(float, np.quantile(self.draws, tails(level), method=self.method))
         return (low, high) if np.isfinite(low) and np.isfinite(high) else None
+
+
+@dataclass(frozen=True)
+class Reaching:
+    """Ends that reach as far as a value that no draw holds.
+
+    Example
+    -------
+    >>> Reaching(DrawnEnds(np.arange(201.0)), -3.0)(0.95)
+    (-3.0, 195.0)
+    """
+
+    ends: Callable[[float], Interval | None]
+    value: float
+
+    def __call__(self, level: float) -> Interval | None:
+        """Lower and upper end at a level."""
+        found = self.ends(level)
+        return found and (min(found[0], self.value), max(found[1], self.value))
 
 
 def drawn_estimate(

@@ -1,11 +1,11 @@
-"""Margins of tuned gains that are read where no model was shown to hold: above the band."""
+"""What resonances above the band, where no model was shown to hold, may do to margins."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.control.margins.outside_band import MarginBeyond, room_above
+from flightid.control.margins.outside_band import MOST_RAISED_DB, MarginBeyond, room_above
 from flightid.control.tuning.limits import ANGLE
 from flightid.control.tuning.loop_problem import LoopProblem
 
@@ -13,10 +13,41 @@ PLACES = "phase_crossover_rad_s", "sensitivity_peak_rad_s", "delay_crossover_rad
 """Where gain margin, sensitivity peak and delay margin are read."""
 
 
+def rooms_left(
+    problem: LoopProblem, gains: NDArray[np.float64], band_rad_s: tuple[float, float] | None
+) -> dict[str, float]:
+    """What a resonance above the band leaves of the estimate's loops until they pass one, dB.
+
+    Parameters
+    ----------
+    problem : LoopProblem
+    gains : ndarray, shape (n_gains,)
+    band_rad_s : tuple of float or None
+        Where the model was shown to hold, rad/s.
+
+    Returns
+    -------
+    dict of str to float
+        By loop; at most 0 where a resonance may make it unstable. Empty where no band is known, or
+        the loop's frequencies end inside it.
+
+    Assumes
+    -------
+    No resonance raises the response by more than `MOST_RAISED_DB` over that of the model.
+    """
+    above = problem.plants.omega_rad_s > (np.inf if band_rad_s is None else band_rad_s[1])
+    if not above.any():
+        return {}
+    loops = problem.loops(gains[None], problem.plants.take([0]))
+    return {name: room_above(loop[..., above]) - MOST_RAISED_DB for name, loop in loops.named()}
+
+
 def margins_beyond(
     problem: LoopProblem, gains: NDArray[np.float64], band_rad_s: tuple[float, float] | None
 ) -> tuple[MarginBeyond, ...]:
-    """Loops broken at the output whose margins are read above the band.
+    """Loops broken at the output whose margins what lies above the band may take.
+
+    They are read above it, or a resonance there may leave less of them than is required.
 
     Parameters
     ----------
@@ -25,16 +56,16 @@ def margins_beyond(
     band_rad_s : tuple of float or None
         Where the model was shown to hold, rad/s; nothing is said where that is not known.
     """
-    if band_rad_s is None:
+    left = rooms_left(problem, gains, band_rad_s)
+    if band_rad_s is None or not left:
         return ()
-    judged, loops = problem.judge(gains[None]), problem.loops(gains[None], problem.plants)
-    above = problem.plants.omega_rad_s > band_rad_s[1]
-    if not above.any() or not judged.stable.all():
+    judged = problem.judge(gains[None])
+    if not judged.stable.all():
         return ()
     found = []
-    for name, loop in loops.named():
-        metrics = judged.metrics[name]
+    for name, metrics in judged.metrics.items():
         highest = max(float(np.nanmax(getattr(metrics, at), initial=0.0)) for at in PLACES)
-        if name != ANGLE and highest > band_rad_s[1]:
-            found.append(MarginBeyond(name, highest, room_above(loop[..., above])))
+        short = left[name] < problem.requirements.gain_margin_db
+        if name != ANGLE and (short or highest > band_rad_s[1]):
+            found.append(MarginBeyond(name, highest, left[name] + MOST_RAISED_DB))
     return tuple(found)

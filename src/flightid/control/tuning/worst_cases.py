@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from flightid.control.autopilots import AxisLoop
 from flightid.control.tuning.limits import ANGLE, limits
 from flightid.control.tuning.loop_problem import LoopAssessment, LoopProblem
+from flightid.control.tuning.margins_beyond import rooms_left
 from flightid.uncertainty.estimate import Estimate, Reading
-from flightid.uncertainty.uneven import DrawnEnds
+from flightid.uncertainty.uneven import DrawnEnds, Reaching
 
 Array = NDArray[np.float64]
 FEWEST_PLANTS = 3
@@ -30,7 +31,8 @@ class WorstCase:
         Of the estimated plant, with the middle of all plants as its interval; no value where there
         is no such crossing, no interval where there is one plant, or a crossing is missing.
     worst : float or None
-        Of all plants; none where one of them reads it above the identified band.
+        Of all plants, and no better than a resonance above the identified band may leave it; none
+        where one of them reads it there, or such a resonance may leave less than is required.
     flown, flown_worst : float or None
         The same with the gains of the log; None where they are not stable either.
     required : str
@@ -93,6 +95,10 @@ class _Kind:
     """Field that says at which frequency it is read, where that may lie above the band."""
 
 
+TAKEN_BY = "gain_margin_db", "sensitivity_peak", "disturbance_peak_db"
+"""Numbers that a resonance moves even where the loop does not pass one at it."""
+TAKEN = "a resonance above the identified band may leave less"
+NOISE = _Kind("noise", "noise", "1", False)
 KINDS = (
     _Kind("crossover_rad_s", "crossover", "rad/s", True),
     _Kind("phase_margin_deg", "phase margin", "deg", True),
@@ -132,18 +138,22 @@ def worst_cases(
     tuple of tuple of WorstCase and ndarray of bool, shape (n_plants,)
     """
     new = problem.judge(gains[None]) if judged is None else judged
+    left = rooms_left(problem, gains, band_rad_s)
     made = []
     for loop, kind in _wanted(new):
         values = np.asarray(getattr(new.metrics[loop], kind.field))[0]
         before = None if old is None else np.asarray(getattr(old.metrics[loop], kind.field))[0]
         steady = old is not None and bool(old.stable[0, 0])
-        known = not _beyond(new, loop, kind, band_rad_s)
+        unknown = _beyond(new, loop, kind, band_rad_s)
+        bound = _bound(kind, left.get(loop))
+        if kind.field in TAKEN_BY and left.get(loop, np.inf) < problem.requirements.gain_margin_db:
+            unknown = unknown or TAKEN
         made.append(
             WorstCase(
                 loop,
                 kind.name,
-                _estimate(f"{loop}: {kind.name}", kind.unit, values, known),
-                _worst(values, kind.more) if known else None,
+                _estimate(f"{loop}: {kind.name}", kind, values, unknown, bound),
+                None if unknown else _worst(np.append(values, bound), kind.more),
                 _number(before[0]) if steady and before is not None else None,
                 _worst(before, kind.more)
                 if before is not None and old is not None and bool(old.stable.all())
@@ -182,12 +192,12 @@ def _noise(problem: LoopProblem, new: LoopAssessment, old: LoopAssessment | None
     limit = problem.noise_limit
     before = None if old is None or not old.stable[0, 0] else old.noise[0]
     rate = problem.inner == AxisLoop.inner
-    sensor = "gyro" if rate else "measurement"
+    sensor, unit = "gyro" if rate else "measurement", "1/(rad/s)" if rate and not known else "1"
     name = "noise, rms" if known else f"noise over {sensor} noise"
     return WorstCase(
         "output",
         name,
-        _estimate(f"output: {name}", "1/(rad/s)" if rate and not known else "1", values),
+        _estimate(f"output: {name}", replace(NOISE, unit=unit), values),
         _worst(values, False),
         None if before is None else _number(before[0]),
         None if before is None or old is None or not old.stable.all() else _worst(before, False),
@@ -198,27 +208,49 @@ def _noise(problem: LoopProblem, new: LoopAssessment, old: LoopAssessment | None
 
 def _beyond(
     judged: LoopAssessment, loop: str, kind: _Kind, band_rad_s: tuple[float, float] | None
-) -> bool:
-    """Whether a plant reads a number above the band, where a resonance would change it."""
+) -> str:
+    """Why nothing is promised: a plant reads a number above the band; empty where none does."""
     if band_rad_s is None or not kind.place:
-        return False
-    return bool(np.any(getattr(judged.metrics[loop], kind.place)[0] > band_rad_s[1]))
+        return ""
+    read = getattr(judged.metrics[loop], kind.place)[0]
+    return "read above the identified band" if np.any(read > band_rad_s[1]) else ""
+
+
+def _bound(kind: _Kind, left_db: float | None) -> float:
+    """What a resonance above the band may make of a number; infinite where it does not touch it.
+
+    A loop that is raised to −m dB has a gain margin of m there, and 1/(1 − 10^(−m/20)) at most of a
+    sensitivity.
+    """
+    best = np.inf if kind.more else -np.inf
+    if left_db is None or kind.field not in TAKEN_BY:
+        return best
+    if kind.more:
+        return left_db
+    if left_db <= 0.0:
+        return np.inf
+    peak = 1.0 / (1.0 - 10.0 ** (-left_db / 20.0))
+    return float(peak if kind.unit == "1" else 20.0 * np.log10(peak))
 
 
 def _number(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def _estimate(name: str, unit: str, values: Array, known: bool = True) -> Reading:
+def _estimate(
+    name: str, kind: _Kind, values: Array, unknown: str = "", bound: float = np.inf
+) -> Reading:
     """Of the estimated plant, which is the first, with the middle of all plants about it."""
     value = _number(values[0])
     if value is None:
-        return Estimate(name, None, unit, None, "no crossing in the band of the loop")
-    if not known:
-        return Estimate(name, value, unit, None, "read above the identified band")
+        return Estimate(name, None, kind.unit, None, "no crossing in the band of the loop")
+    if unknown:
+        return Estimate(name, value, kind.unit, None, unknown)
     if len(values) < FEWEST_PLANTS or not np.all(np.isfinite(values)):
-        return Estimate(name, value, unit)
-    return Estimate(name, value, unit, ends=DrawnEnds(values))
+        return Estimate(name, value, kind.unit)
+    ends = DrawnEnds(values)
+    worse = np.isfinite(bound) and _worst(np.append(values, bound), kind.more) == bound
+    return Estimate(name, value, kind.unit, ends=Reaching(ends, bound) if worse else ends)
 
 
 def _worst(values: Array, more: bool) -> float | None:
