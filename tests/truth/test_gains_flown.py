@@ -74,3 +74,24 @@ def test_a_flexible_frame_bends_beside_the_body() -> None:
     pencil = s[:, None, None] * np.eye(len(craft.a)) - craft.a
     found = np.linalg.solve(pencil, craft.b.astype(complex)[:, None])[:, -2, 0]
     assert_close(found, wanted, rtol=1e-10, why="exact")
+
+
+def test_a_rate_that_grows_by_itself_has_gains_whose_angle_loop_is_stable() -> None:
+    """The rate loop holds its pole; broken at the angle the loop has none outside the circle."""
+    craft = hover.vehicle("motor lag", effect=96.0, damping=0.15, motor_s=0.06, delay=3)
+    plant = fid.LinearSystem(
+        craft.a, craft.b[:, None], np.eye(3)[[1]], [[0.0]], ("tau_phi",), ("p",),
+        [craft.delay * hover.STEP_S],
+    )  # fmt: skip
+    flown = hover.Gains(p=0.056, i=0.033, d=8.5e-4, angle_p=1.8)
+    asked = {"gyro": "raw", "nominal": True, "draws": 1, "band_rad_s": (1.0, 100.0)}
+    values = {name: getattr(flown, key) for key, name in gains.NAMES.items()}
+    loop = fid.axis_loop("arducopter", "roll", loop_rate_hz=1 / hover.STEP_S).with_gains(values)
+    design = fid.tune_pid(plant, gains=loop, **asked)
+    assert design.exists
+    new = replace(flown, **{key: design.gains[name] for key, name in gains.NAMES.items()})
+    axis = hover.Axis(replace(craft, gyro_hz=loop.gains["INS_GYRO_FILTER"]), new)
+    assert np.abs(axis.poles()).max() < 1.0
+    phase, _ = hover.margins(axis.loops()["angle loop"])
+    said = design.worst_case("angle loop", "phase margin").worst
+    assert_close(said, phase, atol=gains.TOLERANCE["phase margin"], why="two grids")

@@ -228,12 +228,18 @@ class LoopProblem:
         """
         plants = self.plants if rows is None else self.plants.take(rows)
         omega, loops = plants.omega_rad_s, self.loops(gains, plants)
-        stable = np.ones(loops.rate.shape[:2], dtype=bool)
-        for broken in (loops.rate,) if loops.angle is None else (loops.rate, loops.whole):
-            difference = 1.0 + broken
-            stable &= unstable_poles(omega, difference * plants.rest, plants.unstable) == 0
+        closed = unstable_poles(omega, (1.0 + loops.rate) * plants.rest, plants.unstable)
+        stable = closed == 0
+        if loops.angle is not None:
+            whole = (1.0 + loops.whole) * plants.rest
+            stable &= unstable_poles(omega, whole, plants.unstable) == 0
         metrics = {
-            name: loop_metrics(omega, loop, unstable_poles=plants.unstable)
+            # Broken at the angle, the loop's own poles are those that the rate loop leaves.
+            name: loop_metrics(
+                omega,
+                loop,
+                unstable_poles=np.maximum(closed, 0) if name == ANGLE else plants.unstable,
+            )
             for name, loop in loops.named()
         }
         noise = self._noise(omega, np.abs(loops.control)[:, None] / np.abs(1.0 + loops.whole))
