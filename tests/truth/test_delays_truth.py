@@ -7,8 +7,9 @@ import pytest
 from scipy.signal import lfilter
 
 import flightid as fid
-from flightid.identification.advice.delays import delays_to_scan
-from tests.strangers import rig_lights
+from flightid.identification.advice.delays import delays_to_scan, find_delays
+from flightid.models.sampled.channels import gather_channels
+from tests.strangers import open_loops, rig_lights
 
 KINDS = ("white", "prbs", "sweep", "coloured", "periodic", "multisine")
 
@@ -111,3 +112,14 @@ def test_a_slow_sweep_does_not_take_any_delay(seed: int) -> None:
     tried = delays_to_scan([record], ("u",), "y")
     assert truth in tried
     assert tried[-1] <= 12
+
+
+@pytest.mark.parametrize("seed", [9001, 9007])
+def test_a_swept_rig_of_third_order_hides_its_delay_and_none_is_told(seed: int) -> None:
+    """Poles far above the sweep pass for a delay, as any delay from 0 on does; 12 was told of 5."""
+    _, late, record = open_loops.drawn(seed)
+    data = gather_channels([record], "y", ("u",), "mean")
+    (found,) = find_delays(data, 20)
+    assert found.samples is None or abs(found.samples - late) <= 1
+    low, high = found.interval or (0, 0)
+    assert low <= late <= high

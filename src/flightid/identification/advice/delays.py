@@ -8,14 +8,20 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 import scipy
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from flightid.identification.prediction_error.linear_regression import reflected, regress
+from flightid.identification.advice.delayed_output_error import (
+    DelayedSignals,
+    Ended,
+    criterion,
+    output_error,
+    refined,
+)
+from flightid.identification.prediction_error.linear_regression import regress
 from flightid.models.sampled.channels import SampledChannels, gather_channels
 from flightid.record import Record
 
@@ -32,10 +38,8 @@ COARSE = 4
 """Samples between delays that output-error structures try before those around the best."""
 AROUND = 4
 """Delays on either side of the best of these that are tried one by one."""
-ROUNDS = 8
-"""Of the Steiglitz-McBride iteration."""
-SETTLED = 1.0
-"""Change of twice the log likelihood below which that iteration ends."""
+NEAR = 0.1
+"""Share by which squares of a first search may lie above the least for its minimum to be sought."""
 LONG = 40
 MOST_SAMPLES = 6_000
 """The second scan takes the first records up to so many samples."""
@@ -130,7 +134,7 @@ def find_delays(data: SampledChannels, largest: int) -> list[InputDelay]:
 
 
 def _costs(
-    data: _Signals, delays: Sequence[int], place: int, tried: Iterable[int]
+    data: DelayedSignals, delays: Sequence[int], place: int, tried: Iterable[int]
 ) -> dict[int, float]:
     """Least criterion of each delay of one input, each search begun by the poles of neighbours.
 
@@ -139,11 +143,11 @@ def _costs(
     way = sorted(tried)
     skip = max(*delays, *way) + max(POLES)
 
-    def searched(delay: int, order: int, start: Array) -> _Ended:
+    def searched(delay: int, order: int, start: Array) -> Ended:
         asked = [*delays[:place], delay, *delays[place + 1 :]]
-        return _output_error(data, asked, order, skip, start)
+        return output_error(data, asked, order, skip, start)
 
-    ends: dict[int, list[_Ended]] = {}
+    ends: dict[int, list[Ended]] = {}
     poles = [np.ones(1)] * len(POLES)
     for delay in way:
         ends[delay] = list(map(searched, [delay] * len(POLES), POLES, poles))
@@ -154,6 +158,11 @@ def _costs(
             again = searched(delay, order, start)
             start = again[1]
             ends[delay][i] = min(ends[delay][i], again, key=lambda each: each[0])
+    near = min(cost for each in ends.values() for cost, _ in each) + NEAR * sum(data.lengths)
+    for i, order in enumerate(POLES):
+        for delay in (each for each in way if ends[each][i][0] <= near):
+            asked = [*delays[:place], delay, *delays[place + 1 :]]
+            ends[delay][i] = refined(data, asked, order, skip, ends[delay][i])
     return {delay: min(cost for cost, _ in each) for delay, each in ends.items()}
 
 
@@ -247,7 +256,7 @@ class _ArxScan:
                 both = np.concatenate([windows, target], axis=2)
                 squares = np.asarray(np.linalg.qr(both, mode="r"))[:, -1, -1] ** 2
                 best = int(np.argmin(squares))
-                found.append((_criterion(squares[best], self.n_rows, n_a + n_b), best))
+                found.append((criterion(squares[best], self.n_rows, n_a + n_b), best))
         return min(found)[1]
 
 
@@ -257,32 +266,7 @@ def _left(triangle: Array, columns: Sequence[int]) -> float:
     return float(kept[-1, -1] ** 2)
 
 
-def _criterion(squares: float, n: int, numbers: int) -> float:
-    return n * float(np.log(max(squares, np.finfo(float).tiny) / n)) + numbers * float(np.log(n))
-
-
-@dataclass(frozen=True, eq=False)
-class _Signals:
-    """The output above the inputs, records end to end."""
-
-    rows: Array
-    lengths: tuple[int, ...]
-    levels: bool
-
-    @property
-    def spans(self) -> list[slice]:
-        ends = np.cumsum([0, *self.lengths])
-        return [slice(first, last) for first, last in pairwise(ends.tolist())]
-
-    def filtered(self, top: Array, below: Array) -> Array:
-        """Output and inputs of every record through one filter."""
-        with np.errstate(over="ignore", invalid="ignore"):
-            return np.hstack(
-                [scipy.signal.lfilter(top, below, self.rows[:, span]) for span in self.spans]
-            )
-
-
-def _shortened(data: SampledChannels) -> _Signals:
+def _shortened(data: SampledChannels) -> DelayedSignals:
     """The first records, or the first samples of the first."""
     lengths: list[int] = []
     for length in data.lengths:
@@ -293,10 +277,10 @@ def _shortened(data: SampledChannels) -> _Signals:
         if lengths[-1] < length:
             break
     n = sum(lengths)
-    return _Signals(np.vstack([data.output, data.inputs])[:, :n], tuple(lengths), data.levels)
+    return DelayedSignals(np.vstack([data.output, data.inputs])[:, :n], tuple(lengths), data.levels)
 
 
-def _whitened(data: _Signals) -> _Signals:
+def _whitened(data: DelayedSignals) -> DelayedSignals:
     """Signals filtered so that what a long model leaves of the output is white, starts cut off."""
     output, inputs = data.rows[0], data.rows[1:]
     m, n = inputs.shape
@@ -309,57 +293,4 @@ def _whitened(data: _Signals) -> _Signals:
     # A pulse at the start of each record answers as whatever state it began in.
     pulses = np.zeros(kept.size)
     pulses[np.cumsum((0, *lengths[:-1]))] = 1.0
-    return _Signals(np.vstack([white[:, kept], pulses]), lengths, data.levels)
-
-
-_Ended = tuple[float, Array]
-"""Criterion and denominator of a search."""
-
-
-def _output_error(
-    data: _Signals, delays: Sequence[int], order: int, skip: int, below: Array
-) -> _Ended:
-    """Criterion of output error with one denominator of this order, and that denominator."""
-    criterion = np.inf
-    for _ in range(ROUNDS):
-        rows = data.filtered(np.ones(1), below)
-        if not np.isfinite(rows).all():
-            break
-        parts = [
-            _triangle(rows[:, span], delays, order, skip, levels=data.levels) for span in data.spans
-        ]
-        triangle = parts[0]
-        if len(parts) > 1:
-            triangle = np.asarray(np.linalg.qr(np.concatenate(parts), mode="r"))
-        before = criterion
-        n = sum(data.lengths) - skip * len(parts)
-        criterion = _criterion(triangle[-1, -1] ** 2, n, len(triangle) - 1)
-        if abs(criterion - before) < SETTLED:
-            break
-        found = np.linalg.lstsq(triangle[:-1, :-1], triangle[:-1, -1])[0]
-        below = reflected(np.concatenate([[1.0], found[:order]]))
-    return criterion, below
-
-
-def _triangle(rows: Array, delays: Sequence[int], order: int, skip: int, *, levels: bool) -> Array:
-    """Triangle of one record's regressors and output, whatever state it began in taken out.
-
-    Filtering from rest leaves 1/F of what was before: free responses of that denominator, which
-    follow a pulse at the start. A level is a direction too.
-    """
-    output, *inputs, pulse = rows
-    lags = range(1, order + 1)
-    shifted = [(pulse, lag - 1) for lag in lags]
-    shifted += [(output, lag) for lag in lags]
-    shifted += [
-        (row, delay + lag - 1) for row, delay in zip(inputs, delays, strict=True) for lag in lags
-    ]
-    own = order + int(levels)
-    columns = np.ones((own + len(shifted) - order + 1, output.size - skip))
-    places = [*range(order), *range(own, len(columns) - 1)]
-    for place, (row, lag) in zip(places, shifted, strict=True):
-        columns[place] = row[skip - lag : row.size - lag]
-    columns[-1] = output[skip:]
-    columns[own : own + order] *= -1.0
-    # Directions that rounding leaves of responses that are over cost a sample each, no more.
-    return np.asarray(np.linalg.qr(columns.T, mode="r"))[own:, own:]
+    return DelayedSignals(np.vstack([white[:, kept], pulses]), lengths, data.levels)
