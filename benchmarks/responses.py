@@ -53,7 +53,7 @@ def _ours(records: list[np.ndarray]) -> list[np.ndarray]:
     found = []
     for length in LENGTHS:
         basis = FoldedBasis.of(WindowPlan(length, 2), _omega() * SAMPLE_TIME_S)
-        found.append(average_spectra(records, basis, SAMPLE_TIME_S, "none").matrix)
+        found.append(average_spectra(records, basis, SAMPLE_TIME_S).matrix)
     return found
 
 

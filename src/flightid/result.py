@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from enum import Enum
 from importlib import import_module
 from inspect import get_annotations
@@ -153,7 +153,7 @@ def _plain(value: object, way: str, absent: dict[str, str]) -> Any:  # noqa: ANN
         return value
     if isinstance(value, Mapping):
         return {str(key): _plain(item, _step(way, key), absent) for key, item in value.items()}
-    if isinstance(value, list | tuple | set | frozenset):
+    if isinstance(value, Sequence | set | frozenset) and not isinstance(value, str | bytes):
         return [_plain(item, f"{way}[{i}]", absent) for i, item in enumerate(value)]
     raise TypeError(f"{way} is a {type(value).__name__}, which has no plain values")
 

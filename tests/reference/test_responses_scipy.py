@@ -26,8 +26,8 @@ def _arrays(n: int = 3000, seed: int = 1) -> tuple[np.ndarray, np.ndarray]:
 def test_spectral_matrix_is_that_of_csd(length: int, shifts: int, detrend: str) -> None:
     u, y = _arrays()
     bins = np.arange(1, length // 2)
-    basis = FoldedBasis.of(WindowPlan(length, shifts), 2 * np.pi * bins / length)
-    ours = average_spectra([np.array([u, y])], basis, 1 / RATE_HZ, detrend).matrix
+    basis = FoldedBasis.of(WindowPlan(length, shifts), 2 * np.pi * bins / length, detrend)
+    ours = average_spectra([np.array([u, y])], basis, 1 / RATE_HZ).matrix
     options = {
         "fs": RATE_HZ,
         "window": "hann",
@@ -65,11 +65,42 @@ def test_transform_between_bins_is_that_of_the_chirp_z_transform(length: int, hi
     low, count = 0.31, 150
     plan = WindowPlan(length, 2)
     omega = 2 * np.pi * np.linspace(low, high, count) / RATE_HZ
-    real, imaginary = transform(u[None], FoldedBasis.of(plan, omega), "none")
+    real, imaginary = transform(u[None], FoldedBasis.of(plan, omega))
     windows = frames(u[None], plan)[0] * plan.taper()
     theirs = signal.zoom_fft(windows, [low, high], m=count, fs=RATE_HZ, endpoint=True)
     from_start = np.exp(-0.5j * omega * length)[:, None] * (real + 1j * imaginary)[:, 0]
     assert_close(from_start, theirs.T, atol=1e-10 * np.abs(theirs).max(), why="both are exact")
+
+
+@pytest.mark.parametrize("detrend", ["none", "mean", "line"])
+@pytest.mark.parametrize("length", [2940, 1740, 1022, 600, 130])
+def test_panels_are_the_exact_transform(length: int, detrend: str) -> None:
+    # Frequencies on the panels of both levels, of one, and on none; channels with large levels.
+    rng = np.random.default_rng(length)
+    samples = rng.standard_normal((2, 7001)) + np.array([[0.0], [30.0]])
+    plan, omega = WindowPlan(length, 2), np.geomspace(0.003, 1.25, 200)
+    basis = FoldedBasis.of(plan, omega, detrend)
+    windows = frames(samples, plan, detrend) * plan.taper()
+    time = np.arange(length) - length // 2
+    exact = np.tensordot(np.exp(-1j * np.multiply.outer(omega, time)), windows, axes=(1, 2))
+    real, imaginary = transform(samples, basis)
+    limit = 1e-12 * np.abs(windows).sum(axis=2).max()
+    assert_close(real + 1j * imaginary, exact, atol=limit, why="panels miss 1e-12 of a sinusoid")
+
+
+def test_groups_of_windows_make_no_difference(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(5)
+    records = [rng.standard_normal((3, n)) for n in (4001, 1033, 700, 2600)]
+    basis = FoldedBasis.of(WindowPlan(600, 2), np.geomspace(0.01, 1.0, 90), "mean")
+    whole = average_spectra(records, basis, 0.01)
+    monkeypatch.setattr("flightid.responses.spectra.MAXIMUM_CHUNK", 4000)
+    parts = average_spectra(records, basis, 0.01)
+    assert (
+        whole.n_windows
+        == parts.n_windows
+        == sum(WindowPlan(600, 2).count(n) for n in (4001, 1033, 700, 2600))
+    )
+    assert_close(parts.matrix, whole.matrix, rtol=1e-12, atol=1e-15, why="one sum in two orders")
 
 
 def test_parseval() -> None:
@@ -77,6 +108,6 @@ def test_parseval() -> None:
     length = 400
     bins = np.arange(1, length // 2)
     basis = FoldedBasis.of(WindowPlan(length, 2), 2 * np.pi * bins / length)
-    density = np.real(average_spectra([u[None]], basis, 1 / RATE_HZ, "none").matrix[:, 0, 0])
+    density = np.real(average_spectra([u[None]], basis, 1 / RATE_HZ).matrix[:, 0, 0])
     power = np.sum(density) * RATE_HZ / length
     assert_close(power, np.var(u), rtol=0.02, why="one-sided spectrum integrates to the power")

@@ -90,7 +90,7 @@ def _predicted(response: FrequencyResponse, kind: str) -> np.ndarray:
         here = response.omega_rad_s
         errors = replace(errors, noise=NoiseSpectrum(here, noise.at(here)))
     else:
-        errors = replace(errors, noise=noise)
+        errors = replace(errors, known_noise=noise)
     return replace(response, errors=errors).covariance_at(response.omega_rad_s)[0]
 
 

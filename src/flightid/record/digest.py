@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,6 +100,49 @@ class RecordDigest:
                 needed="what the fit wrote under training_records",
                 action="take training_records out of the file",
             ) from error
+
+
+class RecordDigests(Sequence[RecordDigest]):
+    """Digests of several records, made when one of them is asked for: few who estimate need any.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        Kept until then.
+    names : sequence of str
+        Channels.
+
+    Example
+    -------
+    >>> record = Record.from_arrays([0.0, 0.1], outputs={"p": [1.0, 2.0]})
+    >>> RecordDigests([record], ["p"])[0] == digest_of(record, ["p"])
+    True
+    """
+
+    def __init__(self, records: Sequence[Record], names: Sequence[str]) -> None:
+        self._records, self._names = tuple(records), tuple(names)
+        self._found: tuple[RecordDigest, ...] | None = None
+
+    def _made(self) -> tuple[RecordDigest, ...]:
+        found = self._found
+        if found is None:
+            found = self._found = tuple(digest_of(each, self._names) for each in self._records)
+            self._records = ()
+        return found
+
+    def __len__(self) -> int:
+        return len(self._made())
+
+    @overload
+    def __getitem__(self, place: int) -> RecordDigest: ...
+    @overload
+    def __getitem__(self, place: slice) -> tuple[RecordDigest, ...]: ...
+    def __getitem__(self, place: int | slice) -> RecordDigest | tuple[RecordDigest, ...]:
+        return self._made()[place]
+
+    def __reduce__(self) -> tuple[type[tuple[RecordDigest, ...]], tuple[object, ...]]:
+        """Elsewhere they are a tuple, without the records."""
+        return tuple, (self._made(),)
 
 
 def record_sha256(record: Record, names: Iterable[str] | None = None) -> str:

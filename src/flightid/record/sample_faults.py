@@ -91,7 +91,9 @@ def sample_faults(
     ['spikes']
     """
     present = np.isfinite(samples) & np.isfinite(time_s)
-    stamps, values = time_s[present], samples[present]
+    stamps, values = time_s, samples
+    if not present.all():
+        stamps, values = time_s[present], samples[present]
     if values.size < FEWEST or np.ptp(values) == 0.0:
         return []
     if role is Role.INPUT:

@@ -13,7 +13,7 @@ from flightid.errors import DataError
 from flightid.findings import Finding
 from flightid.record import Record
 from flightid.record.chosen_hold import shape_of
-from flightid.record.digest import digest_of
+from flightid.record.digest import RecordDigests
 from flightid.record.history import Step
 from flightid.record.hold import InputShape, Loop, common_hold, common_loop
 from flightid.record.several import as_records
@@ -217,7 +217,7 @@ def _with_inputs(
         known,
         findings=(*response.findings, *feedback_findings(test), *end_findings(known)),
         input_shape=InputShape(common_hold(shapes), loop=common_loop(shapes)),
-        digests=tuple(digest_of(each, channels) for each in records),
+        digests=RecordDigests(records, channels),
     )
 
 

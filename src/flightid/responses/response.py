@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -76,7 +76,7 @@ class FrequencyResponse(
         Whether a loop was closed, tested or declared; None after arithmetic and where it was given.
     input_shape : InputShape
         What the records know of their inputs between samples.
-    digests : tuple of RecordDigest
+    digests : sequence of RecordDigest
         Of the records that it was estimated from.
     linear : LinearEstimate, optional
         The estimate as weights on the measured outputs, from which a fit computes its bias; None
@@ -112,7 +112,7 @@ class FrequencyResponse(
     linear: LinearEstimate | None = field(default=None)
     loop: FeedbackTest | None = None
     input_shape: InputShape = field(default_factory=InputShape)
-    digests: tuple[RecordDigest, ...] = ()
+    digests: Sequence[RecordDigest] = ()
 
     def __post_init__(self) -> None:
         sizes = {"o": len(self.outputs), "i": len(self.inputs), "f": len(self.omega_rad_s)}

@@ -61,7 +61,9 @@ class SpectralSum:
         shifts = shifts_of(DEFAULT_OVERLAP)
         plans = {plan_of(one, sample_time_s, shifts) for one in window_s}
         self._plans = sorted(plans, key=lambda plan: -plan.length)
-        self._bases = [FoldedBasis.of(plan, omega_rad_s * sample_time_s) for plan in self._plans]
+        self._bases = [
+            FoldedBasis.of(plan, omega_rad_s * sample_time_s, "mean") for plan in self._plans
+        ]
         shape = (omega_rad_s.size, len(self._row), len(self._row))
         self._sums = [Spectra(plan, np.zeros(shape, complex), 0, 0.0) for plan in self._plans]
 
@@ -78,7 +80,7 @@ class SpectralSum:
         for at, (basis, total) in enumerate(zip(self._bases, self._sums, strict=True)):
             if samples.shape[1] < basis.plan.length:
                 continue
-            more = average_spectra([samples], basis, self._step, "mean")
+            more = average_spectra([samples], basis, self._step)
             self._sums[at] = replace(
                 total,
                 matrix=total.matrix + more.n_windows * more.matrix,

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.responses.windows.transform import HANN_POWER, FoldedBasis, WindowPlan, transform
+from flightid.responses.windows.transform import HANN_POWER, FoldedBasis, WindowPlan, transform_into
 
 MAXIMUM_CHUNK = 1 << 22
 """Largest number of real values of frames, or of their transforms, that are held at a time."""
@@ -54,11 +54,28 @@ def pieces(
         yield first, samples[:, start : start + (last - first - 1) * plan.hop + plan.length]
 
 
+def _groups(
+    records: Sequence[NDArray[np.float64]], plan: WindowPlan, n_f: int
+) -> Iterator[list[NDArray[np.float64]]]:
+    """Pieces of records whose transforms are held together."""
+    group: list[NDArray[np.float64]] = []
+    held = 0
+    for samples in records:
+        for _, piece in pieces(samples, plan, n_f):
+            more = 2 * n_f * plan.count(piece.shape[1]) * piece.shape[0]
+            if group and held + more > MAXIMUM_CHUNK:
+                yield group
+                group, held = [], 0
+            group.append(piece)
+            held += more
+    if group:
+        yield group
+
+
 def average_spectra(
     records: Sequence[NDArray[np.float64]],
     basis: FoldedBasis,
     sample_time_s: float,
-    detrend: str,
 ) -> Spectra:
     """Average spectra over every window of every record; no window spans two records.
 
@@ -68,22 +85,27 @@ def average_spectra(
     basis : FoldedBasis
         Tapered cosines and sines of the window length at the chosen frequencies.
     sample_time_s : float
-    detrend : {"none", "mean", "line"}
     """
     plan, n_f = basis.plan, basis.n_frequencies
     channels = records[0].shape[0]
-    total = np.zeros((n_f, 2 * channels, 2 * channels))
-    for samples in records:
-        for _, piece in pieces(samples, plan, n_f):
-            parts = np.concatenate(transform(piece, basis, detrend), axis=1)
-            total += parts @ parts.transpose(0, 2, 1)
+    equal = np.zeros((n_f, channels, channels))
+    turned = np.zeros_like(equal)
+    for group in _groups(records, plan, n_f):
+        parts = np.empty((n_f, 2, sum(plan.count(each.shape[1]) for each in group), channels))
+        start = 0
+        for samples in group:
+            stop = start + plan.count(samples.shape[1])
+            transform_into(samples, basis, parts[:, :, start:stop])
+            start = stop
+        both = parts.reshape(n_f, -1, channels)
+        equal += both.transpose(0, 2, 1) @ both
+        turned += parts[:, 0].transpose(0, 2, 1) @ parts[:, 1]
     n_windows = sum(plan.count(samples.shape[1]) for samples in records)
-    real = total[:, :channels, :channels] + total[:, channels:, channels:]
-    imaginary = total[:, :channels, channels:] - total[:, channels:, :channels]
     scale = 2.0 * sample_time_s / (HANN_POWER * plan.length * n_windows)
+    matrix = equal + 1j * (turned - turned.transpose(0, 2, 1))
     return Spectra(
         plan,
-        scale * (real + 1j * imaginary),
+        np.asarray(scale * matrix, dtype=np.complex128),
         n_windows,
         sum(plan.independent(samples.shape[1]) for samples in records),
     )

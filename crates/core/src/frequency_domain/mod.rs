@@ -1,5 +1,6 @@
 //! Models as frequency responses, and their fit to measured ones.
 
+pub mod composite;
 pub mod frequency_fit;
 pub mod response_model;
 pub mod state_space_response;

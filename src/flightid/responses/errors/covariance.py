@@ -13,12 +13,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Protocol
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from flightid.responses.errors.noise import NoiseSpectrum
+from flightid.responses.errors.noise import NoiseOfRecords, NoiseSpectrum
 from flightid.responses.errors.random_error import JointErrors, Points, union
 from flightid.responses.windows.window_weights import WindowShare, WindowWeights
 
@@ -36,6 +37,14 @@ Real = NDArray[np.float64]
 Places = NDArray[np.intp]
 
 
+class Composed(Protocol):
+    """A composite of window lengths."""
+
+    @property
+    def sensitivity(self) -> Real:
+        """From parts of each window's response to the estimate's: see `Composite`."""
+
+
 @dataclass(frozen=True)
 class WindowedErrors(JointErrors):
     """Errors of a composite (or single-window) estimate; the covariance is made when asked for.
@@ -44,15 +53,20 @@ class WindowedErrors(JointErrors):
     ----------
     windows : WindowWeights
     sample_time_s : float
-    sensitivity : ndarray, shape (n_windows, 2, 2, n_out, n_in, n_f)
-        From real and imaginary part of a window's response to those of the estimate.
-    noise : NoiseSpectrum
+    composite : Composed
+    known_noise : NoiseSpectrum or NoiseOfRecords
     """
 
     windows: WindowWeights
     sample_time_s: float
-    sensitivity: Real
-    noise: NoiseSpectrum
+    composite: Composed
+    known_noise: NoiseSpectrum | NoiseOfRecords
+
+    @property
+    def noise(self) -> NoiseSpectrum:
+        """Noise spectra of the outputs."""
+        known = self.known_noise
+        return known if isinstance(known, NoiseSpectrum) else known.spectrum
 
     def covariances(self, wanted: Sequence[Points]) -> list[Real]:
         """See `JointErrors`: the kernels of the noise do not depend on the output."""
@@ -94,7 +108,7 @@ class WindowedErrors(JointErrors):
                 yield from self._of_bins(columns, length, weights, frequencies)
 
     def _part(self, wanted: Points, inputs: Places, frequencies: Places) -> _Part:
-        turns = self.sensitivity[:, :, :, wanted.output][:, :, :, wanted.inputs]
+        turns = self.composite.sensitivity[:, :, :, wanted.output][:, :, :, wanted.inputs]
         return _Part(
             wanted.output,
             np.searchsorted(inputs, wanted.inputs),

@@ -71,7 +71,9 @@ class WindowedWeights:
         windows = self.errors.windows
         bases = windows.bases(frequencies)
         weights = windows.weights_by(bases, inputs, frequencies)
-        turns = self.errors.sensitivity[:, :, :, outputs][:, :, :, :, inputs][..., frequencies]
+        turns = self.errors.composite.sensitivity[:, :, :, outputs][:, :, :, :, inputs][
+            ..., frequencies
+        ]
         shape = (len(outputs), len(inputs), len(frequencies))
 
         def apply(changes: Sequence[Real]) -> Complex:
@@ -81,7 +83,7 @@ class WindowedWeights:
                 for each, change in zip(weights, changes, strict=True):
                     if not (basis.plan.count(change.shape[1]) and np.any(change)):
                         continue
-                    real, imaginary = transform(change, basis, windows.detrend)
+                    real, imaginary = transform(change, basis)
                     window = (real + 1j * imaginary).transpose(0, 2, 1)
                     moved += (each[place].transpose(1, 0, 2) @ window).transpose(2, 1, 0)
                 parts = np.stack([moved.real, moved.imag])
@@ -99,7 +101,7 @@ class WindowedWeights:
 
     def errors_with(self, noise: NoiseSpectrum, outputs: Places) -> CovarianceSource:
         """See `OutputWeights`; the other outputs keep their noise, as independent."""
-        return replace(self.errors, noise=self.errors.noise.replaced(noise, outputs))
+        return replace(self.errors, known_noise=self.errors.noise.replaced(noise, outputs))
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,6 +84,43 @@ class NoiseSpectrum:
         share = (place - below)[:, None, None]
         above = np.minimum(below + 1, last)
         return np.asarray((1.0 - share) * self.coherency[below] + share * self.coherency[above])
+
+
+@dataclass(frozen=True)
+class NoiseOfRecords:
+    """Noise spectra that are estimated when somebody asks for them: see `estimate_noise`."""
+
+    samples: Samples
+    omega: Real
+    response: Complex
+
+    @cached_property
+    def spectrum(self) -> NoiseSpectrum:
+        """The estimate."""
+        return estimate_noise(self.samples, self.omega, self.response)
+
+
+def require_bins(samples: Samples) -> None:
+    """Refuse records that are too short for `estimate_noise`.
+
+    Raises
+    ------
+    DataError
+        They hold too few samples.
+    """
+    n_regressors = len(samples.excitations or samples.inputs)
+    sizes = [(record.shape[1] - 1) // 2 for record in samples.records]
+    _require(min(sizes), bins_needed(n_regressors, len(sizes)))
+
+
+def _require(size: int, count: int) -> None:
+    if size < count:
+        raise DataError(
+            "the records are too short for a noise spectrum",
+            found=f"{size} Fourier bins",
+            needed=f"{count}",
+            action="use longer records, or covariance=False",
+        )
 
 
 def estimate_noise(samples: Samples, omega: Real, response: Complex) -> NoiseSpectrum:
@@ -198,13 +236,7 @@ def _groups(
     """Centre of each group of neighbouring bins, and the residual of its local fit."""
     count = bins_needed(n_regressors, len(records))
     size = min(len(bins.omega) for bins in records)
-    if size < count:
-        raise DataError(
-            "the records are too short for a noise spectrum",
-            found=f"{size} Fourier bins",
-            needed=f"{count}",
-            action="use longer records, or covariance=False",
-        )
+    _require(size, count)
     at_longest = int(np.argmax([len(bins.omega) for bins in records]))
     longest = records[at_longest]
     # A window's side lobes beyond this are far below its main lobe; the last density is held there.

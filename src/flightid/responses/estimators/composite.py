@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid import _native
 from flightid.responses.estimators.conditioned import ConditionalSpectra
 
 COHERENCE_WEIGHT = 5.0
@@ -36,9 +38,10 @@ class Composite:
         Weighted number of independent windows.
     weights : ndarray, shape (n_windows, n_out, n_in, n_f)
         Weight of each window length; zero where it does not hold two cycles.
-    sensitivity : ndarray, shape (n_windows, 2, 2, n_out, n_in, n_f)
-        ``[i, a, b]``: change of part a (real, imaginary) of the composite response for a change of
-        part b of the response of window length i.
+    parts : tuple of ConditionalSpectra
+        One for each window length.
+    scale : ndarray, shape (5, n_out, n_in, n_f)
+        Scales of the four unknowns and of the coherence.
     """
 
     input_auto: NDArray[np.float64]
@@ -46,7 +49,8 @@ class Composite:
     cross: NDArray[np.complex128]
     n_independent: NDArray[np.float64]
     weights: NDArray[np.float64]
-    sensitivity: NDArray[np.float64]
+    parts: tuple[ConditionalSpectra, ...]
+    scale: NDArray[np.float64]
 
     @property
     def response(self) -> NDArray[np.complex128]:
@@ -58,6 +62,19 @@ class Composite:
         """Composite partial coherence."""
         power = np.maximum(self.input_auto * self.output_auto, np.finfo(float).tiny)
         return np.clip(np.abs(self.cross) ** 2 / power, 0.0, 1.0)
+
+    @cached_property
+    def sensitivity(self) -> NDArray[np.float64]:
+        """Change of the response with that of each window length.
+
+        Shape (n_windows, 2, 2, n_out, n_in, n_f).
+
+        ``[i, a, b]``: change of part a (real, imaginary) of the composite response for a change of
+        part b of the response of window length i.
+        """
+        solution = [self.input_auto, self.output_auto, self.cross.real, self.cross.imag]
+        unknown = np.array(solution) / self.scale[:4]
+        return _sensitivity(self.parts, self.weights, unknown, self.scale)
 
 
 def combine(parts: Sequence[ConditionalSpectra], valid: NDArray[np.bool_]) -> Composite:
@@ -104,7 +121,8 @@ def combine(parts: Sequence[ConditionalSpectra], valid: NDArray[np.bool_]) -> Co
         solution[2] + 1j * solution[3],
         np.tensordot(n_independent, weights, 1) / total,
         weights / total,
-        _sensitivity(parts, weights / total, unknown, scale),
+        tuple(parts),
+        scale,
     )
 
 
@@ -141,53 +159,21 @@ def _coherence_and_slope(
     return value, slope
 
 
-def _cost(
-    x: NDArray[np.float64], target: NDArray[np.float64], scale: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    value, _ = _coherence_and_slope(x, scale)
-    distance = np.sum((x - target[:4]) ** 2, axis=0)
-    return np.asarray(distance + COHERENCE_WEIGHT * (value - target[4]) ** 2)
-
-
 def _solve(
     start: NDArray[np.float64], target: NDArray[np.float64], scale: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Gauss–Newton at every place by itself; a place that has come to rest costs nothing more."""
-    x = start.reshape(len(start), -1).copy()
-    target, scale = target.reshape(len(target), -1), scale.reshape(len(scale), -1)
-    moving = np.arange(x.shape[1])
-    for _ in range(MAXIMUM_STEPS):
-        before = x[:, moving]
-        x[:, moving] = _step(before, target[:, moving], scale[:, moving])
-        moving = moving[np.max(np.abs(x[:, moving] - before), axis=0) >= TOLERANCE]
-        if not moving.size:
-            break
-    return x.reshape(start.shape)
-
-
-def _step(
-    x: NDArray[np.float64], target: NDArray[np.float64], scale: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """The unknowns, shape (4, n), after one step, halved where the cost would rise."""
-    value, slope = _coherence_and_slope(x, scale)
-    gradient = (x - target[:4]) + COHERENCE_WEIGHT * slope * (value - target[4])
-    # Sherman–Morrison on identity + 5 s sᵀ.
-    along = np.sum(slope * gradient, axis=0)
-    bent = 1.0 + COHERENCE_WEIGHT * np.sum(slope**2, axis=0)
-    step = -(gradient - COHERENCE_WEIGHT * slope * along / bent)
-    allowed = _cost(x, target, scale) * (1.0 + ROUNDING)
-    moved, waiting, length = x.copy(), np.arange(x.shape[1]), 1.0
-    for _ in range(MAXIMUM_HALVINGS):
-        trial = x[:, waiting] + length * step[:, waiting]
-        inside = (trial[0] > 0.0) & (trial[1] > 0.0)
-        trial[:, ~inside] = x[:, waiting[~inside]]
-        cost = _cost(trial, target[:, waiting], scale[:, waiting])
-        accepted = inside & (cost <= allowed[waiting])
-        moved[:, waiting[accepted]] = trial[:, accepted]
-        waiting, length = waiting[~accepted], 0.5 * length
-        if not waiting.size:
-            break
-    return moved
+    """Gauss–Newton at every place by itself, steps halved where the cost would rise."""
+    found = _native.composite(
+        np.ascontiguousarray(start).reshape(-1),
+        np.ascontiguousarray(target).reshape(-1),
+        np.ascontiguousarray(scale).reshape(-1),
+        coherence_weight=COHERENCE_WEIGHT,
+        steps=MAXIMUM_STEPS,
+        halvings=MAXIMUM_HALVINGS,
+        tolerance=TOLERANCE,
+        rounding=ROUNDING,
+    )
+    return found.reshape(start.shape)
 
 
 def _sensitivity(

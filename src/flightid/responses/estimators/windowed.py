@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from flightid.record.history import Step
 from flightid.responses.cautions import band_findings, correlation_findings
 from flightid.responses.errors.covariance import WindowedErrors
-from flightid.responses.errors.noise import estimate_noise
+from flightid.responses.errors.noise import NoiseOfRecords, require_bins
 from flightid.responses.estimators.composite import Composite, combine
 from flightid.responses.estimators.conditioned import ConditionalSpectra, condition, random_error
 from flightid.responses.estimators.instrument import condition_on_excitation, excitation_projection
@@ -53,8 +53,8 @@ def estimate_windowed(
     spectra, parts = [], []
     n_in = len(samples.inputs)
     for plan in plans:
-        basis = FoldedBasis.of(plan, omega * samples.sample_time_s)
-        one = average_spectra(samples.records, basis, samples.sample_time_s, detrend)
+        basis = FoldedBasis.of(plan, omega * samples.sample_time_s, detrend)
+        one = average_spectra(samples.records, basis, samples.sample_time_s)
         spectra.append(one)
         if samples.excitations:
             part = condition_on_excitation(one, n_in, len(samples.outputs), omega, samples)
@@ -74,7 +74,7 @@ def windowed_errors(estimate: WindowedEstimate) -> WindowedErrors:
         The records are too short for a noise spectrum.
     """
     samples = estimate.samples
-    noise = estimate_noise(samples, estimate.omega, estimate.composite.response)
+    require_bins(samples)
     shares = []
     for one, part in zip(estimate.spectra, estimate.parts, strict=True):
         scale = 2.0 * samples.sample_time_s / (HANN_POWER * one.plan.length * one.n_windows)
@@ -89,7 +89,9 @@ def windowed_errors(estimate: WindowedEstimate) -> WindowedErrors:
         estimate.detrend,
         tuple(shares),
     )
-    return WindowedErrors(windows, samples.sample_time_s, estimate.composite.sensitivity, noise)
+    composite = estimate.composite
+    noise = NoiseOfRecords(samples, estimate.omega, composite.response)
+    return WindowedErrors(windows, samples.sample_time_s, composite, noise)
 
 
 def windowed_response(estimate: WindowedEstimate, estimator: str, step: Step) -> FrequencyResponse:

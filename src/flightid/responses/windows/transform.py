@@ -4,29 +4,25 @@ A Hann window is even about its middle, so each frame is folded there: its even 
 and its odd part sines, which halves the work of the matrix product. Every number is the exact
 transform at the frequency that was asked for; no frequency is rounded to a grid of the window.
 
-Slow frequencies do not need every sample: on a panel of samples all slow sinusoids, tapered or not,
-lie in a space of few dimensions. Frames are projected on it, panel by panel, before their product.
+Slow frequencies do not need every sample: see `panels`. A mean that is removed from each window is
+taken out of the basis instead, once.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-PANEL = 128
-"""Samples in a panel of a folded frame."""
-SLOW = 0.25
-"""Highest frequency of the panels' space, rad per sample."""
-PANEL_TOLERANCE = 1e-12
-"""Largest share of a slow sinusoid that its projection may miss."""
-FEWEST_SLOW = 50
-"""Slow frequencies from which on the projection pays."""
+from flightid.responses.windows.panels import PanelBasis, PanelSpace, exponentials, panel_levels
+
 HANN_POWER = 3.0 / 8.0
 """Mean square of the (periodic) Hann window: what U is in the one-sided spectra."""
+SMALL = 1e-9
+"""Sine of half an angle below which a sum over a window is its length."""
+Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -69,80 +65,70 @@ class FoldedBasis:
 
     Attributes
     ----------
-    cosine, sine : ndarray, shape (n_f − n_slow, half + 1)
-        Columns belong to distances 0 … length/2 from the middle.
-    slow_cosine, slow_sine : ndarray, shape (n_slow, n_panels · rank)
-        Of the slow frequencies at the head, on the panels' space.
+    plan : WindowPlan
+    detrend : {"none", "mean", "line"}
+        What is removed from each window by itself.
+    cosine, sine : ndarray, shape (n_f − slow ones, half + 1)
+        Of the fast frequencies; columns belong to distances 0 … length/2 from the middle.
+    slow : tuple of PanelBasis
+        Of the slow frequencies at the head, slowest first; the first level of panels is last.
     """
 
     plan: WindowPlan
-    cosine: NDArray[np.float64]
-    sine: NDArray[np.float64]
-    slow_cosine: NDArray[np.float64]
-    slow_sine: NDArray[np.float64]
-
-    @property
-    def n_slow(self) -> int:
-        """Leading frequencies that are worked on by panels."""
-        return len(self.slow_cosine)
+    detrend: str
+    cosine: Real
+    sine: Real
+    slow: tuple[PanelBasis, ...]
 
     @property
     def n_frequencies(self) -> int:
         """All frequencies."""
-        return len(self.slow_cosine) + len(self.cosine)
+        return sum(len(each.cosine) for each in self.slow) + len(self.cosine)
 
     @classmethod
-    def of(cls, plan: WindowPlan, omega: NDArray[np.float64]) -> FoldedBasis:
-        """Basis for `omega` in rad per sample."""
+    def of(cls, plan: WindowPlan, omega: Real, detrend: str = "none") -> FoldedBasis:
+        """Basis for `omega` in rad per sample, increasing."""
         size = plan.length // 2 + 1
-        fast = np.flatnonzero(omega + 2.0 * np.pi / plan.length > SLOW)
-        n_slow = int(fast[0]) if fast.size else len(omega)
-        if n_slow < FEWEST_SLOW or size < 2 * PANEL:
-            n_slow = 0
-        # Frames are zero beyond half a window; the basis goes on, for a cut leaves the space.
-        width = -(-size // PANEL) * PANEL
-        slow = _tapered(plan, omega[:n_slow], width)
-        rest = _tapered(plan, omega[n_slow:], size)
-        return cls(
-            plan, rest.real.copy(), rest.imag.copy(), _project(slow.real), _project(slow.imag)
-        )
+        bend = 2.0 * np.pi / plan.length
+        level = np.zeros(len(omega))
+        if detrend == "mean":
+            level = _taper_transform(plan, omega) / plan.length
+        slow, start = [], 0
+        levels = panel_levels(omega + bend, size)
+        width = -(-size // levels[0][0].size) * levels[0][0].size if levels else 0
+        for space, stop in levels:
+            part = slice(start, stop)
+            count = width // space.size
+            slow.append(_on_panels(space, count, omega[part], level[part], bend))
+            start = stop
+        rest = exponentials(omega[start:], size)
+        rest *= 0.5 + 0.5 * np.cos(bend * np.arange(size))
+        cosine = rest.real - level[start:, None]
+        return cls(plan, detrend, cosine, rest.imag.copy(), tuple(slow))
 
 
-def _tapered(plan: WindowPlan, omega: NDArray[np.float64], count: int) -> NDArray[np.complex128]:
-    """Tapered ``exp(jωd)`` for distances d from 0 to `count` − 1."""
-    taper = 0.5 + 0.5 * np.cos(2.0 * np.pi * np.arange(count) / plan.length)
-    return _exponentials(omega, count) * taper
+def _taper_transform(plan: WindowPlan, omega: Real) -> Real:
+    """``Σ w(d) cos ωd`` over a window, time counted from its middle."""
+    half = plan.length // 2
+    bend = np.pi / half
+    total = np.zeros_like(omega)
+    for weight, angle in ((0.5, omega), (0.25, omega + bend), (0.25, omega - bend)):
+        small = np.abs(np.sin(0.5 * angle)) < SMALL
+        safe = np.where(small, 1.0, angle)
+        total += weight * np.where(small, 2.0 * half, np.sin(half * safe) / np.tan(0.5 * safe))
+    return total
 
 
-def _exponentials(omega: NDArray[np.float64], count: int) -> NDArray[np.complex128]:
-    """``exp(jωd)`` for d below `count`, from two short tables: coarse steps and fine ones."""
-    fine = int(np.ceil(np.sqrt(count)))
-    coarse = -(-count // fine)
-    small = np.exp(1j * np.multiply.outer(omega, np.arange(fine)))
-    large = np.exp(1j * np.multiply.outer(omega, fine * np.arange(coarse)))
-    whole = (large[:, :, None] * small[:, None, :]).reshape(len(omega), coarse * fine)
-    return np.asarray(whole[:, :count])
+def _on_panels(space: PanelSpace, count: int, omega: Real, level: Real, bend: float) -> PanelBasis:
+    """Tapered sinusoids less their level, on the panels of a folded frame."""
+    found: NDArray[np.complex128] = 0.5 * space.sinusoids(omega, count)
+    found += 0.25 * space.sinusoids(omega + bend, count)
+    found += 0.25 * space.sinusoids(omega - bend, count)
+    cosine = found.real - level[:, None] * space.sinusoids(np.zeros(1), count).real
+    return PanelBasis(space, cosine, found.imag.copy())
 
 
-@cache
-def _panel_space() -> NDArray[np.float64]:
-    """Orthonormal basis of all sinusoids up to `SLOW` on one panel, shape (PANEL, rank)."""
-    place = np.arange(PANEL) - (PANEL - 1) / 2.0
-    angle = np.multiply.outer(place, SLOW * np.linspace(0.0, 1.0, PANEL))
-    u, s, _ = np.linalg.svd(np.concatenate([np.cos(angle), np.sin(angle)], axis=1))
-    return np.ascontiguousarray(u[:, : int(np.sum(s > PANEL_TOLERANCE * s[0]))])
-
-
-def _project(rows: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rows of whole panels on the panels' space, shape (n_rows, n_panels · rank)."""
-    space = _panel_space()
-    panels = rows.shape[1] // PANEL
-    return np.asarray((rows.reshape(-1, PANEL) @ space).reshape(len(rows), panels * space.shape[1]))
-
-
-def frames(
-    samples: NDArray[np.float64], plan: WindowPlan, detrend: str = "none"
-) -> NDArray[np.float64]:
+def frames(samples: Real, plan: WindowPlan, detrend: str = "none") -> Real:
     """Windows of each channel before tapering.
 
     Parameters
@@ -167,40 +153,52 @@ def frames(
     return np.asarray(removed)
 
 
-def transform(
-    samples: NDArray[np.float64], basis: FoldedBasis, detrend: str
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def transform(samples: Real, basis: FoldedBasis) -> tuple[Real, Real]:
     """Transform of every window of every channel, time counted from the window's middle.
 
     Parameters
     ----------
     samples : ndarray, shape (n_channels, n_samples)
     basis : FoldedBasis
-    detrend : {"none", "mean", "line"}
 
     Returns
     -------
     tuple of ndarray, each shape (n_f, n_channels, n_windows)
         Real and imaginary parts of ``Σ w(t) x(t) exp(−jωt)``.
     """
-    window = frames(samples, basis.plan, detrend)
-    channels, count, length = window.shape
-    even, odd = _fold(window, -(-(length // 2 + 1) // PANEL) * PANEL if basis.n_slow else 0)
-    shape = (basis.n_frequencies, channels, count)
-    real = _product(basis.slow_cosine, basis.cosine, even)
-    imaginary = _product(basis.slow_sine, basis.sine, odd)
-    return real.reshape(shape), np.negative(imaginary, out=imaginary).reshape(shape)
+    count = basis.plan.count(samples.shape[1])
+    parts = np.empty((basis.n_frequencies, 2, count, samples.shape[0]))
+    transform_into(samples, basis, parts)
+    real, imaginary = parts[:, 0].transpose(0, 2, 1), parts[:, 1].transpose(0, 2, 1)
+    return real, imaginary
 
 
-def _fold(
-    window: NDArray[np.float64], at_least: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Even and odd parts about the middle, shape (n_rows, distances), zeros up to `at_least`."""
+def transform_into(samples: Real, basis: FoldedBasis, parts: Real) -> None:
+    """As `transform`, into rows that are there, shape (n_f, 2, n_windows, n_channels).
+
+    Windows come before channels, so that the windows of several records lie side by side.
+    """
+    window = frames(samples, basis.plan, "line" if basis.detrend == "line" else "none")
+    width = basis.slow[0].width if basis.slow else 0
+    even, odd = _fold(window, width)
+    rows = [even, odd]
+    for place, part in enumerate(rows):
+        found = parts[:, place].reshape(len(parts), len(part))
+        _product(basis, place, part, found)
+    np.negative(parts[:, 1], out=parts[:, 1])
+
+
+def _fold(window: Real, at_least: int) -> tuple[Real, Real]:
+    """Even and odd parts about the middle, shape (n_rows, distances), zeros up to `at_least`.
+
+    Rows are windows, and channels within each.
+    """
     channels, count, length = window.shape
     half = length // 2
     width = max(half + 1, at_least)
-    even = np.empty((channels, count, width))
+    even = np.empty((count, channels, width))
     odd = np.empty_like(even)
+    window = window.transpose(1, 0, 2)
     right, left = window[:, :, half + 1 :], window[:, :, half - 1 : 0 : -1]
     np.add(right, left, out=even[:, :, 1:half])
     np.subtract(right, left, out=odd[:, :, 1:half])
@@ -211,12 +209,14 @@ def _fold(
     return even.reshape(-1, width), odd.reshape(-1, width)
 
 
-def _product(
-    slow: NDArray[np.float64], fast: NDArray[np.float64], rows: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Slow rows of a basis with the projected rows, fast ones with the rows themselves."""
-    found = np.empty((len(slow) + len(fast), len(rows)))
-    if len(slow):
-        np.matmul(slow, _project(rows).T, out=found[: len(slow)])
-    np.matmul(fast, rows[:, : fast.shape[1]].T, out=found[len(slow) :])
-    return found
+def _product(basis: FoldedBasis, place: int, rows: Real, found: Real) -> None:
+    """Slow sinusoids with the projected rows, fast ones with the rows themselves."""
+    start, projected = len(found) - len(basis.cosine), rows
+    for panels in reversed(basis.slow):
+        projected = panels.space.project(projected)
+        known = (panels.cosine, panels.sine)[place]
+        start -= len(known)
+        np.matmul(known, projected.T, out=found[start : start + len(known)])
+    known = (basis.cosine, basis.sine)[place]
+    fast = found[len(found) - len(known) :]
+    np.matmul(known, rows[:, : known.shape[1]].T, out=fast)

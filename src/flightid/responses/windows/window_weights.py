@@ -50,7 +50,8 @@ class WindowWeights:
 
     def bases(self, frequencies: Places) -> list[FoldedBasis]:
         """Tapered sinusoids of each window length."""
-        return [FoldedBasis.of(share.plan, self.omega[frequencies]) for share in self.shares]
+        omega = self.omega[frequencies]
+        return [FoldedBasis.of(share.plan, omega, self.detrend) for share in self.shares]
 
     def weights_at(self, inputs: Places, frequencies: Places) -> list[list[Complex]]:
         """Weight of each window's output transform, by record and window length.
@@ -83,6 +84,6 @@ class WindowWeights:
     ) -> Complex:
         if not share.plan.count(record.shape[1]):
             return np.zeros((len(inputs), len(frequencies), 0), dtype=np.complex128)
-        real, imaginary = transform(record, basis, self.detrend)
+        real, imaginary = transform(record, basis)
         projection = share.projection[frequencies][:, inputs]
         return np.asarray((projection @ (real - 1j * imaginary)).transpose(1, 0, 2))
