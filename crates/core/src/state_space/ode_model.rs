@@ -25,17 +25,22 @@ pub struct OdeModel {
     pub(crate) rates: Program,
     pub(crate) residuals: Vec<usize>,
     pub(crate) mass: Mass,
-    /// Derivatives of the residuals by x, u and leaves, with the residuals where M is one.
+    /// Derivatives of the residuals by x, u and leaves, with what gives ẋ; ẋ comes late.
     pub(crate) rate_slopes: Program,
+    pub(crate) slope_residuals: Vec<usize>,
+    /// Entries of M, where it moves.
+    pub(crate) slope_mass: Vec<Entry>,
     pub(crate) rate_entries: Vec<Entry>,
     /// Outputs.
     pub(crate) outputs: Program,
-    pub(crate) output_registers: Vec<usize>,
-    /// Derivatives of the outputs by ẋ, x, u and leaves.
+    pub(crate) measured: Vec<usize>,
+    /// Derivatives of the outputs by ẋ, x, u and leaves, with the outputs.
     pub(crate) output_slopes: Program,
+    pub(crate) output_registers: Vec<usize>,
     pub(crate) output_entries: Vec<Entry>,
     /// Whether an output depends on ẋ.
     pub(crate) outputs_need_rates: bool,
+    affine: bool,
 }
 
 /// The matrix M of the factors of ẋ.
@@ -73,8 +78,9 @@ impl OdeModel {
         let registers = |entries: &[Entry]| entries.iter().map(|e| e.register).collect::<Vec<_>>();
         let residuals = moving.outputs[..n].to_vec();
         let mass = pick(0, n, 0..n);
-        let rates = Program::new(&tape, &[residuals.clone(), registers(&mass)].concat(), n_moving);
-        let factors = Program::new(&tape, &registers(&mass), n_moving);
+        let rates =
+            Program::new(&tape, &[residuals.clone(), registers(&mass)].concat(), 0, n_moving);
+        let factors = Program::new(&tape, &registers(&mass), 0, n_moving);
         // M depends on ẋ: the equations are not linear in it.
         if (0..n).any(|state| factors.uses(state)) {
             let problem = "a state derivative does not enter its equation linearly".to_string();
@@ -91,15 +97,37 @@ impl OdeModel {
             Mass::Moving(mass)
         };
         let rate_entries = pick(0, n, n..n_moving + n_leaves);
-        let mut wanted = registers(&rate_entries);
-        if mass.is_one() {
-            wanted.extend(&residuals);
-        }
+        let slope_mass = match &mass {
+            Mass::Moving(entries) => entries.clone(),
+            Mass::One | Mass::Fixed(_) => Vec::new(),
+        };
+        let wanted = [registers(&rate_entries), residuals.clone(), registers(&slope_mass)].concat();
+        let rate_slopes = Program::new(&tape, &wanted, n, n_moving);
         let mut output_entries = pick(n, n + p, 0..n_moving + n_leaves);
         output_entries.iter_mut().for_each(|entry| entry.row -= n);
         let output_registers = moving.outputs[n..].to_vec();
-        let outputs = Program::new(&tape, &output_registers, n_moving);
+        let outputs = Program::new(&tape, &output_registers, 0, n_moving);
         let both = [registers(&output_entries), output_registers.clone()].concat();
+        let output_slopes = Program::new(&tape, &both, 0, n_moving);
+        let fixed = |entries: &[Entry], program: &Program| {
+            entries.iter().all(|e| e.column >= n_moving || !program.moves(e.register))
+        };
+        let affine = !matches!(mass, Mass::Moving(_))
+            && fixed(&rate_entries, &rate_slopes)
+            && fixed(&output_entries, &output_slopes);
+        // From registers of the tape to places of the programs.
+        let placed = |entries: &[Entry], program: &Program| -> Vec<Entry> {
+            let at = |e: &Entry| Entry { register: program.place(e.register), ..*e };
+            entries.iter().map(at).collect()
+        };
+        let all = |registers: &[usize], program: &Program| -> Vec<usize> {
+            registers.iter().map(|&register| program.place(register)).collect()
+        };
+        let mass = match mass {
+            Mass::One => Mass::One,
+            Mass::Fixed(entries) => Mass::Fixed(placed(&entries, &rates)),
+            Mass::Moving(entries) => Mass::Moving(placed(&entries, &rates)),
+        };
         Ok(Self {
             n_states: n,
             n_inputs: m,
@@ -107,16 +135,20 @@ impl OdeModel {
             n_parameters: model.n_parameters(),
             n_leaves,
             leaves,
-            rates,
-            residuals,
+            residuals: all(&residuals, &rates),
             mass,
-            rate_slopes: Program::new(&tape, &wanted, n_moving),
-            rate_entries,
+            slope_residuals: all(&residuals, &rate_slopes),
+            slope_mass: placed(&slope_mass, &rate_slopes),
+            rate_entries: placed(&rate_entries, &rate_slopes),
+            rate_slopes,
+            rates,
             outputs_need_rates: (0..n).any(|state| outputs.uses(state)),
+            measured: all(&output_registers, &outputs),
             outputs,
-            output_registers,
-            output_slopes: Program::new(&tape, &both, n_moving),
-            output_entries,
+            output_registers: all(&output_registers, &output_slopes),
+            output_entries: placed(&output_entries, &output_slopes),
+            output_slopes,
+            affine,
         })
     }
 
@@ -128,14 +160,7 @@ impl OdeModel {
     /// Whether states, inputs and their derivatives enter equations and outputs linearly, with factors
     /// that depend on parameters alone.
     pub fn is_affine(&self) -> bool {
-        let fixed = |entries: &[Entry], program: &Program| {
-            entries
-                .iter()
-                .all(|entry| entry.column >= self.n_moving() || !program.moves(entry.register))
-        };
-        !matches!(self.mass, Mass::Moving(_))
-            && fixed(&self.rate_entries, &self.rate_slopes)
-            && fixed(&self.output_entries, &self.output_slopes)
+        self.affine
     }
 
     /// Number of states.

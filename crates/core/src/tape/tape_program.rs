@@ -1,8 +1,9 @@
 //! A tape made ready to run along a trajectory: what never changes there is computed once, dead parts
-//! are left out, and B points are evaluated side by side.
+//! are left out, and B points are evaluated side by side, in few places.
 
 use crate::language::lookup_table::{LookupTable, Part};
 use crate::language::syntax::{Binary, Unary};
+use crate::numerics::widest::widest;
 use crate::tape::expression_tape::Tape;
 use crate::tape::operation::{Operation, apply_binary, apply_unary};
 
@@ -23,58 +24,129 @@ enum Step {
 /// Some registers of a tape in the order of their computation.
 #[derive(Debug, Clone)]
 pub(crate) struct Program {
-    n_registers: usize,
+    n_places: usize,
     constants: Vec<(usize, f64)>,
-    /// Register of each input; none where nothing depends on it.
+    /// Place of each input; none where nothing depends on it.
     inputs: Vec<Option<usize>>,
     /// Computed once in a run.
     fixed: Vec<Step>,
     /// Computed at every point.
-    moving: Vec<Step>,
+    early: Vec<Step>,
+    /// What depends on the inputs that come late.
+    late: Vec<Step>,
     is_moving: Vec<bool>,
+    /// Place of each register of the tape.
+    places: Places,
     tables: Vec<LookupTable>,
 }
 
-/// Values of all registers at B points.
+/// Values at all places of a program at B points.
 pub(crate) type Lanes<const B: usize> = Vec<[f64; B]>;
 
-impl Program {
-    /// What `outputs` (registers) need; the first `n_moving` inputs change from point to point.
-    pub(crate) fn new(tape: &Tape, outputs: &[usize], n_moving: usize) -> Self {
-        let needed = tape.needed(outputs);
-        let mut program = Self {
-            n_registers: tape.operations.len(),
-            constants: Vec::new(),
-            inputs: vec![None; tape.n_inputs],
-            fixed: Vec::new(),
-            moving: Vec::new(),
-            is_moving: vec![false; tape.operations.len()],
-            tables: tape.tables.clone(),
-        };
-        for (register, &operation) in tape.operations.iter().enumerate() {
-            if !needed[register] {
-                continue;
-            }
-            let moves = operation.arguments().any(|a| program.is_moving[a]);
-            match operation {
-                Operation::Constant(value) => program.constants.push((register, value)),
-                Operation::Input(place) => {
-                    program.inputs[place] = Some(register);
-                    program.is_moving[register] = place < n_moving;
-                    continue;
-                }
-                _ => {
-                    let step = step(tape, register, operation);
-                    let list = if moves { &mut program.moving } else { &mut program.fixed };
-                    list.extend(step);
-                }
-            }
-            program.is_moving[register] = moves;
+/// When a register is computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Moment {
+    Before,
+    Early,
+    Late,
+}
+
+/// Where the registers of a tape are kept: values that are read once more and then not again make room
+/// for others, so that all that is at work stays in the nearest cache.
+#[derive(Debug, Clone)]
+struct Places {
+    of: Vec<usize>,
+    count: usize,
+}
+
+impl Places {
+    /// `kept` are the registers whose values stay; `early` are computed in that order.
+    fn new(tape: &Tape, needed: &[bool], kept: &[bool], early: &[usize]) -> Self {
+        let mut places = Self { of: vec![0; needed.len()], count: 0 };
+        for register in (0..needed.len()).filter(|&r| needed[r] && kept[r]) {
+            places.of[register] = places.fresh();
         }
-        program
+        let mut last = vec![0; needed.len()];
+        for (time, &register) in early.iter().enumerate() {
+            tape.operations[register].arguments().for_each(|a| last[a] = time);
+        }
+        let mut free = Vec::new();
+        for (time, &register) in early.iter().enumerate() {
+            let mut read: Vec<usize> = tape.operations[register].arguments().collect();
+            read.sort_unstable();
+            read.dedup();
+            // A step reads before it writes, so that its result may take the place of an argument.
+            free.extend(
+                read.iter().filter(|&&a| !kept[a] && last[a] == time).map(|&a| places.of[a]),
+            );
+            if !kept[register] {
+                places.of[register] = free.pop().unwrap_or_else(|| places.fresh());
+            }
+        }
+        places
     }
 
-    /// Whether a register changes from point to point.
+    fn fresh(&mut self) -> usize {
+        self.count += 1;
+        self.count - 1
+    }
+}
+
+impl Program {
+    /// What `outputs` (registers) need. The first `n_moving` inputs change from point to point, and
+    /// the first `n_late` of these are known only when the rest has been computed.
+    pub(crate) fn new(tape: &Tape, outputs: &[usize], n_late: usize, n_moving: usize) -> Self {
+        let needed = tape.needed(outputs);
+        let moments = moments(tape, n_late, n_moving);
+        let steps = |moment: Moment| -> Vec<usize> {
+            let wanted = |&r: &usize| {
+                let leaf =
+                    matches!(tape.operations[r], Operation::Constant(_) | Operation::Input(_));
+                needed[r] && !leaf && moments[r] == moment
+            };
+            (0..needed.len()).filter(wanted).collect()
+        };
+        let (fixed, early, late) =
+            (steps(Moment::Before), steps(Moment::Early), steps(Moment::Late));
+        let mut kept = vec![true; needed.len()];
+        early.iter().for_each(|&register| kept[register] = false);
+        outputs.iter().for_each(|&register| kept[register] = true);
+        for &register in &late {
+            tape.operations[register].arguments().for_each(|a| kept[a] = true);
+        }
+        let places = Places::new(tape, &needed, &kept, &early);
+        let made = |registers: &[usize]| -> Vec<Step> {
+            let of = |&register: &usize| step(tape, &places.of, register);
+            registers.iter().filter_map(of).collect()
+        };
+        let mut constants = Vec::new();
+        let mut inputs = vec![None; tape.n_inputs];
+        for register in (0..needed.len()).filter(|&r| needed[r]) {
+            match tape.operations[register] {
+                Operation::Constant(value) => constants.push((places.of[register], value)),
+                Operation::Input(place) => inputs[place] = Some(places.of[register]),
+                _ => {}
+            }
+        }
+        Self {
+            n_places: places.count,
+            constants,
+            inputs,
+            fixed: made(&fixed),
+            early: made(&early),
+            late: made(&late),
+            is_moving: moments.iter().map(|&moment| moment > Moment::Before).collect(),
+            tables: tape.tables.clone(),
+            places,
+        }
+    }
+
+    /// Where the lanes hold an output register of the tape.
+    pub(crate) fn place(&self, register: usize) -> usize {
+        self.places.of[register]
+    }
+
+    /// Whether a register of the tape changes from point to point.
     pub(crate) fn moves(&self, register: usize) -> bool {
         self.is_moving[register]
     }
@@ -87,13 +159,13 @@ impl Program {
         lanes: &mut Lanes<B>,
     ) {
         lanes.clear();
-        lanes.resize(self.n_registers, [0.0; B]);
-        for &(register, value) in &self.constants {
-            lanes[register] = [value; B];
+        lanes.resize(self.n_places, [0.0; B]);
+        for &(place, value) in &self.constants {
+            lanes[place] = [value; B];
         }
         for (place, &value) in self.inputs[n_moving..].iter().zip(fixed) {
-            if let Some(register) = place {
-                lanes[*register] = [value; B];
+            if let Some(place) = place {
+                lanes[*place] = [value; B];
             }
         }
         run(&self.fixed, &self.tables, lanes);
@@ -106,8 +178,8 @@ impl Program {
         values: [f64; B],
         lanes: &mut Lanes<B>,
     ) {
-        if let Some(register) = self.inputs[input] {
-            lanes[register] = values;
+        if let Some(place) = self.inputs[input] {
+            lanes[place] = values;
         }
     }
 
@@ -118,14 +190,38 @@ impl Program {
 
     /// Compute all that moves.
     pub(crate) fn run<const B: usize>(&self, lanes: &mut Lanes<B>) {
-        run(&self.moving, &self.tables, lanes);
+        self.run_early(lanes);
+        self.run_late(lanes);
+    }
+
+    /// Compute what moves without the inputs that come late.
+    pub(crate) fn run_early<const B: usize>(&self, lanes: &mut Lanes<B>) {
+        run(&self.early, &self.tables, lanes);
+    }
+
+    /// Compute what depends on the inputs that come late; again, where they change.
+    pub(crate) fn run_late<const B: usize>(&self, lanes: &mut Lanes<B>) {
+        run(&self.late, &self.tables, lanes);
     }
 }
 
-fn step(tape: &Tape, register: usize, operation: Operation) -> Option<Step> {
+fn moments(tape: &Tape, n_late: usize, n_moving: usize) -> Vec<Moment> {
+    let mut moments = vec![Moment::Before; tape.operations.len()];
+    for (register, operation) in tape.operations.iter().enumerate() {
+        moments[register] = match *operation {
+            Operation::Input(place) if place < n_late => Moment::Late,
+            Operation::Input(place) if place < n_moving => Moment::Early,
+            _ => operation.arguments().map(|a| moments[a]).max().unwrap_or(Moment::Before),
+        };
+    }
+    moments
+}
+
+fn step(tape: &Tape, places: &[usize], register: usize) -> Option<Step> {
     // A tape holds at most MAXIMUM_OPERATIONS registers, so their numbers fit.
-    let (to, short) = (register as u32, |place: usize| place as u32);
-    Some(match operation {
+    let short = |register: usize| places[register] as u32;
+    let to = short(register);
+    Some(match tape.operations[register] {
         Operation::Constant(_) | Operation::Input(_) => return None,
         Operation::Unary(Unary::Negate, a) => Step::Negate(to, short(a)),
         Operation::Unary(function, a) => Step::Unary(function, to, short(a)),
@@ -143,7 +239,7 @@ fn step(tape: &Tape, register: usize, operation: Operation) -> Option<Step> {
         Operation::Binary(function, a, b) => Step::Binary(function, to, short(a), short(b)),
         Operation::Select(test, a, b) => Step::Select(to, short(test), short(a), short(b)),
         Operation::Table(table, part, a, b) => {
-            Step::Table(to, short(table), part, [short(a), short(b)])
+            Step::Table(to, table as u32, part, [short(a), short(b)])
         }
     })
 }
@@ -168,6 +264,17 @@ fn pair<const B: usize>(
 }
 
 fn run<const B: usize>(steps: &[Step], tables: &[LookupTable], lanes: &mut [[f64; B]]) {
+    if B == 1 {
+        return execute(steps, tables, lanes);
+    }
+    widest(
+        #[inline(always)]
+        || execute(steps, tables, lanes),
+    );
+}
+
+#[inline(always)]
+fn execute<const B: usize>(steps: &[Step], tables: &[LookupTable], lanes: &mut [[f64; B]]) {
     for step in steps {
         match *step {
             Step::Negate(to, a) => each(lanes, to, a, |x| -x),

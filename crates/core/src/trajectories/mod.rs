@@ -10,6 +10,7 @@ pub mod loop_simulation;
 pub mod runge_kutta;
 pub(crate) mod scalar_equations;
 pub mod sensitivity;
+pub(crate) mod sensitivity_columns;
 pub mod sensitivity_pattern;
 pub mod shooting;
 pub(crate) mod state_covariance;

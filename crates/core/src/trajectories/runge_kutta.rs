@@ -50,7 +50,7 @@ pub struct Setting {
     pub(crate) held: Vec<HeldInput>,
     pub(crate) inverse_mass: Vec<f64>,
     /// Its entries that are not zero: row, column, value.
-    weights: Vec<(usize, usize, f64)>,
+    pub(crate) weights: Vec<(usize, usize, f64)>,
     pub(crate) n_samples: usize,
     pub(crate) substeps: usize,
     pub(crate) step_s: f64,
@@ -205,7 +205,7 @@ impl Setting {
             ode.outputs.load(n + place, [value], &mut self.outputs);
         }
         ode.outputs.run(&mut self.outputs);
-        for (row, &register) in ode.output_registers.iter().enumerate() {
+        for (row, &register) in ode.measured.iter().enumerate() {
             outputs[row * stride] = self.outputs[register][0];
         }
         Ok(())

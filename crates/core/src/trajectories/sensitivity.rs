@@ -9,13 +9,10 @@ use crate::error::CoreError;
 use crate::state_space::ode_model::{Mass, OdeModel};
 use crate::tape::expression_tape::Registers;
 use crate::tape::tape_program::Lanes;
-use crate::trajectories::runge_kutta::{STAGES, Setting, WEIGHTS, expect, inverse};
+use crate::trajectories::runge_kutta::{STAGES, Setting, expect, inverse};
+use crate::trajectories::sensitivity_columns::{BLOCK, ColumnSteps, Derivatives};
 use crate::trajectories::sensitivity_pattern::{Directions, GROUP, Pattern, Seeds};
 use crate::trajectories::trajectory::{Rate, Trajectory};
-
-/// Samples that are evaluated side by side.
-const BLOCK: usize = 16;
-type Many = [f64; GROUP];
 
 /// Buffers, kept from run to run.
 #[derive(Debug, Clone, Default)]
@@ -25,7 +22,6 @@ pub struct TrajectorySensitivity {
     leaf_slopes: Vec<f64>,
     rate_pattern: Pattern,
     output_pattern: Pattern,
-    rates: Lanes<BLOCK>,
     slopes: Lanes<BLOCK>,
     outputs: Lanes<BLOCK>,
     /// Derivatives of each stage of each part of a block; then M⁻¹ of each.
@@ -34,11 +30,7 @@ pub struct TrajectorySensitivity {
     output_stage: Vec<[f64; BLOCK]>,
     scratch: Vec<f64>,
     inverse: Vec<f64>,
-    /// S by group, then state.
-    sensitivity: Vec<Many>,
-    moved: Vec<Many>,
-    slope: Vec<Many>,
-    sum: Vec<Many>,
+    columns: ColumnSteps,
     rows: Vec<f64>,
 }
 
@@ -67,7 +59,7 @@ impl TrajectorySensitivity {
         self.prepare(ode, setting, parameters, directions)?;
         for (place, &seed) in seeds.iter().enumerate() {
             let (state, column) = (place / n_columns, place % n_columns);
-            self.sensitivity[column / GROUP * ode.n_states + state][column % GROUP] = seed;
+            self.columns.reached[column / GROUP * ode.n_states + state][column % GROUP] = seed;
         }
         let height = ode.n_outputs * stride;
         let mut start = trajectory.range.start;
@@ -85,9 +77,15 @@ impl TrajectorySensitivity {
                 // No step follows the record's last sample; one follows the last of a segment, up
                 // to its end.
                 if sample + 1 < setting.n_samples {
-                    (0..setting.substeps).for_each(|part| {
-                        self.advance(trajectory, sample, part, sample - start);
-                    });
+                    let known = Derivatives {
+                        trajectory,
+                        pattern: &self.rate_pattern,
+                        stages: &self.stages,
+                        masses: &self.masses,
+                        lane: sample - start,
+                    };
+                    (0..setting.substeps)
+                        .for_each(|part| self.columns.advance(&known, sample, part));
                 }
             }
             if stride > 0 {
@@ -96,13 +94,13 @@ impl TrajectorySensitivity {
             self.rows = rows;
             start = stop;
         }
-        let sound = self.sensitivity.iter().flatten().all(|entry| entry.is_finite());
+        let sound = self.columns.reached.iter().flatten().all(|entry| entry.is_finite());
         if sound { Ok(()) } else { Err(CoreError::Diverged { sample: trajectory.range.end }) }
     }
 
     /// Derivative of the state after the last step of the run by a column.
     pub fn end(&self, ode: &OdeModel, state: usize, column: usize) -> f64 {
-        self.sensitivity[column / GROUP * ode.n_states + state][column % GROUP]
+        self.columns.reached[column / GROUP * ode.n_states + state][column % GROUP]
     }
 
     fn prepare(
@@ -126,16 +124,11 @@ impl TrajectorySensitivity {
             values,
             slopes,
         )?;
-        let n_groups = directions.count().div_ceil(GROUP);
+        let n_groups = self.columns.begin(n, directions.count());
         let leaf_slopes = &self.leaf_slopes;
         let seeds = Seeds { ode, directions, leaf_slopes, n_groups };
         self.rate_pattern = seeds.pattern(&ode.rate_entries);
         self.output_pattern = seeds.pattern(&ode.output_entries);
-        for buffer in [&mut self.sensitivity, &mut self.moved, &mut self.slope, &mut self.sum] {
-            buffer.clear();
-            buffer.resize(n_groups * n, [0.0; GROUP]);
-        }
-        ode.rates.prepare(n_moving, &setting.leaves, &mut self.rates);
         ode.rate_slopes.prepare(n_moving, &setting.leaves, &mut self.slopes);
         ode.output_slopes.prepare(n_moving, &setting.leaves, &mut self.outputs);
         // Four stages of each part of a sample interval, and one at the sample for outputs that
@@ -212,23 +205,30 @@ impl TrajectorySensitivity {
         let ode = trajectory.ode;
         let n = ode.n_states;
         let program = &ode.rate_slopes;
-        if !ode.mass.is_one() {
-            state.iter().enumerate().for_each(|(i, v)| ode.rates.load(n + i, *v, &mut self.rates));
-            driven
-                .iter()
-                .enumerate()
-                .for_each(|(i, v)| ode.rates.load(2 * n + i, *v, &mut self.rates));
-            ode.rates.run(&mut self.rates);
-            self.solve_mass(trajectory, place, slope)?;
-            slope.iter().enumerate().for_each(|(i, v)| program.load(i, *v, &mut self.slopes));
-        }
         state.iter().enumerate().for_each(|(i, v)| program.load(n + i, *v, &mut self.slopes));
         driven.iter().enumerate().for_each(|(i, v)| program.load(2 * n + i, *v, &mut self.slopes));
-        program.run(&mut self.slopes);
-        if ode.mass.is_one() {
-            for (rate, &register) in slope.iter_mut().zip(&ode.residuals) {
-                *rate = self.slopes[register].map(|r| -r);
+        program.run_early(&mut self.slopes);
+        // Residuals at ẋ = 0, then all that depends on the ẋ that they give.
+        (0..n).for_each(|i| program.load(i, [0.0; BLOCK], &mut self.slopes));
+        program.run_late(&mut self.slopes);
+        match &ode.mass {
+            Mass::One => {
+                for (rate, &register) in slope.iter_mut().zip(&ode.slope_residuals) {
+                    *rate = self.slopes[register].map(|r| -r);
+                }
             }
+            Mass::Fixed(_) => {
+                slope.fill([0.0; BLOCK]);
+                for &(row, column, weight) in &trajectory.setting.weights {
+                    let residual = &self.slopes[ode.slope_residuals[column]];
+                    slope[row].iter_mut().zip(residual).for_each(|(k, r)| *k -= weight * r);
+                }
+            }
+            Mass::Moving(_) => self.solve_mass(trajectory, place, slope)?,
+        }
+        if !ode.mass.is_one() {
+            slope.iter().enumerate().for_each(|(i, v)| program.load(i, *v, &mut self.slopes));
+            program.run_late(&mut self.slopes);
         }
         let stage = &mut self.stages[place];
         stage.clear();
@@ -236,6 +236,7 @@ impl TrajectorySensitivity {
         Ok(())
     }
 
+    /// M⁻¹ of every lane, where it moves, and ẋ.
     fn solve_mass(
         &mut self,
         trajectory: &Trajectory<'_>,
@@ -247,100 +248,20 @@ impl TrajectorySensitivity {
         let store = &mut self.masses[place];
         store.clear();
         store.resize(n * n, [0.0; BLOCK]);
-        // Serves every lane where M is fixed; where it moves each lane makes its own.
-        self.inverse.copy_from_slice(&trajectory.setting.inverse_mass);
         for lane in 0..BLOCK {
-            if let Mass::Moving(entries) = &ode.mass {
-                let value = |register: usize| self.rates[register][lane];
-                inverse(entries, n, value, &mut self.scratch, &mut self.inverse)?;
-            }
+            let value = |register: usize| self.slopes[register][lane];
+            inverse(&ode.slope_mass, n, value, &mut self.scratch, &mut self.inverse)?;
             for i in 0..n {
                 let mut sum = 0.0;
                 for j in 0..n {
                     let weight = self.inverse[i * n + j];
                     store[i * n + j][lane] = weight;
-                    sum -= weight * self.rates[ode.residuals[j]][lane];
+                    sum -= weight * self.slopes[ode.slope_residuals[j]][lane];
                 }
                 slope[i][lane] = sum;
             }
         }
         Ok(())
-    }
-
-    /// K of one group of columns at a stage, from the moved sensitivities.
-    fn stage_slopes(
-        &mut self,
-        trajectory: &Trajectory<'_>,
-        place: usize,
-        lane: usize,
-        group: usize,
-        rate: Rate,
-    ) {
-        let n = trajectory.ode.n_states;
-        let stage = &self.stages[place];
-        let own = group * n..(group + 1) * n;
-        let moved = &self.moved[own.clone()];
-        let slope = &mut self.slope[own];
-        slope.fill([0.0; GROUP]);
-        for link in &self.rate_pattern.by_state {
-            let factor = stage[link.entry][lane];
-            let (to, from) = (&mut slope[link.row], &moved[link.from]);
-            for column in 0..GROUP {
-                to[column] -= factor * from[column];
-            }
-        }
-        for force in &self.rate_pattern.forces[group] {
-            // A delay acts through the rate of its input, everything else by itself.
-            let late = force.delayed.map_or(1.0, |input| rate.of(trajectory, input));
-            slope[force.row][force.lane] -= stage[force.entry][lane] * force.factor * late;
-        }
-        if !trajectory.ode.mass.is_one() {
-            let weights = &self.masses[place];
-            let plain: Vec<Many> = slope.to_vec();
-            for i in 0..n {
-                let mut sum = [0.0; GROUP];
-                for (j, entry) in plain.iter().enumerate() {
-                    let weight = weights[i * n + j][lane];
-                    (0..GROUP).for_each(|column| sum[column] += weight * entry[column]);
-                }
-                slope[i] = sum;
-            }
-        }
-    }
-
-    fn advance(&mut self, trajectory: &Trajectory<'_>, sample: usize, part: usize, lane: usize) {
-        let n = trajectory.ode.n_states;
-        let h = trajectory.setting.step_s;
-        let step = sample * trajectory.setting.substeps + part;
-        for group in 0..self.rate_pattern.forces.len() {
-            let own = group * n..(group + 1) * n;
-            for (stage, (place, share)) in STAGES.into_iter().enumerate() {
-                for i in own.clone() {
-                    for column in 0..GROUP {
-                        let k = if stage == 0 { 0.0 } else { self.slope[i][column] };
-                        self.moved[i][column] = self.sensitivity[i][column] + share * h * k;
-                    }
-                }
-                self.stage_slopes(
-                    trajectory,
-                    4 * part + stage,
-                    lane,
-                    group,
-                    Rate::Step(step, place),
-                );
-                for i in own.clone() {
-                    for column in 0..GROUP {
-                        let before = if stage == 0 { 0.0 } else { self.sum[i][column] };
-                        self.sum[i][column] = before + WEIGHTS[stage] * self.slope[i][column];
-                    }
-                }
-            }
-            for i in own {
-                for column in 0..GROUP {
-                    self.sensitivity[i][column] += h / 6.0 * self.sum[i][column];
-                }
-            }
-        }
     }
 
     /// Rows of one sample.
@@ -362,11 +283,17 @@ impl TrajectorySensitivity {
             let own = group * n..(group + 1) * n;
             if ode.outputs_need_rates {
                 // ẋ at the sample itself: S as it stands, between no stages.
-                self.moved[own.clone()].copy_from_slice(&self.sensitivity[own.clone()]);
+                let known = Derivatives {
+                    trajectory,
+                    pattern: &self.rate_pattern,
+                    stages: &self.stages,
+                    masses: &self.masses,
+                    lane,
+                };
                 let place = 4 * trajectory.setting.substeps;
-                self.stage_slopes(trajectory, place, lane, group, Rate::Sample(sample));
+                self.columns.measured(&known, place, sample, group);
             }
-            let (state, slope) = (&self.sensitivity[own.clone()], &self.slope[own]);
+            let (state, slope) = (&self.columns.reached[own], &self.columns.slope[..]);
             let (pattern, first) = (&self.output_pattern, 1 + group * GROUP);
             let width = GROUP.min(n_columns - group * GROUP);
             for (links, from) in [(&pattern.by_state, state), (&pattern.by_rate, slope)] {

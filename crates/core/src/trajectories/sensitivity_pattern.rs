@@ -4,7 +4,7 @@ use crate::state_space::ode_model::OdeModel;
 use crate::tape::derivative_tape::Entry;
 
 /// Derivatives that are carried side by side.
-pub(crate) const GROUP: usize = 4;
+pub(crate) const GROUP: usize = 16;
 
 /// By what a trajectory is differentiated; columns in this order.
 #[derive(Debug, Clone, Copy)]
@@ -48,6 +48,7 @@ pub(crate) struct Link {
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Pattern {
     pub(crate) by_rate: Vec<Link>,
+    /// Row after row.
     pub(crate) by_state: Vec<Link>,
     /// By group of columns.
     pub(crate) forces: Vec<Vec<Force>>,

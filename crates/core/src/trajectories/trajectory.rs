@@ -32,7 +32,7 @@ impl Trajectory<'_> {
 }
 
 /// Where the derivative of an input by its delay is taken.
-#[derive(Clone, Copy)]
+#[derive(Debug, Clone, Copy)]
 pub(crate) enum Rate {
     Step(usize, usize),
     Sample(usize),
