@@ -19,7 +19,7 @@ pub struct Candidates<'a> {
     pub columns: &'a [f64],
     /// Radial functions and the regressors at which they are read, (n_samples × dimension).
     pub radial: Option<(Radial<'a>, &'a [f64])>,
-    /// Whether a selection keeps all of them beside, in single precision, and reads those.
+    /// Whether a selection keeps all of them beside, in sixteen bits, and reads those.
     pub rounded: bool,
     /// Length of a column.
     pub n_samples: usize,

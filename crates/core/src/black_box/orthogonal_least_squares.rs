@@ -3,7 +3,7 @@
 //!
 //! For every candidate p_j the squared length a_j and the product b_j = w_jᵀy of its part w_j that is
 //! orthogonal to the chosen terms are kept; a new direction q changes them by r_j = qᵀp_j alone, so
-//! the candidates are read and never written: in single precision (`rounded_columns.rs`), after which
+//! the candidates are read and never written: in sixteen bits (`rounded_columns.rs`), after which
 //! those that may be the best within the bounds of its errors are worked out in double; or where they
 //! are computed at each reading, for several terms at a time (`look_ahead.rs`). A penalty λ_j on a term's squared coefficient along w_j shrinks it by a_j/(a_j + λ_j).
 //!
@@ -17,7 +17,7 @@ use crate::black_box::candidates::Candidates;
 use crate::black_box::look_ahead::{LookAhead, Progress};
 use crate::black_box::radial_basis::require_finite;
 use crate::black_box::remainder::Remainder;
-use crate::black_box::rounded_columns::{RoundedColumns, round};
+use crate::black_box::rounded_columns::{RoundedColumns, Whole, round};
 use crate::black_box::stop_rule::Path;
 use crate::black_box::stop_rule::Stop;
 use crate::error::CoreError;
@@ -57,7 +57,7 @@ pub struct Selection {
 
 struct State<'a> {
     candidates: &'a Candidates<'a>,
-    /// What is left of the candidates, in single precision; None where they are computed when read.
+    /// What is left of the candidates, in sixteen bits; None where they are computed when read.
     rounded: Option<RoundedColumns>,
     remainders: Vec<Remainder>,
     directions: Vec<Vec<f64>>,
@@ -158,24 +158,25 @@ impl<'a> State<'a> {
         true
     }
 
-    /// Products of the newest direction, that of candidate `index`, with the open candidates.
-    fn share(&self, index: usize, ahead: &mut LookAhead) -> Vec<f64> {
+    /// Products of the newest direction, that of candidate `index`, with the open candidates, and the
+    /// length of what they miss of it.
+    fn share(&self, index: usize, ahead: &mut LookAhead) -> (Vec<f64>, f64) {
         let open = |index: usize| self.remainders[index].open;
         match (&self.rounded, self.directions.last()) {
             (Some(columns), Some(newest)) => columns.products(newest, open),
-            _ => ahead.share(index, &self.progress()),
+            _ => (ahead.share(index, &self.progress()), 0.0),
         }
     }
 
     /// Take the newest direction out of every open candidate, whose products with it are given.
-    fn deflate(&mut self, share: Vec<f64>) {
+    fn deflate(&mut self, (share, blurred): (Vec<f64>, f64)) {
         let Some(&gain) = self.gains.last() else { return };
         let vector = Vector { candidates: self.candidates, directions: &self.directions };
         let residual = &self.unpenalised;
         let each = self.remainders.par_iter_mut().zip(&share).enumerate();
         // Errors of the shares lie along the directions: b does not see them, a to second order.
         let restore = |(index, (candidate, r)): (usize, (&mut Remainder, &f64)), rounded| {
-            candidate.deflate(*r, gain);
+            candidate.deflate(*r, gain, blurred);
             if candidate.open && candidate.lost() {
                 vector.restore(index, candidate, residual, rounded);
             }
@@ -231,7 +232,7 @@ impl Vector<'_> {
         index: usize,
         candidate: &mut Remainder,
         residual: &[f64],
-        rounded: Option<(&mut [f32], &mut f64)>,
+        rounded: Option<(&mut [Whole], &mut f64)>,
     ) {
         let mut w = self.candidates.column(index, &mut Vec::new()).to_vec();
         let shares: Vec<f64> = self.directions.iter().map(|q| dot(q, &w)).collect();

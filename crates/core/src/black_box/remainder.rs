@@ -62,12 +62,14 @@ impl Remainder {
         self.length_doubt == 0.0 && self.product_doubt == 0.0
     }
 
-    /// Take out a direction whose products with the candidate and the target are given.
-    pub fn deflate(&mut self, share: f64, gain: f64) {
+    /// Take out a direction whose products with the candidate and the target are given; `blurred` is
+    /// the length of what that with the candidate misses of the direction.
+    pub fn deflate(&mut self, share: f64, gain: f64, blurred: f64) {
+        let missed = self.missed + blurred * self.exact.sqrt();
         self.length -= share * share;
         self.product -= share * gain;
-        self.length_doubt += self.missed * (2.0 * share.abs() + self.missed);
-        self.product_doubt += self.missed * gain.abs();
+        self.length_doubt += missed * (2.0 * share.abs() + missed);
+        self.product_doubt += missed * gain.abs();
     }
 
     /// Whether the squared length has lost digits that only the vector itself brings back.

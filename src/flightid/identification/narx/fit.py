@@ -42,7 +42,7 @@ from flightid.uncertainty.agreement import AgreementTest
 from flightid.uncertainty.estimate import Estimate
 
 Array = NDArray[np.float64]
-# Candidates beyond this in single precision are computed when they are read instead of being kept.
+# Candidates beyond this in sixteen bits are computed when they are read instead of being kept.
 MAXIMUM_BYTES = 1 << 30
 OF_FREE_RUNS = "weights minimise errors of free runs: they have no standard errors"
 MORE_TERMS = "allow more lags or terms (maximum_terms), check the delay, or look for feedback"
@@ -320,7 +320,7 @@ def _select(model: NarxStructure, candidates: CandidateTerms, data: Regressors) 
                 candidates.centres(data.vectors.shape[1]),
                 model.kernel or "gaussian",
                 model.beta,
-                4 * len(candidates.terms) * target.size <= MAXIMUM_BYTES,
+                2 * len(candidates.terms) * target.size <= MAXIMUM_BYTES,
                 forced,
                 model.stop,
                 model.goal,

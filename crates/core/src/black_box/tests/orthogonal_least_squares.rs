@@ -250,7 +250,7 @@ fn products_found_ahead_are_those_of_the_directions() {
             let error = (share[j] - exact).abs() / dot(column, column).sqrt();
             assert!(error < 1e-14, "{error}");
         }
-        state.deflate(share);
+        state.deflate((share, 0.0));
     }
     assert!(ahead.reads() < 25, "the candidates were read {} times", ahead.reads());
 }
