@@ -1,6 +1,8 @@
 //! Polynomials in the delay operator q⁻¹ applied to signals, from rest. (Python side:
 //! models/polynomial/model.py)
 
+use crate::numerics::gram_schmidt::subtract;
+
 /// p(q) x delayed by `delay` samples, added to `out` with a factor.
 pub fn add_product(factor: f64, polynomial: &[f64], delay: usize, x: &[f64], out: &mut [f64]) {
     for (power, &coefficient) in polynomial.iter().enumerate() {
@@ -8,9 +10,7 @@ pub fn add_product(factor: f64, polynomial: &[f64], delay: usize, x: &[f64], out
         if weight == 0.0 || shift >= out.len() {
             continue;
         }
-        for (value, &sample) in out[shift..].iter_mut().zip(x) {
-            *value += weight * sample;
-        }
+        subtract(&mut out[shift..], -weight, x);
     }
 }
 

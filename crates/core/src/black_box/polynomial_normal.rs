@@ -6,7 +6,7 @@
 //! Reference: the covariance method of linear prediction, Makhoul (1975), Proc. IEEE 63, section II.
 
 use crate::black_box::polynomial_predictor::{Column, Derivatives};
-use crate::numerics::householder::dot;
+use crate::numerics::gram_schmidt::dot;
 
 const CHUNK: usize = 2048;
 /// A pivot that lost this much of its column leaves the normal equations without digits.

@@ -9,7 +9,8 @@
 use crate::black_box::digital_filter::{add_product, divide, divide_together};
 use crate::black_box::polynomial_orders::Orders;
 use crate::error::CoreError;
-use crate::numerics::householder::{dot, norm};
+use crate::numerics::gram_schmidt::dot;
+use crate::numerics::householder::norm;
 
 /// The polynomials in q⁻¹; all but B start with one.
 #[derive(Debug, Clone)]
