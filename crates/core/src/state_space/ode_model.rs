@@ -109,17 +109,9 @@ impl OdeModel {
         let outputs = Program::new(&tape, &output_registers, 0, n_moving);
         let both = [registers(&output_entries), output_registers.clone()].concat();
         let output_slopes = Program::new(&tape, &both, 0, n_moving);
-        let fixed = |entries: &[Entry], program: &Program| {
-            entries.iter().all(|e| e.column >= n_moving || !program.moves(e.register))
-        };
         let affine = !matches!(mass, Mass::Moving(_))
-            && fixed(&rate_entries, &rate_slopes)
-            && fixed(&output_entries, &output_slopes);
-        // From registers of the tape to places of the programs.
-        let placed = |entries: &[Entry], program: &Program| -> Vec<Entry> {
-            let at = |e: &Entry| Entry { register: program.place(e.register), ..*e };
-            entries.iter().map(at).collect()
-        };
+            && fixed(&rate_entries, &rate_slopes, n_moving)
+            && fixed(&output_entries, &output_slopes, n_moving);
         let all = |registers: &[usize], program: &Program| -> Vec<usize> {
             registers.iter().map(|&register| program.place(register)).collect()
         };
@@ -182,6 +174,16 @@ impl OdeModel {
     pub fn n_parameters(&self) -> usize {
         self.n_parameters
     }
+}
+
+/// Whether derivatives by what moves are the same everywhere; registers are those of the tape.
+fn fixed(entries: &[Entry], program: &Program, n_moving: usize) -> bool {
+    entries.iter().all(|e| e.column >= n_moving || !program.moves(e.register))
+}
+
+/// Entries with places of a program instead of registers of the tape.
+fn placed(entries: &[Entry], program: &Program) -> Vec<Entry> {
+    entries.iter().map(|e| Entry { register: program.place(e.register), ..*e }).collect()
 }
 
 /// Part of the tape that depends on parameters alone (its outputs: leaves, then what stands after the

@@ -37,7 +37,7 @@ Real = NDArray[np.float64]
 Places = NDArray[np.intp]
 
 
-class Composed(Protocol):
+class SensitiveComposite(Protocol):
     """A composite of window lengths."""
 
     @property
@@ -53,13 +53,13 @@ class WindowedErrors(JointErrors):
     ----------
     windows : WindowWeights
     sample_time_s : float
-    composite : Composed
+    composite : SensitiveComposite
     known_noise : NoiseSpectrum or NoiseOfRecords
     """
 
     windows: WindowWeights
     sample_time_s: float
-    composite: Composed
+    composite: SensitiveComposite
     known_noise: NoiseSpectrum | NoiseOfRecords
 
     @property
