@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from flightid import _native
@@ -20,6 +19,7 @@ from flightid.excitation.checks import (
     whole_samples,
 )
 from flightid.excitation.excitation import Excitation
+from flightid.recursive_filter import filtered
 
 C1, C2 = 4.0, 0.0187
 """Growth of the sweep (Tischler & Remple, section 5.11); C2 (exp C1 - 1) is 1.002."""
@@ -266,4 +266,4 @@ def _coloured_noise(count: int, cutoff_rad: float, seed: int) -> NDArray[np.floa
     """First-order low-passed Gaussian noise of unit deviation; cutoff in rad per sample."""
     pole = math.exp(-cutoff_rad)
     white = np.random.default_rng(seed).standard_normal(count)
-    return np.asarray(math.sqrt(1 - pole**2) * scipy.signal.lfilter([1.0], [1.0, -pole], white))
+    return np.asarray(math.sqrt(1 - pole**2) * filtered([1.0], [1.0, -pole], white))

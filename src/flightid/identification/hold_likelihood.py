@@ -29,6 +29,7 @@ from flightid.identification.records.setup import OwnNumbers, RecordSet, prepare
 from flightid.models import GreyBoxModel
 from flightid.record import Record
 from flightid.record.hold import InputHold
+from flightid.recursive_filter import filtered
 from flightid.responses import FrequencyResponse
 from flightid.uncertainty.foretold import expected_gain, likelihood_gain
 from flightid.uncertainty.triangle import triangle_of_parts
@@ -167,10 +168,7 @@ def _whitened(values: Array, filters: Sequence[Array] | None) -> Array:
     if filters is None:
         return values
     return np.stack(
-        [
-            scipy.signal.lfilter(f, [1.0], row, axis=0)
-            for f, row in zip(filters, values, strict=True)
-        ]
+        [filtered(f, [1.0], row, axis=0) for f, row in zip(filters, values, strict=True)]
     )
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from flightid.errors import DataError
 from flightid.identification.prediction_error.linear_regression import regress
+from flightid.recursive_filter import filtered
 from flightid.review.kernel_posterior import kernel_draws
 
 Array = NDArray[np.float64]
@@ -71,7 +72,7 @@ class LoopDraws:
         """
         ones = np.ones(count)
         rows = zip(self.numerators, self.denominators, strict=True)
-        return np.array([scipy.signal.lfilter(b, a, ones) for b, a in rows])
+        return np.array([filtered(b, a, ones) for b, a in rows])
 
     def response(self, omega_rad_s: Array) -> NDArray[np.complex128]:
         """Frequency responses, shape (1 + draws, n_omega)."""

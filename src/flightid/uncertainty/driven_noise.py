@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
+
+from flightid.recursive_filter import filtered_from
 
 Array = NDArray[np.float64]
 AT_ONCE = 1 << 14
@@ -44,14 +45,14 @@ def driven_products(columns: Array, denominator: Array) -> Array:
     state, found = np.zeros((count, order)), np.zeros((count, count))
     for begin in range(0, len(columns), AT_ONCE):
         rows = np.ascontiguousarray(columns[begin : begin + AT_ONCE].T)
-        made, state = scipy.signal.lfilter([1.0], denominator, rows, zi=state)
+        made, state = filtered_from([1.0], denominator, rows, state)
         found += made @ made.T
     ringing = _ringing(denominator)
     if ringing is not None:
         return np.asarray(found + state @ ringing @ state.T)
     silent = np.zeros((count, AT_ONCE))
     for _ in range(LONGEST):
-        made, state = scipy.signal.lfilter([1.0], denominator, silent, zi=state)
+        made, state = filtered_from([1.0], denominator, silent, state)
         rest = made @ made.T
         found += rest
         if np.trace(rest) <= TOLD * np.trace(found):

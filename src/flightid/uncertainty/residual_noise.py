@@ -17,6 +17,7 @@ import scipy
 from numpy.typing import NDArray
 
 from flightid._native import autoregression_weights
+from flightid.recursive_filter import filtered_from, state_after
 from flightid.uncertainty.driven_noise import driven_products
 from flightid.uncertainty.fitted_directions import FittedDirections, WhiteNoiseLoss
 from flightid.uncertainty.periodograms import leaking, pooled, transform_length
@@ -84,9 +85,9 @@ class Autoregression:
         if order:
             # Beyond its order the model continues its autocovariance by its own recursion.
             denominator = np.concatenate(([1.0], -self.weights))
-            state = scipy.signal.lfiltic([1.0], denominator, y=result[order:0:-1])
-            result[order + 1 :] = scipy.signal.lfilter(
-                [1.0], denominator, np.zeros(n_lags - order - 1), zi=state
+            state = state_after(denominator, result[order:0:-1])
+            result[order + 1 :] = filtered_from(
+                [1.0], denominator, np.zeros(n_lags - order - 1), state
             )[0]
         return result
 

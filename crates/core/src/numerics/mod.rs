@@ -10,6 +10,7 @@ pub mod levinson;
 pub mod matrix_exponential;
 pub mod polynomial_roots;
 pub mod random;
+pub mod recursive_filter;
 pub mod running_median;
 pub mod span_hashes;
 pub mod sparse_lu;

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-import scipy
 from numpy.typing import ArrayLike
 
 from flightid.control.autopilots.axis_loop import AxisLoop
@@ -27,6 +26,7 @@ from flightid.control.autopilots.parameter_files import GainChange
 from flightid.control.autopilots.parameter_table import Axis, AxisParameters
 from flightid.control.gyro import Gyro
 from flightid.errors import DataError, OptionError
+from flightid.recursive_filter import filtered
 
 P_SCALE, I_SCALE, D_SCALE = 0.032029, 0.244381, 0.000529
 """PTERM_SCALE, ITERM_SCALE and DTERM_SCALE: PID sum over deg/s for a gain of one."""
@@ -168,7 +168,7 @@ class BetaflightLoop(AxisLoop):
         if self.relax is None:
             return error, error
         weight = one_pole_weight(self.relax.cutoff_hz, self.loop_rate_hz)
-        slow = scipy.signal.lfilter([weight], [1.0, weight - 1.0], setpoint)
+        slow = filtered([weight], [1.0, weight - 1.0], setpoint)
         fast = np.abs(setpoint - slow)
         if self.relax.by_setpoint:
             relaxed = error * np.maximum(0.0, 1.0 - fast / math.radians(RELAX_DEG_S))
@@ -202,12 +202,12 @@ class BetaflightLoop(AxisLoop):
         for stage in self.stages:
             if stage.path == "derivative":
                 for b0, b1, b2, a1, a2 in stage.sections:
-                    smooth = scipy.signal.lfilter([b0, b1, b2], [1.0, a1, a2], smooth)
+                    smooth = filtered([b0, b1, b2], [1.0, a1, a2], smooth)
         slope = np.diff(smooth, prepend=0.0) * rate_hz
         step = self.unit_of("i") * self.values["i"] / rate_hz
         counted, freely = self._integrated(setpoint, rate)
         terms = {
-            "P": scipy.signal.lfilter([weight], [1.0, weight - 1.0], gain * error),
+            "P": filtered([weight], [1.0, weight - 1.0], gain * error),
             "I": _clamped_sum(step * counted, step * freely, self.integral_limit),
             "D": -self.unit_of("d") * self.values["d"] * self.throttle_shares[1] * slope,
         }

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from flightid.identification.prediction_error.linear_regression import reflected
+from flightid.recursive_filter import filtered
 
 Array = NDArray[np.float64]
 ROUNDS = 8
@@ -42,9 +42,7 @@ class DelayedSignals:
     def filtered(self, top: Array, below: Array) -> Array:
         """Output and inputs of every record through one filter."""
         with np.errstate(over="ignore", invalid="ignore"):
-            return np.hstack(
-                [scipy.signal.lfilter(top, below, self.rows[:, span]) for span in self.spans]
-            )
+            return np.hstack([filtered(top, below, self.rows[:, span]) for span in self.spans])
 
 
 def criterion(squares: float, n: int, numbers: int) -> float:
@@ -156,7 +154,7 @@ class _Profile:
         """Change of the denominator by one linearisation."""
         wide = []
         for simulated, shared in zip(self.simulated, self.shared, strict=True):
-            slope = scipy.signal.lfilter([1.0], self.below, simulated)
+            slope = filtered([1.0], self.below, simulated)
             moved = np.array([-_late(slope, lag, skip) for lag in range(1, order + 1)]).T
             wide.append(np.hstack([moved, shared]))
         return _solved(self.own, wide, self.residuals)[0][:order]
@@ -169,9 +167,9 @@ def _late(row: Array, lag: int, skip: int) -> Array:
 def _simulated(rows: Array, delays: Sequence[int], above: Array, start: Array) -> Array:
     """Output of a record from its inputs and pulse, all behind the denominator."""
     _, *inputs, pulse = rows
-    made = scipy.signal.lfilter(start, [1.0], pulse)
+    made = filtered(start, [1.0], pulse)
     for row, late, b in zip(inputs, delays, np.split(above, len(delays)), strict=True):
-        made = made + scipy.signal.lfilter(np.pad(b, (late, 0)), [1.0], row)
+        made = made + filtered(np.pad(b, (late, 0)), [1.0], row)
     return np.asarray(made)
 
 

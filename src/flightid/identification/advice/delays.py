@@ -236,7 +236,7 @@ class _ArxScan:
         if whole <= 0.0 or free < 1:
             return without > whole
         ratio = (without - whole) / self.span / (whole / free)
-        return float(scipy.stats.f.sf(ratio, self.span, free)) < LEVEL / self.n_inputs
+        return float(scipy.special.fdtrc(self.span, free, ratio)) < LEVEL / self.n_inputs
 
     def best(self, place: int) -> int:
         """Delay of the best structure, the other inputs with all their lags."""

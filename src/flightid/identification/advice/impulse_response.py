@@ -23,6 +23,7 @@ from flightid.models.polynomial.structure import KERNELS
 from flightid.models.sampled.channels import SampledChannels, gather_channels
 from flightid.record import Record
 from flightid.record.several import as_records
+from flightid.recursive_filter import filtered
 from flightid.result import Result
 from flightid.table import Column, Table
 from flightid.uncertainty.quantiles import half_width
@@ -227,7 +228,7 @@ def impulse_response(
     Example
     -------
     >>> u = np.random.default_rng(0).standard_normal(800)
-    >>> y = scipy.signal.lfilter([0.0, 0.0, 0.0, 1.0], [1.0, -0.7], u)
+    >>> y = filtered([0.0, 0.0, 0.0, 1.0], [1.0, -0.7], u)
     >>> y += 0.1 * np.random.default_rng(1).standard_normal(800)
     >>> record = Record.from_arrays(np.arange(800) / 50, inputs={"u": u}, outputs={"y": y})
     >>> impulse_response(record).delays
@@ -355,7 +356,7 @@ def _estimate(
     left, start = np.array(data.output), first.shortest
     for i, row in enumerate(data.inputs):
         for span in data.spans:
-            left[span] -= scipy.signal.lfilter(start[i * n : (i + 1) * n], [1.0], row[span])
+            left[span] -= filtered(start[i * n : (i + 1) * n], [1.0], row[span])
     inside = np.concatenate([left[span][n - 1 :] for span in data.spans])
     lengths = [length - n + 1 for length in data.lengths]
     noise = regress(
@@ -364,7 +365,7 @@ def _estimate(
     whitener = np.concatenate([[1.0], noise])
     signals = np.vstack([data.output, data.inputs])
     for span in data.spans:
-        signals[:, span] = scipy.signal.lfilter(whitener, [1.0], signals[:, span])
+        signals[:, span] = filtered(whitener, [1.0], signals[:, span])
     final = regress_lags(
         signals[0], signals[1:], data.lengths, n, n - 1 + WHITENER, levels=data.levels
     )

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from flightid import _native
 from flightid.errors import FitError
 from flightid.models.polynomial.model import PolynomialModel
 from flightid.models.sampled.channels import SampledChannels
+from flightid.recursive_filter import filtered
 
 Array = NDArray[np.float64]
 FORGOTTEN = 1e-8
@@ -48,7 +48,7 @@ def backcast(model: PolynomialModel, data: SampledChannels) -> list[list[float]]
     for span in data.spans:
         disturbance = np.array(data.output[span])
         for name, row in zip(model.inputs, data.inputs, strict=True):
-            disturbance -= scipy.signal.lfilter(*model.transfer(name), row[span])
+            disturbance -= filtered(*model.transfer(name), row[span])
         noise = _past(disturbance, above, below, reach, of_noise)
         found.append([0.0] * sum(of_inputs) + noise.tolist())
     return found
@@ -56,10 +56,10 @@ def backcast(model: PolynomialModel, data: SampledChannels) -> list[list[float]]
 
 def _past(disturbance: Array, above: Array, below: Array, reach: int, count: int) -> Array:
     """What the disturbance and errors before the record add to C e at its first samples."""
-    backwards = scipy.signal.lfilter(below, above, disturbance[::-1])
-    longer = scipy.signal.lfilter(above, below, np.concatenate([backwards, np.zeros(reach)]))
+    backwards = filtered(below, above, disturbance[::-1])
+    longer = filtered(above, below, np.concatenate([backwards, np.zeros(reach)]))
     before = longer[disturbance.size :][::-1]
-    errors = scipy.signal.lfilter(below, above, before)
+    errors = filtered(below, above, before)
     added = np.zeros(count)
     for t in range(count):
         for j in range(t + 1, below.size):

@@ -11,12 +11,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from flightid import _native
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.models.sampled.channels import SampledChannels
+from flightid.recursive_filter import filtered
 from flightid.uncertainty.blocks import RecordBlock
 from flightid.uncertainty.coloured_residuals import (
     ResidualCovariance,
@@ -83,7 +83,7 @@ def output_error_covariance(
         block = RecordBlock.of(shared[None], own[None], rest[None])
         if own_of_noise:
             weighed = _weighed(structure, theta, shared, own, skip)
-            turned = scipy.signal.lfilter(*noise_filter(structure, theta), weighed[::-1], axis=0)
+            turned = filtered(*noise_filter(structure, theta), weighed[::-1], axis=0)
             block = RecordBlock.of(turned[None, ::-1], own[None], rest[None])
             block = replace(block, answering=shared)
         blocks.append(block)
@@ -100,7 +100,7 @@ def answers(
     """
     above, below = noise_filter(structure, theta)[::-1]
     of_vehicle = theta[[name[0] in "bf" for name in structure.names]]
-    left = [scipy.signal.lfilter(above, below, errors[span]) for span in data.spans]
+    left = [filtered(above, below, errors[span]) for span in data.spans]
     size = float(np.sqrt(np.mean(np.concatenate(left) ** 2))) or 1.0
     found = []
     for span, rest in zip(data.spans, left, strict=True):
@@ -160,8 +160,7 @@ def _whitened(
     and what D/C leaves of several behind the reach of D is one direction, C's own.
     """
     shared, own = (
-        scipy.signal.lfilter(*noise_filter(structure, theta), part, axis=0)
-        for part in (shared, own)
+        filtered(*noise_filter(structure, theta), part, axis=0) for part in (shared, own)
     )
     return RecordBlock.of(shared[None], own[None], np.zeros((1, len(shared))))
 
@@ -181,7 +180,7 @@ def _weighed(
     if not count:
         return whitened.projected
     impulses = np.eye(len(shared), count)
-    before = scipy.signal.lfilter([1.0], noise_filter(structure, theta)[1], impulses, axis=0)
+    before = filtered([1.0], noise_filter(structure, theta)[1], impulses, axis=0)
     taken = _independent(np.hstack([whitened.basis, before]))
     return np.asarray(whitened.projected - taken @ (taken.T @ whitened.projected))
 
@@ -204,20 +203,20 @@ def _sensitivities(
     numerators, denominators = _polynomials(structure, theta)
     driven, starts = [], []
     for row, b, f in zip(inputs, numerators, denominators, strict=True):
-        driven.append(scipy.signal.lfilter(b, f, row))
+        driven.append(filtered(b, f, row))
         reach = min(max(b.size - 1, f.size - 1), n)
         impulses = np.zeros((n, reach))
         impulses[np.arange(reach), np.arange(reach)] = 1.0
-        starts.append(scipy.signal.lfilter([1.0], f, impulses, axis=0))
+        starts.append(filtered([1.0], f, impulses, axis=0))
     own = np.concatenate([*starts, level], axis=1)
     shares = np.linalg.lstsq(own, modelled - np.sum(driven, axis=0), rcond=INDEPENDENT)[0]
     of_b, turned, first = [], [], 0
     for i, (row, b, f) in enumerate(zip(inputs, numerators, denominators, strict=True)):
         whole = driven[i] + starts[i] @ shares[first : first + starts[i].shape[1]]
         first += starts[i].shape[1]
-        moved = scipy.signal.lfilter([1.0], f, row)
+        moved = filtered([1.0], f, row)
         of_b += [_late(moved, lag) for lag in range(structure.nk[i], b.size)]
-        turned.append(scipy.signal.lfilter([1.0], f, whole))
+        turned.append(filtered([1.0], f, whole))
     if structure.is_common:
         turned = [np.sum(turned, axis=0)]
     degrees = structure.degrees_of_f

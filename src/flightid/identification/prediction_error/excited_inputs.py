@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from flightid.identification.prediction_error.linear_regression import reflected, regress
@@ -14,6 +13,7 @@ from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.models.sampled.channels import SampledChannels
 from flightid.record import Record
 from flightid.record.hold import common_loop
+from flightid.recursive_filter import filtered
 
 Array = NDArray[np.float64]
 LONGEST, ROWS_PER_COEFFICIENT = 30, 20
@@ -77,5 +77,5 @@ def _driven(row: Array, injected: Array, data: SampledChannels, degree: int) -> 
     made = np.zeros_like(row)
     for moved, above in zip(injected, np.split(theta[degree:], n), strict=True):
         for span in data.spans:
-            made[span] += scipy.signal.lfilter(above, below, moved[span])
+            made[span] += filtered(above, below, moved[span])
     return made

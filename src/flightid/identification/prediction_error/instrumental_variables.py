@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from flightid.errors import DataError
@@ -19,6 +18,7 @@ from flightid.identification.prediction_error.linear_regression import (
 )
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.models.sampled.channels import SampledChannels
+from flightid.recursive_filter import filtered
 from flightid.uncertainty.coloured_residuals import ResidualCovariance
 
 Array = NDArray[np.float64]
@@ -57,7 +57,7 @@ def four_stage(
 
 
 def _filtered(above: Array, below: Array, row: Array, spans: Sequence[slice]) -> Array:
-    return np.concatenate([scipy.signal.lfilter(above, below, row[span]) for span in spans])
+    return np.concatenate([filtered(above, below, row[span]) for span in spans])
 
 
 def _numerators(structure: PolynomialStructure, theta: Array) -> list[Array]:

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from flightid.errors import FitError
@@ -18,6 +17,7 @@ from flightid.identification.prediction_error.linear_regression import (
 )
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.models.sampled.channels import SampledChannels
+from flightid.recursive_filter import filtered
 
 Array = NDArray[np.float64]
 ROUNDS = 8
@@ -91,11 +91,9 @@ def _long_model(
     b = [theta[length * (i + 1) : length * (i + 2)] for i in range(n_inputs)]
     innovations = np.zeros_like(data.output)
     for span in data.spans:
-        part = scipy.signal.lfilter(a, [1.0], data.output[span])
+        part = filtered(a, [1.0], data.output[span])
         for row, numerator, delay in zip(data.inputs, b, structure.nk, strict=True):
-            part -= scipy.signal.lfilter(
-                np.concatenate([np.zeros(delay), numerator]), [1.0], row[span]
-            )
+            part -= filtered(np.concatenate([np.zeros(delay), numerator]), [1.0], row[span])
         part[: length + max([0, *structure.nk])] = 0.0
         innovations[span] = part
     return innovations, a, b
@@ -137,7 +135,7 @@ def _whitened(data: SampledChannels, long_a: Array) -> SampledChannels:
     """Channels through what makes a long model's noise white, the start of each record cut off."""
     first = long_a.size - 1
     rows = [
-        scipy.signal.lfilter(long_a, [1.0], np.vstack([data.output, data.inputs])[:, span])
+        filtered(long_a, [1.0], np.vstack([data.output, data.inputs])[:, span])
         for span in data.spans
     ]
     kept = np.hstack([row[:, first:] for row in rows])
@@ -182,9 +180,7 @@ def _reduced(
     pulses = np.zeros((m, m, length))
     pulses[range(m), range(m), 0] = sizes / np.max(sizes)
     with np.errstate(over="ignore", invalid="ignore"):
-        responses = np.array(
-            [scipy.signal.lfilter(b, long_a, pulses[i, i]) for i, b in enumerate(long_b)]
-        )
+        responses = np.array([filtered(b, long_a, pulses[i, i]) for i, b in enumerate(long_b)])
     size = np.max(np.abs(responses), axis=1)
     ended = np.abs(responses[:, -1]) <= 0.5 * size
     if min(nb) == 0 or not np.all(np.isfinite(size) & (size > 0.0) & ended):
@@ -236,7 +232,7 @@ def _steiglitz_mcbride(
         below = reflected(np.concatenate([[1.0], f]))
         signals = np.vstack([output, inputs])
         for first, last in pairwise(ends):
-            signals[:, first:last] = scipy.signal.lfilter([1.0], below, signals[:, first:last])
+            signals[:, first:last] = filtered([1.0], below, signals[:, first:last])
         # Filters at the edge of stability leave no equations: what was found before stands.
         if not np.max(np.abs(signals)) < LARGEST:
             break
@@ -258,19 +254,16 @@ def _noise(
         return np.zeros(0), np.zeros(0)
     left = np.zeros_like(data.output)
     for span in data.spans:
-        part = scipy.signal.lfilter(np.concatenate([[1.0], plant.a]), [1.0], data.output[span])
+        part = filtered(np.concatenate([[1.0], plant.a]), [1.0], data.output[span])
         for row, (b, f), k in zip(data.inputs, plant.responses, structure.nk, strict=True):
             below = reflected(np.concatenate([[1.0], f]))
-            part -= scipy.signal.lfilter(np.concatenate([np.zeros(k), b]), below, row[span])
+            part -= filtered(np.concatenate([np.zeros(k), b]), below, row[span])
         left[span] = part
     none = np.empty((0, left.size))
     length = max(1, min(20 + 2 * (nc + nd), min(data.lengths) // 4))
     long_d = regress(left, none, data.lengths, length, [], [], levels=data.levels).shortest
     innovations = np.concatenate(
-        [
-            scipy.signal.lfilter(np.concatenate([[1.0], long_d]), [1.0], left[span])
-            for span in data.spans
-        ]
+        [filtered(np.concatenate([[1.0], long_d]), [1.0], left[span]) for span in data.spans]
     )
     theta = regress(
         left, innovations[None], data.lengths, nd, [nc], [1], levels=data.levels

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from flightid import _native
 from flightid.models.polynomial.polynomials import Polynomials
+from flightid.recursive_filter import filtered
 
 Array = NDArray[np.float64]
 
@@ -39,8 +39,8 @@ def ahead(
     above, below = model.noise_transfer
     impulse = np.zeros(horizon)
     impulse[0] = 1.0
-    young = scipy.signal.lfilter(above, below, impulse)
-    return np.asarray(output - scipy.signal.lfilter(young, [1.0], errors))
+    young = filtered(above, below, impulse)
+    return np.asarray(output - filtered(young, [1.0], errors))
 
 
 def forced_run(model: Polynomials, inputs: Array) -> Array:
@@ -48,7 +48,7 @@ def forced_run(model: Polynomials, inputs: Array) -> Array:
     run = np.zeros(inputs.shape[1])
     with np.errstate(over="ignore", invalid="ignore"):
         for name, row in zip(model.inputs, inputs, strict=True):
-            run += scipy.signal.lfilter(*model.transfer(name), row)
+            run += filtered(*model.transfer(name), row)
     return run
 
 
@@ -62,7 +62,7 @@ def free_motion(model: Polynomials, n_samples: int) -> Array:
     if below.size == 1:
         return impulse
     with np.errstate(over="ignore", invalid="ignore"):
-        return np.asarray(scipy.signal.lfilter([1.0], below, impulse))
+        return np.asarray(filtered([1.0], below, impulse))
 
 
 def motion_from(model: Polynomials, past: Array, n_samples: int) -> Array:
@@ -74,7 +74,7 @@ def motion_from(model: Polynomials, past: Array, n_samples: int) -> Array:
     count = min(past.size, n_samples)
     impulse[:count] = past[:count]
     with np.errstate(over="ignore", invalid="ignore"):
-        return np.asarray(scipy.signal.lfilter([1.0], below, impulse))
+        return np.asarray(filtered([1.0], below, impulse))
 
 
 def free_run(model: Polynomials, output: Array, inputs: Array, *, initial_state: str) -> Array:

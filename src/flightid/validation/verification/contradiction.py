@@ -91,7 +91,7 @@ def _judged(
     known = _by_parameters(source, way, run, request, name)
     own += known or 0.0
     freedom = (independent_samples([error]), float(left["independent_samples"]))
-    chance = float(scipy.stats.f.sf(size / max(own, np.finfo(float).tiny), *freedom))
+    chance = float(scipy.special.fdtrc(*freedom, size / max(own, np.finfo(float).tiny)))
     if not _is_beyond(size, own, power) or chance > FALSE_ALARMS:
         return None
     share = (size - own) / power
