@@ -16,9 +16,11 @@ SYMBOLS = {
     "cdeg": (pi / 18000.0, {"radian": 1}),
     "deg": (pi / 180.0, {"radian": 1}),
     "ft": (0.3048, {"meter": 1}),
+    "h": (3600.0, {"second": 1}),
     "in": (0.0254, {"meter": 1}),
     "kg": (1.0, {"kilogram": 1}),
     "m": (1.0, {"meter": 1}),
+    "mA": (0.001, {"ampere": 1}),
     "ms": (0.001, {"second": 1}),
     "N": (1.0, {"kilogram": 1, "meter": 1, "second": -2}),
     "Pa": (1.0, {"kilogram": 1, "meter": -1, "second": -2}),
@@ -29,9 +31,9 @@ SYMBOLS = {
 }
 """Factor to SI base units and the radian, and powers of those."""
 NAMES = {
-    "A": "ampere", "cdeg": "centidegree", "deg": "degree", "ft": "foot", "in": "inch",
-    "kg": "kilogram", "m": "meter", "ms": "millisecond", "N": "newton", "Pa": "pascal",
-    "rad": "radian", "s": "second", "µs": "microsecond", "V": "volt",
+    "A": "ampere", "cdeg": "centidegree", "deg": "degree", "ft": "foot", "h": "hour",
+    "in": "inch", "kg": "kilogram", "m": "meter", "mA": "milliampere", "ms": "millisecond",
+    "N": "newton", "Pa": "pascal", "rad": "radian", "s": "second", "µs": "microsecond", "V": "volt",
 }  # fmt: skip
 """By whose order the canonical spelling goes."""
 SHORT = {"us": "µs"} | {name: symbol for symbol, name in NAMES.items()}

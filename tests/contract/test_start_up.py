@@ -45,3 +45,11 @@ def test_inspect_loads_what_it_uses(tmp_path: Path) -> None:
     found = loaded("--quiet", "inspect", str(path))
     assert "flightid.inspection.usable_band" in found
     assert not found & HEAVY
+
+
+def test_a_run_does_without_what_loads_for_a_second(tmp_path: Path) -> None:
+    path = SweepFlight(sweep_s=8.0).write(tmp_path)
+    found = loaded("--quiet", "run", str(path), "--output", str(tmp_path / "made"))
+    assert "flightid.identification.frequency_domain.fit" in found
+    parts = ("signal", "stats", "optimize", "interpolate", "sparse", "spatial", "ndimage", "io")
+    assert not found & {"pint", "h5py", *(f"scipy.{part}" for part in parts)}

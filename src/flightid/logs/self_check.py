@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from flightid._native import cubic_spline
@@ -22,6 +21,7 @@ from flightid.conventions import Axis, Light
 from flightid.findings import Finding
 from flightid.logs.contents import LogContents
 from flightid.logs.dataflash.sid_runs import SidRun
+from flightid.scalar_search import minimum_between
 
 # Axis -> command to the mixer in RATE, and the message with the controller's terms.
 COMMANDS = {Axis.ROLL: ("ROut", "PIDR"), Axis.PITCH: ("POut", "PIDP"), Axis.YAW: ("YOut", "PIDY")}
@@ -223,8 +223,7 @@ def _best_lag(
 
     grid = np.arange(LOOPS[0], LOOPS[1] + 0.25, 0.5)
     best = float(grid[np.argmin([loss(float(loops)) for loops in grid])])
-    found = scipy.optimize.minimize_scalar(loss, bounds=(best - 0.5, best + 0.5), method="bounded")
-    return float(found.x) * loop_time_s
+    return minimum_between(loss, best - 0.5, best + 0.5) * loop_time_s
 
 
 def _projection(left: NDArray[np.float64], chirp: NDArray[np.float64]) -> tuple[float, float]:

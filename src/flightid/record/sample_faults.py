@@ -168,13 +168,20 @@ def _alone(values: Array) -> tuple[NDArray[np.intp], Array, float]:
     tall = beyond & (away > FAR * spread)
     if not tall.any():
         return np.empty(0, dtype=np.intp), away, spread
-    from scipy.ndimage import maximum_filter1d  # noqa: PLC0415
-
     # The largest of the neighbours, without the few samples that a spike may last.
-    around = maximum_filter1d(np.where(tall, 0.0, away), 2 * NEIGHBOURS + 1, mode="nearest")
+    around = _largest_near(np.where(tall, 0.0, away), NEIGHBOURS)
     crowd = np.convolve(tall, np.ones(2 * (NEIGHBOURS + HALF_WIDTH) + 1), mode="same")
     alone = tall & (away > FAR_FROM_NEIGHBOURS * around) & (crowd <= HALF_WIDTH)
     return np.flatnonzero(alone), away, spread
+
+
+def _largest_near(values: Array, half: int) -> Array:
+    """Largest of each sample and `half` neighbours on either side: spans doubled, two joined."""
+    largest, width, whole = np.pad(values, half, mode="edge"), 1, 2 * half + 1
+    while 2 * width <= whole:
+        largest, width = np.maximum(largest[:-width], largest[width:]), 2 * width
+    n, rest = len(values), whole - width
+    return np.maximum(largest[:n], largest[rest : rest + n])
 
 
 def _input_spikes(channel: _ExaminedChannel) -> SampleFault | None:

@@ -7,7 +7,6 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
-import h5netcdf
 import numpy as np
 
 from flightid.errors import DataError, FileFormatError, OptionError
@@ -152,6 +151,8 @@ def _from_parquet(path: Path, labels: list[RecordLabels]) -> list[Record]:
 
 
 def _write_netcdf(path: Path, records: list[Record]) -> None:
+    import h5netcdf  # noqa: PLC0415 - whoever writes none does without
+
     labels = [labels_of(record, plain_names=True) for record in records]
     with h5netcdf.File(path, "w") as file:
         file.attrs[netcdf.LABELS_KEY] = to_text(labels)

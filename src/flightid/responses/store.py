@@ -12,9 +12,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import h5netcdf
 import numpy as np
-from h5py import string_dtype
 from numpy.typing import NDArray
 
 from flightid.conventions import Light
@@ -58,6 +56,9 @@ def write_response(response: FrequencyResponse, path: str | Path) -> Path:
     ...     read_response(write_response(response, Path(folder) / "p.nc"))
     FrequencyResponse(1 output x 1 input, 1 frequencies 1 to 1 rad/s, mean coherence 1.00)
     """
+    import h5netcdf  # noqa: PLC0415 - whoever writes none does without
+    from h5py import string_dtype  # noqa: PLC0415 - as above
+
     variables = _variables(response)
     lengths = {
         key: n for keys, each in variables.values() for key, n in zip(keys, each.shape, strict=True)

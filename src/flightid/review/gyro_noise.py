@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-import scipy
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from flightid.control.autopilots import AXES
@@ -15,8 +15,9 @@ from flightid.inspection.signals import Signal, Span, find, inside
 from flightid.logs import Log
 from flightid.result import Result
 from flightid.review.gyro_windows import GyroWindows, gyro_windows
+from flightid.review.rank_correlation import rank_correlation
 from flightid.table import Column, Table
-from flightid.uncertainty.quantiles import shown, tails
+from flightid.uncertainty.quantiles import chi_squared_quantile, shown, tails
 
 Array = NDArray[np.float64]
 BINS = 8
@@ -127,7 +128,7 @@ class GyroNoise(Result, schema="flightid.gyro_noise/1"):
         Bendat & Piersol, *Random Data*, 4th ed., eq. 8.159.
         """
         low, high = tails(shown(level))
-        above, below = (self.freedom / scipy.stats.chi2.ppf(q, self.freedom) for q in (low, high))
+        above, below = (self.freedom / chi_squared_quantile(q, self.freedom) for q in (low, high))
         return self.spectrum * below, self.spectrum * above
 
     def summary(self) -> Table:
@@ -239,7 +240,7 @@ def _peaks(frequency: Array, mean: Array, freedom: float) -> list[tuple[int, flo
     count = int(np.count_nonzero(inside_band))
     if count < 8:
         return []
-    limit = scipy.stats.chi2.ppf(1.0 - FALSE_PEAKS / (3 * count), freedom) / freedom
+    limit = chi_squared_quantile(1.0 - FALSE_PEAKS / (3 * count), freedom) / freedom
     found: list[tuple[int, float, float]] = []
     for axis, power in enumerate(mean):
         ratio = power / floor_beneath(frequency, power)
@@ -264,7 +265,9 @@ def floor_beneath(frequency: Array, power: Array) -> Array:
     grid = np.geomspace(frequency[0], frequency[-1], 400)
     level = np.interp(grid, frequency, np.log(np.maximum(power, np.finfo(float).tiny)))
     width = 2 * int(0.5 * np.log1p(FLOOR_WIDTH) / np.log(grid[1] / grid[0]) + 1.0) + 1
-    return np.asarray(np.exp(np.interp(frequency, grid, scipy.ndimage.median_filter(level, width))))
+    around = np.pad(level, width // 2, mode="symmetric")
+    middle = np.median(sliding_window_view(around, width), axis=1)
+    return np.asarray(np.exp(np.interp(frequency, grid, middle)))
 
 
 def _motor_hz(log: Log, spans: tuple[Span, ...]) -> tuple[float, float] | None:
@@ -298,7 +301,7 @@ def _source(
     if throttle.size < 12 or np.ptp(throttle) < 0.1 * np.mean(throttle) or near.sum() < 5:
         return ""
     tops = frequency[near][np.argmax(powers[:, near], axis=1)]
-    rank, chance = scipy.stats.spearmanr(throttle, tops)
+    rank, chance = rank_correlation(throttle, tops)
     if np.isfinite(rank) and chance < FALSE_PEAKS:
         return MOVES if rank > 0.0 else FALLS
     still = np.ptp(tops) <= 4.0 * slack and np.ptp(throttle) > 0.3 * np.mean(throttle)

@@ -161,7 +161,7 @@ def _battery(log: Log, spans: tuple[Span, ...]) -> Battery | None:
 def _milliampere_hours(table: LogTable, field: str) -> NDArray[np.float64]:
     """Charge in mAh: ArduPilot declares its unit, PX4 writes mAh and declares none."""
     declared = table.unit(field)
-    return table[field] if declared == DIMENSIONLESS else convert(table[field], declared, "mA*h")
+    return table[field] if declared == DIMENSIONLESS else convert(table[field], declared, "h*mA")
 
 
 def _measured(values: NDArray[np.float64]) -> NDArray[np.float64] | None:

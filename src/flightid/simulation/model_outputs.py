@@ -18,12 +18,12 @@ from flightid import _native
 from flightid.errors import ModelError
 from flightid.models import GreyBoxModel, TransferFunctionModel
 from flightid.models.linear.realisation import canonical_form
+from flightid.simulation.finer_samples import finer_samples
 
 Array = NDArray[np.float64]
 HOLDS = ("band_limited", "first", "zero")
 FINER = 4
 """Steps within a sample in which a band-limited input is followed."""
-SPLINE_DEGREE = 5
 SLOW, FAST = 0.5, 7.0
 """Growth exponents over a record: below the first a mode is followed forwards, above the second
 backwards, and between them the modes are parted where their rates lie furthest from each other."""
@@ -145,12 +145,7 @@ def between_samples(values: Array, hold: str) -> Array:
     """
     if hold != "band_limited":
         return values
-    n = values.shape[1]
-    fine = np.arange(FINER * (n - 1) + 1) / FINER
-    spline = scipy.interpolate.make_interp_spline(
-        np.arange(n), values, k=min(SPLINE_DEGREE, n - 1), axis=1
-    )
-    dense = np.array(spline(fine))
+    dense = finer_samples(values, FINER)
     # Straight lines between points weaken ω by sinc²(ωT/2) = 1 − (ωT)²/12 + …: given back here.
     dense[:, 1:-1] -= np.diff(dense, 2, axis=1) / 12.0
     return dense

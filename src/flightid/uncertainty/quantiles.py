@@ -170,6 +170,17 @@ def normal_quantiles(shares: ArrayLike) -> NDArray[np.float64]:
     return np.asarray(scipy.special.ndtri(np.asarray(shares, dtype=np.float64)))
 
 
+def chi_squared_quantile(share: float, freedom: float) -> float:
+    """Value below which a χ² of some degrees of freedom lies with a probability.
+
+    Example
+    -------
+    >>> round(chi_squared_quantile(0.95, 2.0), 4)
+    5.9915
+    """
+    return 2.0 * float(scipy.special.gammaincinv(freedom / 2.0, share))
+
+
 def two_sided_chance(deviations: float) -> float:
     """Probability that a normal error is as large as this, in standard errors, to either side.
 

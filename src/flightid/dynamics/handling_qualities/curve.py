@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from flightid.dynamics.handling_qualities.branch import Branch, branch_of
@@ -15,6 +15,7 @@ from flightid.models import LinearSystem, TransferFunctionModel
 from flightid.models.model import linear_system
 from flightid.responses import FrequencyResponse
 from flightid.responses.unbiased import WITHOUT_BIAS
+from flightid.scalar_search import root_between
 
 GRID_POINTS = 2000
 SLOPE_POINTS = 200
@@ -126,15 +127,18 @@ class GainPhaseCurve:
 
     def at(self, omega: float) -> tuple[float, float]:
         """Decibels and degrees at one frequency: of a model exactly, else between neighbours."""
-        logs, wanted = np.log(self.omega), np.log(omega)
-        decibel = float(np.interp(wanted, logs, self.decibels))
-        degrees = float(np.interp(wanted, logs, self.degrees))
+        wanted = np.log(omega)
+        degrees = float(np.interp(wanted, self._logs, self.degrees))
         if self.exact is None:
-            return decibel, degrees
+            return float(np.interp(wanted, self._logs, self.decibels)), degrees
         value = self.exact(omega)
         angle = float(np.degrees(np.angle(value)))
         turns = round((degrees - angle) / 360.0)
         return float(20.0 * np.log10(abs(value))), angle + 360.0 * turns
+
+    @cached_property
+    def _logs(self) -> Array:
+        return np.log(self.omega)
 
     def falls_through(self, level: float) -> float | None:
         """Lowest frequency above unstable pairs at which the phase falls through a level."""
@@ -168,7 +172,7 @@ class GainPhaseCurve:
         Half the slope: with phase on one line through −180° at ω_180 it is the phase delay.
         """
         omega = np.linspace(low, high, SLOPE_POINTS)
-        phase = np.interp(np.log(omega), np.log(self.omega), self.degrees)
+        phase = np.interp(np.log(omega), self._logs, self.degrees)
         line = np.polyfit(omega - low, phase, 1)
         misfit = phase - np.polyval(line, omega - low)
         return float(-line[0] / (2.0 * DEGREES_PER_RADIAN)), float(np.sqrt(np.mean(misfit**2)))
@@ -176,9 +180,7 @@ class GainPhaseCurve:
     def _between(self, place: int, part: int, level: float) -> float:
         left = float(self.omega[place])
         right = float(self.omega[min(place + 1, len(self.omega) - 1)])
-        return float(
-            scipy.optimize.brentq(lambda at: self.at(at)[part] - level, left, right, xtol=1e-12)
-        )
+        return root_between(lambda at: self.at(at)[part] - level, left, right)
 
 
 def smoother_of(response: FrequencyResponse, pair: Pair) -> Array | None:

@@ -6,9 +6,8 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from math import prod
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import h5py
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,6 +15,9 @@ from flightid.errors import FileFormatError
 from flightid.reading import decoding, require_memory
 from flightid.record.formats.columns import VALUE_BYTES
 from flightid.record.formats.hdf5_heaps import require_sound_heaps
+
+if TYPE_CHECKING:
+    import h5py
 
 MAXIMUM_OBJECTS = 100_000
 DEEPEST = 16
@@ -31,6 +33,8 @@ def plain_datasets(path: Path) -> Iterator[Mapping[str, h5py.Dataset]]:
     FileFormatError
         The file is damaged, or holds too many objects or samples.
     """
+    import h5py  # noqa: PLC0415 - whoever reads other files does without
+
     require_sound_heaps(path)
     with decoding(path.name, WHOLE):
         file = h5py.File(path, "r")
@@ -71,6 +75,8 @@ def _declared_bytes(dataset: h5py.Dataset) -> int:
 
 def _place(group: h5py.Group) -> int:
     """Where a group stands in its file, whatever names lead to it."""
+    import h5py  # noqa: PLC0415 - as above
+
     return int(h5py.h5o.get_info(group.id).addr)
 
 
@@ -78,6 +84,8 @@ def _walk(
     path: Path, group: h5py.Group, prefix: str, found: dict[str, h5py.Dataset], seen: set[int]
 ) -> None:
     """Add the datasets below a group; a group that several names lead to is entered once."""
+    import h5py  # noqa: PLC0415 - as above
+
     for key in group:
         link = group.get(key, getlink=True)
         if key.startswith("#") or not isinstance(link, h5py.HardLink):

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import h5py
 import numpy as np
 import scipy
 from numpy.typing import NDArray
@@ -20,6 +19,9 @@ from flightid.reading import bounded_bytes, decoding, memory_budget
 from flightid.record.formats.columns import ColumnTable
 from flightid.record.formats.hdf5 import plain_datasets, read_dataset
 from flightid.record.formats.matlab_bytes import inflated
+
+if TYPE_CHECKING:
+    import h5py
 
 PLAIN = "save its numbers as plain arrays"
 WAYS = {

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.io import netcdf_file
 
 from flightid.errors import FileFormatError
 from flightid.reading import decoding, require_memory
@@ -107,7 +107,7 @@ def _variables(path: Path) -> Variables:
 def _classic_variables(path: Path) -> Variables:
     # Twice: the library copies what it reads.
     require_memory(path.name, 2 * path.stat().st_size)
-    with decoding(path.name, WHOLE), netcdf_file(path, "r", mmap=False) as file:
+    with decoding(path.name, WHOLE), scipy.io.netcdf_file(path, "r", mmap=False) as file:
         return {
             str(name): (_letters_joined(np.array(item.data)), vars(item)["_attributes"])
             for name, item in file.variables.items()
