@@ -45,8 +45,7 @@ def refined_roots(
     """
     roots: list[complex] = []
     # Infinitely many roots lie far left; seeds there are artefacts of the approximation.
-    for seed in seeds:
-        root = newton_root(a, b, c, d, delays_s, complex(seed))
+    for root in newton_roots(a, b, c, d, delays_s, seeds):
         if root is None or any(abs(root - each) < SAME * max(1.0, abs(root)) for each in roots):
             continue
         roots.append(root)
@@ -57,30 +56,69 @@ def refined_roots(
     return np.array(roots, dtype=np.complex128)
 
 
-def newton_root(
-    a: Array, b: Array, c: Array, d: Array, delays: Array, s: complex
-) -> complex | None:
-    """The root that Newton's method reaches from one seed; None where it reaches none."""
-    one, inner = np.eye(len(a)), np.eye(len(delays))
+def newton_roots(
+    a: Array, b: Array, c: Array, d: Array, delays_s: Array, seeds: Complex
+) -> list[complex | None]:
+    """The roots that Newton's method reaches from some seeds, all at once; None where from none.
+
+    Parameters
+    ----------
+    a, b, c, d, delays_s, seeds : ndarray
+        As for `refined_roots`.
+    """
+    s = np.array(seeds, dtype=np.complex128)
+    found: list[complex | None] = [None] * len(s)
+    going = np.arange(len(s))
     for _ in range(STEPS):
-        late = np.exp(np.clip(-s.real * delays, -200.0, 200.0) - 1j * s.imag * delays)
-        e = np.diag(late)
-        try:
-            left = np.linalg.inv(inner - e @ d)
-            slope_k = left @ np.diag(-delays * late) @ np.linalg.inv(inner - d @ e)
-            f = s * one - a - b @ (left @ e) @ c
-            trace = np.trace(np.linalg.solve(f, one - b @ slope_k @ c))
-        except np.linalg.LinAlgError:
-            return s
-        if not np.isfinite(trace) or trace == 0.0:
-            return None
-        step = 1.0 / trace
-        s = complex(s - step)
-        if not np.isfinite(s):
-            return None
-        if abs(step) < 1e-13 * max(1.0, abs(s)):
-            return complex(s.real, 0.0) if abs(s.imag) < 1e-10 * max(1.0, abs(s)) else s
-    return None
+        if not len(going):
+            break
+        traces, is_root = _traces(a, b, c, d, delays_s, s[going])
+        for place in going[is_root]:
+            found[place] = complex(s[place])
+        lasts = ~is_root & np.isfinite(traces) & (traces != 0.0)
+        going, steps = going[lasts], 1.0 / traces[lasts]
+        s[going] -= steps
+        lasts = np.isfinite(s[going])
+        going, steps = going[lasts], steps[lasts]
+        size = np.maximum(1.0, np.abs(s[going]))
+        settled = np.abs(steps) < 1e-13 * size
+        for place in going[settled]:
+            found[place] = _off_the_axis(complex(s[place]))
+        going = going[~settled]
+    return found
+
+
+def _off_the_axis(s: complex) -> complex:
+    return complex(s.real, 0.0) if abs(s.imag) < 1e-10 * max(1.0, abs(s)) else s
+
+
+def _traces(
+    a: Array, b: Array, c: Array, d: Array, delays: Array, s: Complex
+) -> tuple[Complex, NDArray[np.bool_]]:
+    """Trace of F⁻¹F' at some places, and where F has no inverse: those are roots."""
+    try:
+        return _traces_of(a, b, c, d, delays, s), np.zeros(len(s), dtype=bool)
+    except np.linalg.LinAlgError:
+        if len(s) == 1:
+            return np.ones(1, dtype=np.complex128), np.ones(1, dtype=bool)
+    parts = [_traces(a, b, c, d, delays, s[k : k + 1]) for k in range(len(s))]
+    return np.concatenate([each[0] for each in parts]), np.concatenate([each[1] for each in parts])
+
+
+def _traces_of(a: Array, b: Array, c: Array, d: Array, delays: Array, s: Complex) -> Complex:
+    one, inner = np.eye(len(a)), np.eye(len(delays))
+    apart = np.multiply.outer(s.real, delays)
+    late = np.exp(np.clip(-apart, -200.0, 200.0) - 1j * np.multiply.outer(s.imag, delays))
+    if d.any():
+        left = np.linalg.inv(inner - late[:, :, None] * d)
+        right = np.linalg.inv(inner - d * late[:, None, :])
+        gain = left * late[:, None, :]
+        slope = (left * (-delays * late)[:, None, :]) @ right
+    else:  # what goes around inside has no direct part: both inverses are one
+        gain, slope = late[:, :, None] * inner, (-delays * late)[:, :, None] * inner
+    f = s[:, None, None] * one - a - b @ gain @ c
+    solved = np.linalg.solve(f, one - b @ slope @ c)
+    return np.asarray(np.trace(solved, axis1=1, axis2=2))
 
 
 def line_right_of_axis(a: Array, delays_s: Array) -> float:

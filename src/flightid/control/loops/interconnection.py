@@ -150,7 +150,15 @@ class Interconnection(
         pade_order : int or None
             None: refuse delays inside.
         """
-        return continuous_system(self.wiring, self.outputs, pade_order)
+        known = self._linear_systems
+        if pade_order not in known:
+            known[pade_order] = continuous_system(self.wiring, self.outputs, pade_order)
+        return known[pade_order]
+
+    @cached_property
+    def _linear_systems(self) -> dict[int | None, LinearSystem]:
+        """Those that were asked for: each axis of a rating asks every vehicle again."""
+        return {}
 
     def sampled(self, sample_time_s: float | None = None) -> LinearSystem:
         """The exact recursion of the signals at the samples, for inputs held over each sample.

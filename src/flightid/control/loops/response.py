@@ -100,10 +100,12 @@ class ConnectionBlocks:
             else:
                 looped[k, inside.index(k)] = 1.0
         seen = [place[core.signals.index(name)] for name in around]
-        direct, back = by_row @ outside, by_row @ looped
-        shares = self._port_responses(len(inside), len(given), len(reads), omega)
-        loop = shares @ back[:, seen]
-        driven = np.linalg.solve(np.eye(loop.shape[1]) - loop, shares @ direct[:, seen])
+        direct, back = _gathered(by_row, outside), _gathered(by_row, looped)
+        loop, given_from = back[:, seen], direct[:, seen]
+        if self.ports:  # else all that goes around is late signals, one for one
+            shares = self._port_responses(len(inside), len(given), len(reads), omega)
+            loop, given_from = shares @ loop, shares @ given_from
+        driven = np.linalg.solve(np.eye(loop.shape[1]) - loop, given_from)
         wanted = [place[each] for each in places]
         return np.asarray(direct[:, wanted] + back[:, wanted] @ driven)
 
@@ -125,6 +127,14 @@ class ConnectionBlocks:
             shares[:, row : row + p, column : column + m] = found
             row, column = row + p, column + m
         return shares
+
+
+def _gathered(by_row: Complex, chosen: Array) -> Complex:
+    """Columns of rows that belong together added up; one alone is taken as it is."""
+    places = [np.flatnonzero(column) for column in chosen.T]
+    if all(len(each) == 1 for each in places):
+        return by_row[:, :, np.concatenate(places)] if places else by_row[:, :, :0]
+    return np.asarray(by_row @ chosen)
 
 
 def _port_response(block: Block, omega: Array) -> Complex:

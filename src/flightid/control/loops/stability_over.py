@@ -6,7 +6,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from flightid.control.loops.delayed_roots import count_right, line_right_of_axis, newton_root
+from flightid.control.loops.delayed_roots import count_right, line_right_of_axis, newton_roots
 from flightid.control.loops.interconnection import Interconnection
 
 Complex = NDArray[np.complex128]
@@ -34,7 +34,7 @@ def followed_poles(loops: Interconnection, known: Complex) -> Complex:
         found = np.full(len(known), np.nan, dtype=np.complex128)
         found[rows] = poles[columns]
         return found
-    roots = [newton_root(*parts, complex(each)) for each in known]
+    roots = newton_roots(*parts, known)
     return np.array([np.nan if each is None else each for each in roots], dtype=np.complex128)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -73,12 +74,18 @@ def _with_late_rows(core: Core, late: list[Row], inputs: tuple[str, ...], order:
     blocks = [Block("core", fed, inner, replace(whole, delays_s=[0.0] * len(fed)))]
     for row in late:
         source = row.carrier if row.carrier in inputs else f"{row.carrier} (core)"
-        made = static("late", (source,), (names[row],), np.eye(1), (row.delay_s,))
-        assert isinstance(made.part, LinearSystem)
-        blocks.append(replace(made, part=made.part.with_pade(order)))
+        blocks.append(Block("late", (source,), (names[row],), _late(row.delay_s, order)))
     carriers = list(dict.fromkeys([*inputs, *(_feed(row) for row in rest)]))
     joined = assemble(blocks, carriers)
     return _renamed(joined, core, rest)
+
+
+@lru_cache(256)
+def _late(delay_s: float, order: int) -> LinearSystem:
+    """A delay by states: a law's are the same around every vehicle that the data allow."""
+    made = static("late", ("u",), ("y",), np.eye(1), (delay_s,)).part
+    assert isinstance(made, LinearSystem)
+    return made.with_pade(order)
 
 
 def _feed(row: Row) -> str:

@@ -24,7 +24,8 @@ from flightid.dynamics.modes.modes import modes
 from flightid.dynamics.modes.result import Modes
 from flightid.errors import DataError, ModelError, OptionError
 from flightid.findings import Finding
-from flightid.identification.uncertain_of import source_findings
+from flightid.identification.uncertain_of import source_findings, uncertain_of
+from flightid.models import TransferFunctionModel
 from flightid.models.model import linear_system, model_of
 from flightid.responses import FrequencyResponse
 from flightid.result import Result
@@ -238,6 +239,7 @@ def handling_qualities(
         else {"category": category, "class": aircraft_class}
     )
     pairs, findings = _pairs(source, axes)
+    vehicles = _made_once(source)
     bandwidths: dict[str, AttitudeBandwidth] = {}
     ratings: list[Rating] = []
     for axis, (output, control) in pairs.items():
@@ -246,7 +248,7 @@ def handling_qualities(
             sign: int, axis: str = axis, pair: tuple[str, str] = (control, output)
         ) -> Any:  # noqa: ANN401
             return attitude_bandwidth(
-                source,
+                vehicles,
                 *pair,
                 band_rad_s=band_rad_s,
                 response_type=response_type,
@@ -277,6 +279,16 @@ def handling_qualities(
     findings += [finding for rating in ratings for finding in rating.findings]
     findings += source_findings(source)
     return HandlingQualities(vehicle, conditions, bandwidths, seen, tuple(ratings), tuple(findings))
+
+
+def _made_once(source: object) -> object:
+    """A source whose vehicles, all that its covariance allows, are made once for all axes."""
+    if isinstance(source, FrequencyResponse):
+        return source
+    estimate = uncertain_of(source)
+    # A transfer function answers by its own pairs: as one system it would be of higher order.
+    is_by_pairs = isinstance(estimate.value, TransferFunctionModel)
+    return source if is_by_pairs else estimate.then(linear_system).kept()
 
 
 def _slope(source: object, seen: Modes, findings: list[Finding]) -> float | None:
