@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 ABSENT = "absent"
 """Key that says why a value of `to_dict` is None, by the way to it."""
+WHOLE = frozenset({bool, int, type(None)})
 PLAIN = frozenset({str, bool, int, float, type(None)})
 
 
@@ -143,6 +144,8 @@ class Result(TableView):
 
 def _plain(value: object, way: str, absent: dict[str, str]) -> Any:  # noqa: ANN401 — plain values
     """Value as JSON holds it; `absent` takes what no JSON number can say."""
+    if _says_itself(value):  # nearly all: neither its way nor its kind need be found out
+        return value
     if _is_plain_array(value):
         return value.tolist()  # type: ignore[attr-defined]  # thousands of numbers at once
     value = value if type(value) in PLAIN else _opened(value)
@@ -152,10 +155,22 @@ def _plain(value: object, way: str, absent: dict[str, str]) -> Any:  # noqa: ANN
     if value is None or isinstance(value, bool | int | float | str):
         return value
     if isinstance(value, Mapping):
-        return {str(key): _plain(item, _step(way, key), absent) for key, item in value.items()}
+        return {
+            str(key): item if _says_itself(item) else _plain(item, _step(way, key), absent)
+            for key, item in value.items()
+        }
     if isinstance(value, Sequence | set | frozenset) and not isinstance(value, str | bytes):
-        return [_plain(item, f"{way}[{i}]", absent) for i, item in enumerate(value)]
+        return [
+            item if _says_itself(item) else _plain(item, f"{way}[{i}]", absent)
+            for i, item in enumerate(value)
+        ]
     raise TypeError(f"{way} is a {type(value).__name__}, which has no plain values")
+
+
+def _says_itself(value: object) -> bool:
+    """Whether it is, itself and no subclass of it, what JSON can say."""
+    kind = type(value)
+    return kind is str or (kind is float and math.isfinite(value)) or kind in WHOLE  # type: ignore[arg-type]  # narrowed by its very type
 
 
 def _is_plain_array(value: object) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -125,7 +126,7 @@ class Rivals:
     assumed: InputHold
     loop: Loop | None = None
 
-    @property
+    @cached_property
     def is_fed_back(self) -> bool:
         """Whether what the outputs did may have moved the inputs.
 

@@ -28,6 +28,8 @@ LARGEST_RESIDUAL = 10.0
 """Largest residual, in multiples of the measured output's rms, before a simulation is not believed:
 a loop may hold an output well below its disturbances, but no model that is right diverges so."""
 _RANK = 1e-9
+AT_ONCE = 2_000_000
+"""Samples of derivatives that are worked on together."""
 TINY = float(np.finfo(float).tiny)
 
 
@@ -204,9 +206,12 @@ class ModelResiduals:
         followed, known = self._followed(model)
         kept = self._kept(model)
         changes = [np.zeros((len(moved), *each.shape)) for each in self.linear.output_records]
+        turns = [np.zeros((len(moved), len(each.start))) for each in followed]
         for place, (other, step) in enumerate(moved):
             motions: dict[int, tuple[list[_SystemRun], Array]] = {}
-            for change, one, between in zip(changes, followed, self._between, strict=True):
+            for change, turn, one, between in zip(
+                changes, turns, followed, self._between, strict=True
+            ):
                 n = change.shape[2]
                 free, unknown = known[n][1:]
                 if n not in motions:
@@ -215,12 +220,12 @@ class ModelResiduals:
                 driven = self._driven(motions[n][0], kept, between, n)
                 turned = motions[n][1]
                 direct = (driven - one.driven) / step + np.tensordot(one.start, turned, axes=1)
-                direct -= direct.mean(axis=1, keepdims=True)
+                change[place, kept] = direct - direct.mean(axis=1, keepdims=True)
                 # What is left of the outputs turns with the space that was taken out of them.
                 left = one.rest[kept] / one.fitter.scale[:, None] ** 2
-                against = np.tensordot(turned, left, axes=2) / unknown.lengths
-                again = np.tensordot(one.fitter.normal @ against, unknown.motions, axes=1)
-                change[place, kept] = unknown.less(one.fitter, direct) + again
+                turn[place] = np.tensordot(turned, left, axes=2) / unknown.lengths
+        for change, turn, one in zip(changes, turns, followed, strict=True):
+            _take_motion_out(change, kept, one.fitter, known[change.shape[2]][2], turn)
         return changes
 
     def _kept(self, model: GreyBoxModel) -> Places:
@@ -315,3 +320,17 @@ class ModelResiduals:
             needed="a simulation that stays near the measured output",
             action="check the structure, or fit shorter records",
         )
+
+
+def _take_motion_out(
+    change: Array, kept: Places, fitter: _Fitter, unknown: _InitialConditions, turn: Array
+) -> None:
+    """Take initial states and trims out of derivatives, and add what their own turning leaves.
+
+    `turn`, shape (n_moved, n_unknowns), says how the residual sees the turning motions.
+    """
+    at_once = max(1, AT_ONCE // max(change[0].size, 1))
+    for begin in range(0, len(change), at_once):
+        part = slice(begin, begin + at_once)
+        again = np.tensordot(turn[part] @ fitter.normal, unknown.motions, axes=1)
+        change[part, kept] = unknown.less(fitter, change[part, kept]) + again
