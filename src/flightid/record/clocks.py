@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from flightid._native import cubic_spline
@@ -275,6 +274,8 @@ def _of_stretches(
     floor_s: float,
 ) -> ClockOffset:
     """Offset, interval and drift from stretches of the overlap in which the signal moves."""
+    from scipy.stats import t as student  # noqa: PLC0415 - commands that join nothing do without
+
     inside = (first[0] >= second[0][0] + start_s) & (first[0] <= second[0][-1] + start_s)
     moves = 0.1 * float(np.std(first[1][inside]))
     span_s = float(np.ptp(first[0][inside]))
@@ -300,7 +301,7 @@ def _of_stretches(
     ends_s = float(np.hypot(error / np.sqrt(time_s.size), slope_error * farther_s))
     # Edges of held signals lie anywhere between two samples of the common grid, for many stretches
     # alike where clocks drift little: that is added. Both ends are to hold.
-    half = float(scipy.special.stdtrit(time_s.size - 2, 1.0 - 0.05 / 4.0)) * ends_s + floor_s
+    half = float(student.ppf(1.0 - 0.05 / 4.0, time_s.size - 2)) * ends_s + floor_s
     step_s = _step(design, offsets_s, max(STEP * sample_s, 2 * floor_s))
     # Stamps t of the first and s of the second: t - s = offset + slope (t - centre).
     drift = float(line[1] / (1 - line[1]))
@@ -318,6 +319,8 @@ def _of_stretches(
 
 def _step(design: Array, offsets_s: Array, least_s: float) -> float:
     """Step between stretches that a line with one explains far better than a line; else 0."""
+    from scipy.stats import f as fisher  # noqa: PLC0415 - as above
+
     n = offsets_s.size
     line = np.linalg.lstsq(design, offsets_s, rcond=None)[0]
     whole = float(np.sum((offsets_s - design @ line) ** 2))
@@ -329,7 +332,7 @@ def _step(design: Array, offsets_s: Array, least_s: float) -> float:
         if left < best:
             best, size = left, float(found[2])
     gain = (whole - best) / max(best / max(n - 4, 1), np.finfo(float).tiny)
-    sure = float(scipy.special.fdtrc(1, max(n - 4, 1), gain)) * n < STEP_LEVEL
+    sure = float(fisher.sf(gain, 1, max(n - 4, 1))) * n < STEP_LEVEL
     return size if sure and abs(size) > least_s else 0.0
 
 
