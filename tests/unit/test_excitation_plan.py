@@ -251,3 +251,23 @@ def test_command_leaves_with_one_for_no_go(capsys: pytest.CaptureFixture[str]) -
 
 def test_command_offers_every_kind() -> None:
     assert set(design_command.Kinds().choices) == set(KINDS)
+
+
+def test_a_rig_that_nobody_guesses_gets_its_input_without_a_verdict(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    asked = ["design", "prbs", "--band-hz", "0.05", "2", "--rate", "10", "--duration", "60"]
+    file, page = tmp_path / "prbs.csv", tmp_path / "prbs.html"
+    written = ["--write", str(file), "--html", str(page)]
+    assert run([*asked, "--amplitude", "0.2", *written]) == 0
+    said = capsys.readouterr()
+    assert "coverage of band" in said.out
+    assert "go" not in said.out.split("coverage")[0].split()
+    assert "not judged" in said.err
+    samples = np.loadtxt(file, delimiter=",", skiprows=1)
+    assert set(samples[:, 1]) == {-0.2, 0.2}
+    assert "how often it has each size" in page.read_text(encoding="utf-8")
+    assert "Go or no-go" not in page.read_text(encoding="utf-8")
+    assert run(asked) == 2
+    assert "--amplitude" in capsys.readouterr().err
+    assert run([*asked, "--amplitude", "0.2", "--gain", "1"]) == 2, "half a guess is asked for"

@@ -13,7 +13,7 @@ from flightid.cli.output import WRITTEN, emit, json_option, leave_by_verdict, no
 from flightid.cli.pages import html_option
 
 if TYPE_CHECKING:
-    from flightid.excitation import Plan
+    from flightid.excitation import Excitation, Plan
     from flightid.options import Options
 
 
@@ -54,22 +54,52 @@ def command(
 
     For rigs, and to try inputs on a guess. Sweeps that an autopilot flies, with its loops closed:
     `flightid plan`. Prints what the flight would give and a go/no-go list; exit code 1 is no-go.
+    Without a guess (--gain, --time-constant) the input is made and nothing is said of its flight.
     """
     from flightid import excitation
 
-    of_design, guess, limits = parted(options, _fields())
-    plan = excitation.plan(
-        kind, excitation.RateAxis(**guess), limits=excitation.Limits(**limits), **of_design
-    )
-    emit(plan, as_json=as_json)
+    if not _is_guessed(options):
+        made = _unjudged(kind, options)
+        emit(made, as_json=as_json)
+        plan = None
+    else:
+        of_design, guess, limits = parted(options, _fields())
+        plan = excitation.plan(
+            kind, excitation.RateAxis(**guess), limits=excitation.Limits(**limits), **of_design
+        )
+        made = plan.excitation
+        emit(plan, as_json=as_json)
     if target is not None:
-        note(f"Wrote {excitation.write_csv(plan.excitation, target)}")
+        note(f"Wrote {excitation.write_csv(made, target)}")
     if html is not None:
-        note(f"Wrote {_write_page(plan, html)}")
-    leave_by_verdict(plan.findings)
+        note(f"Wrote {_write_page(made, plan, html)}")
+    if plan is None:
+        note(
+            "not judged: what this input would give, and whether it is safe; a guess of the rate "
+            "that it moves tells that: --gain, --time-constant"
+        )
+    else:
+        leave_by_verdict(plan.findings)
 
 
-def _write_page(plan: Plan, path: Path) -> Path:
+def _is_guessed(options: dict[str, Any]) -> bool:
+    """Whether anything is said of the vehicle."""
+    from flightid.excitation import RateAxis
+    from flightid.options import options_of
+
+    return any(options.get(each.name) not in (None, ()) for each in options_of(RateAxis))
+
+
+def _unjudged(kind: str, options: dict[str, Any]) -> Excitation:
+    """The input by itself, for a rig of which nothing is known yet."""
+    from flightid.excitation.design import designed
+    from flightid.excitation.options import DesignOptions
+
+    (asked,) = parted(options, {"a design without a guess of the vehicle": DesignOptions})
+    return designed(kind, DesignOptions(**asked))
+
+
+def _write_page(made: Excitation, plan: Plan | None, path: Path) -> Path:
     from flightid.files import write_atomically
     from flightid.plot.excitation import excitation_history, plan_spectrum
     from flightid.plot.inputs import input_figure
@@ -79,21 +109,20 @@ def _write_page(plan: Plan, path: Path) -> Path:
     from flightid.report.figures import figure_block
     from flightid.report.html import to_html
 
-    pictures = (
-        figure_block(excitation_history(plan.excitation), "The input as it would be flown."),
-        figure_block(
-            plan_spectrum(plan),
+    pictures = [figure_block(excitation_history(made), "The input as it would be flown.")]
+    if plan is not None:
+        expected = (
             "Power of the input over the target band (shaded), and the coherence and error of a "
-            "response that the guess lets expect.",
-        ),
-        figure_block(
-            input_figure(Record.from_excitation(plan.excitation)),
-            "Spectrum of each input, and how often it has each size.",
-        ),
-    )
+            "response that the guess lets expect."
+        )
+        pictures.append(figure_block(plan_spectrum(plan), expected))
+    shown = "Spectrum of each input, and how often it has each size."
+    pictures.append(figure_block(input_figure(Record.from_excitation(made)), shown))
+    judged = () if plan is None else (Section("Go or no-go", result_blocks(plan)),)
     sections = (
-        Section("Go or no-go", result_blocks(plan)),
-        Section("Input", result_blocks(plan.excitation)),
-        Section("Pictures", pictures),
+        *judged,
+        Section("Input", result_blocks(made)),
+        Section("Pictures", tuple(pictures)),
     )
-    return write_atomically(path, to_html(Document("Excitation design", repr(plan), sections)))
+    title = repr(made if plan is None else plan)
+    return write_atomically(path, to_html(Document("Excitation design", title, sections)))

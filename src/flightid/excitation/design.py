@@ -256,6 +256,43 @@ def plan(
     return made(_largest_amplitude(made(1.0)))
 
 
+def designed(kind: str, asked: DesignOptions) -> Excitation:
+    """The input alone, where nobody guesses the vehicle: what it would give is not judged.
+
+    Parameters
+    ----------
+    kind : str
+        As `plan` takes it.
+    asked : DesignOptions
+
+    Raises
+    ------
+    OptionError
+        A kind that is not known, or no amplitude: limits of a vehicle give none here.
+
+    Example
+    -------
+    >>> made = designed("prbs", DesignOptions((0.3, 6.0), amplitude=0.2, sample_rate_hz=10.0))
+    >>> made.inputs["u"].max()
+    0.2
+    """
+    if kind not in KINDS:
+        raise OptionError("no such kind of design", found=kind, needed=", ".join(KINDS))
+    if asked.amplitude is None:
+        raise OptionError(
+            "an input has no size where nobody guesses what it moves",
+            needed="amplitude=…, or a guess of the vehicle: gain=… and time_constant_s=…",
+        )
+    rate_hz = float(asked.sample_rate_hz)
+    length = asked.duration_s or _default_length(kind, asked.band_rad_s, rate_hz)
+    return KINDS[kind](
+        DesignRequest(
+            asked.band_rad_s, asked.amplitude, length, rate_hz, tuple(asked.inputs), asked.unit,
+            asked.seed, asked.axis,
+        )
+    )  # fmt: skip
+
+
 def _default_length(kind: str, band_rad_s: tuple[float, float], sample_rate_hz: float) -> float:
     cycles = CYCLES_AT_LOWEST + (2.0 if kind == "ardupilot_chirp" else 0.0)
     length_s = cycles * 2 * math.pi / band_rad_s[0]
