@@ -44,7 +44,9 @@ def test_the_page_says_of_a_fleet_what_its_report_says(tmp_path: Path) -> None:
     row = dict(zip(kind.tables[0].columns, kind.tables[0].rows[1], strict=True))
     assert (row["next vehicle low"], row["next vehicle high"]) == (low, high)
     assert (row["parameter"], row["symbol"]) == ("roll control power", "Ltphi")
-    assert {each[1] for each in kind.tables[-1].rows} <= set(kind.labels.values())
+    *_, changes, events = kind.tables
+    assert {each[1] for each in changes.rows} <= set(kind.labels.values())
+    assert ("new motor", "v02") in {(each[0], each[1]) for each in events.rows}
     drift = answers.types[0].drift
     assert drift is not None
     first = part.histories[0]
@@ -54,7 +56,7 @@ def test_the_page_says_of_a_fleet_what_its_report_says(tmp_path: Path) -> None:
     assert_close(
         np.array(first.half), 1.959964 * np.sqrt(told.variances), rtol=1e-6, why="95 %, normal"
     )
-    assert part.refused.rows[0][:3] == [2, "refused", "rate-too-low"]
+    assert part.refused.rows[0][:3] == [2, "refused", "rate too low"]
     own = fleet_work.answer_vehicle(path, "v02")
     assert [each["name"] for each in own["histories"]] == ["Lp", "Ltphi"]
     assert own["histories"][1]["events"] == [(1769126400.0, "new motor")]

@@ -123,7 +123,7 @@ def test_a_fleet_is_run_once_and_then_only_for_what_is_missing(
         ((reason, message),) = catalogue.query(
             "SELECT reason, message FROM logs WHERE outcome = 'refused'"
         ).fetchall()
-    assert reason == "not-a-log"
+    assert reason == "empty-file"
     assert "empty file" in message
 
 

@@ -212,7 +212,7 @@ def test_every_template_loads_and_simulates(name: str, axis: str) -> None:
     assert fid.load_model(f"{name}_{axis}") == model
 
 
-def test_files_are_read_as_data(tmp_path: Path) -> None:
+def test_files_are_read_as_data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "model.toml"
     path.write_text(
         'kind="transfer"\n[inputs]\nu="1"\n[outputs]\ny="m"\n[parameters]\nK={value=2,unit="m"}\n'
@@ -233,6 +233,8 @@ def test_files_are_read_as_data(tmp_path: Path) -> None:
         fid.load_model(path)
     with pytest.raises(UnknownNameError, match="no such library model"):
         fid.load_model("no_such_model")
+    # Whatever lies there from the folder that tests run in: nothing lies there from this one.
+    monkeypatch.chdir(tmp_path)
     with pytest.raises(UnknownNameError, match="no such library model"):
         fid.load_model("../../etc/passwd")
     with pytest.raises(OptionError, match="not written for that axis"):

@@ -26,6 +26,7 @@ from flightid.record.history import is_of_log
 from flightid.record.hold import InputHold, Loop
 from flightid.responses import FrequencyResponse
 from flightid.uncertainty.foretold import likelihood_gain
+from flightid.uncertainty.quantiles import half_width
 
 Data = Any
 DECISIVE = 6.0
@@ -37,7 +38,7 @@ SELDOM, RARE = 2.05, 2.58
 """Standard deviations below its mean at which a gain is found in 1 of 50 and 1 of 200 fits: what
 rules out a rival within the intervals, and one beyond them. With 1 of 50 for all, wrong words were
 green beside a delay half a sample off in 1 to 4 % of flights."""
-WITHIN = 1.96
+WITHIN = half_width()
 """Standard errors up to which a rival's estimates lie in the intervals."""
 NEGLIGIBLE = 0.3
 """Standard errors by which an estimate may move: a 95 % interval then holds 94 in 100."""

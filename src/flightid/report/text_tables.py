@@ -25,7 +25,7 @@ def folded_table(table: Table, width: int) -> list[str]:
     >>> made = Table("", (Column("n"), Column("why")), ((1, "one two three four five six"),))
     >>> print("\n".join(folded_table(made, 18)))
     n  why
-    -  --------------
+    -  -------------
     1  one two three
        four five six
     """
