@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from scipy.signal import cont2discrete, lfilter
 
+from flightid import ControllerOptions
 from flightid.cli.output import Exit
 from flightid.cli.program import run
 from flightid.errors import DataError, StudyError
 from flightid.study.settings import read_settings
-from flightid.study.tuning import TuneSettings, tune_models
+from flightid.study.tuning import TuneSettings, _controllers, tune_models
 from tests.closeness import assert_close
 
 STUDY = """
@@ -168,3 +169,10 @@ def test_records_alone_hold_no_gains() -> None:
     with pytest.raises(StudyError, match="cannot be tuned without the log"):
         tune_models([Item()], None, TuneSettings())  # type: ignore[list-item]
     assert tune_models([], None, TuneSettings()) is None
+
+
+def test_gains_without_any_model_say_that_there_is_none() -> None:
+    """And not that models have several inputs."""
+    asked = ControllerOptions(controller="pi_d")
+    with pytest.raises(StudyError, match="no model was made, so no gains"):
+        _controllers([], asked, None)  # type: ignore[arg-type]

@@ -246,6 +246,12 @@ def _controllers(
     settings: TuneSettings,
 ) -> Tuning | None:
     """A PID of its own around each loop that is asked for, of the first model that has it."""
+    if not known:
+        raise StudyError(
+            "no model was made, so no gains are made",
+            needed="a fitted model",
+            action="read why each model was left out, and record again as that says",
+        )
     designs: dict[str, PidDesign] = {}
     errors: dict[str, FlightidError] = {}
     for model, checks in known:
@@ -282,8 +288,8 @@ def _controllers(
 
 
 def _first_loop(known: Sequence[tuple[Any, object]]) -> str:
-    model = cast(Model, model_of(known[0][0])) if known else None
-    return "OUTPUT/INPUT" if model is None else f"{model.outputs[0]}/{model.inputs[0]}"
+    model = cast(Model, model_of(known[0][0]))
+    return f"{model.outputs[0]}/{model.inputs[0]}"
 
 
 def _only_loop(model: Model) -> tuple[str, ...]:
