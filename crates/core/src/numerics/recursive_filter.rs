@@ -23,7 +23,7 @@ pub fn filter_rows(
     state: &mut [f64],
 ) -> Result<Vec<f64>, CoreError> {
     let order = b.len().saturating_sub(1);
-    let rows = if n == 0 { 0 } else { x.len() / n };
+    let rows = x.len().checked_div(n).unwrap_or(0);
     if b.is_empty() || a.len() != b.len() {
         let (found, needed) = (a.len(), b.len().max(1));
         return Err(CoreError::Shape { what: "denominator of a filter", found, needed });
