@@ -1,7 +1,8 @@
 """Print the table: `python -m tests.strangers [PART OF A NAME ...] --runs 500 --jobs 2`.
 
 `--keep FILE` adds every flight to a file and flies only those that it has not, so that runs add up;
-`--runs 0 --keep FILE` prints what it holds.
+`--runs 0 --keep FILE` prints what it holds; with `--page docs/coverage.md` it becomes that page,
+with `--before FILE` beside what the flights of an earlier tree held.
 """
 
 from __future__ import annotations
@@ -11,7 +12,8 @@ from pathlib import Path
 
 from tests.strangers.cases import CASES, LIGHTS
 from tests.strangers.counting import HEADING, count
-from tests.strangers.kept import collected
+from tests.strangers.coverage_page import write
+from tests.strangers.kept import collected, read
 
 
 def main() -> None:
@@ -23,7 +25,11 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--keep", type=Path, help="file that flights are added to, and read from")
     parser.add_argument("--each", action="store_true", help="coverage of every quantity too")
+    parser.add_argument("--page", type=Path, help="Markdown to make of the file of flights")
+    parser.add_argument("--before", type=Path, help="flights of an earlier tree, for the page")
     asked = parser.parse_args()
+    if asked.page and not asked.keep:
+        parser.error("--page is made of the file of --keep")
     print(HEADING, flush=True)
     for case in (*CASES, *LIGHTS):
         if asked.names and not any(part in case.name for part in asked.names):
@@ -39,6 +45,8 @@ def main() -> None:
         for name in tally.quantities() if asked.each else ():
             share, n = tally.coverage(name)
             print(f"    {name:40s} {100 * share:6.1f} {n:7d}", flush=True)
+    if asked.page:
+        write(asked.page, read(asked.keep), asked.before and read(asked.before))
 
 
 if __name__ == "__main__":
