@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.signal import chirp, lfilter
 
-from flightid import Record, inspect_log, run_study
+from flightid import Record, inspect_log, run_study, write_records
 from flightid.cli.program import run
 from flightid.cli.wording import as_typed
 from flightid.conventions import Light
@@ -274,3 +274,36 @@ def test_an_injected_channel_is_the_instrument_of_a_closed_loop(tmp_path: Path) 
         assert found.interval95[0] < truth < found.interval95[1], found
     with pytest.raises(UnknownNameError, match="no such column"):
         propose_study([tmp_path / "closed.csv"], excitations=["sweep"], **asked)
+
+
+def test_sweeps_of_one_input_each_are_fitted_together(tmp_path: Path) -> None:
+    """Alone none of them tells what the other input does: the run found it without power."""
+    rng = np.random.default_rng(4)
+    flown = []
+    for name, n, moved in (("a", 900, 0), ("b", 900, 1), ("doublet a", 150, 0)):
+        injected = np.zeros((2, n))
+        injected[moved] = np.sin(0.002 * np.arange(n) ** 1.6)
+        stick = injected + 0.01 * rng.standard_normal((2, n))
+        flown.append(
+            Record.from_arrays(
+                0.02 * np.arange(n),
+                inputs={"lat": stick[0], "lon": stick[1]},
+                outputs={"p": np.cumsum(stick[0]), "q": np.cumsum(stick[1])},
+                excitations={"sweep_lat": injected[0], "sweep_lon": injected[1]},
+                name=name,
+            )
+        )
+    write_records(flown, tmp_path / "flights.nc")
+    made = propose_study(
+        [tmp_path / "flights.nc"], folder=tmp_path, model="r50_hover", inputs=["lat", "lon"],
+        outputs=["p", "q"], excitations=["sweep_lat", "sweep_lon"],
+    )  # fmt: skip
+    assert 'identify = ["a", "b"]' in made.text
+    assert 'verify = ["doublet a"]' in made.text
+    assert 'responses = "coherent"\noutputs = ["p", "q"]' in made.text
+    # Where one sweep holds all that was injected, each manoeuvre stands for itself as before.
+    one = propose_study(
+        [tmp_path / "flights.nc"], folder=tmp_path, model="r50_hover", inputs=["lat", "lon"],
+        outputs=["p", "q"], excitations=["sweep_lat"],
+    )  # fmt: skip
+    assert 'identify = "a, fitted"' in one.text

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterator, Mapping, MutableMapping, Sequence
-from dataclasses import dataclass, replace
-from itertools import pairwise
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,13 +18,22 @@ from flightid.identification.advice.delays import delays_to_scan
 from flightid.logs.joinable import joinable
 from flightid.models.polynomial.orders import USED
 from flightid.models.save import toml_value
-from flightid.record import Record, read_records
+from flightid.record import read_records
 from flightid.record.formats.columns import channel_name
-from flightid.record.time_question import time_column, time_said
+from flightid.record.time_question import time_said
 from flightid.study.proposal.columns import Columns, columns_of
 from flightid.study.proposal.options import DataOptions, told
 from flightid.study.proposal.order_scans import ProposedScans, record_file
 from flightid.study.proposal.proposal import Proposal
+from flightid.study.proposal.stretches import (
+    FITTED,
+    Group,
+    Segments,
+    Stretch,
+    one_experiment,
+    rounded,
+    segments_of,
+)
 from flightid.study.stage_runner import StageRunner
 from flightid.study.structures import AS_GOOD, ranked
 from flightid.surface import as_key, speaking
@@ -35,49 +43,10 @@ ORDERS = {"na": (1, 2, 3, 4), "nb": (1, 2, 3), "nc": (1, 2), "nd": (1, 2), "nf":
 """Orders that are tried: two modes; delays are those that the record tells."""
 OF_VEHICLE = ("nb", "nf", "nk")
 """Orders of Box-Jenkins that are those of the best output error, whose noise models are tried."""
-FITTED, CHOSEN, ALONE = 0.6, 1.0, (0.5, 0.75)
-"""Part of a record that is fitted, the rest ranks structures; and where it also has to verify."""
 SHORTEST = 0.1
 """Part of the longest manoeuvre's samples below which another is a rag between gaps."""
-RICHER = 2.0
-"""Ratio of powers of an input's steps, of halves of a record, that is no chance."""
 CYCLES, SAMPLES_PER_CYCLE = 10.0, 10.0
 """What a response needs: cycles of its lowest frequency in a record, samples of its highest."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Stretch:
-    """A manoeuvre, and where a study finds it: `manoeuvre` where its file holds several."""
-
-    record: Record
-    path: Path
-    manoeuvre: str | None = None
-
-    @property
-    def name(self) -> str:
-        return self.manoeuvre or self.path.stem
-
-    def lines(self, name: str, span: tuple[float, float] | None, folder: Path) -> Iterator[str]:
-        """Its table of the study, under a name."""
-        yield from ("", "[[record]]", f"name = {toml_value(name)}")
-        yield f"path = {toml_value(Path(os.path.relpath(self.path, folder)).as_posix())}"
-        if self.manoeuvre is not None:
-            yield f"manoeuvre = {toml_value(self.manoeuvre)}"
-        if span is not None:
-            yield f"span_s = {toml_value(list(span))}"
-
-    def time_key(self) -> list[str]:
-        """The column that was taken for the time, so that the study keeps it."""
-        name = time_column(self.record)
-        return [f"time_column = {toml_value(name)}"] if name else []
-
-
-@dataclass(frozen=True, eq=False)
-class _Group:
-    """Records in which the same inputs moved: the longest is fitted, the others verify."""
-
-    inputs: tuple[str, ...]
-    parts: tuple[_Stretch, ...]
 
 
 def study_of_records(
@@ -129,12 +98,15 @@ def study_of_records(
     if injected and model is None:
         raise _needs_equations(paths, columns, injected)
     groups, missed = _groups(read, columns)
+    swept = None if model is None else one_experiment(read, columns.inputs, injected)
+    if swept is not None:
+        groups = [swept[0]]
     runner = StageRunner(cache)
     body: list[str] = []
     names: list[str] = []
     for whole in groups:
-        segments = _segments(whole)
-        group, still = _driven(whole, segments)
+        segments = segments_of(whole) if swept is None else swept[1]
+        group, still = _driven(whole, segments) if swept is None else (whole, [])
         missed += still
         tables = {}
         for name, part, span in segments.all:
@@ -180,17 +152,17 @@ def _needs_equations(
     )
 
 
-def _times(read: Sequence[_Stretch]) -> list[str]:
+def _times(read: Sequence[Stretch]) -> list[str]:
     """What is to be said of the stamps, in the words of where it is said."""
     return [*filter(None, dict.fromkeys(time_said(part.record) for part in read))]
 
 
-def _parts(path: Path, reading: Mapping[str, Any]) -> list[_Stretch]:
+def _parts(path: Path, reading: Mapping[str, Any]) -> list[Stretch]:
     """Manoeuvres of a file."""
     found = read_records(path, **{**reading, "join": joinable(reading["join"])})
     if len(found) == 1:
-        return [_Stretch(found[0], path)]
-    return [_Stretch(record, path, str(record.name)) for record in found]
+        return [Stretch(found[0], path)]
+    return [Stretch(record, path, str(record.name)) for record in found]
 
 
 def _keys(reading: DataOptions, folder: Path) -> list[str]:
@@ -203,9 +175,9 @@ def _keys(reading: DataOptions, folder: Path) -> list[str]:
     return [f"{name} = {toml_value(value)}" for name, value in keys.items()]
 
 
-def _groups(read: Sequence[_Stretch], columns: Columns) -> tuple[list[_Group], list[Finding]]:
+def _groups(read: Sequence[Stretch], columns: Columns) -> tuple[list[Group], list[Finding]]:
     """Records by the inputs that move in them, the longest of each first."""
-    by_inputs: dict[tuple[str, ...], list[_Stretch]] = {}
+    by_inputs: dict[tuple[str, ...], list[Stretch]] = {}
     missed = []
     longest = max(part.record.n_samples for part in read)
     for part in read:
@@ -232,44 +204,11 @@ def _groups(read: Sequence[_Stretch], columns: Columns) -> tuple[list[_Group], l
     groups = []
     for moving, members in by_inputs.items():
         members.sort(key=lambda each: -each.record.n_samples)
-        groups.append(_Group(moving, tuple(members)))
+        groups.append(Group(moving, tuple(members)))
     return groups, missed
 
 
-@dataclass(frozen=True)
-class _Segments:
-    """Names of what is fitted, what ranks structures and what verifies; all with file and span."""
-
-    all: tuple[tuple[str, _Stretch, tuple[float, float] | None], ...]
-    fitted: str
-    choice: str
-    unseen: tuple[str, ...]
-    spans: tuple[tuple[float, float], tuple[float, float]]
-
-
-def _segments(group: _Group) -> _Segments:
-    first, record = group.parts[0], group.parts[0].record
-    start, stop = float(record.time_s[0]), float(record.time_s[-1])
-    alone = len(group.parts) == 1
-    cuts: Sequence[float] = ALONE if alone else (FITTED, CHOSEN)
-    turned = alone and _ends_richer(record, group.inputs)
-    if turned:
-        cuts = [1.0 - cut for cut in reversed(cuts)]
-    edges = [start, *(_round(start + cut * (stop - start)) for cut in cuts), stop]
-    spans = list(pairwise(edges))
-    if turned:
-        spans.reverse()
-    name = first.name
-    parts = [(f"{name}, fitted", first, spans[0]), (f"{name}, choice", first, spans[1])]
-    rest = [(part.name, part, None) for part in group.parts[1:]]
-    unseen = [(f"{name}, unseen", first, spans[2])] if alone else rest
-    return _Segments(
-        (*parts, *unseen), parts[0][0], parts[1][0],
-        tuple(each[0] for each in unseen), (parts[0][2], parts[1][2]),
-    )  # fmt: skip
-
-
-def _driven(group: _Group, segments: _Segments) -> tuple[_Group, list[Finding]]:
+def _driven(group: Group, segments: Segments) -> tuple[Group, list[Finding]]:
     """The group with the inputs that move in the part that is fitted, and word of the others."""
     record, (start, stop) = group.parts[0].record, segments.spans[0]
     fitted = (record.time_s >= start) & (record.time_s <= stop)
@@ -282,29 +221,19 @@ def _driven(group: _Group, segments: _Segments) -> tuple[_Group, list[Finding]]:
     return replace(group, inputs=moving), [Finding("input-still", Light.AMBER, said, action)]
 
 
-def _ends_richer(record: Record, inputs: tuple[str, ...]) -> bool:
-    """Whether inputs move much faster in the second half, as those of a rising sweep do.
-
-    What is slow is foretold by what was fitted to the fast, not the other way round.
-    """
-    steps = np.diff(record.matrix(inputs), axis=1) / np.std(record.matrix(inputs), axis=1)[:, None]
-    early, late = (float(np.sum(part**2)) for part in np.array_split(steps, 2, axis=1))
-    return late > RICHER * early
-
-
 def _model(
     name: str,
-    group: _Group,
-    segments: _Segments,
+    group: Group,
+    segments: Segments,
     output: str,
     model: str | None,
     scans: ProposedScans,
 ) -> Iterator[str]:
     injected = scans.injected
-    lines = [f"identify = {toml_value(segments.fitted)}"]
+    lines = [f"identify = {toml_value(list(segments.together) or segments.fitted)}"]
     lines += [f"verify = {toml_value(list(segments.unseen))}"]
     record = group.parts[0].record
-    span_s = record.duration_s * FITTED
+    span_s = record.duration_s * (1.0 if segments.together else FITTED)
     low = CYCLES * math.tau / span_s
     high = math.tau * record.sample_rate_hz / SAMPLES_PER_CYCLE
     if model is not None:
@@ -314,10 +243,13 @@ def _model(
         elif high > 2 * low:
             said = "# By way of what was injected: a controller in the loop does not bias that."
             names = toml_value(list(injected))
-            template += [f"band_rad_s = {toml_value([_round(low), _round(high)])}", said]
+            template += [f"band_rad_s = {toml_value([rounded(low), rounded(high)])}", said]
             template += [f'response = {{ estimator = "instrument", excitations = {names} }}']
+        if segments.together:
+            # Of inputs times outputs some say nothing: coherence tells which are fitted.
+            template += ['responses = "coherent"', f"outputs = {toml_value(list(scans.outputs))}"]
         return iter(["", "[[model]]", f"name = {toml_value(name)}", *template, *lines])
-    band = (_round(low), _round(high)) if high > 2 * low else None
+    band = (rounded(low), rounded(high)) if high > 2 * low else None
     driving = scans.driving(output, band)
     kind, found, orders_of = _structure(scans, output, driving, record.unit(output))
     orders = [f"{order} = {toml_value(list(orders_of[order]))}" for order in USED[kind]]
@@ -359,7 +291,7 @@ def _structure(
     return good[-1], f"{said} {unit}".rstrip(), of_kind[good[-1]]
 
 
-def _stamps(read: Sequence[_Stretch]) -> Iterator[str]:
+def _stamps(read: Sequence[Stretch]) -> Iterator[str]:
     """Where stamps come from, of records whose channels have clocks of their own."""
     said = dict.fromkeys(
         step.options.get("stamps")
@@ -381,7 +313,3 @@ def _head(paths: Sequence[Path], said: Sequence[str], missed: Sequence[Finding])
         f"aircraft = {toml_value(f'records {files}')}",
         "", "[verify]", "residual_tests = true",
     ]  # fmt: skip
-
-
-def _round(value: float) -> float:
-    return float(f"{value:.4g}")
