@@ -770,12 +770,16 @@ export interface RigManoeuvre {
   faults: RigFault[];
 }
 
-/** What `flightid new` is asked: roles of columns where their names do not tell. */
+/** What `flightid new` is asked: roles of columns where their names do not tell.
+
+`model` is one of the library, in place of structures that are tried. */
 export interface RigProposal {
   time_column: string | null;
   sample_time_s: number | null;
   inputs: string[];
   outputs: string[];
+  excitations: string[];
+  model: string | null;
   units: Record<string, string>;
 }
 

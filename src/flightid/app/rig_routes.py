@@ -21,6 +21,7 @@ from flightid.app.pyramid import Pyramid, view
 from flightid.app.rig_schemas import ProposedStudy, RigItem, RigProposal, RigReading, RigScreen
 from flightid.app.rigs import Rigs
 from flightid.app.study_edits import write_study
+from flightid.models import library_names
 
 
 def add_rig_routes(app: FastAPI, backstage: Backstage) -> None:
@@ -52,7 +53,9 @@ def add_rig_routes(app: FastAPI, backstage: Backstage) -> None:
     @app.post("/api/records/{rig}/study")
     async def propose(rig: LogName, asked: RigProposal) -> ProposedStudy:
         paths, target = _known(rigs, rig), workspace.study_path(rig)
-        roles = {"inputs": asked.inputs, "outputs": asked.outputs}
+        if asked.model is not None and asked.model not in library_names():
+            raise HTTPException(422, f"The library has no model {asked.model}.")
+        roles = asked.model_dump(include={"inputs", "outputs", "excitations", "model"})
         reading = _options(asked) | ({"units": asked.units} if asked.units else {})
         call = workers.live(rig_work.propose, paths, target.parent, roles, reading)
         proposed = ProposedStudy(**await made(call))

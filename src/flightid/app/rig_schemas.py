@@ -67,10 +67,15 @@ class RigReading(Message):
 
 
 class RigProposal(RigReading):
-    """What `flightid new` is asked: roles of columns where their names do not tell."""
+    """What `flightid new` is asked: roles of columns where their names do not tell.
+
+    `model` is one of the library, in place of structures that are tried.
+    """
 
     inputs: list[str] = Field(default_factory=list, max_length=64)
     outputs: list[str] = Field(default_factory=list, max_length=64)
+    excitations: list[str] = Field(default_factory=list, max_length=64)
+    model: str | None = Field(None, pattern="^[a-z0-9_]{1,80}$")
     units: dict[str, str] = Field(default_factory=dict)
 
 

@@ -1,0 +1,167 @@
+"""Rig and helicopter records dropped on the page, by mouse and keyboard to their report.
+
+Whole studies of the examples' records, minutes each: `nightly`. A short one of the same path stays.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tomllib
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.contract.source import ROOT
+from tests.reference.test_app_in_browser import Desk, desk
+from tests.reference.test_app_screens_in_browser import _opened, _saved, _watched
+
+__all__ = ["desk"]
+RUN_MS = 1_800_000
+HOVER_OUTPUTS = ("um", "vm", "w", "p", "q", "r", "ax", "ay", "az")
+
+
+def _records(example: str, folder: Path) -> Path:
+    """What the example's script writes, from its simulated vehicle."""
+    script = ROOT / "examples" / example / "fly.py"
+    subprocess.run([sys.executable, script, folder], check=True, capture_output=True)
+    return folder
+
+
+def _dropped(desk: Desk, files: list[Path]) -> Any:
+    window = _watched(desk)
+    page = window.page
+    page.wait_for_selector(".drop")
+    page.set_input_files("input[type=file]", files)
+    page.get_by_role("button", name="Write the study").wait_for()
+    page.locator("select[aria-label^='Role of']").first.wait_for()
+    return window
+
+
+def _roles(page: Any, roles: dict[str, str]) -> None:
+    for name, role in roles.items():
+        page.get_by_label(f"Role of {name}", exact=True).select_option(role)
+
+
+def _study(desk: Desk, page: Any) -> dict[str, Any]:
+    rig = page.url.rpartition("/")[2]
+    text = (desk.folder / "studies" / f"{rig}.toml").read_text("utf-8")
+    return tomllib.loads(text)
+
+
+def _reported(page: Any, folder: Path) -> None:
+    """The study is run, and its report opened and taken as one zip."""
+    page.set_default_timeout(RUN_MS)
+    page.get_by_role("button", name="Fit and verify").press("Enter")
+    page.locator("[aria-label^='Part of']").first.wait_for()
+    _opened(page, "Report")
+    page.get_by_role("link", name="Open the report").wait_for()
+    packed = zipfile.ZipFile(_saved(page, "Everything as one zip", folder))
+    assert any(each.endswith("report.html") for each in packed.namelist())
+
+
+def test_the_study_is_written_with_a_model_and_edited_as_text(desk: Desk, tmp_path: Path) -> None:
+    """Roles, a model of the library in place of structures, and a key typed into the file."""
+    rows = "".join(f"{0.05 * k},{k // 20 % 2},{(k % 7) * 0.01}\n" for k in range(400))
+    (tmp_path / "arm.csv").write_text("t,volts,rate\n" + rows)
+    window = _dropped(desk, [tmp_path / "arm.csv"])
+    page = window.page
+    _roles(page, {"volts": "input", "rate": "output"})
+    page.locator("#template option", has_text="first order").first.wait_for(state="attached")
+    page.select_option("#template", value="rate_first_order")
+    page.get_by_role("button", name="Write the study").press("Enter")
+    page.locator("pre", has_text='template = "rate_first_order"').wait_for()
+    page.get_by_role("button", name="Edit", exact=True).press("Enter")
+    field = page.get_by_label("Study file, to be written")
+    text = field.input_value()
+    field.fill(text.replace("title = ", "tilte = "))
+    page.get_by_role("button", name="Save", exact=True).press("Enter")
+    page.get_by_role("alert").filter(has_text="tilte").first.wait_for()
+    field.fill(text.replace('title = "', 'title = "By hand, '))
+    page.get_by_role("button", name="Save", exact=True).press("Enter")
+    page.locator("pre .changed", has_text="By hand").wait_for()
+    assert _study(desk, page)["study"]["title"].startswith("By hand, ")
+    # A refusal of the server is an answer of 422, which the browser writes down.
+    assert all("422" in each for each in window.complaints)
+    page.close()
+
+
+@pytest.mark.nightly
+def test_seed_000_linear_models_of_the_rig(desk: Desk, tmp_path: Path) -> None:
+    folder = _records("twin_rotor_linear", tmp_path / "rig")
+    files = [folder / f"{each}.csv" for each in ("u1_prbs", "u1_doublet_pitch", "u1_3211_pitch")]
+    window = _dropped(desk, files)
+    page = window.page
+    page.set_default_timeout(RUN_MS)
+    _roles(page, {"u1": "input", "u2": "left out", "y1": "output", "y2": "output"})
+    page.get_by_role("button", name="Write the study").press("Enter")
+    page.locator("#content .box").first.wait_for()
+    page.locator("#content .box").first.get_by_label("Structure").select_option("armax")
+    page.locator("pre .changed", has_text="armax").wait_for()
+    assert _study(desk, page)["model"][0]["structure"] == "armax"
+    _reported(page, tmp_path)
+    assert not window.complaints
+    page.close()
+
+
+@pytest.mark.nightly
+def test_seed_001_narx_of_the_rig(desk: Desk, tmp_path: Path) -> None:
+    folder = _records("twin_rotor_rbf", tmp_path / "rig")
+    window = _dropped(desk, [folder / f"{each}.mat" for each in ("noise", "doublet", "3211")])
+    page = window.page
+    page.set_default_timeout(RUN_MS)
+    _roles(page, {"t": "time", "voltage": "input", "pitch": "output"})
+    page.get_by_role("button", name="Write the study").press("Enter")
+    page.locator("#content .box").first.wait_for()
+    page.locator("#content .box").first.get_by_label("Structure").select_option("narx")
+    page.locator("pre .changed", has_text="narx").wait_for()
+    _reported(page, tmp_path)
+    assert not window.complaints
+    page.close()
+
+
+def _helicopter(page: Any, model: str, outputs: tuple[str, ...], inputs: tuple[str, ...]) -> None:
+    columns = page.locator("select[aria-label^='Role of']")
+    for k in range(columns.count()):
+        name = str(columns.nth(k).get_attribute("aria-label")).removeprefix("Role of ")
+        injected = name.startswith("sweep_")
+        role = "injected" if injected else "input" if name in inputs else "left out"
+        columns.nth(k).select_option("output" if name in outputs else role)
+    page.select_option("#template", value=model)
+    page.get_by_role("button", name="Write the study").press("Enter")
+    page.locator("pre", has_text=f'template = "{model}"').wait_for()
+
+
+@pytest.mark.nightly
+def test_seed_002_the_r50_from_its_flights(desk: Desk, tmp_path: Path) -> None:
+    folder = _records("r50", tmp_path / "r50")
+    window = _dropped(desk, [folder / "hover_sweeps.nc", folder / "hover_doublets.nc"])
+    page = window.page
+    page.set_default_timeout(RUN_MS)
+    _helicopter(page, "r50_hover", HOVER_OUTPUTS, ("lat", "lon", "ped", "col"))
+    (model,) = _study(desk, page)["model"]
+    assert len(model["identify"]) == 8
+    assert len(model["verify"]) == 4
+    _reported(page, tmp_path)
+    assert not window.complaints
+    page.close()
+
+
+@pytest.mark.nightly
+def test_seed_003_the_apache_reduced_beside_a_rival(desk: Desk, tmp_path: Path) -> None:
+    folder = _records("ah64", tmp_path / "ah64")
+    window = _dropped(desk, [folder / "sweeps.nc", folder / "manoeuvres.nc"])
+    page = window.page
+    page.set_default_timeout(RUN_MS)
+    outputs = ("u", "v", "p", "q", "r", "ax", "ay", "az")
+    _helicopter(page, "ah64_hover", outputs, ("lat", "lon", "ped", "col"))
+    _opened(page, "Model")
+    page.get_by_label("Reduce structures to what the data determine").check()
+    page.locator("pre .changed", has_text="maximum_insensitivity_percent").wait_for()
+    page.get_by_label("Another rival").select_option("helicopter_6dof")
+    page.locator("pre .changed", has_text="rivals").wait_for()
+    _reported(page, tmp_path)
+    assert not window.complaints
+    page.close()
