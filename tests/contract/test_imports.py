@@ -25,6 +25,7 @@ BASE = {
     "scalar_search",
     "surface",
     "table",
+    "threads",
     "units",
     "version",
     "wrapping",

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+from flightid.threads import LINEAR_ALGEBRA
 from tests.sweep_log import SweepFlight
 
 LOADED = (
@@ -29,6 +31,18 @@ def loaded(*arguments: str) -> set[str]:
 @pytest.mark.parametrize("flag", ["--help", "--version"])
 def test_help_and_version_load_no_numbers(flag: str) -> None:
     assert not loaded(flag) & (HEAVY | {"numpy", "scipy"})
+
+
+@pytest.mark.parametrize(("told", "threads"), [({}, "1"), ({"OPENBLAS_NUM_THREADS": "2"}, "2")])
+def test_linear_algebra_has_one_thread_unless_told(told: dict[str, str], threads: str) -> None:
+    """Two spun: a command took twice the processor time, and longer by the clock."""
+    words = (
+        LOADED + "; import os; print(os.environ['OPENBLAS_NUM_THREADS'], 'numpy' in sys.modules)"
+    )
+    bare = {k: v for k, v in os.environ.items() if k not in LINEAR_ALGEBRA}
+    command = [sys.executable, "-c", words, "--version"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, env=bare | told)
+    assert done.stdout.splitlines()[-1] == f"{threads} False"
 
 
 @pytest.mark.parametrize("verb", ["run", "tune"])

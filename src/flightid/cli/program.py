@@ -16,6 +16,7 @@ from flightid.cli.output import Exit, note
 from flightid.cli.wording import as_typed
 from flightid.errors import FlightidError
 from flightid.surface import speaking
+from flightid.threads import one_linear_algebra_thread
 from flightid.version import VERSION
 
 NAME, COMPLETE = "flightid", "_FLIGHTID_COMPLETE"
@@ -146,6 +147,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
     int
         One of `Exit`.
     """
+    one_linear_algebra_thread()
     given = None if arguments is None else list(arguments)
     try:
         with speaking(as_typed):

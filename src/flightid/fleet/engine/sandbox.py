@@ -23,11 +23,12 @@ from flightid.fleet.engine.order import (
     LogOutcome,
     RunOrder,
 )
+from flightid.threads import LINEAR_ALGEBRA
 
 CHILD = "flightid.fleet.engine.child"
 START_S = 120.0
 """Longest time until a process is ready."""
-ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "RAYON_NUM_THREADS")
+ONE_THREAD = (*LINEAR_ALGEBRA, "RAYON_NUM_THREADS")
 MEMORY_WORDS = (b"MemoryError", b"memory allocation", b"bad_alloc", b"Cannot allocate memory")
 TIME, MEMORY, DEAD = "time", "memory", "killed"
 """Kinds of failure of a process that did not answer."""
