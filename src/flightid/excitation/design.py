@@ -273,7 +273,7 @@ def designed(kind: str, asked: DesignOptions) -> Excitation:
     Example
     -------
     >>> made = designed("prbs", DesignOptions((0.3, 6.0), amplitude=0.2, sample_rate_hz=10.0))
-    >>> made.inputs["u"].max()
+    >>> float(made.signals.max())
     0.2
     """
     if kind not in KINDS:
