@@ -259,6 +259,9 @@ def test_what_is_no_file_is_a_failure_of_its_own(fleet: Path, tmp_path: Path) ->
         assert made is not None
         assert problem
         assert problem in made.rows["failures"][0]["message"]
+        # Counted with files that are no logs, a broken link had their next step.
+        row = made.rows["logs"][0]
+        assert (row["reason"], row["action"]) == ("not-readable", "mend or remove it")
         assert LogRecord.from_bytes(made.to_bytes()).outcome == "refused"
 
 

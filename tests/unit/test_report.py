@@ -185,6 +185,9 @@ def test_text_html_and_json_show_the_same_numbers() -> None:
     assert values["tally"] == "1 green, 1 amber, 1 red, 1 not judged"
     for face in (to_text(document), to_html(document)):
         assert values["tally"] in face
+    # The class of a style keeps the word of scripts; what is read is one word for one state.
+    assert '<span class="word">not judged</span>' in to_html(document)
+    assert '<span class="word">unknown</span>' not in to_html(document)
 
 
 def test_verdict_is_the_worst_light() -> None:

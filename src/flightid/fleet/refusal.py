@@ -64,6 +64,12 @@ class LogRefusalError(FlightidError):
     code = "no-model"
 
 
+class UnreadableFileError(LogRefusalError):
+    """What lies there cannot be opened as a file, whatever it holds."""
+
+    code = "not-readable"
+
+
 def kind_of(error: Exception) -> str:
     """Class of an error as the table of failures names it."""
     if isinstance(error, LogRefusalError):

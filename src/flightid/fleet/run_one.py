@@ -28,6 +28,7 @@ from flightid.fleet.refusal import (
     ACTIONS,
     MESSAGE_LENGTH,
     UNSUITED,
+    UnreadableFileError,
     kind_of,
     refusal,
     unidentified,
@@ -185,9 +186,8 @@ def _fetched(address: LogAddress, scratch: Path, task: LogTask, state: Progress)
     """The log as a local file, its digest taken on the way, block by block."""
     task.tell(ADDRESS, state.log)
     if address.problem:
-        raise FileFormatError(
-            f"{address.name} cannot be taken as a log",
-            found=address.problem,
+        raise UnreadableFileError(
+            f"{address.name} cannot be taken as a log: {address.problem}",
             needed="a regular file under a name in UTF-8",
             action="mend or remove it",
         )

@@ -224,12 +224,14 @@ def _resource(name: str) -> str:
 @cache
 def environment() -> jinja2.Environment:
     """What draws the templates: everything that comes from a log is text."""
-    return jinja2.Environment(
+    made = jinja2.Environment(
         loader=jinja2.FunctionLoader(_resource),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
         trim_blocks=False,
     )
+    made.filters["in_words"] = lambda light: Light(light).words
+    return made
 
 
 def _kind(table: Table, index: int) -> str:
