@@ -55,6 +55,16 @@ def test_a_file_without_time_says_so_and_reads_with_a_sample_time(tmp_path: Path
     assert (told["inputs"], told["outputs"]) == (["u"], ["y"])
 
 
+def test_a_column_that_stands_still_has_a_row_as_well(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("time,u1,u2,y\n" + "".join(f"{k},{k % 2},0.5,{k}\n" for k in range(40)))
+    columns = {each["name"]: each for each in make_rig([path], {})["files"][0]["columns"]}
+    assert list(columns) == ["time", "u1", "y", "u2"]
+    assert columns["u2"] | {"unit": ""} == {
+        "name": "u2", "unit": "", "samples": 40, "least": 0.5, "most": 0.5,
+    }  # fmt: skip
+
+
 def test_a_table_of_a_list_is_taken_out() -> None:
     text = "[[model]]\nname = 'A'\n\n[[model]]\nname = 'B'\n"
     assert edited(text, [KeyEdit(("model", 0), None)]).strip() == "[[model]]\nname = 'B'"

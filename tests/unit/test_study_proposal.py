@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.signal import chirp, lfilter
+from scipy.signal import chirp, lfilter, lsim
 
 from flightid import Record, inspect_log, run_study, write_records
 from flightid.cli.program import run
@@ -301,9 +301,34 @@ def test_sweeps_of_one_input_each_are_fitted_together(tmp_path: Path) -> None:
     assert 'identify = ["a", "b"]' in made.text
     assert 'verify = ["doublet a"]' in made.text
     assert 'responses = "coherent"\noutputs = ["p", "q"]' in made.text
+    assert "conditioning" not in made.text
     # Where one sweep holds all that was injected, each manoeuvre stands for itself as before.
     one = propose_study(
         [tmp_path / "flights.nc"], folder=tmp_path, model="r50_hover", inputs=["lat", "lon"],
         outputs=["p", "q"], excitations=["sweep_lat"],
     )  # fmt: skip
     assert 'identify = "a, fitted"' in one.text
+
+
+def test_a_known_servo_is_taken_out_ahead_of_the_model(tmp_path: Path) -> None:
+    """SciPy's servo of 12 rad/s before a vehicle of 4 rad/s: it takes the model's place."""
+    n, rate_hz = 3000, 50.0
+    u = np.repeat(np.random.default_rng(2).choice([-1.0, 1.0], n // 20), 20)
+    y = lsim(([40.0 * 12.0], np.polymul([1.0, 4.0], [1.0, 12.0])), u, np.arange(n) / rate_hz)[1]
+    y += np.random.default_rng(3).normal(0.0, 0.05, n)
+    rows = [f"{k / rate_hz:.2f},{u[k]:g},{y[k]:.6f}" for k in range(n)]
+    path = tmp_path / "arm.csv"
+    path.write_text("\n".join(["time,tau_phi [1],p [rad/s]", *rows]))
+    asked = {"folder": tmp_path, "model": "rate_first_order", "hold": "first"}
+    found = {}
+    for servos in ({}, {"tau_phi": 12.0}):
+        made = propose_study([path], actuators=servos, **asked)
+        fit = run_study(made.write(tmp_path / f"{len(servos)}.toml")).identified[0].fit
+        assert fit is not None
+        found[len(servos)] = fit.parameters["Lp"]
+    assert found[1].interval95[0] < -4.0 < found[1].interval95[1]
+    assert abs(found[1].value + 4.0) < 0.05 < 0.5 < abs(found[0].value + 4.0)
+    with pytest.raises(StudyError, match="actuators are taken out for a model of equations alone"):
+        propose_study([path], folder=tmp_path, actuators={"tau_phi": 12.0})
+    with pytest.raises(UnknownNameError, match="an actuator has no input"):
+        propose_study([path], actuators={"p": 12.0}, **asked)

@@ -772,7 +772,7 @@ export interface RigManoeuvre {
 
 /** What `flightid new` is asked: roles of columns where their names do not tell.
 
-`model` is one of the library, in place of structures that are tried. */
+`model` is one of the library, in place of structures that are tried; `actuators` are rad/s. */
 export interface RigProposal {
   time_column: string | null;
   sample_time_s: number | null;
@@ -781,6 +781,7 @@ export interface RigProposal {
   excitations: string[];
   model: string | null;
   units: Record<string, string>;
+  actuators: Record<string, number>;
 }
 
 /** How files are read, where they do not tell: as in `[defaults.record]` of a study. */

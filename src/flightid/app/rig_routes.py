@@ -14,7 +14,7 @@ from fastapi import FastAPI, HTTPException, Query, Request, Response
 
 from flightid.app import rig_work
 from flightid.app.backstage import Backstage, LogName, made
-from flightid.app.field_routes import MOST_COLUMNS, MOST_SERIES
+from flightid.app.field_routes import MOST_COLUMNS
 from flightid.app.guard import UPLOAD_BYTES
 from flightid.app.own_folders import is_link
 from flightid.app.pyramid import Pyramid, view
@@ -22,6 +22,9 @@ from flightid.app.rig_schemas import ProposedStudy, RigItem, RigProposal, RigRea
 from flightid.app.rigs import Rigs
 from flightid.app.study_edits import write_study
 from flightid.models import library_names
+
+MOST_CHANNELS = 128
+"""In one view: as many inputs and outputs as a study of records may be asked for."""
 
 
 def add_rig_routes(app: FastAPI, backstage: Backstage) -> None:
@@ -55,7 +58,7 @@ def add_rig_routes(app: FastAPI, backstage: Backstage) -> None:
         paths, target = _known(rigs, rig), workspace.study_path(rig)
         if asked.model is not None and asked.model not in library_names():
             raise HTTPException(422, f"The library has no model {asked.model}.")
-        roles = asked.model_dump(include={"inputs", "outputs", "excitations", "model"})
+        roles = asked.model_dump(include={"inputs", "outputs", "excitations", "model", "actuators"})
         reading = _options(asked) | ({"units": asked.units} if asked.units else {})
         call = workers.live(rig_work.propose, paths, target.parent, roles, reading)
         proposed = ProposedStudy(**await made(call))
@@ -68,7 +71,7 @@ def add_rig_routes(app: FastAPI, backstage: Backstage) -> None:
         rig: LogName,
         file: Annotated[str, Query(max_length=300)],
         manoeuvre: Annotated[str, Query(max_length=300)],
-        series: Annotated[list[str], Query(min_length=1, max_length=MOST_SERIES)],
+        series: Annotated[list[str], Query(min_length=1, max_length=MOST_CHANNELS)],
         start_s: float,
         stop_s: float,
         columns: Annotated[int, Query(ge=10, le=MOST_COLUMNS)],

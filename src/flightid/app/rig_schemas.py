@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 from pydantic import Field
 
 from flightid.app.schemas import Job, Light, Message
@@ -69,7 +71,7 @@ class RigReading(Message):
 class RigProposal(RigReading):
     """What `flightid new` is asked: roles of columns where their names do not tell.
 
-    `model` is one of the library, in place of structures that are tried.
+    `model` is one of the library, in place of structures that are tried; `actuators` are rad/s.
     """
 
     inputs: list[str] = Field(default_factory=list, max_length=64)
@@ -77,6 +79,7 @@ class RigProposal(RigReading):
     excitations: list[str] = Field(default_factory=list, max_length=64)
     model: str | None = Field(None, pattern="^[a-z0-9_]{1,80}$")
     units: dict[str, str] = Field(default_factory=dict)
+    actuators: dict[str, Annotated[float, Field(gt=0.0)]] = Field(default_factory=dict)
 
 
 class RigScreen(Message):

@@ -92,7 +92,9 @@ def _file(path: Path, reading: Mapping[str, Any]) -> RigFile:
         table = table_contents(path)
         columns = [_column(row) for row in table.rows]
         notes = [each for each in table.notes if not each.startswith("Next:")]
-        manoeuvres = [_manoeuvre(each) for each in _records(path, reading)]
+        records = _records(path, reading)
+        manoeuvres = [_manoeuvre(each) for each in records]
+        columns += _still(records, {each.name for each in columns})
     except FlightidError as error:
         said = str(error)
     return RigFile(name=path.name, columns=columns, notes=notes, manoeuvres=manoeuvres, error=said)
@@ -101,6 +103,21 @@ def _file(path: Path, reading: Mapping[str, Any]) -> RigFile:
 def _column(row: tuple[Any, ...]) -> RigColumn:
     name, unit, samples, _, least, most = row
     return RigColumn(name=name, unit=unit or "", samples=samples, least=least, most=most)
+
+
+def _still(records: Sequence[Record], told: set[str]) -> list[RigColumn]:
+    """Channels that never move in this file, which its table of contents leaves out."""
+    still: dict[str, RigColumn] = {}
+    for record in records:
+        for name in record.channels:
+            if name not in told and name not in still:
+                held = float(record[name][0])
+                unit = record.unit(name)
+                column = RigColumn(name=name, unit=unit, samples=0, least=held, most=held)
+                still[name] = column
+            if name in still:
+                still[name].samples += record.n_samples
+    return list(still.values())
 
 
 def _manoeuvre(record: Record) -> RigManoeuvre:

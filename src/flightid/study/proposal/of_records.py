@@ -21,6 +21,7 @@ from flightid.models.save import toml_value
 from flightid.record import read_records
 from flightid.record.formats.columns import channel_name
 from flightid.record.time_question import time_said
+from flightid.simulation.actuators import check_actuators
 from flightid.study.proposal.columns import Columns, columns_of
 from flightid.study.proposal.options import DataOptions, told
 from flightid.study.proposal.order_scans import ProposedScans, record_file
@@ -57,6 +58,7 @@ def study_of_records(
     inputs: tuple[str, ...],
     outputs: tuple[str, ...],
     excitations: tuple[str, ...] = (),
+    actuators: Mapping[str, float] | None = None,
     reading: DataOptions | None = None,
     cache: MutableMapping[str, Any] | None = None,
 ) -> Proposal:
@@ -74,6 +76,8 @@ def study_of_records(
         Columns, where their names do not tell.
     excitations : tuple of str
         Columns that were injected ahead of a controller: responses are estimated by way of them.
+    actuators : mapping of str to float, optional
+        Bandwidths, rad/s, of known actuators between columns and the inputs of equations.
     reading : DataOptions, optional
         How the files are read.
     cache : mutable mapping of str to object, optional
@@ -82,7 +86,9 @@ def study_of_records(
     Raises
     ------
     StudyError
-        No column can be told for an input or output.
+        No column can be told for an input or output, or actuators belong to no equations.
+    UnknownNameError, OptionError
+        An actuator belongs to no input, or its bandwidth has no meaning.
     """
     reading = reading or DataOptions()
     # What is named alone is read, so that no other column's gaps part its manoeuvres.
@@ -97,12 +103,12 @@ def study_of_records(
     keys = _keys(reading, folder)
     if injected and model is None:
         raise _needs_equations(paths, columns, injected)
+    body = _servos(actuators or {}, columns, model)
     groups, missed = _groups(read, columns)
     swept = None if model is None else one_experiment(read, columns.inputs, injected)
     if swept is not None:
         groups = [swept[0]]
     runner = StageRunner(cache)
-    body: list[str] = []
     names: list[str] = []
     for whole in groups:
         segments = segments_of(whole) if swept is None else swept[1]
@@ -150,6 +156,22 @@ def _needs_equations(
         needed="model='rate_first_order', another of the library, or a file of equations",
         action=f"name it; what the loop tells without one: flightid response {files} {named}",
     )
+
+
+def _servos(actuators: Mapping[str, float], columns: Columns, model: str | None) -> list[str]:
+    """Actuators that the equations do not hold: taken out ahead of every fit."""
+    if not actuators:
+        return []
+    if model is None:
+        raise StudyError(
+            "actuators are taken out for a model of equations alone",
+            found=", ".join(actuators),
+            needed="model='rate_first_order', another of the library, or a file of equations",
+            action="leave them out: a structure without equations holds them as well",
+        )
+    check_actuators(actuators, columns.inputs)
+    said = "# Known from the ground; they lie between the columns and the inputs of the model."
+    return ["", said, "[[conditioning]]", f"actuators = {toml_value(dict(actuators))}"]
 
 
 def _times(read: Sequence[Stretch]) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -47,4 +48,7 @@ class ProposalOptions(DataOptions):
     outputs: tuple[str, ...] = option((), doc="Columns of records that answer.")
     excitations: tuple[str, ...] = option(
         (), doc="Columns that were injected ahead of a controller: instruments in a closed loop."
+    )
+    actuators: Mapping[str, float] = option(
+        default_factory=dict, unit="rad/s", doc="Bandwidth of the known actuator behind an input."
     )

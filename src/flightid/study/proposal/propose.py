@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import MutableMapping, Sequence
+from collections.abc import Mapping, MutableMapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,7 @@ def propose_study(
     inputs: Sequence[str] = (),
     outputs: Sequence[str] = (),
     excitations: Sequence[str] = (),
+    actuators: Mapping[str, float] | None = None,
     tune: bool = False,
     cache: MutableMapping[str, Any] | None = None,
     **reading: Any,  # noqa: ANN401 — fields of DataOptions
@@ -43,6 +44,9 @@ def propose_study(
         Columns of records, where their names do not tell.
     excitations : sequence of str
         Columns of records that were injected ahead of a controller: instruments in a closed loop.
+    actuators : mapping of str to float, optional
+        Bandwidths, rad/s, of known first-order actuators that lie between a column and the input
+        of `model`: they are taken out of the records.
     tune : bool
         Let the study end in gains of the autopilot that flew.
     cache : mutable mapping of str to object, optional
@@ -66,7 +70,7 @@ def propose_study(
     paths = [Path(file) for file in files]
     asked = checked(DataOptions, reading, "a study of records")
     # Columns that are named are those of the topics of a bag, whoever published them.
-    named = bool(inputs or outputs or excitations or told(asked) != asked.declared)
+    named = bool(inputs or outputs or excitations or actuators or told(asked) != asked.declared)
     logs = [path for path in paths if is_log(path) and not (named and is_bag(path))]
     if not logs:
         return study_of_records(
@@ -76,6 +80,7 @@ def propose_study(
             inputs=tuple(inputs),
             outputs=tuple(outputs),
             excitations=tuple(excitations),
+            actuators=actuators or {},
             reading=asked,
             cache=cache,
         )
