@@ -241,3 +241,14 @@ def test_damaged_logs_never_break_the_reader(data: st.DataObject) -> None:
         assert [values.size for values in columns] == [rows * width for width in widths]
     skipped = sum(stop - start for start, stop, _ in file.skipped())
     assert 0 <= skipped <= len(content) == file.size()
+
+
+def test_a_column_that_was_read_is_not_read_again(tmp_path: Path) -> None:
+    """An inspection asks for stamps and rates some sixty times, each time by a table of its own."""
+    log = fid.read_log(_writer().write(tmp_path / "a.bin"))
+    first, second = log.table("IMU", 0), log.table("IMU", 0)
+    assert first["GyrX"] is second["GyrX"]
+    assert first.time_s is second.time_s
+    assert first["GyrX"] is not log.table("IMU", 1)["GyrX"]
+    with pytest.raises(ValueError, match="read-only"):
+        second["GyrX"][0] = 1.0

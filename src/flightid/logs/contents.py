@@ -7,6 +7,7 @@ from pathlib import Path
 
 from flightid.errors import MissingColumnError
 from flightid.findings import Finding
+from flightid.logs.kept_arrays import KeptArrays
 from flightid.logs.log_table import LogTable
 from flightid.logs.source import ByteRange, Event, Gap, LogSource, MessageInfo, ParameterChange
 from flightid.result import Result
@@ -30,6 +31,7 @@ class LogContents(Result, schema="flightid.log/1"):
     def __init__(self, path: str | Path, source: LogSource) -> None:
         self._path = Path(path)
         self._source = source
+        self._kept = KeptArrays()
 
     @property
     def path(self) -> Path:
@@ -133,7 +135,7 @@ class LogContents(Result, schema="flightid.log/1"):
             raise MissingColumnError(
                 "the log holds no such message", found=name, needed=self._near(name)
             )
-        return LogTable(self._source, name, instance)
+        return LogTable(self._source, name, instance, self._kept)
 
     def summary(self) -> Table:
         """Table of the message types with rows, instances, rate and span."""

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from flightid.errors import MissingColumnError
 from flightid.extras import extra_module
+from flightid.logs.kept_arrays import KeptArrays
 from flightid.logs.source import LogSource
 from flightid.result import Result
 from flightid.table import Column, Table
@@ -21,8 +22,9 @@ if TYPE_CHECKING:
 class LogTable(Result, schema="flightid.log_table/1"):
     """Rows of one message type (or one of its instances), by column.
 
-    Columns are read on demand and kept. Numbers are scaled by the log's own multipliers and carry
-    the unit that the log declares; nothing is converted to SI here.
+    Columns are read on demand and kept; those read last also for other tables of their log.
+    Numbers are scaled by the log's own multipliers and carry the unit that the log declares;
+    nothing is converted to SI here.
 
     Parameters
     ----------
@@ -32,6 +34,8 @@ class LogTable(Result, schema="flightid.log_table/1"):
         A message that the log holds.
     instance : int, optional
         Instance; default: all rows.
+    kept : KeptArrays, optional
+        Columns that tables of this log have read.
 
     Raises
     ------
@@ -45,7 +49,13 @@ class LogTable(Result, schema="flightid.log_table/1"):
     >>> log.table("RATE")["R"]                                       # doctest: +SKIP
     """
 
-    def __init__(self, source: LogSource, name: str, instance: int | None = None) -> None:
+    def __init__(
+        self,
+        source: LogSource,
+        name: str,
+        instance: int | None = None,
+        kept: KeptArrays | None = None,
+    ) -> None:
         if instance is not None and instance not in source.messages[name].instances:
             instances = ", ".join(map(str, source.messages[name].instances))
             raise MissingColumnError(
@@ -59,6 +69,7 @@ class LogTable(Result, schema="flightid.log_table/1"):
         # Not by way of MessageInfo: describing a message reads the stamps of all its rows.
         self._units, self._text_fields = source.fields(name)
         self._kept: dict[str, NDArray[np.float64]] = {}
+        self._of_log = KeptArrays(0) if kept is None else kept
         self._time_s: NDArray[np.float64] | None = None
 
     @property
@@ -138,12 +149,15 @@ class LogTable(Result, schema="flightid.log_table/1"):
         names = tuple(columns)
         for name in names:
             self._require_numbers(name)
+        for name in names:
+            values = None if name in self._kept else self._of_log.get(self._key(name))
+            if values is not None:
+                self._kept[name] = values
         missing = [name for name in dict.fromkeys(names) if name not in self._kept]
         if missing:
             found = self._source.columns(self.name, missing, self._instance)
             for name, values in zip(missing, found, strict=True):
-                values.flags.writeable = False
-                self._kept[name] = values
+                self._kept[name] = self._of_log.put(self._key(name), values)
         return {name: self._kept[name] for name in names}
 
     def text(self, column: str) -> list[str]:
@@ -171,10 +185,15 @@ class LogTable(Result, schema="flightid.log_table/1"):
             The message has no stamp.
         """
         if self._time_s is None:
+            self._time_s = self._of_log.get(self._key(None))
+        if self._time_s is None:
             stamps = self._source.time_s(self.name, self._instance)
-            stamps.flags.writeable = False
-            self._time_s = stamps
+            self._time_s = self._of_log.put(self._key(None), stamps)
         return self._time_s
+
+    def _key(self, column: str | None) -> tuple[str, int | None, str | None]:
+        """By which a column, or with None the stamps, is kept for other tables."""
+        return self._name, self._instance, column
 
     def to_pandas(self) -> pd.DataFrame:
         """All columns as a `pandas.DataFrame`; array fields become ``name[i]``.
