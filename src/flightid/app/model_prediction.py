@@ -16,6 +16,7 @@ from flightid.app.study_edits import KeyEdit, edited
 from flightid.app.work import KEPT
 from flightid.errors import DataError, FlightidError, StudyError
 from flightid.models import GreyBoxModel
+from flightid.record.hold import InputHold
 from flightid.responses import FrequencyResponse
 from flightid.study.model_preview import ModelPreview, preview_model
 from flightid.validation import Verification, verify
@@ -37,13 +38,13 @@ def predict_model(
         A value lies outside its bounds.
     """
     begun = time.process_time()
-    seen = _prepared(study, text, edits, name)
+    seen, holds = _prepared(study, text, edits, name)
     if seen.model is None:
         raise StudyError("this model has no equations", found=name, needed="a template")
     model = seen.model.with_values(dict(values)) if values else seen.model
     refusal, curves = "", []
     try:
-        curves = _curves(model, seen)
+        curves = _curves(model, seen, holds)
     except FlightidError as error:
         refusal = str(error)
     responses = [] if seen.response is None else _responses(model, seen.response)
@@ -51,7 +52,10 @@ def predict_model(
     return {"prediction": told, "processor_s": time.process_time() - begun}
 
 
-def _prepared(study: Path, text: str, edits: Sequence[KeyEdit], name: str) -> ModelPreview:
+def _prepared(
+    study: Path, text: str, edits: Sequence[KeyEdit], name: str
+) -> tuple[ModelPreview, dict[str, InputHold]]:
+    """What is predicted, and how inputs were taken between samples, by record, once one was."""
     now = edited(text, edits) if edits else text
     key = f"prediction: {study} {name} {now}"
     found = KEPT.get(key)
@@ -59,7 +63,8 @@ def _prepared(study: Path, text: str, edits: Sequence[KeyEdit], name: str) -> Mo
         with draft_of(study, now) as draft:
             found = preview_model(draft, name, data=True, cache=KEPT)
         KEPT[key], KEPT[f"{key} file"] = found, _written(found)
-    return found
+        KEPT[f"{key} holds"] = {}
+    return found, KEPT.setdefault(f"{key} holds", {})
 
 
 def _written(seen: ModelPreview) -> int:
@@ -68,15 +73,23 @@ def _written(seen: ModelPreview) -> int:
     return Path(template).stat().st_mtime_ns if template.endswith(".toml") else 0
 
 
-def _curves(model: GreyBoxModel, seen: ModelPreview) -> list[PredictedCurve]:
+def _curves(
+    model: GreyBoxModel, seen: ModelPreview, holds: dict[str, InputHold]
+) -> list[PredictedCurve]:
     outputs = seen.settings.outputs or model.outputs
     made: list[PredictedCurve] = []
     for name, records in (seen.records or {}).items():
         held = [each for each in outputs if all(each in record for record in records)]
         if not held:
             continue
-        found = verify(model, records, outputs=held, **seen.settings.check.options)
+        options = {**seen.settings.check.options}
+        if options.get("hold") is None and name in holds:
+            # Told, what the first prediction assumed is not weighed against other holds again.
+            options["hold"] = holds[name]
+        found = verify(model, records, outputs=held, **options)
         assert isinstance(found, Verification)
+        if found.hold is not None:
+            holds[name] = found.hold
         if not all(np.isfinite(found.predicted[each]).all() for each in held):
             raise DataError("the prediction grows without bound", needed="a stable model")
         made += [_curve(name, output, found) for output in held]
