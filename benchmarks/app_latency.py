@@ -2,8 +2,9 @@
 
     python -m benchmarks.app_latency [LOG]      default: a simulated flight of sweeps of 130 s
 
-Drags of a band go over the socket as the page sends them; a zoom is one view of a channel of 10⁷
-samples; the page's list is asked while ten jobs run.
+Drags and sliders are what a worker does for each; a log of 60 MB is sent to a server and asked for
+until its screen has a verdict, `DROPS` times; a zoom is one view of a channel of 10⁷ samples; the
+page's list is asked while ten jobs run. Gains are those of a quadrotor that flew a sweep.
 """
 
 from __future__ import annotations
@@ -11,12 +12,14 @@ from __future__ import annotations
 import asyncio
 import http.client
 import json
+import os
 import sys
 import tempfile
 import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from tests.sweep_log import SweepFlight
@@ -30,19 +33,29 @@ from flightid.app.study_edits import KeyEdit, edited, write_study
 from flightid.app.workspace import Workspace
 from flightid.errors import FlightidError
 from flightid.study.gain_preview import preview_fits
+from flightid.vehicles import PilotDoublet, SidActivation, fly
+from flightid.vehicles.ardupilot_log import write_ardupilot_log
 
 REPEATS = 50
 JOBS = 10
+DROPS = 7
+"""Of the large log: each is another one, by a few bytes."""
+DROPPED = SweepFlight(rate_hz=400.0, sweep_s=297.0)
+TICKS_A_SECOND = os.sysconf("SC_CLK_TCK")
 
 
-def medians(call: Callable[[int], object]) -> str:
+def medians(
+    call: Callable[[int], object],
+    repeats: int = REPEATS,
+    clock: Callable[[], float] = time.process_time,
+) -> str:
     """Median wall and processor time of a call, ms."""
     wall, processor = [], []
-    for number in range(REPEATS):
-        begun, used = time.perf_counter(), time.process_time()
+    for number in range(repeats):
+        begun, used = time.perf_counter(), clock()
         call(number)
         wall.append(time.perf_counter() - begun)
-        processor.append(time.process_time() - used)
+        processor.append(clock() - used)
     return f"{1e3 * np.median(wall):7.1f} ms wall, {1e3 * np.median(processor):7.1f} ms processor"
 
 
@@ -91,9 +104,21 @@ def drags(log: Path, folder: Path) -> None:
     print(f"parameter slider → prediction:      {medians(slide)}")
 
 
+def flown(folder: Path) -> Path:
+    """Roll of a quadrotor swept for half a minute: gains are found from it."""
+    sweep = SidActivation(
+        axis=10, start_s=5.0, magnitude=0.15, start_hz=0.15, stop_hz=12.0,
+        fade_in_s=3.0, record_s=30.0, fade_out_s=1.0, leave_after_s=40.0,
+    )  # fmt: skip
+    sticks = [PilotDoublet("roll", start_s=47.0 + 3.37 * k, amplitude=0.25) for k in range(10)]
+    flight = fly(runs=[sweep], doublets=sticks, log_every=2, seed=1)
+    return write_ardupilot_log(flight, folder / "flown.bin")
+
+
 def sliders(log: Path, folder: Path) -> None:
     """A gain moved, where the log tells the gains that flew."""
-    study = folder / "studies" / "a.toml"
+    study = folder / "studies" / f"{log.stem}-gains.toml"
+    work.make_overview(log, study, folder / "gains-overview.json")
     text = study.read_text()
     begun = time.process_time()
     try:
@@ -127,42 +152,92 @@ def zooms() -> None:
     print(f"one view of it, 1200 columns:       {told}")
 
 
+class Served:
+    """A folder behind a server in a thread, asked as the page asks."""
+
+    def __init__(self, folder: Path) -> None:
+        bound = bound_socket(0)
+        self.session = Session(bound.getsockname()[1])
+        self.server = server_of(Workspace(folder), {}, self.session)
+        self.thread = threading.Thread(
+            target=lambda: asyncio.run(self.server.serve(sockets=[bound]))
+        )
+        self.thread.start()
+
+    def ask(self, path: str, way: str = "GET", body: bytes | None = None) -> Any:
+        """What it answers."""
+        line = http.client.HTTPConnection("127.0.0.1", self.session.port, timeout=60)
+        said = {"Cookie": f"{self.session.cookie}={self.session.secret}"}
+        said |= {"Sec-Fetch-Site": "same-origin", "Content-Type": "application/octet-stream"}
+        line.request(way, path, body, headers=said)
+        told = json.loads(line.getresponse().read())
+        line.close()
+        return told
+
+    def close(self) -> None:
+        """End it."""
+        self.server.should_exit = True
+        self.thread.join()
+
+
+def whole_processor_s() -> float:
+    """Processor time of this process and of those that it started and that live, s."""
+    used, found = time.process_time(), {os.getpid()}
+    rows = []
+    for place in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            words = place.read_text().rpartition(")")[2].split()
+        except OSError:  # It has ended.
+            continue
+        rows.append((int(place.parent.name), int(words[1]), int(words[11]) + int(words[12])))
+    for pid, parent, ticks in sorted(rows):
+        if parent in found:
+            found.add(pid)
+            used += ticks / TICKS_A_SECOND
+    return used
+
+
+def drops(folder: Path) -> None:
+    """A large log dropped, until its screen says what it can carry."""
+    content = DROPPED.write(folder).read_bytes()
+    served = Served(folder / "drops")
+    mark = b"V4.6.0 (test)"
+
+    def drop(number: int) -> None:
+        body = content.replace(mark, b"V4.6.0 (%04d)" % number)
+        log = served.ask("/api/logs?name=large.bin", "PUT", body)["id"]
+        while served.ask(f"/api/logs/{log}")["overview"] is None:
+            time.sleep(0.1)
+
+    drop(1000)
+    told = medians(lambda k: drop(1001 + k), DROPS, whole_processor_s)
+    print(f"log of {len(content) / 1e6:.0f} MB dropped → verdict:      {told}")
+    served.close()
+
+
 def crowd(folder: Path) -> None:
     """The page's answers while ten jobs run or wait."""
     for number in range(JOBS):
         made = SweepFlight(rate_hz=400.0, sweep_s=45.0, amplitude=0.1 + 0.001 * number)
         made.write(folder).replace(folder / f"{number}.bin")
-    bound = bound_socket(0)
-    session = Session(bound.getsockname()[1])
-    server = server_of(Workspace(folder), {}, session)
-    thread = threading.Thread(target=lambda: asyncio.run(server.serve(sockets=[bound])))
-    thread.start()
-
-    def ask(path: str) -> list[dict[str, str]]:
-        line = http.client.HTTPConnection("127.0.0.1", session.port, timeout=60)
-        cookie = f"{session.cookie}={session.secret}"
-        line.request("GET", path, headers={"Cookie": cookie, "Sec-Fetch-Site": "same-origin"})
-        told = json.loads(line.getresponse().read())
-        line.close()
-        return list(told) if isinstance(told, list) else list(told["logs"])
-
-    ask("/api/workspace")
-    waiting = len(ask("/api/jobs"))
-    print(f"jobs that run or wait, before:      {waiting}")
+    served = Served(folder)
+    served.ask("/api/workspace")
+    print(f"jobs that run or wait, before:      {len(served.ask('/api/jobs'))}")
     for path in ("/api/workspace", "/api/jobs"):
-        print(f"{path} beside them:{' ' * (23 - len(path))}{medians(lambda _, p=path: ask(p))}")
-    print(f"jobs that run or wait, after:       {len(ask('/api/jobs'))}")
-    server.should_exit = True
-    thread.join()
+        told = medians(lambda _, asked=path: served.ask(asked))
+        print(f"{path} beside them:{' ' * (23 - len(path))}{told}")
+    print(f"jobs that run or wait, after:       {len(served.ask('/api/jobs'))}")
+    served.close()
 
 
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as name:
-        given = [Path(each) for each in sys.argv[1:]]
-        path = given[0] if given else SweepFlight(rate_hz=100.0, sweep_s=130.0).write(Path(name))
-        drags(path, Path(name))
-        sliders(path, Path(name))
-        crowded = Path(name) / "crowded"
-        crowded.mkdir()
-        crowd(crowded)
+        place, given = Path(name), [Path(each) for each in sys.argv[1:]]
+        path = given[0] if given else SweepFlight(rate_hz=100.0, sweep_s=130.0).write(place)
+        drags(path, place)
+        sliders(given[0] if given else flown(place), place)
+        for each in ("drops", "crowded"):
+            (place / each).mkdir()
+        drops(place)
+        crowd(place / "crowded")
     zooms()
