@@ -9,28 +9,20 @@ page's list is asked while ten jobs run. Gains are those of a quadrotor that fle
 
 from __future__ import annotations
 
-import asyncio
-import http.client
-import json
-import os
 import sys
 import tempfile
-import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from tests.sweep_log import SweepFlight
 
+from benchmarks.app_served import Served, processor_s
 from flightid.app import gain_work, model_prediction, work
-from flightid.app.guard import Session
 from flightid.app.own_folders import draft_of
 from flightid.app.pyramid import Pyramid, view
-from flightid.app.serving import bound_socket, server_of
 from flightid.app.study_edits import KeyEdit, edited, write_study
-from flightid.app.workspace import Workspace
 from flightid.errors import FlightidError
 from flightid.study.gain_preview import preview_fits
 from flightid.vehicles import PilotDoublet, SidActivation, fly
@@ -41,7 +33,6 @@ JOBS = 10
 DROPS = 7
 """Of the large log: each is another one, by a few bytes."""
 DROPPED = SweepFlight(rate_hz=400.0, sweep_s=297.0)
-TICKS_A_SECOND = os.sysconf("SC_CLK_TCK")
 
 
 def medians(
@@ -152,51 +143,6 @@ def zooms() -> None:
     print(f"one view of it, 1200 columns:       {told}")
 
 
-class Served:
-    """A folder behind a server in a thread, asked as the page asks."""
-
-    def __init__(self, folder: Path) -> None:
-        bound = bound_socket(0)
-        self.session = Session(bound.getsockname()[1])
-        self.server = server_of(Workspace(folder), {}, self.session)
-        self.thread = threading.Thread(
-            target=lambda: asyncio.run(self.server.serve(sockets=[bound]))
-        )
-        self.thread.start()
-
-    def ask(self, path: str, way: str = "GET", body: bytes | None = None) -> Any:
-        """What it answers."""
-        line = http.client.HTTPConnection("127.0.0.1", self.session.port, timeout=60)
-        said = {"Cookie": f"{self.session.cookie}={self.session.secret}"}
-        said |= {"Sec-Fetch-Site": "same-origin", "Content-Type": "application/octet-stream"}
-        line.request(way, path, body, headers=said)
-        told = json.loads(line.getresponse().read())
-        line.close()
-        return told
-
-    def close(self) -> None:
-        """End it."""
-        self.server.should_exit = True
-        self.thread.join()
-
-
-def whole_processor_s() -> float:
-    """Processor time of this process and of those that it started and that live, s."""
-    used, found = time.process_time(), {os.getpid()}
-    rows = []
-    for place in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            words = place.read_text().rpartition(")")[2].split()
-        except OSError:  # It has ended.
-            continue
-        rows.append((int(place.parent.name), int(words[1]), int(words[11]) + int(words[12])))
-    for pid, parent, ticks in sorted(rows):
-        if parent in found:
-            found.add(pid)
-            used += ticks / TICKS_A_SECOND
-    return used
-
-
 def drops(folder: Path) -> None:
     """A large log dropped, until its screen says what it can carry."""
     content = DROPPED.write(folder).read_bytes()
@@ -210,7 +156,7 @@ def drops(folder: Path) -> None:
             time.sleep(0.1)
 
     drop(1000)
-    told = medians(lambda k: drop(1001 + k), DROPS, whole_processor_s)
+    told = medians(lambda k: drop(1001 + k), DROPS, processor_s)
     print(f"log of {len(content) / 1e6:.0f} MB dropped → verdict:      {told}")
     served.close()
 

@@ -16,6 +16,8 @@ const HAZE_M = 1300;
 /** Below this many frames a second a picture is drawn with fewer points; `COARSEST` is the end. */
 const WANTED_MS = 22;
 const COARSEST = 0.4;
+/** So long, in time and not in pictures: at one a second sixty of them were a minute of standing still. */
+const PATIENCE_MS = 1000;
 
 const COLOURS = {
   light: { sky: "#a9d3ef", high: "#4d93cf", ground: "#7d9b5f", line: "#93ae76", hill: "#8aa0a8", tree: "#4f7546", pad: "#6d7276", mark: "#f4f4f0" },
@@ -41,7 +43,8 @@ export class FlyWorld {
   readonly #attitude = new Euler(0, 0, 0, "YXZ");
   readonly #painted: (paint: Paint) => void;
   #scale = 1;
-  #slow = 0;
+  #slow = 0; // ms for which pictures came too slowly
+  #before = performance.now();
   #size = [0, 0];
 
   /** Throws where there is no WebGL. */
@@ -76,13 +79,15 @@ export class FlyWorld {
 
   /** Whether the machine draws it at less than the coarsest points too slowly to fly by. */
   get tooSlow() {
-    return this.#slow > 60 && this.#scale <= COARSEST;
+    return this.#slow > 2 * PATIENCE_MS && this.#scale <= COARSEST;
   }
 
   /** `took` is what the last pictures took, ms. */
   draw(pose: FlyPose, width: number, height: number, ratio: number, took: number) {
-    this.#slow = took > WANTED_MS ? this.#slow + 1 : Math.max(0, this.#slow - 2);
-    if (this.#slow > 30 && this.#scale > COARSEST) [this.#scale, this.#slow] = [Math.max(COARSEST, 0.75 * this.#scale), 0];
+    const [now, before] = [performance.now(), this.#before];
+    this.#before = now;
+    this.#slow = took > WANTED_MS ? this.#slow + now - before : Math.max(0, this.#slow - 2 * (now - before));
+    if (this.#slow > PATIENCE_MS && this.#scale > COARSEST) [this.#scale, this.#slow] = [Math.max(COARSEST, 0.75 * this.#scale), 0];
     const size = [Math.round(width * ratio * this.#scale), Math.round(height * ratio * this.#scale)];
     if (size[0] !== this.#size[0] || size[1] !== this.#size[1]) {
       this.#size = size;
