@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 import flightid as fid
@@ -32,10 +34,7 @@ def test_by_keyboard_from_take_off_to_a_rated_record(desk: Desk) -> None:
     page.get_by_role("img", name="roll 0 %").wait_for()
     page.keyboard.press("p")
     page.get_by_text("paused", exact=True).wait_for()
-    page.wait_for_timeout(400)  # numbers are written ten times a second
-    stood = page.locator("dl dd").first.inner_text()
-    page.wait_for_timeout(400)
-    assert page.locator("dl dd").first.inner_text() == stood
+    assert _stands(page)
     page.keyboard.press("p")
     page.get_by_text("flying", exact=True).wait_for()
     # A second window finds the seat taken, and says so.
@@ -67,6 +66,17 @@ def test_by_keyboard_from_take_off_to_a_rated_record(desk: Desk) -> None:
     assert not said
     assert not _own(window)
     page.close()
+
+
+def _stands(page: Any) -> bool:
+    """Whether the clock stands; ten times a second it is written, on a busy machine less often."""
+    for _ in range(10):
+        before = page.locator("dl dd").first.inner_text()
+        page.wait_for_timeout(400)
+        if page.locator("dl dd").first.inner_text() == before:
+            page.wait_for_timeout(400)
+            return bool(page.locator("dl dd").first.inner_text() == before)
+    return False
 
 
 MODEL = """
