@@ -167,7 +167,8 @@ def test_columns_that_are_not_there_are_refused(log: fid.Log) -> None:
         (b"\x1f\x8b\x08rest", "gzip"),
         (b"PK\x03\x04rest", "zip"),
         (b"FMT, 128, 89", "text log"),
-        (b"time,p,q\n0,1,2\n", "first bytes"),
+        (b"time,p,q\n0,1,2\n", "text of no known kind"),
+        (b"\x00\x01secret", "found bytes of no known kind; needed"),
         (b"\xa3\x95 but no message", "without one message"),
     ],
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -18,6 +19,7 @@ from flightid.fleet.opening import current_store
 from flightid.fleet.page import fleet_document
 from flightid.fleet.settings import read_fleet
 from flightid.fleet.statistics.answers import FleetAnswers, answer_questions
+from flightid.fleet.statistics.drift import find_drift
 from flightid.fleet.statistics.events import FleetEvent
 from flightid.report.content import Figure, TableBlock
 from flightid.report.html import to_html
@@ -67,6 +69,32 @@ def test_vehicles_too_few_to_be_judged_are_grey_and_not_green() -> None:
         assert "” 1 counts, 6 are needed)" in each.message
         assert "cannot tell whether it is like its type (" in each.message
         assert "no change" not in each.message
+
+
+def test_flights_too_few_for_change_leave_a_sentence_and_no_empty_picture() -> None:
+    few = answer_questions(fleet_rows(3, 6, 4), covariates=["battery"])
+    document = fleet_document(few)
+    titles = [b.table.title for b in document.walk() if isinstance(b, TableBlock)]
+    assert "What changed" not in titles
+    assert sum(isinstance(block, Figure) for block in document.walk()) == 1, "of the type alone"
+    said = " ".join(to_text(document).split())
+    assert "Not answered: whether a vehicle changed: that takes 6 flights of it" in said
+    assert "and the most is 4." in said
+    assert "(of 6 vehicles 6 not judged)" in said
+    # No heading claims of vehicles what is true of a few.
+    assert "Changed, or unlike" not in said
+    alike = answer_questions(fleet_rows(3, 4, 7), covariates=["battery"])
+    quiet = replace(alike, types=tuple(
+        replace(t, drift=find_drift(t.data.chosen(t.data.member_of > 1))) for t in alike.types
+    ))  # fmt: skip
+    assert "Nothing changed: 4 histories asked" in " ".join(to_text(fleet_document(quiet)).split())
+
+
+def test_tables_of_a_type_fit_a_page(answers: FleetAnswers) -> None:
+    """In one table they took 200 letters, and scrolled on a screen of 1440 px."""
+    text = to_text(fleet_document(answers))
+    start = text.index("In common: type")
+    assert max(map(len, text[start : text.index("[Figure")].split("\n"))) <= 100
 
 
 def test_a_long_history_without_a_type_is_no_green_light() -> None:

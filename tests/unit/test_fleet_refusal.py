@@ -10,8 +10,10 @@ from flightid import errors
 from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.fleet import refusal as room
+from flightid.fleet.identity import read_tables
 from flightid.fleet.reasons import grouped_reasons, reason_lines
 from flightid.fleet.refusal import refusal
+from flightid.fleet.settings import read_fleet
 from flightid.inspection import inspect_log
 from flightid.logs import Log, read_log
 from tests.sweep_log import SweepFlight
@@ -81,7 +83,8 @@ def test_a_span_beyond_the_log_says_where_the_log_ends(log: Log, tmp_path: Path)
     with pytest.raises(errors.DataError, match=r"found RATE from [\d.]+ to [\d.]+ s") as told:
         log.record(names=["p"], span_s=(900.0, 910.0))
     assert "samples from 900 to 910 s" in str(told.value)
-    assert "copy it again" in str(told.value)
+    # A log that is cut off is the usual cause, and comes first.
+    assert "copy the log again where it is cut off, else name a span" in str(told.value)
 
 
 def test_reasons_are_counted_with_an_example_and_what_to_do() -> None:
@@ -98,3 +101,38 @@ def test_reasons_are_counted_with_an_example_and_what_to_do() -> None:
         "  3 refused: not a log (such as 0.bin: an empty file)",
         "      do: copy it again",
     ]
+
+
+@pytest.mark.parametrize(
+    ("reason", "message", "said"),
+    [
+        ("not-a-log", "a.bin is not a log: found text", "a.bin: found text"),
+        ("empty-file", "a.bin is an empty file: none", "a.bin: none"),
+        ("not-a-log", "a.bin is longer than it may be", "a.bin, which is longer than it may be"),
+        ("too-short", "16 s in the air", "a.bin: 16 s in the air"),
+    ],
+)
+def test_an_example_says_neither_its_name_nor_the_reason_twice(
+    reason: str, message: str, said: str
+) -> None:
+    row = {"outcome": "refused", "reason": reason, "message": message, "action": ""}
+    (line,) = reason_lines(grouped_reasons([{**row, "address": "logs/a.bin"}]))
+    assert line.endswith(f"(such as {said})")
+
+
+def test_nothing_is_repeated_of_a_file_that_is_not_the_fleets(tmp_path: Path) -> None:
+    """A stranger's fleet file names what it likes; its errors and records may go to them."""
+    own, secret = tmp_path / "own", b"root:x:0:0:hunter2"
+    own.mkdir()
+    for path in (tmp_path / "id_rsa", tmp_path / "told.csv", own / "told.csv"):
+        path.write_bytes(secret)
+    with pytest.raises(errors.LogFormatError, match="found text of no known kind") as told:
+        read_log(tmp_path / "id_rsa")
+    assert not any(piece in str(told.value) for piece in ("hunter", secret[:8].hex(" ")))
+    for place, is_told in (("told.csv", True), ("../told.csv", False)):
+        (own / "f.toml").write_text(
+            f'[fleet]\ntitle = "t"\nlogs = ["."]\n[vehicles]\ntable = "{place}"\n'
+        )
+        with pytest.raises(errors.StudyError, match="names no column 'id'") as found:
+            read_tables(read_fleet(own / "f.toml"))
+        assert ("hunter" in str(found.value)) == is_told

@@ -316,7 +316,7 @@ def test_an_address_has_one_record_that_counts(
     os.utime(tmp_path / "a.bin", ns=(seen.st_mtime_ns, seen.st_mtime_ns))
     again = run_fleet(tmp_path / "fleet.toml")
     assert (again.kept, again.outcomes) == (0, {"refused": 1})
-    assert [each.code for each in again.findings] == ["replaced-records"]
+    assert [each.code for each in again.findings] == ["replaced-records", "nothing-fitted"]
     assert fleet_status(tmp_path / "fleet.toml").outcomes == {"refused": 1}
     assert run_fleet(tmp_path / "fleet.toml").kept == 1
 
@@ -331,11 +331,13 @@ def test_one_content_under_three_names_is_one_log(
     # Two at once may both be taken, the third then is known: either way there is one.
     done = run_fleet(tmp_path / "fleet.toml", workers=1)
     assert (done.found, done.kept, done.outcomes) == (3, 0, {"refused": 1})
-    assert [each.code for each in done.findings] == ["copied-logs"]
+    assert [each.code for each in done.findings] == ["copied-logs", "nothing-fitted"]
     assert done.findings[0].message.startswith("2 logs with the bytes of another")
     assert fleet_status(tmp_path / "fleet.toml").outcomes == {"refused": 1}
     again = run_fleet(tmp_path / "fleet.toml", workers=1)
-    assert (again.found, again.kept, again.outcomes, again.findings) == (3, 3, {}, ())
+    assert (again.found, again.kept, again.outcomes) == (3, 3, {})
+    # A fleet without one model is as red when nothing is left to take.
+    assert [(each.code, each.light) for each in again.findings] == [("nothing-fitted", "red")]
 
 
 def test_tables_of_vehicles_and_flights_reach_every_log(fleet: Path, tmp_path: Path) -> None:

@@ -70,8 +70,8 @@ def answer_fleet(place: Path) -> dict[str, Any]:
     """The answers of a fleet's catalogue."""
     answers, level = _answers(place), _level(place)
     with showing(level):
-        every = [(t, h) for t in answers.types if t.drift for h in t.drift.histories]
-        every.sort(key=lambda pair: 2.0 if pair[1].chance is None else pair[1].chance)
+        every = [(t, h) for t in answers.types if t.drift for h in t.drift.judged]
+        every.sort(key=lambda pair: pair[1].chance or 0.0)
         return FleetPart(
             title=_title(place),
             words=fleet_words(answers),
@@ -168,14 +168,18 @@ def _finding(found: Finding) -> ShownFinding:
 
 
 def _type(each: TypeAnswers) -> FleetType:
-    tables = [] if each.population is None else [each.population.summary(labels=each.labels)]
+    tables, reasons = list[Table](), list(each.reasons)
+    if each.population is not None:
+        tables.append(each.population.summary(labels=each.labels))
+        tables.append(each.population.spread_table(labels=each.labels))
     if each.outliers is not None:
         tables.append(each.outliers.summary(each.labels))
     if each.drift is not None:
         tables.append(each.drift.summary(labels=each.labels))
         tables.append(events_table(each.drift, each.labels))
+        reasons += [each.drift.reason] if each.drift.reason else []
     return FleetType(
-        name=each.type_name, model=each.model, reasons=list(each.reasons),
+        name=each.type_name, model=each.model, reasons=reasons,
         labels=dict(each.labels), tables=[_table(table) for table in tables],
     )  # fmt: skip
 

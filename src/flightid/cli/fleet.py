@@ -45,7 +45,8 @@ def run(
     is said: <folder>-fleet.toml is what the other commands take from then on.
 
     A log that fails costs itself alone. Interrupt a run at any time: the next one takes what is
-    missing. The exit code is 1 where no log was found, or every one that was taken failed.
+    missing. The exit code is 1 where no log was found, every one that was taken failed, or none of
+    the catalogue has a model.
     """
     from flightid.fleet import run_fleet
     from flightid.fleet.reasons import reason_lines

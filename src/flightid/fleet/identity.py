@@ -96,9 +96,10 @@ def read_tables(settings: FleetSettings) -> FleetTables:
             try:
                 instant_of(row["flown_at"])
             except ValueError as error:
+                told = _repeated(settings.path.parent, rules.flight_table, repr(row["flown_at"]))
                 raise StudyError(
-                    f"{rules.flight_table}: flown_at of {name} has no meaning",
-                    found=repr(row["flown_at"]),
+                    f"{rules.flight_table}: flown_at of a line has no meaning",
+                    found=f"{name}: {told}" if told else None,
                     needed="a day or an instant, such as 2026-03-01T09:30",
                 ) from error
     return FleetTables(vehicles, flights)
@@ -113,18 +114,29 @@ def _table(folder: Path, name: str | None, key: str) -> dict[str, dict[str, str]
         raise StudyError(f"{name} is too long for a table of a fleet", needed="at most 256 MiB")
     with path.open(newline="", encoding="utf-8-sig", errors="replace") as stream:
         try:
-            return _lines(csv.DictReader(stream), name, key)
+            return _lines(csv.DictReader(stream), folder, name, key)
         except csv.Error as error:
             raise StudyError(f"{name} is no table of a fleet", found=str(error)) from error
 
 
-def _lines(reader: csv.DictReader[str], name: str, key: str) -> dict[str, dict[str, str]]:
+def _repeated(folder: Path, name: str | None, text: str) -> str | None:
+    """What an error may repeat of a table; None of one that lies outside the fleet file's folder.
+
+    A fleet file may come from a stranger, and name what is not theirs to read.
+    """
+    inside = (folder / (name or "")).resolve().is_relative_to(folder.resolve())
+    return text if inside else None
+
+
+def _lines(
+    reader: csv.DictReader[str], folder: Path, name: str, key: str
+) -> dict[str, dict[str, str]]:
     found = dict[str, dict[str, str]]()
     columns = reader.fieldnames or ()
     if key not in columns:
         raise StudyError(
             f"{name}: its first line names no column {key!r}",
-            found=", ".join(columns)[:200] or "nothing",
+            found=_repeated(folder, name, ", ".join(columns)[:200] or "nothing"),
         )
     for n, row in enumerate(reader):
         if n * len(columns) > TABLE_CELLS:
@@ -134,7 +146,8 @@ def _lines(reader: csv.DictReader[str], name: str, key: str) -> dict[str, dict[s
             )
         own = row.pop(key) or ""
         if own in found:
-            raise StudyError(f"{name}: two lines have one {key}", found=own)
+            told = _repeated(folder, name, own)
+            raise StudyError(f"{name}: two lines have one {key}", found=told)
         found[own] = {column: text for column, text in row.items() if column and text}
     return found
 

@@ -41,7 +41,15 @@ def fleet_document(answers: FleetAnswers, title: str = "Fleet") -> Document:
         *(Section(_type_title(each), tuple(_type_blocks(each))) for each in answers.types),
         Section("Logs that could not be used", tuple(_refused(answers.logs))),
     ]
-    return Document(title, fleet_words(answers), tuple(sections), f"Made by flightid {VERSION}.")
+    footer, lights = f"Made by flightid {VERSION}.", _lights_counted(answers)
+    return Document(title, fleet_words(answers), tuple(sections), footer, lights)
+
+
+def _lights_counted(answers: FleetAnswers) -> str:
+    """Vehicles by light, in words; other verdicts of the page are on estimates, not on vehicles."""
+    found = Counter(each.light for each in fleet_vehicles(answers).values())
+    said = ", ".join(f"{found[light]} {light.words}" for light in ORDER if found[light])
+    return f"of {counted(found.total(), 'vehicle')} {said}" if said else ""
 
 
 def fleet_words(answers: FleetAnswers) -> str:
@@ -87,7 +95,7 @@ def _vehicles(answers: FleetAnswers) -> Iterator[Block]:
     else:
         worrying = [e for e in found.values() if e.light in (Light.RED, Light.AMBER)]
         shown_lights = (*worrying, *_counts(list(found.values())))
-    yield Lights(shown_lights, "Changed, or unlike their type")
+    yield Lights(shown_lights, "The worst first")
     if answers.undated:
         yield Paragraph(
             f"{counted(answers.undated, 'flight')} without a date: part of their type, but of no "
@@ -142,6 +150,7 @@ def _type_blocks(each: TypeAnswers) -> Iterator[Block]:
         yield Paragraph(f"Not answered: {reason}.")
     if each.population is not None:
         yield TableBlock(each.population.summary(labels=each.labels))
+        yield TableBlock(each.population.spread_table(labels=each.labels))
         caption = (
             "Every vehicle's own estimate with its interval, and, shaded, where the next vehicle "
             f"lies with {interval_words(shown())}."
@@ -164,17 +173,24 @@ def _drift_blocks(drift: FleetDrift, labels: Mapping[str, str]) -> Iterator[Bloc
     slopes = _slopes(drift, labels)
     if slopes.rows:
         yield TableBlock(slopes)
-    yield TableBlock(drift.summary(labels=labels))
+    if drift.reason:
+        yield Paragraph(f"Not answered: {drift.reason}.")
+    else:
+        changes = drift.summary(labels=labels)
+        yield TableBlock(changes) if changes.rows else Paragraph(_unchanged(changes))
     events = events_table(drift, labels)
     if events.rows:
         yield TableBlock(events)
-    ranked = sorted(drift.histories, key=lambda one: 2.0 if one.chance is None else one.chance)
-    if ranked:
+    if drift.judged:
         caption = (
             "Estimates of flights with their intervals, what covariates explain taken out; the "
             "level behind them; orange where it changed, and when. Drawn are the least likely ones."
         )
-        yield figure_block(history_picture(ranked[:SHOWN], labels), caption)
+        yield figure_block(history_picture(drift.judged[:SHOWN], labels), caption)
+
+
+def _unchanged(changes: Table) -> str:
+    return " ".join(("Nothing changed:", changes.notes[0], *changes.notes[1:]))
 
 
 def _errors_light(scatter: RepeatScatter, name: str) -> Finding:

@@ -84,13 +84,23 @@ def reason_lines(reasons: Iterable[RefusalReason]) -> list[str]:
     """Lines of a terminal, at most 100 characters each: count, reason, example, what to do."""
     lines = []
     for each in reasons:
-        message = each.message.removeprefix(f"{each.name} ")
-        example = f" (such as {each.name}: {message})" if each.name else ""
+        example = f" (such as {_said(each)})" if each.name else ""
         said = f"{each.logs} {each.outcome}: {each.words}{example}"
         lines += wrapped(said, WIDTH, first="  ", later="      ")
         if each.action:
             lines += wrapped(f"do: {each.action}", WIDTH, first="      ", later="          ")
     return lines
+
+
+def _said(reason: RefusalReason) -> str:
+    """The example with its message, in which neither its name nor the reason comes twice."""
+    name, told = reason.name, reason.message
+    if not told.startswith(f"{name} "):
+        return f"{name}: {told}"
+    rest = told.removeprefix(f"{name} ")
+    clause = f"is {reason.words}: ", f"is a {reason.words}: ", f"is an {reason.words}: "
+    again = next((each for each in clause if rest.startswith(each)), None)
+    return f"{name}, which {rest}" if again is None else f"{name}: {rest.removeprefix(again)}"
 
 
 def reasons_table(reasons: Iterable[RefusalReason]) -> Table:

@@ -28,7 +28,7 @@ from flightid.fleet.catalogue.loose import (
     write_loose,
 )
 from flightid.fleet.catalogue.parts import KnownLogs, read_parts
-from flightid.fleet.catalogue.schema import FAILED
+from flightid.fleet.catalogue.schema import FAILED, FITTED
 from flightid.fleet.catalogue.store import Store
 from flightid.fleet.engine.cluster import require_address, run_cluster, scheduler_finding
 from flightid.fleet.engine.order import (
@@ -180,7 +180,7 @@ def _run(path: str | Path, workers: int | None, scheduler: str | None, *, retry:
         text = f"{len(replaced)} earlier records count no more: their logs have other bytes now"
         findings.append(Finding("replaced-records", Light.GREEN, text))
     findings += taken.findings()
-    findings += _all_failed(counts)
+    findings += _nothing_fitted(counts, store, len(addresses))
     return FleetRun(
         settings.catalogue, len(addresses), kept, counts, tuple(findings), taken.reasons()
     )
@@ -274,12 +274,23 @@ def _findings(scheduler: str | None, addresses: list[LogAddress]) -> Iterator[Fi
         )
 
 
-def _all_failed(counts: Mapping[str, int]) -> Iterator[Finding]:
-    """That a run brought nothing but failures: the fault is hardly in the logs then."""
+def _nothing_fitted(counts: Mapping[str, int], store: Store, found: int) -> Iterator[Finding]:
+    """That a run brought nothing but failures, or that no log of the fleet has given a model."""
     if counts.get(FAILED) and counts[FAILED] == sum(counts.values()):
         text = f"{counted(counts[FAILED], 'log')} taken, and every one failed"
         action = "see the table failures for why, then flightid fleet run with --retry"
         yield Finding("all-failed", Light.RED, text, action)
+    elif found and not _has_model(store):
+        text = f"no model: none of {counted(found, 'log')} could be used"
+        action = "do what the commonest reason asks for, then run the fleet again"
+        yield Finding("nothing-fitted", Light.RED, text, action)
+
+
+def _has_model(store: Store) -> bool:
+    """Whether the catalogue holds a log with a model."""
+    if any(part.outcomes.get(FITTED) for part in read_parts(store)[0]):
+        return True
+    return any(record.outcome == FITTED for record in read_loose(store, loose_logs(store)))
 
 
 def _no_space(found: str) -> DataError:

@@ -17,7 +17,7 @@ from flightid.logs.ros.reader import is_vehicle_bag, open_bag
 from flightid.logs.source import LogSource
 from flightid.logs.ulog.reader import UlogSource
 from flightid.reading import require_file
-from flightid.record.formats.foreign import foreign
+from flightid.record.formats.foreign import foreign, unknown_kind
 from flightid.record.formats.sniff import file_format
 
 ULOG_MAGIC = b"ULog\x01\x12\x35"
@@ -140,7 +140,7 @@ def _head(path: Path) -> bytes:
 
 
 def _not_a_log(path: Path, head: bytes) -> LogFormatError:
-    found, action = f"first bytes {head[:8].hex(' ')}", "hand in the autopilot's own log file"
+    found, action = unknown_kind(head), "hand in the autopilot's own log file"
     broken = [(what, advice) for magic, what, advice in _BROKEN if head.startswith(magic)]
     if named := [*filter(None, [None if path.is_dir() else foreign(head)]), *broken]:
         found, action = named[0]

@@ -160,7 +160,7 @@ def _not_in_span(
         f"channel {channel.name!r} has no samples in the span",
         found=f"{message} from {first:.1f} to {last:.1f} s",
         needed=f"samples from {span_s[0]:g} to {span_s[1]:g} s",
-        action="name a span inside the log; where it is cut off, copy it again",
+        action="copy the log again where it is cut off, else name a span inside it",
     )
 
 

@@ -147,6 +147,8 @@ class Document:
         Content in order.
     footer : str
         One line at the end: what made this, and when.
+    counted : str
+        What is counted where it is not verdicts alike: ``"9 vehicles not judged"``.
 
     Example
     -------
@@ -159,6 +161,7 @@ class Document:
     subtitle: str
     sections: tuple[Section, ...]
     footer: str = field(default="")
+    counted: str = field(default="")
 
     def walk(self) -> Iterator[Block]:
         """Every block, in order."""
@@ -187,6 +190,8 @@ class Document:
     @property
     def tally(self) -> str:
         """Verdicts counted, for example ``"3 green, 1 amber"``; empty where nothing was judged."""
+        if self.counted:
+            return self.counted
         order = (Light.GREEN, Light.AMBER, Light.RED, Light.UNKNOWN)
         return ", ".join(
             f"{self.count(light)} {light.words}" for light in order if self.count(light)

@@ -14,6 +14,7 @@ import json
 from collections.abc import Sequence
 from functools import cache
 from importlib.resources import files
+from itertools import groupby
 from typing import Any
 
 import jinja2
@@ -139,17 +140,24 @@ class _Numbering:
 def _sorted_lights(findings: list[dict[str, Any]], *, opening: bool) -> dict[str, Any]:
     """Verdicts to read, and those that are met, which open on demand where the list is long.
 
-    What several of a row say to do stands with the first of them.
+    What several of a row say to do stands with the first of them, and how many it is for.
     """
-    above = [None, *(each["action"] for each in findings)]
-    told = [
-        {**each, "action": "" if each["action"] == said else each["action"]}
-        for each, said in zip(findings, above, strict=False)
-    ]
-    good = [each for each in told if each["light"] == Light.GREEN]
-    if opening or len(told) <= LONG_LIST or len(good) <= FEW_GOOD:
-        return {"findings": told, "good": []}
-    return {"findings": [each for each in told if each not in good], "good": good}
+    good = [each for each in findings if each["light"] == Light.GREEN]
+    if opening or len(findings) <= LONG_LIST or len(good) <= FEW_GOOD:
+        return {"findings": _actions_once(findings), "good": []}
+    rest = [each for each in findings if each["light"] != Light.GREEN]
+    return {"findings": _actions_once(rest), "good": _actions_once(good)}
+
+
+def _actions_once(findings: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Findings of which the first of a row alike in what to do says it, and for how many."""
+    told: list[dict[str, Any]] = []
+    for action, same in groupby(findings, key=lambda each: each["action"]):
+        first, *others = same
+        also = f" (so for the {len(others)} below)" if action and len(others) > 1 else ""
+        also = " (so for the next)" if action and len(others) == 1 else also
+        told += [{**first, "action": f"{action}{also}"}, *({**e, "action": ""} for e in others)]
+    return told
 
 
 def _abreast(blocks: list[dict[str, Any]]) -> list[dict[str, Any]]:

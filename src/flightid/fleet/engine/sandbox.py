@@ -26,8 +26,8 @@ from flightid.fleet.engine.order import (
 from flightid.threads import LINEAR_ALGEBRA
 
 CHILD = "flightid.fleet.engine.child"
-START_S = 120.0
-"""Longest time until a process is ready."""
+START_S = 600.0
+"""Longest time until a process is ready: on a machine that others load two minutes were too few."""
 ONE_THREAD = (*LINEAR_ALGEBRA, "RAYON_NUM_THREADS")
 MEMORY_WORDS = (b"MemoryError", b"memory allocation", b"bad_alloc", b"Cannot allocate memory")
 TIME, MEMORY, DEAD = "time", "memory", "killed"

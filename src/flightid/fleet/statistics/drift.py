@@ -153,6 +153,23 @@ class FleetDrift(Result, schema="flightid.fleet_drift/1"):
         found = [each for each in self.histories if each.is_alarm]
         return tuple(sorted(found, key=lambda each: each.chance or 0.0))
 
+    @property
+    def judged(self) -> tuple[ParameterHistory, ...]:
+        """Histories long enough to be asked, the least likely first."""
+        found = [each for each in self.histories if each.chance is not None]
+        return tuple(sorted(found, key=lambda each: each.chance or 0.0))
+
+    @property
+    def reason(self) -> str:
+        """Why no history was asked; empty where one was."""
+        if self.judged:
+            return ""
+        most = max((len(each.values) for each in self.histories), default=0)
+        return (
+            f"whether a vehicle changed: that takes {FEWEST} flights of it with a date and an "
+            f"interval, and the most is {most}"
+        )
+
     def __repr__(self) -> str:
         """Histories and alarms."""
         return f"FleetDrift({len(self.histories)} histories, {len(self.alarms)} changed)"
@@ -187,10 +204,10 @@ class FleetDrift(Result, schema="flightid.fleet_drift/1"):
                     each.kind,
                 )
             )
-        asked = sum(each.chance is not None for each in self.histories)
+        asked = len(self.judged)
         note = (
-            f"{asked} histories asked, at most {100 * FALSE_SHARE:.0f} % of the alarms false "
-            "(Benjamini and Hochberg)."
+            f"{asked} {'history' if asked == 1 else 'histories'} asked, at most "
+            f"{100 * FALSE_SHARE:.0f} % of the alarms false (Benjamini and Hochberg)."
         )
         odd = ", ".join(
             f"{n} of {named.get(name, name)}" for name, n in self.odd_flights.items() if n

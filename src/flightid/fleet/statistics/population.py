@@ -142,48 +142,67 @@ class Population(
     def summary(
         self, *, level: float | None = None, labels: Mapping[str, str] | None = None
     ) -> Table:
-        """One row a parameter, in words where there are any: mean, spread, next vehicle."""
+        """One row a parameter, in words where there are any: mean, and where the next one lies."""
         level = shown(level)
         words = interval_words(level)
         columns = (
-            Column("parameter"),
-            Column("symbol"),
-            Column("unit"),
-            Column("mean"),
-            Column(f"mean, {words} low"),
-            Column(f"mean, {words} high"),
-            Column("between vehicles", digits=3),
-            Column(f"between, {words} low", digits=3),
-            Column(f"between, {words} high", digits=3),
-            Column("next vehicle low"),
-            Column("next vehicle high"),
-            Column("between flights", digits=3),
-            Column("I²", "%", digits=3),
-            Column("vehicles"),
+            *(Column("parameter"), Column("symbol"), Column("unit")),
+            *(Column("mean"), Column("low"), Column("high")),
+            *(Column("next vehicle low"), Column("next vehicle high"), Column("vehicles")),
         )
         rows: list[tuple[Cell, ...]] = []
-        named = labels or {}
         for name, found in self.parameters.items():
-            mean = found.mean.interval(level) or (None, None)
-            spread = found.spread.interval(level) or (None, None)
-            following = found.next_vehicle.interval(level) or (None, None)
-            unit = "" if found.mean.unit == "1" else found.mean.unit
-            rows.append(
-                (
-                    *(named.get(name, name), name if name in named else None, unit),
-                    *(found.mean.value, *mean, found.spread.value, *spread, *following),
-                    *(found.flight_spread.value, found.inconsistency_percent, found.n_vehicles),
-                )
+            ends = (
+                each.interval(level) or (None, None) for each in (found.mean, found.next_vehicle)
             )
+            mean, following = ends
+            told = (*self._named(name, labels), found.mean.value, *mean, *following)
+            rows.append((*told, found.n_vehicles))
         note = (
-            f"Restricted likelihood, spread between vehicles {self.spreads.structure}, "
-            f"between flights {self.spreads.within_structure}. The next vehicle lies between its "
-            f"two columns with {words}. Intervals of the spread take vehicles for draws of a "
-            "normal distribution, longer where some lie further out: with few odd ones among many "
-            "they hold the truth less often."
+            f"Low and high are the {words} interval of the mean; the next vehicle lies between its "
+            f"two columns with {words}."
         )
         title = f"In common: type “{self.type_name}”"
         return Table(title, columns, tuple(rows), (note,)).without_empty_columns()
+
+    def spread_table(
+        self, *, level: float | None = None, labels: Mapping[str, str] | None = None
+    ) -> Table:
+        """One row a parameter: how far vehicles differ, and flights of one.
+
+        Parameters
+        ----------
+        level : float, optional
+            Of the intervals; default: as shown elsewhere.
+        labels : mapping of str to str, optional
+            Parameters in words.
+        """
+        level = shown(level)
+        columns = (
+            *(Column("parameter"), Column("unit"), Column("between vehicles", digits=3)),
+            *(Column("low", digits=3), Column("high", digits=3)),
+            *(Column("between flights", digits=3), Column("I²", "%", digits=3)),
+        )
+        rows: list[tuple[Cell, ...]] = []
+        for name, found in self.parameters.items():
+            words, _, unit = self._named(name, labels)
+            spread = found.spread.interval(level) or (None, None)
+            told = (words, unit, found.spread.value, *spread, found.flight_spread.value)
+            rows.append((*told, found.inconsistency_percent))
+        note = (
+            f"Standard deviations by restricted likelihood, between vehicles "
+            f"{self.spreads.structure}, between flights {self.spreads.within_structure}; low and "
+            f"high are the {interval_words(level)} interval. It takes vehicles for draws of a "
+            "normal distribution, longer where some lie further out: with few odd ones among many "
+            "it holds the truth less often. I² is the share of what is seen that is no error."
+        )
+        title = f"How far apart: type “{self.type_name}”"
+        return Table(title, columns, tuple(rows), (note,)).without_empty_columns()
+
+    def _named(self, name: str, labels: Mapping[str, str] | None) -> tuple[str, str | None, str]:
+        """A parameter in words, its symbol where these are others, and its unit."""
+        named, unit = labels or {}, self.parameters[name].mean.unit
+        return named.get(name, name), name if name in named else None, "" if unit == "1" else unit
 
 
 def estimate_population(

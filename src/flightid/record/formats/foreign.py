@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import re
 
 UNPACK = "unpack it, and hand in the file in it"
@@ -109,3 +110,28 @@ def foreign(head: bytes) -> tuple[str, str] | None:
             return found, action
     text = head.removeprefix(b"\xef\xbb\xbf").lstrip()
     return next(((found, action) for sign, found, action in _TEXTS if sign.match(text)), None)
+
+
+def is_text(head: bytes) -> bool:
+    """Whether a file is text, by its first bytes: none of them is zero but in UTF-16."""
+    return head[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE) or (
+        bool(head) and b"\x00" not in head
+    )
+
+
+def unknown_kind(head: bytes) -> str:
+    """What a file is of which nothing else is known, in words that repeat nothing of it.
+
+    Whoever hands a file in may not be whom it belongs to: a study or a fleet file names others.
+
+    Example
+    -------
+    >>> unknown_kind(b"root:x:0:0"), unknown_kind(bytes([0, 1, 2]))
+    ('text of no known kind', 'bytes of no known kind')
+    """
+    try:
+        codecs.getincrementaldecoder("utf-8")().decode(head)  # it may be cut within a letter
+        is_whole = is_text(head)
+    except UnicodeDecodeError:
+        is_whole = False
+    return f"{'text' if is_whole else 'bytes'} of no known kind"

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import codecs
 from enum import StrEnum
 from pathlib import Path
 
 from flightid.errors import FileFormatError
 from flightid.reading import require_file
-from flightid.record.formats.foreign import foreign
+from flightid.record.formats.foreign import foreign, is_text, unknown_kind
 
 TEXT_SUFFIXES = {".csv", ".txt", ".tsv", ".dat"}
 SNIFFED = 4096
@@ -64,9 +63,9 @@ def file_format(path: Path) -> FileFormat:
     strange = foreign(head)
     found = None if strange else _by_content(head, suffix)
     if found is None:
-        if strange is None and _is_text(head):
+        if strange is None and is_text(head):
             strange = "text", f"if it is a table, give it a name that ends in .csv, not {suffix!r}"
-        what, action = strange or (f"first bytes {head[:8]!r}", OTHERS)
+        what, action = strange or (unknown_kind(head), OTHERS)
         raise FileFormatError(
             f"{path.name} is of no format that holds records or a flight",
             found=what,
@@ -74,12 +73,6 @@ def file_format(path: Path) -> FileFormat:
             action=action,
         )
     return found
-
-
-def _is_text(head: bytes) -> bool:
-    return head[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE) or (
-        bool(head) and b"\x00" not in head
-    )
 
 
 def _by_content(head: bytes, suffix: str) -> FileFormat | None:
@@ -92,7 +85,7 @@ def _by_content(head: bytes, suffix: str) -> FileFormat | None:
         (head[:8] == HDF5_SIGNATURE, hdf5),
         (head[512:520] == HDF5_SIGNATURE, FileFormat.MATLAB_HDF5),
         (head[:6] == b"MATLAB" or head[126:128] in (b"IM", b"MI"), FileFormat.MATLAB),
-        (suffix in TEXT_SUFFIXES and _is_text(head), FileFormat.CSV),
+        (suffix in TEXT_SUFFIXES and is_text(head), FileFormat.CSV),
     )
     return next((kind for is_met, kind in signs if is_met), None)
 
