@@ -11,9 +11,10 @@ import pytest
 
 from flightid.plot import look
 from flightid.plot.record import Panel, Trace, time_histories
-from flightid.report.content import Document, Section
+from flightid.report.content import Document, Section, TableBlock
 from flightid.report.figures import figure_block
 from flightid.report.html import to_html
+from flightid.table import Column, Table
 
 BROWSER = shutil.which("chromium") or shutil.which("google-chrome")
 QUIET = [
@@ -66,8 +67,11 @@ def test_plots_draw_from_disk(tmp_path: Path, packed: bool) -> None:
 
 
 @pytest.mark.skipif(BROWSER is None, reason="no Chromium on this machine")
-def test_paper_shows_all_plots_at_its_own_width(tmp_path: Path) -> None:
-    """A browser takes the page when the event is over: what is drawn later is a blank on paper."""
+def test_paper_shows_all_plots_and_columns_at_its_own_width(tmp_path: Path) -> None:
+    """A browser takes the page when the event is over: what is drawn later is a blank on paper.
+
+    What is wider than paper it cuts: tables are made smaller, and the widest lie on turned pages.
+    """
     api = pytest.importorskip("playwright.sync_api")
     time_s = np.linspace(0.0, 9.0, 400)
     pictures = [
@@ -78,25 +82,43 @@ def test_paper_shows_all_plots_at_its_own_width(tmp_path: Path) -> None:
         )
         for k in range(1, 9)
     ]
+    tables = [
+        TableBlock(Table(f"{n} columns", columns, (tuple(0.123456 * k for k in range(n)),)))
+        for n in (3, 18, 40)
+        for columns in [tuple(Column(f"name{k}") for k in range(n))]
+    ]
+    tables.append(
+        TableBlock(Table("Hash", (Column("hash"), Column("made by")), (("a" * 300, ""),)))
+    )
     file = tmp_path / "report.html"
-    file.write_text(to_html(Document("Title", "", (Section("S", tuple(pictures)),))))
+    file.write_text(to_html(Document("Title", "", (Section("S", (*pictures, *tables)),))))
     with api.sync_playwright() as player:
         browser = player.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
         page = browser.new_page(viewport={"width": 1440, "height": 500}, color_scheme="dark")
         page.goto(file.as_uri())
         page.wait_for_selector(".main-svg", timeout=60_000)
         page.wait_for_timeout(1500)
-        drawn, widths, paper = page.evaluate(
+        drawn, widths, paper, frames = page.evaluate(
             """() => {
                 const plots = [...document.querySelectorAll(".plot")];
                 const count = () => plots.filter((one) => one.querySelector(".main-svg")).length;
                 const before = count();
                 dispatchEvent(new Event("beforeprint"));
                 const wide = plots.map((one) => one.querySelector(".main-svg")?.clientWidth ?? 0);
-                return [before, wide, count()];
+                const frames = [...document.querySelectorAll(".scroll")].map((one) => {
+                    const aside = one.classList.contains("aside"), paper = aside ? 1190 : 870;
+                    const zoom = Number(one.firstElementChild.style.zoom);
+                    one.style.width = `${paper}px`;
+                    return [one.scrollWidth - paper, zoom, aside];
+                });
+                return [before, wide, count(), frames];
             }"""
         )
         browser.close()
     assert drawn < 8, "what is folded or below the screen is not drawn before"
     assert paper == 8
-    assert max(widths) <= 690, "of a window 1440 px wide"
+    assert max(widths) <= 880, "of a window 1440 px wide"
+    assert [over <= 1 for over, _, _ in frames] == [True] * 4, frames
+    assert [(zoom < 1, aside) for _, zoom, aside in frames] == [
+        (False, False), (True, False), (True, True), (False, False),
+    ]  # fmt: skip

@@ -12,6 +12,7 @@ import flightid as fid
 from flightid import errors
 from flightid.cli.program import run
 from flightid.dynamics.conditions.ratios import chance_of, holm, ratio_of
+from flightid.dynamics.conditions.result import LEAST_CHANCE
 from flightid.uncertainty.estimate import Estimate
 from tests.closeness import assert_close
 
@@ -169,10 +170,30 @@ def test_black_boxes_are_compared_by_their_modes(
     assert found.summary().title == "Modes, before and after"
     files = [str(fid.write_model(box, tmp_path / f"{name}.toml")) for name, box in boxes.items()]
     assert run(["compare", *files]) == 0
-    shown = capsys.readouterr()
-    assert "y at 1.6 Hz, natural frequency" in shown.out
-    assert "--gains FILE" in shown.err
-    assert f"flightid verify {files[0]} RECORDS --against {files[1]}" in shown.err
+    shown = capsys.readouterr().out
+    assert "y at 1.6 Hz, natural frequency" in shown
+    assert "--gains FILE" in shown
+    assert shown.index("natural frequency") < shown.index("flightid verify"), "what to do is last"
+    assert f"flightid verify {files[0]} RECORDS --against {files[1]}" in shown
+    alone = fid.PolynomialModel(("u",), "y", 0.01, a=[1.0, -0.9], b=[[0.0, 1.0]])
+    apart = fid.compare_conditions({"pair": boxes["before"], "lag": alone})
+    assert apart.only_modes["pair"] == ("y, lightly damped oscillation: -2.011 ± 9.85i rad/s",)
+    (tmp_path / "second-output" / "models").mkdir(parents=True)
+    fid.write_model(alone, tmp_path / "second-output" / "models" / "y.toml")
+    (tmp_path / "second.csv").write_text("time,u,y\n")
+    (tmp_path / "second-output" / "results.json").write_text('{"files": {"second.csv": "0"}}')
+    assert run(["compare", files[0], str(tmp_path / "second-output")]) == 0
+    asked = f"flightid verify {files[0]} {tmp_path / 'second.csv'} --against"
+    assert asked in capsys.readouterr().out
+
+
+def test_a_chance_that_no_tail_tells_is_no_zero() -> None:
+    apart = fid.compare_conditions({
+        name: _fit(fid.load_model("rate_first_order", axis="roll").with_values({"Lp": lag}), 1)
+        for name, lag in (("slow", -1.0), ("quick", -40.0))
+    })  # fmt: skip
+    assert apart["Lp"].chances["quick"] < LEAST_CHANCE
+    assert "< 1e-15" in apart.summary().to_text()
 
 
 def test_modes_without_common_states_do_not_answer_to_each_other() -> None:

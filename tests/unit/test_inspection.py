@@ -67,6 +67,9 @@ def test_result_is_plain_values_text_and_tables(good: Inspection) -> None:
     assert set(values["usable_band_rad_s"]) == {"roll", "pitch", "yaw"}
     assert repr(good) == "Inspection('sweeps.bin', 145 s, 134.9 s airborne, green)"
     text = good.to_text()
+    head = "s of the autopilot's clock, as all times here"
+    span = f"from {good.start_s:.1f} to {good.start_s + good.duration_s:.1f} {head}"
+    assert span in " ".join(text.split())
     assert "can support identification" in text
     assert max(map(len, text.split("\n\n")[0].splitlines())) <= 100
     assert [table.title for table in good.tables()][1:3] == [

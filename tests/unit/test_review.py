@@ -112,6 +112,9 @@ def test_a_tracking_error_of_one_wild_stretch_is_no_number() -> None:
 
 
 def test_a_healthy_flight_has_no_complaint(review: fid.FlightReview) -> None:
+    later = replace(review, start_s=44.0, duration_s=50.2).flight().to_text()
+    assert "50.2 s, from 44.0 to 94.2 s of the autopilot's clock, as all times here" in later
+    assert "clock" not in replace(review, start_s=0.0).flight().to_text(), "its zero is the log's"
     # The simulator flies roll alone: the other axes stand still.
     assert not [code for code in codes(review) if "pitch" not in code and "yaw" not in code]
     assert review.identity.battery is not None

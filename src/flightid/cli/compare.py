@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,15 +14,17 @@ from flightid.cli.compared_loops import compared_loops, paired_models, short_nam
 from flightid.cli.hints import PARAMETERS
 from flightid.cli.lists import ListOption, ListsCommand
 from flightid.cli.model_commands import feedback_option
-from flightid.cli.output import all_option, json_option, level_option, note
+from flightid.cli.next_comparison import unasked
+from flightid.cli.output import all_option, json_option, level_option
 from flightid.cli.pages import html_option, show
 from flightid.cli.sources import AXES, known_models, load_source
 
 if TYPE_CHECKING:
     from flightid.dynamics.conditions.result import ConditionComparison
+    from flightid.findings import Finding
     from flightid.models import Model
     from flightid.result import Result
-    from flightid.review import FlightComparison, FlightReview
+    from flightid.review import FlightComparison, FlightReview, MarginComparison
 
 PART = re.compile(r"(.+)@([\d.]*):([\d.]*)")
 """A log and a part of it, s: ``flight.BIN@20:80``."""
@@ -63,15 +66,15 @@ def command(
 ) -> None:
     """What changed from A to B, and what is more than chance.
 
-    Two logs, or parts of logs (flight.BIN@20:80, s on its clock): steps, bandwidths and tracking of
-    the loops, gains and filters that differ, and whether vehicle, firmware or battery do. Models,
-    then a log: what they promise of the gains that it flew beside what it shows; where `flightid
-    tune --write` left its files beside either, the next step to fly or the file that takes this one
-    back. Models alone: parameters and modes with their ratios, the first as base; with --gains or
-    --feedback, and of studies that tuned a PID, margins with intervals of the difference too; one
-    model and two files of --gains: what the gains change. A model is a .toml file, the folder of a
-    study, the JSON of a fit, or a library name. To see which predicts better: `flightid verify
-    MODEL RECORDS --against MODEL`.
+    Two logs, or parts of logs (flight.BIN@20:80, s on the autopilot's clock): steps, bandwidths and
+    tracking of the loops, gains and filters that differ, and whether vehicle, firmware or battery
+    do. Models, then a log: what they promise of the gains that it flew beside what it shows; where
+    `flightid tune --write` left its files beside either, the next step to fly or the file that
+    takes this one back. Models alone: parameters and modes with their ratios, the first as base;
+    with --gains or --feedback, and of studies that tuned a PID, margins with intervals of the
+    difference too; one model and two files of --gains: what the gains change. A model is a .toml
+    file, the folder of a study, the JSON of a fit, or a library name. To see which predicts better:
+    `flightid verify MODEL RECORDS --against MODEL`.
     """
     from flightid.uncertainty.quantiles import showing
 
@@ -81,10 +84,12 @@ def command(
     _require_sides(files, flights, closed=bool(gains or feedback))
     if not flights:
         loops = compared_loops(files, axis, gains, feedback, loop_rate_hz)
-        results: list[Result] = [*_conditions(files, axis, needed=not loops), *loops]
-        first, *beside = results
+        conditions = _conditions(files, axis, needed=not loops)
         if not loops:
-            note(f"Next: {_after_models(files)}")
+            *_, last = conditions
+            conditions[-1] = replace(last, findings=(*last.findings, unasked(files)))
+        said = [finding for each in conditions for finding in each.findings]
+        first, *beside = results = [*conditions, *(_without(each, said) for each in loops)]
         if not as_json:
             _show_modes(results, level)
         show(first, "Comparison", *beside, as_json=as_json, html=html, level=level)
@@ -150,6 +155,11 @@ def _conditions(
         return []
 
 
+def _without(loops: MarginComparison, said: Sequence[Finding]) -> MarginComparison:
+    """Margins without the doubts that stand above them."""
+    return replace(loops, findings=tuple(each for each in loops.findings if each not in said))
+
+
 def _show_modes(results: Sequence[Result], level: float | None) -> None:
     """Modes of models with named parameters, ahead of those; of others they are the summary."""
     from flightid.dynamics.conditions.result import ConditionComparison
@@ -159,15 +169,6 @@ def _show_modes(results: Sequence[Result], level: float | None) -> None:
         if isinstance(result, ConditionComparison) and result.parameters and result.modes:
             with showing(level):
                 click.echo(f"{result.modes_table()}\n")
-
-
-def _after_models(files: Sequence[str]) -> str:
-    """What can be asked of models that no controller was closed around."""
-    named = " ".join(files)
-    margins = f"flightid compare {named} --gains FILE compares margins under gains of `tune`"
-    if len(files) != 2:
-        return margins
-    return f"{margins}; flightid verify {files[0]} RECORDS --against {files[1]}: which errs less"
 
 
 def _holds_gains(path: Path) -> bool:
@@ -186,8 +187,6 @@ def _is_flight(name: str) -> bool:
 
 
 def _reviewed(name: str) -> FlightReview:
-    from dataclasses import replace
-
     from flightid import review_flight
 
     part = PART.fullmatch(name)
@@ -208,8 +207,6 @@ def _flights(before: str, after: str) -> FlightComparison:
 
 def _promise(models: Sequence[str], after: str) -> FlightComparison:
     """What models promised of a flight, and which step of the gains comes next."""
-    from dataclasses import replace
-
     from flightid import compare_with_promise, read_log
     from flightid.progress import progress
     from flightid.review.next_step import flown_step

@@ -66,5 +66,6 @@ def inspect_log(log: Log | str | Path) -> Inspection:
         saturations=saturations(opened, phases.airborne, actuators),
         skews=stream_skews(opened, phases.airborne),
         bands=axis_bands(opened, phases.airborne, excited),
+        start_s=start_s,
     )
     return found.with_findings(judge(opened, found))

@@ -11,6 +11,7 @@ from flightid.inspection.axes import axes_of
 from flightid.inspection.carried import carried_axes, carried_sentence
 from flightid.inspection.excitation_found import FoundExcitation
 from flightid.inspection.flight_phases import FlightPhases
+from flightid.inspection.log_clock import logged_words
 from flightid.inspection.rates import StreamRate
 from flightid.inspection.saturation import Saturation
 from flightid.inspection.skew import StreamSkew
@@ -54,6 +55,8 @@ class Inspection(Result, schema="flightid.inspection/1"):
         What each axis supports.
     findings : tuple of Finding
         Verdicts with what to do.
+    start_s : float
+        First stamp on the autopilot's clock, of which all times here are, s.
 
     Example
     -------
@@ -75,6 +78,12 @@ class Inspection(Result, schema="flightid.inspection/1"):
     skews: tuple[StreamSkew, ...]
     bands: tuple[AxisBand, ...]
     findings: tuple[Finding, ...] = ()
+    start_s: float = 0.0
+
+    @property
+    def logged_words(self) -> str:
+        """How long the log is, and where it begins on the autopilot's clock."""
+        return logged_words(self.start_s, self.duration_s)
 
     @property
     def verdict(self) -> Light:
@@ -144,9 +153,10 @@ class Inspection(Result, schema="flightid.inspection/1"):
         return "\n\n".join([self._said(), *(t.to_text() for t in tables if t.rows)])
 
     def _said(self) -> str:
-        head = f"{self.name}: {self.firmware or self.kind}, {self.duration_s:.1f} s"
-        said = "\n".join(wrapped(carried_sentence(self), WIDTH))
-        return f"{head}\n{said}\nThis log {self._words()}.\n{verdict_lines(self.findings)}"
+        head = f"{self.name}: {self.firmware or self.kind}, {self.logged_words}"
+        opening = (*wrapped(head, WIDTH), *wrapped(carried_sentence(self), WIDTH))
+        said = "\n".join(opening)
+        return f"{said}\nThis log {self._words()}.\n{verdict_lines(self.findings)}"
 
     def _used_rates(self) -> Table:
         """Rates of what a model would be made of; the others are counted."""
@@ -164,7 +174,7 @@ class Inspection(Result, schema="flightid.inspection/1"):
     def in_short(self) -> str:
         """The flight in a line, what each axis supports, what moved it, what was at a limit."""
         head = (
-            f"{self.name}: {self.firmware or self.kind}, {self.duration_s:.1f} s, "
+            f"{self.name}: {self.firmware or self.kind}, {self.logged_words}, "
             f"airborne {self.phases.airborne_words}"
         )
         tables = (self._axes(), self._excitations(), self._saturations(), self._skews())

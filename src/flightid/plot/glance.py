@@ -61,7 +61,7 @@ def flight_glance(review: FlightReview, used: Used | None = None) -> go.PlotFigu
                     if not any(each.name == words for each in made.data):
                         drawn["showlegend"] = True
                     made.add_trace(drawn, row=row)
-    look.label_axes(made, x="time of the log [s]", y=titles)
+    look.label_axes(made, x="time on the autopilot's clock [s]", y=titles)
     _modes(made, review)
     return made
 

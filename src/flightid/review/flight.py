@@ -74,6 +74,7 @@ def review_flight(
         kind=opened.kind,
         firmware=opened.firmware,
         vehicle=opened.vehicle,
+        start_s=start_s,
         duration_s=stop_s - start_s,
         phases=phases,
         identity=flight_identity(opened, phases),

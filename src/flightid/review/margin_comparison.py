@@ -271,10 +271,15 @@ def _doubts(
 ) -> Iterator[Finding]:
     """What is to be doubted of each model and loop, by its name."""
     for name, source, loops in zip(names, sources, told, strict=True):
-        found = [("", finding) for finding in source_findings(source)]
+        own = source_findings(source)
+        found = [("", finding) for finding in own]
         found += [
-            (f", {loop}", finding) for loop, each in loops.items() for finding in each.findings
+            (f", {loop}", finding)
+            for loop, each in loops.items()
+            for finding in each.findings
+            if finding not in own
         ]
         for where, finding in found:
             if finding.light not in (Light.GREEN, Light.UNKNOWN):
-                yield replace(finding, message=f"{name}{where}: {finding.message}")
+                said = finding.message.removeprefix(f"{where[2:]}: ")
+                yield replace(finding, message=f"{name}{where}: {said}")

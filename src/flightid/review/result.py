@@ -8,6 +8,7 @@ from flightid.conventions import Light
 from flightid.errors import UnknownNameError
 from flightid.findings import Finding, worst
 from flightid.inspection.flight_phases import FlightPhases
+from flightid.inspection.log_clock import logged_words
 from flightid.inspection.signals import Signal
 from flightid.inspection.verdict_lines import verdict_lines
 from flightid.result import Result
@@ -37,8 +38,8 @@ class FlightReview(
         File name, who wrote it (as `Log.kind`), firmware as logged.
     vehicle : str or None
         Kind of vehicle.
-    duration_s : float
-        First to last stamp, s.
+    start_s, duration_s : float
+        First stamp on the autopilot's clock, of which all times here are; from it to the last.
     phases : FlightPhases
         Airborne spans.
     identity : FlightIdentity
@@ -72,6 +73,7 @@ class FlightReview(
     kind: str
     firmware: str
     vehicle: str | None
+    start_s: float
     duration_s: float
     phases: FlightPhases
     identity: FlightIdentity
@@ -117,7 +119,7 @@ class FlightReview(
             ("vehicle", " ".join(filter(None, (KINDS.get(self.kind, self.kind), self.vehicle)))),
             ("firmware", self.firmware or None),
             ("frame", self.identity.frame or None),
-            ("logged", f"{self.duration_s:.1f} s"),
+            ("logged", logged_words(self.start_s, self.duration_s)),
             ("in the air", self.phases.airborne_words),
             *tables.battery(self.identity.battery),
         ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -186,8 +186,8 @@ def _match(
             if cost[row, column] < FAR:
                 answers[row][other.name] = other.modes.modes[column]
                 taken.add(column)
-        alone[other.name] = tuple(m.name for k, m in enumerate(other.modes.modes) if k not in taken)
-    alone[base.name] = tuple(found[base.name].name for found in answers.values() if len(found) == 1)
+        alone[other.name] = _told(m for k, m in enumerate(other.modes.modes) if k not in taken)
+    alone[base.name] = _told(found[base.name] for found in answers.values() if len(found) == 1)
     names = [mode.name for mode in base.modes]
     matched = [
         _compared_mode(found, base.name, names.count(found[base.name].name) == 1, tied)
@@ -195,6 +195,11 @@ def _match(
         if len(found) > 1
     ]
     return matched, alone
+
+
+def _told(found: Iterable[Mode]) -> tuple[str, ...]:
+    """Names; of a black box, whose modes are called after its output, what they are."""
+    return tuple(m.name if m.participations else f"{m.name}, {m.place_words}" for m in found)
 
 
 def _without_delays(found: Modes) -> Modes:

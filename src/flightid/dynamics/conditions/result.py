@@ -14,6 +14,9 @@ from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Reading
 from flightid.uncertainty.quantiles import interval_words, shown
 
+LEAST_CHANCE = 1e-15
+"""Smaller probabilities are told as less than this: no error is normal so far out."""
+
 
 @dataclass(frozen=True)
 class ComparedNumber:
@@ -191,7 +194,8 @@ class ConditionComparison(Result, schema="flightid.condition_comparison/1"):
             for name in self.conditions:
                 cells += _value(number.values.get(name), level)
             for name in self.conditions[1:]:
-                cells += [*_ratio(number.ratios.get(name), level), number.chances.get(name)]
+                cells += [*_ratio(number.ratios.get(name), level)]
+                cells.append(_chance(number.chances.get(name)))
             rows.append(tuple(cells))
         said: tuple[str, ...] = (
             "chance: of so large a difference between equal truths, of this row alone.",
@@ -218,6 +222,11 @@ class ConditionComparison(Result, schema="flightid.condition_comparison/1"):
     @property
     def _is_named(self) -> bool:
         return bool(self.parameters or any(self.only_parameters.values()))
+
+
+def _chance(chance: float | None) -> Cell:
+    """A probability; of one that no normal tail tells, that it is less than such."""
+    return f"< {LEAST_CHANCE:g}" if chance is not None and chance < LEAST_CHANCE else chance
 
 
 def _value(quantity: Reading | None, level: float) -> list[Cell]:

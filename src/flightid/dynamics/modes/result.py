@@ -149,9 +149,14 @@ class Mode:
         found = (p.share.value for p in self.participations if p.state == state)
         return next(found, 0.0) or 0.0
 
+    @property
+    def place_words(self) -> str:
+        """Character and eigenvalue."""
+        return f"{self.named.character}: {_place(self)}"
+
     def __repr__(self) -> str:
         """Name, character and eigenvalue on one line."""
-        return f"Mode({self.named.name}, {self.named.character}: {_place(self)})"
+        return f"Mode({self.named.name}, {self.place_words})"
 
     def to_dict(self) -> dict[str, object]:
         """Plain values."""

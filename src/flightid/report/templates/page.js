@@ -5,7 +5,10 @@
   const isDark = () => (root.dataset.theme || (systemDark.matches ? "dark" : "light")) === "dark";
   const plots = [...document.querySelectorAll(".plot")];
   const drawn = new Set();
-  const PAPER_PX = 680; // A4 without its margins, narrower than US letter
+  const PAPER_PX = 870; // A4 without its margins, narrower than US letter, at the zoom of paper in page.css
+  const ASIDE_PX = 1190; // US letter turned, which is narrower than A4 turned
+  const PAPER_HEIGHT = 0.85; // of a plot's on a screen, so that two manoeuvres share a page
+  const READABLE = 0.6; // of a table's size; below it turned pages are used
   let library = null;
 
   // Long texts and the arrays are stored as gzip in base64.
@@ -117,7 +120,8 @@
     spec.layout.autosize = !paper;
     if (paper) {
       spec.layout.width = PAPER_PX;
-      place.style.height = `${spec.layout.height ?? place.clientHeight}px`;
+      spec.layout.height = Math.round(PAPER_HEIGHT * (spec.layout.height ?? place.clientHeight));
+      place.style.height = `${spec.layout.height}px`;
     } else if (phone.matches) stack(spec.layout, place);
     if (!paper && place.clientWidth < 520) {
       spec.layout.margin = { ...spec.layout.margin, l: 52, r: 8 };
@@ -139,6 +143,32 @@
   const show = (place) => draw(place).catch(apologise);
   const redraw = () => drawn.forEach(show);
 
+  // Paper scrolls nothing, and what is wider than it makes the whole page smaller before it is cut.
+  const frames = [...document.querySelectorAll(".scroll")];
+  const widths = (px) => {
+    frames.forEach((one) => { one.style.width = px && `${px}px`; });
+    return frames.map((one) => one.scrollWidth);
+  };
+  const shrink = () => {
+    const shares = widths(PAPER_PX).map((wide) => PAPER_PX / wide);
+    const turned = widths(ASIDE_PX).map((wide) => ASIDE_PX / wide);
+    widths("");
+    frames.forEach((one, k) => {
+      const aside = shares[k] < READABLE;
+      one.classList.toggle("aside", aside);
+      one.firstElementChild.style.zoom = Math.min(1, aside ? turned[k] : shares[k]);
+    });
+  };
+  const enlarge = () => frames.forEach((one) => {
+    one.classList.remove("aside");
+    one.firstElementChild.style.zoom = "";
+  });
+  addEventListener("beforeprint", () => {
+    document.querySelectorAll("details").forEach((part) => { part.open = true; });
+    shrink();
+  });
+  addEventListener("afterprint", enlarge);
+
   if (plots.length) {
     const near = new IntersectionObserver((entries) => {
       for (const entry of entries) {
@@ -152,7 +182,6 @@
     }));
     // Paper shows all plots at its own width, in ink for white paper, and waits for none of them.
     addEventListener("beforeprint", () => {
-      document.querySelectorAll("details").forEach((part) => { part.open = true; });
       plots.forEach((place) => texts.has(place.dataset.spec) ? paint(place, true) : show(place));
     });
     addEventListener("afterprint", redraw);

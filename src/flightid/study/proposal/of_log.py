@@ -16,6 +16,7 @@ from flightid.inspection import Inspection, inspect_log
 from flightid.inspection.axes import axes_of
 from flightid.inspection.carried import OF_WINDOW, why_no_model
 from flightid.inspection.excitation_found import FoundExcitation
+from flightid.inspection.log_clock import begins_later
 from flightid.inspection.signals import Span
 from flightid.inspection.usable_band import AxisBand
 from flightid.logs import Log, read_log
@@ -218,6 +219,10 @@ def _lines(
     """The study file, line by line."""
     yield f"# Study of {path.name}, from what `flightid inspect` finds in it."
     yield "# docs/study.md describes every key; `flightid run` of this file gives the same numbers."
+    if begins_later(inspection.start_s):
+        stop_s = inspection.start_s + inspection.duration_s
+        yield "# Spans are seconds of the autopilot's clock, on which this log runs from"
+        yield f"# {inspection.start_s:.1f} to {stop_s:.1f} s."
     for finding in missed:
         yield f"# Left out: {finding.message}."
     yield from ("", "[study]", f"title = {toml_value(f'Rates of {path.stem}')}")

@@ -1,0 +1,79 @@
+"""What ``flightid compare`` leaves unasked of two models, with the commands that ask it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from flightid.conventions import Light
+from flightid.findings import Finding
+
+RESULTS = "results.json"
+MAXIMUM_RESULTS = 256 << 20
+MODEL_SUFFIX = ".toml"
+RECORDS = "RECORDS"
+"""Stands for records that nothing names."""
+
+
+def unasked(files: Sequence[str]) -> Finding:
+    """That neither predictions nor margins of models were compared, and how they are.
+
+    Parameters
+    ----------
+    files : sequence of str
+        Models as they were named, the base first.
+
+    Returns
+    -------
+    Finding
+        Its action names models and records that are there, so that it can be typed.
+    """
+    named = " ".join(files)
+    margins = f"flightid compare {named} --gains FILE, of margins under gains of `tune`"
+    if len(files) != 2:
+        return Finding("margins-unasked", Light.UNKNOWN, "margins are not compared", margins)
+    first, second = _models(files)
+    verify = f"flightid verify {first} {_records(Path(files[1]))} --against {second}"
+    return Finding(
+        "prediction-unasked",
+        Light.UNKNOWN,
+        "whether the first predicts what the second was fitted to, and what either does to margins",
+        f"{verify}; {margins}",
+    )
+
+
+def _models(files: Sequence[str]) -> Sequence[str]:
+    """Files of one model of each side, where a folder holds several; else as they were named."""
+    from flightid.models.saved_files import models_of
+
+    folders = [Path(file) for file in files if Path(file).is_dir()]
+    if len(folders) < 2:
+        return files
+    first, second = ({path.name: path for path in models_of(each)} for each in folders)
+    if len(first) == len(second) == 1:
+        return files
+    shared = next((name for name in first if name in second), None)
+    return files if shared is None else [str(first[shared]), str(second[shared])]
+
+
+def _records(results: Path) -> str:
+    """Records that a study's results were made of, where they lie beside its folder."""
+    from flightid.logs import is_log
+
+    for name in _used(results / RESULTS):
+        path = results.parent / name
+        if path.suffix != MODEL_SUFFIX and path.is_file() and not is_log(path):
+            return str(path)
+    return RECORDS
+
+
+def _used(results: Path) -> Iterator[str]:
+    """Names of the files that a study read."""
+    from flightid.reading import bounded_bytes, parse_json
+
+    if not results.is_file():
+        return
+    content = parse_json(bounded_bytes(results, MAXIMUM_RESULTS), "results", results.name)
+    files = content.get("files") if isinstance(content, dict) else None
+    if isinstance(files, dict):
+        yield from files
