@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from functools import cache
 from itertools import product
 
 import numpy as np
@@ -49,53 +50,58 @@ def kernel_draws(
     Reference
     ---------
     Chen, Ohlsson & Ljung (2012), Automatica 48, eq. 35 (DC kernel); Rasmussen & Williams, *Gaussian
-    Processes for Machine Learning*, section 5.2 (what a best kernel alone leaves out).
+    Processes for Machine Learning*, section 5.2 (what a best kernel alone leaves out); Journel &
+    Huijbregts (1978), *Mining Geostatistics*, section VII.A (draws of a posterior by kriging).
     """
     n = wanted.size
-    shapes = list(_shapes(n))
+    roots = _roots(n)
     lowest = SMALLEST * variance
     powers = np.geomspace(lowest, max(LARGEST * float(wanted @ wanted) / n, 10.0 * lowest), SIZES)
-    parts = [np.linalg.eigh(factor @ shape @ factor.T) for shape in shapes]
-    scaled = [powers / (values.mean() or 1.0) for values, _ in parts]
-    evidence = np.array(
-        [
-            _evidence(values, (vectors.T @ wanted) ** 2, sizes, variance)
-            for (values, vectors), sizes in zip(parts, scaled, strict=True)
-        ]
-    )
+    through = factor @ roots
+    values, vectors = np.linalg.eigh(through @ through.transpose(0, 2, 1))
+    values, turned = np.maximum(values, 0.0), np.einsum("kij,i->kj", vectors, wanted)
+    middle = values.mean(axis=1)
+    sizes = powers / np.where(middle > 0.0, middle, 1.0)[:, None]
+    evidence = _evidence(values, turned**2, sizes, variance)
     weights = np.exp(-0.5 * (evidence - evidence.min()))
     weights /= weights.sum()
     chosen = random.multinomial(count, weights.ravel()).reshape(weights.shape)
     mean, drawn = np.zeros(n), []
-    for place, step in product(range(len(shapes)), range(SIZES)):
-        if weights[place, step] < 1e-4 and not chosen[place, step]:
-            continue
-        values, vectors = parts[place]
-        prior = scaled[place][step] * shapes[place]
-        gain = prior @ factor.T @ vectors
-        damped = gain / (scaled[place][step] * np.maximum(values, 0.0) + variance)
-        middle = damped @ (vectors.T @ wanted)
-        mean += weights[place, step] * middle
-        if chosen[place, step]:
-            covariance = prior - damped @ gain.T
-            spread, directions = np.linalg.eigh(covariance)
-            root = directions * np.sqrt(np.maximum(spread, 0.0))
-            numbers = WIDENING * random.standard_normal((chosen[place, step], n))
-            drawn.append(middle + numbers @ root.T)
+    for place, step in np.argwhere((weights >= 1e-4) | (chosen > 0)):
+        root = math.sqrt(sizes[place, step]) * roots[place]
+        damped = vectors[place] / (sizes[place, step] * values[place] + variance)
+        gain = root @ (factor @ root).T @ damped @ vectors[place].T
+        found = gain @ wanted
+        mean += weights[place, step] * found
+        # What the data leave of values of the prior, told with their noise: no root is taken.
+        prior = random.standard_normal((chosen[place, step], n)) @ root.T
+        noise = math.sqrt(variance) * random.standard_normal((chosen[place, step], n))
+        left = prior - (prior @ factor.T + noise) @ gain.T
+        drawn.append(found + WIDENING * left)
     return mean, np.vstack(drawn)
 
 
-def _shapes(count: int) -> Iterator[Array]:
-    """Bumps that begin at zero, as what follows a delay and a motor's lag does."""
+@cache
+def _roots(count: int) -> Array:
+    """Lower triangles of every shape of the prior, shape (shapes, count, count).
+
+    Bumps that begin at zero, as what follows a delay and a motor's lag does; what correlates as
+    powers of the distance is a chain, whose triangle is known.
+    """
     lag = np.arange(1, count + 1)
-    apart = np.abs(lag[:, None] - lag)
+    apart = np.maximum(lag[:, None] - lag, 0)
+    made = []
     for memory, roughness in product(MEMORIES, ROUGHNESSES):
         bump = lag / memory * np.exp(1.0 - lag / memory)
-        yield np.outer(bump, bump) * (1.0 - roughness) ** apart
+        chain = np.tril((1.0 - roughness) ** apart)
+        chain[:, 1:] *= math.sqrt(1.0 - (1.0 - roughness) ** 2)
+        made.append(bump[:, None] * chain)
+    return np.array(made)
 
 
 def _evidence(values: Array, squares: Array, sizes: Array, variance: float) -> Array:
-    """Minus twice the logarithm of the marginal likelihood at each size of one shape."""
-    total = sizes[:, None] * np.maximum(values, 0.0) + variance
+    """Minus twice the logarithm of the marginal likelihood at each size of each shape."""
+    total = sizes[:, :, None] * values[:, None, :] + variance
     # Flat in the prior's variance: on a logarithmic grid no prior would favour none at all.
-    return np.asarray(np.sum(squares / total + np.log(total), axis=1) - 2.0 * np.log(sizes))
+    fit = np.sum(squares[:, None, :] / total + np.log(total), axis=2)
+    return np.asarray(fit - 2.0 * np.log(sizes))
