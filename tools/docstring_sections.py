@@ -37,3 +37,21 @@ class DocstringSections(griffe.Extension):
         del kwargs
         if obj.docstring:
             obj.docstring.value = known(obj.docstring.value)
+
+
+class FrozenClasses(griffe.Extension):
+    """Shows constructors of classes by `flightid.frozen` as those of dataclasses."""
+
+    def on_class_instance(self, *, cls: griffe.Class, **kwargs: Any) -> None:  # noqa: ANN401
+        """Call our decorator by the name that the reader knows."""
+        del kwargs
+        for decorator in cls.decorators:
+            for part in _names(decorator.value):
+                if part.canonical_path == "flightid.frozen.dataclass":
+                    part.parent = None
+                    part.name = "dataclasses.dataclass"
+
+
+def _names(value: object) -> list[griffe.ExprName]:
+    found = value.function if isinstance(value, griffe.ExprCall) else value
+    return [found] if isinstance(found, griffe.ExprName) else []

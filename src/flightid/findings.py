@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Protocol, TypeVar
 
 from flightid.conventions import Light
+from flightid.frozen import dataclass
 from flightid.surface import spoken
 
 

@@ -7,8 +7,9 @@ import math
 import types
 import typing
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
+
+from flightid.frozen import dataclass
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,12 +10,13 @@ from __future__ import annotations
 import dataclasses
 import typing
 from collections.abc import Callable, Hashable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from difflib import get_close_matches
 from functools import cache
 from typing import Any, TypeVar
 
 from flightid.errors import FlightidError, OptionError
+from flightid.frozen import dataclass
 from flightid.option_forms import (
     BAND,
     FIGURES,
@@ -230,6 +231,13 @@ class Options:
     def to_dict(self) -> dict[str, object]:
         """Plain values by name, for provenance."""
         return {each.name: _plain(getattr(self, each.name)) for each in options_of(type(self))}
+
+
+def options_class(name: str, keys: list[tuple[str, object, Any]]) -> type[Options]:
+    """Write a class of options whose keys are worked out: name, type and `option` of each."""
+    body: dict[str, Any] = {key: each for key, _, each in keys}
+    body["__annotations__"] = {key: kind for key, kind, _ in keys}
+    return dataclass(frozen=True)(type(name, (Options,), body))
 
 
 def _plain(value: object) -> object:

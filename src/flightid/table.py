@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import field
 from html import escape
 
+from flightid.frozen import dataclass
 from flightid.wrapping import without_controls
 
 Cell = str | float | int | bool | None

@@ -13,6 +13,9 @@ FORBIDDEN_STEMS = {"utils", "util", "helpers", "common", "misc", "base", "core"}
 OPEN_ENDS = re.compile(r"\b(TODO|FIXME|XXX|HACK)\b|todo!\(|unimplemented!\(|NotImplementedError")
 OPEN_WORDS = ("TODO", "FIXME", "XXX", "HACK", "todo!", "unimplemented!", "NotImplementedError")
 SUSPECT = re.compile(r"\b(eval|exec|print)\s*\(|except\s*:")  # worth a look at the tree
+COMPILED = re.compile(r"^from dataclasses import .*\bdataclass\b", re.MULTILINE)
+ORDERED = {"models/narx/terms.py"}
+"""Classes that compare as larger and smaller, which `flightid.frozen` leaves to the library."""
 PANICS = re.compile(r"\.unwrap\(\)|\.expect\(|panic!\(|unreachable!\(")
 
 
@@ -66,6 +69,8 @@ def test_python_sources() -> None:
             found += _python_habits(tree(path), may_print=stage(path) == "cli")
         if path.stem in FORBIDDEN_STEMS:
             found.append("a name that says nothing")
+        if COMPILED.search(text) and str(path.relative_to(PACKAGE)) not in ORDERED | {"frozen.py"}:
+            found.append(" takes a millisecond a class to load: take it from flightid.frozen")
         offenders += [f"{path.relative_to(PACKAGE)}:{line}" for line in found]
     assert not offenders, "\n".join(offenders)
 

@@ -16,6 +16,7 @@ BASE = {
     "files",
     "findings",
     "formula",
+    "frozen",
     "option_forms",
     "options",
     "progress",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,6 +11,7 @@ from fastapi import HTTPException
 from flightid.app.jobs import Workers
 from flightid.app.studies import Studies
 from flightid.app.workspace import Workspace
+from flightid.frozen import dataclass
 
 LogName = Annotated[str, "first 16 digits of the SHA-256 of its bytes"]
 

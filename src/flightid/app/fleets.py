@@ -7,7 +7,6 @@ import re
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from flightid.app.own_folders import is_link, read_plain
@@ -16,6 +15,7 @@ from flightid.errors import FlightidError, OptionError
 from flightid.fleet import read_fleet
 from flightid.fleet.engine.order import study_files
 from flightid.fleet.settings import FleetSettings
+from flightid.frozen import dataclass
 
 DEEPEST = 3
 """Folders below the workspace that are looked into for fleets."""

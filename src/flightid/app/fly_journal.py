@@ -13,7 +13,6 @@ import re
 import secrets
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +22,7 @@ from flightid.app.fly_vehicles import fly_vehicle
 from flightid.app.own_folders import is_link, own_folder, read_plain
 from flightid.errors import DataError, FlightidError, OptionError
 from flightid.files import write_atomically
+from flightid.frozen import dataclass
 from flightid.record import Record, Step, write_records
 
 FLIGHTS, RECORD, JOURNAL, ABOUT, RATING = (

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Literal
 
 import numpy as np
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from flightid.app.fly_vehicles import FlyVehicle
 from flightid.excitation import Excitation
+from flightid.frozen import dataclass
 from flightid.models import LinearSystem
 from flightid.simulation.stepper import Controller, Stepper
 from flightid.study.loop_blocks import law_controller

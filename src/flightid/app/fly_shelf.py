@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 from flightid.app.fly_schemas import FlyChoice, FlyInput
@@ -16,6 +16,7 @@ from flightid.app.run_schemas import RunPart
 from flightid.app.workspace import ID, Workspace
 from flightid.control.laws.augmentation import augmentation_law
 from flightid.errors import FlightidError
+from flightid.frozen import dataclass
 from flightid.models import load_model
 
 MODELS = "models"

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 
+from flightid.frozen import dataclass
 from flightid.units import conversion_factor, is_convertible
 
 SPEEDS = {"u": ("u", "um"), "v": ("v", "vm"), "w": ("w",)}

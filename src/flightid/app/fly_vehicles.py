@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from flightid import Noise, load_model
 from flightid.errors import UnknownNameError
+from flightid.frozen import dataclass
 from flightid.models import Model
 
 RATE_HZ = 100.0

@@ -8,9 +8,10 @@ from __future__ import annotations
 import sqlite3
 import threading
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+from flightid.frozen import dataclass
 
 SCHEMA = """
 create table if not exists log (

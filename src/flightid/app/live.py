@@ -6,7 +6,6 @@ import asyncio
 import json
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
-from dataclasses import dataclass
 
 from fastapi import FastAPI, WebSocket, WebSocketDisconnect
 from pydantic import ValidationError
@@ -18,6 +17,7 @@ from flightid.app.model_routes import answer_prediction
 from flightid.app.model_schemas import PredictionQuestion
 from flightid.app.response_answers import answer_response
 from flightid.app.schemas import Job, JobNews, Question, Reply, ResponseQuestion
+from flightid.frozen import dataclass
 
 MOST_WORDS = 1 << 16
 

@@ -8,13 +8,13 @@ value that is missing stays missing, and a silence of the stream parts the line.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.files import write_atomically
+from flightid.frozen import dataclass
 
 Array = NDArray[np.float64]
 BASE, FACTOR = 64, 8

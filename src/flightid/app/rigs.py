@@ -11,7 +11,6 @@ import hashlib
 import os
 import stat
 from collections.abc import AsyncIterator
-from dataclasses import dataclass
 from pathlib import Path
 
 from flightid.app.own_folders import (
@@ -26,6 +25,7 @@ from flightid.app.own_folders import (
 from flightid.app.workspace import HIDDEN, ID, Workspace, plain_name
 from flightid.errors import OptionError
 from flightid.files import flush
+from flightid.frozen import dataclass
 from flightid.record.formats.sniff import FileFormat, file_format
 
 FOLDER = "records"

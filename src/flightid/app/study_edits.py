@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +13,7 @@ from tomlkit.exceptions import TOMLKitError
 from flightid.app.own_folders import draft_of
 from flightid.errors import StudyError
 from flightid.files import write_atomically
+from flightid.frozen import dataclass
 from flightid.reading import DOCUMENT_BYTES
 from flightid.study.settings import read_settings
 

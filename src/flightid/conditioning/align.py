@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 import scipy
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from flightid.conventions import Light
 from flightid.errors import DataError, OptionError
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.record import Record, Step
 from flightid.record.interpolation import windowed_sinc
 from flightid.result import Result

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.record import Record
 from flightid.result import Result
 from flightid.table import Column, Table

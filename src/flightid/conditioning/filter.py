@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from enum import StrEnum
 from typing import Literal
 
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from flightid.conditioning.detrend import chosen_channels
 from flightid.errors import DataError, OptionError
+from flightid.frozen import dataclass
 from flightid.record import Record, Step
 from flightid.table import Cell
 

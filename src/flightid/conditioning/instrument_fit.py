@@ -6,14 +6,13 @@ pass, so a trial point is a linearisation already, and the measured inputs, nois
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.conditioning.consistency_findings import require_separable
 from flightid.conditioning.kinematics import KinematicModel, KinematicOutputs
 from flightid.errors import DataError, FitError, OptionError
+from flightid.frozen import dataclass
 
 Array = NDArray[np.float64]
 ROUNDS = 8

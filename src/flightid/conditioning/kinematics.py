@@ -8,7 +8,6 @@ derivatives by every parameter are exact.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 
 from flightid._native import reconstruct_kinematics
 from flightid.conventions import STANDARD_GRAVITY_M_S2
+from flightid.frozen import dataclass
 from flightid.uncertainty.input_noise import InputNoise, white_deviation
 
 Array = NDArray[np.float64]

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 from flightid.conditioning.filter import BANDS, Band, FilterDesign
 from flightid.errors import OptionError
+from flightid.frozen import dataclass
 from flightid.options import Options, option
 
 

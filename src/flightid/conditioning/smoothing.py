@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 import scipy
@@ -11,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from flightid.conventions import Role
 from flightid.errors import DataError, OptionError
+from flightid.frozen import dataclass
 from flightid.record import Channel, Record, Step
 from flightid.table import Cell
 from flightid.units import canonical

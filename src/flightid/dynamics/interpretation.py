@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from flightid.conventions import Light
 from flightid.errors import ModelError
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.identification import Fit
 from flightid.identification.prediction_error.roots import (
     POLE,

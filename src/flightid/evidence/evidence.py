@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from flightid.conventions import Light
 from flightid.errors import DataError, OptionError
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.result import Result
 from flightid.surface import spoken
 from flightid.table import Column, Table

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,7 @@ from flightid.evidence.parameter_checks import declared_signs
 from flightid.evidence.part_checks import agreement_check
 from flightid.evidence.spans import Span, judge_coherence, judge_span
 from flightid.findings import Finding, worst
+from flightid.frozen import dataclass
 from flightid.inspection import Inspection
 from flightid.models.narx.structure import STOPS
 from flightid.record import Record

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from flightid.conventions import Light
 from flightid.evidence.evidence import BAND, COHERENCE, Check
+from flightid.frozen import dataclass
 from flightid.inspection.thresholds import BAND_GOOD, BAND_LEAST, MINIMUM_COHERENCE
 from flightid.responses import FrequencyResponse
 from flightid.responses.bands import coherent_band, coherent_parts

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from flightid.errors import OptionError
 from flightid.excitation.assess import assess
@@ -18,6 +18,7 @@ from flightid.excitation.prbs import HALF_POWER, HIGHEST_ORDER, LOWEST_ORDER, pr
 from flightid.excitation.sweep import ardupilot_chirp, sweep
 from flightid.excitation.vehicle import RateAxis
 from flightid.excitation.verdicts import MARGIN
+from flightid.frozen import dataclass
 
 CYCLES_AT_LOWEST = 5.0
 LONGEST_RECORD_S = 600.0

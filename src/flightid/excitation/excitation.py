@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from flightid.excitation.spectrum import (
     smoothed_matrix,
 )
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
 from flightid.units import canonical

@@ -9,12 +9,13 @@ harmonic, so that peaks between its points are within one percent.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
+
+from flightid.frozen import dataclass
 
 NORMS = (4, 8, 16, 32, 64, 128)
 POINTS_PER_CYCLE = 8

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +12,7 @@ from flightid.conventions import Light
 from flightid.excitation.excitation import Excitation
 from flightid.excitation.vehicle import RateAxis
 from flightid.findings import Finding, worst
+from flightid.frozen import dataclass
 from flightid.options import Options, option
 from flightid.result import Result
 from flightid.table import Cell, Column, Table

@@ -7,10 +7,10 @@ of constant relative width, since single lines of a multisine or of noise say no
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
+
+from flightid.frozen import dataclass
 
 RELATIVE_HALF_WIDTH = 0.12
 """Half-width of the smoothing band over its centre: a third of an octave in all."""

@@ -7,14 +7,13 @@ the frequency domain, with a silent end as long as the loop's memory, so that an
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
 from flightid.errors import ModelError
 from flightid.excitation.checks import require_positive
+from flightid.frozen import dataclass
 from flightid.options import Options, option
 
 MEMORY = 12.0

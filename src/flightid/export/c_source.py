@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -23,6 +22,7 @@ from flightid.export.names import (
     number_literal,
     text_literal,
 )
+from flightid.frozen import dataclass
 from flightid.models import StateSpaceModel
 from flightid.models.linear.hold_equivalent import Hold
 from flightid.models.linear.linear_system import LinearSystem

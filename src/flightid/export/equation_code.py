@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 from flightid import _native
 from flightid.errors import ModelError
 from flightid.export.names import number_literal
 from flightid.export.table_code import table_functions
+from flightid.frozen import dataclass
 from flightid.models import StateSpaceModel
 
 Line = tuple[str, float, list[int]]

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from flightid.errors import UnitError
 from flightid.export.c_source import CSource, Entry
 from flightid.export.options import Interface
+from flightid.frozen import dataclass
 from flightid.units import DIMENSIONLESS, si_base
 from flightid.version import VERSION
 

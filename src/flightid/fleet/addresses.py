@@ -8,13 +8,13 @@ import hashlib
 import os
 import stat
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any, BinaryIO
 from urllib.parse import unquote, urlsplit
 
 from flightid.errors import StudyError
 from flightid.extras import extra_module
+from flightid.frozen import dataclass
 
 SUFFIXES = (".bin", ".ulg", ".bbl", ".bfl", ".tlog", ".log")
 """What a folder is searched for; a glob or a file's own name takes any."""

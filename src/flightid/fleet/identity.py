@@ -7,13 +7,14 @@ import datetime
 import hashlib
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path, PurePosixPath
 
 import numpy as np
 
 from flightid.errors import FlightidError, StudyError
 from flightid.fleet.settings import FleetSettings, VehicleRules, instant_of
+from flightid.frozen import dataclass
 from flightid.logs import Log
 from flightid.reading import DOCUMENT_BYTES
 from flightid.units import DIMENSIONLESS, convert

@@ -7,7 +7,6 @@ import os
 import re
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from flightid.errors import FlightidError, StudyError
@@ -15,6 +14,7 @@ from flightid.files import write_atomically
 from flightid.fleet.addresses import LogAddress, find_logs
 from flightid.fleet.identity import DATES, FleetTables, identify_log
 from flightid.fleet.settings import VehicleRules
+from flightid.frozen import dataclass
 from flightid.logs import read_log
 
 NAMED = re.compile(r"^([A-Za-z]+[-_]?[0-9]+)[-_.]")

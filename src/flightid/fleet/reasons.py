@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from typing import Any
 
 from flightid.fleet.catalogue.schema import FITTED, OUTCOMES
+from flightid.frozen import dataclass
 from flightid.table import Cell, Column, Table
 from flightid.wrapping import wrapped
 

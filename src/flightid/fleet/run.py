@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from importlib.util import find_spec
 from multiprocessing import current_process
 from pathlib import Path
@@ -49,6 +49,7 @@ from flightid.fleet.refusal import ACTIONS
 from flightid.fleet.run_one import FULL, made_record
 from flightid.fleet.settings import FleetSettings, read_fleet
 from flightid.fleet.taken import TakenContents
+from flightid.frozen import dataclass
 from flightid.progress import progress
 from flightid.result import Result
 from flightid.table import Column, Table

@@ -11,7 +11,7 @@ import tempfile
 import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -35,6 +35,7 @@ from flightid.fleet.refusal import (
 )
 from flightid.fleet.settings import FleetSettings
 from flightid.fleet.study_rows import study_rows, told_covariates, usable
+from flightid.frozen import dataclass
 from flightid.logs import Log, read_log
 from flightid.study import Study, run_study
 from flightid.study.proposal import propose_study

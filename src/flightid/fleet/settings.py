@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import datetime
 import re
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
 from flightid.errors import StudyError
+from flightid.frozen import dataclass
 from flightid.options import Options, option
 from flightid.reading import read_toml
 from flightid.study.error_list import ErrorList

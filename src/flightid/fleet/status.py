@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ from flightid.fleet.catalogue.store import Store
 from flightid.fleet.opening import catalogue_place, names_fleet_file, opened_store
 from flightid.fleet.reasons import RefusalReason, grouped_reasons
 from flightid.fleet.settings import read_fleet
+from flightid.frozen import dataclass
 from flightid.result import Result
 from flightid.table import Column, Table
 

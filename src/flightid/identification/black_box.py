@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.identification.details import Details
 from flightid.identification.fit import Fit
 from flightid.identification.fitted_record import FittedRecord

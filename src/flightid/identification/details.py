@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
+from flightid.frozen import dataclass
 from flightid.table import Table
 from flightid.uncertainty.estimate import Estimate
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from typing import Any
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from flightid.evidence import Evidence
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.identification.details import Details
 from flightid.identification.fitted_record import FittedRecord
 from flightid.identification.fitted_response import FittedResponse

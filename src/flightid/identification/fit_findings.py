@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from flightid.conventions import Light
 from flightid.evidence.gather import CONVERGED, CORRELATED, CRAMER_RAO, INSENSITIVE, MORE_STEPS
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.identification.multistart import End
 from flightid.uncertainty.estimate import Estimate
 from flightid.uncertainty.influence import NEXT

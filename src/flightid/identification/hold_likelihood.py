@@ -9,7 +9,7 @@ the same for every hold.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from typing import Any, Self
 
 import numpy as np
@@ -17,6 +17,7 @@ import scipy
 from numpy.typing import NDArray
 
 from flightid.errors import DataError
+from flightid.frozen import dataclass
 from flightid.identification.fit import Fit
 from flightid.identification.output_error.distinct import run_with_slopes
 from flightid.identification.output_error.equation_records import (

@@ -12,13 +12,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.conventions import Light
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.uncertainty.agreement import Agreement
 from flightid.uncertainty.fitted_correlation import FittedCorrelation
 from flightid.uncertainty.foretold import (

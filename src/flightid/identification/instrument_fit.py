@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 from flightid.conventions import Light
 from flightid.errors import FlightidError
 from flightid.evidence.evidence import LOOP
+from flightid.frozen import dataclass
 from flightid.identification.fit import Fit
 from flightid.identification.identify import identify
 from flightid.models import StateSpaceModel, TransferFunctionModel

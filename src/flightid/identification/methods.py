@@ -6,10 +6,10 @@ A new method is one folder and one line here.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 from flightid.errors import FitError, OptionError
+from flightid.frozen import dataclass
 from flightid.identification.filter_error.fit import fit_filter_error
 from flightid.identification.fit import Fit
 from flightid.identification.frequency_domain.fit import fit_responses

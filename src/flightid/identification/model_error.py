@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError, FlightidError
+from flightid.frozen import dataclass
 from flightid.identification.fitted_record import FittedRecord
 from flightid.identification.fitted_response import FittedResponse
 from flightid.models.model import Model, linear_system

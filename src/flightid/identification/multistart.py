@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from flightid import _native
 from flightid.errors import FitError, OptionError
 from flightid.evidence.gather import CONVERGED
+from flightid.frozen import dataclass
 from flightid.identification.local_minimum import LocalMinimum
 from flightid.models import GreyBoxModel, Parameter
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -12,6 +12,7 @@ import numpy as np
 
 from flightid.evidence.feedback import feedback_test
 from flightid.evidence.gather import CONVERGED
+from flightid.frozen import dataclass
 from flightid.identification.fit import Fit
 from flightid.identification.frequency_domain.estimator_bias import Correction
 from flightid.identification.hold_likelihood import (

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 
 import numpy as np
 
+from flightid.frozen import dataclass
 from flightid.record import Record
 from flightid.record.digest import TRAINING, digest_of
 from flightid.responses import FrequencyResponse

@@ -6,11 +6,10 @@ zero where there is none. It counts where the set-point of an axis moves with th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.frozen import dataclass
 from flightid.inspection.axes import axes_of
 from flightid.inspection.signals import Span, find
 from flightid.inspection.stamps import believable

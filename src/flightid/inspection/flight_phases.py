@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.frozen import dataclass
 from flightid.inspection.actuators import Actuators
 from flightid.inspection.signals import Signal, Span, find
 from flightid.inspection.stamps import believable, log_span

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from flightid.conventions import Light
 from flightid.findings import Finding, worst
+from flightid.frozen import dataclass
 from flightid.inspection.axes import axes_of
 from flightid.inspection.carried import carried_axes, carried_sentence
 from flightid.inspection.excitation_found import FoundExcitation

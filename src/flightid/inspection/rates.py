@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.frozen import dataclass
 from flightid.inspection.signals import Span
 from flightid.inspection.stamps import believed, longer_steps
 from flightid.inspection.thresholds import GAP_FACTOR

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.frozen import dataclass
 from flightid.inspection.actuators import Actuators
 from flightid.inspection.axes import axes_of
 from flightid.inspection.signals import Span, find, inside, place_of

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError, MissingColumnError, UnitError, UnknownNameError
+from flightid.frozen import dataclass
 from flightid.inspection.stamps import believable
 from flightid.logs import Log
 from flightid.logs.channels.channel_map import DEFAULTS, ChannelMap, channel_map, default_map

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.frozen import dataclass
 from flightid.inspection.axes import axes_of
 from flightid.inspection.signals import Signal, Span, place_of, places
 from flightid.inspection.thresholds import SKEW_CORRELATION

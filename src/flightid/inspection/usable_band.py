@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import FlightidError
+from flightid.frozen import dataclass
 from flightid.inspection.axes import AxisChannels, axes_of
 from flightid.inspection.excitation_found import FoundExcitation
 from flightid.inspection.excited_to import excited_to

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import MissingColumnError, UnitError
+from flightid.frozen import dataclass
 from flightid.logs.channels.channel_map import ChannelSource, MappedChannel
 from flightid.logs.contents import LogContents
 from flightid.logs.log_table import LogTable

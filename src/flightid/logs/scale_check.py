@@ -8,7 +8,7 @@ their noise can explain, hold different units, or one is wrong.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from flightid.conventions import Light
 from flightid.errors import MissingColumnError, UnitError
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.logs.channels.channel_map import ChannelMap
 from flightid.logs.contents import LogContents
 from flightid.logs.extraction import extract

@@ -10,7 +10,6 @@ sign and the delay are proven rather than assumed.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -19,6 +18,7 @@ from numpy.typing import NDArray
 from flightid._native import cubic_spline
 from flightid.conventions import Axis, Light
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.logs.contents import LogContents
 from flightid.logs.dataflash.sid_runs import SidRun
 from flightid.scalar_search import minimum_between

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from flightid.errors import MissingColumnError
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.logs.source import ByteRange, Event, Gap, MessageInfo, ParameterChange, board_of
 
 Array = NDArray[np.float64]

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import ModelError
+from flightid.frozen import dataclass
 from flightid.models.language.reading import (
     read_list,
     read_matrix,

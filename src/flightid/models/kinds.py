@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, cast
 
 from flightid.errors import ModelError
+from flightid.frozen import dataclass
 from flightid.models.estimated import EstimateProvenance
 from flightid.models.innovations.model import InnovationsModel
 from flightid.models.linear.description import system_from_table

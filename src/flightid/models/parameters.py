@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from copy import copy
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +13,7 @@ from flightid import _native
 from flightid.dimensions import require_unit
 from flightid.errors import ModelError, UnknownNameError
 from flightid.formula import formula_names, require_name
+from flightid.frozen import dataclass
 from flightid.result import TableView
 from flightid.table import Column, Table
 from flightid.units import canonical

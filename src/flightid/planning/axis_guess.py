@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import scipy
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from flightid.control.autopilots.axis_loop import AxisLoop
 from flightid.errors import DataError, FlightidError
+from flightid.frozen import dataclass
 from flightid.inspection.signals import Span, find, places, records
 from flightid.logs import Log
 from flightid.planning.flown_axis import Entry, FlownAxis

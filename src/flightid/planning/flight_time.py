@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
 
+from flightid.frozen import dataclass
 from flightid.inspection.flight_phases import FlightPhases
 from flightid.logs import Log
 from flightid.review.identity import flight_identity

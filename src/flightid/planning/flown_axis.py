@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -10,6 +9,7 @@ from numpy.typing import NDArray
 
 from flightid.control.autopilots.axis_loop import AxisLoop
 from flightid.excitation import RateAxis
+from flightid.frozen import dataclass
 
 Array = NDArray[np.float64]
 Entry = Literal["mixer", "rate", "angle"]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +11,7 @@ from flightid.control.autopilots.axis_loop import AxisLoop
 from flightid.conventions import Light
 from flightid.errors import FlightidError
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.planning.flown_axis import FlownAxis
 from flightid.record import Record
 from flightid.responses import FrequencyResponse, estimate_response

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
+from flightid.frozen import dataclass
 from flightid.options import Options, option
 
 VEHICLES = ("quad", "heli", "plane", "quadplane")

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
 from flightid.errors import UnknownNameError
+from flightid.frozen import dataclass
 from flightid.planning.flown_axis import Entry
 
 How = Literal["mode", "stick", "autotune", "chirp"]

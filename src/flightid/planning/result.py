@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 from flightid.control.autopilots.parameter_files import (
@@ -17,6 +16,7 @@ from flightid.errors import OptionError
 from flightid.excitation import Plan
 from flightid.files import write_atomically
 from flightid.findings import Finding, worst
+from flightid.frozen import dataclass
 from flightid.planning.axis_guess import AxisGuess
 from flightid.planning.flight_time import FlightTime
 from flightid.planning.loop_check import MISSED

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from flightid.errors import UnknownNameError
+from flightid.frozen import dataclass
 from flightid.identification import Fit, FittedResponse
 from flightid.plot import graph_objects as go
 from flightid.plot import look

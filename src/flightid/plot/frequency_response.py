@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError
+from flightid.frozen import dataclass
 from flightid.plot import graph_objects as go
 from flightid.plot import look
 from flightid.responses.response_band import TAKEN_OUT, ResponseIntervals

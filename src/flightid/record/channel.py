@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from flightid.conventions import Role
+from flightid.frozen import dataclass
 from flightid.units import canonical
 
 DECLARED = "unit declared as"

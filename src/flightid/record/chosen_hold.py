@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from flightid.conventions import Light
 from flightid.errors import DataError
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.record.history import is_of_log
 from flightid.record.hold import BETWEEN, InputHold, InputShape, require_hold
 from flightid.record.record import Record

@@ -8,12 +8,12 @@ what was measured after it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.conventions import Role
+from flightid.frozen import dataclass
 
 Array = NDArray[np.float64]
 Places = NDArray[np.intp]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from flightid import _native
 from flightid.dimensions import unit_of
 from flightid.errors import DataError, ModelError, OptionError
 from flightid.formula import RESERVED, formula_names
+from flightid.frozen import dataclass
 from flightid.record.formats import ColumnTable
 from flightid.record.formats.columns import channel_name
 from flightid.record.rows import column_unit

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any, overload
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from flightid import _native
 from flightid.errors import DataError
+from flightid.frozen import dataclass
 from flightid.record.record import Record
 
 SPAN = 16

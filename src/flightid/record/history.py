@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from flightid.frozen import dataclass
 from flightid.table import Cell
 
 FROM_LOG = "Log.record"

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal, cast
 
 import numpy as np
 
 from flightid.errors import OptionError
+from flightid.frozen import dataclass
 
 InputHold = Literal["zero", "first", "band_limited"]
 Loop = Literal["open", "closed"]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from flightid.conventions import Role
 from flightid.errors import DataError, FileFormatError, FlightidError
+from flightid.frozen import dataclass
 from flightid.reading import parse_json
 from flightid.record.channel import Channel
 from flightid.record.display import plain_step

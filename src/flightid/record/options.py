@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
+from flightid.frozen import dataclass
 from flightid.options import Options, option
 from flightid.record.interpolation import Interpolation
 

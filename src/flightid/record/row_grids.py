@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from flightid.conventions import Role
 from flightid.errors import DataError
+from flightid.frozen import dataclass
 from flightid.record.channel import Channel
 from flightid.record.checks import REMOVE_OUTLIERS, entry_steps, fault_steps
 from flightid.record.folded_power import folded_power

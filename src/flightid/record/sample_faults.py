@@ -6,7 +6,6 @@ be sharp, a sensor coarse, a simulated channel free of noise.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 
 from flightid.conventions import Light, Role
 from flightid.findings import Finding, counted
+from flightid.frozen import dataclass
 from flightid.record.commanded_edges import Surroundings, answered, answers
 from flightid.record.outlying import distances, none_stands_out, spread_of
 from flightid.record.repeats import found_staircase

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from flightid.errors import DataError
 from flightid.files import sha256_of_file
+from flightid.frozen import dataclass
 from flightid.record.channel import Channel
 from flightid.record.formats import ColumnTable
 from flightid.record.record import Record

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flightid.errors import DataError, ShapeError
+from flightid.frozen import dataclass
 
 GAP_FACTOR = 2.5
 """A spacing above this many median spacings is a gap; one lost sample (factor 2) is not."""

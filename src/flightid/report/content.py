@@ -8,11 +8,12 @@ where its result is: in the result's own `summary()`, one `Column` and its cells
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 from flightid.conventions import Light
 from flightid.findings import Finding, worst
+from flightid.frozen import dataclass
 from flightid.table import Cell, Table
 
 

@@ -9,7 +9,7 @@ the result says so. Coherence stays that of the measured response the result was
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from flightid.conventions import Light
 from flightid.errors import DataError, ShapeError
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.record.hold import InputShape
 from flightid.responses.errors.random_error import CovarianceSource
 from flightid.responses.response import FrequencyResponse

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from flightid.errors import OptionError
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.responses.bands import coherent_band
 from flightid.responses.pair import PairResponse
 from flightid.responses.response import FrequencyResponse

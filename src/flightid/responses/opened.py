@@ -6,12 +6,13 @@ With y = H u and u = r + F y + V r, the measured T = y/r gives H = T (1 + V + F 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import ShapeError, SingularError
+from flightid.frozen import dataclass
 from flightid.responses.errors.random_error import (
     CovarianceSource,
     JointErrors,

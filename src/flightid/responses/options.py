@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
+from flightid.frozen import dataclass
 from flightid.options import Options, option
 from flightid.record.hold import LOOPS, Loop
 from flightid.responses.windows.defaults import DEFAULT_FREQUENCIES, DEFAULT_OVERLAP

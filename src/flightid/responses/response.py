@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flightid.errors import DataError, ShapeError, UnknownNameError
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.record.digest import RecordDigest
 from flightid.record.history import Step
 from flightid.record.hold import InputShape

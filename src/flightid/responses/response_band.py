@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.frozen import dataclass
 from flightid.responses.response import FrequencyResponse
 from flightid.responses.unbiased import unbiased
 from flightid.uncertainty.quantiles import LEVEL, half_width

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.frozen import dataclass
 from flightid.responses.windows.transform import HANN_POWER, FoldedBasis, WindowPlan, transform_into
 
 MAXIMUM_CHUNK = 1 << 22

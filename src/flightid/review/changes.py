@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 
 from flightid.conventions import Light
 from flightid.dynamics.conditions.ratios import chance_of, difference_of, holm
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.review.tables import cell
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Reading

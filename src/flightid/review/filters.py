@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from flightid.control.autopilots.output_noise import (
 )
 from flightid.control.tuning.filter_choice import FilterChoice, choose_filters
 from flightid.errors import FlightidError
+from flightid.frozen import dataclass
 from flightid.inspection.signals import Span
 from flightid.logs import Log
 from flightid.review.gyro_noise import GyroNoise

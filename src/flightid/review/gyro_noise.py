@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from flightid.control.autopilots import AXES
 from flightid.control.autopilots.output_noise import GyroSpectrum
 from flightid.control.gyro import Gyro
+from flightid.frozen import dataclass
 from flightid.inspection.signals import Signal, Span, find, inside
 from flightid.logs import Log
 from flightid.result import Result

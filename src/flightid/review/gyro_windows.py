@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.control.gyro import Gyro
+from flightid.frozen import dataclass
 from flightid.inspection.signals import Signal, Span, inside, places
 from flightid.inspection.stamps import believable
 from flightid.logs import Log

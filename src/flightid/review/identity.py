@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from flightid.control.autopilots.from_log import autopilot_of
 from flightid.control.autopilots.parameter_table import AXES, parameter_entries
 from flightid.errors import DataError
+from flightid.frozen import dataclass
 from flightid.inspection.flight_phases import FlightPhases
 from flightid.inspection.signals import Span, inside
 from flightid.inspection.stamps import believable, log_span

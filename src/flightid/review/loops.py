@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.control.autopilots.make import told_loop_rate_hz
 from flightid.errors import FlightidError
+from flightid.frozen import dataclass
 from flightid.inspection.advice import logging
 from flightid.inspection.signals import Signal, Span, find, inside, places, records
 from flightid.inspection.thresholds import RATE_LEAST

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from operator import methodcaller
 from typing import Any
 
@@ -22,6 +22,7 @@ from flightid.conventions import Light
 from flightid.dynamics.conditions.ratios import SHARED_ERRORS, even_error
 from flightid.errors import DataError
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.identification.prediction.remembered import share_samples
 from flightid.identification.uncertain_of import source_findings
 from flightid.result import Result

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.frozen import dataclass
 from flightid.inspection.actuators import Actuators
 from flightid.inspection.saturation import EDGE
 from flightid.inspection.signals import Span, inside

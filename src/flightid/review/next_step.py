@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 from flightid.control.autopilots.parameter_files import ROLLBACK, WRITERS, read_parameters
 from flightid.conventions import Light
 from flightid.errors import FileFormatError
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 
 SAME = 1e-4
 """Relative difference of gains that went through single precision and a ground station."""

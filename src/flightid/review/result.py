@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from flightid.conventions import Light
 from flightid.errors import UnknownNameError
 from flightid.findings import Finding, worst
+from flightid.frozen import dataclass
 from flightid.inspection.flight_phases import FlightPhases
 from flightid.inspection.log_clock import logged_words
 from flightid.inspection.signals import Signal

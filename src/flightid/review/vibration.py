@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from flightid.frozen import dataclass
 from flightid.inspection.signals import Span, inside
 from flightid.inspection.stamps import believable
 from flightid.inspection.thresholds import Threshold

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any, Literal
 
 from flightid.errors import OptionError
+from flightid.frozen import dataclass
 from flightid.options import Options, option
 
 Style = Literal["json", "flightgear"]

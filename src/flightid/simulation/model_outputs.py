@@ -8,14 +8,13 @@ response G(jω) of an unstable model is the transform of this two-sided response
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
 from flightid import _native
 from flightid.errors import ModelError
+from flightid.frozen import dataclass
 from flightid.models import GreyBoxModel, TransferFunctionModel
 from flightid.models.linear.realisation import canonical_form
 from flightid.simulation.finer_samples import finer_samples

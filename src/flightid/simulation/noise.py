@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ import scipy
 from numpy.typing import NDArray
 
 from flightid.errors import ModelError, OptionError, UnknownNameError
+from flightid.frozen import dataclass
 from flightid.models import LinearModel, StateSpaceModel
 from flightid.models.model import linear_system
 from flightid.models.sampled.recursion import run_recursion

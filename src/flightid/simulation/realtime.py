@@ -7,13 +7,14 @@ import math
 import socket
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from types import TracebackType
 from typing import Protocol, Self
 
 import numpy as np
 
 from flightid.errors import DataError, OptionError
+from flightid.frozen import dataclass
 from flightid.record import Record
 from flightid.result import Result
 from flightid.simulation.fly_options import FlyOptions

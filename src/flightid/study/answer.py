@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from shlex import quote
 from statistics import median
 from typing import TYPE_CHECKING
@@ -13,6 +13,7 @@ from flightid.control.autopilots.pid_loop import PidLoop
 from flightid.control.tuning.limits import ANGLE
 from flightid.conventions import Light
 from flightid.findings import Finding, counted, worst
+from flightid.frozen import dataclass
 from flightid.report.content import Document, Lights, Section, TableBlock
 from flightid.study.elsewhere import red_elsewhere
 from flightid.study.estimate_tables import short_modes_table, structure_words

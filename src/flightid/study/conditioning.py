@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, make_dataclass, replace
+from dataclasses import field, replace
 from itertools import product
 from typing import Any
 
@@ -26,7 +26,8 @@ from flightid.conditioning.options import FilterOptions, OutlierOptions
 from flightid.conditioning.sensor_position import RATES
 from flightid.conventions import AxisConversion
 from flightid.errors import StudyError
-from flightid.options import Options, option
+from flightid.frozen import dataclass
+from flightid.options import Options, option, options_class
 from flightid.record import Record
 from flightid.simulation import actuator_positions
 from flightid.study.reading import TableReader, read_each
@@ -45,7 +46,7 @@ LENGTHS = ("m", "cm", "mm", "ft", "in")
 """Units that a position may be told in, behind the sensor's key: ``accelerometers_ft``."""
 
 
-SensorPositions: type[Options] = make_dataclass(
+SensorPositions = options_class(
     "SensorPositions",
     [
         (
@@ -56,8 +57,6 @@ SensorPositions: type[Options] = make_dataclass(
         for sensor in SENSORS
         for unit in LENGTHS
     ],
-    bases=(Options,),
-    frozen=True,
 )
 """Where sensors sit, each told in one unit: keys of ``[[conditioning]]``."""
 

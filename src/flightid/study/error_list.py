@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, TypeVar
 
 from flightid.errors import FlightidError, StudyError
+from flightid.frozen import dataclass
 
 Part = TypeVar("Part")
 Value = TypeVar("Value")

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, TypeVar
 
 from flightid.conventions import Light
 from flightid.errors import FlightidError
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.report.content import Block, Lights, Section
 
 Value = TypeVar("Value")

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, cast
 
 from flightid.errors import StudyError
+from flightid.frozen import dataclass
 from flightid.identification.methods import METHODS, takes_responses
 from flightid.identification.prediction.request import FREE_RUN
 from flightid.models import StateSpaceModel

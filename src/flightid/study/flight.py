@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from flightid.control.autopilots import read_parameters
 from flightid.control.tuning.result import Tuning
 from flightid.errors import FlightidError, StudyError
+from flightid.frozen import dataclass
 from flightid.options import Options, option
 from flightid.study.reading import TableReader, read_table
 from flightid.vehicles import (

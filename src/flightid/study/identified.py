@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from flightid.conventions import Light
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.identification import Fit, Reduction
 from flightid.identification.prediction.request import FREE_RUN
 from flightid.models import Model

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 
+from flightid.frozen import dataclass
 from flightid.option_forms import NOTHING, ONE, SPAN, part_of
 from flightid.options import Options, option
 from flightid.study.fit_settings import FitSettings, VerifySettings, read_fit

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from flightid.conventions import Light
 from flightid.errors import DataError, FitError, FlightidError, StudyError
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.identification.frequency_domain.longer_windows import LongerWindows, second_pass
 from flightid.inspection import Inspection
 from flightid.models import GreyBoxModel

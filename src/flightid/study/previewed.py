@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 from flightid.errors import StudyError, UnknownNameError
+from flightid.frozen import dataclass
 from flightid.study.settings import Settings, read_settings
 from flightid.study.task import Task, load_task
 

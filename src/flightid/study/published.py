@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from flightid.errors import StudyError
+from flightid.frozen import dataclass
 from flightid.identification import Fit, PolynomialDetails, SubspaceDetails
 from flightid.options import Options, option
 from flightid.reading import read_toml

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass, make_dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from flightid.dynamics.handling_qualities.options import CASES, QualitiesOptions
 from flightid.errors import OptionError, StudyError
-from flightid.options import Options, option, options_of
+from flightid.frozen import dataclass
+from flightid.options import option, options_class, options_of
 from flightid.study.reading import TableReader, read_table
 
 SOURCES = ("fit", "reference", "response", "loop")
@@ -52,14 +53,12 @@ def _require_case(settings: QualitiesOptions, given: Collection[str], where: str
         raise StudyError(problem, found=said.found, needed=said.needed) from said
 
 
-QualityCase: type[Options] = make_dataclass(
+QualityCase = options_class(
     "QualityCase",
     [
         (each.name, str | None, option(None, choices=each.choices, doc=each.doc))
         for each in options_of(QualitiesOptions)
         if each.choices and any(each.name in names for names in CASES.values())
     ],
-    bases=(Options,),
-    frozen=True,
 )
 """Case of the standards that one model differs in: keys of ``qualities`` of a ``[[model]]``."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import shlex
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from glob import glob, has_magic
 from itertools import takewhile
 from pathlib import Path
@@ -13,6 +13,7 @@ from typing import Any
 
 from flightid.conventions import Role
 from flightid.errors import StudyError
+from flightid.frozen import dataclass
 from flightid.logs.joinable import joinable
 from flightid.option_forms import NOTHING, SPAN
 from flightid.options import option

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import cast
 
+from flightid.frozen import dataclass
 from flightid.identification.reduction.reduce import AFTER_RISE
 from flightid.identification.reduction.rules import ReductionLimits
 from flightid.options import Options, option

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
+from flightid.frozen import dataclass
 from flightid.logs.to_record import EXCITATION
 from flightid.options import option
 from flightid.record.hold import LOOPS, Loop

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 from flightid.conditioning.consistency_result import KinematicConsistency
 from flightid.control.tuning.result import Tuning
 from flightid.dynamics.handling_qualities.handling_qualities import HandlingQualities
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.inspection import Inspection
 from flightid.record import Record
 from flightid.result import Result

@@ -7,12 +7,13 @@ are relative to the file.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
 from flightid.errors import StudyError
+from flightid.frozen import dataclass
 from flightid.logs.to_record import EXCITATION
 from flightid.option_forms import NOTHING, SPAN
 from flightid.options import Options, option

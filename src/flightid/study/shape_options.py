@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 
+from flightid.frozen import dataclass
 from flightid.options import Options, option
 from flightid.record.hold import HOLDS, LOOPS, InputShape
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterable, Mapping, MutableMapping
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import fields, is_dataclass
 from enum import Enum
 from pathlib import Path
 from typing import Any, Generic, TypeVar
@@ -12,6 +12,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 
 from flightid.files import sha256_of_file
+from flightid.frozen import dataclass
 from flightid.models.kinds import KINDS, model_to_description
 from flightid.record.formats.sniff import BAG_SUFFIXES
 from flightid.version import VERSION

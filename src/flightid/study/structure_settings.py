@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any
 
 from flightid.errors import StudyError
+from flightid.frozen import dataclass
 from flightid.models import NarxStructure, SubspaceStructure
 from flightid.models.polynomial.orders import ANY, EVERY_ORDER, USED, OrderOptions
 from flightid.models.polynomial.structure import PolynomialStructure

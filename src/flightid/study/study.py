@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.report.content import Document
 from flightid.report.json import to_dict
 from flightid.study.answer import short_document

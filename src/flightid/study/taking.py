@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ import numpy as np
 from flightid.conditioning.consistency_result import KinematicConsistency
 from flightid.conventions import Role
 from flightid.errors import StudyError
+from flightid.frozen import dataclass
 from flightid.inspection import Inspection, inspect_log
 from flightid.logs import Log, read_log
 from flightid.logs.dataflash.sid_runs import SidRun

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 
 from flightid.conventions import Role
 from flightid.errors import DataError, UnknownNameError
+from flightid.frozen import dataclass
 from flightid.models import GreyBoxModel, Model, StateSpaceModel, load_model, load_structure
 from flightid.record import Record
 from flightid.study.model_settings import ModelSettings

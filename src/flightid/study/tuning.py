@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -18,6 +18,7 @@ from flightid.control.tuning.tune_controller import tune_controller
 from flightid.control.tuning.tune_pid import CHANNELS
 from flightid.control.tuning.tuned_filters import TunedFilters
 from flightid.errors import DataError, FlightidError, ModelError, StudyError
+from flightid.frozen import dataclass
 from flightid.models import Model, load_model
 from flightid.models.model import model_of
 from flightid.options import options_of

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -18,6 +18,7 @@ from flightid.dynamics.rotor.rotor_physics import rotor_physics
 from flightid.errors import StudyError
 from flightid.export import ExportFiles
 from flightid.export.to_file import export
+from flightid.frozen import dataclass
 from flightid.identification import Fit
 from flightid.models import GreyBoxModel, write_model
 from flightid.models.saved_files import MODELS

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ from flightid.dynamics.rotor.options import RotorOptions
 from flightid.errors import OptionError, StudyError
 from flightid.export.options import FORMATS
 from flightid.export.to_file import format_of
+from flightid.frozen import dataclass
 from flightid.option_forms import NOTHING, SPAN
 from flightid.options import Options, option
 from flightid.study.loop_blocks import made_block

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.frozen import dataclass
 from flightid.uncertainty.fitted_directions import FittedDirections
 from flightid.uncertainty.parts import LEAST_INFORMATION, RecordParts
 from flightid.uncertainty.residual_noise import Autoregression

@@ -11,7 +11,6 @@ that all records share meet in one small matrix.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +18,7 @@ from numpy.typing import NDArray
 from flightid.conventions import Light
 from flightid.errors import FitError
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.uncertainty.agreement import Agreement, AgreementTest, compare_parts
 from flightid.uncertainty.blocks import (
     JointResiduals,

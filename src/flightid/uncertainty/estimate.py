@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Generic, Protocol, TypeVar, cast
 
+from flightid.frozen import dataclass
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.quantiles import LEVEL, half_width, interval_words, shown
 

@@ -16,7 +16,7 @@ loop is not known.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -24,6 +24,7 @@ import scipy
 from numpy.typing import NDArray
 
 from flightid.errors import OptionError
+from flightid.frozen import dataclass
 from flightid.record.history import Step, spread_channels
 from flightid.record.hold import LOOPS
 from flightid.uncertainty.lagged_products import (

@@ -10,12 +10,12 @@ hides what quick inputs foretell: it is told by Ω⁻¹U in place of U, the scor
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from flightid.frozen import dataclass
 from flightid.uncertainty.blocks import RecordBlock, levels
 from flightid.uncertainty.lagged_inputs import LaggedInputs
 from flightid.uncertainty.residual_noise import Autoregression

@@ -8,10 +8,11 @@ the transforms of all sensitivities would be most of the time and of the memory.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from flightid.frozen import dataclass
 
 Array = NDArray[np.float64]
 AT_ONCE = 2048

@@ -8,10 +8,10 @@ sensitivities, so the map and its transpose are running sums: no matrix of n x n
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
+
+from flightid.frozen import dataclass
 
 Array = NDArray[np.float64]
 # A Hann window's power over n samples, and the median of a chi-square with two degrees over its

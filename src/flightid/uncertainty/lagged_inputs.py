@@ -6,12 +6,12 @@ themselves.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.frozen import dataclass
 from flightid.uncertainty.lagged_products import lagged_products, products_with_past
 
 Array = NDArray[np.float64]

@@ -8,11 +8,12 @@ Gauss and Newton that a part would take from there is H_k⁻¹ g_k, and no part 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
+
+from flightid.frozen import dataclass
 
 Array = NDArray[np.float64]
 LEAST_INFORMATION = 1e-6

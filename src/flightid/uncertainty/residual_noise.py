@@ -10,13 +10,14 @@ one, the recursion over the orders meets no reflection of one or more, and the m
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
 from flightid._native import autoregression_weights
+from flightid.frozen import dataclass
 from flightid.recursive_filter import filtered_from, state_after
 from flightid.uncertainty.driven_noise import driven_products
 from flightid.uncertainty.fitted_directions import FittedDirections, WhiteNoiseLoss

@@ -8,12 +8,12 @@ the cost are, the interval speaks of the scatter over repeated flights.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.frozen import dataclass
 from flightid.uncertainty.influence import require_apart, require_influence
 
 Array = NDArray[np.float64]

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.frozen import dataclass
 from flightid.uncertainty.estimate import Estimate, Reading, first_order
 from flightid.uncertainty.quantiles import half_width
 from flightid.uncertainty.uneven import turned

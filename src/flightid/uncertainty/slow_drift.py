@@ -7,12 +7,14 @@ autoregression of few samples does not see these, and slow sensitivities look no
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+from flightid.frozen import dataclass
 
 Array = NDArray[np.float64]
 SLOWEST = 1.5

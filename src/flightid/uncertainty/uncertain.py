@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, lru_cache
 from typing import Generic, TypeVar
 
@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from flightid.errors import OptionError
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.uncertainty.estimate import Estimate, Reading
 from flightid.uncertainty.quantiles import LEVEL, half_width
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from flightid.frozen import dataclass
 from flightid.uncertainty.estimate import Estimate, Interval, Reading
 from flightid.uncertainty.quantiles import half_width, tails
 

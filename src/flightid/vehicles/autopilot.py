@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, field, replace
 from typing import Any
 
 from flightid.control.autopilots.parameter_table import AXES, Axis
 from flightid.errors import OptionError, UnknownNameError
+from flightid.frozen import dataclass
 from flightid.options import Options, option
 from flightid.vehicles.quadrotor import Axes
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from itertools import pairwise
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from flightid import _native
 from flightid.errors import OptionError, UnknownNameError
+from flightid.frozen import dataclass
 from flightid.record import Record, Step
 from flightid.record.history import FLOWN
 from flightid.result import Result

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from flightid.control.tuning.pid_design import PidDesign
 from flightid.control.tuning.result import Tuning
 from flightid.control.tuning.worst_cases import WorstCase
 from flightid.errors import DataError
+from flightid.frozen import dataclass
 from flightid.options import Options, option
 from flightid.progress import progress
 from flightid.record import Record

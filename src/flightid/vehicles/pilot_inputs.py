@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from flightid.errors import OptionError, UnknownNameError
 from flightid.excitation import sweep
 from flightid.excitation.multistep import MULTISTEPS, Steps
+from flightid.frozen import dataclass
 from flightid.options import Options, option
 from flightid.record import Record
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any
 
 from flightid.conventions import STANDARD_GRAVITY_M_S2
 from flightid.errors import OptionError
+from flightid.frozen import dataclass
 from flightid.options import Options, option
 
 Axes = tuple[float, float, float]

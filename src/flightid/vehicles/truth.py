@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Literal
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from flightid import _native
 from flightid.errors import OptionError
+from flightid.frozen import dataclass
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.vehicles.autopilot import Autopilot
 from flightid.vehicles.quadrotor import QuadrotorParameters

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flightid import _native
 from flightid.errors import OptionError, ShapeError
+from flightid.frozen import dataclass
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.record import Record, Step
 from flightid.vehicles.twin_rotor_parameters import (

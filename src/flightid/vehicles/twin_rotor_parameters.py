@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any
 
 from flightid.errors import OptionError
+from flightid.frozen import dataclass
 
 Pair = tuple[float, float]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import chain
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from flightid import _native
 from flightid.errors import OptionError, UnitError, UnknownNameError
 from flightid.excitation.excitation import Excitation
+from flightid.frozen import dataclass
 from flightid.models.linear.hold_equivalent import Hold
 from flightid.models.linear.realisation import Matrices
 from flightid.models.model import LinearModel

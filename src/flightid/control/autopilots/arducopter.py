@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -12,6 +11,7 @@ from flightid import _native
 from flightid.control.autopilots.ardupilot_loop import ArduPilotLoop
 from flightid.control.autopilots.filters import Omega, Response, delay_operator, difference_response
 from flightid.control.autopilots.loop_run import LoopFlags
+from flightid.frozen import dataclass
 
 LEAK_SHARE = 0.02
 """Part of the excess over ILMI that a helicopter's integrator loses in each loop."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Self
 
 import numpy as np
@@ -27,6 +27,7 @@ from flightid.control.autopilots.filters import (
 )
 from flightid.control.autopilots.loop_run import LoopFlags, LoopRun, LoopState, samples
 from flightid.control.gyro import Gyro
+from flightid.frozen import dataclass
 
 NOTCH_OFF = (0.0, 0.0, 0.0)
 PID_COLUMNS = ("Tar", "Err", "P", "I", "D", "FF", "DFF", "Dmod", "SRate")

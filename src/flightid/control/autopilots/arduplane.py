@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -12,6 +11,7 @@ from flightid.control.autopilots.ardupilot_loop import ArduPilotLoop
 from flightid.control.autopilots.filters import Omega, Response, difference_response
 from flightid.control.autopilots.loop_run import LoopFlags, LoopState
 from flightid.errors import OptionError
+from flightid.frozen import dataclass
 
 DEGREES = float(np.degrees(1.0))
 FULL_SERVO_DEG = 45.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from array import array
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import ClassVar, Self
 
 import numpy as np
@@ -25,6 +25,7 @@ from flightid.control.autopilots.parameter_files import GainChange
 from flightid.control.autopilots.parameter_table import GainRange, gain_ranges
 from flightid.control.gyro import Gyro
 from flightid.errors import DataError, OptionError, UnknownNameError
+from flightid.frozen import dataclass
 from flightid.result import Result
 from flightid.table import Column, Table
 

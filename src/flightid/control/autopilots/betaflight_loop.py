@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -26,6 +25,7 @@ from flightid.control.autopilots.parameter_files import GainChange
 from flightid.control.autopilots.parameter_table import Axis, AxisParameters
 from flightid.control.gyro import Gyro
 from flightid.errors import DataError, OptionError
+from flightid.frozen import dataclass
 from flightid.recursive_filter import filtered
 
 P_SCALE, I_SCALE, D_SCALE = 0.032029, 0.244381, 0.000529

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -16,6 +15,7 @@ from flightid.control.autopilots.filters import (
     one_pole_section,
     sections_response,
 )
+from flightid.frozen import dataclass
 
 FilterPath = Literal["gyro", "error", "derivative", "target", "output"]
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 
 from flightid import _native
 from flightid.control.autopilots.filters import Section
 from flightid.control.autopilots.notch_tracking import Centre, NotchTracking
+from flightid.frozen import dataclass
 
 HIGHEST_SHARE = 0.48
 """ArduPilot leaves notches off above this part of the sample rate."""

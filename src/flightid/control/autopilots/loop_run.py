@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flightid.errors import DataError, ShapeError
+from flightid.frozen import dataclass
 
 Samples = NDArray[np.float64]
 

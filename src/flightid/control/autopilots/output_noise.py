@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.control.autopilots.axis_loop import AxisLoop
 from flightid.control.gyro import Gyro
+from flightid.frozen import dataclass
 
 Array = NDArray[np.float64]
 LEAST_POWER = 1e-3

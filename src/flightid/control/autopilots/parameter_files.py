@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
@@ -13,6 +12,7 @@ import numpy as np
 
 from flightid.errors import FileFormatError, OptionError
 from flightid.files import as_path, write_atomically
+from flightid.frozen import dataclass
 
 NAME = re.compile(r"[A-Z][A-Z0-9_]{0,15}")
 """ArduPilot and PX4 keep names in 16 characters."""

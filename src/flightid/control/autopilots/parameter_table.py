@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 from typing import Any, Literal
 
 from flightid.errors import DataError, OptionError
+from flightid.frozen import dataclass
 
 Axis = Literal["roll", "pitch", "yaw"]
 AXES: tuple[Axis, ...] = ("roll", "pitch", "yaw")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import ClassVar
 
 import numpy as np
@@ -19,6 +19,7 @@ from flightid.control.autopilots.filters import (
 from flightid.control.autopilots.loop_run import LoopFlags, LoopRun, samples
 from flightid.control.autopilots.parameter_table import GainRange
 from flightid.control.gyro import Gyro
+from flightid.frozen import dataclass
 from flightid.table import Column, Table
 
 FORMS = {

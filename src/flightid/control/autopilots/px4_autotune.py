@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from flightid.control.autopilots.parameter_table import parameter_entries
 from flightid.errors import OptionError, ShapeError
+from flightid.frozen import dataclass
 
 FUDGE = 5.0
 """PX4 divides the integral gain by this to get gains that fly; it is not part of the method."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -21,6 +20,7 @@ from flightid.control.autopilots.filters import (
 from flightid.control.autopilots.loop_run import LoopFlags, LoopRun, samples
 from flightid.control.gyro import Gyro
 from flightid.errors import OptionError, ShapeError
+from flightid.frozen import dataclass
 
 
 @dataclass(frozen=True, repr=False)

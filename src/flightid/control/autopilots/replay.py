@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,7 @@ from flightid.control.autopilots.replay_signals import (
     read_signals,
 )
 from flightid.errors import DataError
+from flightid.frozen import dataclass
 from flightid.logs import Log
 
 Samples = NDArray[np.float64]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +13,7 @@ from flightid.control.autopilots.replay_result import QUIET, TermReplay
 from flightid.control.autopilots.replay_signals import I_SET, LIMIT, RESET, AxisSignals
 from flightid.conventions import Light
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.logs import Log
 
 Samples = NDArray[np.float64]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from flightid.control.autopilots.axis_loop import AxisLoop
 from flightid.control.autopilots.parameter_table import AXES
 from flightid.errors import DataError
+from flightid.frozen import dataclass
 from flightid.logs import Log, LogTable
 from flightid.logs.self_check import paired_rows
 

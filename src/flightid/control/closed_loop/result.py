@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from operator import methodcaller
 
 from flightid.control.loops.interconnection import Interconnection
 from flightid.control.margins.margins import Margins, margins
 from flightid.errors import UnknownNameError
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.result import Result
 from flightid.table import Column, Table
 from flightid.uncertainty.estimate import Reading

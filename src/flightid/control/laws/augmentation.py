@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 from flightid.errors import OptionError
+from flightid.frozen import dataclass
 from flightid.options import Options, option
 from flightid.reading import read_toml
 

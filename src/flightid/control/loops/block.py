@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 from flightid.errors import ModelError, OptionError
+from flightid.frozen import dataclass
 from flightid.models import StateSpaceModel
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.units import canonical

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 
 import numpy as np
@@ -26,6 +26,7 @@ from flightid.control.loops.wiring import Wiring
 from flightid.conventions import Light
 from flightid.errors import OptionError, UnknownNameError
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.models.linear.hold_equivalent import Hold as InputHold
 from flightid.models.linear.linear_system import DEFAULT_PADE_ORDER, LinearSystem
 from flightid.record import Record

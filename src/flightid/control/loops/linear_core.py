@@ -7,7 +7,7 @@ are no linear system of the same time, and delayed signals.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from flightid.control.loops.block import Block, Equations, Hold
 from flightid.control.loops.elements import static
 from flightid.errors import ModelError
+from flightid.frozen import dataclass
 from flightid.models.linear.linear_system import LinearSystem
 
 Array = NDArray[np.float64]

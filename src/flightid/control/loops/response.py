@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +12,7 @@ from flightid.control.loops.block import Block, Hold
 from flightid.control.loops.linear_core import Core, assemble, linear_view
 from flightid.control.loops.wiring import Wiring
 from flightid.errors import DataError, SingularError
+from flightid.frozen import dataclass
 from flightid.models.linear.linear_system import LinearSystem
 
 Complex = NDArray[np.complex128]

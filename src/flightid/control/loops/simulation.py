@@ -9,7 +9,7 @@ the square of the step.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -21,6 +21,7 @@ from flightid.control.loops.linear_core import Core, assemble
 from flightid.control.loops.wiring import Wiring
 from flightid.conventions import Role
 from flightid.errors import OptionError, ShapeError, UnitError
+from flightid.frozen import dataclass
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.models.state_space.integration_steps import steps_per_sample
 from flightid.record import Channel, InputHold, Record, Step

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,6 +13,7 @@ from flightid.control.loops.delayed_roots import (
 from flightid.control.loops.linear_core import Core
 from flightid.conventions import Light
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.result import Result
 from flightid.table import Column, Table
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from difflib import get_close_matches
 from functools import cached_property
 
 from flightid.control.loops.block import Block, Hold
 from flightid.control.loops.linear_core import Core, assemble, linear_view
 from flightid.errors import ModelError, UnitError, UnknownNameError
+from flightid.frozen import dataclass
 from flightid.units import canonical
 
 

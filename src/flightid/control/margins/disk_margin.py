@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
@@ -26,6 +26,7 @@ from flightid.control.margins.structured_gain import structured_gain
 from flightid.conventions import Light
 from flightid.errors import OptionError
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.result import Result
 from flightid.table import Table
 from flightid.uncertainty.estimate import Estimate, Reading, estimate_table

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from flightid.control.margins.loop_source import Controller, Given, read_loop
 from flightid.control.margins.margins import LoopCurve, drawn_points
 from flightid.conventions import Light
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.result import Result
 from flightid.table import Table
 from flightid.uncertainty.estimate import Reading, estimate_table

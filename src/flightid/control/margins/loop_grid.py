@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import FlightidError
+from flightid.frozen import dataclass
 from flightid.models.model import linear_system
 
 Array = NDArray[np.float64]

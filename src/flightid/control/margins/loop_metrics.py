@@ -6,7 +6,7 @@ computed, so that thousands of draws of a model cost no more than their evaluati
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,6 +20,7 @@ from flightid.control.margins.crossings import (
     phases_from_axis,
 )
 from flightid.errors import DataError, ShapeError
+from flightid.frozen import dataclass
 
 Array = NDArray[np.float64]
 DISTURBANCE_LEVEL_DB = -3.0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
@@ -12,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from flightid.control.margins.loop_grid import loop_grid, roots_of, whole_grid
 from flightid.control.margins.loop_metrics import LoopMetrics, loop_metrics
 from flightid.errors import DataError, ModelError, OptionError, ShapeError, UnknownNameError
+from flightid.frozen import dataclass
 from flightid.identification.uncertain_of import uncertain_of
 from flightid.models import Model, linear_system
 from flightid.responses import FrequencyResponse

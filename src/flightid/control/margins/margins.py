@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,7 @@ from flightid.control.margins.gain_limits import (
 from flightid.control.margins.loop_source import BrokenLoop, Controller, Given, read_loop
 from flightid.control.margins.outside_band import BEYOND, outside_band, outside_band_findings
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.result import Result
 from flightid.table import Column, Table
 from flightid.uncertainty.estimate import Estimate, Reading, estimate_table

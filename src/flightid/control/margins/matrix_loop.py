@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
@@ -18,6 +18,7 @@ from flightid.control.margins.loop_source import (
     known_values,
 )
 from flightid.errors import DataError, ModelError, OptionError, ShapeError, UnknownNameError
+from flightid.frozen import dataclass
 from flightid.identification.uncertain_of import uncertain_of
 from flightid.responses import FrequencyResponse
 from flightid.responses.arithmetic import Known

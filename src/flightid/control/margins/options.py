@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from flightid.control.margins.disturbance_rejection import PEAK_GUIDE_DB
 from flightid.control.margins.loop_source import GIVEN, Given
 from flightid.control.margins.matrix_loop import PLACES, At
+from flightid.frozen import dataclass
 from flightid.options import Options, option
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +12,7 @@ from flightid.control.margins.loop_metrics import READ_AT
 from flightid.control.margins.loop_source import BrokenLoop
 from flightid.conventions import Light
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 
 MOST_RAISED_DB = 20.0
 """By which no mode raises a response that damping and share leave ordinary: ten times."""

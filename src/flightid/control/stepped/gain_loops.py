@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -17,6 +16,7 @@ from flightid.control.tuning.axis_tuning import JUDGED_POINTS
 from flightid.control.tuning.controller_paths import has_angle_loop, loop_responses, standing
 from flightid.control.tuning.evidence import hold_in_model
 from flightid.control.tuning.sampled_plants import SampledPlants, loop_grid, sample_plants
+from flightid.frozen import dataclass
 from flightid.identification.uncertain_of import uncertain_of
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.models.model import linear_system

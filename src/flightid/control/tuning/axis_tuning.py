@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,7 @@ from flightid.control.tuning.sampled_plants import (
 )
 from flightid.control.tuning.whole_gains import whole_gains
 from flightid.control.tuning.worst_cases import WorstCase, worst_cases
+from flightid.frozen import dataclass
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]

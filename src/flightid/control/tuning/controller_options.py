@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from flightid.errors import OptionError
+from flightid.frozen import dataclass
 from flightid.options import Options, option
 
 STRUCTURES = {"p": "p", "pi": "pi", "pd": "pd", "pid": "pid", "pi_d": "pid", "i_pd": "pid",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +11,7 @@ from flightid.control.autopilots import AxisLoop
 from flightid.control.gyro import Gyro
 from flightid.control.tuning.sampled_plants import SampledPlants
 from flightid.errors import OptionError
+from flightid.frozen import dataclass
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]

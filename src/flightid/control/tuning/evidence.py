@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Protocol
 
 import numpy as np
@@ -15,6 +15,7 @@ from flightid.dynamics.continuous import to_continuous
 from flightid.errors import DataError, FlightidError
 from flightid.evidence.evidence import LOOP
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.identification.fit import WITHHOLDING, Fit
 from flightid.identification.instrument_fit import instrument_fit
 from flightid.identification.model_error import ModelErrorBound

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import product
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from flightid.control.autopilots import AxisLoop, GainChange
 from flightid.control.autopilots.output_noise import GyroSpectrum, output_noise
+from flightid.frozen import dataclass
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
 

@@ -9,7 +9,6 @@ a solution violates are added until none is.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 
 import numpy as np
 import scipy
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 
 from flightid.control.tuning.limits import TARGET
 from flightid.control.tuning.loop_problem import LoopAssessment, LoopProblem
+from flightid.frozen import dataclass
 
 Array = NDArray[np.float64]
 Linear = tuple[Array, Array, Array, Array]

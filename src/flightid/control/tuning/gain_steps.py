@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+
+from flightid.frozen import dataclass
 
 AT_LIMIT = 1.1e-3
 """Of the range's upper end: with it the least value that a search takes counts as an end."""

@@ -7,12 +7,12 @@ field in `requirements.py` and its line here.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.control.tuning.requirements import TuningRequirements
+from flightid.frozen import dataclass
 
 Array = NDArray[np.float64]
 WHOLE, ANGLE = "whole loop", "angle loop"

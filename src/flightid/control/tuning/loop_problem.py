@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Protocol
 
@@ -14,6 +14,7 @@ from flightid.control.margins.loop_metrics import LoopMetrics, loop_metrics
 from flightid.control.margins.stability_count import unstable_poles
 from flightid.control.tuning.limits import ANGLE, TINY, WHOLE, limits, present
 from flightid.control.tuning.requirements import TuningRequirements
+from flightid.frozen import dataclass
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import cast
 
 import numpy as np
@@ -13,6 +13,7 @@ from flightid.control.tuning.controller_paths import ControllerPaths
 from flightid.control.tuning.pid_design import PidDesign
 from flightid.control.tuning.responses import ResponseBand, response_bands
 from flightid.control.tuning.worst_cases import WorstCase, worst_cases
+from flightid.frozen import dataclass
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]

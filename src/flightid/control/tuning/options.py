@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Literal
 
 from flightid.control.gyro import Gyro
+from flightid.frozen import dataclass
 from flightid.options import Options, option
 
 OtherLoops = Literal["closed", "open"]

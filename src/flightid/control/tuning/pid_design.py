@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import chain
 from pathlib import Path
 
@@ -23,6 +23,7 @@ from flightid.conventions import Light
 from flightid.errors import DataError, UnknownNameError
 from flightid.files import as_path
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.quantiles import interval_words, shown

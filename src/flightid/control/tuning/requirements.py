@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import tomllib
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, fields
 from functools import cache
 from importlib.resources import files
 
+from flightid.frozen import dataclass
 from flightid.options import Options, option
 
 PRESETS = ("gentle", "balanced", "firm")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 from flightid.control.tuning.pid_design import PidDesign, require_gains, write_steps
@@ -11,6 +10,7 @@ from flightid.control.tuning.tuned_filters import TunedFilters
 from flightid.conventions import Light
 from flightid.errors import FlightidError, UnknownNameError
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.control.tuning.loop_problem import Plants
 from flightid.errors import ModelError
+from flightid.frozen import dataclass
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.models.model import linear_system
 from flightid.progress import track

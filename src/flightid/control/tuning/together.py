@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from flightid.control.tuning.worst_cases import WorstCase
 from flightid.conventions import Light
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 
 MOST = 0.95
 """Share of the fresh plants that have to keep what was required."""

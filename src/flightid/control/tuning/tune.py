@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -39,6 +39,7 @@ from flightid.control.tuning.tune_pid import (
 )
 from flightid.control.tuning.tuned_filters import tuned_filters
 from flightid.errors import DataError, FlightidError, ModelError, OptionError
+from flightid.frozen import dataclass
 from flightid.progress import progress
 
 Array = NDArray[np.float64]

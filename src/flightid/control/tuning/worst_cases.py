@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from flightid.control.autopilots import AxisLoop
 from flightid.control.tuning.limits import ANGLE, limits
 from flightid.control.tuning.loop_problem import LoopAssessment, LoopProblem
 from flightid.control.tuning.margins_beyond import rooms_left
+from flightid.frozen import dataclass
 from flightid.uncertainty.estimate import Estimate, Reading
 from flightid.uncertainty.uneven import DrawnEnds, Reaching
 

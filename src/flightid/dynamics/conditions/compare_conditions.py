@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import scipy
@@ -20,6 +20,7 @@ from flightid.dynamics.modes.modes import modes
 from flightid.dynamics.modes.result import Mode, Modes
 from flightid.errors import ModelError, OptionError
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.identification import Fit
 from flightid.identification.prediction.remembered import share_samples
 from flightid.identification.uncertain_of import source_findings

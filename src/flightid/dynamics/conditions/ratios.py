@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from flightid.dynamics.modes.modes import UNFITTED
+from flightid.frozen import dataclass
 from flightid.identification.uncertain_of import NO_COVARIANCE
 from flightid.uncertainty.estimate import Estimate, Interval, Reading
 from flightid.uncertainty.quantiles import half_width, two_sided_chance

@@ -6,7 +6,6 @@ A further one is a parameter of its model in `models/library/`; its name is know
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 import scipy
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 from flightid.dynamics.derivatives.nondimensional import FORCES, MOMENTS, Normalisation
 from flightid.errors import ModelError, UnitError
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.identification import Fit
 from flightid.identification.uncertain_of import source_findings
 from flightid.identification.uncertain_parameters import parameter_estimates

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Protocol
 
 from flightid.errors import OptionError
+from flightid.frozen import dataclass
 
 FORCES, MOMENTS = "XYZ", "LMN"
 SPEEDS = {"u": "u", "V": "u", "v": "v", "w": "w"}

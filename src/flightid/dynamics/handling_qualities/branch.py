@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
+
+from flightid.frozen import dataclass
 
 POINTS = 120
 """Points over log frequency at which the phase is compared with what the gain asks for."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from flightid.dynamics.handling_qualities.branch import Branch, branch_of
 from flightid.errors import DataError, UnknownNameError
+from flightid.frozen import dataclass
 from flightid.models import LinearSystem, TransferFunctionModel
 from flightid.models.model import linear_system
 from flightid.responses import FrequencyResponse

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, cast
 
 from flightid.conventions import Light
@@ -24,6 +23,7 @@ from flightid.dynamics.modes.modes import modes
 from flightid.dynamics.modes.result import Modes
 from flightid.errors import DataError, ModelError, OptionError
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.identification.uncertain_of import source_findings, uncertain_of
 from flightid.models import TransferFunctionModel
 from flightid.models.model import linear_system, model_of

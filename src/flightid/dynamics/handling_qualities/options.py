@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from flightid.dynamics.handling_qualities.handling_qualities import ATTITUDES
 from flightid.errors import OptionError
+from flightid.frozen import dataclass
 from flightid.options import Options, option, options_of
 
 CASES = {

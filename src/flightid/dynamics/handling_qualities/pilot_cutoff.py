@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import scipy
@@ -13,6 +12,7 @@ from flightid.conventions import Light
 from flightid.errors import DataError, OptionError
 from flightid.excitation.spectrum import power_spectrum
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.record import Record
 from flightid.record.several import as_records
 from flightid.responses.spectrum_measures import band_rms, cutoff_frequency

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,6 +12,7 @@ from flightid.conventions import Light
 from flightid.dynamics.handling_qualities.rating_charts import RatingChart
 from flightid.errors import DataError
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.uncertainty.estimate import Estimate, Reading
 from flightid.uncertainty.uneven import drawn_estimate
 

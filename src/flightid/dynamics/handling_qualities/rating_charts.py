@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import UnknownNameError
+from flightid.frozen import dataclass
 from flightid.result import Result
 from flightid.table import Column, Table
 

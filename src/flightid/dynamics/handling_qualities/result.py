@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,6 +9,7 @@ from flightid.dynamics.handling_qualities.curve import GainPhaseCurve
 from flightid.dynamics.handling_qualities.rating import Rating, normal_draws, rate
 from flightid.dynamics.handling_qualities.rating_charts import RatingChart
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.result import Result
 from flightid.table import Table
 from flightid.uncertainty.estimate import Estimate, Reading, estimate_table

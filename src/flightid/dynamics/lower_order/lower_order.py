@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from flightid.dynamics.lower_order.start import best_starts
 from flightid.dynamics.lower_order.structures import DELAY, GAIN, equivalent_model, structure_of
 from flightid.errors import DataError, FitError, OptionError, UnknownNameError
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.identification import Fit, identify
 from flightid.identification.uncertain_of import source_findings, uncertain_of
 from flightid.models import GreyBoxModel, LinearSystem, StateSpaceModel, TransferFunctionModel

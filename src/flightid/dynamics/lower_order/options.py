@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 from flightid.dynamics.lower_order.structures import STRUCTURES
+from flightid.frozen import dataclass
 from flightid.options import Options, option
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from flightid.dynamics.handling_qualities.rating import Rating, normal_draws, ra
 from flightid.dynamics.handling_qualities.rating_charts_reading import rating_chart
 from flightid.dynamics.lower_order.structures import structure_of
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.identification import Fit
 from flightid.models import TransferFunctionModel
 from flightid.responses import FrequencyResponse

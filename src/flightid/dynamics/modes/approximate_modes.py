@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +15,7 @@ from flightid.dynamics.modes.result import Mode, Modes
 from flightid.dynamics.modes.state_matrix import StateMatrix, read_states
 from flightid.errors import ModelError
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.identification.uncertain_of import source_findings
 from flightid.result import Result
 from flightid.table import Cell, Column, Table

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.dynamics.modes.participation import Eigenpair
+from flightid.frozen import dataclass
 from flightid.units import same_dimension
 
 LIGHT = 0.3

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
+
+from flightid.frozen import dataclass
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flightid.errors import UnknownNameError
+from flightid.frozen import dataclass
 from flightid.identification import Fit
 from flightid.identification.uncertain_of import uncertain_of
 from flightid.models import LinearSystem, StateSpaceModel

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from flightid.errors import OptionError
+from flightid.frozen import dataclass
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from flightid.dynamics.rotor.blades import flapping_time_constant
 from flightid.dynamics.rotor.result import FULL, GIVEN, THEORY, RotorFact, RotorPhysics
 from flightid.errors import ModelError, OptionError
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.identification import Fit
 from flightid.identification.uncertain_of import source_findings
 from flightid.identification.uncertain_parameters import uncertain_parameters

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from flightid.fleet.catalogue.loose import loose_logs, read_loose
 from flightid.fleet.catalogue.parts import KEY_BYTES, KnownLogs, TablePart, read_keys, read_parts
 from flightid.fleet.catalogue.record import LogRecord
 from flightid.fleet.catalogue.store import Store
+from flightid.frozen import dataclass
 
 LOOSE = ""
 """Stands for the loose files of a set where a part has its name."""

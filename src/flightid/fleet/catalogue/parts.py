@@ -7,7 +7,7 @@ import json
 import secrets
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from flightid.errors import DataError
 from flightid.fleet.catalogue.schema import SCHEMA, TABLES
 from flightid.fleet.catalogue.store import Store
+from flightid.frozen import dataclass
 
 PARTS = "parts"
 MANIFEST = "manifest.json"

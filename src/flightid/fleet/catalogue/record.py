@@ -6,7 +6,6 @@ import datetime
 import json
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, TypeGuard
 
 from flightid.errors import DataError, FlightidError
@@ -22,6 +21,7 @@ from flightid.fleet.catalogue.schema import (
     WHOLE,
     FleetTable,
 )
+from flightid.frozen import dataclass
 
 KEY_LENGTH = 64
 MOST_EXACT = 1 << 53

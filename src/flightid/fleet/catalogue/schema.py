@@ -8,7 +8,8 @@ it failed, one in `failures`.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+
+from flightid.frozen import dataclass
 
 SCHEMA = "flightid.fleet/3"
 """Version of all tables: columns are added or changed under a new number only."""

@@ -6,7 +6,7 @@ import base64
 import hashlib
 import os
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, field
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ from flightid.fleet.addresses import LogAddress
 from flightid.fleet.catalogue.schema import SCHEMA
 from flightid.fleet.identity import FleetTables
 from flightid.fleet.settings import FleetSettings
+from flightid.frozen import dataclass
 from flightid.study.run import named_paths
 from flightid.study.settings import read_settings
 from flightid.version import VERSION

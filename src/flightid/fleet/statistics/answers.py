@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from flightid.fleet.statistics.events import FleetEvent
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
 from flightid.fleet.statistics.outliers import FleetOutliers, find_outliers
 from flightid.fleet.statistics.population import Population, estimate_population
+from flightid.frozen import dataclass
 from flightid.uncertainty.quantiles import LEVEL, half_width
 
 Row = Mapping[str, Any]

@@ -8,7 +8,6 @@ that slopes give it. Together that is generalised least squares of all flights a
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +15,7 @@ from scipy.optimize import nnls
 
 from flightid.errors import ShapeError
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
+from flightid.frozen import dataclass
 from flightid.uncertainty.estimate import Estimate, Reading
 
 Array = NDArray[np.float64]

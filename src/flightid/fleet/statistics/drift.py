@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,7 @@ from flightid.fleet.statistics.multiple_testing import FALSE_SHARE, chance_cell,
 from flightid.fleet.statistics.neighbours import neighbour_factor, variances_with_odd_ones
 from flightid.fleet.statistics.repeats import RepeatScatter, repeat_scatter
 from flightid.fleet.statistics.wandering import wandering_chance
+from flightid.frozen import dataclass
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Estimate, Reading

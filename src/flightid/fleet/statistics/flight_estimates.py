@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flightid.errors import DataError, ShapeError, UnknownNameError
+from flightid.frozen import dataclass
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -10,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc, chdtri, ndtr
 
 from flightid.errors import DataError
+from flightid.frozen import dataclass
 from flightid.uncertainty.quantiles import LEVEL, student_quantiles, tails
 
 Array = NDArray[np.float64]

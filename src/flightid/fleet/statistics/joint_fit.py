@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 from flightid.errors import DataError, FitError, ModelError
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
 from flightid.fleet.statistics.population import Population, estimate_population
+from flightid.frozen import dataclass
 from flightid.identification.frequency_domain.model_curves import curves_of, log_slopes_of
 from flightid.models import GreyBoxModel
 

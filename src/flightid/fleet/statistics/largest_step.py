@@ -7,7 +7,6 @@ integrals: no simulation, and exact in the tail where thousands of series are co
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -16,6 +15,7 @@ from scipy.optimize import brentq
 from scipy.special import ndtr
 
 from flightid.errors import DataError, ShapeError
+from flightid.frozen import dataclass
 from flightid.uncertainty.quantiles import LEVEL, tails
 
 Array = NDArray[np.float64]

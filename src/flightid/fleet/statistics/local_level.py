@@ -6,12 +6,11 @@ first level is unknown, so the likelihood is that of what follows the first flig
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError, ShapeError
+from flightid.frozen import dataclass
 from flightid.uncertainty.quantiles import LEVEL, half_width
 
 Array = NDArray[np.float64]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from flightid.fleet.statistics.heterogeneity import VehicleEstimates
 from flightid.fleet.statistics.multiple_testing import FALSE_SHARE, chance_cell, corrected
 from flightid.fleet.statistics.population import Population
 from flightid.fleet.statistics.spread_search import SpreadFit, search_spreads
+from flightid.frozen import dataclass
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Estimate

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from flightid.fleet.statistics.flight_estimates import Flags, FlightEstimates
 from flightid.fleet.statistics.heterogeneity import FEWEST, VehicleEstimates
 from flightid.fleet.statistics.spread_search import SpreadFit, search_spreads
+from flightid.frozen import dataclass
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Estimate, Reading

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.special import chdtrc, chdtri
 
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
+from flightid.frozen import dataclass
 from flightid.uncertainty.quantiles import LEVEL, tails
 
 DAY_S = 86400.0

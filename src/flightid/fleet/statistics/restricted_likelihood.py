@@ -8,12 +8,13 @@ needs matrices of p × p alone, and no inverse of T or A_i: T may be singular an
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
+from flightid.frozen import dataclass
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import OptionError
+from flightid.frozen import dataclass
 
 Array = NDArray[np.float64]
 STRUCTURES = ("diagonal", "factor", "full")

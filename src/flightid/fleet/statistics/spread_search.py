@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from flightid.errors import DataError, FitError
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
 from flightid.fleet.statistics.restricted_likelihood import Evaluation, RestrictedLikelihood
 from flightid.fleet.statistics.spread import SpreadStructure, supported
+from flightid.frozen import dataclass
 
 Array = NDArray[np.float64]
 FEWEST = 2

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 import scipy
@@ -13,6 +13,7 @@ from flightid.conventions import Light
 from flightid.errors import DataError, FitError, SingularError
 from flightid.evidence import FeedbackTest, feedback_test
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.identification.advice.delays import InputDelay, find_delays
 from flightid.identification.advice.impulse_response import (
     ImpulseResponse,

@@ -7,13 +7,13 @@ response and the noise is whitened, so that slow, periodic and band-limited inpu
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import scipy
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from flightid.frozen import dataclass
 from flightid.identification.advice.delayed_output_error import (
     DelayedSignals,
     Ended,

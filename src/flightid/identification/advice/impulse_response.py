@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 
 import numpy as np
@@ -11,6 +11,7 @@ import scipy
 from numpy.typing import NDArray
 
 from flightid.errors import DataError, OptionError
+from flightid.frozen import dataclass
 from flightid.identification.advice.delays import InputDelay, find_delays
 from flightid.identification.prediction_error.kernel_regression import kernel_estimate
 from flightid.identification.prediction_error.linear_regression import (

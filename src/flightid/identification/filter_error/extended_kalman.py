@@ -7,13 +7,13 @@ measurement and constants of channels at zero, both with a wide prior in place o
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid import _native
 from flightid.errors import FlightidError
+from flightid.frozen import dataclass
 from flightid.identification.filter_error.innovations import (
     Filtered,
     FilteredData,

@@ -8,7 +8,7 @@ they are positive and no constraint on the innovations' covariance is needed.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from flightid.conventions import Light
 from flightid.errors import UnknownNameError
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.identification.filter_error.extended_kalman import (
     ExtendedProblem,
     along_the_flight,

@@ -8,11 +8,12 @@ which could do the same are not counted.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.frozen import dataclass
 from flightid.identification.filter_error.gusts import GUST_REACH
 from flightid.identification.filter_error.innovations import InnovationsProblem
 from flightid.identification.multistart import DenseEnd

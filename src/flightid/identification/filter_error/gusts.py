@@ -8,11 +8,10 @@ decides.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.frozen import dataclass
 from flightid.identification.filter_error.steady_filter import ContinuousPoint
 from flightid.identification.records.held_model import LinearPoint
 

@@ -8,13 +8,13 @@ the whitened innovations times the geometric mean of their deviations.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid import _native
 from flightid.errors import FlightidError
+from flightid.frozen import dataclass
 from flightid.identification.filter_error.gusts import GUST_REACH, GUST_UNKNOWNS, Gust
 from flightid.identification.filter_error.steady_filter import (
     ContinuousPoint,

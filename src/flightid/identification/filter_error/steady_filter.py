@@ -9,13 +9,14 @@ order.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid import _native
 from flightid.errors import FitError
+from flightid.frozen import dataclass
 
 Array = NDArray[np.float64]
 _DOUBLINGS = 60

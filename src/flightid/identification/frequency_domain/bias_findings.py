@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.conventions import Light
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.identification.frequency_domain.error_model import ErrorModel
 from flightid.identification.frequency_domain.selection import SelectedResponse
 from flightid.uncertainty.response_errors import DECIBEL, DEGREE

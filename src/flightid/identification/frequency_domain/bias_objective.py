@@ -7,12 +7,12 @@ the model's outputs; derivatives are the same weights on the model's sensitiviti
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.frozen import dataclass
 from flightid.identification.frequency_domain.error_model import ErrorModel, whitening
 from flightid.identification.frequency_domain.estimator_bias import Correction
 from flightid.identification.frequency_domain.model_curves import slopes_of

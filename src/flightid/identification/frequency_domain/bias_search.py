@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import FitError
+from flightid.frozen import dataclass
 from flightid.identification.frequency_domain.bias_findings import ENOUGH
 from flightid.identification.frequency_domain.bias_objective import Curves, Objective
 from flightid.identification.frequency_domain.estimator_bias import OUTSIDE

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import groupby
 
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import FitError
+from flightid.frozen import dataclass
 from flightid.identification.fit_findings import APPROXIMATE, UNKNOWN
 from flightid.identification.frequency_domain.selection import SelectedResponse
 from flightid.identification.shared_work import shared

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import FitError
+from flightid.frozen import dataclass
 from flightid.identification.fit_findings import UNKNOWN
 from flightid.identification.frequency_domain.error_model import ErrorModel
 from flightid.identification.frequency_domain.model_curves import log_slopes_of

@@ -8,13 +8,14 @@ of the estimate to the model's sensitivities.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError, ModelError, OptionError, SingularError
+from flightid.frozen import dataclass
 from flightid.identification.frequency_domain.model_residuals import ModelResiduals
 from flightid.models import GreyBoxModel, Parameter
 from flightid.responses import FrequencyResponse

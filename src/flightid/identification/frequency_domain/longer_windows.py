@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -12,6 +12,7 @@ from flightid.conventions import Light
 from flightid.errors import FlightidError, ModelError, SingularError
 from flightid.evidence.gather import WINDOWS_LENGTHENED, WINDOWS_SHORT
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.models import GreyBoxModel
 from flightid.record.history import Step
 from flightid.responses import FrequencyResponse

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError
+from flightid.frozen import dataclass
 from flightid.models import GreyBoxModel
 from flightid.responses.errors.linear_estimate import LinearEstimate
 from flightid.simulation.model_outputs import (

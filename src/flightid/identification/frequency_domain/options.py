@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 from flightid.errors import OptionError
+from flightid.frozen import dataclass
 from flightid.options import Options, option
 from flightid.simulation.model_outputs import HOLDS
 

@@ -8,12 +8,12 @@ up to nothing.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.frozen import dataclass
 from flightid.identification.frequency_domain.error_model import ErrorModel
 from flightid.identification.frequency_domain.estimator_bias import Correction
 from flightid.identification.frequency_domain.longer_windows import slowest_mode

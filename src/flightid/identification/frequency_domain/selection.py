@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flightid.errors import DataError, OptionError, UnknownNameError
+from flightid.frozen import dataclass
 from flightid.identification.frequency_domain.options import Band, Bands
 from flightid.identification.shared_work import shared
 from flightid.responses import FrequencyResponse, PairResponse

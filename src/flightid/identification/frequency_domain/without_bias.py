@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from flightid.errors import FitError
+from flightid.frozen import dataclass
 from flightid.identification.frequency_domain.bias_findings import (
     TOLERABLE,
     BiasOutcome,

@@ -7,12 +7,13 @@ on the way; the fit has settled where a turn with the slopes of its own start mo
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.frozen import dataclass
 from flightid.identification.frequency_domain.bias_findings import ENOUGH
 from flightid.identification.frequency_domain.bias_objective import Curves, Objective
 from flightid.identification.frequency_domain.bias_search import (

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError, FitError, FlightidError
+from flightid.frozen import dataclass
 from flightid.identification.fit import Fit
 from flightid.identification.fit_findings import (
     NoiseCost,

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from flightid.frozen import dataclass
 from flightid.identification.frequency_domain.options import FrequencyDomainOptions, PointOptions
 from flightid.identification.records.options import RecordOptions
 

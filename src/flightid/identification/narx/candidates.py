@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import combinations_with_replacement, product
 from typing import Literal
 
@@ -13,6 +12,7 @@ import scipy
 from numpy.typing import NDArray
 
 from flightid.errors import FitError, OptionError
+from flightid.frozen import dataclass
 from flightid.models.narx.structure import NarxStructure
 from flightid.models.narx.terms import Term, product_term
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
+from flightid.frozen import dataclass
 from flightid.identification.details import Details
 from flightid.models.narx.model import NarxModel
 from flightid.models.narx.structure import NarxStructure

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid import _native
 from flightid.errors import DataError, FitError, SingularError
+from flightid.frozen import dataclass
 from flightid.identification.black_box import (
     BlackBoxEstimates,
     BlackBoxRuns,

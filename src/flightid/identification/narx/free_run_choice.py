@@ -7,7 +7,7 @@ free runs over the first part of each record and judged by free runs over the re
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from flightid.conventions import Light
 from flightid.errors import FitError
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.identification.narx.findings import loses
 from flightid.identification.narx.simulation_error import (
     Run,

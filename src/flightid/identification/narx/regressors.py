@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError
+from flightid.frozen import dataclass
 from flightid.models.narx.scaling import Scaling
 from flightid.models.narx.structure import NarxStructure
 from flightid.record import Record

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from flightid.frozen import dataclass
 from flightid.identification.multistart import DenseEnd
 from flightid.models.narx.model import NarxModel
 from flightid.models.narx.terms import Lag, Term

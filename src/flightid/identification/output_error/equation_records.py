@@ -7,7 +7,7 @@ growing modes set at its end and the others at its beginning, so that nothing gr
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import scipy
@@ -17,6 +17,7 @@ from flightid import _native
 from flightid.conventions import Light
 from flightid.errors import DataError, OptionError, SingularError
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.identification.records.setup import OwnNumbers, RecordSet
 from flightid.models import GreyBoxModel, StateSpaceModel
 from flightid.models.state_space.first_sample import measured_point

@@ -8,13 +8,14 @@ Its time goes into sensitivities: `linear_sensitivities.rs`, `trajectories/sensi
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import FlightidError
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.identification.fit import Fit
 from flightid.identification.fit_findings import (
     judge_correlation,

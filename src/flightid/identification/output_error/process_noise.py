@@ -13,7 +13,6 @@ tells them apart, and a covariance by that colour holds for both.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import scipy
@@ -22,6 +21,7 @@ from numpy.typing import NDArray
 from flightid.conventions import Light
 from flightid.errors import FlightidError
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.identification.output_error.innovation_gain import (
     ORDER,
     innovations,

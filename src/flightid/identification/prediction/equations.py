@@ -6,12 +6,11 @@ state, input shifts and output biases of the record are solved for, by Gauss-New
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid import _native
+from flightid.frozen import dataclass
 from flightid.identification.multistart import DenseEnd
 from flightid.identification.prediction.linear import Freedom, column_rank
 from flightid.identification.prediction.result import Shifts

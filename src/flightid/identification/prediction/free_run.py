@@ -7,11 +7,10 @@ forwards, they span the same solutions of the same equations.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.frozen import dataclass
 from flightid.models.linear.realisation import Matrices
 from flightid.simulation.model_outputs import (
     ModeSubset,

@@ -7,12 +7,13 @@ the initial state, so each one's share of the output is a column and all are sol
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError
+from flightid.frozen import dataclass
 from flightid.identification.prediction.free_run import Answer, FreeRun
 from flightid.identification.prediction.result import Shifts
 from flightid.models.linear.realisation import Matrices

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
+from flightid.frozen import dataclass
 from flightid.identification.records.options import ESTIMATE, MEASURED, TRIM, InitialState
 from flightid.identification.records.record_parameters import with_record_values
 from flightid.models import StateSpaceModel

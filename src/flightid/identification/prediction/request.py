@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from flightid.errors import OptionError
+from flightid.frozen import dataclass
 from flightid.identification.records.options import InitialState
 from flightid.options import Options, option
 from flightid.record.hold import HOLDS, InputHold

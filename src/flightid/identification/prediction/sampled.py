@@ -7,12 +7,12 @@ record declares: never the mean of the record that is predicted.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError, OptionError
+from flightid.frozen import dataclass
 from flightid.identification.prediction.request import FREE_RUN, Request, usual_stretch
 from flightid.identification.prediction.result import Prediction, Shifts
 from flightid.models import InnovationsModel, PolynomialModel

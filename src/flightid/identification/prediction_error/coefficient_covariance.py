@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from flightid.frozen import dataclass
 from flightid.identification.innovation_tests import ROUNDING, InnovationTests, innovation_tests
 from flightid.identification.local_minimum import LocalMinimum
 from flightid.identification.prediction_error.coloured_errors import (

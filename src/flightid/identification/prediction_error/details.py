@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any
 
+from flightid.frozen import dataclass
 from flightid.identification.details import Details
 from flightid.identification.prediction_error.information_criteria import Criteria
 from flightid.identification.prediction_error.roots import POLE, FittedRoot

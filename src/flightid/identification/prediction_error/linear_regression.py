@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import scipy
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from flightid import _native
 from flightid.errors import DataError, FitError
+from flightid.frozen import dataclass
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.models.sampled.channels import SampledChannels
 

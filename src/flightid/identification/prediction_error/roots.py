@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.frozen import dataclass
 from flightid.models.polynomial.model import PolynomialModel
 from flightid.models.sampled.discrete_modes import discrete_modes, zero_note
 from flightid.responses.pair import quotient_unit

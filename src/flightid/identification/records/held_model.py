@@ -7,13 +7,13 @@ weights of the neighbouring samples on one step, with derivatives by parameters 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid import _native
+from flightid.frozen import dataclass
 from flightid.models import StateSpaceModel
 
 Array = NDArray[np.float64]

@@ -7,10 +7,10 @@ constants would follow: separable least squares.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
+
+from flightid.frozen import dataclass
 
 Array = NDArray[np.float64]
 _RANK = 1e-9

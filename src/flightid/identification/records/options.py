@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
 from flightid.errors import OptionError, UnknownNameError
+from flightid.frozen import dataclass
 from flightid.options import Options, option
 
 Array = NDArray[np.float64]

@@ -7,12 +7,13 @@ value, and where none does a constant shift of that input is estimated in each r
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from flightid.conventions import Role
 from flightid.errors import DataError, OptionError, UnknownNameError
+from flightid.frozen import dataclass
 from flightid.identification.fit import Fit
 from flightid.identification.fitted_record import FittedRecord
 from flightid.models import StateSpaceModel

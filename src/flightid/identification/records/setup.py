@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError
+from flightid.frozen import dataclass
 from flightid.identification.multistart import require_free
 from flightid.identification.records.declared_numbers import declared_numbers, with_declared
 from flightid.identification.records.options import (

@@ -9,11 +9,11 @@ autocovariance replaces "white" in the covariance of the estimates.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.frozen import dataclass
 from flightid.identification.frequency_domain.estimates import (
     at_bound,
     fitted_parameters,

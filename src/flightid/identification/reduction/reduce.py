@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any
 
 from flightid.errors import DataError, FitError, ModelError, OptionError
+from flightid.frozen import dataclass
 from flightid.identification.fit import Fit
 from flightid.identification.identify import identify
 from flightid.identification.reduction.result import Reduction, ReductionStep

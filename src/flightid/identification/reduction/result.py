@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from flightid.conventions import Light
 from flightid.errors import OptionError
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.identification.fit import Fit
 from flightid.identification.reduction.rules import ReductionLimits, choose
 from flightid.result import Result

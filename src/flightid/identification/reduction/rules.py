@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import scipy
 
+from flightid.frozen import dataclass
 from flightid.identification.fit import Fit
 from flightid.identification.fit_findings import (
     CORRELATION_GUIDE,

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
 from flightid.conventions import Light
 from flightid.errors import DataError, OptionError
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.identification.fit import Fit
 from flightid.identification.fit_findings import (
     CORRELATION_GUIDE,

@@ -8,13 +8,14 @@ taken out exactly.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.conditioning.smoothing import local_derivative, local_mean
+from flightid.frozen import dataclass
 from flightid.identification.regression.harmonics import FEWEST_SAMPLES, Harmonics
 from flightid.identification.regression.sampled_equations import StateMeasurements, require_length
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import FitError
+from flightid.frozen import dataclass
 from flightid.identification.regression.equation_operators import FourierRows, Operator
 from flightid.identification.regression.right_side import Bends, RightSide
 from flightid.identification.regression.rounds import Rows

@@ -14,13 +14,13 @@ transfer function in the z domain: exact for held inputs).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError, FitError
+from flightid.frozen import dataclass
 from flightid.identification.records.held_model import HeldModel, LinearPoint
 from flightid.identification.records.nuisance import Nuisance
 from flightid.identification.regression.harmonics import Harmonics

@@ -7,13 +7,12 @@ sample intervals, whatever the inputs do inside them, so no curve is laid throug
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
 from flightid.errors import DataError, OptionError
+from flightid.frozen import dataclass
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]

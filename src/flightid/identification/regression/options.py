@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
+from flightid.frozen import dataclass
 from flightid.identification.records.options import HOLDS
 from flightid.options import Options, option
 

@@ -9,13 +9,13 @@ model's own slope makes of each corner is added to the cubic that leaves it out.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import ModelError
+from flightid.frozen import dataclass
 from flightid.identification.records.delayed_inputs import DelayedInputs, lagrange
 from flightid.identification.regression.sampled_equations import Reconstruction, StateMeasurements
 from flightid.models import StateSpaceModel

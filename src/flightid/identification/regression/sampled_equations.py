@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError, FitError
+from flightid.frozen import dataclass
 from flightid.models import StateSpaceModel
 from flightid.models.state_space.measured_states import StateOutputs
 from flightid.record import Record

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError
+from flightid.frozen import dataclass
 from flightid.models.innovations.structure import SubspaceStructure
 from flightid.models.sampled.channels import SampledChannels, gather_channels
 from flightid.record import Record

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
+from flightid.frozen import dataclass
 from flightid.identification.prediction_error.details import PolynomialDetails
 from flightid.identification.subspace.order import OrderChoice
 from flightid.table import Table

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError
+from flightid.frozen import dataclass
 from flightid.identification.prediction.request import usual_stretch
 from flightid.identification.prediction_error.information_criteria import Criteria, criteria
 from flightid.identification.subspace.data import SubspaceData

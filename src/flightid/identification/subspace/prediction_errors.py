@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from flightid import _native
 from flightid.errors import DataError
+from flightid.frozen import dataclass
 from flightid.identification.multistart import DenseEnd
 from flightid.identification.records.nuisance import Nuisance, NuisanceDirections
 from flightid.identification.subspace.data import SubspaceData

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.frozen import dataclass
 from flightid.identification.prediction.request import usual_stretch
 from flightid.identification.subspace.data import SubspaceData
 from flightid.identification.subspace.determinant import log_determinant

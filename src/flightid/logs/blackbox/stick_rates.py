@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from flightid.frozen import dataclass
 
 Array = NDArray[np.float64]
 FULL_STICK, FASTEST_DEG_S = 500.0, 1998.0

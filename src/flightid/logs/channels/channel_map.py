@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -11,6 +11,7 @@ from typing import Any
 
 from flightid.conventions import Role
 from flightid.errors import DataError, FileFormatError, FlightidError, UnknownNameError
+from flightid.frozen import dataclass
 from flightid.reading import DOCUMENT_BYTES, bounded_bytes, parse_toml
 from flightid.record.hold import HOLDS, InputHold, require_hold
 

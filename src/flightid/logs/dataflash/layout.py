@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cache, cached_property
 from importlib.resources import files
 from typing import Any
@@ -13,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError, OptionError
+from flightid.frozen import dataclass
 
 # Format character -> NumPy storage (AP_Logger/LogStructure.h).
 STORAGE: dict[str, str] = {

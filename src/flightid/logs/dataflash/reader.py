@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import repeat
 from pathlib import Path
@@ -17,6 +16,7 @@ from flightid import _native
 from flightid.conventions import Light
 from flightid.errors import MissingColumnError
 from flightid.findings import Finding, counted
+from flightid.frozen import dataclass
 from flightid.logs.dataflash.events import error_text, event_text, mode_text, vehicle_of
 from flightid.logs.dataflash.field_units import (
     DEGREES_SINCE,

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.conventions import Axis
+from flightid.frozen import dataclass
 from flightid.logs.contents import LogContents
 
 COPTER_DELAY_S = 1.0

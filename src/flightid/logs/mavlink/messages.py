@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import tomllib
-from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 
 import numpy as np
 
+from flightid.frozen import dataclass
 from flightid.units import DIMENSIONLESS
 
 

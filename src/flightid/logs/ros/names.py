@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+
+from flightid.frozen import dataclass
 
 PX4_TYPES, MAVROS_TYPES = "px4_msgs/", "mavros_msgs/"
 _PX4 = re.compile(r"(?P<vehicle>.*?)/?fmu/(?P<way>in|out)/(?P<name>[a-z0-9_]+?)(?:_v\d+)?")

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flightid.errors import ModelError
+from flightid.frozen import dataclass
 from flightid.models.estimated import EstimateProvenance
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.models.parameters import Parameter

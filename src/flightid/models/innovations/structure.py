@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TypedDict
 
 from flightid.errors import OptionError
+from flightid.frozen import dataclass
 from flightid.models.polynomial.structure import INITIAL_STATES
 from flightid.models.sampled.channels import OFFSETS
 from flightid.options import Options, option

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from flightid.errors import ModelError
 from flightid.formula import NAME, require_name
+from flightid.frozen import dataclass
 from flightid.models.language.reading import read_text, require_keys
 
 MAXIMUM_ORDER = 10

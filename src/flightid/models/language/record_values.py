@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from flightid.errors import ModelError
+from flightid.frozen import dataclass
 from flightid.models.language.reading import read_number, require_keys
 
 

@@ -9,11 +9,11 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache
 
 from flightid import _native
 from flightid.errors import ModelError
+from flightid.frozen import dataclass
 
 MAXIMUM_TERM = 20_000
 _TURNS = 8

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from flightid import _native
 from flightid.errors import FlightidError, ModelError
 from flightid.formula import require_name
+from flightid.frozen import dataclass
 from flightid.models.language.reading import read_number, read_text, require_keys
 from flightid.units import canonical
 

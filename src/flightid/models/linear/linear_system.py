@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Self
 
 import numpy as np
@@ -18,6 +18,7 @@ from flightid.errors import (
     SingularError,
     UnknownNameError,
 )
+from flightid.frozen import dataclass
 from flightid.models.estimated import EstimateProvenance
 from flightid.models.linear.delay_states import delays_as_states, shift_registers
 from flightid.models.linear.hold_equivalent import Hold, hold_equivalent

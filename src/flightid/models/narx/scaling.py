@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError
+from flightid.frozen import dataclass
 from flightid.record import Record
 from flightid.units import clash, match
 

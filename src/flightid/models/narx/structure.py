@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from flightid.errors import OptionError
+from flightid.frozen import dataclass
 from flightid.models.narx.terms import KERNELS, WIDTH_FACTORS, Lag, width_to_beta
 from flightid.models.sampled.channel_order import require_inputs_first
 from flightid.options import Options, option

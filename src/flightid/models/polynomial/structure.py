@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Self, TypedDict
 
 from flightid.errors import OptionError
+from flightid.frozen import dataclass
 from flightid.models.sampled.channels import OFFSETS
 from flightid.options import Options, option
 

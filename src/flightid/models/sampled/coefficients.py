@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 
 from flightid.errors import UnknownNameError
+from flightid.frozen import dataclass
 from flightid.models.parameters import Parameter
 
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any, TypeVar
 
 from flightid.dimensions import unit_of
 from flightid.errors import ModelError
 from flightid.formula import formula_names
+from flightid.frozen import dataclass
 from flightid.models.language.blocks import MAXIMUM_BLOCKS, ModelBlock, Realisation, wrapped
 from flightid.models.parameters import Parameter, Parameters
 from flightid.models.state_space.linear import Linearisation

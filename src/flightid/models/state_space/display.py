@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from html import escape
 
+from flightid.frozen import dataclass
 from flightid.models.language.symbolic import ZERO, Formula, Printer, latex_name
 from flightid.models.state_space.linear import Linearisation
 from flightid.models.state_space.parts import derivative

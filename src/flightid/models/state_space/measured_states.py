@@ -7,12 +7,11 @@ rest.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError, SingularError
+from flightid.frozen import dataclass
 from flightid.models.state_space.model import StateSpaceModel
 
 Array = NDArray[np.float64]

@@ -7,10 +7,11 @@ and need not be linear: the matrices are then those of the linearisation at the 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 from flightid import _native
 from flightid.errors import ModelError, UnknownNameError
+from flightid.frozen import dataclass
 from flightid.models.estimated import EstimateProvenance
 from flightid.models.language.blocks import ModelBlock
 from flightid.models.language.record_values import RecordValue

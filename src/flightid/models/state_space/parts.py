@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import ModelError
+from flightid.frozen import dataclass
 from flightid.units import canonical
 
 Array = NDArray[np.float64]

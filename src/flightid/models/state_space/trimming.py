@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid import _native
 from flightid.errors import FitError, FlightidError, UnknownNameError
+from flightid.frozen import dataclass
 from flightid.models.state_space.linear import Linearisation
 
 MAXIMUM_ITERATIONS = 100

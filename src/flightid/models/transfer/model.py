@@ -7,7 +7,7 @@ coefficients of the factors are formulas of the parameters; factors are polynomi
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,6 +16,7 @@ from flightid import _native
 from flightid.dimensions import require_unit
 from flightid.errors import DataError, ModelError, UnknownNameError
 from flightid.formula import formula_names
+from flightid.frozen import dataclass
 from flightid.models.adjustable import Adjustable
 from flightid.models.estimated import EstimateProvenance
 from flightid.models.linear.linear_system import LinearSystem

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Callable, Container, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from flightid.errors import DataError, FileFormatError, OptionError, UnitError, UnknownNameError
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.reading import require_memory
 from flightid.units import SPELLINGS, canonical
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import io
 import struct
 import zlib
-from dataclasses import dataclass, field
+from dataclasses import field
 from math import prod
 
 from flightid.errors import FileFormatError
+from flightid.frozen import dataclass
 from flightid.reading import memory_budget, require_memory
 
 HEADER = 128

@@ -11,7 +11,7 @@ the output, so the cross-spectra of the noise give the covariance between output
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from typing import Protocol
 
@@ -19,6 +19,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from flightid.frozen import dataclass
 from flightid.responses.errors.noise import NoiseOfRecords, NoiseSpectrum
 from flightid.responses.errors.random_error import JointErrors, Points, union
 from flightid.responses.windows.window_weights import WindowShare, WindowWeights

@@ -8,13 +8,14 @@ model's response but this functional of the model's outputs. The difference is t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import ShapeError
+from flightid.frozen import dataclass
 from flightid.responses.errors.covariance import WindowedErrors
 from flightid.responses.errors.functional import Functional
 from flightid.responses.errors.local_errors import LocalErrors

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.frozen import dataclass
 from flightid.responses.errors.noise import NoiseSpectrum
 from flightid.responses.errors.random_error import JointErrors, Points, union
 from flightid.responses.windows.local_fit import LocalFit

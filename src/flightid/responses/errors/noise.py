@@ -7,13 +7,13 @@ as independent would count one cause as many.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError
+from flightid.frozen import dataclass
 from flightid.responses.windows.local_fit import Bins, bins_needed, fit_locally, local_residuals
 from flightid.responses.windows.samples import Samples
 

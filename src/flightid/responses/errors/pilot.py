@@ -9,12 +9,13 @@ model's outputs, less its own response, is the bias to expect.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from flightid.frozen import dataclass
 from flightid.responses.errors.pilot_search import (
     SPARE,
     PilotBins,

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+
+from flightid.frozen import dataclass
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]

@@ -8,7 +8,6 @@ means stand for their samples: long memory by few numbers.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
 
@@ -16,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError
+from flightid.frozen import dataclass
 from flightid.responses.errors.functional import Functional
 from flightid.responses.errors.random_error import CovarianceSource, JointErrors, Points
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid import _native
+from flightid.frozen import dataclass
 from flightid.responses.estimators.conditioned import ConditionalSpectra
 
 COHERENCE_WEIGHT = 5.0

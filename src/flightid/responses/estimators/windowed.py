@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.frozen import dataclass
 from flightid.record.history import Step
 from flightid.responses.cautions import band_findings, correlation_findings
 from flightid.responses.errors.covariance import WindowedErrors

@@ -8,11 +8,12 @@ filtered or folded over, ends of windows included, as in a decimated record.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
+
+from flightid.frozen import dataclass
 
 PANEL = 128
 """Samples in a panel of the first level."""

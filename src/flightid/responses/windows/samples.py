@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError, OptionError
+from flightid.frozen import dataclass
 from flightid.record import Record
 from flightid.record.checks import CHECK, checked_history
 from flightid.record.history import Step

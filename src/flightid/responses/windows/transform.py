@@ -10,12 +10,11 @@ taken out of the basis instead, once.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from flightid.frozen import dataclass
 from flightid.responses.windows.panels import PanelBasis, PanelSpace, exponentials, panel_levels
 
 HANN_POWER = 3.0 / 8.0

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
 from flightid.control.margins.margins import Margins
 from flightid.conventions import Light
 from flightid.findings import Finding, worst
+from flightid.frozen import dataclass
 from flightid.inspection.verdict_lines import verdict_lines
 from flightid.result import Result
 from flightid.review.autotune.run import AutotuneRun

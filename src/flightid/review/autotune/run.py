@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.inspection.signals import Span
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +12,7 @@ from flightid.control.margins.margins import Margins, margins
 from flightid.control.tuning.tune_pid import CHANNELS
 from flightid.conventions import Light
 from flightid.errors import FlightidError
+from flightid.frozen import dataclass
 from flightid.identification import Fit
 from flightid.identification.identify import identify
 from flightid.identification.withheld_intervals import without_intervals

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from flightid.conventions import Role
 from flightid.errors import StudyError, UnknownNameError
+from flightid.frozen import dataclass
 from flightid.record import Record
 
 DRIVES = re.compile(

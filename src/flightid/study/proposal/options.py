@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
+from flightid.frozen import dataclass
 from flightid.options import Options, option
 from flightid.record.options import ReadOptions
 from flightid.study.shape_options import ShapeOptions

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 from flightid.conventions import Role
 from flightid.errors import StudyError
+from flightid.frozen import dataclass
 from flightid.reading import parse_toml
 from flightid.record import Record
 from flightid.responses.coherent_pairs import MINIMUM_DECADES

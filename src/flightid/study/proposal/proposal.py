@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 from flightid.conventions import Light
 from flightid.errors import StudyError
 from flightid.files import write_atomically
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.inspection import Inspection
 from flightid.inspection.carried import carried_sentence
 from flightid.surface import spoken

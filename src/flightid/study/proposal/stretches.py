@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
+from flightid.frozen import dataclass
 from flightid.models.save import toml_value
 from flightid.record import Record
 from flightid.record.time_question import time_column

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from flightid.conventions import Light
 from flightid.errors import FitError, OptionError
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.identification.fit import Fit
 from flightid.identification.identify import identify
 from flightid.identification.prediction.predict import predict

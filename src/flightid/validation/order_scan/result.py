@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
 from flightid.conventions import Light
 from flightid.errors import OptionError
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.identification.fit import Fit
 from flightid.identification.prediction_error.information_criteria import Criteria
 from flightid.models.innovations.model import InnovationsModel

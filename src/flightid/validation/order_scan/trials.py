@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from flightid import _native
 from flightid.errors import DataError, FitError, OptionError
+from flightid.frozen import dataclass
 from flightid.identification.fit import Fit
 from flightid.identification.identify import identify
 from flightid.identification.narx.free_run_choice import LINEAR

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.frozen import dataclass
 from flightid.uncertainty.fitted_correlation import FittedCorrelation
 from flightid.uncertainty.foretold import (
     percent_of_output,

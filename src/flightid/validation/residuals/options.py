@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from flightid.frozen import dataclass
 from flightid.options import Options, option
 
 

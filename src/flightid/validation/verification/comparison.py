@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.conventions import Light
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.identification.prediction.weights import weighted_error
 from flightid.result import Result
 from flightid.table import Cell, Column, Table

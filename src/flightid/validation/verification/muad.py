@@ -6,14 +6,13 @@ phase. They are tightest between 1 and 4 rad/s, where pilots close their loops.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flightid.conventions import Light
 from flightid.errors import DataError, ModelError, OptionError
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 from flightid.models import model_of
 from flightid.responses import FrequencyResponse
 from flightid.result import Result

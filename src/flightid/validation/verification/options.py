@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from flightid.frozen import dataclass
 from flightid.identification.prediction.request import PredictionOptions
 from flightid.options import option
 from flightid.record.hold import HOLDS, InputHold

@@ -6,12 +6,13 @@ import bz2
 import io
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import field
 from sys import getsizeof
 from typing import IO, cast
 
 from flightid.errors import FileFormatError
 from flightid.extras import extra_module
+from flightid.frozen import dataclass
 from flightid.reading import require_memory
 
 LONGEST = 1 << 16

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from flightid.errors import FileFormatError
 from flightid.extras import extra_module
+from flightid.frozen import dataclass
 
 Definitions = Mapping[str, tuple["Field", ...]]
 SECTION = re.compile(r"^={3,}\s*$", re.MULTILINE)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from flightid.errors import FileFormatError
+from flightid.frozen import dataclass
 from flightid.record.formats.ros.definitions import Definitions, Field
 
 LETTERS = {
