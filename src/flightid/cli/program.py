@@ -57,6 +57,7 @@ NOT_VERBS = frozenset(
         "hints",
         "lists",
         "model_commands",
+        "next_comparison",
         "option_fields",
         "output",
         "pages",
