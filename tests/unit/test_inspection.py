@@ -71,6 +71,7 @@ def test_result_is_plain_values_text_and_tables(good: Inspection) -> None:
     span = f"from {good.start_s:.1f} to {good.start_s + good.duration_s:.1f} {head}"
     assert span in " ".join(text.split())
     assert "can support identification" in text
+    assert "injected sweep on roll" in " ".join(text.split())
     assert max(map(len, text.split("\n\n")[0].splitlines())) <= 100
     assert [table.title for table in good.tables()][1:3] == [
         "Usable band by axis",

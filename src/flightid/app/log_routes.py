@@ -67,6 +67,14 @@ def add_log_routes(app: FastAPI, backstage: Backstage) -> None:
         )
 
 
+def _folder_words(folder: Path) -> str:
+    """A folder as a shell names it: from the home, where it lies there."""
+    try:
+        return shown_name(Path("~") / folder.relative_to(Path.home()))
+    except (RuntimeError, ValueError):  # no home, or elsewhere
+        return shown_name(folder)
+
+
 def _listing(workspace: Workspace) -> Listing:
     logs = []
     for entry in workspace.index.entries():
@@ -93,5 +101,6 @@ def _listing(workspace: Workspace) -> Listing:
             )
         )
     left = [LeftOut(path=path, reason=why) for path, why in workspace.left_out.items()]
-    folder = shown_name(workspace.folder)
-    return Listing(folder=folder, version=VERSION, logs=logs, left_out=left)
+    return Listing(
+        folder=_folder_words(workspace.folder), version=VERSION, logs=logs, left_out=left
+    )

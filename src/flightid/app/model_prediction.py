@@ -99,7 +99,7 @@ def _curves(
 def _curve(record: str, output: str, found: Verification) -> PredictedCurve:
     measured, predicted = found.measured, found.predicted
     drawn = (measured[output], predicted[output])
-    time_s, *rows = _thinned(measured.time_s - measured.time_s[0], *drawn)
+    time_s, *rows = _thinned(measured.time_s, *drawn)
     return PredictedCurve(
         record=record,
         output=output,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import cast
 
 import numpy as np
@@ -26,8 +26,10 @@ from flightid.inspection.carried import carried_sentence
 from flightid.logs import Log
 from flightid.review import FlightReview
 from flightid.review.loop_response import LoopResponse
+from flightid.review.tables import cell
 from flightid.review.timeline import FlightTimeline, TimelineBlock
 from flightid.study.settings import Settings
+from flightid.uncertainty.estimate import Estimate, Reading
 
 AXES = ("roll", "pitch", "yaw")
 MOST_EVENTS = 500
@@ -139,7 +141,7 @@ def _card(
         coherence = None if band is None or band.coherence is None else band.coherence
         said = "" if coherence is None else f"mean coherence {coherence:.2f}"
         swept = [each for each in inspection.excitations if each.axis == axis]
-        told = "; ".join(dict.fromkeys(f"{each.kind}: {each.detail}" for each in swept))
+        told = "; ".join(dict.fromkeys(f"{each.words}: {each.detail}" for each in swept))
         return AxisCard(
             axis=axis,
             kind="model",
@@ -195,7 +197,7 @@ def _shows(block: TimelineBlock, code: str) -> bool:
 def step_curve(loop: LoopResponse) -> StepCurve:
     """A step of a loop as the page is told it."""
     low, high = loop.band()
-    known: Mapping[str, str] = {each.name: each.text for each in loop.readings}
+    known = {each.name: _reading(each) for each in loop.readings}
     return StepCurve(
         axis=loop.axis,
         loop=loop.loop,
@@ -205,6 +207,14 @@ def step_curve(loop: LoopResponse) -> StepCurve:
         high=high.tolist(),
         readings=[(CALLED.get(name, name), known[name]) for name in READINGS if name in known],
     )
+
+
+def _reading(reading: Reading | Estimate) -> str:
+    """A number of a step with its interval and unit, to three digits."""
+    said = cell(reading)
+    if said is None:
+        return reading.text
+    return said if reading.unit in ("", "1") else f"{said} {reading.unit}"
 
 
 def _events(log: Log) -> list[StripEvent]:

@@ -22,6 +22,7 @@ AUTOMATIC = {
 """Modes in which no stick moves the vehicle, besides those named AUTO_…, of all autopilots."""
 PLANE_AUTOMATIC = {"LOITER", "TAKEOFF", "QLAND", "QRTL", "THERMAL", "LOITER_ALT_QLAND"}
 """ArduPlane's own: a copter's LOITER is flown by stick."""
+WORDS = {"sid": "injected sweep", "steps": "steps", "flying": "plain flying", "hand": "by hand"}
 SWEEP_RATIO, SWEEP_CYCLES, SWEEP_ORDER = 3.0, 8, 0.9
 
 
@@ -49,6 +50,11 @@ class FoundExcitation:
     start_s: float
     stop_s: float
     detail: str
+
+    @property
+    def words(self) -> str:
+        """The kind as people say it."""
+        return WORDS.get(self.kind, self.kind)
 
     @property
     def is_injected(self) -> bool:

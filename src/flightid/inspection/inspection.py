@@ -222,7 +222,7 @@ class Inspection(Result, schema="flightid.inspection/1"):
             Column("stop", "s"),
             Column("detail"),
         )
-        rows = tuple((e.kind, e.axis, e.start_s, e.stop_s, e.detail) for e in self.excitations)
+        rows = tuple((e.words, e.axis, e.start_s, e.stop_s, e.detail) for e in self.excitations)
         return Table("Excitation found", columns, rows)
 
     def _saturations(self) -> Table:

@@ -80,7 +80,8 @@ def _flight(log: Log, found: Inspection) -> list[Finding]:
             Finding(
                 "tipped-over",
                 Light.AMBER,
-                f"{phases.fall} and stays tilted: everything after that is left out",
+                f"the vehicle falls over at {phases.tipped_s:.1f} s and stays tilted: everything "
+                "after that is left out",
                 "look for the cause of the fall before flying a manoeuvre",
             )
         )
@@ -187,7 +188,7 @@ def _excitation(log: Log, found: Inspection) -> list[Finding]:
         return []
     made = [e for e in found.excitations if not e.is_plain]
     if made:
-        text = "; ".join(f"{e.kind} on {e.axis} ({e.detail})" for e in made[:6])
+        text = "; ".join(f"{e.words} on {e.axis} ({e.detail})" for e in made[:6])
         return [Finding("excitation-found", Light.GREEN, f"excitation found: {text}")]
     axes = ", ".join(dict.fromkeys(e.axis for e in found.excitations))
     who = ", ".join(dict.fromkeys(e.detail.split(", ", 1)[1] for e in found.excitations))

@@ -174,7 +174,7 @@ def _measured(axis: str, pieces: list[Record], base: FlownAxis, loop: AxisLoop) 
         raise DataError("no span in the air holds command and rate", found=f"{command}, {rate}")
     limited = np.mean(np.abs(np.concatenate([piece[command] for piece in pieces])) >= FULL)
     if loop.output_unit == "1" and limited > MOST_AT_LIMIT:
-        raise DataError("the command was at its limit", found=f"{limited:.0%} of the time")
+        raise DataError("the command was at its limit", found=f"{100 * limited:.0f} % of the time")
     if angle not in pieces[0]:
         raise DataError("no set-point of attitude is logged", found=f"no {angle}")
     rate_hz = min(record.sample_rate_hz for record in pieces)
@@ -190,7 +190,8 @@ def _measured(axis: str, pieces: list[Record], base: FlownAxis, loop: AxisLoop) 
     if np.count_nonzero(sure) < FEWEST_POINTS:
         raise DataError(
             "the set-point moves the axis too little",
-            found=f"errors below {LARGEST_ERROR:.0%} in {np.mean(sure):.0%} of the band",
+            found=f"errors below {100 * LARGEST_ERROR:.0f} % in {100 * np.mean(sure):.0f} % of "
+            "the band",
         )
     omega, flown = response.omega_rad_s[sure], response.response[0, 0][sure]
     shape = _fitted(base, omega, flown, error[sure])
@@ -223,7 +224,8 @@ def _fitted(base: FlownAxis, omega: Array, flown: Complex, error: Array) -> Flow
             shape, left = led, closer
     if left > LARGEST_MISS:
         raise DataError(
-            "no gain, lag and delay go through what was flown", found=f"{left:.0%} away from it"
+            "no gain, lag and delay go through what was flown",
+            found=f"{100 * left:.0f} % away from it",
         )
     return shape
 

@@ -66,9 +66,10 @@ class LoopCheck:
         )
         flown = f"its closed loop in this flight, {hertz} Hz"
         if self.holds:
-            said = f"{axis}: expected within {self.miss:.0%} of {flown}"
+            said = f"{axis}: expected within {_percent(self.miss)} of {flown}"
             return Finding("loop-as-flown", Light.GREEN, said)
-        apart = f"{self.miss:.0%} ({self.least:.0%} to {self.most:.0%}) away from {flown}"
+        ends = f"{_percent(self.least)} to {_percent(self.most)}"
+        apart = f"{_percent(self.miss)} ({ends}) away from {flown}"
         if self.is_missed:
             said = f"{axis}: what the plan expects is {apart}"
             return Finding(MISSED, Light.AMBER, said, CAREFULLY)
@@ -76,9 +77,13 @@ class LoopCheck:
             "loop-untold",
             Light.UNKNOWN,
             f"{axis}: what the plan expects is {apart}: whether it holds to "
-            f"{math.expm1(LARGEST_MISS):.0%} is not told",
+            f"{_percent(math.expm1(LARGEST_MISS))} is not told",
             f"fly a minute with brisker sticks about {axis} and plan from that log, or {CAREFULLY}",
         )
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.0f} %"
 
 
 def check_loop(

@@ -126,10 +126,10 @@ class SweepPlan(Result, schema="flightid.sweep_plan/1"):
 
     @property
     def verdict(self) -> str:
-        """``"no-go"``; ``"not held"`` where the flight missed an expected loop; or ``"go"``."""
+        """``"no-go"``; ``"begin small"`` where the flight missed an expected loop; or ``"go"``."""
         if not self.is_go:
             return "no-go"
-        return "not held" if any(f.code == MISSED for f in self.findings) else "go"
+        return "begin small" if any(f.code == MISSED for f in self.findings) else "go"
 
     def summary(self) -> Table:
         """A line for each axis: what to fly."""

@@ -38,6 +38,7 @@ PENALTY = 50.0
 LARGEST_TD_S, TIME_SCALE_S = 0.5, 0.1
 TINY_GAIN = 1e-9
 INTEGRAL = "ratio of I to P"
+IN_WORDS = {"A": "the angle's P"}
 EDGE = 0.02
 """Slack below which a requirement binds."""
 
@@ -386,11 +387,10 @@ def _report(problem: LoopProblem, gains: Array) -> GainSearchResult:
     exists = bool(min(least.values()) >= 0.0)
     edge = EDGE if exists else 0.0
     binding = tuple(name for name, slack in least.items() if slack < edge + 2 * HEADROOM)
+    placed = zip(problem.kinds, gains, problem.low, problem.high, strict=True)
     at_range = tuple(
-        f"range of {kind}"
-        for kind, value, low, high in zip(
-            problem.kinds, gains, problem.low, problem.high, strict=True
-        )
+        f"range of {IN_WORDS.get(kind, kind)}"
+        for kind, value, low, high in placed
         if value >= high * (1.0 - 1e-3) or (kind == "P" and value <= low * (1.0 + 1e-3))
     )
     slack = {name: float(each) for name, each in least.items()}
