@@ -12,6 +12,7 @@ import shutil
 import threading
 import tomllib
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
@@ -87,6 +88,13 @@ class Desk:
 def desk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Desk]:
     if missing := _missing():
         pytest.fail(missing) if REQUIRED else pytest.skip(missing)
+    with opened_desk(tmp_path_factory.mktemp("workspace")) as made:
+        yield made
+
+
+@contextmanager
+def opened_desk(folder: Path) -> Iterator[Desk]:
+    """A browser before the page on a folder, with the cookie of its first visit."""
     from playwright.sync_api import sync_playwright
 
     from flightid.app.guard import Session
@@ -94,7 +102,7 @@ def desk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Desk]:
     from flightid.app.serving import bound_socket, server_of
     from flightid.app.workspace import Workspace
 
-    folder = tmp_path_factory.mktemp("workspace")
+    folder.mkdir(exist_ok=True)
     bound = bound_socket(0)
     session = Session(bound.getsockname()[1])
     server = server_of(Workspace(folder), page_files(), session)
@@ -128,6 +136,21 @@ def _findings(page: Any) -> list[str]:
     return found
 
 
+def zoomed_by_keys(chart: Any, whole: Any) -> None:
+    """Plus, minus, an arrow and 0 on a chart over time, values by Shift; the whole by a button."""
+    for back in ("-", "0"):
+        chart.press("+")
+        chart.press("ArrowLeft")
+        whole.wait_for()
+        chart.press(back)
+        whole.wait_for(state="detached")
+    chart.press("Shift+ArrowRight")
+    chart.get_by_role("status").filter(has_text=" s: ").wait_for()
+    chart.press("+")
+    whole.click()
+    whole.wait_for(state="detached")
+
+
 def test_from_a_dropped_log_to_a_dragged_band(desk: Desk, tmp_path: Path) -> None:
     window = desk.open()
     page = window.page
@@ -143,6 +166,9 @@ def test_from_a_dropped_log_to_a_dragged_band(desk: Desk, tmp_path: Path) -> Non
     page.fill("#field", "imu gyrx")
     page.press("#field", "Enter")
     page.wait_for_selector("section[aria-label='Plot of IMU.GyrX'] canvas")
+    # By keyboard what a drag does by mouse, and the values at the cursor.
+    chart = page.locator("[role=application][aria-label^='IMU.GyrX over time']")
+    zoomed_by_keys(chart, page.locator(".plots").get_by_role("button", name="Whole flight"))
     said += _findings(page)
     # A span is typed; the model is fitted on it; the change is taken back.
     before = desk.study

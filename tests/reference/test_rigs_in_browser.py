@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 
 import flightid as fid
-from tests.reference.test_app_in_browser import Desk, _findings, desk
+from tests.reference.test_app_in_browser import Desk, _findings, desk, zoomed_by_keys
 
 __all__ = ["desk"]
 
 
-def _write(folder: Path) -> list[Path]:
+def rig_tables(folder: Path) -> list[Path]:
     """Two manoeuvres of a sampled second-order rig with an outlier, in volts and radians."""
     made = []
     for place, (name, n) in enumerate((("prbs", 700), ("steps", 260))):
@@ -41,13 +41,16 @@ def test_from_dropped_tables_to_a_report(desk: Desk, tmp_path: Path) -> None:
     window = desk.open()
     page = window.page
     page.wait_for_selector(".empty")
-    page.set_input_files("input[type=file]", _write(tmp_path))
+    page.set_input_files("input[type=file]", rig_tables(tmp_path))
     page.locator("select[aria-label='Role of drive']").wait_for()
     page.select_option("select[aria-label='Role of drive']", "input")
     page.select_option("select[aria-label='Role of swing']", "output")
     page.locator(".uplot canvas").nth(1).wait_for()
     page.select_option("#place", label="steps.csv: steps")
     page.locator(".fault", has_text="swing").first.wait_for()
+    for name in ("drive", "swing"):
+        chart = page.locator(f"[role=application][aria-label^='{name} of steps over time']")
+        zoomed_by_keys(chart, page.get_by_role("button", name="Whole", exact=True))
     page.click("text=Write the study")
     page.locator("#content .box").wait_for()
     rig = page.url.rpartition("/")[2]

@@ -45,5 +45,7 @@ export const axis = (more: uPlot.Axis = {}): uPlot.Axis => ({
 export const plotted = (row: Float64Array): (number | null | undefined)[] =>
   Array.from(row, (each) => (Number.isNaN(each) ? null : each === Infinity ? undefined : each));
 
+/** A unit as people write it; nothing where there is none. */
+export const unitOf = (unit: string) => (unit === "1" ? "" : unit.replaceAll("^2", "²").replaceAll("^3", "³"));
 export const three = (value: number) => String(Number(value.toPrecision(3)));
 export const seconds = (value: number) => `${Number(value.toFixed(1))} s`;
