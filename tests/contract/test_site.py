@@ -116,6 +116,17 @@ def test_the_gallery_can_be_drawn_again() -> None:
         assert 0 < (DOCS / "pictures" / shot.picture).stat().st_size <= MAXIMUM_BYTES
 
 
+def test_every_screen_of_the_page_has_its_picture() -> None:
+    """`tools/app_pictures.py` takes them."""
+    listed = (ROOT / "app" / "src" / "lib" / "screens.ts").read_text(encoding="utf-8")
+    names = re.findall(r'\{ name: "(\w+)", title:', listed)
+    text = (DOCS / "app.md").read_text(encoding="utf-8")
+    assert len(names) > 10
+    for name in names:
+        assert f"](pictures/app-{name}.png)" in text
+        assert 0 < (DOCS / "pictures" / f"app-{name}.png").stat().st_size <= MAXIMUM_BYTES
+
+
 @pytest.mark.slow
 def test_the_site_builds_without_a_warning_and_loads_nothing_from_afar(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(tmp_path)]

@@ -26,7 +26,8 @@ REACHED = """() => { window.reached = new Set();
   document.addEventListener("focusin", (event) => window.reached.add(event.target)); }"""
 AT_THE_END = "document.activeElement === document.body"
 LEFT = """() => {
-  const can = "a[href], button, input, select, summary, textarea, [role=slider], [role=button]";
+  const roles = ["slider", "button", "application"].map((each) => `[role=${each}]`);
+  const can = ["a[href], button, input, select, summary, textarea", ...roles].join(", ");
   const seen = (each) =>
     each.checkVisibility({ visibilityProperty: true }) && each.getClientRects().length;
   const told = (each) =>
@@ -56,7 +57,7 @@ def _flown(folder: Path, name: str, gains: Path | None = None) -> Path:
     return write_ardupilot_log(flight, folder / name)
 
 
-def _looked_at(page: Any) -> list[str]:
+def looked_at(page: Any) -> list[str]:
     """What is wrong with a screen: findings of axe, controls out of reach, a phone too narrow."""
     said = _findings(page)
     page.evaluate(REACHED)
@@ -110,7 +111,7 @@ def test_from_a_dropped_log_to_gains_and_the_flight_with_them(desk: Desk, tmp_pa
     page.wait_for_selector(".cards")
     page.locator(".sweep").first.press("Enter")
     page.get_by_role("button", name="fit Roll rate").wait_for()
-    said = _looked_at(page)
+    said = looked_at(page)
     _opened(page, "Gains")
     page.get_by_role("button", name="Download step 1").wait_for()
     step = _saved(page, "Download step 1 of 2", tmp_path)
@@ -118,7 +119,7 @@ def test_from_a_dropped_log_to_gains_and_the_flight_with_them(desk: Desk, tmp_pa
     assert set(old) == set(new)
     assert old["ATC_RAT_RLL_P"] == pytest.approx(0.09)
     assert new["ATC_RAT_RLL_P"] > 1.1 * old["ATC_RAT_RLL_P"]
-    said += _looked_at(page)
+    said += looked_at(page)
     # At the end of its slider: red, and nothing to download on the page or behind it.
     slider = page.locator("input[type=range]").first
     name = str(slider.get_attribute("id")).removeprefix("slider-")
@@ -148,7 +149,7 @@ def _compared(page: Any, second: Path, folder: Path) -> list[str]:
     page.locator("section[aria-label=Verdict]").wait_for()
     assert page.locator("section[aria-label=Numbers] tbody tr").count() >= 4
     assert "ATC_RAT_RLL_P" in _saved(page, "Download the way back", folder).read_text("utf-8")
-    said = _looked_at(page)
+    said = looked_at(page)
     page.get_by_role("button", name="how it flew").press("Enter")
     page.get_by_text("before (95 %)").wait_for()
     return said + _findings(page)
@@ -162,7 +163,7 @@ def _planned(page: Any) -> list[str]:
     page.fill("#amplitude", "0.05")
     page.press("#amplitude", "Tab")
     amplitude.filter(has_text="0.05 of full").first.wait_for()
-    said = _looked_at(page)
+    said = looked_at(page)
     with page.expect_popup() as told:
         page.get_by_role("link", name="The card to print").press("Enter")
     told.value.wait_for_load_state()
@@ -199,7 +200,7 @@ def test_from_a_cell_of_a_model_to_its_report(desk: Desk, tmp_path: Path) -> Non
     own = page.get_by_label("Model file", exact=True)
     own.fill(own.input_value().replace('unit = "s"', 'unit = "m"'))
     page.locator("#own-said .error", has_text="Line").wait_for()
-    said = _looked_at(page)
+    said = looked_at(page)
     page.get_by_role("button", name="Undo").press("Enter")
     page.locator("pre", has_text=f"{name} = {{").wait_for(state="detached")
     page.get_by_role("button", name="Fit and verify").press("Enter")
@@ -211,10 +212,10 @@ def test_from_a_cell_of_a_model_to_its_report(desk: Desk, tmp_path: Path) -> Non
     for k in range(parts.count()):
         parts.nth(k).press("Enter")
         page.locator("main figure .js-plotly-plot, main table").first.wait_for()
-        said += _looked_at(page) if k == 0 else _findings(page)
+        said += looked_at(page) if k == 0 else _findings(page)
     _opened(page, "Report")
     page.get_by_role("link", name="Open the report").wait_for()
-    said += _looked_at(page)
+    said += looked_at(page)
     packed = zipfile.ZipFile(_saved(page, "Everything as one zip", tmp_path))
     assert f"studies/{log}.toml" in packed.namelist()
     assert any(each.endswith("report.html") for each in packed.namelist())
