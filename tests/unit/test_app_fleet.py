@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import asyncio
 import multiprocessing
 import os
 from pathlib import Path
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 import pytest
@@ -16,8 +17,9 @@ pytest.importorskip("duckdb", reason="the extra fleet is not installed")
 
 import flightid as fid
 from flightid.app import fleet_routes, fleet_work
-from flightid.app.fleet_schemas import FleetPart, FleetRunPart
+from flightid.app.fleet_schemas import FleetHappening, FleetPart, FleetRunPart, FleetScreen
 from flightid.app.fleets import checked_fleet, fleet_of, known_fleets, log_folders
+from flightid.app.server import make_server
 from flightid.app.workspace import Workspace
 from flightid.errors import OptionError, StudyError
 from tests.closeness import assert_close
@@ -123,6 +125,50 @@ def test_a_fleet_that_leads_out_of_the_workspace_is_refused(tmp_path: Path) -> N
             with pytest.raises(OptionError, match="outside the folder"):
                 checked_fleet(workspace, place)
     assert fleet_of(workspace, "../../etc/passwd") is None
+
+
+def test_a_folder_that_a_fleet_names_is_not_proposed_again(tmp_path: Path) -> None:
+    (tmp_path / "day").mkdir()
+    for number in range(3):
+        (tmp_path / "day" / f"V{number}.bin").write_bytes(b"no log" + bytes([number]))
+    SweepFlight(sweep_s=2.0, rate_hz=50.0).write(tmp_path / "day")
+    workspace = Workspace(tmp_path)
+    workspace.scan()
+    # What a run finds is counted, not what can be read: it said 1 of these 4 logs.
+    assert log_folders(workspace) == {"day": 4}
+    fleet = tmp_path / "season.toml"
+    for logs, is_named in (("day/V0.bin", False), (".", True), ("day", True), ("d*/*.bin", True)):
+        fleet.write_text(f'[fleet]\ntitle = "t"\nlogs = ["{logs}"]\n')
+        assert (log_folders(workspace) == {}) == is_named, logs
+
+
+def test_an_event_is_added_to_the_fleet_file_and_asked_about(tmp_path: Path) -> None:
+    path = write_fleet(tmp_path, flights=16)
+    path.write_text(path.read_text().rstrip("\n") + "  # kept")
+    workspace = Workspace(tmp_path)
+    (place,) = known_fleets(workspace)
+    routes = make_server(workspace, {}).routes
+    happened: Any = next(e for e in routes if getattr(e, "path", "").endswith("/events"))
+    said = 'new "blades" \N{DEGREE SIGN}'
+
+    def add(**told: str) -> FleetScreen:
+        screen: FleetScreen = asyncio.run(happened.endpoint(place.id, FleetHappening(**told)))
+        return screen
+
+    told = add(date="2026-02-01", what=said, vehicle="v00")
+    assert [(e.what, e.vehicle) for e in told.events] == [(said, "v00"), ("new motor", "v02")]
+    assert "# kept" in told.text
+    *_, events = FleetPart(**fleet_work.answer_fleet(path)).types[0].tables
+    assert (said, "v00") in {(row[0], row[1]) for row in events.rows}
+    kept = path.read_bytes()
+    with pytest.raises(StudyError, match="already"):
+        add(date="2026-02-01", what=said, vehicle="v00")
+    with pytest.raises(StudyError, match="no meaning"):
+        add(date="some day", what="x")
+    with pytest.raises(ValueError, match="at least 1"):
+        add(date="2026-02-01", what="")
+    assert path.read_bytes() == kept
+    assert not [each for each in tmp_path.iterdir() if each.name.startswith(".f")]
 
 
 def test_a_folder_of_logs_becomes_a_fleet_that_a_worker_runs(tmp_path: Path) -> None:

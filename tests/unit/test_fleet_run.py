@@ -369,3 +369,45 @@ def test_a_run_in_which_all_fails_says_so(fleet: Path, monkeypatch: pytest.Monke
     monkeypatch.setattr("flightid.fleet.run.run_plain", dead)
     done = run_fleet(fleet)
     assert [each.code for each in done.findings if each.light == "red"] == ["all-failed"]
+
+
+def _claimed(monkeypatch: pytest.MonkeyPatch, folder: Path, name: str) -> tuple[Any, LogAddress]:
+    """A fleet of three logs of which another run, on another machine, is at one."""
+    (folder / "fleet.toml").write_text("[fleet]\ntitle = 't'\nlogs = ['.']\n")
+    for number in range(3):
+        (folder / f"{number}.bin").write_bytes(b"no log %d" % number)
+    monkeypatch.setattr("flightid.fleet.run.find_spec", lambda _: None)
+    store = current_store(read_fleet(folder / "fleet.toml"))
+    address = next(e for e in find_logs([str(folder)]) if e.name == name)
+    told = b'{"run": "other", "host": "far away", "pid": 1, "n": 1}'
+    store.write(f"claims/{address.digest}.json", told)
+    return store, address
+
+
+def test_a_log_that_another_run_takes_is_left_to_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store, address = _claimed(monkeypatch, tmp_path, "1.bin")
+    task = LogTask(read_fleet(tmp_path / "fleet.toml"))
+
+    def meanwhile(_: float) -> None:  # The other run is done with it.
+        made = run_one(address, task)
+        assert made is not None
+        write_loose(store, made)
+        store.remove(f"claims/{address.digest}.json")
+
+    monkeypatch.setattr("flightid.fleet.run.sleep", meanwhile)
+    done = run_fleet(tmp_path / "fleet.toml", workers=1)
+    assert (done.found, done.kept, done.outcomes) == (3, 1, {"refused": 2})
+    assert fleet_status(tmp_path / "fleet.toml").outcomes == {"refused": 3}
+    assert not list(store.names("claims")), "a run leaves no claim behind"
+
+
+def test_a_log_whose_run_is_gone_is_taken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    _claimed(monkeypatch, tmp_path, "1.bin")
+    waited = list[float]()
+    monkeypatch.setattr("flightid.fleet.run.sleep", waited.append)
+    monkeypatch.setattr("flightid.fleet.engine.claims.STALE_S", 0.0)
+    done = run_fleet(tmp_path / "fleet.toml", workers=1)
+    assert (done.found, done.kept, done.outcomes) == (3, 0, {"refused": 3})
+    assert waited

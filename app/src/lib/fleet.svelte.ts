@@ -1,6 +1,6 @@
 import * as api from "./api";
 import { live } from "./live.svelte";
-import type { FleetListing, FleetPart, FleetDraft, FleetRows, FleetScreen, FleetVehiclePart } from "./types";
+import type { FleetHappening, FleetListing, FleetPart, FleetDraft, FleetRows, FleetScreen, FleetVehiclePart } from "./types";
 
 export const fleets = () => api.json<FleetListing>("/api/fleets");
 export const propose = (folder: string) => api.json<FleetDraft>("/api/fleets", api.sent("POST", { folder }));
@@ -55,9 +55,19 @@ export class Fleet {
     await this.#try(async () => { this.screen = await api.json<FleetScreen>(`/api/fleets/${this.id}/run`, api.sent("POST", {})); });
   }
 
-  async look(name: string) {
+  /** Write an event into the fleet file, and ask anew; whether it stands there. */
+  async happened(event: FleetHappening) {
+    await this.#try(async () => { this.screen = await api.json<FleetScreen>(`/api/fleets/${this.id}/events`, api.sent("POST", event)); });
+    if (this.error) return false;
+    const shown = this.vehicle?.name ?? "";
+    await this.answer();
+    if (shown) await this.look(shown, true);
+    return true;
+  }
+
+  async look(name: string, again = false) {
     if (this.vehicle?.name !== name) this.vehicle = null;
-    if (name) await this.#try(async () => { this.vehicle = await api.json<FleetVehiclePart>(`/api/fleets/${this.id}/vehicle?name=${encodeURIComponent(name)}`); });
+    if (name || again) await this.#try(async () => { this.vehicle = await api.json<FleetVehiclePart>(`/api/fleets/${this.id}/vehicle?name=${encodeURIComponent(name)}`); });
   }
 
   async #try(work: () => Promise<void>) {

@@ -115,6 +115,13 @@ export interface FleetFlight {
   here: string | null;
 }
 
+/** Something that was done to a vehicle, or to all (null). */
+export interface FleetHappening {
+  date: string;
+  what: string;
+  vehicle: string | null;
+}
+
 /** A parameter of a vehicle over time, with the level behind it and when it changed. */
 export interface FleetHistory {
   vehicle: string;
@@ -186,6 +193,7 @@ export interface FleetRunPart {
 export interface FleetScreen {
   fleet: FleetItem;
   text: string;
+  events: FleetHappening[];
   outcomes: Record<string, number>;
   found: number | null;
   words: string;

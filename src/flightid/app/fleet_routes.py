@@ -12,6 +12,7 @@ from flightid.app import fleet_work
 from flightid.app.backstage import Backstage, made
 from flightid.app.fleet_schemas import (
     FleetDraft,
+    FleetHappening,
     FleetItem,
     FleetListing,
     FleetPart,
@@ -36,7 +37,9 @@ from flightid.app.own_folders import read_plain
 from flightid.app.workspace import Workspace
 from flightid.errors import FlightidError
 from flightid.fleet import fleet_status
+from flightid.fleet.event_entry import add_event
 from flightid.fleet.opening import has_catalogue
+from flightid.fleet.settings import EventSettings, FleetSettings
 
 
 def add_fleet_routes(app: FastAPI, backstage: Backstage) -> None:
@@ -93,6 +96,15 @@ def add_fleet_routes(app: FastAPI, backstage: Backstage) -> None:
             raise HTTPException(422, refusal)
         return FleetRows(**told, seconds=seconds)
 
+    @app.post("/api/fleets/{fleet}/events")
+    async def happened(fleet: str, asked: FleetHappening) -> FleetScreen:
+        place = await sound(fleet)
+        if not place.is_file:
+            raise HTTPException(422, "A catalogue alone has no events; its fleet file has.")
+        event = EventSettings(asked.date, asked.what, asked.vehicle)
+        await asyncio.to_thread(add_event, place.path, event)
+        return await screen(fleet)
+
     @app.post("/api/fleets/{fleet}/run")
     async def run(fleet: str) -> FleetScreen:
         place = await sound(fleet)
@@ -138,9 +150,10 @@ def _item(place: FleetPlace) -> FleetItem:
 def _screen(backstage: Backstage, place: FleetPlace) -> FleetScreen:
     workspace = backstage.workspace
     outcomes: dict[str, int] = {}
-    found, words = None, ""
+    found, words, events = None, "", list[FleetHappening]()
     try:
         settings = checked_fleet(workspace, place)
+        events = _events(settings)
         # A fleet that was never run has nothing to count, which is no fault.
         if settings is None or has_catalogue(settings.catalogue):
             status = fleet_status(place.path)
@@ -151,12 +164,22 @@ def _screen(backstage: Backstage, place: FleetPlace) -> FleetScreen:
     return FleetScreen(
         fleet=_item(place),
         text=_text(place.path) if place.is_file else "",
+        events=events,
         outcomes=outcomes,
         found=found,
         words=words,
         run=part if isinstance(part, FleetRunPart) else None,
         jobs=[job for job in backstage.workers.of_log(place.id) if job.kind == "fleet"],
     )
+
+
+def _events(settings: FleetSettings | None) -> list[FleetHappening]:
+    """What was done, the newest first."""
+    found = sorted(() if settings is None else settings.events, key=lambda each: each.instant)
+    return [
+        FleetHappening.model_construct(date=each.date, what=each.what, vehicle=each.vehicle)
+        for each in reversed(found)
+    ]
 
 
 def _text(path: Path) -> str:

@@ -81,6 +81,14 @@ class FleetHistory(Message):
     logs: list[str]
 
 
+class FleetHappening(Message):
+    """Something that was done to a vehicle, or to all (null)."""
+
+    date: str = Field(min_length=4, max_length=40)
+    what: str = Field(min_length=1, max_length=200)
+    vehicle: str | None = Field(default=None, max_length=300)
+
+
 class FleetVehicle(Message):
     """A vehicle with its light."""
 
@@ -127,6 +135,7 @@ class FleetScreen(Message):
 
     fleet: FleetItem
     text: str
+    events: list[FleetHappening]
     outcomes: dict[str, int]
     found: int | None
     words: str

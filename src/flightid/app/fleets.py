@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections import Counter
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path, PurePosixPath
@@ -13,6 +12,7 @@ from flightid.app.own_folders import is_link, read_plain
 from flightid.app.workspace import ID, Workspace
 from flightid.errors import FlightidError, OptionError
 from flightid.fleet import read_fleet
+from flightid.fleet.addresses import find_logs
 from flightid.fleet.engine.order import study_files
 from flightid.fleet.settings import FleetSettings
 from flightid.frozen import dataclass
@@ -104,17 +104,36 @@ def checked_fleet(workspace: Workspace, place: FleetPlace) -> FleetSettings | No
 
 
 def log_folders(workspace: Workspace) -> dict[str, int]:
-    """Folders right below the workspace with logs enough for a fleet, and no fleet file yet."""
-    tops = Counter(
+    """Folders right below the workspace with logs enough for a fleet, which no fleet file names.
+
+    Logs are counted as a fleet file of the folder would find them.
+    """
+    tops = {
         PurePosixPath(each.path).parts[0]
         for each in workspace.index.entries()
         if len(PurePosixPath(each.path).parts) > 1
-    )
-    return {
-        name: number
-        for name, number in sorted(tops.items())
-        if number >= FEWEST_LOGS and not (workspace.folder / f"{name}-fleet.toml").exists()
     }
+    if not tops:
+        return {}
+    named = _named_logs(workspace)
+    found = dict[str, int]()
+    for name in sorted(tops):
+        logs = {each.address for each in find_logs([str(workspace.folder / name)])}
+        if len(logs - named) >= FEWEST_LOGS:
+            found[name] = len(logs)
+    return found
+
+
+def _named_logs(workspace: Workspace) -> set[str]:
+    """Addresses of all logs that fleet files of the workspace name."""
+    found = set[str]()
+    for place in known_fleets(workspace):
+        with suppress(FlightidError, OSError, RuntimeError):
+            settings = checked_fleet(workspace, place)
+            if settings is not None:
+                logs = find_logs([settings.place(each) for each in settings.words.logs])
+                found |= {each.address for each in logs}
+    return found
 
 
 def _candidates(folder: Path, deep: int) -> Iterator[Path]:

@@ -234,17 +234,18 @@ def _slopes(drift: FleetDrift, labels: Mapping[str, str]) -> Table:
 
 
 def events_table(drift: FleetDrift, labels: Mapping[str, str]) -> Table:
-    """What was done, and by how much each parameter stepped then."""
+    """What was done, and by how much each parameter stepped then, the least likely first."""
     rows: list[tuple[Cell, ...]] = []
-    for history in drift.histories:
-        for each in history.events:
-            low, high = each.percent.interval(shown()) or (None, None)
-            event = each.event.what
-            value, reason = each.percent.value, each.percent.reason or None
-            name = labels.get(history.name, history.name)
-            rows.append(
-                (event, history.vehicle, name, value, low, high, chance_cell(each.chance), reason)
-            )
+    happened = [(e, history) for history in drift.histories for e in history.events]
+    happened.sort(key=lambda pair: 2.0 if pair[0].chance is None else pair[0].chance)
+    for each, history in happened[:NAMED]:
+        low, high = each.percent.interval(shown()) or (None, None)
+        event = each.event.what
+        value, reason = each.percent.value, each.percent.reason or None
+        name = labels.get(history.name, history.name)
+        rows.append(
+            (event, history.vehicle, name, value, low, high, chance_cell(each.chance), reason)
+        )
     words = interval_words(shown())
     columns = (
         *(Column("event"), Column("vehicle"), Column("parameter")),
@@ -255,7 +256,9 @@ def events_table(drift: FleetDrift, labels: Mapping[str, str]) -> Table:
         ),
         *(Column("chance without", digits=2), Column("note")),
     )
-    return Table("Events", columns, tuple(rows)).without_empty_columns()
+    left = len(happened) - len(rows)
+    notes = (f"The least likely first; {left} more are not shown.",) if left else ()
+    return Table("Events", columns, tuple(rows), notes).without_empty_columns()
 
 
 def _refused(logs: Sequence[Row]) -> Iterator[Block]:

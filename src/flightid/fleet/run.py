@@ -3,35 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import fields, replace
+from dataclasses import replace
 from importlib.util import find_spec
 from multiprocessing import current_process
 from pathlib import Path
+from time import sleep
 
 from flightid.conventions import Light
 from flightid.errors import DataError, OptionError
 from flightid.findings import Finding, counted
 from flightid.fleet.addresses import LogAddress, find_logs
-from flightid.fleet.catalogue.compaction import (
-    compact,
-    merge,
-    read_columns,
-    rewrite,
-    set_aside,
-    text_of,
-)
-from flightid.fleet.catalogue.loose import (
-    BROKEN,
-    loose_logs,
-    loose_name,
-    read_loose,
-    write_loose,
-)
-from flightid.fleet.catalogue.parts import KnownLogs, read_parts
+from flightid.fleet.catalogue.compaction import compact, merge, set_aside
+from flightid.fleet.catalogue.loose import loose_logs, read_loose, write_loose
+from flightid.fleet.catalogue.parts import read_parts
 from flightid.fleet.catalogue.schema import FAILED, FITTED
 from flightid.fleet.catalogue.store import Store
+from flightid.fleet.engine.claims import ClaimWatch, can_claim, new_claimant
 from flightid.fleet.engine.cluster import require_address, run_cluster, scheduler_finding
 from flightid.fleet.engine.order import (
+    CLAIMED,
     KILLED,
     KNOWN,
     STORAGE,
@@ -43,6 +33,7 @@ from flightid.fleet.engine.order import (
 )
 from flightid.fleet.engine.plain import run_plain
 from flightid.fleet.identity import FleetTables, identify_log, read_tables
+from flightid.fleet.missing import forget, missing_logs
 from flightid.fleet.opening import current_store
 from flightid.fleet.reasons import RefusalReason
 from flightid.fleet.refusal import ACTIONS
@@ -66,7 +57,7 @@ class FleetRun(Result, schema="flightid.fleet_run/1"):
     found : int
         Logs at the places of the fleet file.
     kept : int
-        Of these, in the catalogue before.
+        Of these, in the catalogue before, or taken by another run at the same time.
     outcomes : mapping of str to int
         Those that were taken, by outcome.
     findings : tuple of Finding
@@ -155,11 +146,13 @@ def _run(path: str | Path, workers: int | None, scheduler: str | None, *, retry:
     if scheduler is not None:
         require_address(scheduler)
     store = current_store(settings)
-    order = run_order(settings, tables, store.root)
+    claims = can_claim(store)
+    claimant = new_claimant() if claims else ""
+    order = replace(run_order(settings, tables, store.root), claimant=claimant)
     aside = set_aside(store)
     addresses = find_logs([settings.place(place) for place in settings.words.logs])
-    missing, earlier = _missing(store, addresses, tables, retry=retry)
-    findings = list(_findings(scheduler, addresses))
+    missing, earlier = missing_logs(store, addresses, tables, retry=retry)
+    findings = [*_findings(scheduler, addresses), *([] if claims else [UNCLAIMED])]
     replaced, taken = set[str](), TakenContents()
     run = _Run(settings, tables, store, order, workers, scheduler)
     with progress(len(missing), settings.path.stem) as advance:
@@ -168,7 +161,7 @@ def _run(path: str | Path, workers: int | None, scheduler: str | None, *, retry:
             replaced |= earlier.get(outcome.order.address.address, set())
             advance()
     replaced -= taken.outcomes.keys()
-    _forget(store, replaced)
+    forget(store, replaced)
     run.tidy(1)
     counts = taken.counts()
     kept = len(addresses) - len(missing) + counts.pop(KNOWN, 0)
@@ -185,82 +178,6 @@ def _run(path: str | Path, workers: int | None, scheduler: str | None, *, retry:
     return FleetRun(
         settings.catalogue, len(addresses), kept, counts, tuple(findings), taken.reasons()
     )
-
-
-@dataclass(frozen=True)
-class LogEntry:
-    """What tells whether a record still stands for its log.
-
-    Attributes
-    ----------
-    log, address, stamp, bytes, outcome, reason, id, told : str
-        Columns of the table of logs, numbers as text; empty for null.
-    """
-
-    log: str
-    address: str
-    stamp: str
-    bytes: str
-    outcome: str
-    reason: str
-    id: str
-    told: str
-
-
-def _missing(
-    store: Store, addresses: list[LogAddress], tables: FleetTables, *, retry: bool
-) -> tuple[list[LogAddress], dict[str, set[str]]]:
-    """Logs that no record stands for, by address, size and stamp alone: nothing is read for it.
-
-    Beside them the records that stand at each address for what lay there before. Records of which
-    the tables of vehicles and flights say something else by now are forgotten, and so are broken
-    ones, those that another of the same address has replaced and, where that is asked, those that
-    failed.
-    """
-    there = {each.address: each for each in addresses}
-    done, again, earlier = set[str](), set[str](), dict[str, set[str]]()
-    for entry in _entries(store):
-        is_stale = entry.told != tables.told(entry.id or None, entry.address)
-        if entry.reason == BROKEN or is_stale or (retry and entry.outcome == FAILED):
-            again.add(entry.log)
-        elif entry.address in there:
-            if _stands_for(entry, there[entry.address]):
-                done.add(entry.address)
-            else:
-                earlier.setdefault(entry.address, set()).add(entry.log)
-    for address in done:
-        again |= earlier.pop(address, set())
-    _forget(store, again)
-    return [each for each in addresses if each.address not in done], earlier
-
-
-def _stands_for(entry: LogEntry, address: LogAddress) -> bool:
-    """Whether a log is still the one that was taken; stores of objects tell that by the stamp."""
-    is_as_long = address.local is None or entry.bytes == str(address.n_bytes)
-    return entry.stamp == address.stamp and is_as_long
-
-
-def _entries(store: Store) -> Iterator[LogEntry]:
-    """Of every record."""
-    names = [each.name for each in fields(LogEntry)]
-    parts, _ = read_parts(store)
-    if parts:
-        yield from (LogEntry(*row) for row in read_columns(store, parts, "logs", names))
-    for record in read_loose(store, loose_logs(store)):
-        entry = record.rows["logs"][0]
-        yield LogEntry(*map(text_of, (entry.get(name) for name in names)))
-
-
-def _forget(store: Store, logs: set[str]) -> None:
-    """Take logs out of the catalogue."""
-    for log in logs:
-        store.remove(loose_name(log))
-    if not logs:
-        return
-    for part in read_parts(store)[0]:
-        known = KnownLogs(store, [part])
-        if any(map(known.in_parts, logs)):
-            rewrite(store, [part], frozenset(logs))
 
 
 def _findings(scheduler: str | None, addresses: list[LogAddress]) -> Iterator[Finding]:
@@ -303,6 +220,16 @@ def _no_space(found: str) -> DataError:
     )
 
 
+UNCLAIMED = Finding(
+    "no-claims",
+    Light.GREEN,
+    "the catalogue's place keeps no two runs off one log: at the same time they take logs twice",
+    "give runs at the same time a part of the addresses each",
+)
+POLL_S = 1.0
+"""Time between looks at logs that other runs hold."""
+
+
 class _Run:
     """One run: its engine, its second tries, its compactions."""
 
@@ -320,16 +247,44 @@ class _Run:
         self.written = 0
 
     def outcomes(self, logs: list[LogOrder]) -> Iterator[LogOutcome]:
-        """Outcomes of all logs; those that killed their process are tried once more, alone."""
-        again: list[LogOrder] = []
-        for outcome in self._taken(logs, self.workers):
-            if outcome.outcome == KILLED:
-                again.append(LogOrder(outcome.order.address, outcome.order.flight, 2))
-            else:
-                yield self._counted(outcome)
+        """Outcomes of all logs; those that killed their process are tried once more, alone.
+
+        Those that another run is at come last: they are known then, or its holder is gone.
+        """
+        again, held, free = list[LogOrder](), list[LogOrder](), logs
+        watch = ClaimWatch(self.store)
+        while free or held:
+            for outcome in self._taken(free, self.workers) if free else ():
+                if outcome.outcome == KILLED:
+                    again.append(replace(outcome.order, attempts=2))
+                elif outcome.outcome == CLAIMED:
+                    held.append(outcome.order)
+                else:
+                    yield self._counted(outcome)
+            free = [each for each in held if watch.is_free(each.address.digest)]
+            held = [each for each in held if each not in free]
+            done, free = self._parted(free)
+            yield from (LogOutcome(each, KNOWN, each.address.digest) for each in done)
+            if held and not free:
+                sleep(POLL_S)
         for log in again:
             for outcome in self._taken([log], 1):
-                yield self._counted(self._failed(outcome) if outcome.outcome == KILLED else outcome)
+                if outcome.outcome == CLAIMED:  # Another run tries it, and tells what comes of it.
+                    yield replace(outcome, outcome=KNOWN)
+                else:
+                    killed = outcome.outcome == KILLED
+                    yield self._counted(self._failed(outcome) if killed else outcome)
+
+    def _parted(self, free: list[LogOrder]) -> tuple[list[LogOrder], list[LogOrder]]:
+        """Logs that another run has given back: those that it has done, and the others."""
+        if not free:
+            return [], []
+        places = [each.address for each in free]
+        left = {e.address for e in missing_logs(self.store, places, self.tables, retry=False)[0]}
+        return (
+            [each for each in free if each.address.address not in left],
+            [each for each in free if each.address.address in left],
+        )
 
     def _taken(self, logs: list[LogOrder], workers: int | None) -> Iterable[LogOutcome]:
         # A worker of a server may have no children but by a shell's call, which plain runs make.

@@ -178,6 +178,35 @@ class KnownLogs:
         return self.in_parts(log) or self._store.exists(f"loose/{log}.json")
 
 
+class LiveLogs:
+    """The same while others compact: parts are read again where there are other ones.
+
+    Parameters
+    ----------
+    store : Store
+    """
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+        self._read()
+
+    def _read(self) -> None:
+        self._names = sorted(self._store.folders(PARTS))
+        self._known = KnownLogs(self._store, read_parts(self._store)[0])
+        # One that is being written has no manifest yet, and is looked at again.
+        manifests = {each: f"{PARTS}/{each}/{MANIFEST}" for each in self._names}
+        self._names = [each for each, name in manifests.items() if self._store.exists(name)]
+
+    def __call__(self, log: str) -> bool:
+        """Whether the catalogue holds the log."""
+        if self._known(log):
+            return True
+        if sorted(self._store.folders(PARTS)) == self._names:
+            return False
+        self._read()
+        return self._known(log)
+
+
 def new_name(logs: Sequence[str]) -> str:
     """Name of a new part: what it holds, and a number that nobody else has."""
     content = hashlib.sha256(key_bytes(logs)).hexdigest()[:12]

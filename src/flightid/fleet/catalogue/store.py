@@ -41,6 +41,13 @@ class Store(Protocol):
         """Write a file whole or not at all."""
         ...
 
+    def create(self, name: str, content: bytes) -> bool | None:
+        """Write a small file where there is none, one of several alone; False where there is one.
+
+        None where the store cannot tell: it has no such writing.
+        """
+        ...
+
     def exists(self, name: str) -> bool:
         """Whether there is such a file."""
         ...
@@ -106,6 +113,17 @@ class FolderStore:
         path = self._own(name)
         path.parent.mkdir(parents=True, exist_ok=True)
         write_atomically(path, content)
+
+    def create(self, name: str, content: bytes) -> bool | None:
+        """Write a small file where there is none, one of several alone; False: there is one."""
+        path = self._own(name)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            with path.open("xb") as file:
+                file.write(content)
+        except FileExistsError:
+            return False
+        return True
 
     def exists(self, name: str) -> bool:
         """Whether there is such a file."""
@@ -183,6 +201,20 @@ class ObjectStore:
     def write(self, name: str, content: bytes) -> None:
         """Write a file by one PUT."""
         self.fs.pipe_file(f"{self._base}/{name}", content)
+
+    def create(self, name: str, content: bytes) -> bool | None:
+        """Write a small file where there is none, by a conditional PUT; None where there is none.
+
+        Of stores and of versions of their libraries some refuse a condition; others pass it over,
+        which `flightid.fleet.engine.claims.can_claim` finds out.
+        """
+        try:
+            self.fs.pipe_file(f"{self._base}/{name}", content, mode="create")
+        except FileExistsError:
+            return False
+        except (TypeError, ValueError, NotImplementedError, OSError):
+            return None
+        return True
 
     def exists(self, name: str) -> bool:
         """Whether there is such a file."""

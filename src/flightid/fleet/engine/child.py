@@ -19,7 +19,7 @@ from queue import SimpleQueue
 from typing import Any, TextIO
 
 from flightid.fleet.catalogue.loose import write_loose
-from flightid.fleet.catalogue.parts import KnownLogs, read_parts
+from flightid.fleet.catalogue.parts import LiveLogs
 from flightid.fleet.catalogue.store import store_at
 from flightid.fleet.engine.order import KNOWN, SCRATCH, STORAGE, LogOrder, RunOrder
 from flightid.fleet.identity import FleetTables
@@ -90,7 +90,7 @@ def _ready(
     order = RunOrder(**values)
     settings = read_order(order.unpack(folder))
     store = store_at(order.place)
-    known = KnownLogs(store, read_parts(store)[0])
+    known = LiveLogs(store)
     reports = None if order.reports is None else Path(order.reports)
 
     def tell(stage: str, log: str) -> None:

@@ -38,6 +38,8 @@ class RunOrder:
         Folder for every log's page.
     memory_mib, recycle : int
     time_s : float
+    claimant : str
+        Name of the run, which no other has: logs are claimed by it. Empty: none is.
     """
 
     files: Mapping[str, str]
@@ -48,6 +50,7 @@ class RunOrder:
     memory_mib: int = 4096
     recycle: int = 200
     time_s: float = 600.0
+    claimant: str = ""
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values."""
@@ -97,8 +100,9 @@ class LogOutcome:
     ----------
     order : LogOrder
     outcome : str
-        fitted, refused, failed; ``"known"`` where the catalogue had it; ``"killed"`` where its
-        process ended without a word; ``"storage"`` where nothing can be written.
+        fitted, refused, failed; ``"known"`` where the catalogue had it; ``"claimed"`` where another
+        run is at it; ``"killed"`` where its process ended without a word; ``"storage"`` where
+        nothing can be written.
     log : str
         Digest, as far as it was known.
     reason, message : str
@@ -122,7 +126,7 @@ class LogOutcome:
     action: str = ""
 
 
-KNOWN, KILLED, STORAGE = "known", "killed", "storage"
+KNOWN, CLAIMED, KILLED, STORAGE = "known", "claimed", "killed", "storage"
 SCRATCH = "flightid-order-"
 """How the temporary folder of a process begins: its parent makes it and removes it."""
 

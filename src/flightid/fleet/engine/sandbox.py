@@ -15,7 +15,10 @@ from collections.abc import Mapping
 from queue import Empty, SimpleQueue
 from typing import Any, BinaryIO, Self
 
+from flightid.fleet.catalogue.store import store_at
+from flightid.fleet.engine.claims import RENEW_S, LogClaims
 from flightid.fleet.engine.order import (
+    CLAIMED,
     KILLED,
     SCRATCH,
     STORAGE,
@@ -44,6 +47,7 @@ class Sandbox:
 
     def __init__(self, order: RunOrder) -> None:
         self._order = order
+        self._claims = LogClaims(store_at(order.place), order.claimant)
         self._child: subprocess.Popen[bytes] | None = None
         self._lines: SimpleQueue[bytes | None] = SimpleQueue()
         self._errors: BinaryIO | None = None
@@ -56,7 +60,16 @@ class Sandbox:
         return None if self._child is None else self._child.pid
 
     def run(self, order: LogOrder) -> LogOutcome:
-        """Take one log; whatever becomes of the process, this returns."""
+        """Take a log, unless another run is at it; it returns whatever becomes of the process."""
+        log = order.address.digest
+        if not self._claims.take(log):
+            return LogOutcome(order, CLAIMED, log)
+        try:
+            return self._run(order)
+        finally:
+            self._claims.leave(log)
+
+    def _run(self, order: LogOrder) -> LogOutcome:
         if self._child is None or self._taken >= self._order.recycle:
             self.close()
             problem, message = self._start()
@@ -71,8 +84,11 @@ class Sandbox:
         while True:
             left = begun + self._order.time_s - time.monotonic()
             try:
-                line = self._lines.get(timeout=max(left, 0.0))
+                line = self._lines.get(timeout=max(min(left, RENEW_S), 0.0))
             except Empty:
+                if left > RENEW_S:
+                    self._claims.renew(order.address.digest)
+                    continue
                 return self._killed(order, TIME, stage, log, time.monotonic() - begun)
             if line is None:
                 return self._killed(order, DEAD, stage, log, time.monotonic() - begun)
