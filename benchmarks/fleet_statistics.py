@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from statistics import NormalDist
 from time import process_time
 
 import numpy as np
@@ -142,18 +143,20 @@ def _coverage() -> Iterator[Row]:
         yield _row(begun, f"intervals of {k} vehicles", told, "93 to 97 %", of)
 
 
-def _held(rng: np.random.Generator, k: int, spread: float) -> list[bool]:
+def _held(rng: np.random.Generator, k: int, spread: float) -> list[float]:
+    """Whether mean and spread lie in their intervals, and how probably the next vehicle does."""
     variances = rng.uniform(0.3, 2.0, k)
     values = 10.0 + spread * rng.normal(size=k) + np.sqrt(variances) * rng.normal(size=k)
     names = [f"{i:02}" for i in range(k)]
     data = FlightEstimates.of(["a"], names, values[:, None], variances[:, None, None])
     one = estimate_population(data).parameters["a"]
-    truths = (10.0, spread, 10.0 + spread * rng.normal())
-    ends = [each.interval95 for each in (one.mean, one.spread, one.next_vehicle)]
-    return [
-        pair is not None and pair[0] <= truth <= pair[1]
-        for pair, truth in zip(ends, truths, strict=True)
-    ]
+    held: list[float] = []
+    for each, truth in ((one.mean, 10.0), (one.spread, spread)):
+        low, high = each.interval95 or (np.inf, -np.inf)
+        held.append(float(low <= truth <= high))
+    low, high = one.next_vehicle.interval95 or (10.0, 10.0)
+    following = NormalDist(10.0, spread)
+    return [*held, following.cdf(high) - following.cdf(low)]
 
 
 @dataclass(frozen=True)

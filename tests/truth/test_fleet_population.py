@@ -159,6 +159,12 @@ def test_the_next_vehicle_of_a_known_spread_is_student() -> None:
     assert 0.5 * (high - low) == pytest.approx(half, rel=0.01)
 
 
+def test_vehicles_that_agree_by_chance_do_not_bind_the_next() -> None:
+    """Their errors allow a spread: as if there were none, the interval had no length."""
+    low, high = VehicleEstimates(np.full(5, 2.0), np.ones(5)).next_ends() or (2.0, 2.0)
+    assert low < 1.0 < 3.0 < high
+
+
 def _vehicles(kind: str, k: int, rng: np.random.Generator) -> np.ndarray:
     """Vehicles of mean 0 and spread 1, of another shape than normal."""
     if kind == "bimodal":

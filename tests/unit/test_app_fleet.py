@@ -168,7 +168,7 @@ def test_an_event_is_added_to_the_fleet_file_and_asked_about(tmp_path: Path) -> 
     with pytest.raises(ValueError, match="at least 1"):
         add(date="2026-02-01", what="")
     assert path.read_bytes() == kept
-    assert not [each for each in tmp_path.iterdir() if each.name.startswith(".f")]
+    assert not list(tmp_path.glob(".*.toml"))
 
 
 def test_a_folder_of_logs_becomes_a_fleet_that_a_worker_runs(tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ from flightid.fleet.catalogue.catalogue import Catalogue
 from flightid.fleet.catalogue.compaction import MOST_SMALL, compact, merge, rewrite, set_aside
 from flightid.fleet.catalogue.loose import loose_logs, loose_name, write_loose
 from flightid.fleet.catalogue.on_time import TimedConnection
-from flightid.fleet.catalogue.parts import MANIFEST, PARTS, KnownLogs, read_parts
+from flightid.fleet.catalogue.parts import MANIFEST, PARTS, KnownLogs, LiveLogs, read_parts
 from flightid.fleet.catalogue.record import LogRecord
 from flightid.fleet.catalogue.store import FolderStore
 from flightid.fleet.engine.address_space import bounded_memory
@@ -65,7 +65,7 @@ def test_a_record_keeps_its_values_and_a_broken_one_is_seen() -> None:
 
 def test_compaction_changes_no_answer(tmp_path: Path) -> None:
     store = filled(tmp_path, range(7))
-    before = sums(store)
+    before, live = sums(store), LiveLogs(store)
     part = compact(store)
     assert part is not None
     assert (part.n_logs, part.outcomes) == (7, {"fitted": 7})
@@ -76,6 +76,9 @@ def test_compaction_changes_no_answer(tmp_path: Path) -> None:
     assert known.in_parts(record(3).log)
     assert not known.in_parts(record(7).log)
     assert known(record(7).log)
+    # A process that began before another run compacted would take these again.
+    assert live(record(3).log)
+    assert not live(record(8).log)
     with Catalogue(store) as catalogue:
         sql = "SELECT DISTINCT typeof(flown_at), typeof(value) FROM parameters"
         assert catalogue.query(sql).fetchall() == [("TIMESTAMP", "DOUBLE")]

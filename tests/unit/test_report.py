@@ -313,6 +313,6 @@ def test_what_is_met_opens_on_demand_in_a_long_list_and_actions_stand_once() -> 
     assert page.count("<summary>4 met: green</summary>") == 1, "of the long list below the answer"
     assert [page.count(f"green {n}") for n in range(4)] == [4] * 4
     assert page.count("fly a sweep") == 4, "once in each list"
-    assert page.count("fly a sweep (so for the 2 below)") == 2, "and for how many it is"
+    assert page.count("fly a sweep (the same for the next 2)") == 2, "and for how many it is"
     told = page[page.index('id="part-2"') :]
     assert told.index("amber 0") < told.index("4 met: green") < told.index("green 0")

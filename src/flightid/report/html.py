@@ -154,8 +154,8 @@ def _actions_once(findings: list[dict[str, Any]]) -> list[dict[str, Any]]:
     told: list[dict[str, Any]] = []
     for action, same in groupby(findings, key=lambda each: each["action"]):
         first, *others = same
-        also = f" (so for the {len(others)} below)" if action and len(others) > 1 else ""
-        also = " (so for the next)" if action and len(others) == 1 else also
+        also = f" (the same for the next{f' {len(others)}' if len(others) > 1 else ''})"
+        also = also if action and others else ""
         told += [{**first, "action": f"{action}{also}"}, *({**e, "action": ""} for e in others)]
     return told
 

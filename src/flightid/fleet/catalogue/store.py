@@ -212,7 +212,7 @@ class ObjectStore:
             self.fs.pipe_file(f"{self._base}/{name}", content, mode="create")
         except FileExistsError:
             return False
-        except (TypeError, ValueError, NotImplementedError, OSError):
+        except (TypeError, ValueError, RuntimeError, OSError):  # the third: not implemented
             return None
         return True
 

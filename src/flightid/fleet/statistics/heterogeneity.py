@@ -20,6 +20,8 @@ FEWEST_SHAPED = 4
 SPREADS, MEANS = 200, 60
 """Quantiles of the spread's confidence distribution, and of Student's about each mean."""
 HALVINGS = 60
+LEFT_AT_ZERO = 0.5
+"""Share of the confidence in no spread at all that is kept where the next vehicle is asked for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,9 +138,16 @@ class VehicleEstimates:
 
     @cached_property
     def _mixture(self) -> tuple[Array, Array, Array]:
-        """Centres (m, j), standard deviations (m, 1) and weights (m, j) of the next one."""
+        """Centres (m, j), standard deviations (m, 1) and weights (m, j) of the next one.
+
+        All variances that would be negative count as none in the confidence distribution: of five
+        vehicles whose spread is their error, a quarter does. Taken as it is, the next one lay
+        in its interval in 94 % there, and estimates that agree by chance left an interval of
+        no length; without any of it, in 99 %.
+        """
         shares, weights = _shares(SPREADS)
-        variance = self.spread_quantiles(shares)
+        none = (1.0 - LEFT_AT_ZERO) * self.chance_alike
+        variance = self.spread_quantiles(none + (1.0 - none) * shares)
         mean, total, squares = self.weighed(variance)
         error = np.sqrt(squares / self.freedom / total)
         places, more = _shares(MEANS)
