@@ -160,9 +160,11 @@ def test_the_next_vehicle_of_a_known_spread_is_student() -> None:
 
 
 def test_vehicles_that_agree_by_chance_do_not_bind_the_next() -> None:
-    """Their errors allow a spread: as if there were none, the interval had no length."""
-    low, high = VehicleEstimates(np.full(5, 2.0), np.ones(5)).next_ends() or (2.0, 2.0)
-    assert low < 1.0 < 3.0 < high
+    """With all confidence in no spread it ended at 5.82: fleets were held too seldom."""
+    found = VehicleEstimates(np.array([0.2, 0.9, 2.0, 3.1, 3.8]), np.full(5, 2.0))
+    assert found.chance_alike == pytest.approx(0.3485, abs=1e-4)
+    assert found.next_ends() == pytest.approx((-2.061, 6.061), abs=2e-3)
+    assert VehicleEstimates(np.full(5, 2.0), np.ones(5)).next_ends() is None
 
 
 def _vehicles(kind: str, k: int, rng: np.random.Generator) -> np.ndarray:

@@ -145,6 +145,9 @@ def test_red_models_and_flights_without_a_date_are_left_out_where_they_do_not_be
     answers = answer_questions(rows)
     found = answers.types[0]
     assert answers.undated == 8
+    # Each of these flights would have another model that counts: what is left out is listed.
+    said = " ".join(to_text(fleet_document(answers)).split())
+    assert "Model “roll” is red in 8 logs more, and is left out there: flightid run" in said
     assert found.data.members == ("v01", "v02", "v03", "v04")
     assert found.drift is not None
     assert {each.vehicle for each in found.drift.histories} == {"v02", "v03", "v04"}

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
+import numpy as np
 import pytest
 
 from flightid import errors
@@ -13,6 +16,7 @@ from flightid.fleet import refusal as room
 from flightid.fleet.identity import read_tables
 from flightid.fleet.reasons import grouped_reasons, reason_lines
 from flightid.fleet.refusal import refusal
+from flightid.fleet.run_one import _verdict
 from flightid.fleet.settings import read_fleet
 from flightid.inspection import inspect_log
 from flightid.logs import Log, read_log
@@ -136,3 +140,20 @@ def test_nothing_is_repeated_of_a_file_that_is_not_the_fleets(tmp_path: Path) ->
         with pytest.raises(errors.StudyError, match="names no column 'id'") as found:
             read_tables(read_fleet(own / "f.toml"))
         assert ("hunter" in str(found.value)) == is_told
+
+
+def test_a_red_light_refuses_a_flight_with_its_reason() -> None:
+    def model(light: Light) -> SimpleNamespace:
+        verdict = Finding("record-too-short", light, "three windows", "fly longer")
+        evidence = SimpleNamespace(light=light, verdict=verdict, reason=verdict)
+        fit = SimpleNamespace(evidence=evidence, covariance=np.eye(1))
+        return SimpleNamespace(fit=fit, left_out=(), findings=())
+
+    red, good = model(Light.RED), model(Light.AMBER)
+    for models, outcome, light in (([red], "refused", "red"), ([red, good], "fitted", "amber")):
+        study: Any = SimpleNamespace(identified=models, review=None)
+        told = _verdict(study)
+        assert (told["outcome"], told["light"], told["models"]) == (outcome, light, len(models) - 1)
+        if outcome == "refused":
+            expected = ("record-too-short", "three windows", "fly longer")
+            assert (told["reason"], told["message"], told["action"]) == expected

@@ -6,6 +6,7 @@ import datetime
 import json
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +34,7 @@ from flightid.fleet.page import (
     events_table,
     fleet_vehicles,
     fleet_words,
+    red_words,
     refused_table,
 )
 from flightid.fleet.statistics.answers import FleetAnswers, TypeAnswers
@@ -81,7 +83,7 @@ def answer_fleet(place: Path) -> dict[str, Any]:
             ],
             types=[_type(each) for each in answers.types],
             histories=[_history(*pair) for pair in every[:SHOWN]],
-            refused=_table(refused_table(answers.logs)),
+            refused=_table(_refused(answers)),
             undated=answers.undated,
         ).model_dump()
 
@@ -182,6 +184,11 @@ def _type(each: TypeAnswers) -> FleetType:
         name=each.type_name, model=each.model, reasons=reasons,
         labels=dict(each.labels), tables=[_table(table) for table in tables],
     )  # fmt: skip
+
+
+def _refused(answers: FleetAnswers) -> Table:
+    table = refused_table(answers.logs)
+    return replace(table, notes=(*table.notes, *red_words(answers)))
 
 
 def _table(table: Table) -> FleetSheet:

@@ -39,7 +39,7 @@ def fleet_document(answers: FleetAnswers, title: str = "Fleet") -> Document:
     sections = [
         Section("Vehicles", tuple(_vehicles(answers))),
         *(Section(_type_title(each), tuple(_type_blocks(each))) for each in answers.types),
-        Section("Logs that could not be used", tuple(_refused(answers.logs))),
+        Section("Logs that could not be used", tuple(_refused(answers))),
     ]
     footer, lights = f"Made by flightid {VERSION}.", _lights_counted(answers)
     return Document(title, fleet_words(answers), tuple(sections), footer, lights)
@@ -261,9 +261,19 @@ def events_table(drift: FleetDrift, labels: Mapping[str, str]) -> Table:
     return Table("Events", columns, tuple(rows), notes).without_empty_columns()
 
 
-def _refused(logs: Sequence[Row]) -> Iterator[Block]:
-    table = refused_table(logs)
+def _refused(answers: FleetAnswers) -> Iterator[Block]:
+    table = refused_table(answers.logs)
     yield TableBlock(table) if table.rows else Paragraph("Every log gave a model.")
+    yield from map(Paragraph, red_words(answers))
+
+
+def red_words(answers: FleetAnswers) -> list[str]:
+    """A line for each model that is red in logs of which another one counts."""
+    return [
+        f"Model “{model}” is red in {counted(len(places), 'log')} more, and is left out there: "
+        f"flightid run STUDY --log {places[0].rpartition('/')[2]} says why."
+        for model, places in answers.red.items()
+    ]
 
 
 def refused_table(logs: Sequence[Row]) -> Table:

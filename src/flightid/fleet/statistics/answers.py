@@ -65,11 +65,14 @@ class FleetAnswers:
         Rows of the catalogue's table of logs.
     undated : int
         Flights without a date, which are in no history.
+    red : mapping of str to sequence of str
+        By model: addresses of logs of which another model counts, and this one is red.
     """
 
     types: tuple[TypeAnswers, ...]
     logs: Sequence[Row]
     undated: int = 0
+    red: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
 
 def answer_questions(
@@ -119,7 +122,17 @@ def answer_questions(
             one = replace(one, reasons=(*one.reasons, UNDATED))
         labels = told_apart({each["name"]: each.get("meaning") for each in mine})
         answers.append(replace(one, labels=labels))
-    return FleetAnswers(tuple(answers), tuple(rows["logs"]), undated)
+    return FleetAnswers(tuple(answers), tuple(rows["logs"]), undated, _red_models(rows))
+
+
+def _red_models(rows: Rows) -> dict[str, list[str]]:
+    """Addresses of fitted logs by the model of theirs that is red, and counts nowhere."""
+    places = {e["log"]: str(e["address"] or "") for e in rows["logs"] if e["outcome"] == FITTED}
+    found: dict[str, dict[str, None]] = {}
+    for each in rows["parameters"]:
+        if each["light"] == RED and each["log"] in places:
+            found.setdefault(str(each["model"]), {})[each["log"]] = None
+    return {model: [places[log] for log in logs] for model, logs in sorted(found.items())}
 
 
 def _counts(row: Row, parameters: Sequence[str]) -> bool:
