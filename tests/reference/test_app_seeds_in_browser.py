@@ -13,9 +13,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from benchmarks.app_served import processor_s
 
+from flightid.control.autopilots.parameter_files import read_parameters
 from tests.contract.source import ROOT
-from tests.reference.test_app_in_browser import Desk, desk
+from tests.reference.test_app_in_browser import Desk, _findings, desk
 from tests.reference.test_app_screens_in_browser import _opened, _saved, _watched
 
 __all__ = ["desk"]
@@ -23,6 +25,7 @@ RUN_MS = 1_800_000
 """For a whole run; a control that is not there fails sooner."""
 R50_SERVOS = {"lat": 15.0, "lon": 15.0, "col": 15.0}
 """Of the swashplate, rad/s, known from the ground; the pedal's is part of the model of yaw."""
+WAITED_MS = 120_000
 HOVER_OUTPUTS = ("um", "vm", "w", "p", "q", "r", "ax", "ay", "az")
 
 
@@ -40,6 +43,7 @@ def _dropped(desk: Desk, files: list[Path]) -> Any:
     page.set_input_files("input[type=file]", files)
     page.get_by_role("button", name="Write the study").wait_for()
     page.locator("select[aria-label^='Role of']").first.wait_for()
+    window.page.set_default_timeout(WAITED_MS)
     return window
 
 
@@ -76,6 +80,7 @@ def test_the_study_is_written_with_a_model_and_edited_as_text(desk: Desk, tmp_pa
     page.locator("#template option", has_text="first order").first.wait_for(state="attached")
     page.select_option("#template", value="rate_first_order")
     page.get_by_label("Servo of volts, rad/s").fill("12")
+    said = _findings(page)
     page.get_by_role("button", name="Write the study").press("Enter")
     page.locator("pre", has_text='template = "rate_first_order"').wait_for()
     assert _study(desk, page)["conditioning"] == [{"actuators": {"volts": 12.0}}]
@@ -90,10 +95,18 @@ def test_the_study_is_written_with_a_model_and_edited_as_text(desk: Desk, tmp_pa
     field.fill(text.replace("title = ", "tilte = "))
     page.get_by_role("button", name="Save", exact=True).press("Enter")
     page.get_by_role("alert").filter(has_text="tilte").first.wait_for()
+    said += _findings(page)
     field.fill(text.replace('title = "', 'title = "By hand, '))
     page.get_by_role("button", name="Save", exact=True).press("Enter")
     page.locator("pre .changed", has_text="By hand").wait_for()
     assert _study(desk, page)["study"]["title"].startswith("By hand, ")
+    _opened(page, "Model")
+    page.get_by_label("Reduce structures to what the data determine").check()
+    page.locator("pre .changed", has_text="maximum_insensitivity_percent").wait_for()
+    page.get_by_label("Another rival").select_option("rate_integrator")
+    page.locator("pre .changed", has_text="rivals").wait_for()
+    said += _findings(page)
+    assert said == []
     # A refusal of the server is an answer of 422, which the browser writes down.
     assert all("422" in each for each in window.complaints)
     page.close()
@@ -181,5 +194,34 @@ def test_seed_003_the_apache_reduced_beside_a_rival(desk: Desk, tmp_path: Path) 
     page.get_by_label("Another rival").select_option("helicopter_6dof")
     page.locator("pre .changed", has_text="rivals").wait_for()
     _reported(page, tmp_path)
+    assert not window.complaints
+    page.close()
+
+
+@pytest.mark.nightly
+def test_seed_004_from_the_demos_log_to_gains_and_a_report(desk: Desk, tmp_path: Path) -> None:
+    """Without typing, in less than two minutes of the machine's time."""
+    demo = ROOT / "examples" / "quadrotor_rig" / "study.toml"
+    command = [sys.executable, "-m", "flightid", "run", demo, "--output", tmp_path / "demo"]
+    subprocess.run(command, check=True, capture_output=True)
+    begun_s = processor_s()
+    window = _watched(desk)
+    page = window.page
+    page.wait_for_selector(".drop")
+    page.set_input_files("input[type=file]", tmp_path / "demo" / "flight.bin")
+    page.wait_for_selector(".cards")
+    assert "can carry a model of roll, pitch and yaw" in page.inner_text("h1")
+    assert page.locator(".sweep").count() == 3
+    _opened(page, "Response")
+    page.locator(".uplot canvas").first.wait_for()
+    _opened(page, "Gains")
+    first = page.get_by_role("button", name="Download step 1")
+    first.wait_for(timeout=RUN_MS)
+    new = read_parameters(_saved(page, first.inner_text(), tmp_path))
+    assert set(new) == set(read_parameters(_saved(page, "Its way back", tmp_path)))
+    assert {each[:11] for each in new} >= {"ATC_RAT_RLL", "ATC_RAT_PIT", "ATC_RAT_YAW"}
+    _opened(page, "Report")
+    assert _reported(page, tmp_path) in ("green", "amber")
+    assert processor_s() - begun_s < 120.0
     assert not window.complaints
     page.close()

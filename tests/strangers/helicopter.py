@@ -92,8 +92,11 @@ class Vehicle:
     def __init__(self, k: dict[str, float]) -> None:
         self.f, self.g = matrices(k)
         self.c, self.d = measured(k, self.f, self.g)
-        self.whole = int(np.ceil(k["tau_ped"] / STEP_S - 1e-9))
-        part = self.whole * STEP_S - k["tau_ped"]
+        self._discretise(k["tau_ped"])
+
+    def _discretise(self, pedal_delay_s: float) -> None:
+        self.whole = int(np.ceil(pedal_delay_s / STEP_S - 1e-9))
+        part = self.whole * STEP_S - pedal_delay_s
         # Gusts of u, v, w are held over a step: what moves the air moves the speed terms.
         wide = np.column_stack([self.g, -self.f[:, [0, 1, 8]]])
         self.a, self.b = step(self.f, wide, STEP_S)
@@ -108,7 +111,7 @@ class Vehicle:
         injected[driven] = AMPLITUDES[driven] * sweep(random, n)
         gusts = coloured(random, n, (1.0, 1.0, 0.7), (2.0, 2.0, 1.0))
         hands = coloured(random, n, (0.01,) * 4, (0.3,) * 4)
-        x, u, y = np.zeros(13), np.zeros((4, n)), np.zeros((9, n))
+        x, u, y = np.zeros(len(self.f)), np.zeros((4, n)), np.zeros((9, n))
         fed, attitude = np.zeros((4, n + 10)), np.zeros(4)
         for k in range(n):
             aim = -np.array(

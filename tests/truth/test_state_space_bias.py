@@ -10,6 +10,7 @@ from scipy.signal import cont2discrete
 from scipy.stats import binom
 
 import flightid as fid
+from flightid.identification.frequency_domain.model_residuals import ModelResiduals
 from flightid.simulation.model_outputs import (
     between_samples,
     driven_outputs,
@@ -178,3 +179,37 @@ def test_intervals_of_the_unstable_vehicle_cover_the_truth() -> None:
     low, high = binom.ppf([0.0005, 0.9995], n_flights, 0.95) / n_flights
     assert np.all((covered >= low) & (covered <= high)), covered
     assert 0.93 <= covered.mean() <= 0.97, covered
+
+
+def test_an_output_that_a_pilot_holds_while_another_axis_is_flown_is_followed() -> None:
+    """What is held to a tenth of what feeds through says nothing against a model half right."""
+    model = fid.StateSpaceModel(
+        states={"p": "rad/s", "q": "rad/s"},
+        input_units={"lat": "1", "lon": "1"},
+        measurements={"p": fid.Output("p", "rad/s"), "q": fid.Output("q", "rad/s")},
+        equations={"p'": "Lp*p + Llat*lat", "q'": "Mq*q + Mlat*lat + Mlon*lon"},
+        parameters=fid.Parameters(
+            [
+                fid.Parameter("Lp", -2.0, "1/s", free=False),
+                fid.Parameter("Llat", 8.0, "rad/s^2", free=False),
+                fid.Parameter("Mq", -3.0, "1/s", free=False),
+                fid.Parameter("Mlon", 9.0, "rad/s^2", free=False),
+                fid.Parameter("Mlat", 4.0, "rad/s^2"),
+            ]
+        ),
+    )
+    time_s = np.arange(1500) / RATE_HZ
+    swept = np.sin(0.15 * time_s**2)
+    records = []
+    for lat, lon in ((swept, -0.98 * 4.0 / 9.0 * swept), (0.0 * swept, 0.5 * swept)):
+        flown = fid.Record.from_arrays(time_s, inputs={"lat": lat, "lon": lon}, hold="zero")
+        records.append(fid.simulate(model, flown, units=dict.fromkeys("pq", "rad/s")))
+    response = fid.estimate_response(records, inputs=("lat", "lon"), outputs=("p", "q"))
+    held, moved = (float(np.std(each["q"])) for each in records)
+    assert moved > 10.0 * held
+    assert response.linear is not None
+    followed = ModelResiduals(response.linear, response.outputs, "zero")
+    left = followed.of(model.with_values({"Mlat": 2.0}).with_responses("p/lat", "q/lat"))
+    assert float(np.std(left[0][1])) > 10.0 * held, "half of what feeds through"
+    with pytest.raises(fid.errors.DataError, match=r"a residual .* times the measured output"):
+        followed.of(model.with_values({"Mlat": 400.0}).with_responses("p/lat", "q/lat"))

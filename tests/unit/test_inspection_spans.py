@@ -14,6 +14,7 @@ from flightid.inspection.flight_phases import FlightPhases, flight_phases
 from flightid.inspection.gap_findings import gap_findings
 from flightid.inspection.rates import stream_rates
 from flightid.inspection.signals import Signal, find, inside, records
+from flightid.inspection.usable_band import _whole_window
 from flightid.logs import Log, read_log
 from flightid.logs.dataflash.writer import DataflashWriter
 from flightid.logs.ulog.reader import UlogSource
@@ -131,3 +132,17 @@ def test_the_gyroscope_of_a_driver_is_read(tmp_path: Path) -> None:
     assert found is not None
     assert found.label == "sensor_gyro.x"
     assert found.values[-1] == pytest.approx(4.9)
+
+
+def test_gaps_do_not_leave_an_axis_without_windows(shared_data: Path, tmp_path: Path) -> None:
+    """Pieces of one window and a half hold one: by their lengths' sum no frequency had five."""
+    lengths = [5.4, 5.3, 3.1, *[2.9] * 3, *[1.4] * 6]
+    whole = _whole_window(lengths, 7.0)
+    assert sum(int(each / whole + 1e-9) for each in lengths) >= 7
+    assert sum(int(each / (1.01 * whole) + 1e-9) for each in lengths) < 7
+    assert _whole_window([70.0], 7.0) == pytest.approx(10.0)
+    content = (shared_data / "logs" / "px4_esc_status.ulg").read_bytes()
+    cut = tmp_path / "cut.ulg"
+    cut.write_bytes(content[: len(content) * 39 // 50])
+    # A log cut a little earlier has bands on all axes.
+    assert [band.reason for band in fid.inspect_log(cut).bands] == [""] * 3

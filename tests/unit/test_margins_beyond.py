@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
 import flightid as fid
+from flightid.control.margins.resonance_slack import TAKEN
 from flightid.conventions import Light
+from flightid.uncertainty.uncertain import Uncertain
 from tests.strangers import hover
 from tests.strangers.gains import NAMES
 
@@ -73,3 +76,46 @@ def test_where_a_resonance_may_leave_less_than_is_required_nothing_is_promised()
     for name in ("gain margin", "sensitivity peak", "disturbance peak"):
         assert design.worst_case("loop", name).worst is None
     assert design.worst_case("loop", "phase margin").worst is not None
+
+
+@pytest.mark.parametrize(("top", "reaching"), [(90.0, True), (60.0, False)])
+def test_margins_promise_no_more_than_a_frame_above_the_band_leaves(
+    top: float, reaching: bool
+) -> None:
+    """A mode that the structure lacks, a tenth as wide as it is high: raised by 20 dB."""
+    gain, lag, delay = 8.0, 30.0, 0.01
+    source = Uncertain(
+        np.array([gain, lag]), np.diag([0.01, 0.1]), partial(_lagged, delay), valid_rad_s=(0.1, top)
+    )
+    known = fid.margins(replace(source, valid_rad_s=None))
+    found, rejected = fid.margins(source), fid.disturbance_rejection(source)
+    assert known.phase_crossover.value < top
+    said = [each.light for each in found.findings if each.code == "margin-beyond-band"]
+    assert said == ([] if reaching else [Light.GREEN])
+    assert found.phase_margin.interval95 == known.phase_margin.interval95
+    for number in (found.gain_margin, found.modulus_margin, found.sensitivity_peak, rejected.peak):
+        assert (number.interval95 is not None) is reaching
+        assert (number.reason == TAKEN) is not reaching
+    if not reaching:
+        return
+    w = np.geomspace(1.0, 300.0, 200_000)
+    s = 1j * w
+    true = []
+    for at, share in ((95.0, 0.18), (95.0, -0.18), (140.0, 0.18), (140.0, -0.18)):
+        frame = 1.0 + share * at * s / (s**2 + 0.02 * at * s + at**2)
+        loop = gain / s * lag / (s + lag) * np.exp(-delay * s) * frame
+        assert np.abs(frame).max() < 10.1
+        turns = (loop[:-1].imag * loop[1:].imag < 0.0) & (loop[1:].real < 0.0)
+        true.append(-20.0 * np.log10(np.abs(loop[1:][turns]).max()))
+        nearest = np.abs(1.0 + loop).min()
+        assert found.gain_margin.interval95[0] <= true[-1]
+        assert found.modulus_margin.interval95[0] <= nearest
+        assert found.sensitivity_peak.interval95[1] >= 1.0 / nearest
+        assert rejected.peak.interval95[1] >= -20.0 * np.log10(nearest)
+    assert min(true) < known.gain_margin.interval95[0] - 3.0, "frames take what was promised"
+
+
+def _lagged(delay: float, n: np.ndarray) -> fid.LinearSystem:
+    return fid.LinearSystem(
+        [[0.0, n[1]], [0.0, -n[1]]], [[0.0], [n[0]]], [[1.0, 0.0]], [[0.0]], ("e",), ("y",), [delay]
+    )

@@ -17,6 +17,7 @@ from flightid.errors import DataError, OptionError, StudyError, UnknownNameError
 from flightid.findings import Finding
 from flightid.study.proposal import Proposal, propose_study
 from flightid.study.proposal.columns import columns_of
+from flightid.study.proposal.of_records import study_of_records
 from flightid.surface import speaking
 from tests.ordinary_log import write_ordinary_log
 
@@ -185,6 +186,14 @@ def test_data_without_a_model_give_no_study(tmp_path: Path) -> None:
     with pytest.raises(StudyError, match="carry no model"):
         Proposal((), ()).write(tmp_path / "study.toml")
     assert "No model can be identified" in Proposal((), ()).refusal()
+    time_s = np.arange(30) * 0.1
+    short = np.column_stack([time_s, np.sign(np.sin(3.0 * time_s)), np.sin(3.0 * time_s)])
+    np.savetxt(tmp_path / "rig.csv", short, delimiter=",", header="t_s,u,y", comments="")
+    made = study_of_records(
+        [tmp_path / "rig.csv"], tmp_path, model=None, inputs=("u",), outputs=("y",)
+    )
+    said = " ".join(made.refusal().split())
+    assert "the record is too short: 30 samples, 7 of them to choose orders by" in said
 
 
 def test_a_fall_comes_first_then_the_commands_that_go_on(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from flightid.errors import FlightidError
 from flightid.findings import Finding
 from flightid.report.text import to_text
 from flightid.study.answer import _models
+from flightid.study.identified import LEFT_OUT, ModelResults
 from flightid.study.settings import Segment
 from flightid.study.stage_runner import digest
 from flightid.study.stages import compare_free_run, select_coherent
@@ -312,6 +313,31 @@ def test_no_model_is_none_to_use() -> None:
     said = _models(study, "study.toml")  # type: ignore[arg-type]
     assert said.light is Light.UNKNOWN
     assert "no model was made" in said.message
+    damaged = (Finding("spikes", Light.RED, "3 samples of p stand alone"), left)
+    spiked = SimpleNamespace(name="p", fit=None, findings=damaged, on_unseen={}, left_out=damaged)
+    study = SimpleNamespace(identified=[spiked], faults=(), files=())
+    said = _models(study, "study.toml")  # type: ignore[arg-type]
+    assert (said.light, said.action) == (Light.RED, "mend first what is red there")
+
+
+def test_damage_comes_before_the_coherence_that_it_takes() -> None:
+    """Three spikes take the coherence: a model was left out for that alone, not judged."""
+    time_s = np.arange(1000) * 0.08
+    r = np.random.default_rng(1)
+    moved = np.repeat(r.choice([-1.0, 1.0], 100), 10)
+    answered = np.convolve(moved, 0.2 * 0.8 ** np.arange(40))[:1000]
+    answered[[211, 500, 777]] += 300.0
+    record = fid.Record.from_arrays(time_s, inputs={"u": moved}, outputs={"y": answered})
+    pairs = fid.coherent_pairs(fid.estimate_response(record, inputs="u", outputs="y"))
+    structure = SimpleNamespace(inputs=("u",), outputs=("y",))
+    settings = SimpleNamespace(name="y from u", structure=structure)
+    item = ModelResults(settings, {}, pairs, training=(record,))  # type: ignore[arg-type]
+    assert not pairs.names
+    spikes, left = item.left_out
+    assert (spikes.light, left.code) == (Light.RED, LEFT_OUT)
+    assert spikes.message.startswith("3 samples of y stand alone")
+    assert spikes.message.endswith("at 16.88, 40, 62.16 s")
+    assert "outliers = { deviations = " in spikes.action
 
 
 def test_a_narrow_response_is_no_reason_to_leave_out_the_only_input() -> None:

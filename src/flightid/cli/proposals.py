@@ -96,7 +96,9 @@ def taken_study(
     made.write(target)
     note(f"Wrote {target}")
     note_of(made)
-    return target, output or target.with_name(f"{files[0].stem}-output")
+    from flightid.study.output import output_folder
+
+    return target, output or output_folder(target)
 
 
 def show_study(result: Study, *, whole: bool, as_json: bool) -> None:

@@ -77,10 +77,10 @@ def carried_sentence(inspection: InspectedLog) -> str:
 
 
 def _first(inspection: InspectedLog) -> Iterator[str]:
-    fallen = inspection.phases.tipped_s
-    if fallen is None:
+    fall = inspection.phases.fall
+    if not fall:
         return
-    yield f"The vehicle falls over at {fallen:.1f} s."
+    yield f"{fall[0].upper()}{fall[1:]}."
     limited = next((f.message for f in inspection.findings if f.code == "saturated"), "")
     if limited:
         yield f"Before that {limited}."

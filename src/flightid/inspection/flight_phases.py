@@ -57,6 +57,13 @@ class FlightPhases:
     action: str = ""
 
     @property
+    def fall(self) -> str:
+        """When it fell, in words; empty where it did not."""
+        if self.tipped_s is None:
+            return ""
+        return f"the vehicle falls over at {self.tipped_s:.1f} s of the autopilot's clock"
+
+    @property
     def airborne_s(self) -> float:
         """Time in the air, s."""
         return sum(stop - start for start, stop in self.airborne)

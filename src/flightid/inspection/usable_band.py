@@ -31,6 +31,9 @@ from flightid.responses.running import SpectralSum
 
 N_OMEGA = 60
 """Frequencies at which coherence is computed."""
+SHORTENED = 6
+"""Lengths of windows that are tried until enough of them are independent."""
+ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -171,26 +174,50 @@ def _explained(
     if not inputs:
         return "no command moved" if lengths else "no span holds command and rate together"
     # Conditioning on each other input costs one independent window.
-    window = _longest_window(lengths, INDEPENDENT_WINDOWS.value + len(inputs) - 1)
-    low = CYCLES_IN_WINDOW.value * 2.0 * math.pi / window
-    high = 2.0 * math.pi / (step_s * SAMPLES_PER_CYCLE_LEAST.value)
+    wanted = INDEPENDENT_WINDOWS.value + len(inputs) - 1
     cut = _cut(lengths, stretches)
+    found: AxesCoherence | str = "no window"
+    ends = _longest_window(lengths, wanted), _whole_window(lengths, wanted)
+    # Parts of windows count for less than their length where gaps cut a flight.
+    for window in np.geomspace(*ends, SHORTENED):
+        found = _of_windows(flown, (tuple(inputs), tuple(outputs)), float(window), step_s, cut)
+        if isinstance(found, str) or np.any(_enough(found.composite.n_independent)):
+            break
+    return found
+
+
+def _of_windows(
+    flown: Iterable[Record],
+    names: tuple[tuple[str, ...], tuple[str, ...]],
+    window_s: float,
+    step_s: float,
+    cut: str,
+) -> AxesCoherence | str:
+    """Coherence of outputs with inputs by windows of one length, and of half of it."""
+    inputs, outputs = names
+    low = CYCLES_IN_WINDOW.value * 2.0 * math.pi / window_s
+    high = 2.0 * math.pi / (step_s * SAMPLES_PER_CYCLE_LEAST.value)
     if high < 1.2 * low:
         return (
             f"the windows reach down to {low / (2 * math.pi):.3g} Hz, the sampling up to "
             f"{high / (2 * math.pi):.3g} Hz: no band is left{cut}"
         )
     omega = np.geomspace(low, high, N_OMEGA)
-    windows = [window, window / 2] if high > 4 * low else [window]
+    windows = [window_s, window_s / 2] if high > 4 * low else [window_s]
     total = SpectralSum((*inputs, *outputs), windows, omega, step_s)
     for record in flown:
-        if record.duration_s >= window:
+        if record.duration_s >= window_s:
             total.add({name: record[name] for name in (*inputs, *outputs)})
     try:
-        found = total.composite(inputs, outputs)
+        found = total.composite(list(inputs), list(outputs))
     except FlightidError as error:
         return error.problem
-    return AxesCoherence(omega, tuple(inputs), tuple(outputs), found, cut)
+    return AxesCoherence(omega, inputs, outputs, found, cut)
+
+
+def _enough(n_independent: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Where five independent windows stand behind an estimate."""
+    return np.asarray(n_independent >= INDEPENDENT_WINDOWS.value - 0.5)
 
 
 def _longest_window(lengths: list[float], windows: float) -> float:
@@ -201,6 +228,17 @@ def _longest_window(lengths: list[float], windows: float) -> float:
     ordered = np.sort(lengths)[::-1]
     reach = np.minimum(ordered, np.cumsum(ordered) / windows)
     return min(float(reach.max()), LONGEST_WINDOW.value)
+
+
+def _whole_window(lengths: list[float], windows: float) -> float:
+    """The longest window that lies so often in the records without a part of one, s, up to the cap.
+
+    A record of one window and a half holds one that is independent.
+    """
+    count = math.ceil(windows)
+    candidates = np.concatenate([np.array(lengths) / k for k in range(1, count + 1)])
+    held = np.floor(np.array(lengths) / candidates[:, None] * (1.0 + ROUNDING)).sum(axis=1)
+    return min(float(candidates[held >= count].max()), LONGEST_WINDOW.value)
 
 
 def _cut(lengths: list[float], flown: FlightStretches) -> str:
@@ -219,7 +257,7 @@ def _band(
 ) -> tuple[tuple[float, float] | None, float | None, float | None, str]:
     row, column = explained.outputs.index(output), explained.inputs.index(tau)
     omega, found = explained.omega_rad_s, explained.composite
-    enough = found.n_independent[row, column] >= INDEPENDENT_WINDOWS.value - 0.5
+    enough = _enough(found.n_independent[row, column])
     coherence = np.where(enough, found.coherence[row, column], 0.0)
     fast_enough = omega <= 2.0 * math.pi * rate_hz / SAMPLES_PER_CYCLE.value
     if not np.any(fast_enough):

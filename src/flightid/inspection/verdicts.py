@@ -80,8 +80,7 @@ def _flight(log: Log, found: Inspection) -> list[Finding]:
             Finding(
                 "tipped-over",
                 Light.AMBER,
-                f"the vehicle falls over at {phases.tipped_s:.1f} s and stays tilted: everything "
-                "after that is left out",
+                f"{phases.fall} and stays tilted: everything after that is left out",
                 "look for the cause of the fall before flying a manoeuvre",
             )
         )

@@ -44,8 +44,7 @@ def flight_findings(
             Finding(
                 "tipped-over",
                 Light.RED,
-                f"the vehicle falls over at {phases.tipped_s:.1f} s: what made it fall is "
-                "still there",
+                f"{phases.fall}: what made it fall is still there",
                 "find the cause and fly an ordinary flight first, then plan from that log",
             )
         )

@@ -20,6 +20,8 @@ from flightid.record.repeats import found_staircase
 from flightid.units import DIMENSIONLESS, is_convertible, si_base
 
 Array = NDArray[np.float64]
+TOLD = 4
+"""Instants of samples that are named."""
 FEWEST = 50
 """Samples below which nothing is judged."""
 HALF_WIDTH = 3
@@ -209,10 +211,17 @@ def _spikes(channel: _ExaminedChannel) -> SampleFault | None:
     said = (
         f"{counted(at.size, 'sample')} of {name} {'stands' if at.size == 1 else 'stand'} alone, "
         f"{float(np.max(away[at])):.3g}{channel.of_unit} from the neighbours at most "
-        f"({100 * share:.0f} % of the channel's variance; the first at {stamps[at[0]]:.6g} s)"
+        f"({100 * share:.0f} % of the channel's variance): {_instants(stamps[at])}"
     )
     action = _spike_action(away[at], np.delete(away, at), spread)
     return channel.fault(at, ("spikes", light, said, action))
+
+
+def _instants(stamps: Array) -> str:
+    """When they were, the first few."""
+    told = [f"{each:.6g}" for each in stamps[:TOLD]]
+    more = f" and {len(stamps) - TOLD} more" if len(stamps) > TOLD else ""
+    return f"at {', '.join(told)} s{more}"
 
 
 def _spike_action(heights: Array, others: Array, spread: float) -> str:
@@ -225,8 +234,9 @@ def _spike_action(heights: Array, others: Array, spread: float) -> str:
     between = float(np.sqrt(least * max(most, 1e-3 * least)))
     deviations = between / spread if spread > 0.0 else FAR
     return (
-        f"bridge them where they are read: [[conditioning]] outliers = {{ deviations = "
-        f"{deviations:.0f} }} in a study, conditioning.remove_outliers in Python"
+        "look for their cause (a connector, the logger), and bridge them before any fit: "
+        "write [[conditioning]] into the study and below it outliers = { deviations = "
+        f"{deviations:.0f} }}, which lies between them and all other samples"
     )
 
 

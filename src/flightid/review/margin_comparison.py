@@ -14,8 +14,8 @@ from flightid.control.closed_loop.close_loop import close_loop
 from flightid.control.loops.interconnection import Interconnection
 from flightid.control.margins.gain_limits import loop_numbers, measured_up
 from flightid.control.margins.loop_source import BrokenLoop, read_loop
-from flightid.control.margins.margins import MISSING, Margins, margins_of
-from flightid.control.margins.outside_band import BEYOND, outside_band
+from flightid.control.margins.margins import GAIN_GUIDE_DB, MISSING, Margins, margins_of
+from flightid.control.margins.outside_band import outside_band
 from flightid.control.stepped.gain_controller import GainController
 from flightid.control.stepped.gain_loops import UncertainPlant, gain_loops
 from flightid.conventions import Light
@@ -236,7 +236,7 @@ def _changes(
         apart = both.carried_together(
             lambda pairs: new_rows([b for _, b in pairs]) - old_rows([a for a, _ in pairs])
         )
-    above = [outside_band(loop).above for loop in (old, new)]
+    outside = [outside_band(loop) for loop in (old, new)]
     for place, (quantity, field, unit) in enumerate(COMPARED):
         one, two = (
             carried.number(place, quantity, unit, MISSING.get(field, "there is none"))
@@ -245,10 +245,10 @@ def _changes(
         if one.value is None and two.value is None:
             continue
         one, two = (
-            Estimate(quantity, each.value, unit, None, BEYOND) if field in found else each
-            for each, found in zip((one, two), above, strict=True)
+            found.promised(each, field, GAIN_GUIDE_DB)
+            for each, found in zip((one, two), outside, strict=True)
         )
-        beyond = any(field in found for found in above)
+        beyond = any(field in found.above for found in outside)
         if apart is None or beyond or one.value is None or two.value is None:
             yield change_of(name, one, two)
         else:

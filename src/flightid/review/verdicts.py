@@ -75,7 +75,7 @@ def _flown(review: FlightReview) -> Iterator[Finding]:
         yield Finding(
             "tipped-over",
             Light.AMBER,
-            f"the vehicle falls over at {phases.tipped_s:.1f} s: what comes after is left out",
+            f"{phases.fall}: what comes after is left out",
             "look for the cause of the fall first",
         )
 

@@ -135,8 +135,10 @@ def _models(study: StudyResults, source: str) -> Finding:
     if not lights:
         return Finding("answer", Light.UNKNOWN, "no model was asked for")
     if all(item.fit is None for item in study.identified):
-        action = "move the inputs more, over a decade of frequencies: flightid design plans it"
         said = "no model was made, for the reasons named above: there is nothing to use"
+        if Light.RED in {each.light for each in lights}:
+            return Finding("answer", Light.RED, said, "mend first what is red there")
+        action = "move the inputs more, over a decade of frequencies: flightid design plans it"
         return Finding("answer", Light.UNKNOWN, said, action)
     light = worst(lights)
     pairs = list(zip(lights, study.identified, strict=True))

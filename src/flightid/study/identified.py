@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import field
 
 from flightid.conventions import Light
+from flightid.evidence.data_checks import sample_checks
 from flightid.findings import Finding
 from flightid.frozen import dataclass
 from flightid.identification import Fit, Reduction
@@ -17,6 +18,9 @@ from flightid.study.model_settings import ModelSettings
 from flightid.study.structures import Choice, goal_findings
 from flightid.validation import Comparison, ResidualTests, SpectrumComparison, Verification
 from flightid.validation.verification.of_the_fit import SEEN
+
+LEFT_OUT = "left-out"
+"""Code of an input without coherence."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,13 +127,32 @@ class ModelResults:
 
     @property
     def left_out(self) -> tuple[Finding, ...]:
-        """Inputs of a structure without coherence, or the whole model, with the reason."""
+        """Inputs of a structure without coherence, or the whole model, with the reason.
+
+        Where nothing was fitted, damage in the samples comes first: it takes coherence too.
+        """
+        reasons = self._reasons
+        return (*self._damage, *reasons) if reasons and self.fit is None else reasons
+
+    @property
+    def _damage(self) -> tuple[Finding, ...]:
+        """What was found in the samples that no fit tells of, for none was made."""
+        responses = tuple(self.responses.values())[:1]
+        data = (*self.training, *self.unfitted) or responses
+        named = self.settings.structure or next(iter(responses), None)
+        if named is None:
+            return ()
+        checks = sample_checks(data, {*named.inputs, *named.outputs})
+        return tuple(check.finding for check in checks)
+
+    @property
+    def _reasons(self) -> tuple[Finding, ...]:
         if self.fitted.refused is not None:
             return (self.fitted.refused,)
         if self.coherent is None or self.settings.structure is None:
             return ()
         return tuple(
-            Finding("left-out", Light.UNKNOWN, f"{pair.name} is left out: {pair.reason}")
+            Finding(LEFT_OUT, Light.UNKNOWN, f"{pair.name} is left out: {pair.reason}")
             for pair in self.coherent.pairs
             if not pair.kept and pair.name.split("/")[1] in self.settings.structure.inputs
         )

@@ -32,6 +32,7 @@ from flightid.report.verification import verification_blocks
 from flightid.study.choice_section import choice_blocks
 from flightid.study.estimate_tables import correlation_table, estimates_table, minima_table
 from flightid.study.faults import blocks_until, section_of
+from flightid.study.identified import LEFT_OUT
 from flightid.study.published import published_tables
 from flightid.study.response_figures import response_figures
 from flightid.study.structures import goal_findings
@@ -147,8 +148,9 @@ def _parts(item: ModelResults, truth: Truth | None) -> Iterator[Section]:
 def _coherence(item: ModelResults, truth: Truth | None) -> Iterator[Block]:
     """Which responses or inputs were taken, and why."""
     assert item.coherent is not None
-    if item.left_out:
-        yield Lights(item.left_out)
+    pairs = tuple(finding for finding in item.left_out if finding.code == LEFT_OUT)
+    if pairs:
+        yield Lights(pairs)
     limits = f"{item.coherent.minimum_coherence:g} over {item.coherent.minimum_decades:g}"
     yield from result_blocks(item.coherent, title=f"Coherence, at least {limits} decades needed")
     if item.settings.structure is not None:

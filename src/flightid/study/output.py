@@ -98,6 +98,17 @@ def _age(path: Path) -> float:
     return -path.lstat().st_mtime
 
 
+def output_folder(study: Path) -> Path:
+    """Where a study writes by default: ``dryer.toml`` and ``dryer-study.toml`` to ``dryer-output``.
+
+    Example
+    -------
+    >>> output_folder(Path("rig/dryer-study.toml")).as_posix()
+    'rig/dryer-output'
+    """
+    return study.with_name(f"{study.stem.removesuffix('-study')}-output")
+
+
 def require_replaceable(final: Path, inputs: Iterable[Path] = ()) -> None:
     """Refuse a folder that a study may not replace; call it before the work, not after it.
 

@@ -19,7 +19,12 @@ from flightid.review import FlightReview, review_flight
 from flightid.study.error_list import ErrorList
 from flightid.study.faults import TUNING, Faults
 from flightid.study.flight import fly_again
-from flightid.study.output import RESULTS, require_replaceable, whole_folder
+from flightid.study.output import (
+    RESULTS,
+    output_folder,
+    require_replaceable,
+    whole_folder,
+)
 from flightid.study.pipeline import identify_models
 from flightid.study.qualities import rate_models, require_pairs
 from flightid.study.record_files import require_files
@@ -63,7 +68,8 @@ def run_study(
     path : str or Path
         Study file; docs/study.md describes it.
     output : str or Path, optional
-        Folder to write; default: ``<study>-output`` beside the study file.
+        Folder to write; default: ``<study>-output`` beside the study file, of ``dryer-study.toml``
+        ``dryer-output``.
     log : str or Path, optional
         Log to read instead of the one that the study names.
     tune : bool or mapping
@@ -105,7 +111,7 @@ def _run(
     settings = read_settings(source)
     if level is not None:
         settings = replace(settings, level=checked_level(level))
-    final = Path(output) if output is not None else source.with_name(f"{source.stem}-output")
+    final = Path(output) if output is not None else output_folder(source)
     reads = (source, *named_paths(settings), *(() if log is None else (Path(log),)))
     require_replaceable(final, reads)
     names = tuple(model.name for model in settings.models)

@@ -13,7 +13,8 @@ from flightid.control.margins.findings import guide_finding, stability_findings
 from flightid.control.margins.gain_limits import measured_up
 from flightid.control.margins.loop_metrics import DISTURBANCE_LEVEL_DB
 from flightid.control.margins.loop_source import Controller, Given, read_loop
-from flightid.control.margins.margins import LoopCurve, drawn_points
+from flightid.control.margins.margins import GAIN_GUIDE_DB, LoopCurve, drawn_points
+from flightid.control.margins.outside_band import outside_band, outside_band_findings
 from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.frozen import dataclass
@@ -145,7 +146,8 @@ def disturbance_rejection(
     -------
     A linear loop. The peak of a noisy measurement is biased upwards: it is the highest of many
     points. Leakage and resolution are taken out of a response that was estimated from records, not
-    of one from a file or arithmetic. Intervals are carried by first order.
+    of one from a file or arithmetic. Intervals are carried by first order; the peak's is promised
+    above the band of a fit as in `margins`.
 
     Reference
     ---------
@@ -179,10 +181,10 @@ def disturbance_rejection(
         numbers = np.array([getattr(found, name) for _, _, name, _ in QUANTITIES]).T
         return np.hstack([numbers, 20 * np.log10(np.abs(ratio)), np.degrees(np.angle(ratio))])
 
-    carried = loop.uncertain.carried_together(all_of)
+    carried, outside = loop.uncertain.carried_together(all_of), outside_band(loop)
     made = {
-        key: carried.number(place, name, unit, NO_BANDWIDTH)
-        for place, (key, name, _, unit) in enumerate(QUANTITIES)
+        key: outside.promised(carried.number(place, name, unit, NO_BANDWIDTH), field, GAIN_GUIDE_DB)
+        for place, (key, name, field, unit) in enumerate(QUANTITIES)
     }
     errors = carried.stderr
     parts = (None, None) if errors is None else np.split(errors[len(QUANTITIES) :], 2)
@@ -191,6 +193,7 @@ def disturbance_rejection(
     found = [*stability_findings(loop, metrics)]
     found += _guides(made, bandwidth_guide_rad_s, peak_guide_db)
     found += loop.uncertain.findings
+    found += outside_band_findings(loop, outside, GAIN_GUIDE_DB)
     if not loop.uncertain.known:
         found.append(
             Finding("no-intervals", Light.UNKNOWN, f"no intervals: {loop.uncertain.reason}")

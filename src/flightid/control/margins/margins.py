@@ -18,12 +18,12 @@ from flightid.control.margins.gain_limits import (
     outside_findings,
 )
 from flightid.control.margins.loop_source import BrokenLoop, Controller, Given, read_loop
-from flightid.control.margins.outside_band import BEYOND, outside_band, outside_band_findings
+from flightid.control.margins.outside_band import outside_band, outside_band_findings
 from flightid.findings import Finding
 from flightid.frozen import dataclass
 from flightid.result import Result
 from flightid.table import Column, Table
-from flightid.uncertainty.estimate import Estimate, Reading, estimate_table
+from flightid.uncertainty.estimate import Reading, estimate_table
 from flightid.uncertainty.quantiles import shown
 
 Array = NDArray[np.float64]
@@ -240,8 +240,10 @@ def margins(
     -------
     A linear loop. Intervals are those of the estimate's covariance carried by first order, by draws
     where a margin hangs on two crossings that change places, and leave out what a model lacks.
-    Numbers that are read above the band to which a fit was shown to hold have none. The
-    sensitivity peak of a noisy measurement is biased upwards: it is the highest of many points. A
+    Numbers that are read above the band to which a fit was shown to hold have none, and intervals
+    of gain margin, modulus margin and sensitivity peak reach what a resonance of 20 dB above that
+    band may leave: they have none where it may leave less than `gain_guide_db`. The sensitivity
+    peak of a noisy measurement is biased upwards: it is the highest of many points. A
     measurement should begin below and end above the crossings; joint input and output
     with a known excitation (``estimate_response(estimator="instrument")`` from error to feedback)
     gives L of a flown loop without the bias of a direct estimate.
@@ -286,7 +288,7 @@ def margins_of(
     phases = phases.kept(np.abs(phases.value) < np.log(10.0) / 20.0 * FAR_DB)
     outside = outside_band(loop)
     made = {
-        name.replace("-", "_").replace(" ", "_"): _unpromised(each, field in outside.above)
+        name.replace("-", "_").replace(" ", "_"): outside.promised(each, field, gain_guide_db)
         for (name, field, _), each in quantities
     }
     findings = margin_findings(
@@ -296,7 +298,10 @@ def margins_of(
         phase_guide_deg=phase_guide_deg,
         gain_guide_db=gain_guide_db,
     )
-    findings += (*outside_findings(loop, made), *outside_band_findings(loop, outside))
+    findings += (
+        *outside_findings(loop, made),
+        *outside_band_findings(loop, outside, gain_guide_db),
+    )
     return Margins(
         loop.name,
         **made,
@@ -308,13 +313,6 @@ def margins_of(
         curve=curve,
         findings=findings,
     )
-
-
-def _unpromised(number: Reading, is_above: bool) -> Reading:
-    """A number without an interval where it is read above the band of the fit."""
-    if not is_above or number.value is None:
-        return number
-    return Estimate(number.name, number.value, number.unit, None, BEYOND)
 
 
 def drawn_points(loop: BrokenLoop, omega: Array) -> Array:

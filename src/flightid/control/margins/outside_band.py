@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,12 +11,12 @@ from numpy.typing import NDArray
 from flightid.control.margins.gain_limits import everywhere, loop_numbers, measured_up
 from flightid.control.margins.loop_metrics import READ_AT
 from flightid.control.margins.loop_source import BrokenLoop
+from flightid.control.margins.resonance_slack import MOST_RAISED_DB, ResonanceSlack
 from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.frozen import dataclass
+from flightid.uncertainty.estimate import Estimate, Reading
 
-MOST_RAISED_DB = 20.0
-"""By which no mode raises a response that damping and share leave ordinary: ten times."""
 TO_SEE_IT = 1.3
 """Band beyond the frequency of a margin from which the model is known about it."""
 BEYOND = "read above the band to which the model was shown to hold"
@@ -23,6 +24,7 @@ PLACES = READ_AT | {
     "phase_crossover_rad_s": "phase_crossover_rad_s",
     "gain_reduction_rad_s": "gain_reduction_rad_s",
     "modulus_margin": "sensitivity_peak_rad_s",
+    "disturbance_peak_db": "sensitivity_peak_rad_s",
 }
 """Numbers of a loop, and the fields that say at which frequency each is read."""
 SAID_BELOW = {
@@ -60,17 +62,6 @@ class MarginBeyond:
             f"a resonance there that raises the response by {self.room_db:.2g} dB may make it "
             "unstable"
         )
-
-
-def room_above(loop: NDArray[np.complex128]) -> float:
-    """By how much a resonance may raise a loop's response, of any shape, before it passes one, dB.
-
-    Example
-    -------
-    >>> room_above(np.array([0.1j, 0.01]))
-    20.0
-    """
-    return float(-20.0 * np.log10(np.max(np.abs(loop))))
 
 
 def beyond_findings(
@@ -117,6 +108,10 @@ class OutsideBand:
     ----------
     above, below : mapping of str to float
         By name of the number, as `LoopMetrics` and `loop_numbers` have it.
+    highest_rad_s : float
+        Highest frequency at which any is read.
+    room : ResonanceSlack
+        What a resonance above the band leaves of the others.
 
     Example
     -------
@@ -126,6 +121,26 @@ class OutsideBand:
 
     above: Mapping[str, float]
     below: Mapping[str, float]
+    highest_rad_s: float = 0.0
+    room: ResonanceSlack = field(default_factory=ResonanceSlack)
+
+    def promised(self, number: Reading, of: str, least_db: float) -> Reading:
+        """A number as far as it can be promised.
+
+        Without an interval where it is read above the band, or where a resonance there may leave
+        less than a gain margin of `least_db`; with one that reaches what a resonance may leave.
+
+        Parameters
+        ----------
+        number : Estimate
+        of : str
+            Its name in `LoopMetrics`.
+        least_db : float
+            Gain margin that is asked for.
+        """
+        if number.value is not None and of in self.above:
+            return Estimate(number.name, number.value, number.unit, None, BEYOND)
+        return self.room.reached(number, of, least_db)
 
 
 def outside_band(loop: BrokenLoop) -> OutsideBand:
@@ -139,20 +154,38 @@ def outside_band(loop: BrokenLoop) -> OutsideBand:
     return OutsideBand(
         {name: at for name, at in places.items() if at > band[1]},
         {name: at for name, at in places.items() if at < band[0]},
+        float(np.nanmax(values, initial=0.0)),
+        _room(loop, np.append(omega, values[values > band[1]]), band[1]),
     )
 
 
-def outside_band_findings(loop: BrokenLoop, found: OutsideBand) -> Iterator[Finding]:
-    """What is not promised above the band, and what rests on the model's form below it."""
+def _room(loop: BrokenLoop, omega: NDArray[np.float64], top_rad_s: float) -> ResonanceSlack:
+    """What lies above the band of a fit, over all frequencies of a model's loop."""
+    whole = everywhere(loop, omega)
+    omega = omega if whole is None else np.append(whole, omega)
+    above = np.unique(omega[omega > top_rad_s])
+    if not above.size:
+        return ResonanceSlack()
+    return ResonanceSlack.above(loop.of(loop.uncertain.value, above))
+
+
+def outside_band_findings(
+    loop: BrokenLoop, found: OutsideBand, least_db: float
+) -> Iterator[Finding]:
+    """What is not promised above the band, and what rests on the model's form below it.
+
+    Parameters
+    ----------
+    loop : BrokenLoop
+    found : OutsideBand
+    least_db : float
+        Gain margin that is asked for.
+    """
     band = loop.uncertain.valid_rad_s
     if band is None:
         return
-    if found.above:
-        omega = measured_up(loop)[0]
-        whole = everywhere(loop, omega)
-        omega = np.append(omega if whole is None else whole, list(found.above.values()))
-        values = loop.of(loop.uncertain.value, np.unique(omega[omega > band[1]]))
-        beyond = MarginBeyond(loop.name, max(found.above.values()), room_above(values))
+    if found.above or found.room.left_db < least_db:
+        beyond = MarginBeyond(loop.name, found.highest_rad_s, found.room.room_db)
         yield from beyond_findings([beyond], band)
     if named := [said for name, said in SAID_BELOW.items() if name in found.below]:
         lowest = min(found.below[name] for name in SAID_BELOW if name in found.below)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.control.margins.outside_band import MOST_RAISED_DB, MarginBeyond, room_above
+from flightid.control.margins.outside_band import MarginBeyond
+from flightid.control.margins.resonance_slack import ResonanceSlack
 from flightid.control.tuning.limits import ANGLE
 from flightid.control.tuning.loop_problem import LoopProblem
 
@@ -15,8 +16,8 @@ PLACES = "phase_crossover_rad_s", "sensitivity_peak_rad_s", "delay_crossover_rad
 
 def rooms_left(
     problem: LoopProblem, gains: NDArray[np.float64], band_rad_s: tuple[float, float] | None
-) -> dict[str, float]:
-    """What a resonance above the band leaves of the estimate's loops until they pass one, dB.
+) -> dict[str, ResonanceSlack]:
+    """What a resonance above the band leaves of the estimate's loops until they pass one.
 
     Parameters
     ----------
@@ -27,19 +28,14 @@ def rooms_left(
 
     Returns
     -------
-    dict of str to float
-        By loop; at most 0 where a resonance may make it unstable. Empty where no band is known, or
-        the loop's frequencies end inside it.
-
-    Assumes
-    -------
-    No resonance raises the response by more than `MOST_RAISED_DB` over that of the model.
+    dict of str to ResonanceSlack
+        By loop. Empty where no band is known, or the loop's frequencies end inside it.
     """
     above = problem.plants.omega_rad_s > (np.inf if band_rad_s is None else band_rad_s[1])
     if not above.any():
         return {}
     loops = problem.loops(gains[None], problem.plants.take([0]))
-    return {name: room_above(loop[..., above]) - MOST_RAISED_DB for name, loop in loops.named()}
+    return {name: ResonanceSlack.above(loop[..., above]) for name, loop in loops.named()}
 
 
 def margins_beyond(
@@ -65,7 +61,7 @@ def margins_beyond(
     found = []
     for name, metrics in judged.metrics.items():
         highest = max(float(np.nanmax(getattr(metrics, at), initial=0.0)) for at in PLACES)
-        short = left[name] < problem.requirements.gain_margin_db
+        short = left[name].left_db < problem.requirements.gain_margin_db
         if name != ANGLE and (short or highest > band_rad_s[1]):
-            found.append(MarginBeyond(name, highest, left[name] + MOST_RAISED_DB))
+            found.append(MarginBeyond(name, highest, left[name].room_db))
     return tuple(found)

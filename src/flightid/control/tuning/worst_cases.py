@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.control.autopilots import AxisLoop
+from flightid.control.margins.resonance_slack import TAKEN, ResonanceSlack
 from flightid.control.tuning.limits import ANGLE, limits
 from flightid.control.tuning.loop_problem import LoopAssessment, LoopProblem
 from flightid.control.tuning.margins_beyond import rooms_left
@@ -96,9 +97,6 @@ class _Kind:
     """Field that says at which frequency it is read, where that may lie above the band."""
 
 
-TAKEN_BY = "gain_margin_db", "sensitivity_peak", "disturbance_peak_db"
-"""Numbers that a resonance moves even where the loop does not pass one at it."""
-TAKEN = "a resonance above the identified band may leave less"
 NOISE = _Kind("noise", "noise", "1", False)
 KINDS = (
     _Kind("crossover_rad_s", "crossover", "rad/s", True),
@@ -146,8 +144,10 @@ def worst_cases(
         before = None if old is None else np.asarray(getattr(old.metrics[loop], kind.field))[0]
         steady = old is not None and bool(old.stable[0, 0])
         unknown = _beyond(new, loop, kind, band_rad_s)
-        bound = _bound(kind, left.get(loop))
-        if kind.field in TAKEN_BY and left.get(loop, np.inf) < problem.requirements.gain_margin_db:
+        room = left.get(loop, ResonanceSlack())
+        edge = room.edge(kind.field)
+        bound = (np.inf if kind.more else -np.inf) if edge is None else edge
+        if room.takes(kind.field, problem.requirements.gain_margin_db):
             unknown = unknown or TAKEN
         made.append(
             WorstCase(
@@ -215,23 +215,6 @@ def _beyond(
         return ""
     read = getattr(judged.metrics[loop], kind.place)[0]
     return "read above the identified band" if np.any(read > band_rad_s[1]) else ""
-
-
-def _bound(kind: _Kind, left_db: float | None) -> float:
-    """What a resonance above the band may make of a number; infinite where it does not touch it.
-
-    A loop that is raised to −m dB has a gain margin of m there, and 1/(1 − 10^(−m/20)) at most of a
-    sensitivity.
-    """
-    best = np.inf if kind.more else -np.inf
-    if left_db is None or kind.field not in TAKEN_BY:
-        return best
-    if kind.more:
-        return left_db
-    if left_db <= 0.0:
-        return np.inf
-    peak = 1.0 / (1.0 - 10.0 ** (-left_db / 20.0))
-    return float(peak if kind.unit == "1" else 20.0 * np.log10(peak))
 
 
 def _number(value: float) -> float | None:

@@ -25,8 +25,9 @@ Array = NDArray[np.float64]
 Places = NDArray[np.intp]
 
 LARGEST_RESIDUAL = 10.0
-"""Largest residual, in multiples of the measured output's rms, before a simulation is not believed:
-a loop may hold an output well below its disturbances, but no model that is right diverges so."""
+"""Largest residual before a simulation is not believed, in multiples of the measured output's rms
+in the record that moves it most. Where other axes are flown, a loop holds an output well below its
+disturbances and what feeds through, but no model that is right diverges so far."""
 _RANK = 1e-9
 AT_ONCE = 2_000_000
 """Samples of derivatives that are worked on together."""
@@ -253,7 +254,7 @@ class ModelResiduals:
             start = unknown.coefficients(fitter, rest) / unknown.lengths
             left = measured.copy()
             left[kept] = unknown.less(fitter, rest)
-            self._check(kept, left, measured)
+            self._check(kept, left)
             found.append(_FollowedRun(left, driven, fitter, start))
         return found, known
 
@@ -305,10 +306,15 @@ class ModelResiduals:
             )
         return [held.index(name) for name in names]
 
-    def _check(self, kept: Places, left: Array, measured: Array) -> None:
+    @cached_property
+    def _sizes(self) -> Array:
+        """Rms of each measured output, mean taken off, in the record that moves it most."""
+        return np.max([np.std(each, axis=1) for each in self.linear.output_records], axis=0)
+
+    def _check(self, kept: Places, left: Array) -> None:
         for row in kept:
-            if np.std(left[row]) > LARGEST_RESIDUAL * np.std(measured[row]):
-                ratio = float(np.std(left[row]) / max(np.std(measured[row]), TINY))
+            if np.std(left[row]) > LARGEST_RESIDUAL * self._sizes[row]:
+                ratio = float(np.std(left[row]) / max(self._sizes[row], TINY))
                 found = f"a residual {ratio:.0f} times the measured output"
                 raise self._diverges(np.array([row]), found)
 

@@ -34,6 +34,7 @@ from flightid.study.proposal.stretches import (
     one_experiment,
     rounded,
     segments_of,
+    too_short,
 )
 from flightid.study.stage_runner import StageRunner
 from flightid.study.structures import AS_GOOD, ranked
@@ -112,6 +113,10 @@ def study_of_records(
     names: list[str] = []
     for whole in groups:
         segments = segments_of(whole) if swept is None else swept[1]
+        short = too_short(whole, segments) if model is None else None
+        if short is not None:
+            missed.append(short)
+            continue
         group, still = _driven(whole, segments) if swept is None else (whole, [])
         missed += still
         tables = {}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
@@ -9,6 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
+from flightid.conventions import Light
+from flightid.findings import Finding
 from flightid.frozen import dataclass
 from flightid.models.save import toml_value
 from flightid.record import Record
@@ -18,6 +21,8 @@ FITTED, CHOSEN, ALONE = 0.6, 1.0, (0.5, 0.75)
 """Part of a record that is fitted, the rest ranks structures; and where it also has to verify."""
 RICHER = 2.0
 """Ratio of powers of an input's steps, of halves of a record, that is no chance."""
+FEWEST_IN_PART = 10
+"""Samples of the part that chooses orders, and of the unseen one, at the least."""
 SWEEP = 0.5
 """Part of the longest manoeuvre's samples from which one that was injected is fitted."""
 
@@ -94,6 +99,24 @@ def segments_of(group: Group) -> Segments:
         (*parts, *unseen), parts[0][0], parts[1][0],
         tuple(each[0] for each in unseen), (parts[0][2], parts[1][2]),
     )  # fmt: skip
+
+
+def too_short(group: Group, segments: Segments) -> Finding | None:
+    """Why a record is too short for a structure to be chosen on a part of it; None: it is not."""
+    record = group.parts[0].record
+    shares = [
+        int(np.count_nonzero((record.time_s >= start) & (record.time_s <= stop)))
+        for start, stop in segments.spans
+    ]
+    if min(shares) >= FEWEST_IN_PART:
+        return None
+    least = math.ceil(record.n_samples * FEWEST_IN_PART / max(min(shares), 1))
+    said = (
+        f"{group.parts[0].name}: no model, the record is too short: {record.n_samples} samples, "
+        f"{min(shares)} of them to choose orders by; about {least} are needed at the least, some "
+        "hundreds for a model"
+    )
+    return Finding("no-model", Light.RED, said, "record longer, or hand in several records")
 
 
 def one_experiment(
