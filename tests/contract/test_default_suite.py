@@ -23,7 +23,7 @@ STARTED = {
     "contract/test_stub.py": 1,
     "guide/test_examples.py": 1,
     "reference/test_report_in_browser.py": 1,
-    "reference/test_app_seeds_in_browser.py": 2,  # the examples that fly; nightly
+    "reference/test_app_seeds_in_browser.py": 1,  # the examples that fly; nightly
     "unit/test_cli_program.py": 3,
     "unit/test_commit_subject.py": 2,
     "unit/test_fleet_cluster.py": 3,  # a scheduler, clients to kill, two at once; nightly

@@ -31,9 +31,12 @@ HOVER_OUTPUTS = ("um", "vm", "w", "p", "q", "r", "ax", "ay", "az")
 
 def _records(example: str, folder: Path) -> Path:
     """What the example's script writes, from its simulated vehicle."""
-    script = ROOT / "examples" / example / "fly.py"
-    subprocess.run([sys.executable, script, folder], check=True, capture_output=True)
+    _run(ROOT / "examples" / example / "fly.py", folder)
     return folder
+
+
+def _run(*words: str | Path) -> None:
+    subprocess.run([sys.executable, *words], check=True, capture_output=True)
 
 
 def _dropped(desk: Desk, files: list[Path]) -> Any:
@@ -202,8 +205,7 @@ def test_seed_003_the_apache_reduced_beside_a_rival(desk: Desk, tmp_path: Path) 
 def test_seed_004_from_the_demos_log_to_gains_and_a_report(desk: Desk, tmp_path: Path) -> None:
     """Without typing, in less than two minutes of the machine's time."""
     demo = ROOT / "examples" / "quadrotor_rig" / "study.toml"
-    command = [sys.executable, "-m", "flightid", "run", demo, "--output", tmp_path / "demo"]
-    subprocess.run(command, check=True, capture_output=True)
+    _run("-m", "flightid", "run", demo, "--output", tmp_path / "demo")
     begun_s = processor_s()
     window = _watched(desk)
     page = window.page
