@@ -87,6 +87,7 @@ def test_the_study_is_written_with_a_model_and_edited_as_text(desk: Desk, tmp_pa
     page.get_by_role("button", name="Write the study").press("Enter")
     page.locator("pre", has_text='template = "rate_first_order"').wait_for()
     assert _study(desk, page)["conditioning"] == [{"actuators": {"volts": 12.0}}]
+    page.get_by_role("alert").filter(has_text="No column is named tau_phi, p").wait_for()
     servo = page.get_by_label("Servo of volts, rad/s")
     servo.fill("")
     servo.press("Tab")
