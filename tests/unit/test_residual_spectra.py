@@ -6,12 +6,14 @@ import json
 
 import numpy as np
 import pytest
+from scipy.signal import find_peaks
 
 import flightid as fid
 from flightid.errors import DataError, OptionError
 from flightid.plot.residuals import residual_spectra as draw_spectra
 from flightid.plot.residuals import spectrum_comparison
 from flightid.validation import compare_spectra, residual_spectra
+from flightid.validation.spectra.prominent_peaks import prominent_peaks
 from flightid.validation.spectra.spectra import lags_of_spectrum
 from tests.closeness import assert_close
 
@@ -120,3 +122,13 @@ def test_lags_span_the_slowest_peak_up_to_a_bound_and_need_one() -> None:
         DataError, match="no peak with 5 % of the power stands out of the spectrum of e"
     ):
         lags_of_spectrum([silent], ["u"], "e")
+
+
+def test_prominent_peaks_are_those_of_scipy() -> None:
+    random = np.random.default_rng(3)
+    for rounds in range(200):
+        # Rounded, so that there are plateaus and peaks of one height.
+        curve = np.round(np.cumsum(random.standard_normal(60)), rounds % 2)
+        least = random.uniform(0.0, 3.0, 60)
+        assert prominent_peaks(curve, least) == find_peaks(curve, prominence=least)[0].tolist()
+    assert prominent_peaks(np.ones(5), np.zeros(5)) == []

@@ -21,6 +21,7 @@ from flightid.responses.windows.defaults import (
     shifts_of,
 )
 from flightid.uncertainty.residual_correlation import LEVEL
+from flightid.validation.spectra.prominent_peaks import prominent_peaks
 from flightid.validation.spectra.result import Peak, ResidualSpectra, SpectrumComparison
 from flightid.validation.verification.result import Verification
 
@@ -328,7 +329,7 @@ def _peaks(
     """Frequency and density of each peak that stands out of its own uncertainty."""
     level = 10.0 * np.log10(np.maximum(density, np.finfo(float).tiny))
     width = 10.0 * np.log10(np.maximum(high, 1e-300) / np.maximum(low, 1e-300))
-    places, _ = scipy.signal.find_peaks(level, prominence=np.maximum(PEAK_DB, width))
+    places = prominent_peaks(level, np.maximum(PEAK_DB, width))
     return [(float(omega[place]), float(density[place])) for place in places]
 
 
