@@ -91,7 +91,12 @@ def structure_of(
         wanted = {"channels": channels, "orders": orders, label: fields["polynomials"]}
     else:
         wanted = {"channels": channels, label: fields[kind]}
-    named, *given, of_tables, of_logs = parted(options, {**wanted, **reading()})
+    injected = options.get("excitations") or ()
+    rest = {name: value for name, value in options.items() if name != "excitations"}
+    named, *given, of_tables, of_logs = parted(rest, {**wanted, **reading()})
+    if injected:
+        method = _by_excitation(kind, method)
+        named["excitations"] = tuple(injected)
     if method is not None:
         given[-1]["method"] = method
     records, inputs, outputs = channels_of(files, named, (of_tables, of_logs))
@@ -103,6 +108,30 @@ def structure_of(
             raise click.UsageError("--method is no option of kind narx")
         return NarxStructure(inputs, output, **given[-1]), records
     return PolynomialModel.general(inputs, output, **one_each(kind, given[0]), **given[-1]), records
+
+
+def _by_excitation(kind: str, method: str | None) -> str:
+    """The method by which a kind is fitted by way of what was injected.
+
+    Raises
+    ------
+    click.UsageError
+        The kind has none, or another method was asked for.
+    """
+    from flightid.models.polynomial.structure import BY_EXCITATION
+
+    own = BY_EXCITATION.get(kind.upper())
+    ways = ", ".join(f"{each.lower()} (method {way})" for each, way in BY_EXCITATION.items())
+    if own is None:
+        raise click.UsageError(
+            f"--excitation serves kinds {ways}; {kind} has a noise model of its own, so that a "
+            "loop does not bias it where that is large enough: leave --excitation out"
+        )
+    if method not in (None, own):
+        raise click.UsageError(
+            f"--excitation serves method {own} of kind {kind}; found --method {method}"
+        )
+    return own
 
 
 def only(outputs: Sequence[str]) -> str:

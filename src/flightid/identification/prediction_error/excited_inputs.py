@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.errors import DataError
 from flightid.identification.prediction_error.linear_regression import reflected, regress
-from flightid.models.polynomial.structure import PolynomialStructure
+from flightid.models.polynomial.structure import INSTRUMENTS, REFINED, PolynomialStructure
 from flightid.models.sampled.channels import SampledChannels
 from flightid.record import Record
 from flightid.record.hold import common_loop
@@ -23,10 +24,10 @@ LONGEST, ROWS_PER_COEFFICIENT = 30, 20
 def with_excitations(
     structure: PolynomialStructure, data: SampledChannels, records: Sequence[Record]
 ) -> SampledChannels:
-    """The channels with what was injected, where instruments need it and the records hold it.
+    """The channels with what was injected, where a method needs it and the records hold it.
 
-    They need it where a loop was closed, or nothing tells that it was open: in a closed loop the
-    inputs carry the noise. A loop that is known to be open keeps its inputs, which tell more.
+    Instruments need it where a loop was closed, or nothing tells that it was open: in a closed loop
+    the inputs carry the noise. A loop that is known to be open keeps its inputs, which tell more.
 
     Parameters
     ----------
@@ -34,17 +35,39 @@ def with_excitations(
     data : SampledChannels
         Of the records.
     records : sequence of Record
+
+    Raises
+    ------
+    DataError
+        The records do not hold an excitation for each input, and refined instruments need it.
     """
+    if structure.method == REFINED:
+        moved = _injected(structure, records)
+        if moved is None:
+            raise DataError(
+                "the records do not tell what was injected",
+                found=f"excitations {', '.join(records[0].excitations) or 'none'}",
+                needed=f"one that moves for each input, {', '.join(structure.inputs)}",
+                action="name what was injected as excitations, or fit by prediction_error: armax "
+                "and bj hold a noise model, so that a loop does not bias them",
+            )
+        return replace(data, excitations=moved)
+    known = common_loop([each.input_shape for each in records])
+    if structure.method != INSTRUMENTS or known == "open":
+        return data
+    moved = _injected(structure, records)
+    return data if moved is None else replace(data, excitations=moved)
+
+
+def _injected(structure: PolynomialStructure, records: Sequence[Record]) -> Array | None:
+    """Excitations that move, without their means; None where they are fewer than the inputs."""
     names = records[0].excitations
     alike = all(each.excitations == names for each in records)
-    known = common_loop([each.input_shape for each in records])
-    if structure.method != "iv4" or known == "open" or not alike:
-        return data
-    if len(names) < len(structure.inputs):
-        return data
+    if not alike or len(names) < len(structure.inputs):
+        return None
     rows = [np.concatenate([each[n] - each[n].mean() for each in records]) for n in names]
     moved = [row for row in rows if np.ptp(row) > 0.0]
-    return replace(data, excitations=np.array(moved)) if len(moved) >= len(names) else data
+    return np.array(moved) if len(moved) >= len(names) else None
 
 
 def noise_free_inputs(data: SampledChannels) -> Array:

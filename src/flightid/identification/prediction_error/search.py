@@ -18,6 +18,7 @@ from flightid.identification.prediction_error.coefficient_covariance import (
 )
 from flightid.identification.prediction_error.coloured_errors import has_noise_model
 from flightid.identification.prediction_error.denominators import preferred
+from flightid.identification.prediction_error.excited_inputs import noise_free_inputs
 from flightid.identification.prediction_error.findings import (
     CONVERGED,
 )
@@ -36,9 +37,10 @@ from flightid.identification.prediction_error.part_blocks import (
     about_levels,
     errors_at,
 )
+from flightid.identification.prediction_error.refined_instruments import refined_instruments
 from flightid.identification.prediction_error.starts import polynomial_starts, whitened_start
 from flightid.models.polynomial.model import PolynomialModel
-from flightid.models.polynomial.structure import PolynomialStructure
+from flightid.models.polynomial.structure import REFINED, PolynomialStructure
 from flightid.models.sampled.channels import SampledChannels
 
 Array = NDArray[np.float64]
@@ -107,6 +109,8 @@ def _search(structure: PolynomialStructure, data: SampledChannels) -> SearchResu
         unstable = np.max(np.abs(np.roots([1.0, *found.theta[: structure.na]])), initial=0.0) >= 1.0
         if not (structure.enforce_stability and unstable):
             return found
+    if structure.method == REFINED:
+        return _by_excitation(structure, data)
     if structure.backcast:
         return _backcast_rounds(structure, data)
     return _iterate(structure, data, polynomial_starts(structure, data), [])
@@ -128,6 +132,22 @@ def _regression(structure: PolynomialStructure, data: SampledChannels) -> Search
     require_errors(made.n_rows, made.theta.size)
     covariance = made.sum_of_squares / degrees * inverse_square(made.factor)
     return _linear(structure, made.theta, covariance, degrees, "regression", skip)
+
+
+def _by_excitation(structure: PolynomialStructure, data: SampledChannels) -> SearchResult:
+    """Output error by what the excitations move of the inputs, then by refined instruments."""
+    moved = noise_free_inputs(data)
+    clean = replace(data, inputs=moved, excitations=None)
+    first = _iterate(structure, clean, polynomial_starts(structure, clean), [])
+    made = refined_instruments(structure, data, moved, first.theta)
+    rows = data.output.size - len(data.lengths) * (made.skip + data.levels)
+    degrees = max(rows - made.theta.size, 1)
+    found = _linear(structure, made.theta, made.known.covariance, degrees, "instruments", made.skip)
+    known = made.known
+    return replace(
+        found, iterations=made.steps, freedom=known.freedom, colour=known.colour,
+        agreement=known.agreement,
+    )  # fmt: skip
 
 
 def _linear(

@@ -12,7 +12,10 @@ from flightid.models.sampled.channels import OFFSETS
 from flightid.options import Options, option
 
 INITIAL_STATES = ("estimate", "zero")
-METHODS = ("prediction_error", "iv4")
+INSTRUMENTS, REFINED = "iv4", "riv"
+METHODS = ("prediction_error", INSTRUMENTS, REFINED)
+BY_EXCITATION = {"ARX": INSTRUMENTS, "OE": REFINED}
+"""Kinds that are fitted by way of an excitation, each by its method."""
 KERNELS = ("tc", "dc")
 AUTO, COMMON, SEPARATE = "auto", "common", "separate"
 DENOMINATORS = (AUTO, COMMON, SEPARATE)
@@ -59,8 +62,9 @@ class PolynomialStructure(Options):
         Estimate what was before each record by running the noise model backwards over it, inputs
         at rest, in place of values that are fitted.
     method : str
-        ``"prediction_error"`` or, for ARX, ``"iv4"``: optimal instruments, consistent with noise
-        of any colour.
+        ``"prediction_error"``; for ARX ``"iv4"``: optimal instruments, consistent with noise of
+        any colour; for OE ``"riv"``: refined instruments, the model's slopes by what the
+        excitations of the records alone move of the inputs, consistent in a closed loop.
     offsets : str
         What is taken off each channel of each record: its ``"mean"``, its declared ``"trim"`` or
         nothing (``"none"``). Means are no trims where a record starts away from its working point,
@@ -107,7 +111,9 @@ class PolynomialStructure(Options):
         False, doc="Estimate that time by running the noise model backwards over the record."
     )
     method: str = option(
-        "prediction_error", choices=METHODS, doc="Prediction errors, or instruments for ARX."
+        "prediction_error",
+        choices=METHODS,
+        doc="Prediction errors; instruments: iv4 of ARX, riv of OE in a loop that is excited.",
     )
     offsets: str = option(
         "mean", choices=OFFSETS, doc="What is taken off each channel of each record."
@@ -148,6 +154,14 @@ class PolynomialStructure(Options):
                 "instruments and kernels belong to ARX models",
                 found=self.kind,
                 needed="nc, nd and nf zero",
+            )
+        if self.method == REFINED and self.kind != "OE":
+            raise OptionError(
+                "refined instruments belong to output error",
+                found=self.kind,
+                needed="nf above zero, na, nc and nd zero",
+                action="method='iv4' of ARX goes by way of an excitation too; ARMAX and BJ hold a "
+                "noise model, so that a loop does not bias them where it is large enough",
             )
         if self.kernel and (self.method == "iv4" or self.enforce_stability):
             raise OptionError(
