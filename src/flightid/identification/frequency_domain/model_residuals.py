@@ -309,7 +309,8 @@ class ModelResiduals:
     @cached_property
     def _sizes(self) -> Array:
         """Rms of each measured output, mean taken off, in the record that moves it most."""
-        return np.max([np.std(each, axis=1) for each in self.linear.output_records], axis=0)
+        sizes = [np.std(each, axis=1) for each in self.linear.output_records]
+        return np.asarray(np.max(sizes, axis=0))
 
     def _check(self, kept: Places, left: Array) -> None:
         for row in kept:
