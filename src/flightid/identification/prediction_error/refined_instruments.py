@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import FitError
+from flightid.frozen import dataclass
 from flightid.identification.prediction_error.coloured_errors import instrumental_covariance
 from flightid.identification.prediction_error.linear_regression import regress, require_errors
 from flightid.identification.prediction_error.part_blocks import errors_at
