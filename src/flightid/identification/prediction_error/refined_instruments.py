@@ -75,7 +75,7 @@ def refined_instruments(
         parts = _equations(structure, data, moved, theta, skip)
         instruments, regressors, left = (np.concatenate(rows) for rows in parts)
         require_errors(left.size, theta.size)
-        change = np.linalg.solve(instruments.T @ regressors, instruments.T @ left)
+        change: Array = np.linalg.solve(instruments.T @ regressors, instruments.T @ left)
         theta = _stable_step(structure, theta, change)
         if np.linalg.norm(change) <= SETTLED * np.linalg.norm(theta):
             parts = _equations(structure, data, moved, theta, skip)
