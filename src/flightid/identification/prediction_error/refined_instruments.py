@@ -75,7 +75,8 @@ def refined_instruments(
         parts = _equations(structure, data, moved, theta, skip)
         instruments, regressors, left = (np.concatenate(rows) for rows in parts)
         require_errors(left.size, theta.size)
-        change: Array = np.linalg.solve(instruments.T @ regressors, instruments.T @ left)
+        solved = np.linalg.solve(instruments.T @ regressors, instruments.T @ left)
+        change = np.asarray(solved, dtype=np.float64)
         theta = _stable_step(structure, theta, change)
         if np.linalg.norm(change) <= SETTLED * np.linalg.norm(theta):
             parts = _equations(structure, data, moved, theta, skip)
