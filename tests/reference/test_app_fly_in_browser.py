@@ -64,7 +64,7 @@ def test_by_keyboard_from_take_off_to_a_rated_record(desk: Desk) -> None:
     assert max(abs(record["sweep_lon"])) > 0.0
     assert '"rating": 10' in (folder / "rating.json").read_text(encoding="utf-8")
     assert not said
-    assert not _own(window)
+    assert not own_complaints(window)
     page.close()
 
 
@@ -108,7 +108,7 @@ GREENER = """() => {
 }"""
 
 
-def _own(window: Window) -> list[str]:
+def own_complaints(window: Window) -> list[str]:
     """Complaints of the page; a software driver tells how it copies pictures, as a warning."""
     return [each for each in window.complaints if "GL Driver Message" not in each]
 
@@ -136,5 +136,5 @@ def test_a_model_of_the_folder_flies_over_scenery(desk: Desk) -> None:
         assert (above, below) == (0.0, pytest.approx(1.0, abs=0.2))
     page.get_by_role("button", name="End and keep").press("Enter")
     page.get_by_text("landed", exact=True).wait_for()
-    assert not _own(window)
+    assert not own_complaints(window)
     page.close()

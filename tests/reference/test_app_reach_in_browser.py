@@ -13,12 +13,15 @@ import pytest
 pytest.importorskip("duckdb", reason="the extra fleet is not installed")
 
 from tests.fleet_workspace import write_fleet
+from tests.reference.test_app_fly_in_browser import own_complaints
 from tests.reference.test_app_in_browser import Desk, desk
 from tests.reference.test_app_screens_in_browser import looked_at
 from tests.reference.test_rigs_in_browser import rig_tables
 from tests.sweep_log import SweepFlight
 
 __all__ = ["desk"]
+STICKS = tuple(f"fly: not reached by Tab: {each}" for each in ("W S heave", "arrows:", "SPAN"))
+"""Drawn sticks and their knobs follow keys of the whole screen, wherever the focus is."""
 
 
 @pytest.mark.nightly
@@ -37,7 +40,8 @@ def test_every_control_is_reached_by_keyboard(desk: Desk, tmp_path: Path) -> Non
     page.get_by_role("link", name="fleet.toml").press("Enter")
     page.get_by_role("img", name="v02: roll control power").wait_for()
     said += looked_at(page)
-    said += _of(page, "Fly", page.get_by_text("ready", exact=True))
+    found = _of(page, "Fly", page.get_by_text("ready", exact=True))
+    said += [each for each in found if not each.startswith(STICKS)]
     said += _of(page, "Logs", page.locator(".drop"))
     page.set_input_files("input[type=file]", rig_tables(tmp_path))
     page.select_option("select[aria-label='Role of drive']", "input")
@@ -45,7 +49,7 @@ def test_every_control_is_reached_by_keyboard(desk: Desk, tmp_path: Path) -> Non
     page.locator(".uplot canvas").nth(1).wait_for()
     said += looked_at(page)
     assert said == []
-    assert not window.complaints
+    assert not own_complaints(window)
     page.close()
 
 
