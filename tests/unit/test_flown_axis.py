@@ -128,7 +128,7 @@ def test_a_shape_misses_by_three_tenths_at_most(miss: float, *, measured: bool) 
     if measured:
         assert_close(_fitted(base, omega, flown, error).gain, base.gain, rtol=0.1, why="the mean")
     else:
-        with pytest.raises(DataError, match="35% away from it"):
+        with pytest.raises(DataError, match="35 % away from it"):
             _fitted(base, omega, flown, error)
 
 

@@ -81,8 +81,8 @@ def test_right_loops_hold_and_wrong_ones_are_missed(seed: int) -> None:
 def test_an_interval_around_the_limit_tells_nothing() -> None:
     told = LoopCheck(0.27, 0.2, 0.35, 2.0, 20.0).finding("roll")
     assert (told.code, told.light) == ("loop-untold", Light.UNKNOWN)
-    assert "20% to 35%" in told.message
-    assert "holds to 30% is not told" in told.message
+    assert "20 % to 35 %" in told.message
+    assert "holds to 30 % is not told" in told.message
 
 
 def test_bounds_of_a_quadratic_form_hold_as_they_say() -> None:
