@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tests.bcg_trials import log_ratios
 
+from benchmarks.fleet_assumptions import broken_fleets, fleets_alarmed, small_fleets
 from flightid.fleet.statistics.drift import find_drift
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
 from flightid.fleet.statistics.local_level import follow_level
@@ -36,7 +37,7 @@ COLUMNS = (
 def run() -> Table:
     """Every row, printed as it is counted."""
     rows = []
-    for question, found, needed, of, used_s in (*_peers(), *_coverage(), *_drift()):
+    for question, found, needed, of, used_s in (*_peers(), *_coverage(), *_drift(), *_broken()):
         rows.append((question, found, needed, of, used_s))
     return Table("Statistics of a fleet", COLUMNS, tuple(rows))
 
@@ -215,3 +216,13 @@ def _drift() -> Iterator[Row]:
         told = f"{len(mine) / CHANGED:.1%} found, size held in {held:.1%}, {false} false"
         of = f"{CHANGED} of {VEHICLES} vehicles"
         yield _row(begun, f"steps by {change:.0%}", told, "found, with its size", of)
+
+
+def _broken() -> Iterator[Row]:
+    """Fleets that break what is assumed."""
+    for words, fleet in broken_fleets():
+        begun = process_time()
+        yield _row(begun, words, fleet.told(43), "few without change", f"{fleet.vehicles} vehicles")
+    for words, fleet in small_fleets():
+        begun = process_time()
+        yield _row(begun, words, fleets_alarmed(fleet), "at most 5 %, or all", "100 fleets")

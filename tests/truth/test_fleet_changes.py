@@ -186,8 +186,10 @@ def test_the_size_of_a_drift_is_all_of_it(fleets: int, n: int) -> None:
         values = np.repeat(1.0 + 0.1 * rng.normal(size=40), n) * (1.0 - fallen)
         values += errors * rng.normal(size=40 * n)
         names = np.repeat([f"{i:03}" for i in range(40)], n).tolist()
+        # Each at its own time: what all do by date is shared, and no vehicle's.
+        time_s = DAY_S * (k + 1000.0 * np.repeat(np.arange(40), n))
         data = FlightEstimates.of(
-            ["gain"], names, values[:, None], (errors**2)[:, None, None], time_s=DAY_S * k
+            ["gain"], names, values[:, None], (errors**2)[:, None, None], time_s=time_s
         )
         for each in find_drift(data).alarms:
             low, high = each.change_percent.interval95 or (0.0, 0.0)
@@ -226,8 +228,13 @@ def test_a_changed_vehicle_is_found_and_a_battery_is_none() -> None:
     assert not found.histories[5].events
     slope = next(each for each in found.slopes["gain"] if each.name == "battery")
     assert slope.value == pytest.approx(0.02, abs=0.003)
-    # Without the covariates their effect is a step on every vehicle.
-    assert len(find_drift(data).alarms) == 12
+    # Without the covariates the new firmware is a step of all vehicles, and of none by itself.
+    bare = find_drift(data)
+    assert [each.vehicle for each in bare.alarms] == ["000"]
+    (shared,) = bare.shared
+    assert shared.is_step
+    assert shared.change.value == pytest.approx(8.0, abs=4.0 * (shared.change.stderr or 0.0))
+    assert 10 * DAY_S <= shared.since_s <= 11 * DAY_S
 
 
 def test_understated_errors_show_in_repeats_and_raise_no_alarm() -> None:

@@ -38,7 +38,7 @@ from flightid.fleet.page import (
     refused_table,
 )
 from flightid.fleet.statistics.answers import FleetAnswers, TypeAnswers
-from flightid.fleet.statistics.drift import ParameterHistory
+from flightid.fleet.statistics.parameter_history import ParameterHistory
 from flightid.table import Table
 from flightid.uncertainty.quantiles import half_width, showing, shown
 

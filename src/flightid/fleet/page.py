@@ -7,14 +7,15 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from flightid.conventions import Light
 from flightid.findings import Finding, counted
+from flightid.fleet.drift_lights import errors_lights, shared_lights
 from flightid.fleet.normality import MORE, quiet_light
 from flightid.fleet.pictures import history_picture, type_picture
 from flightid.fleet.reasons import grouped_reasons, reasons_table
 from flightid.fleet.statistics.answers import FleetAnswers, Row, TypeAnswers, fitted_share
 from flightid.fleet.statistics.change_kind import DRIFT, STEP
-from flightid.fleet.statistics.drift import FleetDrift, ParameterHistory
+from flightid.fleet.statistics.drift import FleetDrift
 from flightid.fleet.statistics.multiple_testing import chance_cell
-from flightid.fleet.statistics.repeats import RepeatScatter
+from flightid.fleet.statistics.parameter_history import ParameterHistory
 from flightid.report.content import Block, Document, Lights, Paragraph, Section, TableBlock
 from flightid.report.figures import figure_block
 from flightid.table import Cell, Column, Table
@@ -116,13 +117,17 @@ def _counts(found: Sequence[Finding]) -> Iterator[Finding]:
 
 
 def vehicle_light(vehicle: str, types: Sequence[TypeAnswers]) -> Finding:
-    """Light of one vehicle: changed is red, unlike its type amber."""
+    """Light of one vehicle: changed is red; its newest flight off, or unlike its type, amber."""
     said, light = [], Light.GREEN
     for each in types:
         for history in each.drift.alarms if each.drift is not None else ():
             if history.vehicle == vehicle:
                 said.append(change_words(history, each.labels))
                 light = Light.RED
+        for newest in each.drift.newest_off if each.drift is not None else ():
+            if newest.vehicle == vehicle:
+                said.append(newest.words(each.labels))
+                light = Light.RED if light is Light.RED else Light.AMBER
         for one in each.outliers.odd if each.outliers is not None else ():
             if one.vehicle == vehicle:
                 said.append(one.words(each.labels))
@@ -168,8 +173,9 @@ def _type_blocks(each: TypeAnswers) -> Iterator[Block]:
 
 
 def _drift_blocks(drift: FleetDrift, labels: Mapping[str, str]) -> Iterator[Block]:
-    lights = tuple(_errors_light(each, labels.get(each.name, each.name)) for each in drift.repeats)
-    yield Lights(lights, "Errors of the estimates")
+    yield Lights(errors_lights(drift, labels), "Errors of the estimates")
+    if drift.shared:
+        yield Lights(shared_lights(drift, labels), "What all vehicles did together")
     slopes = _slopes(drift, labels)
     if slopes.rows:
         yield TableBlock(slopes)
@@ -191,25 +197,6 @@ def _drift_blocks(drift: FleetDrift, labels: Mapping[str, str]) -> Iterator[Bloc
 
 def _unchanged(changes: Table) -> str:
     return " ".join(("Nothing changed:", changes.notes[0], *changes.notes[1:]))
-
-
-def _errors_light(scatter: RepeatScatter, name: str) -> Finding:
-    ends = scatter.understated_ends(shown())
-    if ends is None:
-        return Finding(
-            "repeats",
-            Light.UNKNOWN,
-            f"{name}: no vehicle flew twice on a day, so its errors are taken as stated",
-            "fly some vehicles twice a day: scatter beyond the errors would count as change",
-        )
-    words = (
-        f"{name}: flights of one day scatter {scatter.understated:.2f} times their errors "
-        f"({ends[0]:.2f} to {ends[1]:.2f}; χ² {scatter.chi2:.0f} of {scatter.freedom})"
-    )
-    if scatter.errors_hold:
-        return Finding("repeats", Light.GREEN, words)
-    act = "errors were made as large before anything was called a change"
-    return Finding("repeats", Light.AMBER, words, act)
 
 
 def _slopes(drift: FleetDrift, labels: Mapping[str, str]) -> Table:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from flightid.fleet.statistics.drift import ParameterHistory
+from flightid.fleet.statistics.parameter_history import ParameterHistory
 from flightid.fleet.statistics.population import Population
 from flightid.plot import graph_objects as go
 from flightid.plot import look

@@ -16,20 +16,23 @@ from flightid.fleet.statistics.covariates import (
     design_covariates,
     fit_covariates,
 )
-from flightid.fleet.statistics.events import EventEffect, FleetEvent, event_effect
+from flightid.fleet.statistics.events import FleetEvent, event_effect
+from flightid.fleet.statistics.flight_errors import NOTABLE, ErrorScale, error_scale
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
 from flightid.fleet.statistics.largest_step import (
     FEWEST,
     SHORTEST,
-    StepScan,
     scan_changes,
     scan_drifts,
     scan_steps,
 )
-from flightid.fleet.statistics.local_level import LocalLevel, follow_level
+from flightid.fleet.statistics.local_level import follow_level
 from flightid.fleet.statistics.multiple_testing import FALSE_SHARE, chance_cell, corrected
-from flightid.fleet.statistics.neighbours import neighbour_factor, variances_with_odd_ones
+from flightid.fleet.statistics.neighbours import variances_with_odd_ones
+from flightid.fleet.statistics.newest_flight import NewestFlight, judged_newest, newest_flights
+from flightid.fleet.statistics.parameter_history import ParameterHistory, StepEnds
 from flightid.fleet.statistics.repeats import RepeatScatter, repeat_scatter
+from flightid.fleet.statistics.shared_level import SharedLevel, shared_level, without_shared
 from flightid.fleet.statistics.wandering import wandering_chance
 from flightid.frozen import dataclass
 from flightid.result import Result
@@ -38,76 +41,7 @@ from flightid.uncertainty.estimate import Estimate, Reading
 from flightid.uncertainty.quantiles import interval_words, shown
 
 Array = NDArray[np.float64]
-TESTS = 2
-"""Tests of a series, a step and a walk, of which the less likely counts times this."""
 TOO_FEW = f"fewer than {FEWEST} flights"
-
-
-@dataclass(frozen=True)
-class StepEnds:
-    """Ends of the interval of a step whose place is not known, percent of the level before."""
-
-    scan: StepScan
-
-    def __call__(self, level: float) -> tuple[float, float]:
-        """Lower and upper end at a level."""
-        return self.scan.percent_ends(level)
-
-
-@dataclass(frozen=True, eq=False)
-class ParameterHistory:
-    """One parameter of one vehicle over time, what covariates explain taken out.
-
-    Attributes
-    ----------
-    vehicle, name, unit : str
-    time_s : ndarray, shape (n,)
-    values, variances : ndarray, shape (n,)
-        What covariates explain is out, by the slopes of all flights; errors as repeats show them.
-    track : LocalLevel
-        The level behind them.
-    step_chance, walk_chance : float or None
-        Chance of a largest step, and of wandering, as large were there none; None with too few
-        flights.
-    change_percent : Estimate
-        Largest step, percent of the level before it, with its interval over all places it may have.
-        Of an alarm that is drift: the last flight beside the level before it began, of a movement
-        that is steady from then on; where flights do not tell which: of both, as well as each fits.
-    changed_s : tuple of float or None
-        Last flight before the step and first behind it at the earliest and latest place, s.
-    false_share : float or None
-        Benjamini–Hochberg over all vehicles and parameters; an alarm at 0.05 or less.
-    events : tuple of EventEffect
-    kind : str
-        Of an alarm: ``"a step"``, ``"drift"``, or ``"changed"`` where its flights do not tell.
-    """
-
-    vehicle: str
-    name: str
-    unit: str
-    time_s: Array
-    values: Array
-    variances: Array
-    track: LocalLevel
-    step_chance: float | None
-    walk_chance: float | None
-    change_percent: Reading
-    changed_s: tuple[float, float] | None
-    false_share: float | None = None
-    events: tuple[EventEffect, ...] = ()
-    kind: str = ""
-
-    @property
-    def chance(self) -> float | None:
-        """Chance of either were there neither; None with too few flights."""
-        if self.step_chance is None or self.walk_chance is None:
-            return None
-        return min(1.0, TESTS * min(self.step_chance, self.walk_chance))
-
-    @property
-    def is_alarm(self) -> bool:
-        """Whether it changed, false alarms of the whole fleet accounted for."""
-        return self.false_share is not None and self.false_share <= FALSE_SHARE
 
 
 Asked = tuple[ParameterHistory, Array, Array]
@@ -129,6 +63,12 @@ class FleetDrift(Result, schema="flightid.fleet_drift/1"):
         Flights that do not tell a covariate.
     odd_flights : mapping of str to int
         By parameter: flights so far off those before and after them that they count for less.
+    errors : mapping of str to ErrorScale
+        By parameter: what stated errors were taken for.
+    shared : tuple of SharedLevel
+        What all vehicles did together, which no history holds.
+    newest : tuple of NewestFlight
+        The newest flight of each vehicle beside those before it; of no change.
 
     Example
     -------
@@ -147,6 +87,9 @@ class FleetDrift(Result, schema="flightid.fleet_drift/1"):
     slopes: Mapping[str, tuple[Reading, ...]]
     covariates_missing: Mapping[str, int]
     odd_flights: Mapping[str, int]
+    errors: Mapping[str, ErrorScale]
+    shared: tuple[SharedLevel, ...]
+    newest: tuple[NewestFlight, ...]
 
     @property
     def alarms(self) -> tuple[ParameterHistory, ...]:
@@ -159,6 +102,13 @@ class FleetDrift(Result, schema="flightid.fleet_drift/1"):
         """Histories long enough to be asked, the least likely first."""
         found = [each for each in self.histories if each.chance is not None]
         return tuple(sorted(found, key=lambda each: each.chance or 0.0))
+
+    @property
+    def newest_off(self) -> tuple[NewestFlight, ...]:
+        """Newest flights that are off those before them, of what did not change."""
+        changed = {(each.vehicle, each.name) for each in self.alarms}
+        found = [each for each in self.newest if each.is_off]
+        return tuple(each for each in found if (each.vehicle, each.name) not in changed)
 
     @property
     def reason(self) -> str:
@@ -216,6 +166,13 @@ class FleetDrift(Result, schema="flightid.fleet_drift/1"):
         notes = (
             note,
             *((f"Flights far off those beside them count for less: {odd}.",) if odd else ()),
+            *(f"{each.words(named)}; no change of one." for each in self.shared),
+            *(f"{each.vehicle}: {each.words(named)}." for each in self.newest_off),
+            *(
+                f"{named.get(name, name)}: {each.words()}."
+                for name, each in self.errors.items()
+                if each.typical >= NOTABLE
+            ),
         )
         return Table("What changed", columns, tuple(rows), notes)
 
@@ -246,9 +203,9 @@ def find_drift(
 
     Assumes
     -------
-    Errors of flights are independent and normal, with the variances that are given times what
-    repeats within a day, or steps from flight to flight, show, whichever is more. Flights far off
-    those before and those after them count for less.
+    Errors of flights are independent and normal, with the variances of `error_scale`. What nearly
+    all vehicles share by date is no change of one (`shared_level`). Flights far off those before
+    and those after them count for less; the newest flight alone is no change (`newest_flights`).
 
     Reference
     ---------
@@ -257,21 +214,34 @@ def find_drift(
     design = design_covariates(covariates or {})
     histories: list[Asked] = []
     slopes: dict[str, tuple[Reading, ...]] = {}
-    bare = [fit_covariates(data, i, design, _variances(data, i)) for i in range(len(data.names))]
-    explained = _explained(data, design, bare)
-    repeats = repeat_scatter(explained)
     odd: dict[str, int] = {}
+    errors: dict[str, ErrorScale] = {}
+    newest: list[NewestFlight] = []
+    every, parameters = data, range(len(data.names))
+    bare = [fit_covariates(data, i, design, _variances(data, i)) for i in parameters]
+    explained = _explained(data, design, bare)
+    shared = [shared_level(explained, i) for i in parameters]
+    for i, one in enumerate(shared):
+        data, explained = without_shared(data, i, one), without_shared(explained, i, one)
+    repeats = repeat_scatter(explained)
     for i, name in enumerate(data.names):
-        factor = max(repeats[i].variance_factor, neighbour_factor(explained, i))
-        variances, off = variances_with_odd_ones(explained, i, factor)
+        repeated = repeats[i].variance_factor if repeats[i].freedom else None
+        errors[name] = error_scale(explained, i, repeated)
+        usual = errors[name].variances(_variances(data, i))
+        variances, off = variances_with_odd_ones(explained, i, usual)
         odd[name] = int(off.sum())
+        newest += newest_flights(explained, i, usual, variances)
         fitted = fit_covariates(data, i, design, variances)
         slopes[name] = fitted.effects
+        moved = every.values[:, i] - data.values[:, i]
         for vehicle in data.members:
-            found = _history(data, i, vehicle, design, fitted, variances, events)
+            found = _history(data, i, vehicle, design, fitted, variances, events, moved)
             if found is not None:
                 histories.append(found)
-    return FleetDrift(_judged(histories), repeats, slopes, design.missing, odd)
+    return FleetDrift(
+        *(_judged(histories), repeats, slopes, design.missing, odd, errors),
+        *(tuple(each for each in shared if each is not None), judged_newest(newest)),
+    )
 
 
 def _variances(data: FlightEstimates, i: int) -> Array:
@@ -296,6 +266,7 @@ def _history(
     fitted: CovariateSlopes,
     errors: Array,
     events: Sequence[FleetEvent],
+    moved: Array,
 ) -> Asked | None:
     rows = np.flatnonzero((data.member_of == data.members.index(vehicle)) & data.known[:, i])
     if not len(rows):
@@ -318,7 +289,11 @@ def _history(
         Estimate(name, None, "%", reason=TOO_FEW),
         None,
         events=tuple(
-            event_effect(event, name, unit, tested, covariance, time_s)
+            # What was done to all vehicles is in what they share.
+            event_effect(
+                *(event, name, unit, tested if event.vehicles else tested + moved[rows]),
+                *(covariance, time_s),
+            )
             for event in events
             if event.concerns(vehicle)
         ),

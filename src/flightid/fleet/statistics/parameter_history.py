@@ -1,0 +1,84 @@
+"""One parameter of one vehicle over time, with the chance that nothing changed."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.fleet.statistics.events import EventEffect
+from flightid.fleet.statistics.largest_step import StepScan
+from flightid.fleet.statistics.local_level import LocalLevel
+from flightid.fleet.statistics.multiple_testing import FALSE_SHARE
+from flightid.frozen import dataclass
+from flightid.uncertainty.estimate import Reading
+
+Array = NDArray[np.float64]
+TESTS = 2
+"""Tests of a series, a step and a walk, of which the less likely counts times this."""
+
+
+@dataclass(frozen=True)
+class StepEnds:
+    """Ends of the interval of a step whose place is not known, percent of the level before."""
+
+    scan: StepScan
+
+    def __call__(self, level: float) -> tuple[float, float]:
+        """Lower and upper end at a level."""
+        return self.scan.percent_ends(level)
+
+
+@dataclass(frozen=True, eq=False)
+class ParameterHistory:
+    """One parameter of one vehicle over time, what covariates explain taken out.
+
+    Attributes
+    ----------
+    vehicle, name, unit : str
+    time_s : ndarray, shape (n,)
+    values, variances : ndarray, shape (n,)
+        What covariates explain is out, by the slopes of all flights; errors as repeats show them.
+    track : LocalLevel
+        The level behind them.
+    step_chance, walk_chance : float or None
+        Chance of a largest step, and of wandering, as large were there none; None with too few
+        flights.
+    change_percent : Estimate
+        Largest step, percent of the level before it, with its interval over all places it may have.
+        Of an alarm that is drift: the last flight beside the level before it began, of a movement
+        that is steady from then on; where flights do not tell which: of both, as well as each fits.
+    changed_s : tuple of float or None
+        Last flight before the step and first behind it at the earliest and latest place, s.
+    false_share : float or None
+        Benjamini–Hochberg over all vehicles and parameters; an alarm at 0.05 or less.
+    events : tuple of EventEffect
+    kind : str
+        Of an alarm: ``"a step"``, ``"drift"``, or ``"changed"`` where its flights do not tell.
+    """
+
+    vehicle: str
+    name: str
+    unit: str
+    time_s: Array
+    values: Array
+    variances: Array
+    track: LocalLevel
+    step_chance: float | None
+    walk_chance: float | None
+    change_percent: Reading
+    changed_s: tuple[float, float] | None
+    false_share: float | None = None
+    events: tuple[EventEffect, ...] = ()
+    kind: str = ""
+
+    @property
+    def chance(self) -> float | None:
+        """Chance of either were there neither; None with too few flights."""
+        if self.step_chance is None or self.walk_chance is None:
+            return None
+        return min(1.0, TESTS * min(self.step_chance, self.walk_chance))
+
+    @property
+    def is_alarm(self) -> bool:
+        """Whether it changed, false alarms of the whole fleet accounted for."""
+        return self.false_share is not None and self.false_share <= FALSE_SHARE

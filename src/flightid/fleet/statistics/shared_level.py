@@ -1,0 +1,244 @@
+"""What all vehicles of a type share by date: air, season, a firmware for all; no vehicle's change.
+
+Vehicles are held against it before anything is called a change of theirs, and it is a finding by
+itself.
+"""
+
+from __future__ import annotations
+
+import datetime
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import bdtrc
+
+from flightid.fleet.statistics.flight_estimates import FlightEstimates
+from flightid.frozen import dataclass
+from flightid.uncertainty.estimate import Estimate
+from flightid.uncertainty.quantiles import shown
+
+Array = NDArray[np.float64]
+Places = NDArray[np.intp]
+WEEK_S, DAY_S = 7.0 * 86400.0, 86400.0
+FEWEST_VEHICLES = 5
+"""In a week, below which nothing is called shared."""
+AGREEING = 0.85
+"""Share of vehicles that move with the others, from which all do: of a change of fewer than 70 % of
+vehicles, with the others by chance either way, as many seem to."""
+CHANCE = 0.05
+"""Of as many vehicles that agree were each as likely not to."""
+STEPLIKE = 0.9
+"""Share of the squares of a shared level that one step explains, from which it is one; of a wave it
+explains 81 %."""
+SMALL = 30
+"""Vehicles, up to which one counts in the median it is held against."""
+NORMAL_MAD = 1.4826022185056018
+
+
+@dataclass(frozen=True, eq=False)
+class SharedLevel:
+    """How one parameter of all vehicles of a type moved together.
+
+    Attributes
+    ----------
+    name : str
+    moved : ndarray, shape (n,)
+        By flight, in the unit of the parameter; taken out of every vehicle.
+    variances : ndarray, shape (n,)
+        Of `moved`.
+    is_step : bool
+        Whether one step explains nine tenths of it.
+    since_s : float
+        First instant behind the step that explains most.
+    change : Estimate
+        That step: percent of each vehicle's median, or in the unit where a median may be zero.
+    least, most : float
+        Of the whole movement, in the unit of `change`.
+    vehicles, agreeing : int
+        Vehicles that tell it, and those of them that move with the others.
+    """
+
+    name: str
+    moved: Array
+    variances: Array
+    is_step: bool
+    since_s: float
+    change: Estimate
+    least: float
+    most: float
+    vehicles: int
+    agreeing: int
+
+    def words(self, labels: Mapping[str, str]) -> str:
+        """What all did together; dates on the clock of Unix."""
+        name = labels.get(self.name, self.name)
+        unit = "" if self.change.unit == "1" else f" {self.change.unit}"
+        whose = f"{self.agreeing} of {self.vehicles} vehicles"
+        if not self.is_step:
+            ends = f"{self.least:+.2g} to {self.most:+.2g}{unit} of its usual value"
+            return f"{name}: all vehicles moved together by date, {ends} ({whose})"
+        since = datetime.datetime.fromtimestamp(self.since_s, datetime.UTC).date().isoformat()
+        low, high = self.change.interval(shown()) or (-np.inf, np.inf)
+        by = f"{self.change.value:+.2g}{unit} ({low:+.2g} to {high:+.2g}{unit})"
+        return f"{name}: all vehicles changed together by {by} from {since} ({whose})"
+
+
+def shared_level(data: FlightEstimates, i: int) -> SharedLevel | None:
+    """Find what vehicles of a type share by date, where nearly all move alike.
+
+    r = y / m − 1 with the median m of each vehicle (y − m where a median may be zero); the shared
+    level of a week is the median of r over its flights, weeks parted at the largest common step.
+    It counts where ≥ 85 % of vehicles have Σ r c > 0 with the level c of the others, and so many by
+    chance in less than 5 %.
+
+    Parameters
+    ----------
+    data : FlightEstimates
+        What covariates explain taken out.
+    i : int
+        Place of the parameter.
+
+    Returns
+    -------
+    SharedLevel or None
+        None where no two weeks have five vehicles, or vehicles do not agree.
+
+    Assumes
+    -------
+    Vehicles that fly over the same time: of those that fly one after the other their medians take
+    most of it. A change of most vehicles at one date is shared by this definition; those that did
+    not change then look changed, the other way.
+    """
+    rows = np.flatnonzero(data.known[:, i])
+    if len(set(data.member_of[rows])) < FEWEST_VEHICLES:
+        return None
+    scale, residual, in_percent = _residuals(data, i, rows)
+    member, time_s = data.member_of[rows], data.time_s[rows]
+    since = _common_step(residual, member, time_s)
+    if since is None:
+        return None
+    _, bins = np.unique(2 * np.floor(time_s / WEEK_S) + (time_s >= since), return_inverse=True)
+    level, variance, counts = _levels(residual, member, bins)
+    if np.count_nonzero(counts) < 2:
+        return None
+    agreeing, vehicles = _agreeing(residual, member, bins, level)
+    if agreeing < AGREEING * vehicles or bdtrc(agreeing - 1, vehicles, 0.5) > CHANCE:
+        return None
+    moved, variances = np.zeros(len(data.vehicles)), np.zeros(len(data.vehicles))
+    moved[rows], variances[rows] = scale * level[bins], scale**2 * variance[bins]
+    there = counts > 0
+    after = np.array([time_s[bins == b].min() >= since for b in np.flatnonzero(there)])
+    told = _step(level[there], variance[there], counts[there], after)
+    size, unit = (100.0, "%") if in_percent else (1.0, data.units[i])
+    return SharedLevel(
+        data.names[i],
+        moved,
+        variances,
+        told[2] >= STEPLIKE,
+        since,
+        Estimate(data.names[i], size * told[0], unit, size * told[1]),
+        size * float(level[there].min()),
+        size * float(level[there].max()),
+        vehicles,
+        agreeing,
+    )
+
+
+def without_shared(data: FlightEstimates, i: int, shared: SharedLevel | None) -> FlightEstimates:
+    """Estimates without what all vehicles share, which is as uncertain as it is."""
+    if shared is None:
+        return data
+    values, covariances = data.values.copy(), data.covariances.copy()
+    values[:, i] -= shared.moved
+    covariances[:, i, i] += shared.variances
+    return replace(data, values=values, covariances=covariances)
+
+
+def _residuals(data: FlightEstimates, i: int, rows: Places) -> tuple[Array, Array, bool]:
+    """Scale of each flight's vehicle, and flights about their vehicle's median in that scale."""
+    values, member = data.values[rows, i], data.member_of[rows]
+    median = np.zeros(len(data.members))
+    for each in np.unique(member):
+        median[each] = np.median(values[member == each])
+    own = median[member]
+    in_percent = bool(np.all(np.abs(own) > 3.0 * np.sqrt(np.median(data.covariances[rows, i, i]))))
+    scale = np.abs(own) if in_percent else np.ones(len(rows))
+    return scale, (values - own) / scale, in_percent
+
+
+def _common_step(residual: Array, member: Places, time_s: Array) -> float | None:
+    """First day behind the largest step of the days' medians; None with too few vehicles."""
+    days, day = np.unique(np.floor(time_s / DAY_S), return_inverse=True)
+    medians = np.array([np.median(residual[day == d]) for d in range(len(days))])
+    counts = np.bincount(day).astype(np.float64)
+    best, since = -1.0, None
+    total, whole = float(counts @ medians), float(counts.sum())
+    before, weight = np.cumsum(counts * medians), np.cumsum(counts)
+    for place in _told_on_both_sides(day, member):
+        n = float(weight[place - 1])
+        apart = float(before[place - 1]) / n - (total - float(before[place - 1])) / (whole - n)
+        if n * (whole - n) * apart**2 > best:
+            best, since = n * (whole - n) * apart**2, float(days[place] * DAY_S)
+    return since
+
+
+def _told_on_both_sides(day: Places, member: Places) -> list[int]:
+    """Days with five vehicles before them, and five on them or behind."""
+    _, vehicle = np.unique(member, return_inverse=True)
+    first, last = np.full(vehicle.max() + 1, day.max()), np.zeros(vehicle.max() + 1, dtype=np.intp)
+    np.minimum.at(first, vehicle, day)
+    np.maximum.at(last, vehicle, day)
+    before, behind = np.sort(first), np.sort(last)
+    places = np.arange(1, int(day.max()) + 1)
+    many = np.searchsorted(before, places) >= FEWEST_VEHICLES
+    many &= len(behind) - np.searchsorted(behind, places) >= FEWEST_VEHICLES
+    return [int(each) for each in places[many]]
+
+
+def _levels(residual: Array, member: Places, bins: Places) -> tuple[Array, Array, Array]:
+    """Median of each week, its variance and its flights; 0 where fewer than five vehicles flew."""
+    count = int(bins.max()) + 1
+    level, variance, flights = np.zeros(count), np.zeros(count), np.zeros(count)
+    for b in range(count):
+        mine = bins == b
+        if len(np.unique(member[mine])) < FEWEST_VEHICLES:
+            continue
+        each = residual[mine]
+        level[b], flights[b] = np.median(each), len(each)
+        deviation = NORMAL_MAD * float(np.median(np.abs(each - level[b])))
+        variance[b] = 0.5 * np.pi * deviation**2 / len(each)
+    return level, variance, flights
+
+
+def _agreeing(residual: Array, member: Places, bins: Places, level: Array) -> tuple[int, int]:
+    """Vehicles that move with the others, and all that can tell."""
+    agreeing, vehicles = 0, np.unique(member)
+    for each in vehicles:
+        mine = member == each
+        beside = level
+        if len(vehicles) <= SMALL:
+            beside = np.zeros(len(level))
+            for b in np.unique(bins[mine]):
+                others = residual[(bins == b) & ~mine]
+                if level[b] != 0.0 and len(others):
+                    beside[b] = np.median(others)
+        # Each vehicle about its own level: it knows of the movement, not of where it stands.
+        course = beside[bins[mine]] - beside[bins[mine]].mean()
+        agreeing += bool(course @ residual[mine] > 0.0)
+    return agreeing, len(vehicles)
+
+
+def _step(
+    level: Array, variance: Array, counts: Array, after: NDArray[np.bool_]
+) -> tuple[float, float, float]:
+    """Step of weekly levels, its standard error, and the share of their squares it explains."""
+    shares = [
+        np.where(side, counts, 0.0) / max(counts[side].sum(), 1.0) for side in (~after, after)
+    ]
+    means = [float(share @ level) for share in shares]
+    stderr = float(np.sqrt(sum(float(share**2 @ variance) for share in shares)))
+    every = float(np.sum(counts * (level - np.average(level, weights=counts)) ** 2))
+    left = float(np.sum(counts * (level - np.where(after, means[1], means[0])) ** 2))
+    return means[1] - means[0], stderr, 1.0 - left / every if every > 0.0 else 0.0
