@@ -91,6 +91,11 @@ def test_worst_lies_beyond_nominal_and_the_flown_gains_stand_beside(design: fid.
     assert crossover.flown is not None
     assert crossover.nominal is not None
     assert crossover.nominal > 1.2 * crossover.flown
+    # An upper limit: its worst plant is the one that crosses highest.
+    assert crossover.required.startswith("≤")
+    assert crossover.worst is not None
+    assert crossover.worst > crossover.nominal
+    assert crossover.flown_worst is None or crossover.flown_worst > crossover.flown
 
 
 def test_steps_never_exceed_the_limit_and_end_at_the_new_gains(design: fid.PidDesign) -> None:

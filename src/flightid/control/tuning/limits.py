@@ -37,6 +37,8 @@ class Limit:
         Values of the number to slack, at least 0 where the requirement is met.
     highest : bool
         Whether the highest crossover is meant where there are several.
+    most : bool
+        Whether the number may be at most so much: its worst plant has the largest.
     """
 
     name: str
@@ -45,6 +47,7 @@ class Limit:
     text: str
     slack: Callable[[Array], Array]
     highest: bool = False
+    most: bool = False
 
 
 def limits(
@@ -66,7 +69,9 @@ def limits(
         text = f"≤ {crossover_limit_rad_s:.4g}"
         below = _below(crossover_limit_rad_s)
         made.append(
-            Limit("identified band", names[0], "crossover_rad_s", text, below, highest=True)
+            Limit(
+                "identified band", names[0], "crossover_rad_s", text, below, highest=True, most=True
+            )
         )
     return (*made, *(limit for limit in _targets(need, names[0]) if limit.loop in names))
 
@@ -92,6 +97,7 @@ def _margins(need: TuningRequirements, loop: str) -> Iterator[Limit]:
         "sensitivity_peak",
         f"≤ {need.peak:.4g}",
         _peak(need.peak),
+        most=True,
     )
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from flightid.control.autopilots import AxisLoop
 from flightid.control.margins.resonance_slack import TAKEN, ResonanceSlack
-from flightid.control.tuning.limits import ANGLE, limits
+from flightid.control.tuning.limits import ANGLE, Limit, limits
 from flightid.control.tuning.loop_problem import LoopAssessment, LoopProblem
 from flightid.control.tuning.margins_beyond import rooms_left
 from flightid.frozen import dataclass
@@ -33,8 +33,9 @@ class WorstCase:
         Of the estimated plant, with the middle of all plants as its interval; no value where there
         is no such crossing, no interval where there is one plant, or a crossing is missing.
     worst : float or None
-        Of all plants, and no better than a resonance above the identified band may leave it; none
-        where one of them reads it there, or such a resonance may leave less than is required.
+        Of all plants, on the side of its limit, and no better than a resonance above the identified
+        band may leave it; none where one of them reads it there, or such a resonance may leave less
+        than is required.
     flown, flown_worst : float or None
         The same with the gains of the log; None where they are not stable either.
     required : str
@@ -139,7 +140,9 @@ def worst_cases(
     new = problem.judge(gains[None]) if judged is None else judged
     left = rooms_left(problem, gains, band_rad_s)
     made = []
-    for loop, kind in _wanted(new):
+    for loop, usual in _wanted(new):
+        asked = _asked(problem, new, loop, usual)
+        kind = replace(usual, more=_more_is_better(new, asked, usual))
         values = np.asarray(getattr(new.metrics[loop], kind.field))[0]
         before = None if old is None else np.asarray(getattr(old.metrics[loop], kind.field))[0]
         steady = old is not None and bool(old.stable[0, 0])
@@ -159,7 +162,7 @@ def worst_cases(
                 _worst(before, kind.more)
                 if before is not None and old is not None and bool(old.stable.all())
                 else None,
-                *_requirement(problem, new, loop, kind),
+                *_requirement(new, asked),
             )
         )
     made.append(_noise(problem, new, old))
@@ -173,17 +176,29 @@ def _wanted(judged: LoopAssessment) -> Iterator[tuple[str, _Kind]]:
                 yield loop, kind
 
 
-def _requirement(
-    problem: LoopProblem, judged: LoopAssessment, loop: str, kind: _Kind
-) -> tuple[str, bool]:
-    """What was asked of a number, in words, and whether all plants meet it."""
-    asked = [
+def _asked(problem: LoopProblem, judged: LoopAssessment, loop: str, kind: _Kind) -> list[Limit]:
+    """Requirements on a number."""
+    return [
         limit
         for limit in limits(problem.requirements, judged.metrics, problem.crossover_limit_rad_s)
         if (limit.loop, limit.field) == (loop, kind.field)
     ]
-    rows = [judged.slack[judged.names.index(limit.name), 0] for limit in asked]
-    met = all(bool((row >= 0.0).all()) for row in rows)
+
+
+def _slack(judged: LoopAssessment, limit: Limit) -> Array:
+    return np.asarray(judged.slack[judged.names.index(limit.name), 0])
+
+
+def _more_is_better(judged: LoopAssessment, asked: list[Limit], kind: _Kind) -> bool:
+    """On which side the worst plant is: that of the limit which a plant comes nearest to."""
+    if not asked:
+        return kind.more
+    return not min(asked, key=lambda limit: float(_slack(judged, limit).min())).most
+
+
+def _requirement(judged: LoopAssessment, asked: list[Limit]) -> tuple[str, bool]:
+    """What was asked of a number, in words, and whether all plants meet it."""
+    met = all(bool((_slack(judged, limit) >= 0.0).all()) for limit in asked)
     return " and ".join(limit.text for limit in asked), met
 
 
