@@ -18,7 +18,7 @@ pytest.importorskip("fastapi", reason="the extra app is not installed")
 from flightid.app import run_work
 from flightid.app.kept_parts import kept_part
 from flightid.app.rigs import Rigs
-from flightid.app.run_routes import _packed
+from flightid.app.run_routes import _left_out, _packed
 from flightid.app.studies import Studies
 from flightid.app.study_edits import etag_of
 from flightid.app.workspace import Workspace
@@ -100,6 +100,8 @@ def test_a_zip_follows_no_link_and_says_what_it_lacks(tmp_path: Path) -> None:
     os.utime(made / "old.txt", (0, 0))
     (made / "k.txt").symlink_to(secret)
     backstage: Any = SimpleNamespace(workspace=workspace)
+    assert _left_out(workspace, "0" * 16) == [str(far)]
+    assert _left_out(workspace, "1" * 16) == []
     with _packed(backstage, "0" * 16, made) as packed, zipfile.ZipFile(packed) as archive:
         names = archive.namelist()
         assert str(far) in archive.read("NOT_IN_HERE.txt").decode()

@@ -14,7 +14,9 @@ from flightid.app.rig_work import make_rig
 from flightid.app.rigs import Rigs
 from flightid.app.study_edits import KeyEdit, edited
 from flightid.app.workspace import Workspace
-from flightid.errors import FileFormatError, OptionError
+from flightid.errors import FileFormatError, OptionError, StudyError
+from flightid.record import read_records
+from flightid.study.proposal.columns import columns_of
 
 TABLE = b"t,u,y\n0,1,2\n1,0,3\n2,1,1\n"
 
@@ -53,6 +55,16 @@ def test_a_file_without_time_says_so_and_reads_with_a_sample_time(tmp_path: Path
     told = make_rig([path], {"sample_time_s": 0.5})
     assert told["files"][0]["manoeuvres"][0]["stop_s"] == 19.5
     assert (told["inputs"], told["outputs"]) == (["u"], ["y"])
+
+
+def test_what_is_untold_is_told_without_flags_of_the_command_line(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("time,$(x) b,c d\n" + "".join(f"{k},{k % 2},{k % 3}\n" for k in range(40)))
+    told = make_rig([path], {})["untold"]
+    assert told.startswith("the columns do not tell which are inputs")
+    assert "--" not in told
+    with pytest.raises(StudyError, match=r"name them: --inputs '\$\(x\) b'"):
+        columns_of(read_records(path), (), ())
 
 
 def test_a_column_that_stands_still_has_a_row_as_well(tmp_path: Path) -> None:

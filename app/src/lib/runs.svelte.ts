@@ -6,6 +6,8 @@ import type { Job, RunPart } from "./types";
 export class Runs {
   part: RunPart | null = $state(null);
   job: Job | null = $state(null);
+  /** Files that the study names and a zip of it does not hold. */
+  leftOut: string[] = $state([]);
   error = $state("");
 
   constructor(readonly log: string) {
@@ -37,6 +39,7 @@ export class Runs {
     try {
       const told = await asked;
       this.part = told.run;
+      this.leftOut = told.left_out;
       this.job = told.jobs[0] ?? null;
       this.error = this.job?.state === "failed" ? this.job.reason : "";
     } catch (problem) {

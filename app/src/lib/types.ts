@@ -820,10 +820,11 @@ export interface RunPart {
   sections: Record<string, unknown>[];
 }
 
-/** The last run that ended, and the one that goes on. */
+/** The last run that ended, the one that goes on, and files that a zip leaves out. */
 export interface RunScreen {
   run: RunPart | null;
   jobs: Job[];
+  left_out: string[];
 }
 
 /** Two sides in the grammar of model files; a transfer function carries its delay, s. */

@@ -36,7 +36,8 @@ def make_rig(paths: Sequence[Path], reading: Mapping[str, Any]) -> dict[str, Any
             told = columns_of(records, (), ())
             inputs, outputs = told.inputs, told.outputs
         except FlightidError as error:
-            untold = str(error)
+            # What to do is the page's to say: it has no flags.
+            untold = error.reason
     return {
         "files": [each.model_dump() for each in files],
         "inputs": list(inputs),

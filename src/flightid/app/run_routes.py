@@ -19,6 +19,8 @@ from flightid.app.kept_parts import kept_part
 from flightid.app.own_folders import is_link, read_plain, shown_name
 from flightid.app.run_schemas import RunPart, RunScreen
 from flightid.app.run_work import FIGURES
+from flightid.app.workspace import Workspace
+from flightid.errors import FlightidError
 from flightid.plot.graph_objects import plotting_library
 from flightid.study.output import WRITTEN
 from flightid.study.run import named_paths
@@ -46,7 +48,9 @@ def add_run_routes(app: FastAPI, backstage: Backstage) -> None:
     async def screen(log: LogName) -> RunScreen:
         found = await asyncio.to_thread(kept_part, workspace, log, "run")
         jobs = [job for job in workers.of_log(log) if job.kind == "run"]
-        return RunScreen(run=found if isinstance(found, RunPart) else None, jobs=jobs)
+        left = await asyncio.to_thread(_left_out, workspace, log)
+        part = found if isinstance(found, RunPart) else None
+        return RunScreen(run=part, jobs=jobs, left_out=left)
 
     @app.post("/api/runs/{log}")
     async def run(log: LogName) -> RunScreen:
@@ -90,23 +94,40 @@ def add_run_routes(app: FastAPI, backstage: Backstage) -> None:
         return Response(text, media_type="text/javascript; charset=utf-8")
 
 
-def _packed(backstage: Backstage, log: str, folder: Path) -> IO[bytes]:
-    """Study, data and results under the paths of the workspace, so that the study runs again."""
-    workspace, study = backstage.workspace, backstage.workspace.study_path(log)
-    held: list[Path] = [study]
+def _left_out(workspace: Workspace, log: str) -> list[str]:
+    """Files that a zip cannot hold; none where the study is not there, or cannot be read."""
+    study = workspace.study_path(log)
+    if is_link(study) or not study.is_file():
+        return []
+    try:
+        return [shown_name(path) for path in _named_files(workspace, study)[1]]
+    except (FlightidError, OSError):
+        return []
+
+
+def _named_files(workspace: Workspace, study: Path) -> tuple[list[Path], list[Path]]:
+    """Files that a study names: those in the folder of the page, and those elsewhere or missing."""
+    held: list[Path] = []
     elsewhere: list[Path] = []
     for path in dict.fromkeys(named_paths(read_settings(study))):
         place = (path if path.is_absolute() else study.parent / path).resolve()
         inside = place.is_file() and place.is_relative_to(workspace.folder)
         (held if inside else elsewhere).append(place)
+    return list(dict.fromkeys(held)), list(dict.fromkeys(elsewhere))
+
+
+def _packed(backstage: Backstage, log: str, folder: Path) -> IO[bytes]:
+    """Study, data and results under the paths of the workspace, so that the study runs again."""
+    workspace, study = backstage.workspace, backstage.workspace.study_path(log)
+    named, elsewhere = _named_files(workspace, study)
     packed = tempfile.TemporaryFile()  # noqa: SIM115 - closed when it has been sent
     # Stamps before 1980 have no place in a zip: the nearest is taken.
     deflated = zipfile.ZIP_DEFLATED
     with zipfile.ZipFile(packed, "w", deflated, strict_timestamps=False) as archive:
-        for path in dict.fromkeys(held):
+        for path in dict.fromkeys([study, *named]):
             archive.write(path, shown_name(path.relative_to(workspace.folder).as_posix()))
         if elsewhere:
-            names = "".join(f"{shown_name(path)}\n" for path in dict.fromkeys(elsewhere))
+            names = "".join(f"{shown_name(path)}\n" for path in elsewhere)
             archive.writestr("NOT_IN_HERE.txt", f"{ELSEWHERE}\n{names}")
         for path in sorted(each for each in folder.rglob("*") if each.is_file()):
             if not is_link(path):

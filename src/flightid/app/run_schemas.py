@@ -26,7 +26,8 @@ class RunPart(Message):
 
 
 class RunScreen(Message):
-    """The last run that ended, and the one that goes on."""
+    """The last run that ended, the one that goes on, and files that a zip leaves out."""
 
     run: RunPart | None
     jobs: list[Job]
+    left_out: list[str]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Sequence
 
 from flightid.conventions import Role
@@ -88,7 +89,7 @@ def columns_of(
 def _name_them(role: str, free: Sequence[str]) -> str:
     """What to do where nothing tells a role: of columns that no role has taken."""
     if free:
-        return f"name them: --{role} {free[0]}"
+        return f"name them: --{role} {shlex.quote(free[0])}"
     other = "inputs" if role == "outputs" else "outputs"
     return f"no column is left for them: name fewer --{other}"
 
