@@ -7,7 +7,7 @@ import pytest
 
 from flightid.fleet.statistics.change_kind import DRIFT, STEP, change_kind
 from flightid.fleet.statistics.drift import FleetDrift, find_drift
-from flightid.fleet.statistics.events import FleetEvent
+from flightid.fleet.statistics.events import FleetEvent, beside_steps, event_steps
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
 from flightid.fleet.statistics.largest_step import (
     largest_step_chance,
@@ -214,7 +214,7 @@ def test_a_change_of_many_beside_a_new_firmware_is_not_laid_on_the_others() -> N
 
 def test_a_changed_vehicle_is_found_and_a_battery_is_none() -> None:
     data, covariates = _fleet(14, 12, change=0.2, changed=1, explained=True)
-    found = find_drift(data, covariates, [FleetEvent("motor replaced", 13 * DAY_S, ("000",))])
+    found = find_drift(data, covariates)
     assert [each.vehicle for each in found.alarms] == ["000"]
     one = found.alarms[0]
     low, high = one.change_percent.interval95 or (0.0, 0.0)
@@ -222,10 +222,12 @@ def test_a_changed_vehicle_is_found_and_a_battery_is_none() -> None:
     assert high - low < 8.0
     assert one.changed_s is not None
     assert one.changed_s[0] <= 12.05 * DAY_S <= one.changed_s[1]
-    event = one.events[0]
+    told = find_drift(data, covariates, [FleetEvent("motor replaced", 13 * DAY_S, ("000",))])
+    assert not told.alarms
+    (event,) = told.histories[0].events
     assert event.chance is not None
     assert event.chance < 1e-6
-    assert not found.histories[5].events
+    assert not told.histories[5].events
     slope = next(each for each in found.slopes["gain"] if each.name == "battery")
     assert slope.value == pytest.approx(0.02, abs=0.003)
     # Without the covariates the new firmware is a step of all vehicles, and of none by itself.
@@ -235,6 +237,46 @@ def test_a_changed_vehicle_is_found_and_a_battery_is_none() -> None:
     assert shared.is_step
     assert shared.change.value == pytest.approx(8.0, abs=4.0 * (shared.change.stderr or 0.0))
     assert 10 * DAY_S <= shared.since_s <= 11 * DAY_S
+
+
+@pytest.mark.parametrize(("event", "n_alarms"), [(12.0, 1), (26.0, 1), (None, 2)])
+def test_what_an_event_explains_is_no_alarm_and_what_is_beyond_is(
+    event: float | None, n_alarms: int
+) -> None:
+    """Of two vehicles one steps at flight 12, one at 12 and again at 26 of 40."""
+    rng, n = np.random.default_rng(3), 40
+    flight = np.arange(2 * n) % n
+    values = 10.0 + 0.3 * rng.normal(size=2 * n) + 2.0 * (flight >= 12)
+    values[n:] += 1.5 * (flight[n:] >= 26)
+    data = FlightEstimates.of(
+        ["gain"], np.repeat(["a", "b"], n).tolist(), values[:, None],
+        np.full((2 * n, 1, 1), 0.09), time_s=DAY_S * flight,
+    )  # fmt: skip
+    vehicles = () if event == 12.0 else ("b",)
+    events = [] if event is None else [FleetEvent("x", t * DAY_S, vehicles) for t in (12.0, event)]
+    found = find_drift(data, None, events)
+    assert len(found.alarms) == n_alarms
+    if event == 12.0:  # told twice, as two events of one day are: the second step is beyond both
+        assert found.alarms[0].vehicle == "b"
+        assert found.alarms[0].changed_s == (25 * DAY_S, 26 * DAY_S)
+        assert {h.vehicle for h, _ in found.by_event} == {"a", "b"}
+    if event == 26.0:
+        assert found.alarms[0].vehicle == "a"
+        sizes = [effect.change.value for _, effect in found.by_event]
+        assert sizes == pytest.approx([2.0, 1.5], abs=0.3)  # each beside the other
+
+
+@pytest.mark.parametrize(("n", "at"), [(20, 5), (20, 18), (9, 3)])
+def test_chances_beside_an_event_are_even(n: int, at: int) -> None:
+    rng, days, found = np.random.default_rng(1), np.arange(float(n)), []
+    known = event_steps([FleetEvent("motor", at)], days)
+    for _ in range(150):
+        errors = rng.uniform(0.5, 2.0, n)
+        covariance = np.diag(errors**2)
+        values = errors * rng.normal(size=n) + 8.0 * (days >= at)
+        found.append(scan_steps(*beside_steps(values, covariance, known), known).chance)
+    for share in (0.2, 0.5):
+        assert np.mean(np.array(found) < share) == pytest.approx(share, abs=0.12)
 
 
 def test_understated_errors_show_in_repeats_and_raise_no_alarm() -> None:

@@ -62,9 +62,12 @@ def _no_history(vehicle: str, each: TypeAnswers) -> str | None:
 
 def _too_few(vehicle: str, each: TypeAnswers, told: int) -> str:
     """How many flights count, of how many with a model, and how many are needed."""
-    flown = sum(name == vehicle for name in each.data.vehicles)
-    which = f"of its {counted(flown, 'flight')} with model “{each.model}” {told}"
-    rest = "" if told == flown else " with a date and an interval"
+    if told >= FEWEST:
+        return f"no {FEWEST} flights that count before, between or behind its events"
+    sound, red = sum(name == vehicle for name in each.data.vehicles), each.red.get(vehicle, 0)
+    bad = f"{red} {'is' if red == 1 else 'are'} red and " if red else ""
+    which = f"of its {counted(sound + red, 'flight')} with model “{each.model}” {bad}{told}"
+    rest = "" if told == sound else " with a date and an interval"
     verb = "counts" if told == 1 else "count"
     return f"{which} {verb}{rest}, {FEWEST} are needed"
 

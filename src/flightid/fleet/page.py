@@ -4,27 +4,32 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 from flightid.conventions import Light
 from flightid.findings import Finding, counted
+from flightid.fleet.catalogue.schema import FITTED
 from flightid.fleet.drift_lights import errors_lights, shared_lights
 from flightid.fleet.normality import MORE, quiet_light
 from flightid.fleet.pictures import history_picture, type_picture
 from flightid.fleet.reasons import grouped_reasons, reasons_table
-from flightid.fleet.statistics.answers import FleetAnswers, Row, TypeAnswers, fitted_share
+from flightid.fleet.statistics.answers import RED, FleetAnswers, Row, TypeAnswers, fitted_share
 from flightid.fleet.statistics.change_kind import DRIFT, STEP
 from flightid.fleet.statistics.drift import FleetDrift
+from flightid.fleet.statistics.events import EventEffect
 from flightid.fleet.statistics.multiple_testing import chance_cell
 from flightid.fleet.statistics.parameter_history import ParameterHistory
 from flightid.report.content import Block, Document, Lights, Paragraph, Section, TableBlock
 from flightid.report.figures import figure_block
 from flightid.table import Cell, Column, Table
+from flightid.uncertainty.estimate import Reading
 from flightid.uncertainty.quantiles import interval_words, shown
 from flightid.version import VERSION
 
 SHOWN = 9
 """Histories drawn at most; those that changed come first."""
 ORDER = (Light.RED, Light.AMBER, Light.UNKNOWN, Light.GREEN)
+EVERY = "Every log gave a model."
 NAMED = 40
 """Vehicles with a light of their own; of more, those that are green are counted."""
 
@@ -50,7 +55,14 @@ def _lights_counted(answers: FleetAnswers) -> str:
     """Vehicles by light, in words; other verdicts of the page are on estimates, not on vehicles."""
     found = Counter(each.light for each in fleet_vehicles(answers).values())
     said = ", ".join(f"{found[light]} {light.words}" for light in ORDER if found[light])
-    return f"of {counted(found.total(), 'vehicle')} {said}" if said else ""
+    open_ = sum(
+        finding.light is not Light.GREEN
+        for each in answers.types
+        if each.drift is not None
+        for finding in errors_lights(each.drift, each.labels)
+    )
+    rest = f"; errors of {counted(open_, 'parameter')} not borne out" if open_ else ""
+    return f"of {counted(found.total(), 'vehicle')} {said}{rest}" if said else ""
 
 
 def fleet_words(answers: FleetAnswers) -> str:
@@ -63,7 +75,10 @@ def fleet_words(answers: FleetAnswers) -> str:
 
 def fleet_vehicles(answers: FleetAnswers) -> dict[str, Finding]:
     """Light of every vehicle, those without a model too, the worst first."""
-    flown = Counter(str(each["vehicle"]) for each in answers.logs if each["vehicle"] is not None)
+    flown: dict[str, list[Row]] = {}
+    for each in answers.logs:
+        if each["vehicle"] is not None:
+            flown.setdefault(str(each["vehicle"]), []).append(each)
     members = {name for each in answers.types for name in each.data.members}
     found = [
         (name, vehicle_light(name, answers.types) if name in members else _bare(name, flown[name]))
@@ -72,11 +87,15 @@ def fleet_vehicles(answers: FleetAnswers) -> dict[str, Finding]:
     return dict(sorted(found, key=lambda pair: ORDER.index(pair[1].light)))
 
 
-def _bare(vehicle: str, logs: int) -> Finding:
+def _bare(vehicle: str, flown: Sequence[Row]) -> Finding:
     """Of a vehicle without a model that counts."""
+    logs, red = len(flown), sum(e["outcome"] == FITTED and e["light"] == RED for e in flown)
     words = f"none of its {logs} logs gave" if logs > 1 else "its log did not give"
     said = f"{vehicle}: {words} a model that counts"
-    act = "see below what to change, by reason, and fly sweeps"
+    if red:
+        said += f", {'all' if red == logs > 1 else red} of them red" if logs > 1 else ": it is red"
+    why = "see below why they are red" if red == logs else "see below what to change, by reason"
+    act = f"{why}, and fly sweeps"
     return Finding("vehicle", Light.UNKNOWN, said, act)
 
 
@@ -88,7 +107,8 @@ def _vehicles(answers: FleetAnswers) -> Iterator[Block]:
     """One light a vehicle: changed is red, unlike its type amber."""
     found = fleet_vehicles(answers)
     if not any(each.data.members for each in answers.types):
-        yield Paragraph("No vehicle has a model with intervals: see below what to change.")
+        none = "counts: see below why" if answers.red else "intervals: see below what to change"
+        yield Paragraph(f"No vehicle has a model {'that' if answers.red else 'with'} {none}.")
     if not found:
         return
     if len(found) <= NAMED:
@@ -118,8 +138,11 @@ def _counts(found: Sequence[Finding]) -> Iterator[Finding]:
 
 def vehicle_light(vehicle: str, types: Sequence[TypeAnswers]) -> Finding:
     """Light of one vehicle: changed is red; its newest flight off, or unlike its type, amber."""
-    said, light = [], Light.GREEN
+    said, done, light = [], [], Light.GREEN
     for each in types:
+        for history, effect in each.drift.by_event if each.drift is not None else ():
+            if history.vehicle == vehicle:
+                done.append(event_words(history, effect, each.labels))
         for history in each.drift.alarms if each.drift is not None else ():
             if history.vehicle == vehicle:
                 said.append(change_words(history, each.labels))
@@ -133,21 +156,36 @@ def vehicle_light(vehicle: str, types: Sequence[TypeAnswers]) -> Finding:
                 said.append(one.words(each.labels))
                 light = Light.RED if light is Light.RED else Light.AMBER
     if not said:
-        return quiet_light(vehicle, types)
+        quiet = quiet_light(vehicle, types)
+        if not done:
+            return quiet
+        rest = quiet.message.removeprefix(f"{vehicle}: ")
+        return replace(quiet, message=f"{vehicle}: {'; '.join(done)}; beyond that {rest}")
+    said += done
     act = "look at what was done to it, and verify its model on a new flight"
     return Finding("vehicle", light, f"{vehicle}: {'; '.join(said)}", act)
 
 
 def change_words(history: ParameterHistory, labels: Mapping[str, str]) -> str:
     """What changed, by how much, in words."""
-    change = history.change_percent
-    ends = change.interval(shown())
-    size = "" if change.value is None else f" by {change.value:+.2g} %"
-    around = "" if ends is None else f" ({ends[0]:+.2g} to {ends[1]:+.2g} %)"
     how = {STEP: " at once", DRIFT: " by and by, the last flight beside those before"}.get(
         history.kind, ""
     )
-    return f"{labels.get(history.name, history.name)} changed{size}{around}{how}"
+    name, size = labels.get(history.name, history.name), _size_words(history.change_percent)
+    beyond = ", beside what its events explain" if history.events else ""
+    return f"{name} changed{size}{how}{beyond}"
+
+
+def event_words(history: ParameterHistory, effect: EventEffect, labels: Mapping[str, str]) -> str:
+    """What an event changed, by how much: of what was told, no reason to look at it."""
+    name = labels.get(history.name, history.name)
+    return f"{name} changed{_size_words(effect.percent)} at the event “{effect.event.what}”"
+
+
+def _size_words(change: Reading) -> str:
+    ends = change.interval(shown())
+    size = "" if change.value is None else f" by {change.value:+.2g} %"
+    return size + ("" if ends is None else f" ({ends[0]:+.2g} to {ends[1]:+.2g} %)")
 
 
 def _type_blocks(each: TypeAnswers) -> Iterator[Block]:
@@ -250,7 +288,8 @@ def events_table(drift: FleetDrift, labels: Mapping[str, str]) -> Table:
 
 def _refused(answers: FleetAnswers) -> Iterator[Block]:
     table = refused_table(answers.logs)
-    yield TableBlock(table) if table.rows else Paragraph("Every log gave a model.")
+    every = "Every log gave a model; red ones count nowhere." if answers.red else EVERY
+    yield TableBlock(table) if table.rows else Paragraph(every)
     yield from map(Paragraph, red_words(answers))
 
 

@@ -15,6 +15,8 @@ from flightid.uncertainty.quantiles import half_width, shown
 
 COLUMNS = 3
 ROW_PX = 190
+MOST_NAMED = 8
+"""Vehicles named at an axis; of more every second, third …."""
 
 
 def history_picture(
@@ -103,29 +105,31 @@ def type_picture(population: Population, labels: Mapping[str, str] | None = None
     rows = max(1, -(-len(names) // columns))
     made = look.figure(rows, columns, shared_x=False, height_px=110 + ROW_PX * rows)
     made.update_layout(hovermode="closest", showlegend=False)
+    every = population.data.members
+    apart = -(-len(every) // MOST_NAMED)
     for number, name in enumerate(names):
         row, column = number // columns + 1, number % columns + 1
         i, found = population.names.index(name), population.parameters[name]
         mean = found.mean.value
         there = [n for n, own in enumerate(population.own) if own[2][i]]
+        vehicles = [population.data.members[n] for n in there]
         values = np.array([population.own[n][0][i] for n in there])
         errors = np.sqrt([population.own[n][1][i, i] for n in there])
-        order = np.argsort(values)
         percent = 100.0 / abs(mean)
-        place = np.arange(len(order), dtype=np.float64)
+        # By name in every panel, so that each vehicle stands at one place.
+        place = np.array(there, dtype=np.float64)
         ends = found.next_vehicle.interval(shown())
         if ends is not None:
-            edge = np.array([-0.6, len(order) - 0.4])
+            edge = np.array([-0.6, len(every) - 0.4])
             low, high = ((end - mean) * percent for end in ends)
             band = look.band("next", edge, np.full(2, low), np.full(2, high), colour=look.GREEN)
             made.add_traces(band, row, column)
-        vehicles = [population.data.members[there[n]] for n in order]
         made.add_trace(
             go.Scatter(
                 x=place,
-                y=(values[order] - mean) * percent,
+                y=(values - mean) * percent,
                 error_y={
-                    "type": "data", "array": half_width(shown()) * errors[order] * percent,
+                    "type": "data", "array": half_width(shown()) * errors * percent,
                     "thickness": 1, "width": 0, "color": look.LINE,
                 },
                 text=vehicles,
@@ -142,7 +146,10 @@ def type_picture(population: Population, labels: Mapping[str, str] | None = None
             row=row,
             col=column,
             title_text=f"{(labels or {}).get(name, name)}: vehicles",
-            showticklabels=False,
+            tickmode="array",
+            tickvals=list(range(0, len(every), apart)),
+            ticktext=every[::apart],
+            range=[-0.6, len(every) - 0.4],
         )
         made.update_yaxes(row=row, col=column, title_text=title)
     return made

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
 from typing import Any
@@ -18,6 +19,7 @@ from flightid.fleet.statistics.events import FleetEvent
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
 from flightid.fleet.statistics.outliers import FleetOutliers, find_outliers
 from flightid.fleet.statistics.population import Population, estimate_population
+from flightid.fleet.statistics.spread_search import FEWEST
 from flightid.frozen import dataclass
 from flightid.uncertainty.quantiles import LEVEL, half_width
 
@@ -42,6 +44,8 @@ class TypeAnswers:
         Why an answer is missing.
     labels : mapping of str to str
         Parameters in words, where their models have them: ``"Lp"`` to ``"roll damping"``.
+    red : mapping of str to int
+        By vehicle: its flights of which this model is red, which count nowhere.
     """
 
     type_name: str
@@ -52,6 +56,7 @@ class TypeAnswers:
     drift: FleetDrift | None
     reasons: tuple[str, ...] = ()
     labels: Mapping[str, str] = field(default_factory=dict)
+    red: Mapping[str, int] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +116,7 @@ def answer_questions(
     for type_name, model in groups:
         mine = [e for e in told if (e["type"], e["model"]) == (type_name, model)]
         data = _estimates(mine, [e for e in rows["covariances"] if e["model"] == model])
-        dated = np.array([_instant(_first(mine, log)) is not None for log in data.flights])
+        dated = np.array([_instant(head) is not None for head in _heads(mine).values()])
         undated += int(np.count_nonzero(~dated))
         one = _answered(type_name, model, data, population=population, outliers=outliers)
         if drift and dated.any():
@@ -121,7 +126,8 @@ def answer_questions(
         elif drift:
             one = replace(one, reasons=(*one.reasons, UNDATED))
         labels = told_apart({each["name"]: each.get("meaning") for each in mine})
-        answers.append(replace(one, labels=labels))
+        red = _red_flights(rows["parameters"], type_name, model)
+        answers.append(replace(one, labels=labels, red=red))
     return FleetAnswers(tuple(answers), tuple(rows["logs"]), undated, _red_models(rows))
 
 
@@ -141,8 +147,17 @@ def _counts(row: Row, parameters: Sequence[str]) -> bool:
     return bool(known and asked and row["light"] != RED and row["stderr"] > 0.0)
 
 
-def _first(rows: Sequence[Row], log: str) -> Row:
-    return next(each for each in rows if each["log"] == log)
+def _heads(rows: Sequence[Row]) -> dict[str, Row]:
+    """First row of each log, in the order of logs."""
+    found: dict[str, Row] = {}
+    for each in rows:
+        found.setdefault(each["log"], each)
+    return found
+
+
+def _red_flights(rows: Sequence[Row], type_name: str, model: str) -> Counter[str]:
+    mine = (e for e in rows if e["light"] == RED and (e["type"], e["model"]) == (type_name, model))
+    return Counter(str(head["vehicle"]) for head in _heads(list(mine)).values())
 
 
 def _instant(row: Row) -> float | None:
@@ -157,7 +172,8 @@ def _instant(row: Row) -> float | None:
 
 def _estimates(rows: Sequence[Row], covariances: Sequence[Row]) -> FlightEstimates:
     names = sorted({each["name"] for each in rows})
-    logs = list(dict.fromkeys(each["log"] for each in rows))
+    heads = _heads(rows)
+    logs = list(heads)
     units = {each["name"]: each["unit"] or "1" for each in rows}
     values, known = np.zeros((len(logs), len(names))), np.zeros((len(logs), len(names)), dtype=bool)
     matrices = np.zeros((len(logs), len(names), len(names)))
@@ -172,13 +188,12 @@ def _estimates(rows: Sequence[Row], covariances: Sequence[Row]) -> FlightEstimat
     for each in covariances:
         if each["log"] in place:
             _set_covariance(matrices[place[each["log"]]], each, columns)
-    heads = [_first(rows, log) for log in logs]
     return FlightEstimates.of(
         names,
-        [str(each["vehicle"]) for each in heads],
+        [str(each["vehicle"]) for each in heads.values()],
         values,
         matrices,
-        time_s=[_instant(each) or 0.0 for each in heads],
+        time_s=[_instant(each) or 0.0 for each in heads.values()],
         units=[units[name] for name in names],
         known=known,
         flights=logs,
@@ -202,12 +217,27 @@ def _answered(
 ) -> TypeAnswers:
     if not (population or outliers):
         return TypeAnswers(type_name, model, data, None, None, None)
+    shared, rare = _shared(data)
     try:
-        found = estimate_population(data, type_name)
+        found = estimate_population(shared, type_name)
         odd = find_outliers(found) if outliers else None
     except FlightidError as error:
         return TypeAnswers(type_name, model, data, None, None, None, (error.reason,))
-    return TypeAnswers(type_name, model, data, found if population else None, odd, None)
+    return TypeAnswers(type_name, model, data, found if population else None, odd, None, rare)
+
+
+def _shared(data: FlightEstimates) -> tuple[FlightEstimates, tuple[str, ...]]:
+    """Estimates of parameters that several vehicles tell, and what is said of the others."""
+    told = [data.known[:, i] for i in range(len(data.names))]
+    common = np.array([len(set(data.member_of[each])) >= FEWEST for each in told])
+    if common.all() or not common.any():
+        return data, ()
+    rare = [
+        f"what is common in {name}, which {data.members[data.member_of[each][0]]} alone tells"
+        for name, each, several in zip(data.names, told, common, strict=True)
+        if not several
+    ]
+    return data.of_parameters(common), tuple(rare)
 
 
 def _covariates(

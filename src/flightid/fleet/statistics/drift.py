@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,13 @@ from flightid.fleet.statistics.covariates import (
     design_covariates,
     fit_covariates,
 )
-from flightid.fleet.statistics.events import FleetEvent, event_effect
+from flightid.fleet.statistics.events import (
+    EventEffect,
+    FleetEvent,
+    beside_steps,
+    event_effects,
+    event_steps,
+)
 from flightid.fleet.statistics.flight_errors import NOTABLE, ErrorScale, error_scale
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
 from flightid.fleet.statistics.largest_step import (
@@ -25,6 +32,7 @@ from flightid.fleet.statistics.largest_step import (
     scan_changes,
     scan_drifts,
     scan_steps,
+    step_places,
 )
 from flightid.fleet.statistics.local_level import follow_level
 from flightid.fleet.statistics.multiple_testing import FALSE_SHARE, chance_cell, corrected
@@ -44,8 +52,11 @@ Array = NDArray[np.float64]
 TOO_FEW = f"fewer than {FEWEST} flights"
 
 
-Asked = tuple[ParameterHistory, Array, Array]
-"""A history, and values with their covariance as they are tested: slopes are those of others."""
+Asked = tuple[ParameterHistory, Array, Array, Array]
+"""A history, and values with their covariance as they are tested, and the steps of its events.
+
+Slopes are those of others, and what events explain is out.
+"""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -91,11 +102,20 @@ class FleetDrift(Result, schema="flightid.fleet_drift/1"):
     shared: tuple[SharedLevel, ...]
     newest: tuple[NewestFlight, ...]
 
-    @property
+    @cached_property
     def alarms(self) -> tuple[ParameterHistory, ...]:
         """Histories that changed, the surest first."""
         found = [each for each in self.histories if each.is_alarm]
         return tuple(sorted(found, key=lambda each: each.chance or 0.0))
+
+    @cached_property
+    def by_event(self) -> tuple[tuple[ParameterHistory, EventEffect], ...]:
+        """What events changed, false ones among all of them accounted for."""
+        told = [(h, e, e.chance) for h in self.histories for e in h.events]
+        asked = [(h, e, chance) for h, e, chance in told if chance is not None]
+        shares = corrected([chance for *_, chance in asked])
+        kept = zip(asked, shares, strict=True)
+        return tuple((h, e) for (h, e, _), share in kept if share <= FALSE_SHARE)
 
     @property
     def judged(self) -> tuple[ParameterHistory, ...]:
@@ -284,22 +304,18 @@ def _history(
         own = _own_slopes(values, variances, apart, slope, error)
         tested, values = values - apart @ slope, values - apart @ own
     track = follow_level(values, variances, time_s)
+    happened = [event for event in events if event.concerns(vehicle)]
     bare = ParameterHistory(
         *(vehicle, name, unit, time_s, values, variances, track, None, None),
         Estimate(name, None, "%", reason=TOO_FEW),
         None,
-        events=tuple(
-            # What was done to all vehicles is in what they share.
-            event_effect(
-                *(event, name, unit, tested if event.vehicles else tested + moved[rows]),
-                *(covariance, time_s),
-            )
-            for event in events
-            if event.concerns(vehicle)
-        ),
+        events=event_effects(happened, name, unit, tested, covariance, time_s, moved[rows]),
     )
-    found = bare if len(rows) < FEWEST else _tested(bare, tested, covariance)
-    return found, tested, covariance
+    known = event_steps(happened, time_s)
+    tested, covariance = beside_steps(tested, covariance, known)
+    few = not len(step_places(len(rows), known))
+    found = bare if few else _tested(bare, tested, covariance, known)
+    return found, tested, covariance, known
 
 
 def _own_slopes(values: Array, variances: Array, x: Array, slope: Array, error: Array) -> Array:
@@ -311,8 +327,10 @@ def _own_slopes(values: Array, variances: Array, x: Array, slope: Array, error: 
     return np.asarray(np.linalg.solve(total, information @ slope + (flat.T * weights) @ values))
 
 
-def _tested(history: ParameterHistory, values: Array, covariance: Array) -> ParameterHistory:
-    scan = scan_steps(values, covariance)
+def _tested(
+    history: ParameterHistory, values: Array, covariance: Array, known: Array
+) -> ParameterHistory:
+    scan = scan_steps(values, covariance, known)
     first, last = scan.place_ends()
     base = scan.level
     change: Reading = Estimate(history.name, None, "%", reason="the level before it may be zero")
@@ -342,7 +360,9 @@ def _judged(asked: Sequence[Asked]) -> tuple[ParameterHistory, ...]:
     )
 
 
-def _named(history: ParameterHistory, values: Array, covariance: Array) -> ParameterHistory:
+def _named(
+    history: ParameterHistory, values: Array, covariance: Array, known: Array
+) -> ParameterHistory:
     """An alarm as a step or drift, as far as its flights tell, with the size of that."""
     kind = change_kind(values, covariance, history.time_s)
     named = replace(history, kind=kind)
@@ -350,11 +370,11 @@ def _named(history: ParameterHistory, values: Array, covariance: Array) -> Param
     if kind == STEP or change.value is None or history.time_s[0] >= history.time_s[-SHORTEST]:
         return named
     drift = scan_drifts(values, covariance, history.time_s)
-    scan = drift if kind == DRIFT else scan_changes(values, covariance, history.time_s)
+    scan = drift if kind == DRIFT else scan_changes(values, covariance, history.time_s, known)
     percent = 100.0 * scan.size / abs(scan.level)
     size = Estimate(history.name, percent, "%", ends=StepEnds(scan))
     if kind != DRIFT:
         return replace(named, change_percent=size)
-    began = drift.place_ends()[0] - SHORTEST + 1
+    began = drift.place_ends()[0]
     spanned = (float(history.time_s[began]), float(history.time_s[-1]))
     return replace(named, change_percent=size, changed_s=spanned)

@@ -1,6 +1,12 @@
-"""Events at known times, such as a new motor: what each changed, with its interval."""
+"""Events at known times, such as a new motor: what each changed, with its interval.
+
+What an event explains is no change to look for: its step stands in the design at an unknown size,
+which leaves what is beyond it to be judged.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +16,8 @@ from flightid.uncertainty.estimate import Estimate, Reading
 from flightid.uncertainty.quantiles import two_sided_chance
 
 Array = NDArray[np.float64]
+OPEN = 1e6
+"""Variance of a step of which nothing is known, in variances of the least sure flight."""
 FEW = "no flight before the event, or none behind it"
 
 
@@ -107,3 +115,57 @@ def event_effect(
         percent = Estimate(name, float(100.0 * step / abs(level)), "%", 100.0 * spread)
     change = Estimate(name, float(step), unit, stderr)
     return EventEffect(event, change, percent, two_sided_chance(step / stderr))
+
+
+def event_effects(
+    events: Sequence[FleetEvent],
+    name: str,
+    unit: str,
+    values: Array,
+    covariance: Array,
+    time_s: Array,
+    shared: Array,
+) -> tuple[EventEffect, ...]:
+    """The step at each event as `event_effect` has it, those of the others left open.
+
+    What was done to all vehicles is in what they share, which `values` lack.
+    """
+    known = event_steps(events, time_s)
+    found = []
+    for event in events:
+        others = known[:, np.any(known != (time_s >= event.time_s)[:, None], axis=0)]
+        around = opened(covariance, others)
+        own = values if event.vehicles else values + shared
+        found.append(event_effect(event, name, unit, own, around, time_s))
+    return tuple(found)
+
+
+def event_steps(events: Sequence[FleetEvent], time_s: Array) -> Array:
+    """Flights behind each event that has some before it and some behind, shape (n, e).
+
+    Events without a flight between them are one column: nothing tells them apart.
+    """
+    behind = {tuple(time_s >= event.time_s) for event in events}
+    mixed = sorted(each for each in behind if any(each) and not all(each))
+    return np.array(mixed, dtype=np.float64).reshape(-1, len(time_s)).T
+
+
+def opened(covariance: Array, steps: Array) -> Array:
+    """Covariance of a series in which steps at known flights may have any size."""
+    return np.asarray(covariance + OPEN * np.diag(covariance).max() * (steps @ steps.T))
+
+
+def beside_steps(values: Array, covariance: Array, steps: Array) -> tuple[Array, Array]:
+    """A series without its steps at known flights, and the covariance that leaves them open.
+
+    Example
+    -------
+    >>> beside_steps(np.array([2.0, 2.0, 3.0, 3.0]), np.eye(4), np.array([[0.0, 0, 1, 1]]).T)[0]
+    array([2., 2., 2., 2.])
+    """
+    if not steps.size:
+        return values, covariance
+    design = np.column_stack([np.ones(len(values)), steps])
+    weighed = np.linalg.solve(covariance, design)
+    sizes = np.linalg.solve(design.T @ weighed, weighed.T @ values)
+    return np.asarray(values - steps @ sizes[1:]), opened(covariance, steps)

@@ -196,6 +196,19 @@ class FlightEstimates:
             known=self.known[places],
         )
 
+    def of_parameters(self, chosen: Flags) -> FlightEstimates:
+        """The same of some parameters, without flights that tell none of them."""
+        places = np.flatnonzero(chosen)
+        fewer = replace(
+            self,
+            names=tuple(self.names[i] for i in places),
+            units=tuple(self.units[i] for i in places),
+            values=self.values[:, places],
+            covariances=self.covariances[:, places[:, None], places],
+            known=self.known[:, places],
+        )
+        return fewer.chosen(np.flatnonzero(fewer.known.any(axis=1)))
+
     def of_vehicle(self, vehicle: str) -> FlightEstimates:
         """Flights of one vehicle by time.
 

@@ -108,7 +108,10 @@ class VehicleEstimates:
         middle = self.spread_quantiles(np.array([0.5]))
         weights = 1.0 / (self.variances + middle)
         apart = np.sqrt(weights) * (self.values - weights @ self.values / weights.sum())
-        fourth = float(np.mean(apart**4) / np.mean(apart**2) ** 2)
+        second = float(np.mean(apart**2))
+        if second == 0.0:  # all alike: nothing of their shape shows
+            return float(self.freedom)
+        fourth = float(np.mean(apart**4)) / second**2
         excess = (k - 1) / ((k - 2) * (k - 3)) * ((k + 1) * (fourth - 3.0) + 6.0)
         return self.freedom / (1.0 + max(excess, 0.0) * self.freedom / (2.0 * k))
 

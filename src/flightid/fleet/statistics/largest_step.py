@@ -49,6 +49,8 @@ class StepScan:
     before_variances : ndarray, shape (m,)
     with_before : ndarray, shape (m,)
         Covariance of each step with the level before it.
+    places : ndarray of int, shape (m,)
+        Last flight before each step, from 0.
 
     Example
     -------
@@ -63,6 +65,7 @@ class StepScan:
     before: Array
     before_variances: Array
     with_before: Array
+    places: NDArray[np.intp]
 
     @property
     def deviations(self) -> Array:
@@ -70,19 +73,23 @@ class StepScan:
         return np.asarray(self.sizes / np.sqrt(self.variances))
 
     @property
+    def _largest(self) -> int:
+        return int(np.argmax(np.abs(self.deviations)))
+
+    @property
     def place(self) -> int:
         """Last flight before the largest step, from 0."""
-        return SHORTEST - 1 + int(np.argmax(np.abs(self.deviations)))
+        return int(self.places[self._largest])
 
     @property
     def size(self) -> float:
         """The largest step."""
-        return float(self.sizes[self.place - SHORTEST + 1])
+        return float(self.sizes[self._largest])
 
     @property
     def level(self) -> float:
         """Level before the largest step."""
-        return float(self.before[self.place - SHORTEST + 1])
+        return float(self.before[self._largest])
 
     @property
     def statistic(self) -> float:
@@ -122,11 +129,11 @@ class StepScan:
         """Last flight before the step at the earliest and at the latest."""
         order = np.argsort(self._shares)[::-1]
         count = int(np.searchsorted(np.cumsum(self._shares[order]), level)) + 1
-        places = order[:count] + SHORTEST - 1
+        places = self.places[order[:count]]
         return int(places.min()), int(places.max())
 
 
-def scan_steps(values: Array, covariance: Array) -> StepScan:
+def scan_steps(values: Array, covariance: Array, known: Array | None = None) -> StepScan:
     """Estimate a step at every place of a series, by generalised least squares.
 
     Parameters
@@ -135,6 +142,9 @@ def scan_steps(values: Array, covariance: Array) -> StepScan:
         In order of time.
     covariance : ndarray, shape (n, n)
         Of their errors.
+    known : ndarray, shape (n, e), optional
+        Flights behind each known step, whose size `covariance` leaves open: another one has
+        `SHORTEST` flights between itself and each of them, too.
 
     Returns
     -------
@@ -145,19 +155,32 @@ def scan_steps(values: Array, covariance: Array) -> StepScan:
     ShapeError
         Shapes that do not agree.
     DataError
-        Fewer than six values, or a covariance that is not positive definite.
+        Fewer than six values, no place between known steps, or a covariance that is not positive
+        definite.
 
     Reference
     ---------
     Hawkins, *J. Am. Stat. Assoc.* 72 (1977), 180–186; Worsley, *J. Am. Stat. Assoc.* 74 (1979),
     365–367.
     """
-    return _scan(values, covariance, _steps(len(values)))
+    n = len(values)
+    places = step_places(n, known)
+    if n >= FEWEST and not len(places):
+        raise DataError("no step fits between the known ones", needed=f"{FEWEST} flights of one")
+    return _scan(values, covariance, _steps(n, places), places)
 
 
-def _steps(n: int) -> Array:
+def step_places(n: int, known: Array | None = None) -> NDArray[np.intp]:
+    """Last flights before a step that has `SHORTEST` flights to either side, known steps apart."""
+    ends = {0, n} if known is None else {0, n, *np.count_nonzero(known == 0.0, axis=0).tolist()}
+    places = np.arange(n - 1, dtype=np.intp)
+    near = [(places + 1 > end - SHORTEST) & (places + 1 < end + SHORTEST) for end in ends]
+    return np.asarray(places[~np.any(near, axis=0)], dtype=np.intp)
+
+
+def _steps(n: int, places: NDArray[np.intp]) -> Array:
     """Column by column: the flights behind each place."""
-    return np.tri(n, n - 1, -1)[:, SHORTEST - 1 : n - SHORTEST]
+    return np.tri(n, n - 1, -1)[:, places]
 
 
 def scan_drifts(values: Array, covariance: Array, time_s: Array) -> StepScan:
@@ -190,15 +213,20 @@ def scan_drifts(values: Array, covariance: Array, time_s: Array) -> StepScan:
     >>> round(scan.size, 6), [round(end, 2) for end in scan.size_ends()]
     (6.0, [5.98, 6.02])
     """
-    return _scan(values, covariance, _ramps(time_s))
+    ramps = _ramps(time_s)
+    return _scan(values, covariance, ramps, np.arange(ramps.shape[1]))
 
 
-def scan_changes(values: Array, covariance: Array, time_s: Array) -> StepScan:
+def scan_changes(
+    values: Array, covariance: Array, time_s: Array, known: Array | None = None
+) -> StepScan:
     """Steps, then steady movements, as `scan_steps` and `scan_drifts` have them, in one scan.
 
     Its interval weighs both kinds by how well they fit; a change may be either.
     """
-    return _scan(values, covariance, np.hstack([_steps(len(values)), _ramps(time_s)]))
+    places, ramps = step_places(len(values), known), _ramps(time_s)
+    shapes = np.hstack([_steps(len(values), places), ramps])
+    return _scan(values, covariance, shapes, np.append(places, np.arange(ramps.shape[1])))
 
 
 def _ramps(time_s: Array) -> Array:
@@ -210,7 +238,7 @@ def _ramps(time_s: Array) -> Array:
     return np.asarray(np.maximum(time_s[:, None] - starts, 0.0) / (time_s[-1] - starts))
 
 
-def _scan(values: Array, covariance: Array, shapes: Array) -> StepScan:
+def _scan(values: Array, covariance: Array, shapes: Array, places: NDArray[np.intp]) -> StepScan:
     """Each shape at its size, beside a level."""
     n = len(values)
     if covariance.shape != (n, n):
@@ -237,6 +265,7 @@ def _scan(values: Array, covariance: Array, shapes: Array) -> StepScan:
         *(sizes, variances, correlations, before),
         before_variances=1.0 / total + shared**2 * variances,
         with_before=-shared * variances,
+        places=places,
     )
 
 

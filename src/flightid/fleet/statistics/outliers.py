@@ -162,8 +162,10 @@ class FleetOutliers(Result, schema="flightid.fleet_outliers/1"):
             for each in self.vehicles
         )
         note = (
-            "Distance from what all other vehicles say of the next one, in its standard errors; at "
-            f"most {100 * FALSE_SHARE:.0f} % of the vehicles called unlike their type are not."
+            "Distance from what all other vehicles say of the next one, at the spread that they "
+            "show. Few vehicles tell a spread badly, and a large distance is then no rarity: the "
+            f"share decides, so that at most {100 * FALSE_SHARE:.0f} % of the vehicles called "
+            "unlike their type are not."
         )
         notes = (self.reason or note,)
         return Table(f"Vehicles of type “{self.type_name}”", columns, rows, notes)

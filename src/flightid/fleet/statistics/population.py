@@ -18,6 +18,7 @@ from flightid.uncertainty.estimate import Estimate, Reading
 from flightid.uncertainty.quantiles import LEVEL, half_width, interval_words, shown
 
 Array = NDArray[np.float64]
+ALIKE = "vehicles that are all equal say nothing of the next"
 NO_NEXT = f"fewer than {FEWEST} vehicles say nothing of the next"
 
 
@@ -158,10 +159,11 @@ class Population(
             mean, following = ends
             told = (*self._named(name, labels), found.mean.value, *mean, *following)
             rows.append((*told, found.n_vehicles))
-        note = (
-            f"Low and high are the {words} interval of the mean; the next vehicle lies between its "
-            f"two columns with {words}."
-        )
+        note = f"Low and high are the {words} interval of the mean"
+        if any(each.next_vehicle.interval(level) for each in self.parameters.values()):
+            note += f"; the next vehicle lies between its two columns with {words}."
+        else:
+            note += f"; {next(iter(self.parameters.values())).next_vehicle.reason or ALIKE}."
         title = f"In common: type “{self.type_name}”"
         return Table(title, columns, tuple(rows), (note,)).without_empty_columns()
 
