@@ -17,14 +17,16 @@ from flightid.conventions import Light
 from flightid.fleet.catalogue.compaction import compact
 from flightid.fleet.catalogue.loose import write_loose
 from flightid.fleet.catalogue.record import LogRecord
+from flightid.fleet.normality import quiet_light
 from flightid.fleet.opening import current_store
 from flightid.fleet.page import fleet_document
 from flightid.fleet.pictures import type_picture
 from flightid.fleet.settings import read_fleet
-from flightid.fleet.statistics.answers import FleetAnswers, answer_questions
+from flightid.fleet.statistics.answers import FleetAnswers, TypeAnswers, answer_questions
 from flightid.fleet.statistics.drift import find_drift
 from flightid.fleet.statistics.events import FleetEvent
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
+from flightid.fleet.statistics.outliers import find_outliers
 from flightid.fleet.statistics.population import estimate_population
 from flightid.report.content import Figure, TableBlock
 from flightid.report.html import to_html
@@ -312,3 +314,18 @@ def test_equal_estimates_and_panels_of_one_order() -> None:
     assert [list(each["text"]) for each in shown] == [[*"abcde"]] * 2
     axes = [value for key, value in spec["layout"].items() if key.startswith("xaxis")]
     assert [list(each["ticktext"]) for each in axes] == [[*"abcde"]] * 2
+
+
+@pytest.mark.parametrize(("odd", "light"), [(1.6, Light.UNKNOWN), (1.0, Light.GREEN)])
+def test_two_that_are_odd_alike_are_not_called_like_their_type(odd: float, light: Light) -> None:
+    """Each widened what is normal for the other: both were green, in 40 fleets of 40."""
+    rng = np.random.default_rng(11)
+    values = 140.0 * (1.0 + 0.08 * rng.normal(size=8)) * np.where(np.arange(8) > 5, odd, 1.0)
+    data = FlightEstimates.of(["k"], [*"abcdefgh"], values[:, None], np.full((8, 1, 1), 2.0))
+    outliers = find_outliers(estimate_population(data))
+    answered = TypeAnswers("quad", "roll", data, None, outliers, None)
+    found = {name: quiet_light(name, [answered]) for name in "afgh"}
+    assert [found[name].light for name in "gh"] == [light] * 2
+    assert {found[name].light for name in "af"} == {Light.GREEN}
+    if light is Light.UNKNOWN:
+        assert "(it and h are alike in k, and apart from all others)" in found["g"].message

@@ -77,7 +77,7 @@ def _no_type(vehicle: str, each: TypeAnswers) -> str | None:
     if each.outliers is None:
         return "; ".join(_others(each.reasons)) or None
     if any(one.vehicle == vehicle for one in each.outliers.vehicles):
-        return ""
+        return each.outliers.beside(vehicle)
     return each.outliers.reason or "its flights tell none of its parameters"
 
 
