@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from scipy.signal import lfilter
 
 from flightid.review.step_features import step_features
@@ -34,3 +35,21 @@ def test_a_small_overshoot_is_not_lifted_by_its_errors() -> None:
     assert len(held) >= 140
     assert abs(np.mean(values) - truth) < 0.35
     assert 0.92 < np.mean(held) < 0.985
+
+
+@pytest.mark.parametrize(
+    ("slow_s", "scatter", "told"),
+    [(1.0, 0.001, False), (1.0, 0.3, True), (0.01, 0.001, True)],
+    ids=["slow", "slow or not", "settled"],
+)
+def test_a_step_that_has_not_settled_has_no_level(
+    slow_s: float, scatter: float, told: bool
+) -> None:
+    """A demo's yaw rate rose at the end of its window: it "ended at 0.536 (0.533 to 0.538)"."""
+    random = np.random.default_rng(3)
+    late = 0.4 * (1.0 - np.exp(-TIME_S / slow_s))
+    slopes = np.concatenate([[0.0], scatter * random.standard_normal(120)])[:, None]
+    found = step_features(0.6 * _curve() + late + slopes * TIME_S, TIME_S)
+    assert all((each.value is not None) is told for each in found[:1])
+    if not told:
+        assert {each.reason for each in found} == {"not settled in this window of 0.49 s"}

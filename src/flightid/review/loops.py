@@ -19,7 +19,12 @@ from flightid.logs import Log
 from flightid.record import Record
 from flightid.review.deconvolution import LoopDraws, LoopSamples, closed_loop
 from flightid.review.loop_response import LoopResponse
-from flightid.review.step_features import frequency_features, step_features
+from flightid.review.step_features import (
+    frequency_features,
+    step_features,
+    still_moves,
+    window_features,
+)
 from flightid.review.thresholds import (
     FASTEST_ATTITUDE,
     FASTEST_RATE,
@@ -221,21 +226,33 @@ def _step(begun: LoopResponse, samples: LoopSamples, tick_s: float, advised: str
         clauses = (error.problem, error.found, error.needed and f"needed {error.needed}")
         reason = ", ".join(str(clause) for clause in clauses if clause)
         return replace(begun, reason=reason, action=what_to_fly(begun))
-    window_s = WINDOW_S[begun.loop]
-    while True:
-        steps, time_s = _steps(draws, window_s, tick_s)
-        readings = (
-            *step_features(steps, time_s),
-            *frequency_features(draws, SLOWEST_HZ[begun.loop]),
-        )
-        late = readings[1].value is None or readings[1].value > window_s / 3.0
-        if not late or window_s >= 4.0 * WINDOW_S[begun.loop]:
-            break
-        window_s *= 2.0
-    refused = _refusal(begun, readings, samples.sample_time_s, advised)
+    steps, time_s = _longest(draws, WINDOW_S[begun.loop], tick_s)
+    refused = _refusal(begun, window_features(steps, time_s), samples.sample_time_s, advised)
     if refused is not None:
         return refused
+    by_frequency = frequency_features(draws, SLOWEST_HZ[begun.loop])
+    readings = (*step_features(steps, time_s), *by_frequency)
     return replace(begun, time_s=time_s, step=steps[0], draws=steps[1:], readings=readings)
+
+
+def _longest(draws: LoopDraws, usual_s: float, tick_s: float) -> tuple[Array, Array]:
+    """Steps over the usual window, or up to four where they come late or have not settled in it.
+
+    A longer window whose level the data do not tell is not taken for one that tells it.
+    """
+    window_s = usual_s
+    steps, time_s = _steps(draws, window_s, tick_s)
+    while window_s < 4.0 * usual_s:
+        level, delay, *_ = window_features(steps, time_s)
+        late = delay.value is None or delay.value > window_s / 3.0
+        if not late and not still_moves(steps):
+            break
+        window_s *= 2.0
+        longer = _steps(draws, window_s, tick_s)
+        if not late and _is_told(level) and not _is_told(window_features(*longer)[0]):
+            break
+        steps, time_s = longer
+    return steps, time_s
 
 
 def _steps(draws: LoopDraws, window_s: float, tick_s: float) -> tuple[Array, Array]:
@@ -251,7 +268,7 @@ def _refusal(
     level, rise = readings[0], readings[2]
     half = level.half_width95
     steep = rise.value is not None and rise.value < SAMPLES_IN_RISE.value * sample_time_s
-    told = half is not None and half <= WIDEST_LEVEL.value and rise.value is not None
+    told = _is_told(level) and rise.value is not None
     if steep or (not told and begun.loop == "rate" and begun.rate_hz < RATE_LEAST.value):
         return replace(
             begun,
@@ -266,6 +283,11 @@ def _refusal(
         reason = f"gusts, limits or the other axes move it more than the set-point does{why}"
         return replace(begun, reason=reason, action="see motors at limits; fly in calm air")
     return replace(begun, reason=f"not enough motion{why}", action=what_to_fly(begun))
+
+
+def _is_told(level: Reading) -> bool:
+    half = level.half_width95
+    return half is not None and half <= WIDEST_LEVEL.value
 
 
 def what_to_fly(begun: LoopResponse) -> str:

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from flightid.review.deconvolution import LoopDraws
 from flightid.uncertainty.estimate import Estimate, Reading
+from flightid.uncertainty.quantiles import LEVEL, tails
 from flightid.uncertainty.uneven import DrawnEnds
 
 Array = NDArray[np.float64]
@@ -14,6 +15,9 @@ END = 0.2
 """Share of the window, at its end, whose mean is the level that the step reaches."""
 SETTLED = 0.1
 """Of the level: within it a step has settled."""
+STRIDE = 0.15
+"""Share of the window whose mean, the last, is held against the mean of the one before it. Moves
+between them add up over one more window: a step that would leave its settled band has no level."""
 TOLD = 0.95
 """Least share of the draws in which a crossing exists: else it is not told."""
 HIGHEST = 0.3
@@ -21,7 +25,28 @@ HIGHEST = 0.3
 
 
 def step_features(steps: Array, time_s: Array) -> tuple[Reading, ...]:
-    """Level, delay, rise, overshoot and settling of step responses, row 0 the estimate."""
+    """Level, delay, rise, overshoot and settling of step responses, row 0 the estimate.
+
+    No numbers where the step still moves at the end of its window: they all stand on its level.
+    """
+    read = window_features(steps, time_s)
+    if not still_moves(steps):
+        return read
+    why = f"not settled in this window of {time_s[-1]:.3g} s"
+    return tuple(Estimate(each.name, None, each.unit, reason=why) for each in read)
+
+
+def still_moves(steps: Array) -> bool:
+    """Whether steps drift at their end by more than counts, and than their draws allow for none."""
+    count = max(1, round(STRIDE * steps.shape[1]))
+    last = steps[:, -count:].mean(axis=1)
+    drift = last - steps[:, -2 * count : -count].mean(axis=1)
+    low, high = np.quantile(drift[1:], tails(LEVEL))
+    return bool(abs(drift[0]) > SETTLED * STRIDE * abs(last[0]) and (low > 0.0 or high < 0.0))
+
+
+def window_features(steps: Array, time_s: Array) -> tuple[Reading, ...]:
+    """The same of the mean that the window ends at, whether the step has settled there or not."""
     level = steps[:, time_s >= (1.0 - END) * time_s[-1]].mean(axis=1)
     shares = steps / np.where(level > 0.0, level, np.nan)[:, None]
     half = _crossings(shares, time_s, 0.5)

@@ -83,6 +83,9 @@ def _flown(review: FlightReview) -> Iterator[Finding]:
 def _loops(review: FlightReview) -> Iterator[Finding]:
     told = [loop for loop in review.loops if loop.is_told]
     for loop in told:
+        if loop["level"].value is None:
+            yield _unsettled(loop)
+            continue
         half, over = cell(loop["delay to half"], 1e3), cell(loop["overshoot"])
         said = (
             f"{loop.name}: ends at {cell(loop['level'])} of what is asked, half way there after "
@@ -106,6 +109,15 @@ def _loops(review: FlightReview) -> Iterator[Finding]:
             "the log holds no set-point with what was measured",
             LOGGING.get(review.kind, ""),
         )
+
+
+def _unsettled(loop: LoopResponse) -> Finding:
+    """No advice: how far a step gets that still moves is not known."""
+    return Finding(
+        f"step-{loop.axis}-{loop.loop}",
+        Light.UNKNOWN,
+        f"{loop.name}: {loop['level'].reason}: level, rise, overshoot and settling are not told",
+    )
 
 
 CALMER = {
