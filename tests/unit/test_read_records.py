@@ -18,6 +18,7 @@ from flightid.errors import DataError, FileFormatError, OptionError, UnitError, 
 from flightid.evidence.gather import FitFacts, gather_evidence
 from flightid.record import read_records
 from flightid.record.contents import table_contents
+from flightid.record.formats.csv import read_columns
 from flightid.record.time_question import time_question, time_said
 from flightid.surface import as_key, speaking
 from flightid.units import canonical
@@ -416,3 +417,15 @@ def test_g_is_what_the_model_makes_of_it(tmp_path: Path) -> None:
 )
 def test_spellings_of_test_reports_are_read(spelling: str, unit: str) -> None:
     assert canonical(spelling) == canonical(unit)
+
+
+def test_a_quoted_heading_may_hold_a_line_end(tmp_path: Path) -> None:
+    """RFC 4180, section 2.6: it was refused as "2 cells where the heading has 4"."""
+    path = tmp_path / "names.csv"
+    path.write_text('time,"a ""b""\nc",y\n0,1,2\n0.1,3,4\n', encoding="utf-8")
+    columns = read_columns(path)
+    assert list(columns.lengths) == ["time", 'a "b" c', "y"]
+    assert list(columns.load("y")) == [2.0, 4.0]
+    path.write_text('time,"a\n0,1\n0.1,3\n', encoding="utf-8")
+    with pytest.raises(FileFormatError, match="opens a quote that does not end"):
+        read_columns(path)

@@ -27,6 +27,8 @@ DELIMITERS = (",", ";", "\t")
 LONGEST_LINE = 1 << 20
 DATE = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:")
 QUOTED = re.compile(r'"[^"]*"')
+MOST_HEADING_LINES = 1000
+OPEN_QUOTE = re.compile(r'(?:^|[,;\t])[ ]*"[^"]*$')
 
 
 def read_columns(path: Path, headings: Sequence[str] = ()) -> ColumnTable:
@@ -124,6 +126,18 @@ def _first_rows(path: Path, encoding: str) -> tuple[list[str], list[str], str, l
                         f"line {number} of {path.name} is longer than a row can be",
                         needed=f"at most {LONGEST_LINE} characters",
                     )
+                if not rows and not line.startswith("#"):
+                    # A heading in quotes may hold line ends (RFC 4180); its name has a blank.
+                    while _is_open(line):
+                        more = stream.readline(LONGEST_LINE - len(line))
+                        number += 1
+                        if not more or number > MOST_HEADING_LINES:
+                            raise FileFormatError(
+                                f"the heading row of {path.name} opens a quote that does not end",
+                                found=line[:60].strip(),
+                                needed="a quote at both ends of a name",
+                            )
+                        line = f"{line.rstrip()} {more.lstrip()}"
                 if line.strip() and not line.startswith("#"):
                     rows.append(line.rstrip("\r\n"))
                     lines.append(number)
@@ -147,6 +161,10 @@ def _first_rows(path: Path, encoding: str) -> tuple[list[str], list[str], str, l
     delimiter = present[0] if present else ","
     first, second = _cells(rows[0], delimiter), _cells(rows[1], delimiter) if rows[1:] else []
     return first, second, delimiter, lines
+
+
+def _is_open(row: str) -> bool:
+    return bool(OPEN_QUOTE.search(QUOTED.sub("", row)))
 
 
 def _cells(row: str, delimiter: str) -> list[str]:
