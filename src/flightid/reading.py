@@ -246,11 +246,13 @@ def parse_toml(
             raise ValueError(f"a key of more than {DEEPEST} parts")
         table = tomllib.loads(text)
         _require_plain(table)
-    # Integers of thousands of digits are a plain ValueError in Python.
-    except (ValueError, RecursionError) as fault:
+    except RecursionError as fault:
         raise error(
-            f"{what} is no TOML in UTF-8", found=f"{name}: {str(fault) or 'deep nesting'}"
+            f"{what} is nested too deep", found=name, needed=f"at most {DEEPEST}"
         ) from fault
+    # Integers of thousands of digits are a plain ValueError in Python.
+    except ValueError as fault:
+        raise error(f"{what} is no TOML in UTF-8", found=f"{name}: {fault}") from fault
     return table
 
 
