@@ -41,7 +41,7 @@ class ErrorScale:
 
     Example
     -------
-    >>> ErrorScale(2.0, 0.3, 2.0, STEPS).variances(np.array([0.01, 1.0])).tolist()
+    >>> ErrorScale(2.0, 0.3, 2.0, STEPS).variances(np.array([0.01, 1.0])).round(12).tolist()
     [0.1, 4.0]
     """
 
