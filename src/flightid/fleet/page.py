@@ -194,6 +194,11 @@ def _type_blocks(each: TypeAnswers) -> Iterator[Block]:
     if each.population is not None:
         yield TableBlock(each.population.summary(labels=each.labels))
         yield TableBlock(each.population.spread_table(labels=each.labels))
+        if each.odd_flights:
+            told = ", ".join(f"{n} of {each.labels.get(k, k)}" for k, n in each.odd_flights.items())
+            yield Paragraph(
+                f"Flights far off those beside them are left out of these tables: {told}."
+            )
         caption = (
             "Every vehicle's own estimate with its interval, and, shaded, where the next vehicle "
             f"lies with {interval_words(shown())}."

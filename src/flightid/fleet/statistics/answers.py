@@ -17,6 +17,7 @@ from flightid.fleet.statistics.covariates import Covariate
 from flightid.fleet.statistics.drift import FleetDrift, find_drift
 from flightid.fleet.statistics.events import FleetEvent
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
+from flightid.fleet.statistics.odd_flights import without_odd_flights
 from flightid.fleet.statistics.outliers import FleetOutliers, find_outliers
 from flightid.fleet.statistics.population import Population, estimate_population
 from flightid.fleet.statistics.spread_search import FEWEST
@@ -46,6 +47,8 @@ class TypeAnswers:
         Parameters in words, where their models have them: ``"Lp"`` to ``"roll damping"``.
     red : mapping of str to int
         By vehicle: its flights of which this model is red, which count nowhere.
+    odd_flights : mapping of str to int
+        By parameter: flights left out of the population (`without_odd_flights`).
     """
 
     type_name: str
@@ -57,6 +60,7 @@ class TypeAnswers:
     reasons: tuple[str, ...] = ()
     labels: Mapping[str, str] = field(default_factory=dict)
     red: Mapping[str, int] = field(default_factory=dict)
+    odd_flights: Mapping[str, int] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,12 +222,14 @@ def _answered(
     if not (population or outliers):
         return TypeAnswers(type_name, model, data, None, None, None)
     shared, rare = _shared(data)
+    usual, odd = without_odd_flights(shared)
     try:
-        found = estimate_population(shared, type_name)
-        odd = find_outliers(found) if outliers else None
+        found = estimate_population(usual, type_name)
+        apart = find_outliers(found) if outliers else None
     except FlightidError as error:
         return TypeAnswers(type_name, model, data, None, None, None, (error.reason,))
-    return TypeAnswers(type_name, model, data, found if population else None, odd, None, rare)
+    common = found if population else None
+    return TypeAnswers(type_name, model, data, common, apart, None, rare, odd_flights=odd)
 
 
 def _shared(data: FlightEstimates) -> tuple[FlightEstimates, tuple[str, ...]]:

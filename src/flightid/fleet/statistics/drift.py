@@ -23,6 +23,7 @@ from flightid.fleet.statistics.events import (
     beside_steps,
     event_effects,
     event_steps,
+    without_events,
 )
 from flightid.fleet.statistics.flight_errors import NOTABLE, ErrorScale, error_scale
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
@@ -248,9 +249,10 @@ def find_drift(
         repeated = repeats[i].variance_factor if repeats[i].freedom else None
         errors[name] = error_scale(explained, i, repeated)
         usual = errors[name].variances(_variances(data, i))
-        variances, off = variances_with_odd_ones(explained, i, usual)
+        level = without_events(explained, i, usual, events)
+        variances, off = variances_with_odd_ones(level, i, usual)
         odd[name] = int(off.sum())
-        newest += newest_flights(explained, i, usual, variances)
+        newest += newest_flights(level, i, usual, variances)
         fitted = fit_covariates(data, i, design, variances)
         slopes[name] = fitted.effects
         moved = every.values[:, i] - data.values[:, i]

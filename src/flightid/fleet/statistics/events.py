@@ -7,10 +7,13 @@ which leaves what is beyond it to be judged.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.fleet.statistics.flight_estimates import FlightEstimates
+from flightid.fleet.statistics.neighbours import histories_in_time
 from flightid.frozen import dataclass
 from flightid.uncertainty.estimate import Estimate, Reading
 from flightid.uncertainty.quantiles import two_sided_chance
@@ -169,3 +172,22 @@ def beside_steps(values: Array, covariance: Array, steps: Array) -> tuple[Array,
     weighed = np.linalg.solve(covariance, design)
     sizes = np.linalg.solve(design.T @ weighed, weighed.T @ values)
     return np.asarray(values - steps @ sizes[1:]), opened(covariance, steps)
+
+
+def without_events(
+    data: FlightEstimates, i: int, variances: Array, events: Sequence[FleetEvent]
+) -> FlightEstimates:
+    """Estimates of one parameter without the steps of events, by weighted least squares.
+
+    A flight behind an event stands beside those before it as if the event had not been: else it
+    looked odd, and off. Of one flight behind an event nothing is left to tell.
+    """
+    values = data.values.copy()
+    for rows in histories_in_time(data, i):
+        vehicle = data.vehicles[rows[0]]
+        known = event_steps([e for e in events if e.concerns(vehicle)], data.time_s[rows])
+        weights = 1.0 / np.sqrt(variances[rows])
+        design = np.column_stack([np.ones(len(rows)), known]) * weights[:, None]
+        found = np.linalg.lstsq(design, values[rows, i] * weights, rcond=None)[0]
+        values[rows, i] -= known @ found[1:]
+    return replace(data, values=values)
