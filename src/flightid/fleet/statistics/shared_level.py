@@ -16,6 +16,7 @@ from scipy.special import bdtrc
 
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
 from flightid.frozen import dataclass
+from flightid.record.outlying import NORMAL_MAD
 from flightid.uncertainty.estimate import Estimate
 from flightid.uncertainty.quantiles import shown
 
@@ -34,7 +35,6 @@ STEPLIKE = 0.9
 explains 81 %."""
 SMALL = 30
 """Vehicles, up to which one counts in the median it is held against."""
-NORMAL_MAD = 1.4826022185056018
 
 
 @dataclass(frozen=True, eq=False)
