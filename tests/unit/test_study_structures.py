@@ -208,7 +208,9 @@ def slow_errors(seed: int, sample_time_s: float, low_hz: float = 0.05) -> fid.Re
     ("seed", "sample_time_s", "orders"),
     [
         (2, 0.05, {"nb": (1, 2, 3), "nf": (2, 3), "nk": (1, 2, 3)}),
-        (10, 0.01, {"nb": (2, 3), "nf": (2, 3), "nk": (9, 12)}),
+        pytest.param(
+            *(10, 0.01, {"nb": (2, 3), "nf": (2, 3), "nk": (9, 12)}), marks=pytest.mark.slow
+        ),  # six seconds; the other case holds the rule
     ],
     ids=["inputs foretell the errors", "a pole and a zero cancel"],
 )
