@@ -26,6 +26,7 @@ STARTED = {
     "reference/test_app_seeds_in_browser.py": 1,  # the examples that fly; nightly
     "unit/test_cli_program.py": 3,
     "unit/test_commit_subject.py": 2,
+    "unit/test_fleet_claims.py": 1,  # `sleep`, to be killed
     "unit/test_fleet_cluster.py": 3,  # a scheduler, clients to kill, two at once; nightly
     "unit/test_output_error_routes.py": 1,  # another number of threads
     "unit/test_plain_pid.py": 1,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -67,6 +68,14 @@ def test_a_claim_of_a_process_that_was_killed_here_waits_for_no_clock(tmp_path: 
     assert LogClaims(store, new_claimant()).take("a")
     killed.leave("a")
     assert read_claim(store, "a") is not None, "it is another's by now"
+    # One that lives a moment longer than its run; nobody has asked how it ended.
+    with subprocess.Popen(["sleep", "60"]) as late:
+        store.write(f"{CLAIMS}/a.json", json.dumps({**told, "pid": late.pid}).encode())
+        watch = ClaimWatch(store, lambda: 0.0)
+        assert not watch.is_free("a")
+        late.kill()
+        os.waitid(os.P_PID, late.pid, os.WEXITED | os.WNOWAIT)
+        assert watch.is_free("a")
     for broken in (b"", b"[]", b"\xff", b'{"pid": -1}', b'{"pid": "x"}'):
         store.write(f"{CLAIMS}/b.json", broken)
         assert not LogClaims(store, new_claimant()).take("b")

@@ -12,6 +12,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,8 @@ import pytest
 
 from flightid.errors import DataError, OptionError
 from flightid.fleet import fleet_status, run_fleet
+from flightid.fleet.catalogue.store import store_at
+from flightid.fleet.engine.claims import LogClaims, can_claim
 from flightid.fleet.opening import open_catalogue
 
 pytest.importorskip("distributed")
@@ -269,5 +272,11 @@ def test_logs_and_catalogue_may_lie_in_a_store_of_objects(
         with open_catalogue(fleet) as catalogue:
             found = catalogue.query("SELECT vehicle, flown_at_from FROM logs ORDER BY 1").fetchall()
         assert found == [("V00", "name"), ("V01", "name"), ("V02", "name")]
+        store = store_at("s3://fleet/catalogue")
+        assert can_claim(store)
+        with ThreadPoolExecutor(4) as runs:
+            claims = [LogClaims(store, f"run{number}") for number in range(4)]
+            won = runs.map(lambda each: [each.take(f"log{k}") for k in range(10)], claims)
+        assert [sum(each) for each in zip(*won, strict=True)] == [1] * 10
     finally:
         running.stop()

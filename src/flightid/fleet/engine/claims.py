@@ -16,6 +16,7 @@ import socket
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from pathlib import Path
 
 from flightid.fleet.catalogue.store import Store
 
@@ -137,12 +138,12 @@ class ClaimWatch:
         content = read_claim(self._store, log)
         if content is None:
             return True
-        known, since = self._seen.get(log, (None, 0.0))
+        known, since = self._seen.get(log, (None, self._now()))
         if content != known:
-            self._seen[log] = content, self._now()
-            if not _is_dead(content):
-                return False
-        elif self._now() - since < STALE_S:
+            since = self._now()
+            self._seen[log] = content, since
+        # Asked each time: a holder may outlive its run by a moment.
+        if self._now() - since < STALE_S and not _is_dead(content):
             return False
         self._store.remove(_name(log))
         return True
@@ -185,7 +186,16 @@ def _is_dead(content: bytes) -> bool:
         return True
     except (OSError, OverflowError):
         return False
-    return False
+    return _is_zombie(pid)
+
+
+def _is_zombie(pid: int) -> bool:
+    """Whether a process has ended and nobody has asked how: containers often have no one to ask."""
+    try:
+        stat = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return False
+    return stat.rpartition(")")[2].split()[:1] == ["Z"]
 
 
 def _host() -> str:
