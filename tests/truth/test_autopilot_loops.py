@@ -13,6 +13,7 @@ from flightid.control.autopilots import AUTOPILOTS, AXES, AxisLoop, axis_loop
 from flightid.control.autopilots.filter_stages import pole_stage
 from flightid.control.autopilots.gyro_notches import ardupilot_notches, px4_notches
 from flightid.control.gyro import Gyro
+from flightid.logs.blackbox.firmware import BLACKBOX
 from tests.closeness import assert_close
 from tests.examples import examples
 
@@ -45,11 +46,15 @@ def _random_loop(autopilot: str, axis: str, rng: np.random.Generator, per_loop: 
     if "ilmi" in values and rng.random() < 0.5:
         values["ilmi"] = 0.0
     changes: dict[str, object] = {"values": values}
-    if autopilot == "betaflight":
+    if autopilot in BLACKBOX:
         values |= {key: rng.uniform(20.0, 150.0) for key in ("p_filter",) if key in values}
         stage = pole_stage("D", rng.uniform(30, 90), "derivative", LOOP_HZ, order=2)
         shares = (rng.uniform(0.5, 1.0), rng.uniform(0.5, 1.0))
-        return replace(loop, values=values, stages=(stage,), throttle_shares=shares)
+        changes |= {"stages": (stage,), "throttle_shares": shares}
+        if autopilot == "inav":
+            changes["set_point_filter"] = pole_stage("CD", 40.0, "target", LOOP_HZ, order=3)
+            changes["relax"] = None
+        return replace(loop, **changes)
     notch = (rng.uniform(20, 90), rng.uniform(0.7, 4.0), rng.uniform(5, 45))
     if autopilot.startswith("ardu"):
         changes |= {"target_notch": notch, "error_notch": (rng.uniform(20, 90), 2.0, 30.0)}
@@ -114,7 +119,7 @@ def test_feedback_and_forward_are_the_recursions_own(
 ) -> None:
     rng = np.random.default_rng(seed)
     gyro: Gyro = "raw"
-    if autopilot == "betaflight":  # its gyro filters are the firmware's own
+    if autopilot in BLACKBOX:  # its gyro filters are the firmware's own
         gyro, per_loop = "filtered", 1
     loop = _random_loop(autopilot, axis, rng, per_loop)
     omega = np.geomspace(2.0, 0.95 * np.pi * LOOP_HZ, 9)

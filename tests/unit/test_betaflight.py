@@ -21,8 +21,8 @@ from flightid.control.tuning.controller_paths import ControllerPaths
 from flightid.control.tuning.gain_search import GainSearchResult
 from flightid.control.tuning.whole_gains import ROUNDED, whole_gains
 from flightid.errors import DataError, OptionError
-from flightid.inspection.betaflight_chirps import chirps
 from flightid.inspection.excitation_found import injected_spans
+from flightid.inspection.rate_chirps import chirps
 from flightid.logs.blackbox.settings import settings_of
 from flightid.review.loops import loop_responses
 from tests import betaflight_flight as betaflight
@@ -82,6 +82,77 @@ def test_terms_are_those_of_the_firmware() -> None:
         assert_close(
             [found[0], found[1]], [told.real, told.imag], why="settled", atol=2e-4 * abs(told)
         )
+
+
+def _of_version(version: str, **lines: str) -> dict[str, float]:
+    """Settings of a header before 4.3, under the names that it had."""
+    told = {
+        "Firmware revision": f"Betaflight {version} (a) F4", "looptime": "125",
+        "pid_process_denom": "2", "rollPID": "45,40,30", "yawPID": "70,45,20",
+        "dterm_lowpass_hz": "100", "dterm_filter_type": "0", "yaw_lowpass_hz": "40",
+        "tpa_rate": "50", "tpa_breakpoint": "1500", "iterm_limit": "150", **lines,
+    }  # fmt: skip
+    return settings_of(told)
+
+
+@pytest.mark.parametrize(
+    ("version", "weight"), [("3.1.7", 0.6), ("3.3.2", 60 / 127), ("3.5.7", 0.6)]
+)
+def test_terms_of_version_3_are_those_of_its_firmware(version: str, weight: float) -> None:
+    """pid.c: D of the weighted error behind its filter up to 3.3, beside it since; TPA in all."""
+    settings = _of_version(version, dtermSetpointWeight="60")
+    rng = np.random.default_rng(4)
+    wanted = np.cumsum(5.0 * rng.standard_normal(800))
+    gyro = 0.7 * wanted + 8.0 * rng.standard_normal(800)
+    tpa = 1.0 - 0.5 * (0.8 - 0.5) / 0.5
+    tracking = NotchTracking(throttle=Centre(0.8, 0.8, 0.8))
+    loop = axis_loop("betaflight", "roll", settings, notch_tracking=tracking)
+    alpha = 2.0 * np.pi * 100.0 * betaflight.STEP
+    alpha /= 1.0 + alpha
+
+    def smooth(values: np.ndarray) -> np.ndarray:
+        return lfilter([alpha], [1.0, alpha - 1.0], values)
+
+    kd = 0.000529 * 30 * tpa * RATE_HZ
+    if version < "3.4":
+        slope = smooth(kd * np.diff(weight * wanted - gyro, prepend=0.0))
+    else:
+        slope = kd * np.diff(weight * wanted - smooth(gyro), prepend=0.0)
+    exact = {
+        "P": 0.032029 * 45 * tpa * (wanted - gyro),
+        "I": np.cumsum(0.244381 * 40 * (wanted - gyro) / RATE_HZ),
+        "D": slope,
+    }
+    made = loop.run(np.radians(wanted), np.radians(gyro)).terms
+    assert np.abs(exact["I"]).max() < 150.0
+    for name, term in exact.items():
+        assert_close(1e3 * made[name], term, why="rounding", atol=1e-9 * np.abs(term).max())
+    # The linear view of the set-point's path, and yaw, whose I had no weight of its own and no D.
+    time_s, omega = np.arange(8000) / RATE_HZ, 2.0 * np.pi * 30.0
+    wave = loop.run(1e-3 * np.sin(omega * time_s), np.zeros(8000)).output[4000:]
+    basis = np.column_stack([np.sin(omega * time_s), np.cos(omega * time_s), np.ones(8000)])
+    found = np.linalg.lstsq(basis[4000:], wave, rcond=None)[0]
+    told = 1e-3 * loop.forward([omega], with_hold=False)[0]
+    assert_close(found[:2], [told.real, told.imag], why="settled", atol=1e-3 * abs(told))
+    yaw = axis_loop("betaflight", "yaw", settings)
+    assert not np.any(yaw.run(np.radians(wanted), np.radians(gyro)).terms["D"])
+    assert "d_yaw" not in {*yaw.ranges, *yaw.basis([10.0])[1]}
+    assert_close(yaw.unit_of("i"), loop.unit_of("i"), why="no 2.5 before 4", rtol=1e-12)
+
+
+def test_versions_between_are_told_apart() -> None:
+    four = axis_loop("betaflight", "yaw", _of_version("4.2.9", dterm_lowpass2_hz="150"))
+    assert four.era.yaw_integral == 2.5
+    assert [stage.name for stage in four.filter_stages()] == ["dterm_lpf1", "dterm_lpf2"]
+    assert "does not tell tpa_mode" in " ".join(four.unmodelled)
+    gyro = _of_version("4.1.0", gyro_lowpass_hz="120", gyro_lowpass_type="0")
+    (stage, *_) = axis_loop("betaflight", "roll", gyro).filter_stages()
+    assert (stage.name, stage.rate_hz) == ("gyro_lpf1", 8000.0)
+    mean = axis_loop("betaflight", "roll", gyro | _of_version("3.2.0", gyro_soft_type="2"))
+    assert [stage.name for stage in mean.filter_stages()] == ["dterm_lpf1"]
+    assert "moving mean" in " ".join(mean.unknown_notches)
+    with pytest.raises(DataError, match="moving mean"):
+        axis_loop("betaflight", "roll", _of_version("3.2.0", dterm_filter_type="2"))
 
 
 def test_fast_set_points_hold_the_integral_back_as_in_the_firmware() -> None:
@@ -162,9 +233,9 @@ def test_loops_of_a_log_are_those_of_its_header(tmp_path: Path) -> None:
         "simplified_pids_mode": 2.0,
     }
     assert "TPA leaves 100% of P and " in " ".join(loop.unmodelled)
-    for firmware in ("Betaflight 4.2.11", "EmuFlight 0.4.1"):
+    for firmware in ("Betaflight 3.0.1", "EmuFlight 0.4.1"):
         other = _log(tmp_path, **{"Betaflight 2025.12.1": firmware})
-        with pytest.raises(DataError, match=r"needed Betaflight 4\.3 or newer"):
+        with pytest.raises(DataError, match=r"needed Betaflight 3\.1 or newer"):
             autopilot_of(other)
     integrated = _settings() | {"use_integrated_yaw": 1.0}
     with pytest.raises(DataError, match="integrates its whole PID sum"):

@@ -73,13 +73,12 @@ def read_files(
     click.UsageError
         An option of tables for a log, or the other way round.
     """
-    from flightid.logs import is_log
+    from flightid.logs import is_log, is_table_too
     from flightid.progress import track
-    from flightid.record.formats.sniff import is_bag
 
     found: list[Record] = []
     for file in track(list(files), "Reading"):
-        if is_log(file) and not (_names_topics(of_tables, inputs, outputs) and is_bag(file)):
+        if is_log(file) and not (_names_columns(of_tables, inputs, outputs) and is_table_too(file)):
             _refuse(of_tables, f"tables, and {file.name} is a log")
             found.append(_from_log(file, of_logs, inputs, outputs, excitations))
             continue
@@ -88,13 +87,12 @@ def read_files(
     return [_in_units(record, units or {}) for record in found]
 
 
-def _names_topics(
+def _names_columns(
     of_tables: Mapping[str, Any], inputs: Sequence[str] | None, outputs: Sequence[str] | None
 ) -> bool:
-    """Whether columns of a table are meant: of a bag, those of its topics."""
-    return bool(of_tables) or any(
-        name.startswith("/") for name in (*(inputs or ()), *(outputs or ()))
-    )
+    """Whether columns of a table are meant: topics of a bag, fields of a decoded blackbox."""
+    named = (*(inputs or ()), *(outputs or ()))
+    return bool(of_tables) or any(name.startswith("/") or "[" in name for name in named)
 
 
 def _refuse(given: Mapping[str, Any], owner: str) -> None:

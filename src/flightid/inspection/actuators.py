@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from flightid.frozen import dataclass
 from flightid.logs import Log, LogTable
+from flightid.logs.blackbox.firmware import BLACKBOX
 
 Array = NDArray[np.float64]
 MOTOR_FUNCTIONS = range(33, 41)
@@ -56,7 +57,7 @@ class Actuators:
 
 def find_actuators(log: Log) -> Actuators | None:
     """Motor commands of a log, or None where it holds none that can be told apart."""
-    known = {"ardupilot": _ardupilot, "px4": _px4, "betaflight": _betaflight}
+    known = {"ardupilot": _ardupilot, "px4": _px4, **dict.fromkeys(BLACKBOX, _blackbox)}
     return known[log.kind](log) if log.kind in known else None
 
 
@@ -110,7 +111,7 @@ def _moving(
     return found
 
 
-def _betaflight(log: Log) -> Actuators | None:
+def _blackbox(log: Log) -> Actuators | None:
     """Commands of a blackbox, whose header says between which of them the mixer moves."""
     if "main" not in log:
         return None

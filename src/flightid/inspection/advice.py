@@ -24,6 +24,7 @@ PLANE_LOG_BITS = {7: "IMU", 13: "servo outputs", 20: "attitude and PID terms at 
 LOG_BITS = {"copter": COPTER_LOG_BITS, "plane": PLANE_LOG_BITS}
 LOGGING = {
     "betaflight": "set blackbox_sample_rate 1/2 or faster, and log set-point, gyro and PID terms",
+    "inav": "set blackbox_rate_num 1 and blackbox_rate_denom 2 or faster",
     "mavlink": "hand in the log that the autopilot wrote to its own card: telemetry is too slow",
 }
 SDLOG_PROFILE = 25
@@ -96,6 +97,8 @@ def excitation(log: Log) -> str:
             "fly the CHIRP mode of firmware 2025.12 or later (a build with USE_CHIRP), debug_mode "
             f"CHIRP, or {piloted.removeprefix('fly ')}; {sized}"
         )
+    if log.kind == "inav":
+        return f"{piloted}, in ANGLE; {sized}"
     if log.vehicle == "copter" and "SID_AXIS" not in log.parameters and log.parameters:
         return f"{piloted}; {sized}"
     if log.vehicle == "copter":

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from flightid.frozen import dataclass
 from flightid.inspection.axes import axes_of
-from flightid.inspection.betaflight_chirps import chirps
+from flightid.inspection.rate_chirps import chirps
 from flightid.inspection.signals import Signal, Span, find, place_of
 from flightid.inspection.stamps import log_span
 from flightid.inspection.thresholds import RESTING_RATE
@@ -17,7 +17,17 @@ PX4_AUTOTUNE = {2: "roll", 4: "pitch", 6: "yaw"}
 """State of autotune_attitude_control_status while an axis is excited."""
 AUTOMATIC = {
     *("AUTO", "GUIDED", "RTL", "LAND", "CIRCLE", "SMART_RTL", "BRAKE", "THROW", "AVOID_ADSB"),
-    *("GUIDED_NOGPS", "FOLLOW", "AUTOROTATE", "DESCEND", "TERMINATION", "OFFBOARD", "ORBIT"),
+    *(
+        "GUIDED_NOGPS",
+        "RTH",
+        "WP",
+        "FOLLOW",
+        "AUTOROTATE",
+        "DESCEND",
+        "TERMINATION",
+        "OFFBOARD",
+        "ORBIT",
+    ),
 }
 """Modes in which no stick moves the vehicle, besides those named AUTO_…, of all autopilots."""
 PLANE_AUTOMATIC = {"LOITER", "TAKEOFF", "QLAND", "QRTL", "THERMAL", "LOITER_ALT_QLAND"}
@@ -33,8 +43,8 @@ class FoundExcitation:
     Attributes
     ----------
     kind : str
-        ``"sid"``, ``"autotune"``, ``"chirp"`` (of Betaflight, in the set-point of the rate),
-        ``"sweep"``, ``"steps"``; plain flying by ``"pilot"`` or
+        ``"sid"``, ``"autotune"``, ``"chirp"`` (of Betaflight or INAV, in a rate's
+        set-point), ``"sweep"``, ``"steps"``; plain flying by ``"pilot"`` or
         ``"autopilot"``, ``"flying"`` where both did or the log does not tell; ``"hand"`` on the
         ground.
     axis : str

@@ -10,6 +10,7 @@ from flightid.inspection.rates import StreamRate, stream_gaps
 from flightid.inspection.signals import Span
 from flightid.inspection.stamps import believed
 from flightid.logs import Log
+from flightid.logs.blackbox.firmware import BETAFLIGHT, BLACKBOX
 
 NEAR_S = 1.0
 """A flight that ends so shortly before a gap and one that begins so shortly after it are one."""
@@ -48,8 +49,9 @@ def _remedy(log: Log, gaps: list[Span]) -> str:
     """What to do about gaps: a card loses samples only where the logger counted them."""
     dropouts = [gap for gap in log.gaps if log.kind == "px4" and gap.duration_s > 0]
     lost = any(d.start_s < stop and d.stop_s > start for d in dropouts for start, stop in gaps)
-    if log.kind == "betaflight":
-        return "log at a lower rate (blackbox_sample_rate), or to a faster card"
+    if log.kind in BLACKBOX:
+        setting = "blackbox_sample_rate" if log.kind == BETAFLIGHT else "blackbox_rate_denom"
+        return f"log at a lower rate ({setting}), or to a faster card"
     if lost or any(finding.code == "messages-dropped" for finding in log.findings):
         return "use a faster card, or log less"
     if log.kind == "px4" or "DSF" in log:

@@ -6,7 +6,7 @@ from flightid.logs.dataflash.sid_runs import SidRun
 from flightid.logs.dataflash.writer import DataflashWriter
 from flightid.logs.log import Log
 from flightid.logs.log_table import LogTable
-from flightid.logs.reader import is_log, read_log
+from flightid.logs.reader import is_log, is_table_too, read_log
 from flightid.logs.self_check import AxisCheck, InjectionCheck
 from flightid.logs.source import ByteRange, Event, Gap, LogSource, MessageInfo, ParameterChange
 
@@ -29,5 +29,6 @@ __all__ = [
     "SidRun",
     "channel_map",
     "is_log",
+    "is_table_too",
     "read_log",
 ]

@@ -40,7 +40,7 @@ class LogContents(Result, schema="flightid.log/1"):
 
     @property
     def kind(self) -> str:
-        """Who wrote it: ``"ardupilot"``, ``"px4"``, ``"betaflight"`` or ``"mavlink"``."""
+        """By whom: ``"ardupilot"``, ``"px4"``, ``"betaflight"``, ``"inav"``, ``"mavlink"``."""
         return self._source.kind
 
     @property

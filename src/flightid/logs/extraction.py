@@ -124,6 +124,8 @@ def _values(table: LogTable, source: ChannelSource) -> NDArray[np.float64]:
         return TURNED[source.angle](turned) if source.frame == "enu" else turned
     # One field is not copied: of a large log each copy counts.
     total = fields[0] if len(fields) == 1 else np.asarray(np.sum(fields, axis=0), np.float64)
+    if source.zero:
+        total = total - source.zero
     if source.phase_scale is not None:
         return np.where(total == 0.0, 0.0, np.cos(total / source.phase_scale))
     return total

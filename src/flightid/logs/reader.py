@@ -8,6 +8,7 @@ from pathlib import Path
 
 from flightid import _native
 from flightid.errors import FileFormatError, LogFormatError
+from flightid.logs.blackbox.decoded import is_decoded, open_decoded
 from flightid.logs.blackbox.reader import PRODUCT, open_blackbox
 from flightid.logs.dataflash.printed import open_printed
 from flightid.logs.dataflash.sdlog2 import open_binary
@@ -18,7 +19,7 @@ from flightid.logs.source import LogSource
 from flightid.logs.ulog.reader import UlogSource
 from flightid.reading import require_file
 from flightid.record.formats.foreign import foreign, unknown_kind
-from flightid.record.formats.sniff import file_format
+from flightid.record.formats.sniff import file_format, is_bag
 
 ULOG_MAGIC = b"ULog\x01\x12\x35"
 DATAFLASH_HEADER = b"\xa3\x95"
@@ -41,6 +42,7 @@ def _is_printed(head: bytes) -> bool:
 _FORMATS: tuple[tuple[Callable[[bytes], bool], str, Callable[[Path], LogSource]], ...] = (
     (lambda head: head.startswith(ULOG_MAGIC), "PX4 ULog", UlogSource),
     (lambda head: PRODUCT in head, "Betaflight or INAV blackbox", open_blackbox),
+    (is_decoded, "decoded blackbox (CSV)", open_decoded),
     (_is_printed, "ArduPilot text log", open_printed),
     (_native.is_telemetry_log, "MAVLink telemetry", open_telemetry),
 )
@@ -61,8 +63,8 @@ def read_log(path: str | Path) -> Log:
     """Open a flight log, whose format its content tells.
 
     ArduPilot DataFlash (binary and text), PX4 ULog and its forerunner sdlog2, blackbox logs of
-    Betaflight and INAV, telemetry that ground stations record (``.tlog``), and bags of ROS with
-    messages of px4_msgs or topics of MAVROS.
+    Betaflight and INAV, as they are or decoded to CSV, telemetry that ground stations record
+    (``.tlog``), and bags of ROS with messages of px4_msgs or topics of MAVROS.
 
     The file is indexed once; columns are extracted when they are asked for. Damaged places are
     skipped and reported in `Log.skipped`.
@@ -128,6 +130,18 @@ def is_log(path: str | Path) -> bool:
     except FileFormatError:
         return _BY_CHANCE[0](head)
     return False
+
+
+def is_table_too(path: str | Path) -> bool:
+    """Whether a log is a table of records as well: a bag, or a blackbox that was decoded to CSV.
+
+    Raises
+    ------
+    OSError
+        The file cannot be read.
+    """
+    path = Path(path)
+    return is_bag(path) or is_decoded(_head(path))
 
 
 def _head(path: Path) -> bytes:

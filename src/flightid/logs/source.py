@@ -225,7 +225,7 @@ class LogSource(Protocol):
 
     @property
     def kind(self) -> str:
-        """Who wrote it: ``"ardupilot"``, ``"px4"``, ``"betaflight"`` or ``"mavlink"``."""
+        """By whom: ``"ardupilot"``, ``"px4"``, ``"betaflight"``, ``"inav"``, ``"mavlink"``."""
 
     @property
     def vehicle(self) -> str | None:

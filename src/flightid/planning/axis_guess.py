@@ -54,6 +54,7 @@ PHASE_MARGIN_RAD = {
 """At which the gains that fly cross over: yaw is tuned softly."""
 TYPICAL = {
     "multirotor": FlownAxis(1.0, 0.5, 0.012, motor_lag_s=0.05),
+    "small multirotor": FlownAxis(1.0, 0.5, 0.008, motor_lag_s=0.025),
     "helicopter": FlownAxis(1.0, 0.1, 0.02, motor_lag_s=0.05),
     "aeroplane": FlownAxis(1.0, 0.15, 0.03, motor_lag_s=0.05),
 }
@@ -263,10 +264,15 @@ def _typical(loop: AxisLoop, kind: str) -> FlownAxis:
     fed = 0.0
     if forward in names:
         fed = loop.gains[forward] * float(abs(terms[names.index(forward), 0]))
-    if kind != "multirotor" and fed > 0.0:
+    if not kind.endswith("multirotor") and fed > 0.0:
         return replace(base, gain=1.0 / fed, rate_feedback=fed)
     opened = base.response(omega) * loop.feedback(omega, gyro="filtered", with_hold=False)
     phase = np.unwrap(np.angle(opened))
-    place = int(np.argmin(np.abs(phase - (PHASE_MARGIN_RAD[loop.axis] - np.pi))))
+    # Below the corner of P and I the phase passes the margin too, on its way up.
+    corner = loop.values["i"] * loop.unit_of("i") / max(loop.values["p"] * loop.unit_of("p"), 1e-12)
+    missed = np.abs(phase - (PHASE_MARGIN_RAD[loop.axis] - np.pi))
+    place = int(np.argmin(np.where(omega >= min(corner, omega[-1]), missed, np.inf)))
     gain = float(1.0 / abs(opened[place]))
-    return replace(base, gain=gain, rate_feedback=loop.values["p"] or 1.0 / gain)
+    return replace(
+        base, gain=gain, rate_feedback=loop.values["p"] * loop.unit_of("p") or 1.0 / gain
+    )

@@ -8,7 +8,7 @@ from flightid.frozen import dataclass
 from flightid.options import Options, option
 
 VEHICLES = ("quad", "heli", "plane", "quadplane")
-AUTOPILOTS = ("ardupilot", "px4", "betaflight")
+AUTOPILOTS = ("ardupilot", "px4", "betaflight", "inav")
 
 
 @dataclass(frozen=True)

@@ -76,7 +76,7 @@ def plan_flight(
         An ordinary flight of the vehicle. Without one the plan is of a typical vehicle.
     vehicle : {"quad", "heli", "plane", "quadplane"}
         Kind of vehicle where no log tells it.
-    autopilot : {"ardupilot", "px4", "betaflight"}
+    autopilot : {"ardupilot", "px4", "betaflight", "inav"}
         Autopilot where no log tells it.
     axes : tuple of str, optional
         Axes to sweep; default: all that the autopilot sweeps.
@@ -274,6 +274,8 @@ def _logging(procedure: Procedure, log: Log | None) -> str:
         return logging_of(log)
     if procedure.name.startswith("px4"):
         return "SDLOG_PROFILE 25 is in the file"
+    if procedure.name == "inav":
+        return "every second loop, by the file"
     said = set_bits(LOG_BITS[log_family(procedure)])
     return f"{said}; the file has no LOG_BITMASK: only a log tells what is set now"
 

@@ -167,6 +167,23 @@ PROCEDURES = {
             ),
             "Betaflight pull request 13105; pichim/bf_controller_tuning",
         ),
+        Procedure(
+            "inav", "INAV multicopter", "inav", "small multirotor", "stick", "angle", ".txt",
+            (
+                "Save the answer of `diff all` to a file first: it is the way back.",
+                "Paste the file into the CLI: it makes the log fast and takes the control "
+                "derivative (mc_cd_…) out of the sweep.",
+            ),
+            (
+                "Take off in ANGLE with room all around, hover for 10 s hands off.",
+                *_STICK[1:],
+            ),
+            (
+                "Paste your saved `diff all` into the CLI.",
+                "Copy the blackbox log: flightid tune LOG --write gains.txt makes gains of it.",
+            ),
+            "INAV, blackbox.c; its own chirp is in development (flight/chirp_flight.c)",
+        ),
     )
 }  # fmt: skip
 STOP = (
@@ -180,6 +197,7 @@ _OF_VEHICLE = {
     ("quad", "ardupilot"): "arducopter",
     ("quad", "px4"): "px4_multicopter",
     ("quad", "betaflight"): "betaflight",
+    ("quad", "inav"): "inav",
     ("heli", "ardupilot"): "arduheli",
     ("plane", "ardupilot"): "arduplane",
     ("plane", "px4"): "px4_fixed_wing",

@@ -9,6 +9,7 @@ from pathlib import Path
 from flightid.control.autopilots.parameter_files import (
     GainChange,
     write_ardupilot_parameters,
+    write_betaflight_settings,
     write_px4_parameters,
 )
 from flightid.conventions import Light
@@ -257,6 +258,10 @@ class SweepPlan(Result, schema="flightid.sweep_plan/1"):
             if self.procedure.suffix == ".params":
                 made = write_px4_parameters(
                     each.changes, file, notes=notes, integers=INTEGERS, overwrite=overwrite
+                )
+            elif self.procedure.suffix == ".txt":
+                made = write_betaflight_settings(
+                    each.changes, file, notes=notes, overwrite=overwrite
                 )
             else:
                 made = write_ardupilot_parameters(

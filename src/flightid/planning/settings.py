@@ -146,6 +146,9 @@ def _logging(procedure: Procedure, current: Mapping[str, float]) -> dict[str, tu
     if procedure.name.startswith("px4"):
         present = int(current.get("SDLOG_PROFILE", 1))
         return {"SDLOG_PROFILE": (present | SDLOG_PROFILE, "system identification, high rate")}
+    if procedure.name == "inav":
+        without = dict.fromkeys(CONTROL_DERIVATIVES, (0.0, "for the sweep only"))
+        return {**INAV_LOGGING, **without}
     if procedure.name == "betaflight" or not 0 <= current.get("LOG_BITMASK", -1) < 2**31:
         return {}
     bits = sum(2**bit for bit in LOG_BITS[log_family(procedure)])
@@ -157,6 +160,11 @@ def log_family(procedure: Procedure) -> str:
     return "plane" if procedure.name in ("arduplane", "quadplane") else "copter"
 
 
+INAV_LOGGING = {
+    "blackbox_rate_num": (1.0, "every second loop"),
+    "blackbox_rate_denom": (2.0, "every second loop"),
+}
+CONTROL_DERIVATIVES = ("mc_cd_roll", "mc_cd_pitch", "mc_cd_yaw")
 BETAFLIGHT_CLI = """# flightid: chirp; save `diff all` first, it is the way back
 set debug_mode = CHIRP
 set blackbox_sample_rate = 1/2

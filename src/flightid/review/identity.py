@@ -98,6 +98,7 @@ BATTERY = {
     "ardupilot": ("BAT", "Volt", "Curr", "CurrTot"),
     "px4": ("battery_status", "voltage_v", "current_a", "discharged_mah"),
     "betaflight": ("main", "vbatLatest", "amperageLatest", ""),
+    "inav": ("main", "vbat", "amperage", ""),
 }
 """Message, and fields of voltage, current and charge drawn."""
 

@@ -20,6 +20,7 @@ FAST_GYRO = {
     "ardupilot": "set INS_LOG_BAT_MASK 1 for raw batches of the first gyroscope",
     "px4": "set SDLOG_PROFILE 25, with system identification and high rate",
     "betaflight": "set blackbox_sample_rate 1/1, and log the unfiltered gyroscope",
+    "inav": "set blackbox_rate_num 1 and blackbox_rate_denom 1, and log the raw gyroscope",
     "mavlink": LOGGING["mavlink"],
 }
 SHAKEN = "balance propellers, damp the autopilot's mount, look for loose parts"

@@ -13,7 +13,9 @@ const LONGEST_JUMP: i64 = 500_000;
 /// Values that a byte of the file may give: real logs give one or two, and a stranger's header may
 /// claim hundreds of fields that take no bytes.
 const VALUES_A_BYTE: usize = 16;
-const END: &[u8] = b"End of log\0";
+const END: &[u8] = b"End of log";
+/// INAV says behind it why it was disarmed.
+const LONGEST_END: usize = 40;
 const WRAP: i64 = 1 << 32;
 
 /// Rows of one kind of frame.
@@ -308,8 +310,8 @@ impl Blackbox {
     fn event(&mut self, bytes: &mut Bytes, memory: &mut Memory) -> Option<()> {
         let kind = bytes.byte()?;
         let values = match kind {
-            // A beep to line up a video, and an arming whose reason is told.
-            0 | 15 => [i64::from(bytes.unsigned()?), 0],
+            // A beep to line up a video, an arming whose reason is told, a fault of INAV's IMU.
+            0 | 15 | 40 => [i64::from(bytes.unsigned()?), 0],
             13 => {
                 let function = bytes.byte()?;
                 if function & 0x80 != 0 {
@@ -323,7 +325,7 @@ impl Blackbox {
             }
             14 | 30 => [i64::from(bytes.unsigned()?), i64::from(bytes.unsigned()?)],
             255 => {
-                if !bytes.take(END) {
+                if !bytes.take(END) || !bytes.skip_text(LONGEST_END) {
                     return None;
                 }
                 self.ended = true;

@@ -26,6 +26,15 @@ impl<'a> Bytes<'a> {
         self.bytes.get(self.at).copied()
     }
 
+    /// Take letters up to a zero, and the zero; false where there is none within so many bytes.
+    pub fn skip_text(&mut self, most: usize) -> bool {
+        let rest = self.bytes.get(self.at..).unwrap_or_default();
+        let Some(size) = rest.iter().take(most).position(|&byte| byte == 0) else { return false };
+        let is_text = rest[..size].iter().all(|byte| (b' '..=b'~').contains(byte));
+        self.at += if is_text { size + 1 } else { 0 };
+        is_text
+    }
+
     /// Take some bytes if they are these.
     pub fn take(&mut self, wanted: &[u8]) -> bool {
         let holds = self.bytes.get(self.at..).is_some_and(|rest| rest.starts_with(wanted));

@@ -1,4 +1,4 @@
-"""Betaflight's filters on gyro and D-term, from its settings (4.3 to 2025.12)."""
+"""Betaflight's filters on gyro and D-term, from its settings (3.1 to 2025.12)."""
 
 from __future__ import annotations
 
@@ -31,12 +31,13 @@ def betaflight_filters(
     throttle: float = 0.0,
     motors_hz: Sequence[float] = (),
     peaks_hz: Sequence[float] = (),
+    gyro_at_once: bool = False,
 ) -> tuple[FilterStage, ...]:
     """Filters on the gyro and on the D-term in the order in which Betaflight runs them.
 
-    The second gyro low-pass runs at the gyro's rate, all others at the loop's. Low-passes that
-    move with throttle stand where `throttle` puts them, RPM notches at every harmonic of every
-    motor, dynamic notches at the peaks of the axis.
+    The second gyro low-pass runs at the gyro's rate, all others at the loop's, but before 4.3.
+    Low-passes that move with throttle stand where `throttle` puts them, RPM notches at every
+    harmonic of every motor, dynamic notches at the peaks of the axis.
 
     Parameters
     ----------
@@ -51,6 +52,8 @@ def betaflight_filters(
         Turns a second of each motor, by telemetry.
     peaks_hz : sequence of float
         Where the dynamic notches of the axis are.
+    gyro_at_once : bool
+        Whether all gyro filters run at the gyro's rate, as before 4.3.
 
     Raises
     ------
@@ -77,13 +80,14 @@ def betaflight_filters(
             found=f"throttle {throttle}, loop {loop_rate_hz} Hz, gyro {gyro_hz} Hz",
             needed="a throttle from 0 to 1, a loop rate above 0 and a gyro at least as fast",
         )
+    own_hz = gyro_hz if gyro_at_once else loop_rate_hz
     stages = (
         _low_pass(settings, "gyro_lpf2", "gyro", gyro_hz, throttle),
-        _rpm_notches(settings, loop_rate_hz, motors_hz),
-        _static_notch(settings, "gyro_notch1", "gyro", loop_rate_hz),
-        _static_notch(settings, "gyro_notch2", "gyro", loop_rate_hz),
-        _low_pass(settings, "gyro_lpf1", "gyro", loop_rate_hz, throttle),
-        _dynamic_notches(settings, loop_rate_hz, peaks_hz),
+        _rpm_notches(settings, own_hz, motors_hz),
+        _static_notch(settings, "gyro_notch1", "gyro", own_hz),
+        _static_notch(settings, "gyro_notch2", "gyro", own_hz),
+        _low_pass(settings, "gyro_lpf1", "gyro", own_hz, throttle),
+        _dynamic_notches(settings, own_hz, peaks_hz),
         _static_notch(settings, "dterm_notch", "derivative", loop_rate_hz),
         _low_pass(settings, "dterm_lpf1", "derivative", loop_rate_hz, throttle),
         _low_pass(settings, "dterm_lpf2", "derivative", loop_rate_hz, throttle),

@@ -10,6 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from flightid.control.autopilots.axis_loop import AxisLoop
+from flightid.control.autopilots.betaflight_era import (
+    BetaflightEra,
+    era_of,
+    has_gyro_mean,
+    throttle_shares,
+)
 from flightid.control.autopilots.betaflight_filters import betaflight_filters
 from flightid.control.autopilots.filter_stages import FilterStage
 from flightid.control.autopilots.filters import (
@@ -22,7 +28,7 @@ from flightid.control.autopilots.filters import (
 from flightid.control.autopilots.loop_run import LoopFlags, LoopRun, samples
 from flightid.control.autopilots.notch_tracking import NotchTracking
 from flightid.control.autopilots.parameter_files import GainChange
-from flightid.control.autopilots.parameter_table import Axis, AxisParameters
+from flightid.control.autopilots.parameter_table import Axis, AxisParameters, GainRange
 from flightid.control.gyro import Gyro
 from flightid.errors import DataError, OptionError
 from flightid.frozen import dataclass
@@ -30,8 +36,6 @@ from flightid.recursive_filter import filtered
 
 P_SCALE, I_SCALE, D_SCALE = 0.032029, 0.244381, 0.000529
 """PTERM_SCALE, ITERM_SCALE and DTERM_SCALE: PID sum over deg/s for a gain of one."""
-YAW_I = 2.5
-"""What the firmware multiplies the I of yaw by."""
 MIXER = 1000.0
 """PID sum of a full command."""
 SUM_LIMIT, I_SHARE = 500.0, 85.0
@@ -39,8 +43,6 @@ RELAX_HZ, RELAX_DEG_S = 15.0, 40.0
 """iterm_relax_cutoff as it comes, and the fast part of a set-point at which I stands still."""
 RELAX_YAW, RELAX_RISING = (2, 4), (3, 4)
 """Numbers of iterm_relax that hold in yaw too, and that let I go back."""
-TPA_OF_D = 1.0
-"""`tpa_mode` D: throttle takes from D alone, else from P and D."""
 SLIDERS = "simplified_pids_mode"
 
 
@@ -69,7 +71,8 @@ class BetaflightLoop(AxisLoop):
 
     P and I act on the error, D on the filtered gyro's difference behind the D-term filters. I takes
     the error of the loop itself, and has 2.5 times its weight in yaw, where P passes a low-pass.
-    Feed-forward acts on the sticks, not on the set-point, and has no part in this view.
+    Feed-forward acts on the sticks, not on the set-point, and has no part in this view. Versions
+    before 4 had no D in yaw, and D took its share of the set-point; `era` tells.
 
     Attributes
     ----------
@@ -81,10 +84,12 @@ class BetaflightLoop(AxisLoop):
         Of I, in `output_unit`.
     relax : IntegralRelax or None
         How fast set-points hold I back in `run`; the linear view is of small signals.
+    era : BetaflightEra
+        What the version that flew makes of the gains.
 
     Reference
     ---------
-    Betaflight, src/main/flight/pid.c, pid.h and pid_init.c (4.3 to 2025.12).
+    Betaflight, src/main/flight/pid.c, pid.h and pid_init.c (3.1 to 2025.12).
 
     Example
     -------
@@ -97,7 +102,10 @@ class BetaflightLoop(AxisLoop):
     throttle_shares: tuple[float, float] = (1.0, 1.0)
     integral_limit: float = math.inf
     relax: IntegralRelax | None = None
+    era: BetaflightEra = BetaflightEra()
     autopilot: ClassVar[str] = "betaflight"
+    scales: ClassVar[Mapping[str, float]] = {"p": P_SCALE, "i": I_SCALE, "d": D_SCALE}
+    """PID sum over deg/s, deg and deg/s² for a gain of one."""
     full_output: ClassVar[float] = SUM_LIMIT / MIXER
     gains_are_whole: ClassVar[bool] = True
 
@@ -118,12 +126,24 @@ class BetaflightLoop(AxisLoop):
 
     def unit_of(self, role: str) -> float:
         """Of P, I and D: what one count is worth, in output per rad/s, per rad, per rad/s²."""
-        scale = {"p": P_SCALE, "i": I_SCALE, "d": D_SCALE}.get(role)
+        scale = self.scales.get(role)
         if scale is None:
             return 1.0
         if (role, self.axis) == ("i", "yaw"):
-            scale *= YAW_I
+            scale *= self.era.yaw_integral
         return math.degrees(scale) / MIXER
+
+    @property
+    def ranges(self) -> dict[str, GainRange]:
+        """What a designer may move, by parameter name."""
+        found = super().ranges
+        if not self._has_d:
+            found.pop(self.names["d"], None)
+        return found
+
+    @property
+    def _has_d(self) -> bool:
+        return self.axis != "yaw" or self.era.has_yaw_d
 
     def written(self, value: float) -> float:
         """The whole number that the command line takes."""
@@ -156,11 +176,22 @@ class BetaflightLoop(AxisLoop):
         }
 
     def _feedback_terms(self, omega: Omega) -> dict[str, Response]:
-        slope = difference_response(omega, self.loop_rate_hz) * self._along("derivative", omega)
-        return self._error_terms(omega) | {"d": self.unit_of("d") * self.throttle_shares[1] * slope}
+        if not self._has_d:
+            return self._error_terms(omega)
+        return self._error_terms(omega) | {"d": self._slope(omega, is_filtered=True)}
 
     def _forward_terms(self, omega: Omega) -> dict[str, Response]:
-        return self._error_terms(omega)
+        if not (self._has_d and self.era.setpoint_weight):
+            return self._error_terms(omega)
+        slope = self._slope(omega, is_filtered=self.era.weight_is_filtered)
+        return self._error_terms(omega) | {"d": self.era.setpoint_weight * slope}
+
+    def _slope(self, omega: Omega, *, is_filtered: bool) -> Response:
+        """D of one, at the throttle of the flight."""
+        slope = difference_response(omega, self.loop_rate_hz)
+        if is_filtered:
+            slope = slope * self._along("derivative", omega)
+        return np.asarray(self.unit_of("d") * self.throttle_shares[1] * slope)
 
     def _integrated(self, setpoint: np.ndarray, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Error that I counts away from zero and towards it: fast set-points hold it back."""
@@ -198,20 +229,33 @@ class BetaflightLoop(AxisLoop):
         error, rate_hz = setpoint - rate, self.loop_rate_hz
         weight = one_pole_weight(self.values.get("p_filter", 0.0), rate_hz)
         gain = self.unit_of("p") * self.values["p"] * self.throttle_shares[0]
-        smooth = rate
-        for stage in self.stages:
-            if stage.path == "derivative":
-                for b0, b1, b2, a1, a2 in stage.sections:
-                    smooth = filtered([b0, b1, b2], [1.0, a1, a2], smooth)
-        slope = np.diff(smooth, prepend=0.0) * rate_hz
         step = self.unit_of("i") * self.values["i"] / rate_hz
         counted, freely = self._integrated(setpoint, rate)
         terms = {
             "P": filtered([weight], [1.0, weight - 1.0], gain * error),
             "I": _clamped_sum(step * counted, step * freely, self.integral_limit),
-            "D": -self.unit_of("d") * self.values["d"] * self.throttle_shares[1] * slope,
+            **self._slopes(setpoint, rate),
         }
         return LoopRun(sum(terms.values(), np.zeros(rate.size)), terms, rate)
+
+    def _slopes(self, setpoint: np.ndarray, rate: np.ndarray) -> dict[str, np.ndarray]:
+        """Terms of slopes: D."""
+        if not self._has_d:
+            return {"D": np.zeros(rate.size)}
+        weight, is_filtered = self.era.setpoint_weight, self.era.weight_is_filtered
+        smooth = self._smoothed(rate - weight * setpoint if is_filtered else rate)
+        if weight and not is_filtered:
+            smooth = smooth - weight * setpoint
+        slope = np.diff(smooth, prepend=0.0) * self.loop_rate_hz
+        return {"D": -self.unit_of("d") * self.values["d"] * self.throttle_shares[1] * slope}
+
+    def _smoothed(self, values: np.ndarray) -> np.ndarray:
+        """Behind the D-term filters."""
+        for stage in self.stages:
+            if stage.path == "derivative":
+                for b0, b1, b2, a1, a2 in stage.sections:
+                    values = filtered([b0, b1, b2], [1.0, a1, a2], values)
+        return values
 
 
 def _clamped_sum(steps: np.ndarray, freely: np.ndarray, limit: float) -> np.ndarray:
@@ -246,22 +290,30 @@ def betaflight_loop(
             found="use_integrated_yaw 1",
             needed="use_integrated_yaw OFF",
         )
+    era = era_of(known)
     throttle = 0.0 if tracking.throttle is None else min(max(tracking.throttle.middle, 0.0), 1.0)
     motors_hz = [each.middle for each in tracking.motors]
     stages = betaflight_filters(
-        known, loop_rate_hz=rate_hz, gyro_rate_hz=gyro_hz, throttle=throttle, motors_hz=motors_hz
+        {**known, "gyro_lpf1_static_hz": 0.0} if has_gyro_mean(known) else known,
+        loop_rate_hz=rate_hz,
+        gyro_rate_hz=gyro_hz,
+        throttle=throttle,
+        motors_hz=motors_hz,
+        gyro_at_once=era.gyro_at_once,
     )
     limit = known.get("pidsum_limit_yaw" if axis == "yaw" else "pidsum_limit", SUM_LIMIT)
+    share = limit * known.get("iterm_windup", I_SHARE) / 100.0
     return BetaflightLoop(
         *shared,
         (),
         tuple(_unknown(known, motors_hz)),
         found.assumed,
-        tuple(_said(known, axis, throttle)),
+        tuple(_said(known, axis, throttle, era)),
         stages=stages,
-        throttle_shares=_throttle_shares(known, throttle),
-        integral_limit=limit * known.get("iterm_windup", I_SHARE) / 100.0 / MIXER,
+        throttle_shares=throttle_shares(known, throttle, era),
+        integral_limit=(share if math.isnan(era.integral_limit) else era.integral_limit) / MIXER,
         relax=_relax(known, axis),
+        era=era,
         beside_gains=tuple(_beside(known, axis)),
     )
 
@@ -277,18 +329,10 @@ def _relax(known: Mapping[str, float], axis: str) -> IntegralRelax | None:
     )
 
 
-def _throttle_shares(known: Mapping[str, float], throttle: float) -> tuple[float, float]:
-    """What TPA leaves of P and of D."""
-    begin = (known.get("tpa_breakpoint", 1350.0) - 1000.0) / 1000.0
-    rate = known.get("tpa_rate", 0.0) / 100.0
-    if begin >= 1.0:
-        return 1.0, 1.0
-    left = 1.0 - rate * max(throttle - begin, 0.0) / (1.0 - begin)
-    return (1.0 if known.get("tpa_mode", TPA_OF_D) == TPA_OF_D else left), left
-
-
 def _unknown(known: Mapping[str, float], motors_hz: list[float]) -> list[str]:
     said = []
+    if has_gyro_mean(known):
+        said.append("the gyro's moving mean (FIR) is not in this view")
     if known.get("dyn_notch_count"):
         said.append("dynamic notches follow peaks that the log does not tell: not in this view")
     if known.get("rpm_filter_harmonics") and not motors_hz:
@@ -296,15 +340,21 @@ def _unknown(known: Mapping[str, float], motors_hz: list[float]) -> list[str]:
     return said
 
 
-def _said(known: Mapping[str, float], axis: str, throttle: float) -> list[str]:
+def _said(known: Mapping[str, float], axis: str, throttle: float, era: BetaflightEra) -> list[str]:
     """What a view of small signals at one throttle leaves out."""
     said = []
-    shares = _throttle_shares(known, throttle)
+    shares = throttle_shares(known, throttle, era)
     if known.get("tpa_rate"):
         said.append(
             f"TPA leaves {shares[0]:.0%} of P and {shares[1]:.0%} of D at the flight's throttle "
             f"of {throttle:.0%}: this view stays there"
         )
+    if known.get("tpa_rate") and era.gyro_at_once and era.tpa_of_d and "tpa_mode" not in known:
+        said.append("this version's header does not tell tpa_mode: TPA is taken as of D alone")
+    if era.gyro_at_once and {"gyro_lpf1_dyn_max_hz", "dterm_lpf1_dyn_max_hz"} & {*known}:
+        said.append("low-passes that move with throttle stand by the curve of version 4.2")
+    if era.setpoint_weight and known.get("setpoint_relax_ratio", 100.0) < 100.0:
+        said.append("D's share of the set-point falls with the stick: here it is whole")
     if _relax(known, axis) is not None:
         said.append("iterm_relax holds I back in fast set-points: steps are without it")
     if known.get("anti_gravity_gain"):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -19,6 +18,7 @@ from flightid.inspection.flight_phases import flight_phases
 from flightid.inspection.signals import Span
 from flightid.inspection.stamps import log_span
 from flightid.logs import Log
+from flightid.logs.blackbox.firmware import firmware_of
 
 AUTOPILOT_OF = {
     ("ardupilot", "copter"): "arducopter",
@@ -26,12 +26,13 @@ AUTOPILOT_OF = {
     ("px4", "copter"): "px4_multicopter",
     ("px4", "plane"): "px4_fixed_wing",
     ("betaflight", "copter"): "betaflight",
+    ("inav", "copter"): "inav",
 }
 HELICOPTER_FRAMES = (6.0, 11.0, 13.0)
 """FRAME_CLASS of single, dual and quad helicopters."""
 SCALE_BOUNDS = (0.5, 2.0)
-OLDEST_BETAFLIGHT = (4, 3)
-"""Before, filters and headers had other names."""
+OLDEST = {"betaflight": (3, 1), "inav": (3, 0)}
+"""Before, D acted on other signals, and headers did not tell it."""
 SLOWEST_LOOP_HZ = 100.0
 """No rate controller runs slower: such a message was thinned out by the logger."""
 
@@ -53,21 +54,16 @@ def autopilot_of(log: Log) -> str:
         )
     if name == "arducopter" and log.parameters.get("FRAME_CLASS") in HELICOPTER_FRAMES:
         return "arduheli"
-    if name == "betaflight" and betaflight_version(log.firmware) < OLDEST_BETAFLIGHT:
+    # A blackbox that was decoded without its header has no gains, whatever wrote it.
+    if name in OLDEST and log.parameters and firmware_of(log.firmware).version < OLDEST[name]:
         raise DataError(
             "the controllers of this firmware are not known",
             found=log.firmware or "a firmware that is not named",
-            needed="Betaflight 4.3 or newer, whose loop is known to the last filter",
+            needed="Betaflight 3.1 or newer, INAV 3 or newer, whose loops are known",
             action=f"flightid flight {log.path.name} tells steps and noise all the same; for gains "
             "fly such a firmware",
         )
     return name
-
-
-def betaflight_version(firmware: str) -> tuple[int, int]:
-    """Major and minor number of a version of Betaflight; zeros of anything else."""
-    found = re.search(r"Betaflight\D{0,3}(\d{1,4})\.(\d{1,3})", firmware, re.IGNORECASE)
-    return (int(found[1]), int(found[2])) if found else (0, 0)
 
 
 def parameters_at(log: Log, time_s: float) -> dict[str, float]:
@@ -92,7 +88,7 @@ def axis_loop_of(
     Parameters
     ----------
     log : Log
-        ArduCopter, ArduPlane, PX4 multicopter or fixed wing, Betaflight 4.3 or newer.
+        ArduCopter, ArduPlane, PX4 multicopter or fixed wing, Betaflight 3.1 or INAV 3, or newer.
     axis : {"roll", "pitch", "yaw"}
         Axis.
     at_s : float, optional

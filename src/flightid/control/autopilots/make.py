@@ -9,6 +9,7 @@ from flightid.control.autopilots.arduplane import ArduPlaneLoop
 from flightid.control.autopilots.axis_loop import AxisLoop
 from flightid.control.autopilots.betaflight_loop import betaflight_loop
 from flightid.control.autopilots.gyro_notches import ardupilot_notches, pid_notch, px4_notches
+from flightid.control.autopilots.inav_loop import inav_loop
 from flightid.control.autopilots.notch_tracking import NotchTracking
 from flightid.control.autopilots.parameter_table import AXES, Axis, defaults, resolve
 from flightid.control.autopilots.px4_loop import Px4FixedWingLoop, Px4MulticopterLoop
@@ -17,6 +18,7 @@ from flightid.logs.blackbox.settings import loop_step_s
 
 AUTOPILOTS = (
     "arducopter", "arduheli", "arduplane", "px4_multicopter", "px4_fixed_wing", "betaflight",
+    "inav",
 )  # fmt: skip
 LOOP_RATE_PARAMETERS = ("SCHED_LOOP_RATE", "IMU_GYRO_RATEMAX")
 
@@ -39,7 +41,7 @@ def axis_loop(
     ----------
     autopilot : str
         ``"arducopter"``, ``"arduheli"``, ``"arduplane"``, ``"px4_multicopter"``,
-        ``"px4_fixed_wing"`` or ``"betaflight"``.
+        ``"px4_fixed_wing"``, ``"betaflight"`` or ``"inav"``.
     axis : {"roll", "pitch", "yaw"}
         Axis.
     parameters : mapping of str to float, optional
@@ -96,6 +98,8 @@ def axis_loop(
     shared = (kept, found.values, found.names, rate_hz, gyro_hz, computation_delay_s)
     if autopilot == "betaflight":
         return betaflight_loop(found, known, shared, notch_tracking or NotchTracking())
+    if autopilot == "inav":
+        return inav_loop(found, known, shared, notch_tracking or NotchTracking())
     if autopilot.startswith("px4"):
         notches = px4_notches(known, gyro_hz, notch_tracking, AXES.index(kept))
         rest = (notches.sections, notches.unknown, found.assumed, ())

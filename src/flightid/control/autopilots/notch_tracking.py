@@ -12,6 +12,7 @@ from flightid.frozen import dataclass
 from flightid.inspection.signals import Span, find, inside
 from flightid.inspection.stamps import believable
 from flightid.logs import Log
+from flightid.logs.blackbox.firmware import BLACKBOX
 
 Array = NDArray[np.float64]
 STEADY = 1.3
@@ -99,7 +100,7 @@ def notch_tracking(log: Log, spans: Sequence[Span]) -> NotchTracking:
     throttle = find(log, "thrust")
     mixer = None if throttle is None else throttle.within(spans)
     turned = None if mixer is None else Centre.of(mixer[mixer > RUNNING])
-    if log.kind == "betaflight":
+    if log.kind in BLACKBOX:
         return NotchTracking(turned, _betaflight_motors(log, spans))
     return NotchTracking(
         turned,

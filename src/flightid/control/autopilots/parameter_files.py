@@ -238,7 +238,7 @@ def write_px4_parameters(
 def write_betaflight_settings(
     changes: Changes, path: str | Path, *, notes: Iterable[str] = (), overwrite: bool = False
 ) -> WrittenParameters:
-    """Write lines for Betaflight's command line, as its ``diff`` prints them, and ``save``.
+    """Write lines for the command line of Betaflight or INAV, as ``diff`` prints, and ``save``.
 
     Parameters
     ----------
@@ -260,7 +260,7 @@ def write_betaflight_settings(
 
     Reference
     ---------
-    Betaflight, src/main/cli/cli.c: comments have lines of their own; `save` restarts.
+    Betaflight and INAV, cli.c: comments have lines of their own; `save` restarts.
 
     Example
     -------
@@ -289,7 +289,7 @@ def _cli_line(name: str, value: float) -> str:
     words = CLI_WORDS.get(name)
     if not CLI_NAME.fullmatch(name) or value != round(value):
         raise OptionError(
-            "Betaflight's command line takes no such setting",
+            "the command line takes no such setting",
             found=f"{name} = {value:g}",
             needed="a name in small letters, and a whole number",
         )
@@ -300,6 +300,7 @@ def _cli_line(name: str, value: float) -> str:
 WRITERS = {
     "px4": (".params", write_px4_parameters),
     "betaflight": (".txt", write_betaflight_settings),
+    "inav": (".txt", write_betaflight_settings),
     "ardu": (".param", write_ardupilot_parameters),
 }
 """Usual suffix and writer of parameter files by what the name of an autopilot begins with."""

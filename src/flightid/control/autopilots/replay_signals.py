@@ -13,6 +13,7 @@ from flightid.control.autopilots.parameter_table import AXES
 from flightid.errors import DataError
 from flightid.frozen import dataclass
 from flightid.logs import Log, LogTable
+from flightid.logs.blackbox.firmware import BLACKBOX, INAV
 from flightid.logs.self_check import paired_rows
 
 Samples = NDArray[np.float64]
@@ -105,8 +106,8 @@ def read_signals(log: Log, loop: AxisLoop, span_s: tuple[float, float] | None) -
     """
     if log.kind == "px4":
         return _px4(log, loop, span_s)
-    if log.kind == "betaflight":
-        return _betaflight(log, loop, span_s)
+    if log.kind in BLACKBOX:
+        return _blackbox(log, loop, span_s)
     return _ardupilot(log, loop, span_s)
 
 
@@ -265,11 +266,14 @@ def _px4(log: Log, loop: AxisLoop, span_s: tuple[float, float] | None) -> AxisSi
     )
 
 
-def _betaflight(log: Log, loop: AxisLoop, span_s: tuple[float, float] | None) -> AxisSignals:
+def _blackbox(log: Log, loop: AxisLoop, span_s: tuple[float, float] | None) -> AxisSignals:
     """Set-point, filtered gyro and PID terms of a blackbox, in the axes of the firmware."""
     place = _place(loop)
-    names = {f"axis{term}[{place}]": term for term in "PID"}
-    both = [f"setpoint[{place}]", f"gyroADC[{place}]"]
+    is_inav = log.kind == INAV
+    # Betaflight's feed-forward acts on the sticks, which no set-point of the log holds.
+    logged = {**{f"axis{term}": term for term in "PID"}, **({"axisF": "FF"} if is_inav else {})}
+    names = {f"{term}[{place}]": word for term, word in logged.items()}
+    both = [f"{'axisRate' if is_inav else 'setpoint'}[{place}]", f"gyroADC[{place}]"]
     table = log.table("main")
     missing = [name for name in (*both, *list(names)[:2]) if name not in table]
     if missing:
@@ -277,7 +281,7 @@ def _betaflight(log: Log, loop: AxisLoop, span_s: tuple[float, float] | None) ->
             "the log does not hold the controller's terms",
             found="no " + ", ".join(missing),
             needed="set-point, gyro and PID terms in the blackbox",
-            action="set blackbox_disable_pids, blackbox_disable_setpoint and "
+            action="Betaflight: set blackbox_disable_pids, blackbox_disable_setpoint and "
             "blackbox_disable_gyro to OFF",
         )
     rows = _rows(table, span_s)

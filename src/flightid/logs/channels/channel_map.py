@@ -22,6 +22,7 @@ DEFAULTS = {
     ("px4", "copter"): "px4_multicopter",
     ("px4", "plane"): "px4_fixed_wing",
     ("betaflight", "copter"): "betaflight",
+    ("inav", "copter"): "inav",
     ("mavlink", "copter"): "mavlink",
     ("mavlink", "plane"): "mavlink",
     ("mavros", ""): "mavros",
@@ -29,7 +30,7 @@ DEFAULTS = {
 ANGLES = ("roll", "pitch", "yaw")
 _SOURCE_KEYS = {
     "message", "field", "instance", "unit", "factor", "stamp", "quaternion", "angle", "phase_scale",
-    "frame", "note",
+    "frame", "note", "zero",
 }  # fmt: skip
 _CHANNEL_KEYS = {"unit", "role", "unwrap", "sets_rate", "on_request", "sources"}
 
@@ -60,6 +61,8 @@ class ChannelSource:
     phase_scale : float or None
         Counts of a radian where the field is a phase, whose cosine is the channel: zero where the
         field is. None for plain numbers.
+    zero : float
+        What is logged where the channel is zero, in the log's own numbers.
     note : str
         What the source is.
 
@@ -78,6 +81,7 @@ class ChannelSource:
     angle: str | None = None
     frame: str | None = None
     phase_scale: float | None = None
+    zero: float = 0.0
     note: str = ""
 
     def __str__(self) -> str:
@@ -210,8 +214,8 @@ def channel_map(name: str | Path) -> ChannelMap:
     ----------
     name : str or Path
         Shipped map (``"arducopter"``, ``"arduplane"``, ``"px4_multicopter"``,
-        ``"px4_fixed_wing"``, ``"betaflight"``, ``"mavlink"``, ``"mavros"``), or a TOML file of the
-        same form.
+        ``"px4_fixed_wing"``, ``"betaflight"``, ``"inav"``, ``"mavlink"``, ``"mavros"``), or a TOML
+        file of the same form.
 
     Raises
     ------
@@ -284,6 +288,7 @@ def _source(name: str, item: dict[str, Any]) -> ChannelSource:
         angle,
         item.get("frame"),
         item.get("phase_scale"),
+        float(item.get("zero", 0.0)),
         item.get("note", ""),
     )
 

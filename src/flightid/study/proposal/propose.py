@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from flightid.errors import OptionError
-from flightid.logs import is_log
+from flightid.logs import is_log, is_table_too
 from flightid.options import checked
-from flightid.record.formats.sniff import is_bag
 from flightid.study.proposal.of_log import study_of_log
 from flightid.study.proposal.of_records import study_of_records
 from flightid.study.proposal.options import DataOptions, told
@@ -69,9 +68,9 @@ def propose_study(
     """
     paths = [Path(file) for file in files]
     asked = checked(DataOptions, reading, "a study of records")
-    # Columns that are named are those of the topics of a bag, whoever published them.
+    # Columns that are named are those of the topics of a bag, or of a decoded blackbox.
     named = bool(inputs or outputs or excitations or actuators or told(asked) != asked.declared)
-    logs = [path for path in paths if is_log(path) and not (named and is_bag(path))]
+    logs = [path for path in paths if is_log(path) and not (named and is_table_too(path))]
     if not logs:
         return study_of_records(
             paths,

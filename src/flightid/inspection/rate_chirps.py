@@ -1,19 +1,23 @@
-"""Chirps that Betaflight adds to the set-point of a rate: where they are, by what it logs of them.
+"""Chirps that a firmware adds to the set-point of a rate: where they are, by what it logs of them.
 
-With ``debug_mode = CHIRP`` the first debug field holds the phase of the chirp, 5000 a radian, and
-zero where there is none. It counts where the set-point of an axis moves with that very phase.
+With ``debug_mode = CHIRP`` Betaflight's first debug field holds the phase of the chirp, 5000 a
+radian, and zero where there is none; INAV's fields hold its state, its axis, and hundredths of what
+it adds and of its frequency. It counts where the set-point of an axis moves with it.
 """
 
 from __future__ import annotations
+
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.frozen import dataclass
 from flightid.inspection.axes import axes_of
-from flightid.inspection.signals import Span, find
+from flightid.inspection.signals import Signal, Span, find
 from flightid.inspection.stamps import believable
 from flightid.logs import Log
+from flightid.logs.blackbox.firmware import BETAFLIGHT, INAV
 
 Array = NDArray[np.float64]
 PHASE = "debug[0]"
@@ -24,6 +28,9 @@ PIECES = 24
 """Pieces of a chirp in each of which its gain and phase stand still."""
 LEAST_SHARE = 0.6
 """Of the set-point's power that moves with the phase: sticks may move too."""
+INAV_FIELDS = tuple(f"debug[{place}]" for place in range(4))
+RUNNING = 3
+"""INAV's number of the state in which the chirp runs."""
 MOST_SLOPE = 2.5
 """Radians a sample that tell a phase: beyond, the log is too slow for it."""
 
@@ -55,9 +62,12 @@ def chirps(log: Log) -> tuple[FoundChirp, ...]:
 
     Reference
     ---------
-    Betaflight, src/main/flight/pid.c and common/chirp.c (2025.12), DEBUG_CHIRP.
+    Betaflight, src/main/flight/pid.c and common/chirp.c (2025.12), DEBUG_CHIRP; INAV,
+    flight/chirp_flight.c (in development in 2026).
     """
-    if log.kind != "betaflight" or "main" not in log or PHASE not in log.messages["main"].fields:
+    if log.kind == INAV:
+        return tuple(_inav_chirps(log))
+    if log.kind != BETAFLIGHT or "main" not in log or PHASE not in log.messages["main"].fields:
         return ()
     table = log.table("main")
     good = believable(table.time_s)
@@ -66,6 +76,40 @@ def chirps(log: Log) -> tuple[FoundChirp, ...]:
         return ()
     found = (_chirp(log, time_s, phase, rows) for rows in _active(time_s, phase))
     return tuple(each for each in found if each is not None)
+
+
+def _inav_chirps(log: Log) -> Iterator[FoundChirp]:
+    if "main" not in log or not {*INAV_FIELDS} <= {*log.messages["main"].fields}:
+        return
+    table = log.table("main")
+    good = believable(table.time_s)
+    state, axis, added, hertz = (table[name][good] for name in INAV_FIELDS)
+    time_s = table.time_s[good]
+    for rows in _active(time_s, np.where(state == RUNNING, added, 0.0)):
+        names = [
+            name for place, name in enumerate(axes_of(log.vehicle), 1) if place == axis[rows[0]]
+        ]
+        told, cycles = hertz[rows] / 100.0, np.diff(np.sign(added[rows]), prepend=0.0)
+        if not names or np.count_nonzero(cycles) < 2.0 * LEAST_CYCLES:
+            continue
+        signal = find(log, axes_of(log.vehicle)[names[0]].set_point)
+        if signal is None or _share_of(signal, time_s[rows], added[rows]) < LEAST_SHARE:
+            continue
+        span = float(time_s[rows[0]]), float(time_s[rows[-1]])
+        low, high = (float(told[told > 0.0].min(initial=np.inf)), float(told.max()))
+        yield FoundChirp(names[0], span, low, high, float(np.abs(added[rows]).max()) / 100.0)
+
+
+def _share_of(signal: Signal, stamps: Array, added: Array) -> float:
+    """Share of a signal's power that moves with what was added, slow moves of sticks aside."""
+    values = np.interp(stamps, signal.time_s, signal.values)
+    told = total = 0.0
+    for part in np.array_split(np.arange(stamps.size), PIECES):
+        moved, wave = values[part] - values[part].mean(), added[part] - added[part].mean()
+        power = float(wave @ wave)
+        told += float(moved @ wave) ** 2 / power if power > 0.0 else 0.0
+        total += float(moved @ moved)
+    return told / total if total > 0.0 else 0.0
 
 
 def _active(time_s: Array, phase: Array) -> list[NDArray[np.intp]]:
