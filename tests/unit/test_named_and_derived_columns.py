@@ -15,6 +15,7 @@ import scipy.io
 from flightid import Record, read_records, run_study, write_records
 from flightid.cli.program import run
 from flightid.errors import DataError, FileFormatError, OptionError, UnknownNameError
+from flightid.record.contents import table_contents
 from flightid.study.proposal import propose_study
 
 TIME_S = np.arange(600) * 0.1
@@ -33,6 +34,38 @@ def _bare(folder: Path, keep: np.ndarray | None = None) -> Path:
     path = folder / "bare.csv"
     np.savetxt(path, rows if keep is None else rows[keep], "%.8g", ",")
     return path
+
+
+@pytest.mark.parametrize("suffix", ["csv", "mat", "parquet"])
+def test_a_unit_at_the_end_of_a_name_is_read_said_and_gives_way(
+    tmp_path: Path, suffix: str
+) -> None:
+    """Letters that may stand for something else say nothing; a heading and a word go first."""
+    names = ["time", "u_mps", "q_deg_s", "T_m", "az_m_per_s2", "r_dps [rad/s]"]
+    rows = np.arange(24.0).reshape(4, 6)
+    rows[:, 1:] **= 2
+    path = tmp_path / f"a.{suffix}"
+    if suffix == "csv":
+        np.savetxt(path, rows, "%.8g", ",", header=",".join(names), comments="")
+    elif suffix == "mat":
+        names[-1] = "r_radps"
+        scipy.io.savemat(path, dict(zip(names, rows.T, strict=True)))
+    else:
+        pq.write_table(pa.table(dict(zip(names, rows.T, strict=True))), path)
+    (record,) = read_records(path)
+    units = {name: channel.unit for name, channel in record.channels.items()}
+    last = next(name for name in units if name.startswith("r_"))
+    assert units == {
+        "u_mps": "m/s", "q_deg_s": "deg/s", "T_m": "1", "az_m_per_s2": "m/s^2", last: "rad/s",
+    }  # fmt: skip
+    assert record.channels["u_mps"].note == "read as m/s from the heading u_mps"
+    assert record["u_mps"].tolist() == rows[:, 1].tolist()
+    said = " ".join(table_contents(path).notes)
+    assert "Read from the headings: u_mps as m/s, q_deg_s as deg/s, az_m_per_s2 as m/s^2" in said
+    (told,) = read_records(path, others={"u": "u_mps"}, units={"u": "ft/s"})
+    assert told.unit("u") == "ft/s"
+    assert told.channels["u"].is_declared
+    assert "its name says m/s" in told.channels["u"].note
 
 
 @pytest.mark.parametrize("suffix", ["csv", "mat", "parquet"])

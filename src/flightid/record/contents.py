@@ -46,6 +46,7 @@ def table_contents(path: str | Path) -> Table:
     notes += _time(table)
     if table.clock is not None:
         notes += dict.fromkeys(table.clock(name).said for name in table.lengths)
+    notes += _by_name(table)
     if len(moving) < len(rows):
         notes.append(f"Not listed: {len(rows) - len(moving)} columns that never move.")
     notes.append(f"Next: flightid run {path.name} --inputs COLUMN --outputs COLUMN")
@@ -54,6 +55,13 @@ def table_contents(path: str | Path) -> Table:
         *(Column("least"), Column("most")),
     )
     return Table(f"{path.name}: {len(rows)} columns, {kind}", columns, moving, tuple(notes))
+
+
+def _by_name(table: ColumnTable) -> list[str]:
+    """Units that the ends of names tell, where the file states none."""
+    told = {name: table.unit(name) for name in table.lengths if name not in table.units}
+    said = ", ".join(f"{name} as {unit}" for name, unit in told.items() if unit is not None)
+    return [f"Read from the headings: {said}; units that are declared go first."] if said else []
 
 
 def _time(table: ColumnTable) -> list[str]:
@@ -92,4 +100,4 @@ def _row(table: ColumnTable, name: str) -> tuple[Cell, ...]:
     if values.dtype.kind in "fiub":
         finite = values[np.isfinite(values)]
         least, most = (float(finite.min()), float(finite.max())) if finite.size else (None, None)
-    return name, table.units.get(name), table.lengths[name], rate_hz, least, most
+    return name, table.unit(name), table.lengths[name], rate_hz, least, most

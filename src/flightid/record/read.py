@@ -77,8 +77,9 @@ def read_records(
     history says which was taken. Rows fall into several records where the column `record_column`
     changes, where time starts again, or where it has a gap (a spacing above 2.5 median spacings).
     Text with semicolons or tabs may have decimal commas. Units come from
-    headings such as ``p [rad/s]`` or ``p (deg/s)``, from a second row of units in CSV, or from the
-    file's metadata; `units` declares them, over a heading too. Values are not converted.
+    headings such as ``p [rad/s]`` or ``p (deg/s)``, from a second row of units in CSV, from the
+    file's metadata, else from the end of a name where it is certain (``u_mps``, ``q_dps``); `units`
+    declares them, over all of those. Values are not converted.
 
     Columns of a bag (ROS 1 ``.bag``, ROS 2 ``.mcap``, ``.db3`` or their folder) are the numbers of
     its messages, ``/imu/angular_velocity.x``, each topic on its own stamps: those of the headers
@@ -289,10 +290,15 @@ def _declared(record: Record, given: InputShape) -> Record:
 def _note(table: ColumnTable, column: str, name: str, units: Mapping[str, str]) -> str:
     """Where samples and unit come from, where not from a column of that name."""
     notes = [] if name == column else [f"column {column}"]
-    stated, declared = table.units.get(column), units.get(name)
-    known = stated is not None and is_unit(stated)
-    if known and declared is not None and canonical(stated) != canonical(declared):
-        notes.append(f"{DECLARED} {canonical(declared)}; the file says {canonical(stated)}")
+    stated, declared = table.unit(column), units.get(name)
+    by_name = column not in table.units
+    if stated is None or not is_unit(stated):
+        return ", ".join(notes)
+    if declared is not None and canonical(stated) != canonical(declared):
+        who = "its name" if by_name else "the file"
+        notes.append(f"{DECLARED} {canonical(declared)}; {who} says {canonical(stated)}")
+    elif by_name:
+        notes.append(f"read as {canonical(stated)} from the heading {column}")
     return ", ".join(notes)
 
 

@@ -21,14 +21,14 @@ MOST_SAMPLES_PER_ROW = 10
 def column_unit(
     table: ColumnTable, column: str, name: str, units: Mapping[str, str], default: str
 ) -> str:
-    """Unit of a column: what is declared, else what the file says.
+    """Unit of a column: what is declared, else what the file says, else the end of its name.
 
     Raises
     ------
     UnitError
         A unit that is not known.
     """
-    stated, declared = table.units.get(column), units.get(name)
+    stated, declared = table.unit(column), units.get(name)
     if declared is None:
         if stated is not None and not is_unit(stated):
             raise UnitError(

@@ -34,8 +34,11 @@ def turning_columns(
     names = {*taken, *(channel.name for channel in taken.values())}
     return [
         (Channel(column, unit, Role.OTHER), table.column(column))
-        for column, unit in table.units.items()
-        if column not in names and table.lengths.get(column) == n_samples and _turns(unit)
+        for column, length in table.lengths.items()
+        if column not in names
+        and length == n_samples
+        and (unit := table.unit(column)) is not None
+        and _turns(unit)
     ]
 
 

@@ -17,6 +17,7 @@ from flightid.errors import DataError, FileFormatError, OptionError, UnitError, 
 from flightid.findings import Finding
 from flightid.frozen import dataclass
 from flightid.reading import require_memory
+from flightid.record.formats.name_units import unit_at_end
 from flightid.units import SPELLINGS, canonical
 
 VALUE_BYTES = 3 * 8
@@ -125,6 +126,17 @@ class ColumnTable:
                 action=self.advice or None,
             )
         return found
+
+    def unit(self, name: str) -> str | None:
+        """Unit of a column: what the file states, else what the end of its name says for certain.
+
+        Example
+        -------
+        >>> table = ColumnTable(Path("a.csv"), {"u_mps": 2, "y": 2}, lambda name: np.zeros(2))
+        >>> table.unit("u_mps"), table.unit("y")
+        ('m/s', None)
+        """
+        return self.units.get(name) or unit_at_end(name)
 
     def raw(self, name: str) -> NDArray[Any]:
         """Values of a column as the file holds them."""

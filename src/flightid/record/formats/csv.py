@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from flightid import _native
 from flightid.errors import FileFormatError
+from flightid.findings import counted
 from flightid.reading import memory_budget, within_memory
 from flightid.record.formats.columns import (
     ColumnTable,
@@ -22,6 +23,7 @@ from flightid.record.formats.columns import (
     require_one_each,
     split_headings,
 )
+from flightid.record.formats.foreign import NO_DATA
 
 DELIMITERS = (",", ";", "\t")
 LONGEST_LINE = 1 << 20
@@ -52,8 +54,8 @@ def read_columns(path: Path, headings: Sequence[str] = ()) -> ColumnTable:
     OptionError
         Not one heading for each column.
     FileFormatError
-        Another encoding, no heading row and no `headings`, a line above 1 MiB, no numbers, two
-        delimiters, ragged rows, repeated names, more cells than the memory budget holds.
+        Another encoding, no heading row and no `headings`, a line above 1 MiB, no numbers, text
+        alone, two delimiters, ragged rows, repeated names, more cells than the memory budget holds.
     """
     encoding = _encoding(path)
     first, second, delimiter, lines = _first_rows(path, encoding)
@@ -79,6 +81,13 @@ def read_columns(path: Path, headings: Sequence[str] = ()) -> ColumnTable:
     if not n_rows:
         raise FileFormatError(
             f"{path.name} holds headings only", needed="rows of numbers below the headings"
+        )
+    if all(column.dtype.kind == "O" for column in columns):
+        raise FileFormatError(
+            f"{path.name} holds no table of numbers",
+            found=f"text alone in {counted(n_rows, 'row')} of {counted(len(names), 'column')}",
+            needed="one column of numbers at least, below its name",
+            action=NO_DATA,
         )
     by_name = dict(zip(names, columns, strict=True))
     dates = {name: "s" for name, text in zip(names, second, strict=False) if DATE.match(text)}
