@@ -20,9 +20,12 @@ from flightid.control.autopilots.notch_tracking import Centre, NotchTracking
 from flightid.control.tuning.controller_paths import ControllerPaths
 from flightid.control.tuning.gain_search import GainSearchResult
 from flightid.control.tuning.whole_gains import ROUNDED, whole_gains
+from flightid.conventions import Light
 from flightid.errors import DataError, OptionError
 from flightid.inspection.excitation_found import injected_spans
 from flightid.inspection.rate_chirps import chirps
+from flightid.inspection.saturation import saturations
+from flightid.inspection.verdicts import _at_limit
 from flightid.logs.blackbox.settings import settings_of
 from flightid.review.loops import loop_responses
 from tests import betaflight_flight as betaflight
@@ -287,6 +290,24 @@ def test_a_log_of_every_loop_tells_its_hold(tmp_path: Path) -> None:
     for denominator, hold in (("2", "zero"), ("1", None)):
         path.write_bytes(blackbox(columns, {**SETTINGS, "pid_process_denom": denominator}))
         assert fid.read_log(path).record().hold == hold
+
+
+def test_a_command_at_the_limit_of_its_axis_has_a_finding_of_its_own(tmp_path: Path) -> None:
+    """The firmware cuts the sum of yaw at pidsum_limit_yaw, long before the mixer is full."""
+    n = 4000
+    yaw = np.where(np.arange(n) % 10 < 2, 400, 100)
+    columns = {"time": 10_000_000 + 500 * np.arange(n), "axisP[2]": yaw, "axisP[0]": 0 * yaw + 450}
+    columns |= {f"motor[{k}]": 0 * yaw + 1000 for k in range(4)}
+    path = tmp_path / "a.bfl"
+    limits = {"pidsum_limit": "500", "pidsum_limit_yaw": "400"}
+    path.write_bytes(blackbox(columns, {**SETTINGS, **limits}))
+    log = fid.read_log(path)
+    (found,) = saturations(log, ((10.0, 12.0),), None)
+    assert (found.axis, found.limit) == ("yaw", "limit pidsum_limit_yaw 400")
+    assert found.share == pytest.approx(0.2, abs=1e-3)
+    said = _at_limit(found)
+    assert (said.code, said.light) == ("saturated-yaw", Light.AMBER)
+    assert "is at its limit pidsum_limit_yaw 400 for 20 % of the flight" in said.message
 
 
 def test_steps_of_fast_loops_are_read_of_finer_samples(tmp_path: Path) -> None:

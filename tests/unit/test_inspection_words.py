@@ -25,7 +25,10 @@ from flightid.inspection.skew import StreamSkew, _skew
 from flightid.inspection.thresholds import LONGEST_WINDOW
 from flightid.inspection.usable_band import _longest_window
 from flightid.logs.source import Event, Gap
+from flightid.study.proposal import propose_study
+from flightid.study.settings import read_settings
 from tests.closeness import assert_close
+from tests.sweep_log import SweepFlight
 from tests.ulog_builder import flight
 
 
@@ -189,6 +192,30 @@ def test_a_sweep_of_a_set_point_grows_or_shrinks_threefold(
         slope = (last**2 - first**2) / (2.75 * 20.0)
         middle = np.sqrt([first**2 + 3.5 * slope, last**2 - 3.5 * slope])
         assert_close(np.array(ends), middle, rtol=0.05, why="stamps of 0.01 s")
+
+
+def test_axes_share_a_reason_and_each_has_its_number(shared_data: Path) -> None:
+    """Of a flight of sticks with a bent frame: 0.52 and 0.80 were of two axes, and yaw was cut."""
+    found = fid.inspect_log(shared_data / "logs" / "arducopter_457.BIN")
+    messages = {each.code: each.message for each in found.findings}
+    assert "roll, pitch, yaw: nothing was injected, and no sweep was flown." in found.to_text(
+    ).replace("\n", " ")  # fmt: skip
+    assert "(largest found: roll 0.52, pitch 0.63, yaw 0.80)" in messages["no-usable-band"]
+    assert "is at its mixer limit 1 for 26 % of the flight" in messages["saturated-yaw"]
+    assert "RCOU.C3 is at its lower limit" in messages["saturated"]
+
+
+def test_one_axis_has_one_band_wherever_it_is_said(tmp_path: Path) -> None:
+    """Card, finding, table and study of one log: its study's band to the last digit."""
+    path = SweepFlight(sweep_s=20.0, rate_hz=100.0).write(tmp_path)
+    found = fid.inspect_log(path)
+    proposed = propose_study([path], folder=tmp_path)
+    settings = read_settings(proposed.write(tmp_path / "study.toml"))
+    for band, model in zip(found.bands, settings.models, strict=True):
+        assert model.band_rad_s == band.band_rad_s
+        assert f"# {band.words}: " in proposed.text
+        said = next(f.message for f in found.findings if f.code == f"band-{band.axis}")
+        assert f"usable from {band.words} (" in said
 
 
 def test_steps_of_a_set_point_are_counted_where_a_level_is_held() -> None:

@@ -23,6 +23,7 @@ from flightid.app.schemas import (
 from flightid.findings import Finding
 from flightid.inspection import Inspection
 from flightid.inspection.carried import carried_sentence
+from flightid.inspection.usable_band import hertz_words
 from flightid.logs import Log
 from flightid.review import FlightReview
 from flightid.review.loop_response import LoopResponse
@@ -39,7 +40,6 @@ CALLED = {"level": "ends at"}
 PLACES = {
     "airborne": "air",
     "excitation-found": "sid autotune chirp sweep steps",
-    "saturated": "limit",
     "tipped-over": "fall",
     "gap": "gap",
     "dropout": "gap",
@@ -118,25 +118,16 @@ def light_of(light: object) -> Light:
     return cast("Light", str(light))
 
 
-def hertz(band_rad_s: tuple[float, float]) -> str:
-    """A band as people say it.
-
-    Example
-    -------
-    >>> hertz((1.35, 23.6))
-    '0.215 to 3.76 Hz'
-    """
-    low, high = (each / math.tau for each in band_rad_s)
-    return f"{low:.3g} to {high:.3g} Hz"
-
-
 def _card(
     axis: str, inspection: Inspection, missed: Sequence[Finding], settings: Settings | None
 ) -> AxisCard:
     band = next((each for each in inspection.bands if each.axis == axis), None)
     finding = next((f for f in inspection.findings if f.code == f"band-{axis}"), None)
     model = next((m for m in (settings.models if settings else ()) if m.axis == axis), None)
-    if model is not None and model.band_rad_s is not None:
+    fitted = None if model is None else model.band_rad_s
+    if model is not None and fitted is not None:
+        # The log's own band, which the study proposes: a hand may have changed that since.
+        fitted = fitted if band is None or band.band_rad_s is None else band.band_rad_s
         light: Light = "green" if finding is None else light_of(finding.light)
         coherence = None if band is None or band.coherence is None else band.coherence
         said = "" if coherence is None else f"mean coherence {coherence:.2f}"
@@ -146,11 +137,11 @@ def _card(
             axis=axis,
             kind="model",
             light=light,
-            headline=f"Can be identified {hertz(model.band_rad_s)}",
+            headline=f"Can be identified {hertz_words(fitted)}",
             detail=". ".join(filter(None, (said, told))),
             action="" if finding is None else finding.action,
             model=model.name,
-            band_rad_s=model.band_rad_s,
+            band_rad_s=fitted,
             coherence=coherence,
         )
     why = next((f for f in missed if f.message.startswith(f"{axis}:")), None)
@@ -190,6 +181,8 @@ def _shows(block: TimelineBlock, code: str) -> bool:
     axis = code.rpartition("-")[2]
     if axis in AXES and code.startswith("band"):
         return block.axis == axis
+    if code.startswith("saturated"):
+        return block.kind == "limit" and block.axis == (axis if axis in AXES else "")
     kinds = next((kinds for start, kinds in PLACES.items() if code.startswith(start)), "")
     return block.kind in kinds.split()
 

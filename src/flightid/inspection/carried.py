@@ -44,19 +44,19 @@ class InspectedLog(Protocol):
 
 SEARCHED = ("sid", "chirp", "sweep", "autotune")
 """Excitations from which a model may be tried."""
-OF_WINDOW = 2.0
-"""Above the lowest coherent frequency: there a window holds two cycles, and a fit wants four."""
 BROKEN_OFF = "broken off"
 
 
 def why_no_model(inspection: InspectedLog, band: AxisBand) -> str:
     """Why an axis carries no model; empty where one may be tried."""
-    if band.band_rad_s is None:
+    if not band.input:
         return band.reason
     made = [e for e in inspection.excitations if e.axis == band.axis and e.kind in SEARCHED]
     if not any(not each.detail.endswith(BROKEN_OFF) for each in made):
         return "nothing was injected, and no sweep was flown"
-    if band.band_rad_s[1] < BAND_LEAST.value * OF_WINDOW * band.band_rad_s[0]:
+    if band.band_rad_s is None:
+        return band.reason
+    if band.span < BAND_LEAST.value:
         return "the band of its sweep that coherence supports is narrow"
     return ""
 

@@ -14,6 +14,8 @@ from flightid.inspection.signals import Span, find, inside, place_of
 from flightid.inspection.thresholds import GYRO_RANGE
 from flightid.logs import Log
 
+PID_MIXER_SCALING = 1000.0
+"""Of Betaflight: the sum of PID terms that is a command of one."""
 EDGE = 0.005
 """Share of the range within which a command counts as at its limit."""
 
@@ -30,11 +32,14 @@ class Saturation:
         Which limit, with its value.
     share : float
         Of the samples in the air, 0 to 1.
+    axis : str
+        Of a command; empty of motors and sensors.
     """
 
     what: str
     limit: str
     share: float
+    axis: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +48,7 @@ class LimitContact:
 
     Attributes
     ----------
-    what, limit : str
+    what, limit, axis : str
         As in `Saturation`.
     time_s : ndarray, shape (n,)
         Stamps in the air, s.
@@ -55,6 +60,7 @@ class LimitContact:
     limit: str
     time_s: NDArray[np.float64]
     touched: NDArray[np.bool_]
+    axis: str = ""
 
     def spans(self, apart_s: float) -> list[Span]:
         """Spans at the limit, s; those closer than `apart_s` are one."""
@@ -71,7 +77,7 @@ def saturations(
 ) -> tuple[Saturation, ...]:
     """Everything that was at a limit for part of the flight, most first."""
     found = [
-        Saturation(each.what, each.limit, float(np.mean(each.touched)))
+        Saturation(each.what, each.limit, float(np.mean(each.touched)), each.axis)
         for each in limit_contacts(log, spans, actuators)
     ]
     return tuple(
@@ -103,14 +109,27 @@ def _motors(actuators: Actuators | None, spans: tuple[Span, ...]) -> Iterator[Li
 
 
 def _commands(log: Log, spans: tuple[Span, ...]) -> Iterator[LimitContact]:
-    for axis in axes_of(log.vehicle).values():
+    for name, axis in axes_of(log.vehicle).items():
         signal = find(log, axis.command)
         if signal is None or signal.unit != "1":
             continue
+        most, limit = _command_limit(log, name)
         part = place_of(signal.time_s, spans)
-        touched = np.abs(signal.values[part]) >= 1.0 - EDGE
+        touched = np.abs(signal.values[part]) >= most * (1.0 - EDGE)
         if touched.size:
-            yield LimitContact(signal.label, "mixer limit 1", signal.time_s[part], touched)
+            yield LimitContact(signal.label, limit, signal.time_s[part], touched, name)
+
+
+def _command_limit(log: Log, axis: str) -> tuple[float, str]:
+    """Largest command that the mixer takes of an axis, and its name.
+
+    Betaflight cuts the sum of the PID terms before it mixes (`mixTable` of its ``mixer.c``).
+    """
+    name = "pidsum_limit_yaw" if axis == "yaw" else "pidsum_limit"
+    most = log.parameters.get(name, 0.0) if log.kind == "betaflight" else 0.0
+    if not 0.0 < most < PID_MIXER_SCALING:
+        return 1.0, "mixer limit 1"
+    return most / PID_MIXER_SCALING, f"limit {name} {most:g}"
 
 
 def _gyroscopes(log: Log, spans: tuple[Span, ...]) -> Iterator[LimitContact]:

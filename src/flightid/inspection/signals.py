@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,7 +45,7 @@ class Signal:
     unit: str
     label: str
 
-    @property
+    @cached_property
     def rate_hz(self) -> float:
         """Samples per second from the median interval."""
         return float(1.0 / np.median(np.diff(self.time_s), overwrite_input=True))

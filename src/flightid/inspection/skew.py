@@ -14,7 +14,11 @@ from flightid.uncertainty.quantiles import half_width
 
 LONGEST_LAG_S = 0.3
 COARSE, FINE = 61, 41
-"""Lags tried over the whole range, then between the neighbours of the best one."""
+"""Lags over the whole range, then between the neighbours of the best one."""
+APART = 5
+"""Of the fine lags one in so many is tried first, then those about the best of these."""
+ENOUGH_COARSE = 2_500
+"""Samples that tell which coarse lag is near."""
 ENOUGH = 20_000
 """Samples that settle a correlation; more only cost time."""
 PARTS = 10
@@ -85,27 +89,17 @@ def _skew(
     every = max(1, stamps.size // ENOUGH)
     stamps, values = stamps[::every], values[::every]
 
-    middle_off = values - values.mean()
-    size = float(np.linalg.norm(middle_off))
-
-    def correlation_at(lag: float) -> float:
-        moved = np.interp(stamps + lag, fast.time_s, fast.values)
-        moved -= moved.mean()
-        spread = size * float(np.linalg.norm(moved))
-        return float(middle_off @ moved) / spread if spread > 0 else 0.0
-
-    def correlations_at(lags: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.array([correlation_at(lag) for lag in lags.tolist()])
-
     coarse = np.linspace(-LONGEST_LAG_S, LONGEST_LAG_S, COARSE)
-    near = float(coarse[int(np.argmax(correlations_at(coarse)))])
+    apart = max(1, stamps.size // ENOUGH_COARSE)
+    thin = _Alike(stamps[::apart], values[::apart], fast)
+    near = float(coarse[int(np.argmax([thin.at(lag) for lag in coarse.tolist()]))])
     step = float(coarse[1] - coarse[0])
     lags = np.linspace(near - step, near + step, FINE)
-    correlations = correlations_at(lags)
-    best = int(np.argmax(correlations))
+    correlations = _about_the_best(_Alike(stamps, values, fast), lags)
+    best = max(correlations, key=correlations.__getitem__)
     if not 0 < best < lags.size - 1 or correlations[best] < SKEW_CORRELATION.value:
         return None
-    left, middle, right = correlations[best - 1 : best + 2]
+    left, middle, right = (correlations[best + side] for side in (-1, 0, 1))
     curvature = left - 2.0 * middle + right
     fraction = 0.5 * (left - right) / curvature if curvature < 0 else 0.0
     # The fast stream read `lag` later matches the slow one: the fast one is later by `lag`.
@@ -120,6 +114,34 @@ def _skew(
         0.1 / slow.rate_hz,
         _half_width_s(values, stamps + lag, fast, float(lags[1] - lags[0])),
     )
+
+
+class _Alike:
+    """How alike a slow stream and a fast one are that is read a lag later."""
+
+    def __init__(
+        self, stamps: NDArray[np.float64], values: NDArray[np.float64], fast: Signal
+    ) -> None:
+        self._stamps, self._fast = stamps, fast
+        self._off = values - values.mean()
+        self._size = float(np.linalg.norm(self._off))
+
+    def at(self, lag: float) -> float:
+        """Correlation at a lag, s."""
+        moved = np.interp(self._stamps + lag, self._fast.time_s, self._fast.values)
+        moved -= moved.mean()
+        spread = self._size * float(np.linalg.norm(moved))
+        return float(self._off @ moved) / spread if spread > 0 else 0.0
+
+
+def _about_the_best(alike: _Alike, lags: NDArray[np.float64]) -> dict[int, float]:
+    """Correlations by the place of their lag: a few over the range, all about the best of these."""
+    found = {place: alike.at(float(lags[place])) for place in range(0, lags.size, APART)}
+    top = max(found, key=found.__getitem__)
+    for place in range(max(0, top - APART + 1), min(lags.size, top + APART)):
+        if place not in found:
+            found[place] = alike.at(float(lags[place]))
+    return found
 
 
 def _half_width_s(

@@ -29,6 +29,8 @@ from flightid.responses.bands import coherent_parts
 from flightid.responses.estimators.composite import Composite
 from flightid.responses.running import SpectralSum
 
+OF_WINDOW = 2.0
+"""Above the lowest coherent frequency: there a window holds two cycles, and a fit wants four."""
 N_OMEGA = 60
 """Frequencies at which coherence is computed."""
 SHORTENED = 6
@@ -49,8 +51,8 @@ class AxisBand:
     rate_hz : float
         Rate of the slower of the two, Hz; 0 where one is missing.
     band_rad_s : tuple of float, or None
-        Widest band in which the partial coherence reaches 0.6 with at least five independent
-        windows and ten samples a cycle, and that ends where the power of the sweeps does, rad/s.
+        Band in which a model is fitted, rad/s, to three digits: `coherent_rad_s` from twice its
+        lowest frequency, where a window holds four cycles. None where nothing is left of it.
     coherence : float or None
         Mean partial coherence in the band; the largest anywhere where there is no band.
     largest_coherence : float or None
@@ -60,6 +62,9 @@ class AxisBand:
         Why there is no band; empty where there is one.
     excited_to_rad_s : float
         Where the power of the sweeps of this axis ends, rad/s; infinite without any.
+    coherent_rad_s : tuple of float, or None
+        Widest band in which the partial coherence reaches 0.6 with at least five independent
+        windows and ten samples a cycle, and that ends where the power of the sweeps does, rad/s.
     """
 
     axis: str
@@ -71,11 +76,29 @@ class AxisBand:
     reason: str = ""
     largest_coherence: float | None = None
     excited_to_rad_s: float = math.inf
+    coherent_rad_s: tuple[float, float] | None = None
+
+    @property
+    def words(self) -> str:
+        """The band in Hz; empty without one."""
+        return hertz_words(self.band_rad_s) if self.band_rad_s else ""
 
     @property
     def span(self) -> float:
         """Highest over lowest frequency of the band; 0 without one."""
         return self.band_rad_s[1] / self.band_rad_s[0] if self.band_rad_s else 0.0
+
+
+def hertz_words(band_rad_s: tuple[float, float]) -> str:
+    """A band as people say it, everywhere.
+
+    Example
+    -------
+    >>> hertz_words((1.35, 23.6))
+    '0.215 to 3.76 Hz'
+    """
+    low, high = (each / math.tau for each in band_rad_s)
+    return f"{low:.3g} to {high:.3g} Hz"
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,17 +160,27 @@ def axis_bands(
         explained = known[chosen]
         slowest = min(command.rate_hz, motion.rate_hz)
         labels = (command.label, motion.label)
-        band, coherence, largest, why = None, None, None, ""
+        coherent, coherence, largest, why = None, None, None, ""
         highest = excited_to(log, axis, excited)
         if isinstance(explained, str):
             why = explained
         elif tau in explained.inputs:
-            band, coherence, largest, reason = _band(explained, rate, tau, slowest, highest)
+            coherent, coherence, largest, reason = _band(explained, rate, tau, slowest, highest)
             why = f"{reason}{explained.cut}" if reason else ""
         else:
             why = f"{labels[0]} did not move"
-        found.append(AxisBand(axis, *labels, slowest, band, coherence, why, largest, highest))
+        band = None if coherent is None else _fitted(coherent)
+        if coherent is not None and band is None:
+            why = f"coherence reaches 0.6 from {hertz_words(coherent)} alone: too narrow for a fit"
+        told = band, coherence, why, largest, highest, coherent
+        found.append(AxisBand(axis, labels[0], labels[1], slowest, *told))
     return tuple(found)
+
+
+def _fitted(coherent: Span) -> Span | None:
+    """Band of a fit in a coherent one, rad/s; None where nothing is left."""
+    low, high = float(f"{OF_WINDOW * coherent[0]:.3g}"), float(f"{coherent[1]:.3g}")
+    return (low, high) if low < high else None
 
 
 def _found(log: Log, names: list[str]) -> Iterator[Signal]:
@@ -287,5 +320,8 @@ def _band(
         reached = largest >= MINIMUM_COHERENCE.value
         why = "reaches 0.6 at single frequencies only" if reached else "stays below 0.6"
         return None, largest, largest, f"partial coherence {why} {size}"
-    within = (omega >= band[0]) & (omega <= band[1])
+    low, high = _fitted(band) or band
+    within = (omega >= low) & (omega <= high)
+    if not np.any(within):
+        within = (omega >= band[0]) & (omega <= band[1])
     return band, float(np.mean(coherence[within])), largest, ""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 from flightid.conventions import Light
@@ -10,6 +9,7 @@ from flightid.findings import Finding, counted
 from flightid.inspection import advice
 from flightid.inspection.carried import carried_axes
 from flightid.inspection.gap_findings import gap_findings
+from flightid.inspection.saturation import Saturation
 from flightid.inspection.signals import map_of
 from flightid.inspection.thresholds import (
     BAND_GOOD,
@@ -20,7 +20,7 @@ from flightid.inspection.thresholds import (
     SATURATED_SHARE,
     SKEW,
 )
-from flightid.inspection.usable_band import AxisBand, lowest_hz
+from flightid.inspection.usable_band import AxisBand, hertz_words, lowest_hz
 from flightid.logs import Log
 from flightid.logs.scale_check import check_scales
 
@@ -205,8 +205,9 @@ def _excitation(log: Log, found: Inspection) -> list[Finding]:
 def _bands(log: Log, found: Inspection) -> list[Finding]:
     findings = [_band(log, band) for band in found.bands if band.rate_hz > 0]
     if not any(finding.code.startswith("band") for finding in findings):
-        measured = [b.largest_coherence for b in found.bands if b.largest_coherence is not None]
-        seen = f"largest found {max(measured):.2f}" if measured else "none could be measured"
+        measured = [b for b in found.bands if b.largest_coherence is not None]
+        largest = ", ".join(f"{b.axis} {b.largest_coherence:.2f}" for b in measured)
+        seen = f"largest found: {largest}" if measured else "none could be measured"
         findings.append(
             Finding(
                 "no-usable-band",
@@ -220,28 +221,32 @@ def _bands(log: Log, found: Inspection) -> list[Finding]:
 
 
 def _band(log: Log, band: AxisBand) -> Finding:
-    if band.band_rad_s is None:
+    coherent = band.coherent_rad_s or band.band_rad_s
+    if coherent is None:
         return Finding(
             f"no-band-{band.axis}",
             Light.AMBER,
             f"{band.axis}: no usable band: {band.reason}",
             advice.excitation(log),
         )
-    low, high = (omega / (2.0 * math.pi) for omega in band.band_rad_s)
+    width = coherent[1] / coherent[0]
+    usable = width >= BAND_LEAST.value and band.band_rad_s is not None
+    shown = band.band_rad_s if usable and band.band_rad_s is not None else coherent
+    word = "usable" if usable else "coherent"
     text = (
-        f"{band.axis}: usable from {low:.2g} to {high:.2g} Hz ({band.band_rad_s[0]:.3g} to "
-        f"{band.band_rad_s[1]:.3g} rad/s), mean coherence {band.coherence:.2f}"
+        f"{band.axis}: {word} from {hertz_words(shown)} ({shown[0]:.3g} to {shown[1]:.3g} rad/s), "
+        f"mean coherence {band.coherence:.2f}"
     )
-    if band.band_rad_s[1] >= band.excited_to_rad_s:
+    if coherent[1] >= band.excited_to_rad_s:
         text += ", up to where the power of the sweep ends"
-    if band.span < BAND_LEAST.value:
+    if width < BAND_LEAST.value:
         return Finding(
             f"narrow-band-{band.axis}",
             Light.AMBER,
             f"{text}: too narrow for more than a gain",
             advice.excitation(log),
         )
-    light = Light.GREEN if band.span >= BAND_GOOD.value else Light.AMBER
+    light = Light.GREEN if width >= BAND_GOOD.value else Light.AMBER
     action = "" if light is Light.GREEN else advice.excitation(log)
     return Finding(f"band-{band.axis}", light, text, action)
 
@@ -273,10 +278,26 @@ def _room(found: Inspection, limit: str) -> str:
     return f"{centre} first; then {more.get(limit.partition(' ')[0], 'gentler flying')}"
 
 
+def _at_limit(command: Saturation) -> Finding:
+    """A command that the mixer cut for long: its axis did not do what its loop asked."""
+    first = "take out what holds a steady yaw moment first (tilted motors, twisted arms)"
+    if command.axis != "yaw":
+        first = "trim the centre of gravity and straighten motors first"
+    return Finding(
+        f"saturated-{command.axis}",
+        Light.AMBER,
+        f"the command of {command.axis}, {command.what}, is at its {command.limit} for "
+        f"{100 * command.share:.0f} % of the flight",
+        f"{first}; then gentler flying, or lower gains",
+    )
+
+
 def _quality(log: Log, found: Inspection) -> list[Finding]:
     findings = []
-    worst = next(iter(found.saturations), None)
-    if worst is not None and worst.share > SATURATED_SHARE.value:
+    long = [each for each in found.saturations if each.share > SATURATED_SHARE.value]
+    findings += [_at_limit(each) for each in long if each.axis]
+    worst = next((each for each in long if not each.axis), None)
+    if worst is not None:
         findings.append(
             Finding(
                 "saturated",

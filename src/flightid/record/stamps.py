@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from enum import StrEnum
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -66,7 +67,7 @@ class StampedSamples:
     n_disordered: int = 0
     n_missing: int = 0
 
-    @property
+    @cached_property
     def median_spacing_s(self) -> float:
         """Median time between stamps, s."""
         return float(np.median(np.diff(self.time_s)))
@@ -74,19 +75,29 @@ class StampedSamples:
     @property
     def sample_time_s(self) -> float:
         """Mean time between stamps outside gaps, s; coarse stamps would mislead a median."""
-        return mean_spacing_s(self.time_s)
+        return float(np.mean(self._regular_spacing()))
 
     @property
     def jitter(self) -> float:
         """Root mean square departure of the spacing from its mean outside gaps, as a fraction."""
-        spacing = np.diff(self.time_s)
-        regular = spacing[spacing <= GAP_FACTOR * np.median(spacing)]
+        regular = self._regular_spacing()
         return float(np.std(regular) / np.mean(regular))
 
+    def _regular_spacing(self) -> NDArray[np.float64]:
+        """Spacings outside gaps, s."""
+        spacing = np.diff(self.time_s)
+        return np.asarray(spacing[spacing <= GAP_FACTOR * self.median_spacing_s])
+
+    @cached_property
+    def usual_gaps(self) -> tuple[tuple[float, float], ...]:
+        """Spans without a sample: spacings above 2.5 median spacings."""
+        return tuple(self.gaps(GAP_FACTOR * self.median_spacing_s))
+
     def gaps(self, longest_s: float | None = None) -> list[tuple[float, float]]:
-        """Spans without a sample: spacings above `longest_s`, or above 2.5 median spacings."""
-        limit = GAP_FACTOR * self.median_spacing_s if longest_s is None else longest_s
-        (index,) = np.nonzero(np.diff(self.time_s) > limit)
+        """Spans without a sample: spacings above `longest_s`, or the `usual_gaps`."""
+        if longest_s is None:
+            return list(self.usual_gaps)
+        (index,) = np.nonzero(np.diff(self.time_s) > longest_s)
         return [(float(self.time_s[i]), float(self.time_s[i + 1])) for i in index]
 
     def is_uniform(self) -> bool:

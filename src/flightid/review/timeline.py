@@ -135,7 +135,7 @@ def _blocks(log: Log, inspection: Inspection, span: Span) -> list[TimelineBlock]
         found.append(TimelineBlock("fall", "", "the vehicle falls over", fell, span[1]))
     apart = (span[1] - span[0]) / JOINED
     limits = [
-        TimelineBlock("limit", "", f"{contact.what} at its {contact.limit}", *each)
+        TimelineBlock("limit", contact.axis, f"{contact.what} at its {contact.limit}", *each)
         for contact in limit_contacts(log, airborne, find_actuators(log))
         for each in contact.spans(apart)
     ]

@@ -152,6 +152,7 @@ class DataflashSource:
         self._bad_lines = bad_lines
         self._layouts: dict[str, _Layout] = {}
         self._renamed: list[str] = []
+        self._rows: dict[tuple[str, int | None], int] = {}
         for index, (name, _, count) in enumerate(file.tables()):
             if count > 0:
                 self._adopt(name, _Layout(file, index, count, partial(self._assumed, name)))
@@ -194,7 +195,10 @@ class DataflashSource:
 
     def rows(self, message: str, instance: int | None) -> int:
         """Rows of a message, or of one of its instances."""
-        return self._file.rows(self._layouts[message].table, instance)
+        key = message, instance
+        if key not in self._rows:  # of an instance they are counted one by one
+            self._rows[key] = self._file.rows(self._layouts[message].table, instance)
+        return self._rows[key]
 
     def places(self, message: str) -> NDArray[np.float64]:
         """Place of each row in the file, bytes."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Iterator, Mapping, MutableMapping
 from pathlib import Path
@@ -14,11 +13,11 @@ from flightid.findings import Finding
 from flightid.frozen import dataclass
 from flightid.inspection import Inspection, inspect_log
 from flightid.inspection.axes import axes_of
-from flightid.inspection.carried import OF_WINDOW, why_no_model
+from flightid.inspection.carried import why_no_model
 from flightid.inspection.excitation_found import FoundExcitation
 from flightid.inspection.log_clock import begins_later
 from flightid.inspection.signals import Span
-from flightid.inspection.usable_band import AxisBand
+from flightid.inspection.usable_band import AxisBand, hertz_words
 from flightid.logs import Log, read_log
 from flightid.logs.dataflash.sid_runs import SidRun
 from flightid.models.save import toml_value
@@ -71,7 +70,6 @@ class _Axis:
         return f"{self.axis.capitalize()} rate"
 
     def lines(self) -> Iterator[str]:
-        low, high = self.band_rad_s
         yield from ("", "[[model]]", f"name = {toml_value(self.name)}")
         yield f"template = {toml_value(self.template)}"
         yield f"axis = {toml_value(self.axis)}"
@@ -80,8 +78,8 @@ class _Axis:
             yield f"verify = {toml_value([each.name for each in self.unseen])}"
         else:
             yield "# Nothing else moved this axis: fly a doublet, and name its span for verify."
-        yield f"# {low / math.tau:.3g} to {high / math.tau:.3g} Hz: {self.found}"
-        yield f"band_rad_s = {toml_value([_three(low), _three(high)])}"
+        yield f"# {hertz_words(self.band_rad_s)}: {self.found}"
+        yield f"band_rad_s = {toml_value(list(self.band_rad_s))}"
         if self.template == "rate_motor_lag":
             yield "parameters.T_m = { maximum = 0.15 } # the motor is the faster of the two lags"
         if self.chirped:
@@ -147,7 +145,6 @@ def _axis(log: Log, inspection: Inspection, band: AxisBand, model: str | None) -
             "name one of the library or of your own: --model short_period",
         )  # fmt: skip
     flown, unseen = _flown(log, axis, runs, others)
-    low, high = OF_WINDOW * band.band_rad_s[0], band.band_rad_s[1]
     if not unseen:
         avoid = [(e.start_s, e.stop_s) for e in inspection.excitations if e.is_injected]
         sid = [(run.start_s - 1.0, run.stop_s + 1.0) for run in log.sid_runs]
@@ -158,7 +155,7 @@ def _axis(log: Log, inspection: Inspection, band: AxisBand, model: str | None) -
         f"coherence {band.coherence:.2f} on average" if band.coherence is not None else "coherent"
     )
     return _Axis(
-        axis, flown, unseen, (low, high), "instrument" if runs else "composite",
+        axis, flown, unseen, band.band_rad_s, "instrument" if runs else "composite",
         model or TEMPLATES[axis], f"{said}, inside what was swept",
         not runs and bool(_chirped(others)),
     )  # fmt: skip
@@ -201,10 +198,6 @@ def _missed(inspection: Inspection, axis: str, why: str, action: str = "") -> Fi
     """Why there is no model of an axis; the inspection's advice where there is none of its own."""
     advice = next((f.action for f in inspection.findings if f.code == "no-excitation"), "")
     return Finding("no-model", Light.RED, f"{axis}: no model, {why}", action or advice)
-
-
-def _three(value: float) -> float:
-    return float(f"{value:.3g}")
 
 
 def _lines(
