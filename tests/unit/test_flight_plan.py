@@ -15,10 +15,10 @@ from flightid.conventions import Light
 from flightid.errors import OptionError, UnknownNameError
 from flightid.findings import Finding
 from flightid.inspection.advice import set_bits
-from flightid.inspection.excitation_found import FoundExcitation
 from flightid.inspection.flight_phases import FlightPhases, flight_phases
 from flightid.planning.axis_guess import guess_axis
 from flightid.planning.flight_findings import flight_findings
+from flightid.planning.flown_sweeps import FlownSweeps
 from flightid.planning.loop_check import MISSED
 from flightid.planning.result import AxisSweep
 from flightid.planning.still_rate import still_rate
@@ -286,16 +286,42 @@ def test_a_fall_an_unknown_rate_and_a_trim_are_said(
     found = flight_findings(opened, phases, plan.sweeps, 400.0)
     lights = {each.code: each.light for each in found}
     assert lights == {"tipped-over": Light.RED, "loop-rate-typical": Light.AMBER}
-    swept = [FoundExcitation("sid", axis, 12.0, 60.0, "") for axis in ("roll", "roll", "yaw")]
-    with monkeypatch.context() as patch:
-        patch.setattr("flightid.planning.flight_findings.excitations", lambda *_: swept)
-        first = flight_findings(opened, phases, plan.sweeps, 400.0)[0]
-    assert "already: roll (2), yaw;" in first.message
-    assert first.action == f"next is flightid tune {opened.path.name}"
     monkeypatch.setattr("flightid.planning.flight_findings.LARGEST_TRIM", 0.0)
     (said,) = flight_findings(opened, replace(phases, tipped_s=None), plan.sweeps[2:], 0.0)
     assert said.code == "trim-let-go"
     assert "ATC_RAT_YAW_I at 0" in said.message
+
+
+def test_what_a_log_carries_already_is_not_swept_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A log with a good sweep of roll: its model is there, and the next flight is of the others."""
+    sweep = SidActivation(
+        axis=10, start_s=5.0, magnitude=0.15, start_hz=0.15, stop_hz=12.0,
+        fade_in_s=3.0, record_s=30.0, fade_out_s=1.0, leave_after_s=40.0,
+    )  # fmt: skip
+    path = write_ardupilot_log(fly(runs=[sweep], log_every=2, seed=1), tmp_path / "swept.bin")
+    opened = fid.read_log(path)
+    made = fid.plan_flight(opened)
+    assert made.carried == ("roll",)
+    assert [each.axis for each in made.sweeps] == ["pitch", "yaw"]
+    (done,) = (each for each in made.findings if each.code == "identified-already")
+    assert "a model of roll: no further sweep" in done.message
+    assert done.action == "next is flightid tune swept.bin"
+    again = {each.code for each in fid.plan_flight(opened, axes=("roll",)).findings}
+    assert "swept-already" in again
+    assert "identified-already" not in again
+    every = FlownSweeps(("roll", "roll", "yaw"), ("roll", "pitch", "yaw"))
+    said = [each.message for each in every.findings(opened, ("yaw",))]
+    assert said[0].startswith("this log can carry a model of roll and pitch:")
+    assert "already: yaw;" in said[1]
+    monkeypatch.setattr("flightid.planning.plan.flown_sweeps", lambda *_: every)
+    none = fid.plan_flight(opened)
+    assert (none.verdict, none.is_go, none.sweeps) == ("not needed", True, ())
+    assert {each.light for each in none.findings} == {Light.GREEN}
+    assert run(["plan", str(path), "--output", str(tmp_path / "out")]) == 0
+    assert "a model of roll, pitch and yaw" in " ".join(capsys.readouterr().out.split())
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_log_without_the_rate_of_the_controller_is_planned(

@@ -48,8 +48,8 @@ def command(
     LOG is any flight: its loops stay on while the sweep is flown, so they decide, with the axis as
     this flight showed it, which amplitude gives which rates, attitudes and coherence. Writes
     card.html, one page to print and take to the field, and the settings of each axis with the file
-    that takes them back. The exit code is 1 for no-go,
-    which leaves no settings.
+    that takes them back. Axes of which LOG can carry a model already are left out, unless --axes
+    names them. The exit code is 1 for no-go, which leaves no settings.
     """
     from flightid import plan_flight
     from flightid.files import write_atomically
@@ -67,6 +67,9 @@ def command(
         emit_values(plan.to_dict())
     else:
         click.echo("\n\n".join(str(table) for table in reversed(plan._tables())))
+    if not plan.sweeps:
+        leave_by_verdict(plan.findings)
+        return
     place = output or (
         Path(f"{asked['vehicle']}-plan") if log is None else log.parent / f"{log.stem}-plan"
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
 
@@ -10,7 +9,6 @@ import numpy as np
 
 from flightid.conventions import Light
 from flightid.findings import Finding
-from flightid.inspection.excitation_found import excitations
 from flightid.inspection.flight_phases import FlightPhases
 from flightid.inspection.signals import find
 from flightid.logs import Log
@@ -26,7 +24,7 @@ LARGEST_TRIM = 0.05
 def flight_findings(
     log: Log | None, phases: FlightPhases | None, sweeps: Iterable[AxisSweep], assumed_hz: float
 ) -> list[Finding]:
-    """Sweeps flown already, a fall, a rate that nobody told, and trims that integrators held.
+    """A fall, a rate that nobody told, and trims that integrators held.
 
     Parameters
     ----------
@@ -58,19 +56,7 @@ def flight_findings(
                 "say it: loop_rate_hz=…",
             )
         )
-    return [*_swept(log, phases), *found, *_trims(log, phases, sweeps)]
-
-
-def _swept(log: Log, phases: FlightPhases) -> Iterator[Finding]:
-    """What was injected already, which a plan of the next sweep does not read."""
-    axes = [each.axis for each in excitations(log, phases.airborne) if each.is_injected]
-    if axes:
-        named = ", ".join(f"{axis} ({n})" if n > 1 else axis for axis, n in Counter(axes).items())
-        yield Finding(
-            "swept-already", Light.AMBER,
-            f"this log holds injected sweeps already: {named}; a plan is of ordinary flying",
-            f"next is flightid tune {log.path.name}",
-        )  # fmt: skip
+    return [*found, *_trims(log, phases, sweeps)]
 
 
 def _trims(log: Log, phases: FlightPhases, sweeps: Iterable[AxisSweep]) -> Iterator[Finding]:

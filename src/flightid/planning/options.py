@@ -24,7 +24,7 @@ class PlanOptions(Options):
     vehicle: str = option("quad", choices=VEHICLES, doc="Kind of vehicle, where no log tells it.")
     autopilot: str = option("ardupilot", choices=AUTOPILOTS, doc="Its autopilot, likewise.")
     axes: tuple[str, ...] | None = option(
-        None, doc="Axes to sweep; default: all that the autopilot sweeps."
+        None, doc="Axes to sweep; default: those of which the log carries no model yet."
     )
     band_rad_s: tuple[float, float] | None = option(
         None, unit="rad/s", above=0.0, doc="Band to sweep; default: by the loops that fly."

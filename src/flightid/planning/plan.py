@@ -23,6 +23,7 @@ from flightid.logs import Log, read_log
 from flightid.planning.flight_findings import flight_findings
 from flightid.planning.flight_time import flight_time
 from flightid.planning.flown_axis import FlownAxis
+from flightid.planning.flown_sweeps import FlownSweeps, flown_sweeps
 from flightid.planning.loop_check import CAREFULLY
 from flightid.planning.options import PlanOptions
 from flightid.planning.procedures import PROCEDURES, Procedure, procedure_of
@@ -79,7 +80,8 @@ def plan_flight(
     autopilot : {"ardupilot", "px4", "betaflight", "inav"}
         Autopilot where no log tells it.
     axes : tuple of str, optional
-        Axes to sweep; default: all that the autopilot sweeps.
+        Axes to sweep; default: all that the autopilot sweeps but those of which the log can carry
+        a model already.
     band_rad_s : tuple of float, optional
         Band to sweep; default: an eighth of the crossover to 2.5 times the frequency at which the
         broken rate loop turns by -180 deg, and what the loop's rate, or a pilot, can do.
@@ -133,7 +135,9 @@ def plan_flight(
     current = {} if opened is None else dict(opened.parameters)
     phases = None if opened is None else flight_phases(opened, find_actuators(opened))
     spans = () if phases is None else phases.airborne
-    chosen = procedure.axes if asked.axes is None else tuple(asked.axes)
+    swept = FlownSweeps() if opened is None or phases is None else flown_sweeps(opened, phases)
+    needed = tuple(axis for axis in procedure.axes if axis not in swept.carried)
+    chosen = needed if asked.axes is None else tuple(asked.axes)
     sweeps = []
     for axis in chosen:
         if axis not in procedure.axes:
@@ -147,13 +151,14 @@ def plan_flight(
             loop = _loop(procedure, axis, opened, rate_hz)
             enters = procedure.entry(axis)
             guess = told_axis(axis, loop, procedure.kind, enters, opened, spans)
-            swept = replace(guess.vehicle, loop=_while_swept(procedure, loop))
-            guess = replace(guess, vehicle=swept)
-            made = _sweep(procedure, axis, swept, asked)
+            vehicle_swept = replace(guess.vehicle, loop=_while_swept(procedure, loop))
+            guess = replace(guess, vehicle=vehicle_swept)
+            made = _sweep(procedure, axis, vehicle_swept, asked)
         excitation = None if made is None else made.excitation
         changes = settings_of(procedure, axis, excitation, current, chosen, asked)
         sweeps.append(AxisSweep(axis, guess, made, changes))
-    flown = flight_findings(opened, phases, sweeps, USUAL_LOOP_HZ if assumed else 0.0)
+    flown = [] if opened is None else list(swept.findings(opened, chosen))
+    flown += flight_findings(opened, phases, sweeps, USUAL_LOOP_HZ if assumed and sweeps else 0.0)
     lengths = [
         each.plan.excitation.duration_s if each.plan else unsized_s(procedure, asked)
         for each in sweeps
@@ -167,7 +172,8 @@ def plan_flight(
         n_records=asked.n_records,
         flight_time=flight_time(runs, asked.n_records, opened, phases),
         logging=_logging(procedure, opened),
-        findings=_findings(procedure, tuple(sweeps), opened, flown),
+        findings=_findings(procedure, tuple(sweeps), opened, flown) if sweeps else tuple(flown),
+        carried=swept.carried,
     )
 
 

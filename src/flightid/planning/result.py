@@ -102,6 +102,8 @@ class SweepPlan(Result, schema="flightid.sweep_plan/1"):
         What to set so that the log is fast enough.
     findings : tuple of Finding
         Go or no-go.
+    carried : tuple of str
+        Axes of which the log can carry a model already.
 
     Example
     -------
@@ -119,6 +121,7 @@ class SweepPlan(Result, schema="flightid.sweep_plan/1"):
     flight_time: FlightTime
     logging: str
     findings: tuple[Finding, ...] = ()
+    carried: tuple[str, ...] = ()
 
     @property
     def is_go(self) -> bool:
@@ -127,9 +130,14 @@ class SweepPlan(Result, schema="flightid.sweep_plan/1"):
 
     @property
     def verdict(self) -> str:
-        """``"no-go"``; ``"begin small"`` where the flight missed an expected loop; or ``"go"``."""
+        """``"no-go"``, ``"not needed"``, ``"begin small"`` or ``"go"``.
+
+        Not needed: the log carries every axis. Small: the flight missed an expected loop.
+        """
         if not self.is_go:
             return "no-go"
+        if not self.sweeps:
+            return "not needed"
         return "begin small" if any(f.code == MISSED for f in self.findings) else "go"
 
     def summary(self) -> Table:
@@ -195,8 +203,9 @@ class SweepPlan(Result, schema="flightid.sweep_plan/1"):
         return f"Flight plan of {self.name}, {self.procedure.title}"
 
     def _notes(self) -> Iterator[str]:
-        yield f"{self.flight_time.words[0].upper()}{self.flight_time.words[1:]}."
-        yield f"Log: {self.logging}."
+        if self.sweeps:
+            yield f"{self.flight_time.words[0].upper()}{self.flight_time.words[1:]}."
+            yield f"Log: {self.logging}."
         yield from map(str, self.findings)
 
     def settings(self, axis: str) -> Table:

@@ -1,0 +1,80 @@
+"""What a log holds of sweeps already, and of which axes it needs no further flight."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection, Iterator
+from weakref import WeakKeyDictionary
+
+from flightid.conventions import Light
+from flightid.findings import Finding
+from flightid.frozen import dataclass
+from flightid.inspection import inspect_log
+from flightid.inspection.carried import SEARCHED, carried_axes
+from flightid.inspection.excitation_found import excitations
+from flightid.inspection.flight_phases import FlightPhases
+from flightid.logs import Log
+
+
+@dataclass(frozen=True)
+class FlownSweeps:
+    """Sweeps of a log.
+
+    Attributes
+    ----------
+    injected : tuple of str
+        Axis of each run that the autopilot injected.
+    carried : tuple of str
+        Axes of which the log can carry a model as it is; none where anything about it is red.
+    """
+
+    injected: tuple[str, ...] = ()
+    carried: tuple[str, ...] = ()
+
+    def findings(self, log: Log, planned: Collection[str]) -> Iterator[Finding]:
+        """What needs no flight, and what is swept again although it was swept."""
+        name = log.path.name
+        done = [axis for axis in self.carried if axis not in planned]
+        if done:
+            yield Finding(
+                "identified-already", Light.GREEN,
+                f"this log can carry a model of {_listed(done)}: no further sweep of it is planned",
+                f"next is flightid tune {name}",
+            )  # fmt: skip
+        again = Counter(axis for axis in self.injected if axis in planned)
+        if again:
+            named = ", ".join(f"{axis} ({n})" if n > 1 else axis for axis, n in again.items())
+            next_step = f"next is flightid tune {name}"
+            if not set(again) <= set(self.carried):
+                next_step = f"flightid inspect {name} says why no model rests on them"
+            yield Finding(
+                "swept-already", Light.AMBER,
+                f"this log holds injected sweeps already: {named}; a plan is of ordinary flying",
+                next_step,
+            )  # fmt: skip
+
+
+_KNOWN: WeakKeyDictionary[Log, FlownSweeps] = WeakKeyDictionary()
+
+
+def flown_sweeps(log: Log, phases: FlightPhases) -> FlownSweeps:
+    """Look for sweeps in a log, once for each log that is held.
+
+    Parameters
+    ----------
+    log : Log
+    phases : FlightPhases
+        Airborne spans.
+    """
+    if log not in _KNOWN:
+        found = excitations(log, phases.airborne)
+        carried: tuple[str, ...] = ()
+        if any(each.kind in SEARCHED for each in found):
+            inspection = inspect_log(log)
+            carried = () if inspection.verdict is Light.RED else carried_axes(inspection)
+        _KNOWN[log] = FlownSweeps(tuple(e.axis for e in found if e.is_injected), carried)
+    return _KNOWN[log]
+
+
+def _listed(axes: list[str]) -> str:
+    return axes[0] if len(axes) == 1 else f"{', '.join(axes[:-1])} and {axes[-1]}"
