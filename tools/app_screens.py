@@ -59,9 +59,12 @@ def compare(stage: Stage) -> None:
 
 
 def plan(stage: Stage) -> None:
-    """The next flight."""
+    """The next flight: what the log allows, and a sweep of yaw that is asked for all the same."""
     stage.open(f"plan/{stage.log}")
-    stage.page.locator("section[aria-label=Sweeps]").wait_for()
+    page = stage.page
+    page.get_by_role("heading", name="This log already carries").wait_for()
+    page.get_by_role("group", name="Axes").get_by_role("button", name="yaw").click()
+    page.locator("section[aria-label=Sweeps]").wait_for()
 
 
 def records(stage: Stage) -> None:

@@ -26,7 +26,17 @@ from flightid.errors import OptionError, StudyError
 from flightid.report.content import Document
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="links need a right of their own there")
+STUDY = (
+    '[study]\ntitle = "t"\naircraft = "a"\n[[record]]\nname = "r"\npath = "{path}"\n'
+    '[[model]]\nname = "m"\nstructure = "oe"\ninputs = ["u"]\noutputs = "y"\n'
+    'identify = "r"\nnb = 1\nnf = 1\nnk = 1\n'
+)
 TABLE = b"t,u,y\n0,1,2\n1,0,3\n2,1,1\n"
+
+
+async def _unread(path: Path) -> str:
+    del path
+    return ""
 
 
 async def _pieces(content: bytes) -> AsyncIterator[bytes]:
@@ -37,9 +47,9 @@ def test_a_pipe_among_the_records_is_not_waited_for(tmp_path: Path) -> None:
     rigs = Rigs(Workspace(tmp_path))
 
     async def take() -> str:
-        first = await rigs.take("a.csv", _pieces(TABLE))
+        first = await rigs.take("a.csv", _pieces(TABLE), check=_unread)
         os.mkfifo(tmp_path / "records" / first / "b.csv")
-        return await asyncio.wait_for(rigs.take("b.csv", _pieces(TABLE), first), 5.0)
+        return await asyncio.wait_for(rigs.take("b.csv", _pieces(TABLE), first, check=_unread), 5.0)
 
     held = sorted(each.name for each in (tmp_path / "records" / asyncio.run(take())).iterdir())
     assert len(held) == 3, held
@@ -50,7 +60,7 @@ def test_a_run_takes_and_removes_nothing_that_a_link_leads_to(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     study, folder, mine = tmp_path / "s.toml", tmp_path / "results", tmp_path / "mine"
-    study.write_text("[study]\n")
+    study.write_text(STUDY.format(path="a.csv"))
     folder.mkdir()
     mine.mkdir()
     (mine / "notes.txt").write_text("mine")
@@ -89,11 +99,7 @@ def test_a_zip_follows_no_link_and_says_what_it_lacks(tmp_path: Path) -> None:
     folder.mkdir()
     workspace = Workspace(folder)
     study = workspace.study_path("0" * 16)
-    study.write_text(
-        f'[study]\ntitle = "t"\naircraft = "a"\n[[record]]\nname = "r"\npath = "{far}"\n'
-        '[[model]]\nname = "m"\nstructure = "oe"\ninputs = ["u"]\noutputs = "y"\n'
-        'identify = "r"\nnb = 1\nnf = 1\nnk = 1\n'
-    )
+    study.write_text(STUDY.format(path=far))
     made = folder / "run"
     made.mkdir()
     (made / "old.txt").write_text("kept")

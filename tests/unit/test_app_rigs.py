@@ -10,15 +10,21 @@ from pathlib import Path
 import pytest
 
 from flightid.app.guard import POLICY, REPORT_POLICY, _dressed
-from flightid.app.rig_work import make_rig
+from flightid.app.removed import RemovedList
+from flightid.app.rig_work import make_rig, require_table
 from flightid.app.rigs import Rigs
 from flightid.app.study_edits import KeyEdit, edited
+from flightid.app.work import answered
 from flightid.app.workspace import Workspace
 from flightid.errors import FileFormatError, OptionError, StudyError
 from flightid.record import read_records
 from flightid.study.proposal.columns import columns_of
 
 TABLE = b"t,u,y\n0,1,2\n1,0,3\n2,1,1\n"
+
+
+async def _checked(path: Path) -> str:
+    return answered(require_table, path)[1]
 
 
 async def _pieces(content: bytes) -> AsyncIterator[bytes]:
@@ -30,7 +36,7 @@ def test_files_of_a_rig_stay_together_and_nothing_else_enters(tmp_path: Path) ->
     rigs = Rigs(Workspace(tmp_path))
 
     def take(name: str, content: bytes, rig: str = "") -> str:
-        return asyncio.run(rigs.take(name, _pieces(content), rig))
+        return asyncio.run(rigs.take(name, _pieces(content), rig, check=_checked))
 
     first = take("../a.csv", TABLE)
     assert first == hashlib.sha256(TABLE).hexdigest()[:16]
@@ -39,11 +45,36 @@ def test_files_of_a_rig_stay_together_and_nothing_else_enters(tmp_path: Path) ->
     assert rigs.ids() == [first]
     with pytest.raises(FileFormatError):
         take("a.mat", b"no MATLAB file")
+    for letter in (b"Dear Ann\nthank you for the drone.\n", b"# A title\n\nIt flies.\nBob, hm\n"):
+        with pytest.raises(FileFormatError, match=r"letter\.txt (holds no|is not a) table of num"):
+            take("letter.txt", letter)
     with pytest.raises(OptionError, match="no file can be added"):
         take("b.csv", TABLE, "0" * 16)
     (tmp_path / "records" / first / "planted.csv").symlink_to("/etc/passwd")
     assert "planted.csv" not in [path.name for path in rigs.files(first)]
     assert rigs.files("../../etc") == []
+
+
+def test_what_is_taken_off_the_list_stays_in_its_place(tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path)
+    removed = RemovedList(workspace)
+    assert removed.ids() == []
+    for item in ("a" * 16, "b" * 16, "a" * 16):
+        removed.take_off(item)
+    assert RemovedList(workspace).ids() == ["b" * 16, "a" * 16]
+    removed.put_back("b" * 16)
+    removed.put_back("c" * 16)
+    assert removed.ids() == ["a" * 16]
+    path = tmp_path / ".flightid" / "removed.json"
+    for broken in (b"", b"[1]", b'{"removed": 3}', b'{"removed": ["../x", 4]}', b"\xff"):
+        path.write_bytes(broken)
+        assert removed.ids() == []
+    path.unlink()
+    path.symlink_to("/etc/passwd")
+    assert removed.ids() == []
+    removed.take_off("d" * 16)
+    assert not path.is_symlink()
+    assert removed.ids() == ["d" * 16]
 
 
 def test_a_file_without_time_says_so_and_reads_with_a_sample_time(tmp_path: Path) -> None:

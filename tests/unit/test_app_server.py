@@ -166,6 +166,72 @@ def test_who_has_not_seen_the_last_version_changes_nothing(browser: Browser, flo
     assert flown.study.read_text() == before
 
 
+def test_a_study_that_leads_out_of_the_folder_is_said_and_opened_by_nothing(
+    browser: Browser, flown: Flown, tmp_path: Path
+) -> None:
+    """The page takes the text, says which file, and neither runs it nor looks into it."""
+    place, before = f"/api/studies/{flown.log}", flown.study.read_text()
+    secret = tmp_path / "secret.bin"
+    shutil.copy(next(flown.folder.glob("*.bin")), secret)
+    inside = browser.ask(place)[1]
+    assert inside["outside"] == []
+    link = flown.folder / "link.bin"
+    link.symlink_to(secret)
+    for named in (str(secret), "../../../secret.bin", "../link.bin"):
+        edit = {"edits": [{"path": ["log", "path"], "value": named}]}
+        tag = browser.ask(place)[1]["etag"]
+        status, told, _ = browser.ask(place, "PATCH", edit, If_Match=tag)
+        assert status == 200, told
+        (said,) = told["outside"]
+        assert said.endswith("secret.bin")
+        status, told, _ = browser.ask(f"/api/runs/{flown.log}", "POST", {})
+        assert status == 422
+        assert "names files outside the folder of the page" in told["error"]
+        with browser.socket() as line:
+            ask = {"request": 1, "kind": "response", "log": flown.log, "model": "Roll rate"}
+            line.send(json.dumps(ask))
+            while (heard := json.loads(line.recv(60))).get("request") != 1:
+                pass
+        assert "outside the folder" in heard["error"]
+        status, told, _ = browser.ask(f"/api/studies/{flown.log}/gains")
+        assert status == 422
+        assert "outside the folder" in told["detail"]
+    link.unlink()
+    tag = browser.ask(place)[1]["etag"]
+    assert browser.ask(place, "POST", {"text": before}, If_Match=tag)[1]["outside"] == []
+
+
+def test_a_log_off_the_list_is_where_it_was_and_comes_back(browser: Browser, flown: Flown) -> None:
+    held = sorted(each for each in flown.folder.rglob("*.bin"))
+
+    def listed() -> list[str]:
+        return [each["id"] for each in browser.ask("/api/workspace")[1]["logs"]]
+
+    off = {"id": flown.log, "removed": True}
+    status, told, _ = browser.ask("/api/removed", "POST", off)
+    assert (status, told) == (200, browser.ask("/api/removed")[1])
+    (item,) = told
+    assert (item["id"], item["kind"], item["name"]) == (flown.log, "log", "sweeps.bin")
+    assert flown.log not in listed()
+    assert browser.ask(f"/api/logs/{flown.log}")[0] == 200
+    assert browser.ask("/api/removed", "POST", off | {"removed": False})[1] == []
+    assert flown.log in listed()
+    browser.ask("/api/removed", "POST", off)
+    body = held[0].read_bytes()  # dropped again: it is meant to be there
+    assert browser.ask("/api/logs?name=again.bin", "PUT", body)[1]["id"] == flown.log
+    assert flown.log in listed()
+    table = b"t,u,y\n0,1,2\n1,0,3\n2,1,1\n"
+    rig = browser.ask("/api/records?name=a.csv", "PUT", table)[1]["id"]
+    (item,) = browser.ask("/api/removed", "POST", {"id": rig, "removed": True})[1]
+    assert (item["kind"], item["name"]) == ("records", "a.csv")
+    assert browser.ask("/api/records")[1] == []
+    status, told, _ = browser.ask("/api/records?name=letter.txt", "PUT", b"Dear Ann\nit flies.\n")
+    assert status == 422
+    assert "letter.txt holds no table of numbers" in told["error"]
+    assert browser.ask("/api/removed", "POST", {"id": "0" * 16, "removed": True})[0] == 404
+    assert sorted(each for each in flown.folder.rglob("*.bin")) == held
+
+
 def test_requests_that_a_stranger_makes_on_the_wire(browser: Browser, flown: Flown) -> None:
     place = f"/api/studies/{flown.log}"
     assert browser.ask(place, Origin="http://127.0.0.1:1")[0] == 403

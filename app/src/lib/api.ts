@@ -1,4 +1,4 @@
-import type { CompareRequest, ComparisonPart, Edit, FieldGroup, FlightScreen, GainFile, Job, Listing, LogItem, ModelAnswer, OwnModelAnswer, OwnModel, PlanPart, PlanRequest, ProposedStudy, RigItem, RigScreen, RunScreen, ShownModel, StudyText, UseEdits } from "./types";
+import type { RemovedItem, CompareRequest, ComparisonPart, Edit, FieldGroup, FlightScreen, GainFile, Job, Listing, LogItem, ModelAnswer, OwnModelAnswer, OwnModel, PlanPart, PlanRequest, ProposedStudy, RigItem, RigScreen, RunScreen, ShownModel, StudyText, UseEdits } from "./types";
 
 /** A refusal of the server, in its own words. */
 export class Refusal extends Error {
@@ -44,6 +44,9 @@ export const sent = (method: string, body: unknown, headers: Record<string, stri
 });
 
 export const workspace = () => json<Listing>("/api/workspace");
+export const removed = () => json<RemovedItem[]>("/api/removed");
+/** Take a log or records off the list, or put them back; the files stay where they are. */
+export const takeOff = (id: string, removed: boolean) => json<RemovedItem[]>("/api/removed", sent("POST", { id, removed }));
 export const flight = (log: string) => json<FlightScreen>(`/api/logs/${log}`);
 export const fields = (log: string) => json<FieldGroup[]>(`/api/logs/${log}/fields`);
 export const study = (log: string) => json<StudyText | null>(`/api/studies/${log}`);

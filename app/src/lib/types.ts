@@ -559,6 +559,8 @@ export interface PlanPart {
   title: string;
   verdict: string;
   light: "green" | "amber" | "red" | "unknown";
+  axes: string[];
+  carried: string[];
   rows: PlanRow[];
   battery: string;
   logging: string;
@@ -666,6 +668,20 @@ export interface Question {
 export interface RefusedGains {
   axis: string;
   finding: ShownFinding;
+}
+
+/** Take a log or records off the list, or put them back. */
+export interface RemovalRequest {
+  id: string;
+  removed: boolean;
+}
+
+/** A log or records that a hand has taken off the list; the files are where they were. */
+export interface RemovedItem {
+  id: string;
+  kind: "log" | "records";
+  name: string;
+  path: string;
 }
 
 /** The answer to a question of that number, or why there is none. */
@@ -916,6 +932,7 @@ export interface StudyText {
   etag: string;
   settings: Record<string, unknown>;
   python: string;
+  outside: string[];
 }
 
 /** A time response of the estimate, with the extremes of some plants. */

@@ -112,6 +112,10 @@ class PlanPart(Message):
     title: str
     verdict: str
     light: Light
+    axes: list[str]
+    """All that the autopilot sweeps."""
+    carried: list[str]
+    """Those of which the log can carry a model already."""
     rows: list[PlanRow]
     battery: str
     logging: str

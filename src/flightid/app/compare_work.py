@@ -21,7 +21,7 @@ from flightid.app.compare_schemas import (
 from flightid.app.gain_schemas import GainFile
 from flightid.app.gain_work import shown_finding
 from flightid.app.overview import light_of, step_curve
-from flightid.app.own_folders import draft_of
+from flightid.app.study_reach import draft_inside
 from flightid.app.work import KEPT, kept_log
 from flightid.files import sha256_of_file
 from flightid.findings import worst
@@ -54,7 +54,7 @@ def make_comparison(
         return _part(compare_flights(*both), None).model_dump()
     key = f"promise of {sha256_of_file(after)} {study} {text}"
     if key not in KEPT:
-        with draft_of(study, text) as draft:
+        with draft_inside(study, text) as draft:
             fits = preview_fits(draft, cache=KEPT)
         KEPT[key] = compare_with_promise(fits, kept_log(after))
     made: FlightComparison = KEPT[key]
@@ -139,7 +139,7 @@ def make_plan(log: Path, options: dict[str, Any]) -> Mapping[str, Any]:
     plan = _plan(log, options)
     files: list[GainFile] = []
     refusal = "" if plan.is_go else "no-go: nothing is written that a vehicle could load"
-    if plan.is_go:
+    if plan.is_go and plan.sweeps:
         with tempfile.TemporaryDirectory() as folder:
             files = [
                 GainFile(name=each.name, text=each.read_text(encoding="utf-8"))
@@ -149,6 +149,8 @@ def make_plan(log: Path, options: dict[str, Any]) -> Mapping[str, Any]:
         title=plan.title,
         verdict=plan.verdict,
         light=light_of(worst(plan.findings)),
+        axes=list(plan.procedure.axes),
+        carried=list(plan.carried),
         rows=[_sweep(each, plan.n_records) for each in plan.sweeps],
         battery=plan.flight_time.words,
         logging=plan.logging,

@@ -24,9 +24,9 @@ from flightid.app.gain_schemas import (
     TimeCurve,
 )
 from flightid.app.overview import light_of
-from flightid.app.own_folders import draft_of
 from flightid.app.schemas import ShownFinding
 from flightid.app.study_edits import KeyEdit, edited
+from flightid.app.study_reach import draft_inside
 from flightid.app.work import KEPT
 from flightid.control.autopilots.parameter_files import parameter_suffix
 from flightid.control.tuning.moved_gains import MovedGains, move_gains
@@ -108,7 +108,7 @@ def make_files(study: Path, text: str) -> list[dict[str, str]]:
 
 
 def _tuned(study: Path, text: str) -> Tuning:
-    with draft_of(study, text) as draft:
+    with draft_inside(study, text) as draft:
         made = preview_tuning(draft, cache=KEPT)
     if made is None:
         raise StudyError(

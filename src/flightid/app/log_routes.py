@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,6 +14,7 @@ from flightid.app.backstage import Backstage, LogName, known_log
 from flightid.app.guard import UPLOAD_BYTES
 from flightid.app.kept_parts import kept_overview, kept_review
 from flightid.app.own_folders import shown_name
+from flightid.app.removed import RemovedList
 from flightid.app.schemas import FlightScreen, LeftOut, Listing, LogItem
 from flightid.app.workspace import Workspace
 from flightid.findings import unsaid
@@ -27,11 +29,12 @@ OF_FLIGHT = ("overview", "review")
 def add_log_routes(app: FastAPI, backstage: Backstage) -> None:
     """Answer what the screens Logs and Flight ask."""
     workspace, workers = backstage.workspace, backstage.workers
+    removed = RemovedList(workspace)
 
     @app.get("/api/workspace")
     async def listing() -> Listing:
         await asyncio.to_thread(workspace.scan)
-        made = await asyncio.to_thread(_listing, workspace)
+        made = await asyncio.to_thread(_listing, workspace, removed.ids())
         for each in [log for log in made.logs if log.light is None][:MOST_LOOKED_AT]:
             if (path := workspace.log_path(each.id)) is not None:
                 workers.ensure("overview", each.id, path)
@@ -43,6 +46,7 @@ def add_log_routes(app: FastAPI, backstage: Backstage) -> None:
         if length > UPLOAD_BYTES:
             raise HTTPException(413)
         log = await workspace.take(name, request.stream())
+        await asyncio.to_thread(removed.put_back, log)
         path = known_log(workspace, log)
         workers.ensure("overview", log, path)
         return next(each for each in _listing(workspace).logs if each.id == log)
@@ -75,9 +79,11 @@ def _folder_words(folder: Path) -> str:
         return shown_name(folder)
 
 
-def _listing(workspace: Workspace) -> Listing:
+def _listing(workspace: Workspace, removed: Sequence[str] = ()) -> Listing:
     logs = []
     for entry in workspace.index.entries():
+        if entry.id in removed:
+            continue
         shown = kept_overview(workspace, entry.id)
         told: dict[str, Any] = {}
         if shown is not None:

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.app.model_schemas import ModelPrediction, PredictedCurve, PredictedResponse
-from flightid.app.own_folders import draft_of
 from flightid.app.study_edits import KeyEdit, edited
+from flightid.app.study_reach import draft_inside
 from flightid.app.work import KEPT
 from flightid.errors import DataError, FlightidError, StudyError
 from flightid.models import GreyBoxModel
@@ -60,7 +60,7 @@ def _prepared(
     key = f"prediction: {study} {name} {now}"
     found = KEPT.get(key)
     if not isinstance(found, ModelPreview) or KEPT.get(f"{key} file") != _written(found):
-        with draft_of(study, now) as draft:
+        with draft_inside(study, now) as draft:
             found = preview_model(draft, name, data=True, cache=KEPT)
         KEPT[key], KEPT[f"{key} file"] = found, _written(found)
         KEPT[f"{key} holds"] = {}

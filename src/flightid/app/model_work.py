@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from flightid.app.model_schemas import OwnModelAnswer, ShownModel, UseEdits
-from flightid.app.own_folders import draft_of
 from flightid.app.schemas import Edit
 from flightid.app.shown_models import AXES, axes_of, shown_model, shown_parameter
 from flightid.app.study_edits import KeyEdit, edited
+from flightid.app.study_reach import draft_inside
 from flightid.errors import FlightidError
 from flightid.models import library_names, load_structure
 from flightid.reading import parse_toml
@@ -38,7 +38,7 @@ def make_model(
     study: Path, text: str, edits: Sequence[KeyEdit], name: str
 ) -> dict[str, Any] | None:
     """A model of a study under edits that are not written yet; None without equations."""
-    with draft_of(study, edited(text, edits) if edits else text) as draft:
+    with draft_inside(study, edited(text, edits) if edits else text) as draft:
         seen = preview_model(draft, name)
     if seen.model is None or seen.settings.template is None:
         return None
@@ -66,7 +66,7 @@ def make_use(study: Path, text: str, asked: Mapping[str, Any]) -> dict[str, Any]
     name = str(own.get("name") or _new_name(str(asked["template"]), models))
     edits = _edits(content, place, name, asked)
     made = [KeyEdit(tuple(each.path), each.value) for each in edits]
-    with draft_of(study, edited(text, made)) as draft:
+    with draft_inside(study, edited(text, made)) as draft:
         preview_model(draft, name)
     return UseEdits(edits=edits, name=name).model_dump()
 

@@ -18,6 +18,7 @@ from flightid.app.field_routes import MOST_COLUMNS
 from flightid.app.guard import UPLOAD_BYTES
 from flightid.app.own_folders import is_link
 from flightid.app.pyramid import Pyramid, view
+from flightid.app.removed import RemovedList
 from flightid.app.rig_schemas import ProposedStudy, RigItem, RigProposal, RigReading, RigScreen
 from flightid.app.rigs import Rigs
 from flightid.app.study_edits import write_study
@@ -30,12 +31,12 @@ MOST_CHANNELS = 128
 def add_rig_routes(app: FastAPI, backstage: Backstage) -> None:
     """Answer what the screen of records asks."""
     workspace, workers, studies = backstage.workspace, backstage.workers, backstage.studies
-    rigs = Rigs(workspace)
+    rigs, removed = Rigs(workspace), RemovedList(workspace)
 
     @app.get("/api/records")
     async def listing() -> list[RigItem]:
-        known = await asyncio.to_thread(rigs.ids)
-        return [_item(rigs, backstage, each) for each in known]
+        known, left = await asyncio.to_thread(rigs.ids), removed.ids()
+        return [_item(rigs, backstage, each) for each in known if each not in left]
 
     @app.put("/api/records")
     async def upload(
@@ -45,7 +46,13 @@ def add_rig_routes(app: FastAPI, backstage: Backstage) -> None:
     ) -> RigItem:
         if int(request.headers.get("content-length", 0)) > UPLOAD_BYTES:
             raise HTTPException(413)
-        return _item(rigs, backstage, await rigs.take(name, request.stream(), rig))
+
+        async def check(path: Path) -> str:
+            return (await workers.live(rig_work.require_table, path))[1]
+
+        taken = await rigs.take(name, request.stream(), rig, check=check)
+        await asyncio.to_thread(removed.put_back, taken)
+        return _item(rigs, backstage, taken)
 
     @app.get("/api/records/{rig}")
     async def screen(rig: LogName, reading: Annotated[RigReading, Query()]) -> RigScreen:
@@ -126,7 +133,7 @@ def _item(rigs: Rigs, backstage: Backstage, rig: str) -> RigItem:
     paths = _known(rigs, rig)
     return RigItem(
         id=rig,
-        name=paths[0].name if len(paths) == 1 else f"{paths[0].name} and {len(paths) - 1} more",
+        name=rigs.name_of(rig),
         files=len(paths),
         size=sum(path.stat().st_size for path in paths),
         has_study=backstage.studies.path(rig) is not None,

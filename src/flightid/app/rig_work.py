@@ -16,12 +16,25 @@ from flightid.errors import FlightidError, UnknownNameError
 from flightid.record import Record, read_records
 from flightid.record.checks import CHECK, checked_history
 from flightid.record.contents import table_contents
+from flightid.record.formats.sniff import file_format
+from flightid.record.tables import read_table
 from flightid.study.proposal import propose_study
 from flightid.study.proposal.columns import columns_of
 from flightid.study.stage_runner import StageRunner
 
 SHOWN = 200
 """Faults of a manoeuvre that are told."""
+
+
+def require_table(path: Path) -> None:
+    """Refuse a file in which nobody would find a column of numbers.
+
+    Raises
+    ------
+    FileFormatError
+        It is of no format that holds records, damaged, or prose.
+    """
+    read_table(path, file_format(path), ())
 
 
 def make_rig(paths: Sequence[Path], reading: Mapping[str, Any]) -> dict[str, Any]:

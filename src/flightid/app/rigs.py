@@ -10,7 +10,7 @@ import asyncio
 import hashlib
 import os
 import stat
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Awaitable, Callable
 from pathlib import Path
 
 from flightid.app.own_folders import (
@@ -23,7 +23,7 @@ from flightid.app.own_folders import (
     own_folder,
 )
 from flightid.app.workspace import HIDDEN, ID, Workspace, plain_name
-from flightid.errors import OptionError
+from flightid.errors import FileFormatError, OptionError
 from flightid.files import flush
 from flightid.frozen import dataclass
 from flightid.record.formats.sniff import FileFormat, file_format
@@ -63,7 +63,19 @@ class Rigs:
         listed = (each for each in folder.iterdir() if each.suffix.lower() in SUFFIXES)
         return sorted(each for each in listed if each.is_file() and not is_link(each))
 
-    async def take(self, name: str, chunks: AsyncIterator[bytes], rig: str = "") -> str:
+    def name_of(self, rig: str) -> str:
+        """A set by the name of its first file, and how many more there are."""
+        first, *more = self.files(rig)
+        return f"{first.name} and {len(more)} more" if more else first.name
+
+    async def take(
+        self,
+        name: str,
+        chunks: AsyncIterator[bytes],
+        rig: str = "",
+        *,
+        check: Callable[[Path], Awaitable[str]],
+    ) -> str:
         """Write a file that comes in pieces, and return the id of its set.
 
         Parameters
@@ -73,13 +85,15 @@ class Rigs:
         chunks : async iterator of bytes
         rig : str
             Set to which it is added; empty: its own.
+        check : callable
+            Reads the file as records are read, and tells why it cannot be; empty: it can.
 
         Raises
         ------
         OptionError
             The name is none, there is no such set, or it is full.
         FileFormatError
-            The file is of no format that holds records.
+            The file is of no format that holds records, or holds no table of numbers.
         """
         plain = plain_name(name)
         if rig and not 0 < len(self.files(rig)) < MOST_FILES:
@@ -102,6 +116,8 @@ class Rigs:
                     needed=f"one of {', '.join(sorted(SUFFIXES))}",
                     action="a bag of ROS is a log: drop it among the logs",
                 )
+            if refusal := await check(temporary):
+                raise FileFormatError(refusal.replace(temporary.name, plain))
             flush(temporary)
             made = rig or digest.hexdigest()[:16]
             folder = own_folder(self.workspace.folder, FOLDER, made)

@@ -19,12 +19,11 @@ from flightid.app.kept_parts import kept_part
 from flightid.app.own_folders import is_link, read_plain, shown_name
 from flightid.app.run_schemas import RunPart, RunScreen
 from flightid.app.run_work import FIGURES
+from flightid.app.study_reach import named_places, require_inside
 from flightid.app.workspace import Workspace
 from flightid.errors import FlightidError
 from flightid.plot.graph_objects import plotting_library
 from flightid.study.output import WRITTEN
-from flightid.study.run import named_paths
-from flightid.study.settings import read_settings
 
 CHUNK = 1 << 16
 ELSEWHERE = "The study names files outside the folder of the page, or missing ones:"
@@ -58,6 +57,7 @@ def add_run_routes(app: FastAPI, backstage: Backstage) -> None:
         if path is None:
             raise HTTPException(404, "There is no study to run.")
         backstage.studies.opened(log)  # refuses a link before a run follows it
+        await asyncio.to_thread(require_inside, workspace.folder, path)
         workers.ensure("run", log, path, again=True)
         return await screen(log)
 
@@ -109,11 +109,10 @@ def _named_files(workspace: Workspace, study: Path) -> tuple[list[Path], list[Pa
     """Files that a study names: those in the folder of the page, and those elsewhere or missing."""
     held: list[Path] = []
     elsewhere: list[Path] = []
-    for path in dict.fromkeys(named_paths(read_settings(study))):
-        place = (path if path.is_absolute() else study.parent / path).resolve()
+    for place in named_places(study):
         inside = place.is_file() and place.is_relative_to(workspace.folder)
         (held if inside else elsewhere).append(place)
-    return list(dict.fromkeys(held)), list(dict.fromkeys(elsewhere))
+    return held, elsewhere
 
 
 def _packed(backstage: Backstage, log: str, folder: Path) -> IO[bytes]:

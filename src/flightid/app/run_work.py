@@ -12,6 +12,7 @@ from flightid.app.overview import light_of
 from flightid.app.own_folders import is_link
 from flightid.app.run_schemas import RunPart
 from flightid.app.study_edits import etag_of
+from flightid.app.study_reach import require_inside
 from flightid.app.work import KEPT
 from flightid.files import write_atomically
 from flightid.report.json import to_dict
@@ -22,6 +23,7 @@ FIGURES = "page-figures.json"
 
 def make_run(study: Path, folder: Path, result: Path) -> None:
     """Run a study into a folder named by its version, and write what the page shows of it."""
+    require_inside(study.parent.parent, study)
     etag = etag_of(study.read_text(encoding="utf-8"))
     begun = time.perf_counter()
     name = f"run-{etag.strip(chr(34))[:16]}"

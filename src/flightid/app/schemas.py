@@ -151,6 +151,22 @@ class Listing(Message):
     left_out: list[LeftOut] = []
 
 
+class RemovedItem(Message):
+    """A log or records that a hand has taken off the list; the files are where they were."""
+
+    id: str
+    kind: Literal["log", "records"]
+    name: str
+    path: str
+
+
+class RemovalRequest(Message):
+    """Take a log or records off the list, or put them back."""
+
+    id: str = Field(max_length=16)
+    removed: bool
+
+
 class FlightScreen(Message):
     """Everything known of a log; parts that are being made are None."""
 
@@ -178,6 +194,8 @@ class StudyText(Message):
     etag: str
     settings: dict[str, Any]
     python: str
+    outside: list[str] = []
+    """Files that it names outside the folder of the page, which opens none of them."""
 
 
 class Edit(Message):

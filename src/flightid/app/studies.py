@@ -8,14 +8,17 @@ from typing import Any
 
 from fastapi import HTTPException
 
-from flightid.app.own_folders import read_plain
+from flightid.app.own_folders import read_plain, shown_name
 from flightid.app.python_lines import python_lines
 from flightid.app.schemas import Edits, StudyText, WholeText
 from flightid.app.study_edits import KeyEdit, edited, etag_of, write_study
+from flightid.app.study_reach import outside_places
 from flightid.app.workspace import ID, Workspace
 from flightid.errors import FlightidError, StudyError
 from flightid.reading import DOCUMENT_BYTES, read_toml
 from flightid.study.settings import read_settings
+
+UNOPENED = "# The study names files outside the folder of the page, which opens none of them.\n"
 
 
 class Studies:
@@ -54,8 +57,13 @@ class Studies:
         if path is None:
             return None
         text = text_of(path)
+        outside = _outside(self._workspace.folder, path)
         return StudyText(
-            text=text, etag=etag_of(text), settings=_tables(path), python=_python(path)
+            text=text,
+            etag=etag_of(text),
+            settings=_tables(path),
+            python=UNOPENED if outside else _python(path),
+            outside=outside,
         )
 
     def change(self, log: str, edits: Edits, tag: str) -> StudyText | None:
@@ -99,6 +107,14 @@ def _tables(path: Path) -> dict[str, Any]:
     return read_toml(path, "the study file")
 
 
+def _outside(folder: Path, path: Path) -> list[str]:
+    """Files outside the folder; none of a study that cannot be read."""
+    try:
+        return [shown_name(each) for each in outside_places(folder, path)]
+    except FlightidError:
+        return []
+
+
 def _python(path: Path) -> str:
     """Python lines of every model, one after the other; why there are none, where it is so."""
     try:
@@ -108,6 +124,6 @@ def _python(path: Path) -> str:
             f"# {model.name}\n{python_lines(settings, model.name, folder)}"
             for model in settings.models
         ]
-    except FlightidError as error:
+    except (FlightidError, OSError) as error:
         return f"# {error}\n"
     return "\n".join(parts)

@@ -14,10 +14,10 @@ from pathlib import Path
 from typing import Any
 
 from flightid.app.overview import light_of, overview_of, review_of
-from flightid.app.own_folders import draft_of
 from flightid.app.pyramid import Pyramid
 from flightid.app.schemas import FieldGroup, ResponseCurve, ResponsePart, ShownFinding
 from flightid.app.study_edits import KeyEdit, edited
+from flightid.app.study_reach import draft_inside
 from flightid.errors import FlightidError
 from flightid.files import write_atomically
 from flightid.logs import Log, read_log
@@ -83,7 +83,8 @@ def make_overview(path: Path, study: Path, result: Path) -> None:
     made = propose_study([path], folder=study.parent, cache=cache)
     inspection = made.inspection
     assert inspection is not None
-    log = _log(path, cache)
+    # Read by the proposal: asked for by its path again, its bytes would be hashed again.
+    (log,) = (each for each in cache.values() if isinstance(each, Log))
     if made.models and not study.exists():
         made.write(study)
     settings = read_settings(study) if study.exists() else None
@@ -123,7 +124,7 @@ def make_responses(
     study: Path, text: str, model: str, edits: Sequence[KeyEdit], around: bool, intervals: bool
 ) -> Mapping[str, Any]:
     """Responses of a model by a study with edits that are not written yet."""
-    with draft_of(study, edited(text, edits) if edits else text) as draft:
+    with draft_inside(study, edited(text, edits) if edits else text) as draft:
         made = preview_responses(draft, model, around=around, cache=KEPT)
     curves = [
         curve

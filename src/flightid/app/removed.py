@@ -1,0 +1,59 @@
+"""What a hand has taken off the list of logs and records: files stay where they are.
+
+``.flightid/removed.json`` names them by their ids. Without it everything is listed again.
+"""
+
+from __future__ import annotations
+
+import json
+import threading
+from collections.abc import Iterable
+from pathlib import Path
+
+from flightid.app.own_folders import own_folder, read_plain
+from flightid.app.workspace import HIDDEN, ID, Workspace
+from flightid.files import write_atomically
+
+FILE = "removed.json"
+MOST_BYTES = 1 << 20
+
+
+class RemovedList:
+    """Ids of logs and records that are not listed, in the order in which they were taken off.
+
+    Parameters
+    ----------
+    workspace : Workspace
+    """
+
+    def __init__(self, workspace: Workspace) -> None:
+        self._workspace = workspace
+        self._lock = threading.Lock()
+
+    def ids(self) -> list[str]:
+        """All that were taken off; none where the file is not there or not as it was written."""
+        try:
+            told = json.loads(read_plain(self._path(), MOST_BYTES))
+        except (OSError, ValueError, RecursionError):
+            return []
+        known = told.get("removed") if isinstance(told, dict) else None
+        named = known if isinstance(known, list) else []
+        return [each for each in named if isinstance(each, str) and ID.fullmatch(each)]
+
+    def take_off(self, item: str) -> None:
+        """Leave a log or records out of the list."""
+        with self._lock:
+            self._write([*(each for each in self.ids() if each != item), item])
+
+    def put_back(self, item: str) -> None:
+        """List it again; nothing happens where it is listed."""
+        with self._lock:
+            known = self.ids()
+            if item in known:
+                self._write(each for each in known if each != item)
+
+    def _write(self, ids: Iterable[str]) -> None:
+        write_atomically(self._path(), json.dumps({"removed": list(ids)}))
+
+    def _path(self) -> Path:
+        return own_folder(self._workspace.folder, HIDDEN) / FILE
