@@ -10,8 +10,8 @@ import tempfile
 import time
 from pathlib import Path
 
-from tests.reference.test_app_demo_in_browser import demo_log, gains_by_mouse
 from tests.reference.test_app_in_browser import opened_desk
+from tests.reference.test_app_seeds_in_browser import WAITED_MS, demo_log, gains_by_mouse
 
 
 def _processor_s() -> float:
@@ -27,7 +27,9 @@ def main() -> None:
         begun, used = time.perf_counter(), _processor_s()
         with opened_desk(folder / "workspace") as desk:
             ready = time.perf_counter()
-            gains_by_mouse(desk, log, folder)
+            page = desk.open().page
+            page.set_default_timeout(WAITED_MS)
+            gains_by_mouse(page, log, folder)
             done = time.perf_counter()
         said = f"browser and server up {ready - begun:.1f} s, log to gains {done - ready:.1f} s"
         print(f"{log.stat().st_size / 1e6:.0f} MB: {said}, processor {_processor_s() - used:.1f} s")

@@ -9,6 +9,7 @@ page's list is asked while ten jobs run. Gains are those of a quadrotor that fle
 
 from __future__ import annotations
 
+import shutil
 import sys
 import tempfile
 import time
@@ -178,10 +179,13 @@ def crowd(folder: Path) -> None:
 
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as name:
-        place, given = Path(name), [Path(each) for each in sys.argv[1:]]
-        path = given[0] if given else SweepFlight(rate_hz=100.0, sweep_s=130.0).write(place)
+        place = Path(name)
+        if sys.argv[1:]:  # the page opens no file outside its folder
+            path = Path(shutil.copy(sys.argv[1], place))
+        else:
+            path = SweepFlight(rate_hz=100.0, sweep_s=130.0).write(place)
         drags(path, place)
-        sliders(given[0] if given else flown(place), place)
+        sliders(path if sys.argv[1:] else flown(place), place)
         for each in ("drops", "crowded"):
             (place / each).mkdir()
         drops(place)

@@ -119,6 +119,8 @@ def test_from_a_dropped_log_to_gains_and_the_flight_with_them(desk: Desk, tmp_pa
     assert set(old) == set(new)
     assert old["ATC_RAT_RLL_P"] == pytest.approx(0.09)
     assert new["ATC_RAT_RLL_P"] > 1.1 * old["ATC_RAT_RLL_P"]
+    _zoomed(page, "Nichols chart", "Whole of the Nichols chart")
+    _zoomed(page, "Rate, 1 rad/s asked", "Whole of Rate, 1 rad/s asked")
     said += looked_at(page)
     # At the end of its slider: red, and nothing to download on the page or behind it.
     slider = page.locator("input[type=range]").first
@@ -141,6 +143,18 @@ def test_from_a_dropped_log_to_gains_and_the_flight_with_them(desk: Desk, tmp_pa
     page.close()
 
 
+def _zoomed(page: Any, chart: str, whole: str) -> None:
+    """A small chart by the keys of every chart, the whole by 0 and by its button."""
+    plot = page.locator(f"[role=application][aria-label^='{chart}']").first
+    button = page.get_by_role("button", name=whole, exact=True)
+    for back in (lambda: plot.press("0"), button.click):
+        plot.press("+")
+        plot.press("ArrowLeft")
+        button.wait_for()
+        back()
+        button.wait_for(state="detached")
+
+
 def _compared(page: Any, second: Path, folder: Path) -> list[str]:
     """The flight with step 1 beside what the model promises of it, then beside the one before."""
     _opened(page, "Compare")
@@ -149,6 +163,7 @@ def _compared(page: Any, second: Path, folder: Path) -> list[str]:
     page.locator("section[aria-label=Verdict]").wait_for()
     assert page.locator("section[aria-label=Numbers] tbody tr").count() >= 4
     assert "ATC_RAT_RLL_P" in _saved(page, "Download the way back", folder).read_text("utf-8")
+    _zoomed(page, "Step of the roll rate loop", "Whole of roll rate")
     said = looked_at(page)
     page.get_by_role("button", name="how it flew").press("Enter")
     page.get_by_text("before (95 %)").wait_for()
@@ -156,14 +171,20 @@ def _compared(page: Any, second: Path, folder: Path) -> list[str]:
 
 
 def _planned(page: Any) -> list[str]:
-    """The next flight: an amplitude typed, its card; a sweep too small is no-go."""
+    """The next flight, of what has no model; an amplitude typed, its card; too small is no-go."""
     _opened(page, "Plan")
+    page.get_by_role("heading", name="This log already carries roll").wait_for()
+    said = looked_at(page)
+    roll = page.get_by_role("group", name="Axes").get_by_role("button", name="roll")
+    assert roll.get_attribute("aria-pressed") == "false"
+    roll.press("Enter")
+    page.get_by_text("this log holds injected sweeps already").wait_for()
     amplitude = page.locator("td[data-label=Amplitude]")
     amplitude.first.wait_for()
     page.fill("#amplitude", "0.05")
     page.press("#amplitude", "Tab")
     amplitude.filter(has_text="0.05 of full").first.wait_for()
-    said = looked_at(page)
+    said += looked_at(page)
     with page.expect_popup() as told:
         page.get_by_role("link", name="The card to print").press("Enter")
     told.value.wait_for_load_state()
