@@ -63,7 +63,7 @@ def _no_history(vehicle: str, each: TypeAnswers) -> str | None:
 def _too_few(vehicle: str, each: TypeAnswers, told: int) -> str:
     """How many flights count, of how many with a model, and how many are needed."""
     if told >= FEWEST:
-        return f"no {FEWEST} flights that count before, between or behind its events"
+        return f"fewer than {FEWEST} flights that count beside its events"
     sound, red = sum(name == vehicle for name in each.data.vehicles), each.red.get(vehicle, 0)
     bad = f"{red} {'is' if red == 1 else 'are'} red and " if red else ""
     which = f"of its {counted(sound + red, 'flight')} with model “{each.model}” {bad}{told}"

@@ -55,13 +55,17 @@ def _lights_counted(answers: FleetAnswers) -> str:
     """Vehicles by light, in words; other verdicts of the page are on estimates, not on vehicles."""
     found = Counter(each.light for each in fleet_vehicles(answers).values())
     said = ", ".join(f"{found[light]} {light.words}" for light in ORDER if found[light])
-    open_ = sum(
-        finding.light is not Light.GREEN
+    errors = Counter(
+        finding.light
         for each in answers.types
         if each.drift is not None
         for finding in errors_lights(each.drift, each.labels)
     )
-    rest = f"; errors of {counted(open_, 'parameter')} not borne out" if open_ else ""
+    rest = "".join(
+        f"; errors of {counted(errors[light], 'parameter')} {words}"
+        for light, words in ((Light.AMBER, "not borne out"), (Light.UNKNOWN, "not tested"))
+        if errors[light]
+    )
     return f"of {counted(found.total(), 'vehicle')} {said}{rest}" if said else ""
 
 
