@@ -153,7 +153,7 @@ def test_refused(compared: fid.ConditionComparison) -> None:
         compared["Zw"]
 
 
-def test_black_boxes_are_compared_by_their_modes(
+def test_black_boxes_are_compared_by_modes_gains_and_delays(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     boxes = {}
@@ -161,13 +161,16 @@ def test_black_boxes_are_compared_by_their_modes(
         # Roots of a pair damped by 0.2, of a lag, and delays of a sample, which are no modes.
         pair = 2.0 * np.pi * hertz * (-0.2 + 1j * np.sqrt(0.96))
         a = np.real(np.poly([*np.exp(0.01 * np.array([pair, pair.conjugate(), -2.0])), 0.0]))
-        boxes[name] = fid.PolynomialModel(("u",), "y", 0.01, a=a, b=[[0.0, 1.0]])
+        boxes[name] = fid.PolynomialModel(("u",), "y", 0.01, a=a, b=[[0.0, 1.0]], nk=(3,))
     found = fid.compare_conditions(boxes)
-    assert found.parameters == ()
+    gains = [float(np.sum(box.b[0]) / np.sum(box.a)) for box in boxes.values()]
+    steady = found["steady gain y/u"].values
+    assert_close([steady[name].value for name in boxes], gains, rtol=1e-12, why="at z = 1")
+    assert [each.value for each in found["delay y/u"].values.values()] == [0.03, 0.03]
     assert [mode.name for mode in found.modes] == ["y at 0.318 Hz", "y at 1.6 Hz"]
     ratios = [mode.numbers[0].ratios["after"].value for mode in found.modes]
     assert_close(ratios, [1.0, 1.25], rtol=1e-9, why="by the roots that were put in")
-    assert found.summary().title == "Modes, before and after"
+    assert found.modes_table().title == "Modes, before and after"
     files = [str(fid.write_model(box, tmp_path / f"{name}.toml")) for name, box in boxes.items()]
     assert run(["compare", *files]) == 0
     shown = capsys.readouterr().out
@@ -175,6 +178,7 @@ def test_black_boxes_are_compared_by_their_modes(
     assert "--gains FILE" in shown
     assert shown.index("natural frequency") < shown.index("flightid verify"), "what to do is last"
     assert f"flightid verify {files[0]} RECORDS --against {files[1]}" in shown
+    assert shown.index("natural frequency") < shown.index("steady gain y/u")
     alone = fid.PolynomialModel(("u",), "y", 0.01, a=[1.0, -0.9], b=[[0.0, 1.0]])
     apart = fid.compare_conditions({"pair": boxes["before"], "lag": alone})
     assert apart.only_modes["pair"] == ("y, lightly damped oscillation: -2.011 ± 9.85i rad/s",)
@@ -240,3 +244,21 @@ def test_models_of_one_record_have_no_changes() -> None:
     assert not {f.code for f in same.findings} & {"changed", "sign-changed"}
     assert 0.0 < other["Lp"].chances["held"] < 1.0
     assert "one-record" not in {f.code for f in other.findings}
+
+
+def test_a_steady_gain_that_changed_is_told_by_its_interval() -> None:
+    fits = {}
+    for name, gain in (("before", 1.0), ("same", 1.0), ("after", 1.3)):
+        rng = np.random.default_rng(len(fits))
+        truth = fid.PolynomialModel(("u",), "y", 0.1, a=[1, -1.5, 0.7], b=[[gain]], nk=(2,))
+        u, noise = rng.standard_normal((2, 300))
+        record = fid.Record.from_arrays(
+            0.1 * np.arange(300), inputs={"u": u}, outputs={"y": np.zeros(300)}, hold="zero"
+        )
+        seen = record.replace({"y": truth.simulate(record) + 0.1 * noise})
+        fits[name] = fid.identify(fid.PolynomialModel.oe("u", "y", nb=1, nf=2, nk=2), [seen])
+    number = fid.compare_conditions(fits)["steady gain y/u"]
+    low, high = number.values["before"].interval95 or (np.nan, np.nan)
+    assert low < 5.0 < high < 5.2
+    assert number.chances["same"] > 0.01
+    assert number.chances["after"] < 1e-6

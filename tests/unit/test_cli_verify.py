@@ -79,3 +79,17 @@ def test_residual_tests_on_demand(
     run([*options, "--json"])
     plain = json.loads(capsys.readouterr().out)
     assert plain["residual_tests"]["horizon"] == "free run"
+
+
+def test_rivals_of_one_name_are_told_apart_by_their_files(
+    flown: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model = fid.load_model("rate_first_order")
+    for name, damping in (("monday", -4.0), ("friday", -9.0)):
+        fid.write_model(model.with_values({"Lp": damping}), tmp_path / f"{name}.toml")
+    first, second = (str(tmp_path / f"{name}.toml") for name in ("monday", "friday"))
+    assert run(["verify", first, str(flown), "--against", second]) == 0
+    shown = capsys.readouterr().out
+    assert "monday" in shown
+    assert "friday" in shown
+    assert "(1)" not in shown

@@ -11,6 +11,7 @@ import pytest
 
 import flightid as fid
 from flightid.cli.program import run
+from flightid.conventions import Light
 from flightid.errors import DataError, OptionError
 from flightid.models.polynomial.structure import PolynomialStructure
 from tests.closeness import assert_close
@@ -69,6 +70,19 @@ def test_without_noise_both_find_the_vehicle(structure: PolynomialStructure) -> 
     found = fid.identify(structure, looped(1, noise=0.0)).parameters
     for name in structure.names:
         assert_close(found[name].value, TRUTH[name], atol=1e-6, why="no noise, exact model")
+
+
+@pytest.mark.parametrize("structure", [ARX, OE], ids=["arx", "oe"])
+def test_a_loop_that_the_excitation_takes_care_of_is_no_doubt(
+    structure: PolynomialStructure,
+) -> None:
+    """The record says that the loop was closed; the advice was to do what had been done."""
+    (check,) = [c for c in fid.identify(structure, looped(2)).evidence.checks if c.name == "loop"]
+    assert check.light is Light.GREEN
+    assert "by way of the excitation" in check.what
+    plain = replace(structure, method="prediction_error")
+    (check,) = [c for c in fid.identify(plain, looped(2)).evidence.checks if c.name == "loop"]
+    assert check.light is Light.AMBER
 
 
 def test_refined_instruments_belong_to_output_error() -> None:

@@ -341,3 +341,24 @@ def test_a_known_servo_is_taken_out_ahead_of_the_model(tmp_path: Path) -> None:
         propose_study([path], folder=tmp_path, actuators={"tau_phi": 12.0})
     with pytest.raises(UnknownNameError, match="an actuator has no input"):
         propose_study([path], actuators={"p": 12.0}, **asked)
+
+
+def test_columns_of_other_names_are_those_of_the_model(tmp_path: Path) -> None:
+    """Equations name tau_phi and p; the file has u and y, in that order."""
+    rng = np.random.default_rng(5)
+    n = 400
+    u, y = np.repeat(rng.choice([-1.0, 1.0], n // 10), 10), np.zeros(n)
+    for k in range(1, n):
+        y[k] = 0.9 * y[k - 1] + 0.1 * u[k - 1]
+    y += 0.01 * rng.standard_normal(n)
+    path = tmp_path / "rig.csv"
+    rows = np.column_stack([0.02 * np.arange(n), u, y])
+    np.savetxt(path, rows, delimiter=",", header="time_s,u,y [rad/s]", comments="")
+    named = {"folder": tmp_path, "inputs": ("u",), "outputs": ("y",)}
+    made = propose_study([path], model="rate_first_order", **named)
+    lines = [line for line in made.lines if line.startswith("columns")]
+    assert lines == ['columns = { tau_phi = "u", p = "y" }'] * 3
+    made.write(tmp_path / "study.toml")
+    (model,) = run_study(tmp_path / "study.toml", output=tmp_path / "out").identified
+    assert abs(model.fit.parameters["Lp"].value + 5.27) < 0.5  # ln 0.9 / 0.02 s
+    assert not any("columns" in line for line in propose_study([path], **named).lines)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +15,7 @@ from flightid.cli.records import FILES, read_files, reading
 from flightid.cli.sources import load_source, model_argument, model_options
 
 if TYPE_CHECKING:
+    from flightid.models import Model
     from flightid.options import Options
     from flightid.validation import Comparison, ResidualTests, Verification
 
@@ -82,9 +84,12 @@ def command(
         records, *of_files, inputs=chosen.inputs, outputs=compared, units=chosen.units,
         excitations=of_tests.get("excitations"),
     )  # fmt: skip
-    result: Verification | Comparison = verify(
-        models if rivals else chosen, flown, outputs=compared, **given
-    )
+    result: Verification | Comparison
+    if rivals:
+        named = _file_names([model, *rivals], models)
+        result = verify([*models], flown, outputs=compared, names=named, **given)
+    else:
+        result = verify(chosen, flown, outputs=compared, **given)
     on_trial = result.first if isinstance(result, Comparison) else result
     tests = residual_tests(on_trial, **of_tests) if with_residuals else None
     if as_json:
@@ -97,6 +102,15 @@ def command(
     if html is not None:
         note(f"Wrote {_write_page(result, tests, str(chosen), html)}")
     leave_by_verdict((*result.findings, *(() if tests is None else tests.findings)))
+
+
+def _file_names(given: Sequence[str], models: Sequence[Model]) -> list[str] | None:
+    """Names by which models of one name are told apart: of their files; None where they are."""
+    own = [str(getattr(model, "name", "")) for model in models]
+    if len({*own}) == len(own):
+        return None
+    stems = [Path(name).stem for name in given]
+    return next((each for each in (stems, [*given]) if len({*each}) == len(each)), None)
 
 
 def _write_page(

@@ -140,6 +140,8 @@ def gather_evidence(made: FitFacts) -> Evidence:
     elif records:
         checks += power_of_records(tuple(records), made.inputs, made.outputs)
     declared = None if made.loop is None else loop_check(declared_loop(made.loop))
+    if _is_by_excitation(made.termination, records) and made.loop != "open":
+        declared = loop_check(FeedbackTest("closed", "instrument"))
     loop = declared or (loop_of_responses(responses) if responses else None)
     if loop is None and records:
         loop = loop_of_records(tuple(records), made.inputs, made.outputs)
@@ -150,6 +152,11 @@ def gather_evidence(made: FitFacts) -> Evidence:
         checks.append(declared_signs(made.signs))
     checks = _with_findings(checks, made)
     return Evidence(tuple(checks), _required(made, responses, records))
+
+
+def _is_by_excitation(termination: str, records: Sequence[Record]) -> bool:
+    """Whether instruments were made of what was injected: a closed loop does not bias those."""
+    return termination == "instruments" and bool(records) and all(r.excitations for r in records)
 
 
 def _required(

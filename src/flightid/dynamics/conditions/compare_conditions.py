@@ -10,6 +10,7 @@ import numpy as np
 import scipy
 
 from flightid.conventions import Light
+from flightid.dynamics.conditions.black_box_numbers import black_box_numbers
 from flightid.dynamics.conditions.ratios import SHARED_ERRORS, chance_of, holm, ratio_of
 from flightid.dynamics.conditions.result import (
     ComparedMode,
@@ -50,7 +51,7 @@ def compare_conditions(sources: Mapping[str, object]) -> ConditionComparison:
     ----------
     sources : mapping of str to Fit or model
         Two or more by name of the condition, such as hover and cruise; the first is the base of all
-        ratios. Black boxes have modes only, and are compared with each other.
+        ratios. Black boxes have modes, steady gains and delays, and are compared with each other.
 
     Returns
     -------
@@ -93,7 +94,9 @@ def compare_conditions(sources: Mapping[str, object]) -> ConditionComparison:
         )
     black_boxes = not any(_is_named(source) for source in sources.values())
     conditions = [
-        _Condition(name, {}, modes(source)) if black_boxes else _condition(name, source)
+        _Condition(name, black_box_numbers(source), modes(source))
+        if black_boxes
+        else _condition(name, source)
         for name, source in sources.items()
     ]
     first, *later = sources

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from flightid.conventions import Role
 from flightid.errors import StudyError, UnknownNameError
 from flightid.frozen import dataclass
+from flightid.models import load_model
 from flightid.record import Record
 
 DRIVES = re.compile(
@@ -41,6 +42,29 @@ class Columns:
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     said: tuple[str, ...]
+
+
+def columns_of_model(model: str, columns: Columns) -> dict[str, str]:
+    """Columns by the channels that equations name, those of another name alone.
+
+    Names that both have stay; as many others are taken in their order, inputs and outputs apart.
+
+    Raises
+    ------
+    FlightidError
+        The model cannot be loaded.
+    """
+    found = load_model(model)
+    pairs: dict[str, str] = {}
+    for channels, named in (
+        (found.inputs, columns.inputs),
+        (found.outputs, columns.outputs),
+    ):
+        free = [name for name in named if name not in channels]
+        waiting = [name for name in channels if name not in named]
+        if len(free) == len(waiting):
+            pairs |= dict(zip(waiting, free, strict=True))
+    return pairs
 
 
 def columns_of(

@@ -22,7 +22,7 @@ from flightid.record import read_records
 from flightid.record.formats.columns import channel_name
 from flightid.record.time_question import time_said
 from flightid.simulation.actuators import check_actuators
-from flightid.study.proposal.columns import Columns, columns_of
+from flightid.study.proposal.columns import Columns, columns_of, columns_of_model
 from flightid.study.proposal.options import DataOptions, told
 from flightid.study.proposal.order_scans import ProposedScans, record_file
 from flightid.study.proposal.proposal import Proposal
@@ -102,9 +102,12 @@ def study_of_records(
     )
     columns = columns_of([part.record for part in read], inputs, outputs, injected)
     keys = _keys(reading, folder)
+    renamed = {} if model is None else columns_of_model(model, columns)
+    if renamed:
+        keys.append(f"columns = {toml_value(renamed)}")
     if injected and model is None:
         raise _needs_equations(paths, columns, injected)
-    body = _servos(actuators or {}, columns, model)
+    body = _servos(actuators or {}, columns, model, renamed)
     groups, missed = _groups(read, columns)
     swept = None if model is None else one_experiment(read, columns.inputs, injected)
     if swept is not None:
@@ -133,7 +136,8 @@ def study_of_records(
                 f"{output} from {' and '.join(group.inputs)}" if model is None else Path(model).stem
             )
             try:
-                body += list(_model(name, group, segments, output, model, scans))
+                made = _model(name, group, segments, output, model, scans, renamed)
+                body += list(made)
             except FlightidError as error:
                 why = str(error).partition(". Next: ")[0]
                 said = f"{name}: no model, {why}"
@@ -163,7 +167,9 @@ def _needs_equations(
     )
 
 
-def _servos(actuators: Mapping[str, float], columns: Columns, model: str | None) -> list[str]:
+def _servos(
+    actuators: Mapping[str, float], columns: Columns, model: str | None, renamed: Mapping[str, str]
+) -> list[str]:
     """Actuators that the equations do not hold: taken out ahead of every fit."""
     if not actuators:
         return []
@@ -176,7 +182,9 @@ def _servos(actuators: Mapping[str, float], columns: Columns, model: str | None)
         )
     check_actuators(actuators, columns.inputs)
     said = "# Known from the ground; they lie between the columns and the inputs of the model."
-    return ["", said, "[[conditioning]]", f"actuators = {toml_value(dict(actuators))}"]
+    channels = {column: channel for channel, column in renamed.items()}
+    known = {channels.get(name, name): each for name, each in actuators.items()}
+    return ["", said, "[[conditioning]]", f"actuators = {toml_value(known)}"]
 
 
 def _times(read: Sequence[Stretch]) -> list[str]:
@@ -255,6 +263,7 @@ def _model(
     output: str,
     model: str | None,
     scans: ProposedScans,
+    renamed: Mapping[str, str],
 ) -> Iterator[str]:
     injected = scans.injected
     lines = [f"identify = {toml_value(list(segments.together) or segments.fitted)}"]
@@ -274,7 +283,9 @@ def _model(
             template += [f'response = {{ estimator = "instrument", excitations = {names} }}']
         if segments.together:
             # Of inputs times outputs some say nothing: coherence tells which are fitted.
-            template += ['responses = "coherent"', f"outputs = {toml_value(list(scans.outputs))}"]
+            channels = {column: channel for channel, column in renamed.items()}
+            told_outputs = [channels.get(output, output) for output in scans.outputs]
+            template += ['responses = "coherent"', f"outputs = {toml_value(told_outputs)}"]
         return iter(["", "[[model]]", f"name = {toml_value(name)}", *template, *lines])
     band = (rounded(low), rounded(high)) if high > 2 * low else None
     driving = scans.driving(output, band)
