@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,7 +17,7 @@ from flightid.models.linear.linear_system import LinearSystem
 from flightid.models.parameters import Parameter
 from flightid.models.polynomial.structure import AUTO, COMMON, SEPARATE, PolynomialStructure
 from flightid.models.sampled.channel_order import require_inputs_first
-from flightid.models.sampled.coefficients import coefficients, replaced
+from flightid.models.sampled.coefficients import coefficients, replaced_numbers
 from flightid.models.sampled.discrete_modes import DiscreteMode, discrete_modes, polynomial_roots
 
 Array = NDArray[np.float64]
@@ -94,26 +94,17 @@ class Polynomials:
         operating_point: Mapping[str, float] | None = None,
     ) -> Self:
         """Model from the coefficients of a structure, in the order of its `names`."""
-        values = np.asarray(theta, dtype=np.float64)
-        parts = np.split(values, np.cumsum(structure.counts)[:-1])
-        n = len(structure.inputs)
-        one = np.ones(1)
-        below = [np.concatenate([one, part]) for part in parts[n + 3 :]]
         return cls(
             structure.inputs,
             structure.output,
             sample_time_s,
-            np.concatenate([one, parts[0]]),
-            parts[1 : n + 1],
-            np.concatenate([one, parts[n + 1]]),
-            np.concatenate([one, parts[n + 2]]),
-            below * n if structure.is_common else below,
-            structure.nk,
-            noise_variance,
-            covariance,
-            units or {},
-            name,
-            operating_point or {},
+            **_rows(structure, theta),
+            nk=structure.nk,
+            noise_variance=noise_variance,
+            covariance=covariance,
+            units=units or {},
+            name=name,
+            operating_point=operating_point or {},
             denominators=COMMON if structure.is_common else SEPARATE,
         )
 
@@ -252,10 +243,9 @@ class Polynomials:
         UnknownNameError
             There is no such one.
         """
-        made = self.from_theta(
-            self.structure, replaced(self.parameters, values), self.sample_time_s
-        )
-        return replace(self, a=made.a, b=made.b, c=made.c, d=made.d, f=made.f, estimated=None)
+        structure = self.structure
+        numbers = replaced_numbers(dict(zip(structure.names, self.theta, strict=True)), values)
+        return replace(self, **_rows(structure, numbers), estimated=None)
 
     def linear_system(self) -> LinearSystem:
         """The response to the inputs as a recursion; the noise model is left out."""
@@ -269,6 +259,20 @@ class Polynomials:
             units=self.units,
             name=self.name,
         )
+
+
+def _rows(structure: PolynomialStructure, theta: ArrayLike) -> dict[str, Any]:
+    """Polynomials by letter, of coefficients in the order of the structure's names."""
+    parts = np.split(np.asarray(theta, dtype=np.float64), np.cumsum(structure.counts)[:-1])
+    n, one = len(structure.inputs), np.ones(1)
+    below = [np.concatenate([one, part]) for part in parts[n + 3 :]]
+    return {
+        "a": np.concatenate([one, parts[0]]),
+        "b": parts[1 : n + 1],
+        "c": np.concatenate([one, parts[n + 1]]),
+        "d": np.concatenate([one, parts[n + 2]]),
+        "f": below * n if structure.is_common else below,
+    }
 
 
 def _row(values: ArrayLike, letter: str, *, monic: bool) -> Array:

@@ -50,11 +50,28 @@ def replaced(parameters: Mapping[str, Parameter], values: Mapping[str, float]) -
     >>> replaced(coefficients(["a1", "b1"], [-0.5, 2.0], ["1", "1"]), {"b1": 3.0})
     [-0.5, 3.0]
     """
+    numbers = {name: item.value or 0.0 for name, item in parameters.items()}
+    return replaced_numbers(numbers, values)
+
+
+def replaced_numbers(numbers: Mapping[str, float], values: Mapping[str, float]) -> list[float]:
+    """The same of plain numbers.
+
+    Raises
+    ------
+    UnknownNameError
+        There is no such coefficient.
+
+    Example
+    -------
+    >>> replaced_numbers({"a1": -0.5, "b1": 2.0}, {"b1": 3.0})
+    [-0.5, 3.0]
+    """
     for name in values:
-        if name not in parameters:
+        if name not in numbers:
             raise UnknownNameError(
                 "there is no such coefficient",
                 found=repr(name),
-                needed=f"one of {', '.join(parameters)}"[:300],
+                needed=f"one of {', '.join(numbers)}"[:300],
             )
-    return [float(values.get(name, item.value or 0.0)) for name, item in parameters.items()]
+    return [float(values.get(name, number)) for name, number in numbers.items()]
