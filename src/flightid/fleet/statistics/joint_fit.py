@@ -120,7 +120,7 @@ def fit_population(
     before: Array | None = None
     for _ in range(MOST_ROUNDS):
         data = _linearised(model, known, places, factors, weight)
-        found = estimate_population(data, type_name)
+        found = estimate_population(data, type_name, errors_at_type=False)
         mean = found.spreads.mean
         stderr = np.sqrt(np.diag(found.spreads.mean_covariance))
         if before is not None and np.max(np.abs(mean - before) / stderr) < SETTLED:

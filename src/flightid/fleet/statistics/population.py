@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.fleet.statistics.errors_by_value import errors_at_the_type
 from flightid.fleet.statistics.flight_estimates import Flags, FlightEstimates
 from flightid.fleet.statistics.heterogeneity import FEWEST, VehicleEstimates
 from flightid.fleet.statistics.spread_search import SpreadFit, search_spreads
@@ -19,6 +20,7 @@ from flightid.uncertainty.quantiles import LEVEL, half_width, interval_words, sh
 
 Array = NDArray[np.float64]
 ALIKE = "vehicles that are all equal say nothing of the next"
+UNTOLD = "too few vehicles have several flights that tell it"
 NO_NEXT = f"fewer than {FEWEST} vehicles say nothing of the next"
 
 
@@ -31,6 +33,24 @@ class NextVehicleEnds:
     def __call__(self, level: float) -> tuple[float, float] | None:
         """Lower and upper end at a level."""
         return self.vehicles.next_ends(level)
+
+
+@dataclass(frozen=True)
+class MeanEnds:
+    """Ends of the interval of a mean: as the vehicles' own, about one that flights share in."""
+
+    vehicles: VehicleEstimates
+    mean: float
+    own_mean: float
+    scale: float
+
+    def __call__(self, level: float) -> tuple[float, float]:
+        """Lower and upper end at a level."""
+        low, high = self.vehicles.mean_ends(level)
+        return (
+            self.mean + self.scale * (low - self.own_mean),
+            self.mean + self.scale * (high - self.own_mean),
+        )
 
 
 @dataclass(frozen=True)
@@ -51,13 +71,15 @@ class TypeParameter:
     Attributes
     ----------
     mean : Estimate
-        Of the type; Hartung–Knapp, Student's t with one degree of freedom less than vehicles.
+        Of the type; standard error by Hartung and Knapp, with one degree of freedom less than
+        vehicles; its interval over the spreads that they allow.
     spread : Estimate
         Standard deviation between vehicles.
     next_vehicle : Estimate
         The mean with the interval that holds the parameter of the next vehicle.
     flight_spread : Estimate
-        Standard deviation between flights of one vehicle beyond the errors of the fits.
+        Standard deviation between flights of one vehicle beyond the errors of the fits; None where
+        too few flights tell it: what there is of it then counts as spread between vehicles.
     inconsistency_percent : float
         I²: share of the scatter of vehicles that is no error of estimates.
     chance_alike : float
@@ -89,6 +111,7 @@ class Population(
     spreads : SpreadFit
         Mean and covariances of all parameters together.
     data : FlightEstimates
+        Errors as they count: `errors_at_the_type`.
 
     Example
     -------
@@ -213,6 +236,7 @@ def estimate_population(
     *,
     structure: str | None = None,
     within_structure: str | None = None,
+    errors_at_type: bool = True,
 ) -> Population:
     """Estimate what the vehicles of a type have in common.
 
@@ -225,6 +249,9 @@ def estimate_population(
     structure, within_structure : str, optional
         Of the spread between vehicles, and between flights of one: ``"diagonal"``, ``"factor"``,
         ``"full"``; default: what the numbers of vehicles and flights support.
+    errors_at_type : bool
+        Whether errors that go with the estimates are taken at the type's value; False of estimates
+        whose errors were worked out there.
 
     Returns
     -------
@@ -240,14 +267,16 @@ def estimate_population(
     Assumes
     -------
     Vehicles are independent draws of one normal population, errors are normal with the covariance
-    that is given. Biased where errors are understated and no vehicle flew twice: they then count as
-    spread between vehicles.
+    that is given; where they go with the estimate they are taken at the type's value
+    (`errors_at_the_type`). Biased where errors are understated and no vehicle flew twice: they then
+    count as spread between vehicles.
 
     Reference
     ---------
     Jackson, Riley & White, *Statistics in Medicine* 30 (2011), 2481–2498; intervals as in
     `flightid.fleet.statistics.heterogeneity.VehicleEstimates`.
     """
+    data = errors_at_the_type(data) if errors_at_type else data
     spreads = search_spreads(data, structure=structure, within_structure=within_structure)
     own = _own(spreads)
     parameters = {}
@@ -271,14 +300,18 @@ def _parameter(
     variance = float(spreads.between[i, i])
     mean = float(spreads.mean[i])
     scatter = vehicles.hartung_knapp(variance)
+    own_mean, total, _ = vehicles.weighed(np.array([variance]))
+    # Beside what a vehicle's flights tell of a parameter alone, the others' tell by correlation.
+    gain = float(np.sqrt(spreads.mean_covariance[i, i] * total[0]))
     stderr = float(np.sqrt(spreads.mean_covariance[i, i] * scatter))
+    ends = MeanEnds(vehicles, mean, float(own_mean[0]), gain)
     few = len(vehicles.values) < FEWEST
     within = spreads.within
-    flights: Reading = Estimate(name, None, unit, None, "no vehicle flew twice")
-    if within is not None:
+    flights: Reading = Estimate(name, None, unit, None, UNTOLD)
+    if within is not None and spreads.within_told[i]:
         flights = Estimate(name, float(np.sqrt(within[i, i])), unit, None, "a spread of its own")
     return TypeParameter(
-        Estimate(name, mean, unit, stderr, freedom=float(vehicles.freedom)),
+        Estimate(name, mean, unit, stderr, freedom=float(vehicles.freedom), ends=ends),
         Estimate(name, float(np.sqrt(variance)), unit, ends=SpreadEnds(vehicles)),
         Estimate(
             name,

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import OptionError
+from flightid.fleet.statistics.flight_estimates import FlightEstimates
 from flightid.frozen import dataclass
 
 Array = NDArray[np.float64]
@@ -15,6 +16,8 @@ PER_FULL, BEYOND_FACTOR = 3, 2
 factor takes; with fewer the spread is a diagonal."""
 NARROW = 3
 """Parameters up to which a factor is no simpler than a full matrix."""
+FEWEST_REPEATS = 3.0
+"""Repeats that tell a parameter, below which flights of a vehicle have no spread of their own."""
 
 
 def supported(p: int, freedom: int) -> str:
@@ -98,3 +101,103 @@ class SpreadStructure:
         lower = np.zeros((self.p, self.p))
         lower[np.tril_indices(self.p)] = numbers
         return lower
+
+
+@dataclass(frozen=True)
+class SpreadOfSome:
+    """A spread of some of p parameters; the others have none.
+
+    Attributes
+    ----------
+    of_those : SpreadStructure
+    places : tuple of int
+        Which parameters they are.
+    p : int
+        All parameters.
+
+    Example
+    -------
+    >>> SpreadOfSome(SpreadStructure("diagonal", 1), (1,), 2).matrix(np.array([3.0])).tolist()
+    [[0.0, 0.0], [0.0, 9.0]]
+    """
+
+    of_those: SpreadStructure
+    places: tuple[int, ...]
+    p: int
+
+    def matrix(self, numbers: Array) -> Array:
+        """Covariance of all, shape (p, p)."""
+        made = np.zeros((self.p, self.p))
+        made[np.ix_(self.places, self.places)] = self.of_those.matrix(numbers)
+        return made
+
+    def gradient(self, numbers: Array, slope: Array) -> Array:
+        """Slope along the free numbers from the symmetric one of all, shape (size,)."""
+        return self.of_those.gradient(numbers, slope[np.ix_(self.places, self.places)])
+
+    def start(self, deviations: Array) -> Array:
+        """Free numbers of independent spreads with these standard deviations of all."""
+        return self.of_those.start(deviations[list(self.places)])
+
+
+def flights_spread(data: FlightEstimates) -> SpreadOfSome | None:
+    """The richest spread between flights of one vehicle that its repeats support.
+
+    Parameters
+    ----------
+    data : FlightEstimates
+
+    Returns
+    -------
+    SpreadOfSome or None
+        Of the parameters that are told by 3 repeats or more (`telling_repeats`); None: of none.
+        Where one flight of each vehicle tells a parameter, nothing parts vehicles from flights:
+        what is seen counts as spread between vehicles then, which is cautious of the next one.
+    """
+    repeats = telling_repeats(data)
+    places = tuple(int(i) for i in np.flatnonzero(repeats >= FEWEST_REPEATS))
+    if not places:
+        return None
+    kind = supported(len(places), int(min(repeats[list(places)])))
+    return SpreadOfSome(SpreadStructure(kind, len(places)), places, len(repeats))
+
+
+def telling_repeats(data: FlightEstimates) -> Array:
+    """Flights beyond the first of each vehicle, as many of equal information tell as much.
+
+        Σ_i (Σ_j u_ij)² / Σ_j u_ij² − 1,   u_ij = 1 / (s_ij² + t²)
+
+    t² is the spread of the vehicles' best flights, s² the variance of an estimate.
+
+    Parameters
+    ----------
+    data : FlightEstimates
+
+    Returns
+    -------
+    ndarray, shape (p,)
+
+    Reference
+    ---------
+    Kish, *Survey Sampling* (1965), section 11.7 (effective number of unequal weights).
+
+    Example
+    -------
+    >>> data = FlightEstimates.of(["a"], [*"aabb"], [[1.0], [1.2], [2.0], [9.0]],
+    ...                           np.array([0.01, 0.01, 0.01, 90.0]).reshape(4, 1, 1))
+    >>> telling_repeats(data).round(2).tolist()
+    [1.01]
+    """
+    found = np.zeros(len(data.names))
+    for i in range(len(data.names)):
+        rows = np.flatnonzero(data.known[:, i])
+        variances, member = data.covariances[rows, i, i], data.member_of[rows]
+        order = np.lexsort((variances, member))
+        best = order[np.flatnonzero(np.diff(member[order], prepend=-1))]
+        errors = variances[best].mean()
+        apart = float(np.var(data.values[rows[best], i], ddof=1)) if len(best) > 1 else 0.0
+        told = 1.0 / (variances + max(apart - errors, 0.0))
+        sums, squares = (np.bincount(member, told**power) for power in (1, 2))
+        there = squares > 0.0
+        found[i] = np.sum(sums[there] ** 2 / squares[there] - 1.0)
+    return found

@@ -11,7 +11,12 @@ from scipy.optimize import minimize
 from flightid.errors import DataError, FitError
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
 from flightid.fleet.statistics.restricted_likelihood import Evaluation, RestrictedLikelihood
-from flightid.fleet.statistics.spread import SpreadStructure, supported
+from flightid.fleet.statistics.spread import (
+    SpreadOfSome,
+    SpreadStructure,
+    flights_spread,
+    supported,
+)
 from flightid.frozen import dataclass
 
 Array = NDArray[np.float64]
@@ -35,8 +40,10 @@ class SpreadFit:
     between : ndarray, shape (p, p)
         T, between vehicles.
     within : ndarray, shape (p, p), or None
-        F, between flights of one vehicle beyond the errors of the fits; None where no vehicle flew
-        twice.
+        F, between flights of one vehicle beyond the errors of the fits; None where too few
+        flights tell it, and 0 of parameters that too few tell.
+    within_told : ndarray of bool, shape (p,)
+        Parameters whose F was searched.
     structure, within_structure : str
         Shapes that were searched.
     information : ndarray, shape (k, p, p)
@@ -51,6 +58,7 @@ class SpreadFit:
     mean_covariance: Array
     between: Array
     within: Array | None
+    within_told: NDArray[np.bool_]
     structure: str
     within_structure: str
     information: Array
@@ -98,10 +106,8 @@ def search_spreads(
     """
     _require_vehicles(data)
     p, k = len(data.names), len(data.members)
-    repeats = len(data.vehicles) - k
     between = SpreadStructure(structure or supported(p, k - 1), p)
-    chosen = within_structure or (supported(p, repeats) if repeats >= 1 else "none")
-    within = None if chosen == "none" else SpreadStructure(chosen, p)
+    within = _within(data, within_structure)
     centre, scale, spread = _scales(data)
     likelihood = RestrictedLikelihood.of(_scaled(data, centre, scale))
     starts = STARTS if len(data.vehicles) < MANY else STARTS[:1]
@@ -121,8 +127,9 @@ def search_spreads(
         np.linalg.inv(best.at.mean_information) * outer,
         _trimmed(best.between) * outer,
         None if best.within is None else _trimmed(best.within) * outer,
+        _searched_places(within, p),
         between.kind,
-        chosen,
+        "none" if within is None else within.of_those.kind,
         information,
         best.at.score / scale + information @ centre,
         best.at.cost,
@@ -138,6 +145,19 @@ class SpreadSearchEnd:
     between: Array
     within: Array | None
     evaluations: int
+
+
+def _within(data: FlightEstimates, structure: str | None) -> SpreadOfSome | None:
+    """Shape of the spread between flights: as told, of all parameters, or as repeats support."""
+    if structure is None:
+        return flights_spread(data)
+    p = len(data.names)
+    told = None if structure == "none" else SpreadStructure(structure, p)
+    return None if told is None else SpreadOfSome(told, tuple(range(p)), p)
+
+
+def _searched_places(within: SpreadOfSome | None, p: int) -> NDArray[np.bool_]:
+    return np.isin(np.arange(p), () if within is None else within.places)
 
 
 def _require_vehicles(data: FlightEstimates) -> None:
@@ -177,7 +197,7 @@ def _scaled(data: FlightEstimates, centre: Array, scale: Array) -> FlightEstimat
 def _searched(
     likelihood: RestrictedLikelihood,
     between: SpreadStructure,
-    within: SpreadStructure | None,
+    within: SpreadOfSome | None,
     start: Array,
 ) -> SpreadSearchEnd:
     split = between.size

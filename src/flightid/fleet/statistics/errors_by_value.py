@@ -1,0 +1,107 @@
+"""Errors that go with the estimate itself, taken at what the type has in common instead."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.fleet.statistics.flight_estimates import Flags, FlightEstimates
+
+Array = NDArray[np.float64]
+SURE = 2.0
+"""Standard errors off zero from which a size says anything of its error."""
+MOST = 0.9
+"""Share of flights that must be so: of a parameter about zero nothing is relative."""
+
+
+def errors_at_the_type(data: FlightEstimates) -> FlightEstimates:
+    """Estimates with the errors that they would have at the type's usual value.
+
+    A fit whose relative error is known states a small error with a small estimate. What is low by
+    chance then counts for more, and the mean of a type is low: by 2 c² of itself at a relative
+    error c without spread, of 20 vehicles 2.7 of its standard errors at c = 0.3. How much of an
+    error is relative its flights tell, as they scatter about either rule:
+
+        share = 1 / (1 + (R₁ / R₀)^((n − 1)/2)),   s → s (m / |y|)^share
+
+    R₀ and R₁ are the sums of squares of log s and of log s − log|y| about their means, m the median
+    |y|. Where they do not tell, half of it counts.
+
+    Parameters
+    ----------
+    data : FlightEstimates
+
+    Returns
+    -------
+    FlightEstimates
+        The same values; of parameters nine of ten of whose flights lie on one side of zero, by two
+        standard errors or more, errors of these flights at the median. Correlations stand.
+
+    Assumes
+    -------
+    Errors absolute or relative, as likely one as the other before the flights are seen. Where
+    vehicles differ and their errors with them, each counts as at the median: weights that do not
+    go with the estimates leave the mean without bias, at the cost of the weights' best choice.
+
+    Reference
+    ---------
+    Carroll & Ruppert, *Transformation and Weighting in Regression* (1988), chapter 2 (weights by
+    fitted values); Kass & Raftery, *J. Am. Stat. Assoc.* 90 (1995), 773–795 (odds of two rules).
+
+    Example
+    -------
+    >>> data = FlightEstimates.of(["a"], [*"uvwx"], [[8.0], [10.0], [10.0], [12.5]],
+    ...                           np.square([0.8, 1.0, 1.0, 1.25])[:, None, None])
+    >>> np.sqrt(errors_at_the_type(data).covariances[:, 0, 0]).round(6).tolist()
+    [1.0, 1.0, 1.0, 1.0]
+    """
+    scale = np.ones_like(data.values)
+    for i in range(len(data.names)):
+        _set_scale(scale[:, i], data, i)
+    if np.all(scale == 1.0):
+        return data
+    outer = scale[:, :, None] * scale[:, None, :]
+    return replace(data, covariances=data.covariances * outer)
+
+
+def _set_scale(scale: Array, data: FlightEstimates, i: int) -> None:
+    """Factors of the standard errors of one parameter, where its errors may be relative."""
+    there = data.known[:, i]
+    values, errors = data.values[:, i], np.sqrt(data.covariances[:, i, i])
+    sure = there & _one_sided(values, errors, there)
+    if np.count_nonzero(sure) < max(3.0, MOST * np.count_nonzero(there)):
+        return
+    size = np.log(np.abs(values[sure]))
+    share = relative_share(size, np.log(errors[sure]))
+    scale[sure] = np.exp(share * (float(np.median(size)) - size))
+
+
+def _one_sided(values: Array, errors: Array, there: Flags) -> Flags:
+    """Estimates on the usual side of zero and sure of it."""
+    side = np.sign(np.median(values[there])) if there.any() else 1.0
+    return np.asarray(side * values > SURE * errors)
+
+
+def relative_share(log_values: Array, log_errors: Array) -> float:
+    """How likely errors are relative rather than absolute.
+
+    Parameters
+    ----------
+    log_values, log_errors : ndarray, shape (n,)
+        Logarithms of sizes and of standard errors.
+
+    Returns
+    -------
+    float
+        From 0, absolute, to 1, relative; 0.5 where nothing tells.
+    """
+    absolute, relative = (
+        float(np.sum((each - each.mean()) ** 2)) for each in (log_errors, log_errors - log_values)
+    )
+    least = 1e-12 * (absolute + relative)
+    if least == 0.0:
+        return 0.5
+    odds = 0.5 * (len(log_values) - 1) * np.log((absolute + least) / (relative + least))
+    return float(1.0 / (1.0 + np.exp(-np.clip(odds, -700.0, 700.0))))
