@@ -11,6 +11,7 @@ from scipy.special import fdtrc
 
 from flightid.fleet.statistics.flight_estimates import Flags, FlightEstimates
 from flightid.fleet.statistics.heterogeneity import VehicleEstimates
+from flightid.fleet.statistics.minorities import VehicleMinority, find_minorities
 from flightid.fleet.statistics.multiple_testing import FALSE_SHARE, chance_cell, corrected
 from flightid.fleet.statistics.population import Population
 from flightid.fleet.statistics.spread_search import SpreadFit, search_spreads
@@ -128,6 +129,8 @@ class FleetOutliers(Result, schema="flightid.fleet_outliers/1"):
     pairs : tuple of tuple of str
         A parameter and two vehicles that lie to one side of all others in it: each hides the other,
         which widens what counts as normal, and neither is called like its type.
+    minorities : tuple of VehicleMinority
+        Two to a third of the vehicles that differ alike from the others.
 
     Example
     -------
@@ -146,6 +149,13 @@ class FleetOutliers(Result, schema="flightid.fleet_outliers/1"):
     vehicles: tuple[VehicleNormality, ...]
     reason: str = ""
     pairs: tuple[tuple[str, str, str], ...] = ()
+    minorities: tuple[VehicleMinority, ...] = ()
+
+    def differences(self, vehicle: str, labels: Mapping[str, str] | None = None) -> list[str]:
+        """In what a vehicle is unlike its type, alone or alike with others, in words."""
+        odd = [each.words(labels) for each in self.odd if each.vehicle == vehicle]
+        mine = (each for each in self.minorities if vehicle in each.vehicles)
+        return [*odd, *(each.words(labels or {}, vehicle) for each in mine)]
 
     def beside(self, vehicle: str) -> str:
         """What hides whether a vehicle is like its type; empty where nothing does."""
@@ -156,8 +166,9 @@ class FleetOutliers(Result, schema="flightid.fleet_outliers/1"):
         return ""
 
     def _said(self, each: VehicleNormality, labels: Mapping[str, str] | None) -> str:
-        hidden = "" if each.is_odd else self.beside(each.vehicle)
-        return f"cannot tell: {hidden}" if hidden else each.words(labels)
+        said = self.differences(each.vehicle, labels)
+        hidden = self.beside(each.vehicle)
+        return "; ".join(said) or (f"cannot tell: {hidden}" if hidden else each.words(labels))
 
     @property
     def odd(self) -> tuple[VehicleNormality, ...]:
@@ -191,7 +202,12 @@ class FleetOutliers(Result, schema="flightid.fleet_outliers/1"):
             f"share decides, so that at most {100 * FALSE_SHARE:.0f} % of the vehicles called "
             "unlike their type are not."
         )
-        notes = (self.reason or note,)
+        alike = (
+            f"{each.words(labels or {})}. What the type has in common spans both kinds; a type of "
+            "their own in the table of vehicles parts them."
+            for each in self.minorities
+        )
+        notes = (self.reason or note, *alike)
         return Table(f"Vehicles of type “{self.type_name}”", columns, rows, notes)
 
 
@@ -209,8 +225,8 @@ def find_outliers(population: Population) -> FleetOutliers:
 
     Assumes
     -------
-    One odd vehicle at a time: several that are odd alike widen what counts as normal. Two such are
-    told as a pair; three or more hide.
+    One odd vehicle at a time: several that are odd alike widen what counts as normal. They are told
+    as a minority where a gap parts them from the others, two also as a pair where it may be one.
 
     Reference
     ---------
@@ -227,7 +243,8 @@ def find_outliers(population: Population) -> FleetOutliers:
     shares = corrected([each.chance for each in found])
     judged = [replace(e, false_share=float(s)) for e, s in zip(found, shares, strict=True)]
     ranked = sorted(judged, key=lambda each: (each.chance, -each.distance2))
-    return FleetOutliers(population.type_name, tuple(ranked), "", tuple(_pairs(population)))
+    pairs, alike = tuple(_pairs(population)), find_minorities(population)
+    return FleetOutliers(population.type_name, tuple(ranked), "", pairs, alike)
 
 
 def _pairs(population: Population) -> Iterator[tuple[str, str, str]]:
@@ -261,13 +278,7 @@ def _judged(population: Population, place: int) -> VehicleNormality:
     told = [len(set(others.member_of[others.known[:, i]])) for i in range(len(data.names))]
     if min(told) < FEWEST - 1:
         return _beside(population, place, kept, _mean_without(kept, place))
-    spreads = search_spreads(
-        others,
-        structure=kept.structure,
-        within_structure=None
-        if len(others.vehicles) == len(others.members)
-        else (kept.within_structure),
-    )
+    spreads = search_spreads(others, structure=kept.structure)
     return _beside(population, place, spreads, (spreads.mean, spreads.mean_covariance))
 
 
