@@ -19,7 +19,8 @@ class BrokenFleet:
     """A fleet with a flight every three days, errors told as `least` to 5 % of the parameter.
 
     Errors are `understated` times as large, flights differ by `spread` more, all move by `season`
-    in a sine over the whole time, and the last flights of the last vehicles by `change`.
+    in a sine over the whole time, and the last flights of the last vehicles by `change`. Errors of
+    the first vehicle are `first_understated` times as large again.
     """
 
     vehicles: int = VEHICLES
@@ -31,6 +32,7 @@ class BrokenFleet:
     change: float = 0.0
     changed: int = 0
     last: int = 14
+    first_understated: float = 1.0
 
     def drift(self, seed: int) -> FleetDrift:
         """What is found of one drawn fleet."""
@@ -38,6 +40,7 @@ class BrokenFleet:
         base = 10.0 * (1.0 + 0.1 * rng.normal(size=(self.vehicles, 1)))
         errors = rng.uniform(self.least, 0.05, shape)
         moved = self.understated * errors * rng.normal(size=shape)
+        moved[0] *= self.first_understated
         moved += self.spread * rng.normal(size=shape)
         moved += self.season * np.sin(2.0 * np.pi * np.arange(self.flights) / self.flights)
         moved[self.vehicles - self.changed :, self.flights - self.last :] += self.change
@@ -96,6 +99,9 @@ def small_fleets() -> Iterator[tuple[str, BrokenFleet]]:
     ):  # fmt: skip
         words = f"{vehicles} of {flights} flights, errors understated by {understated:g}"
         yield words, BrokenFleet(vehicles, flights, understated=understated)
+    for vehicles, flights, first in ((6, 20, 2.0), (6, 20, 3.0), (20, 12, 2.0)):
+        words = f"{vehicles} of {flights} flights, errors of one understated by {first:g}"
+        yield words, BrokenFleet(vehicles, flights, first_understated=first)
     yield "8 of 12 flights, season of 3 %", BrokenFleet(8, 12, season=0.03)
     yield "1 of 12 flights, step of 10 %", BrokenFleet(1, 12, change=0.1, changed=1, last=5)
 

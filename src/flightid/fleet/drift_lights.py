@@ -33,6 +33,16 @@ def shared_lights(drift: FleetDrift, labels: Mapping[str, str]) -> tuple[Finding
     )
 
 
+def scale_lights(drift: FleetDrift, labels: Mapping[str, str]) -> tuple[Finding, ...]:
+    """Vehicles whose own flights scatter further than those of the others."""
+    act = "look for what differs between its flights, and fly it twice on a day"
+    return tuple(
+        Finding("vehicle-errors", Light.AMBER, each.words(labels), act)
+        for each in drift.scales
+        if each.is_sure
+    )
+
+
 def _errors_light(scatter: RepeatScatter, errors: ErrorScale, name: str) -> Finding:
     ends = scatter.understated_ends(shown())
     if ends is None:

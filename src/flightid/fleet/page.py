@@ -9,7 +9,7 @@ from dataclasses import replace
 from flightid.conventions import Light
 from flightid.findings import Finding, counted
 from flightid.fleet.catalogue.schema import FITTED
-from flightid.fleet.drift_lights import errors_lights, shared_lights
+from flightid.fleet.drift_lights import errors_lights, scale_lights, shared_lights
 from flightid.fleet.normality import MORE, quiet_light
 from flightid.fleet.pictures import history_picture, type_picture
 from flightid.fleet.reasons import grouped_reasons, reasons_table
@@ -155,10 +155,10 @@ def vehicle_light(vehicle: str, types: Sequence[TypeAnswers]) -> Finding:
             if newest.vehicle == vehicle:
                 said.append(newest.words(each.labels))
                 light = Light.RED if light is Light.RED else Light.AMBER
-        for one in each.outliers.odd if each.outliers is not None else ():
-            if one.vehicle == vehicle:
-                said.append(one.words(each.labels))
-                light = Light.RED if light is Light.RED else Light.AMBER
+        if each.outliers is not None:
+            unlike = each.outliers.differences(vehicle, each.labels)
+            said += unlike
+            light = Light.AMBER if unlike and light is not Light.RED else light
     if not said:
         quiet = quiet_light(vehicle, types)
         if not done:
@@ -212,7 +212,9 @@ def _type_blocks(each: TypeAnswers) -> Iterator[Block]:
         many = len(each.outliers.vehicles) > SHOWN
         if each.outliers.vehicles:
             table = each.outliers.summary(each.labels)
-            yield TableBlock(table, folded=many and not each.outliers.odd)
+            yield TableBlock(
+                table, folded=many and not (each.outliers.odd or each.outliers.minorities)
+            )
         else:
             yield Paragraph(f"No vehicle was held beside its type: {each.outliers.reason}.")
     if each.drift is not None:
@@ -220,7 +222,8 @@ def _type_blocks(each: TypeAnswers) -> Iterator[Block]:
 
 
 def _drift_blocks(drift: FleetDrift, labels: Mapping[str, str]) -> Iterator[Block]:
-    yield Lights(errors_lights(drift, labels), "Errors of the estimates")
+    errors = (*errors_lights(drift, labels), *scale_lights(drift, labels))
+    yield Lights(errors, "Errors of the estimates")
     if drift.shared:
         yield Lights(shared_lights(drift, labels), "What all vehicles did together")
     slopes = _slopes(drift, labels)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError, ShapeError
-from flightid.fleet.statistics.largest_step import FEWEST, SHORTEST
+from flightid.fleet.statistics.largest_step import FEWEST, NEWEST, SHORTEST
 
 Array = NDArray[np.float64]
 STEP, DRIFT, CHANGED = "a step", "drift", "changed"
@@ -80,7 +80,7 @@ def change_kind(values: Array, covariance: Array, time_s: Array, *, seed: int = 
     since = time_s - time_s[0]
     if since[-1] <= 0.0:
         return CHANGED
-    steps = np.tri(n, n - 1, -1)[:, SHORTEST - 1 : n - SHORTEST]
+    steps = np.tri(n, n - 1, -1)[:, SHORTEST - 1 : n - NEWEST]
     starts = since[: n - SHORTEST]
     slopes = np.maximum(since[:, None] - starts[starts < since[-SHORTEST]], 0.0) / since[-1]
     level = np.linalg.solve(root, np.ones((n, 1)))

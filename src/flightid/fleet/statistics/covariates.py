@@ -204,3 +204,26 @@ def _effect(name: str, slope: float, variance: float, scale: float, tellers: int
     freedom = float(tellers - 1) if tellers > 1 else None
     stderr = float(np.sqrt(variance) / scale)
     return Estimate(name, float(slope / scale), stderr=stderr, freedom=freedom)
+
+
+def own_slopes(values: Array, variances: Array, x: Array, slope: Array, error: Array) -> Array:
+    """Slopes of the other vehicles and of this one's flights together.
+
+    Parameters
+    ----------
+    values, variances : ndarray, shape (n,)
+        Of the vehicle's flights.
+    x : ndarray, shape (n, q)
+        Covariates.
+    slope : ndarray, shape (q,)
+        Of the others, with the covariance `error`, shape (q, q).
+
+    Returns
+    -------
+    ndarray, shape (q,)
+    """
+    weights = 1.0 / variances
+    flat = x - np.average(x, axis=0, weights=weights)
+    information = np.linalg.inv(error)
+    total = information + (flat.T * weights) @ flat
+    return np.asarray(np.linalg.solve(total, information @ slope + (flat.T * weights) @ values))

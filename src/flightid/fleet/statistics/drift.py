@@ -16,6 +16,7 @@ from flightid.fleet.statistics.covariates import (
     CovariateSlopes,
     design_covariates,
     fit_covariates,
+    own_slopes,
 )
 from flightid.fleet.statistics.events import (
     EventEffect,
@@ -29,6 +30,7 @@ from flightid.fleet.statistics.flight_errors import NOTABLE, ErrorScale, error_s
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
 from flightid.fleet.statistics.largest_step import (
     FEWEST,
+    NEWEST,
     SHORTEST,
     scan_changes,
     scan_drifts,
@@ -42,6 +44,12 @@ from flightid.fleet.statistics.newest_flight import NewestFlight, judged_newest,
 from flightid.fleet.statistics.parameter_history import ParameterHistory, StepEnds
 from flightid.fleet.statistics.repeats import RepeatScatter, repeat_scatter
 from flightid.fleet.statistics.shared_level import SharedLevel, shared_level, without_shared
+from flightid.fleet.statistics.vehicle_errors import (
+    VehicleScale,
+    judged_scales,
+    own_scales,
+    variance_factors,
+)
 from flightid.fleet.statistics.wandering import wandering_chance
 from flightid.frozen import dataclass
 from flightid.result import Result
@@ -81,6 +89,8 @@ class FleetDrift(Result, schema="flightid.fleet_drift/1"):
         What all vehicles did together, which no history holds.
     newest : tuple of NewestFlight
         The newest flight of each vehicle beside those before it; of no change.
+    scales : tuple of VehicleScale
+        Vehicles whose own flights scatter further than the fleet's.
 
     Example
     -------
@@ -102,6 +112,7 @@ class FleetDrift(Result, schema="flightid.fleet_drift/1"):
     errors: Mapping[str, ErrorScale]
     shared: tuple[SharedLevel, ...]
     newest: tuple[NewestFlight, ...]
+    scales: tuple[VehicleScale, ...]
 
     @cached_property
     def alarms(self) -> tuple[ParameterHistory, ...]:
@@ -194,6 +205,7 @@ class FleetDrift(Result, schema="flightid.fleet_drift/1"):
                 for name, each in self.errors.items()
                 if each.typical >= NOTABLE
             ),
+            *(f"{each.words(named)}." for each in self.scales if each.is_sure),
         )
         return Table("What changed", columns, tuple(rows), notes)
 
@@ -224,7 +236,8 @@ def find_drift(
 
     Assumes
     -------
-    Errors of flights are independent and normal, with the variances of `error_scale`. What nearly
+    Errors of flights are independent and normal, with the variances of `error_scale`, and of a
+    vehicle whose own flights scatter further, as these do (`own_scales`). What nearly
     all vehicles share by date is no change of one (`shared_level`). Flights far off those before
     and those after them count for less; the newest flight alone is no change (`newest_flights`).
 
@@ -238,6 +251,7 @@ def find_drift(
     odd: dict[str, int] = {}
     errors: dict[str, ErrorScale] = {}
     newest: list[NewestFlight] = []
+    scales: list[VehicleScale] = []
     every, parameters = data, range(len(data.names))
     bare = [fit_covariates(data, i, design, _variances(data, i)) for i in parameters]
     explained = _explained(data, design, bare)
@@ -250,6 +264,10 @@ def find_drift(
         errors[name] = error_scale(explained, i, repeated)
         usual = errors[name].variances(_variances(data, i))
         level = without_events(explained, i, usual, events)
+        _, off = variances_with_odd_ones(level, i, usual)
+        own = own_scales(level, i, usual, off)
+        scales += own
+        usual = usual * variance_factors(own, data.vehicles)
         variances, off = variances_with_odd_ones(level, i, usual)
         odd[name] = int(off.sum())
         newest += newest_flights(level, i, usual, variances)
@@ -263,6 +281,7 @@ def find_drift(
     return FleetDrift(
         *(_judged(histories), repeats, slopes, design.missing, odd, errors),
         *(tuple(each for each in shared if each is not None), judged_newest(newest)),
+        judged_scales(scales),
     )
 
 
@@ -303,7 +322,7 @@ def _history(
         # An error of the slopes that is common to all flights moves the level alone.
         apart = x - x.mean(axis=0)
         covariance = covariance + apart @ error @ apart.T
-        own = _own_slopes(values, variances, apart, slope, error)
+        own = own_slopes(values, variances, apart, slope, error)
         tested, values = values - apart @ slope, values - apart @ own
     track = follow_level(values, variances, time_s)
     happened = [event for event in events if event.concerns(vehicle)]
@@ -320,19 +339,12 @@ def _history(
     return found, tested, covariance, known
 
 
-def _own_slopes(values: Array, variances: Array, x: Array, slope: Array, error: Array) -> Array:
-    """Slopes of the other vehicles and of this one's flights together."""
-    weights = 1.0 / variances
-    flat = x - np.average(x, axis=0, weights=weights)
-    information = np.linalg.inv(error)
-    total = information + (flat.T * weights) @ flat
-    return np.asarray(np.linalg.solve(total, information @ slope + (flat.T * weights) @ values))
-
-
 def _tested(
     history: ParameterHistory, values: Array, covariance: Array, known: Array
 ) -> ParameterHistory:
-    scan = scan_steps(values, covariance, known)
+    # A step is looked for with three flights behind it; where one is, it may be of the last two.
+    scan = scan_steps(values, covariance, known, newest=NEWEST)
+    asked = scan.up_to(len(values) - SHORTEST - 1)
     first, last = scan.place_ends()
     base = scan.level
     change: Reading = Estimate(history.name, None, "%", reason="the level before it may be zero")
@@ -341,7 +353,7 @@ def _tested(
         change = Estimate(history.name, percent, "%", ends=StepEnds(scan))
     return replace(
         history,
-        step_chance=scan.chance,
+        step_chance=asked.chance,
         walk_chance=wandering_chance(values, covariance, history.time_s),
         change_percent=change,
         changed_s=(float(history.time_s[first]), float(history.time_s[last + 1])),

@@ -21,6 +21,8 @@ from flightid.uncertainty.quantiles import LEVEL, tails
 Array = NDArray[np.float64]
 SHORTEST = 3
 """Flights on either side of a step: a lone odd flight is none."""
+NEWEST = 2
+"""Newest flights before which one may stand where its size is asked: two of them may be one."""
 FEWEST = 2 * SHORTEST
 """Flights without which no step is looked for."""
 NODES = 24
@@ -34,7 +36,7 @@ FAR = 8.0
 
 @dataclass(frozen=True, eq=False)
 class StepScan:
-    """Steps of a series at every place where one may stand: `SHORTEST` flights to either side.
+    """Steps of a series at every place where one may stand: as `step_places` has them.
 
     Attributes
     ----------
@@ -66,6 +68,19 @@ class StepScan:
     before_variances: Array
     with_before: Array
     places: NDArray[np.intp]
+
+    def up_to(self, place: int) -> StepScan:
+        """The same of places up to one."""
+        m = int(np.searchsorted(self.places, place, side="right"))
+        return StepScan(
+            self.sizes[:m],
+            self.variances[:m],
+            self.correlations[: max(m - 1, 0)],
+            self.before[:m],
+            self.before_variances[:m],
+            self.with_before[:m],
+            self.places[:m],
+        )
 
     @property
     def deviations(self) -> Array:
@@ -133,7 +148,9 @@ class StepScan:
         return int(places.min()), int(places.max())
 
 
-def scan_steps(values: Array, covariance: Array, known: Array | None = None) -> StepScan:
+def scan_steps(
+    values: Array, covariance: Array, known: Array | None = None, *, newest: int = SHORTEST
+) -> StepScan:
     """Estimate a step at every place of a series, by generalised least squares.
 
     Parameters
@@ -145,6 +162,8 @@ def scan_steps(values: Array, covariance: Array, known: Array | None = None) -> 
     known : ndarray, shape (n, e), optional
         Flights behind each known step, whose size `covariance` leaves open: another one has
         `SHORTEST` flights between itself and each of them, too.
+    newest : int
+        Flights behind a step at the least.
 
     Returns
     -------
@@ -164,16 +183,19 @@ def scan_steps(values: Array, covariance: Array, known: Array | None = None) -> 
     365–367.
     """
     n = len(values)
-    places = step_places(n, known)
+    places = step_places(n, known, newest)
     if n >= FEWEST and not len(places):
         raise DataError("no step fits between the known ones", needed=f"{FEWEST} flights of one")
     return _scan(values, covariance, _steps(n, places), places)
 
 
-def step_places(n: int, known: Array | None = None) -> NDArray[np.intp]:
-    """Last flights before a step that has `SHORTEST` flights to either side, known steps apart."""
-    ends = {0, n} if known is None else {0, n, *np.count_nonzero(known == 0.0, axis=0).tolist()}
-    places = np.arange(n - 1, dtype=np.intp)
+def step_places(n: int, known: Array | None = None, newest: int = SHORTEST) -> NDArray[np.intp]:
+    """Last flights before a step that has `SHORTEST` flights to either side, known steps apart.
+
+    At the end of a series it has `newest` behind it.
+    """
+    ends = {0} if known is None else {0, *np.count_nonzero(known == 0.0, axis=0).tolist()}
+    places = np.arange(n - newest, dtype=np.intp)
     near = [(places + 1 > end - SHORTEST) & (places + 1 < end + SHORTEST) for end in ends]
     return np.asarray(places[~np.any(near, axis=0)], dtype=np.intp)
 
@@ -222,9 +244,10 @@ def scan_changes(
 ) -> StepScan:
     """Steps, then steady movements, as `scan_steps` and `scan_drifts` have them, in one scan.
 
+    Steps may have the two newest flights behind them.
     Its interval weighs both kinds by how well they fit; a change may be either.
     """
-    places, ramps = step_places(len(values), known), _ramps(time_s)
+    places, ramps = step_places(len(values), known, NEWEST), _ramps(time_s)
     shapes = np.hstack([_steps(len(values), places), ramps])
     return _scan(values, covariance, shapes, np.append(places, np.arange(ramps.shape[1])))
 
