@@ -82,9 +82,11 @@ def test_a_saturated_integral_comes_back_at_once() -> None:
 
 
 def test_the_code_does_what_the_recursion_does(tmp_path: Path) -> None:
-    loop = _loop(direct=True, low=-1.5, high=2.0, rate_per_s=40.0)
+    loop = _loop(direct=True, low=-1.5, high=2.0, rate_per_s=40.0, units=("ft/s", "1"))
     design = replace(_tuned(loop_rate_hz=50.0), loop=loop)
     fid.export(design, tmp_path / "pid.c")
+    said = "Set-point and measurement in ft/s, output a number without unit."
+    assert said in (tmp_path / "pid.c").read_text()
     build = ["cc", "-std=c99", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC", "-o"]
     subprocess.run([*build, tmp_path / "pid.so", tmp_path / "pid.c"], check=True)
     code = ctypes.CDLL(str(tmp_path / "pid.so"))
@@ -207,7 +209,7 @@ def test_a_command_ends_in_gains_and_code(
     for name in ("gains.toml", "gains.c"):
         assert run([*said, "100", "--draws", "6", "--write", str(tmp_path / name)]) == 0
         assert "worst" in capsys.readouterr().out
-        assert (tmp_path / name).exists()
+        assert "measurement in rad/s, output a number" in (tmp_path / name).read_text()
     (written,) = tomllib.loads((tmp_path / "gains.toml").read_text())["controller"]
     assert_close(written["ideal"]["K"], written["Kp"], rtol=1e-12, why="the same gain")
     two = _tuned(controller="pi", loop_rate_hz=50.0)

@@ -99,6 +99,45 @@ def test_records_become_the_study_of_their_structure(
     assert first == (tmp_path / "again" / "report.txt").read_text().split("Parameters")[0]
 
 
+HEAVE = """
+kind = "state-space"
+name = "heave"
+[states]
+w = "ft/s"
+[inputs]
+F = "lbf"
+[outputs]
+w = "w"
+[parameters]
+m = { value = 5.0, min = 0.1, max = 100.0, unit = "slug" }
+c = { value = 5.0, min = 0.0, max = 200.0, unit = "lbf*s/ft" }
+[equations]
+"m*w'" = "-c*w + F"
+"""
+
+
+def test_columns_go_to_the_units_of_equations_that_are_named_from_anywhere(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Knots of 12 slug behind 20 lbf s/ft, the records in a folder below the equations."""
+    time_s, force = np.arange(600) * 0.05, np.repeat(np.tile([40.0, -40.0, 40.0], 10), 20)
+    _, speed, _ = lsim(([1.0], [12.0, 20.0]), force, time_s, interp=False)
+    knots = speed / 1.687810 + 0.02 * np.random.default_rng(0).standard_normal(600)
+    (tmp_path / "flights").mkdir()
+    (tmp_path / "heave.toml").write_text(HEAVE)
+    rows = np.column_stack([time_s, force, knots])
+    head = "time [s],F [lbf],w [kt]"
+    np.savetxt(tmp_path / "flights/r.csv", rows, "%.6g", ",", header=head, comments="")
+    monkeypatch.chdir(tmp_path)
+    asked = {"inputs": ["F"], "outputs": ["w"], "hold": "zero"}
+    made = propose_study(["flights/r.csv"], folder="flights", model="heave.toml", **asked)
+    assert "w converted from kn to ft/s, its unit in ../heave.toml" in made.said
+    fit = run_study(made.write(Path("flights/r-study.toml"))).identified[0].fit
+    assert fit is not None
+    assert fit.parameters["m"].value == pytest.approx(12.0, rel=0.02)
+    assert fit.parameters["c"].value == pytest.approx(20.0, rel=0.02)
+
+
 @pytest.mark.nightly
 def test_a_controller_of_a_study_is_written_as_code(tmp_path: Path) -> None:
     _rig(tmp_path)

@@ -35,6 +35,12 @@ def test_rates_are_in_the_units_of_the_firmwares_age(
     assert "scale-contradicted" not in found
 
 
+def test_no_age_is_claimed_where_no_version_is_told(tmp_path: Path) -> None:
+    path = write_old_log(tmp_path / "o.bin", "Mine", rate_scale=DEGREES, seconds=5.0)
+    (said,) = (each for each in fid.read_log(path).findings if each.code == "no-units")
+    assert "as Copter 3.4 stored them, for no version" in said.message
+
+
 @pytest.mark.parametrize("scale", [1.0, 1.1 * DEGREES])
 def test_a_scale_that_is_wrong_is_red_with_the_factor(tmp_path: Path, scale: float) -> None:
     """Firmware that says 3.4 and stores something else."""
@@ -43,6 +49,8 @@ def test_a_scale_that_is_wrong_is_red_with_the_factor(tmp_path: Path, scale: flo
     said = [f for f in inspection.findings if f.code == "scale-contradicted"]
     assert {finding.light for finding in said} == {Light.RED}
     assert f"{DEGREES / scale:.4g} times the turning of RATE.P" in " ".join(f.message for f in said)
+    assert inspection.findings[0] == said[0]
+    assert "nothing-excited" not in {finding.code for finding in inspection.findings}
     record = fid.read_log(path).record(names=["tau_theta", "q"])
     assert [finding.code for finding in record_findings(record)] == ["scale-contradicted"]
 

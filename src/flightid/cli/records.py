@@ -141,15 +141,9 @@ def _from_table(
 
 
 def _in_units(record: Record, units: Mapping[str, str]) -> Record:
-    from flightid.units import canonical, is_convertible
+    from flightid.record.unit_changes import unit_changes
 
-    wanted = {
-        name: canonical(unit)
-        for name, unit in units.items()
-        if name in record.channels
-        and record.unit(name) != canonical(unit)
-        and is_convertible(record.unit(name), canonical(unit))
-    }
+    wanted = unit_changes(record, units)
     for name, unit in wanted.items():
         note(f"{record.name or 'Record'}: {name} converted from {record.unit(name)} to {unit}")
     return record.to_units(**wanted) if wanted else record

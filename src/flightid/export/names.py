@@ -97,6 +97,8 @@ def comment(text: str) -> str:
     Example
     -------
     >>> comment("roll */ int x;")
-    'roll  int x;'
+    'roll  / int x;'
+    >>> comment("damping in lbf*s/ft")
+    'damping in lbf s/ft'
     """
-    return re.sub(r"[^A-Za-z0-9 .,;:=()+_'-]+", "", text)[:200]
+    return re.sub(r"[^A-Za-z0-9 .,;:=()+_'/^-]+", "", text.replace("*", " "))[:200]

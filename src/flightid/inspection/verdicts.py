@@ -30,11 +30,13 @@ if TYPE_CHECKING:
 
 def judge(log: Log, found: Inspection) -> tuple[Finding, ...]:
     """All verdicts on a log, the worst first."""
-    findings = [*log.findings, *_flight(log, found)]
+    # Sizes mean nothing until units do: what contradicts these comes first.
+    scales = _scales(log, found)
+    findings = [*scales, *log.findings, *_flight(log, found)]
     if found.phases.airborne:
         findings += [*_length(found), *_bands(log, found), *_loop(log, found)]
-    findings += [*_logging(log, found), *_excitation(log, found)]
-    findings += [*_quality(log, found), *_scales(log, found)]
+    findings += [*_logging(log, found), *_excitation(log, found, scales)]
+    findings += _quality(log, found)
     return _ranked([*findings, *_without_model(log, found, findings)])
 
 
@@ -164,8 +166,11 @@ def _logging(log: Log, found: Inspection) -> list[Finding]:
     return [Finding("rate-good", Light.GREEN, f"{what} are logged at {rate:.4g} Hz: up to {reach}")]
 
 
-def _excitation(log: Log, found: Inspection) -> list[Finding]:
+def _excitation(log: Log, found: Inspection, scales: list[Finding]) -> list[Finding]:
     if not found.excitations:
+        if scales:
+            said = "what moved cannot be told: the streams disagree on how far the vehicle turns"
+            return [Finding("motion-unknown", Light.UNKNOWN, said, scales[0].action)]
         if all(band.output == "" for band in found.bands):
             return [
                 Finding(

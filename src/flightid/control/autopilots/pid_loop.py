@@ -21,6 +21,7 @@ from flightid.control.autopilots.parameter_table import GainRange
 from flightid.control.gyro import Gyro
 from flightid.frozen import dataclass
 from flightid.table import Column, Table
+from flightid.units import DIMENSIONLESS
 
 FORMS = {
     "parallel": "Kp + Ki/s + Kd s/(Tf s + 1)",
@@ -47,6 +48,8 @@ class PidLoop(AxisLoop):
         Whether the sign of the error is turned: a plant whose output falls as its input rises.
     low, high, rate_per_s : float or None
         Limits of the output, and of its change per second.
+    units : tuple of str
+        Of what it measures and of what it moves; empty where nobody knows them.
     time_scale : float
         Of the loop's dynamics over those of a vehicle's rate loop.
 
@@ -70,6 +73,7 @@ class PidLoop(AxisLoop):
     high: float | None = None
     rate_per_s: float | None = None
     time_scale: float = 1.0
+    units: tuple[str, ...] = ()
     autopilot: ClassVar[str] = "pid"
     inner: ClassVar[str] = "loop"
 
@@ -155,6 +159,9 @@ class PidLoop(AxisLoop):
             if self.sampled
             else "Continuous: sample at least 30 times as fast as it crosses over.",
         ]
+        if {*self.units} - {DIMENSIONLESS}:
+            measured, moved = (_unit_words(each) for each in self.units)
+            made.insert(0, f"Set-point and measurement {measured}, output {moved}.")
         if self.values.get("tracking_s"):
             made.append(f"Anti-windup: back calculation, Tt = {self.values['tracking_s']:.4g} s.")
         limits = zip(
@@ -242,3 +249,7 @@ def _without_infinite(values: dict[str, float]) -> dict[str, float]:
 
 def _listed(values: Mapping[str, float]) -> str:
     return ", ".join(f"{name} {value:.4g}" for name, value in values.items() if value)
+
+
+def _unit_words(unit: str) -> str:
+    return "a number without unit" if unit == DIMENSIONLESS else f"in {unit}"

@@ -25,5 +25,6 @@ def write_settings(
     lines = [f"# {' '.join(note.split())}" for note in notes]
     for loop in loops:
         told = loop.settings().items()
+        lines += [f"# {each}" for each in loop.remarks()]
         lines += ["[[controller]]", *(f"{key} = {toml_value(value)}" for key, value in told), ""]
     return (write_atomically(path, "\n".join(lines)),)

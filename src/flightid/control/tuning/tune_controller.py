@@ -138,7 +138,7 @@ def tune_controller(
         result = tune_axis(setting, [start], [start], 0, advance)
     tuned = result.loop
     assert isinstance(tuned, PidLoop)
-    made, steps_over = _finished(tuned), 0.0
+    made, steps_over = replace(_finished(tuned), units=_units(fit, *channels)), 0.0
     if WEIGHTS.get(asked.controller, (1.0, 1.0))[0] is None:
         shown = setting.judged.sampled.take(list(range(min(SHOWN, len(setting.judged.sampled)))))
         for weight in WEIGHTS_TRIED:
@@ -170,6 +170,12 @@ def _channels(fit: object, inputs: str | None, outputs: str | None) -> tuple[str
             )
         found.append(given or known[0])
     return found[0], found[1]
+
+
+def _units(fit: object, output: str, input: str) -> tuple[str, ...]:
+    """Of the measurement and of what is moved; none where the model does not know both."""
+    known = getattr(model_of(fit), "units", {})
+    return tuple(known[name] for name in (output, input)) if {output, input} <= {*known} else ()
 
 
 def _own_rate(fit: object) -> float | None:

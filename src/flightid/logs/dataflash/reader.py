@@ -365,7 +365,12 @@ class DataflashSource:
             )
         if "FMTU" not in self._messages:
             known = ", ".join(name for name in UNDECLARED if name in self._layouts)
-            taken = f"; {known} are read as firmware of its age stores them" if known else ""
+            how = (
+                "firmware of its age stores them"
+                if _VERSION.match(self.firmware)
+                else ("Copter 3.4 stored them, for no version of the firmware is told")
+            )
+            taken = f"; {known} are read as {how}" if known else ""
             if "RATE" in self._layouts and self._holds_hundredths:
                 taken += ", RATE in hundredths of a deg/s and its commands to 4500"
             yield Finding(

@@ -22,6 +22,7 @@ from flightid.record import read_records
 from flightid.record.formats.columns import channel_name
 from flightid.record.time_question import time_said
 from flightid.simulation.actuators import check_actuators
+from flightid.study.model_settings import placed
 from flightid.study.proposal.columns import Columns, columns_of, columns_of_model
 from flightid.study.proposal.options import DataOptions, told
 from flightid.study.proposal.order_scans import ProposedScans, record_file
@@ -36,6 +37,7 @@ from flightid.study.proposal.stretches import (
     segments_of,
     too_short,
 )
+from flightid.study.proposal.unit_steps import unit_steps
 from flightid.study.stage_runner import StageRunner
 from flightid.study.structures import AS_GOOD, ranked
 from flightid.surface import as_key, speaking
@@ -100,14 +102,18 @@ def study_of_records(
         tuple(channel_name(name, read[0].record.channels) for name in names)
         for names in (inputs, outputs, excitations)
     )
-    columns = columns_of([part.record for part in read], inputs, outputs, injected)
+    records = [part.record for part in read]
+    columns = columns_of(records, inputs, outputs, injected)
     keys = _keys(reading, folder)
-    renamed = {} if model is None else columns_of_model(model, columns)
+    renamed = {} if model is None else columns_of_model(placed(folder, model), columns)
     if renamed:
         keys.append(f"columns = {toml_value(renamed)}")
     if injected and model is None:
         raise _needs_equations(paths, columns, injected)
-    body = _servos(actuators or {}, columns, model, renamed)
+    units, converted = (
+        ([], []) if model is None else unit_steps(model, records, columns, folder, renamed)
+    )
+    body = [*units, *_servos(actuators or {}, columns, model, renamed)]
     groups, missed = _groups(read, columns)
     swept = None if model is None else one_experiment(read, columns.inputs, injected)
     if swept is not None:
@@ -146,8 +152,8 @@ def study_of_records(
             names.append(name)
     with speaking(as_key):
         keyed = _times(read)
-    told_of = (*columns.said, *_times(read), *_stamps(read))
-    head = _head(paths, (*columns.said, *keyed, *_stamps(read)), missed)
+    told_of = (*columns.said, *converted, *_times(read), *_stamps(read))
+    head = _head(paths, (*columns.said, *converted, *keyed, *_stamps(read)), missed)
     return Proposal((*head, *body), tuple(names), tuple(missed), said=told_of)
 
 

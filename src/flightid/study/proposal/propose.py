@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, MutableMapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -38,7 +39,8 @@ def propose_study(
         Folder of the study file; paths in it are relative to that.
     model : str, optional
         Library model or model file in place of the usual one; for records, a model with equations
-        in place of a structure that is looked for.
+        in place of a structure that is looked for. A file as it is named here, or else beside the
+        study.
     inputs, outputs : sequence of str
         Columns of records, where their names do not tell.
     excitations : sequence of str
@@ -70,6 +72,8 @@ def propose_study(
     asked = checked(DataOptions, reading, "a study of records")
     # Columns that are named are those of the topics of a bag, or of a decoded blackbox.
     named = bool(inputs or outputs or excitations or actuators or told(asked) != asked.declared)
+    if model is not None and model.endswith(".toml") and Path(model).is_file():
+        model = Path(os.path.relpath(model, folder)).as_posix()
     logs = [path for path in paths if is_log(path) and not (named and is_table_too(path))]
     if not logs:
         return study_of_records(
