@@ -77,10 +77,12 @@ def _reported(page: Any, folder: Path) -> str:
 def test_the_study_is_written_with_a_model_and_edited_as_text(desk: Desk, tmp_path: Path) -> None:
     """Roles, a servo, a model of the library for structures, and a key typed into the file."""
     rows = "".join(f"{0.05 * k},{k // 20 % 2},{(k % 7) * 0.01}\n" for k in range(400))
-    (tmp_path / "arm.csv").write_text("t,volts,rate\n" + rows)
+    (tmp_path / "arm.csv").write_text("t,volts,rate_dps\n" + rows)
     window = _dropped(desk, [tmp_path / "arm.csv"])
     page = window.page
-    _roles(page, {"volts": "input", "rate": "output"})
+    page.get_by_text("Read from the headings: rate_dps as deg/s;").wait_for()
+    assert page.get_by_label("Unit of rate_dps").input_value() == "deg/s"
+    _roles(page, {"volts": "input", "rate_dps": "output"})
     page.locator("#template option", has_text="first order").first.wait_for(state="attached")
     page.select_option("#template", value="rate_first_order")
     page.get_by_label("Servo of volts, rad/s").fill("12")
@@ -105,16 +107,42 @@ def test_the_study_is_written_with_a_model_and_edited_as_text(desk: Desk, tmp_pa
     page.get_by_role("button", name="Save", exact=True).press("Enter")
     page.locator("pre .changed", has_text="By hand").wait_for()
     assert _study(desk, page)["study"]["title"].startswith("By hand, ")
+    _left_alone(page, text, tmp_path / "arm.csv")
     _opened(page, "Model")
     page.get_by_label("Reduce structures to what the data determine").check()
     page.locator("pre .changed", has_text="maximum_insensitivity_percent").wait_for()
     page.get_by_label("Another rival").select_option("rate_integrator")
     page.locator("pre .changed", has_text="rivals").wait_for()
     said += _findings(page)
+    _opened(page, "Logs")
+    page.get_by_role("button", name="Remove from list: arm.csv").press("Enter")
+    page.get_by_text("arm.csv is off the list").wait_for()
+    page.get_by_text("Off the list: 1").click()
+    page.get_by_role("button", name="Put back arm.csv").wait_for()
+    said += _findings(page)
+    page.keyboard.press("Tab")
+    page.get_by_role("button", name="Undo", exact=True).press("Enter")
+    page.get_by_text("Off the list:").wait_for(state="detached")
+    page.get_by_role("button", name="Remove from list: arm.csv").wait_for()
     assert said == []
     # A refusal of the server is an answer of 422, which the browser writes down.
     assert all("422" in each for each in window.complaints)
     page.close()
+
+
+def _left_alone(page: Any, text: str, outside: Path) -> None:
+    """A file outside the folder is named, and nothing runs; Undo leads back."""
+    line = next(each for each in text.splitlines() if each.startswith("path = "))
+    page.get_by_role("button", name="Edit", exact=True).press("Enter")
+    field = page.get_by_label("Study file, to be written")
+    field.fill(text.replace(line, f'path = "{outside}"'))
+    page.get_by_role("button", name="Save", exact=True).press("Enter")
+    alert = page.get_by_role("alert").filter(has_text="outside this folder")
+    alert.filter(has_text=str(outside)).first.wait_for()
+    assert page.get_by_role("button", name="Fit and verify").is_disabled()
+    page.get_by_role("button", name="Undo", exact=True).press("Enter")
+    alert.first.wait_for(state="detached")
+    assert page.get_by_role("button", name="Fit and verify").is_enabled()
 
 
 @pytest.mark.nightly

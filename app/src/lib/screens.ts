@@ -37,7 +37,7 @@ export interface Screen {
 const hasModels = ({ log, study }: Given) => Boolean(log && study?.models.length);
 
 /** Whether the address is that of records of a rig, which have no flight. */
-const ofRecords = ({ study }: Given) => location.hash.startsWith("#/records/") || Boolean(study?.file?.settings.record);
+export const ofRecords = ({ study }: Given) => location.hash.startsWith("#/records/") || Boolean(study?.file?.settings.record);
 
 /** In the order of the links; the first is where the address says nothing else. */
 export const SCREENS: Screen[] = [

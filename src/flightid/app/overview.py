@@ -130,7 +130,7 @@ def _card(
         fitted = fitted if band is None or band.band_rad_s is None else band.band_rad_s
         light: Light = "green" if finding is None else light_of(finding.light)
         coherence = None if band is None or band.coherence is None else band.coherence
-        said = "" if coherence is None else f"mean coherence {coherence:.2f}"
+        said = "" if coherence is None else f"Mean coherence {coherence:.2f}"
         swept = [each for each in inspection.excitations if each.axis == axis]
         told = "; ".join(dict.fromkeys(f"{each.words}: {each.detail}" for each in swept))
         return AxisCard(
@@ -138,7 +138,7 @@ def _card(
             kind="model",
             light=light,
             headline=f"Can be identified {hertz_words(fitted)}",
-            detail=". ".join(filter(None, (said, told))),
+            detail=". ".join(f"{each[0].upper()}{each[1:]}" for each in (said, told) if each),
             action="" if finding is None else finding.action,
             model=model.name,
             band_rad_s=fitted,
