@@ -306,7 +306,7 @@ def test_what_a_log_carries_already_is_not_swept_again(
     assert made.carried == ("roll",)
     assert [each.axis for each in made.sweeps] == ["pitch", "yaw"]
     (done,) = (each for each in made.findings if each.code == "identified-already")
-    assert "a model of roll already: no further sweep of it" in done.message
+    assert "a model of roll already: no further sweep" in done.message
     assert done.action == "next is flightid tune swept.bin"
     again = {each.code for each in fid.plan_flight(opened, axes=("roll",)).findings}
     assert "swept-already" in again

@@ -38,7 +38,7 @@ class FlownSweeps:
         if done:
             yield Finding(
                 "identified-already", Light.GREEN,
-                f"this log can carry a model of {_listed(done)} already: no further sweep of it",
+                f"this log can carry a model of {_listed(done)} already: no further sweep",
                 f"next is flightid tune {name}",
             )  # fmt: skip
         again = Counter(axis for axis in self.injected if axis in planned)
