@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc
 
-from flightid.fleet.statistics.flight_estimates import Flags, FlightEstimates
+from flightid.fleet.statistics.flight_estimates import FlightEstimates
 from flightid.fleet.statistics.heterogeneity import VehicleEstimates
 from flightid.fleet.statistics.minorities import VehicleMinority, find_minorities
 from flightid.fleet.statistics.multiple_testing import FALSE_SHARE, chance_cell, corrected
@@ -25,8 +25,11 @@ FEWEST = 4
 """Vehicles without which none is called odd: three others tell what is normal."""
 REFITS = 30
 """Vehicles up to which every one is left out of a search of its own; of more, suspects alone."""
-SUSPECT = 0.2
-"""Chance below which a vehicle is left out of a search of its own."""
+SUSPECT = 6.0
+"""Over the number of vehicles: chance beside all of them below which one is left out of a search.
+
+Of many vehicles one moves their spread little, and as many are left out however many there are.
+"""
 PAIR_AMONG = 5
 """Vehicles of which two alike can hide: three others tell what is normal."""
 PAIR_CHANCE = 0.2
@@ -239,7 +242,8 @@ def find_outliers(population: Population) -> FleetOutliers:
     if len(data.members) < FEWEST:
         why = f"fewer than {FEWEST} vehicles: nothing says what is normal"
         return FleetOutliers(population.type_name, (), why)
-    found = [_judged(population, place) for place in range(len(data.members))]
+    everyone = tuple(_everyone(population, i) for i in range(len(data.names)))
+    found = [_judged(population, everyone, place) for place in range(len(data.members))]
     shares = corrected([each.chance for each in found])
     judged = [replace(e, false_share=float(s)) for e, s in zip(found, shares, strict=True)]
     ranked = sorted(judged, key=lambda each: (each.chance, -each.distance2))
@@ -268,18 +272,28 @@ def _column(population: Population, places: Sequence[int], i: int) -> tuple[Arra
     return np.array([each[0][i] for each in own]), np.array([each[1][i, i] for each in own])
 
 
-def _judged(population: Population, place: int) -> VehicleNormality:
+def _everyone(population: Population, i: int) -> VehicleEstimates:
+    """A parameter of all vehicles that tell it."""
+    there = [n for n, own in enumerate(population.own) if own[2][i]]
+    return VehicleEstimates(*_column(population, there, i))
+
+
+def _judged(
+    population: Population, everyone: Sequence[VehicleEstimates], place: int
+) -> VehicleNormality:
     data, kept = population.data, population.spreads
+    quick = _mean_without(kept, place)
     if len(data.members) > REFITS:
-        quick = _beside(population, place, kept, _mean_without(kept, place))
-        if quick.chance > SUSPECT:
-            return quick
+        found = _beside(population, everyone, place, kept, quick)
+        if found.chance > SUSPECT / len(data.members):
+            return found
     others = data.chosen(data.member_of != place)
     told = [len(set(others.member_of[others.known[:, i]])) for i in range(len(data.names))]
     if min(told) < FEWEST - 1:
-        return _beside(population, place, kept, _mean_without(kept, place))
+        return _beside(population, everyone, place, kept, quick)
     spreads = search_spreads(others, structure=kept.structure)
-    return _beside(population, place, spreads, (spreads.mean, spreads.mean_covariance))
+    mean = (spreads.mean, spreads.mean_covariance)
+    return _beside(population, everyone, place, spreads, mean)
 
 
 def _mean_without(spreads: SpreadFit, place: int) -> tuple[Array, Array]:
@@ -295,7 +309,11 @@ def _mean_without(spreads: SpreadFit, place: int) -> tuple[Array, Array]:
 
 
 def _beside(
-    population: Population, place: int, spreads: SpreadFit, mean: tuple[Array, Array]
+    population: Population,
+    everyone: Sequence[VehicleEstimates],
+    place: int,
+    spreads: SpreadFit,
+    mean: tuple[Array, Array],
 ) -> VehicleNormality:
     """A vehicle beside a mean of the others and their spread."""
     data = population.data
@@ -307,10 +325,7 @@ def _beside(
     apart = (value - mean[0])[where]
     distance2 = float(apart @ np.linalg.solve(total, apart))
     freedom = float(len(data.members) - 2)
-    every = population.own
-    single = np.array(
-        [_single(every, place, int(i), float(value[i]), float(covariance[i, i])) for i in where]
-    )
+    single = np.array([_single(population, everyone[i], place, int(i)) for i in where])
     odd = corrected(single) <= FALSE_SHARE
     if spreads.structure == "full":
         chance = _chance(distance2, total, between + error, freedom)
@@ -329,16 +344,18 @@ def _beside(
     return VehicleNormality(data.members[place], distance2, len(where), chance, deviations)
 
 
-def _single(
-    every: Sequence[tuple[Array, Array, Flags]], place: int, i: int, value: float, variance: float
-) -> float:
+def _single(population: Population, everyone: VehicleEstimates, place: int, i: int) -> float:
     """Chance that the next vehicle's parameter lies as far from those of all others."""
-    others = [each for number, each in enumerate(every) if number != place and each[2][i]]
-    if len(others) < FEWEST - 1:
+    value, covariance, _ = population.own[place]
+    one = float(value[i]), float(covariance[i, i])
+    if len(everyone.values) > REFITS:
+        chance = everyone.next_chance(*one)
+        if chance > SUSPECT / len(everyone.values):
+            return chance
+    if len(everyone.values) < FEWEST:
         return 1.0
-    return VehicleEstimates(
-        np.array([each[0][i] for each in others]), np.array([each[1][i, i] for each in others])
-    ).next_chance(value, variance)
+    there = [n for n, own in enumerate(population.own) if n != place and own[2][i]]
+    return VehicleEstimates(*_column(population, there, i)).next_chance(*one)
 
 
 def _chance(distance2: float, total: Array, uncertain: Array, freedom: float) -> float:
