@@ -31,3 +31,17 @@ def test_eliminated_transients_solve_the_whole_problem() -> None:
     whole = np.linalg.lstsq(both, right, rcond=None)[0]
     found = [numerators.ravel(), *transients, denominator[1:]]
     assert_close(np.concatenate(found), whole, atol=1e-9 * np.max(np.abs(whole)), why="rounding")
+
+
+def test_columns_that_are_alike_are_solved_by_triangles() -> None:
+    """An output that is an input: numerator and denominator of order two share both roots."""
+    random = np.random.default_rng(4)
+    inputs = [random.standard_normal((1, n)) for n in (200, 160)]
+    data = spectra_of(inputs, [u[0] for u in inputs], 0.02, 60.0)
+    target, ones = np.concatenate(data.output), np.ones(data.size)
+    made = PilotColumns.of(data, 2, 10.0)
+    assert made.bins.solve(target, ones, target) is None
+    numerators, denominator, transients = solve(made, target, ones, target)
+    still = np.zeros(2)
+    above = made.bins.numerator(np.concatenate([numerators.ravel(), still, *transients]))
+    assert_close(above, target * (denominator @ made.whole), atol=1e-9, why="rounding")

@@ -54,6 +54,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     fits::least_squares::register(module)?;
     models::narx_models::register(module)?;
     models::polynomial_models::register(module)?;
+    models::rational_bins::register(module)?;
     simulation::nonlinear_simulation::register(module)?;
     models::transfer::register(module)?;
     vehicles::twin_rotor::register(module)?;

@@ -1,7 +1,9 @@
 //! Models as frequency responses, and their fit to measured ones.
 
+pub mod bordered_normal;
 pub mod composite;
 pub mod frequency_fit;
+pub mod rational_bins;
 pub mod response_model;
 pub mod state_space_response;
 pub mod transfer;

@@ -208,13 +208,12 @@ def _pilot(data: PilotBins, state: PilotState, scale: float, weights: Real) -> P
     taken = 0.5 * np.einsum("ib,ij,jb->b", left, inverse, left, optimize=True)
     spent = np.minimum(taken.reshape(2, -1).sum(axis=0), MOST_SPENT)
     variance = state.cost * data.size / max(2.0 * data.size - len(slopes), 1.0)
-    samples = [data.samples(row) for row in slopes]
     return Pilot(
         scale,
         state.numerators,
         state.denominator,
         data.samples(state.modelled),
-        tuple(np.stack(each) for each in zip(*samples, strict=True)),
+        data.samples(slopes),
         variance * inverse / np.outer(norms, norms),
         tuple(np.split(spent, np.cumsum([len(each) for each in data.omega])[:-1])),
     )

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid._native import RationalBins
 from flightid.frozen import dataclass
 
 Complex = NDArray[np.complex128]
@@ -47,14 +48,14 @@ class PilotBins:
         return sum(len(each) for each in self.omega)
 
     def samples(self, values: Complex) -> tuple[Real, ...]:
-        """Samples of each record from its bins in the band."""
+        """Samples of each record, shape (…, n), from bins in the band, shape (…, n_bins)."""
         made: list[Real] = []
         at = 0
         for omega, n in zip(self.omega, self.lengths, strict=True):
-            bins = np.zeros(n // 2 + 1, dtype=np.complex128)
-            bins[1 : len(omega) + 1] = values[at : at + len(omega)]
-            scaled = bins * np.sqrt(n / (2.0 * self.sample_time_s))
-            made.append(np.asarray(np.fft.irfft(scaled, n), dtype=np.float64))
+            bins = np.zeros((*values.shape[:-1], n // 2 + 1), dtype=np.complex128)
+            scale = np.sqrt(n / (2.0 * self.sample_time_s))
+            bins[..., 1 : len(omega) + 1] = values[..., at : at + len(omega)] * scale
+            made.append(np.asarray(np.fft.irfft(bins, n), dtype=np.float64))
             at += len(omega)
         return tuple(made)
 
@@ -89,7 +90,7 @@ def spectra_of(
 
 @dataclass(frozen=True)
 class PilotColumns:
-    """What one order makes of the bins, by record; columns of `fixed` hold for all denominators.
+    """What one order makes of the bins, by record.
 
     Attributes
     ----------
@@ -97,25 +98,35 @@ class PilotColumns:
         Powers for numerators and denominator, and for the record's transient.
     whole : ndarray, shape (order + 1, n_bins)
         The basis of all records.
-    fixed : list of ndarray, shape (n_fixed, n_f)
-        Sensitivities times the denominator, of the transient and of the numerators.
+    inputs : tuple of ndarray, shape (n_in, n_f)
+    bins : RationalBins
+        The same for the native half.
     """
 
     basis: list[Complex]
     ends: list[Complex]
     whole: Complex
-    fixed: list[Complex]
+    inputs: tuple[Complex, ...]
+    bins: RationalBins
 
     @classmethod
     def of(cls, data: PilotBins, order: int, scale: float) -> PilotColumns:
         """Of an order."""
         ends = [turns(omega, scale, order + SPARE) for omega in data.omega]
         basis = [each[: order + 1] for each in ends]
-        fixed = [
+        whole = np.concatenate(basis, axis=1)
+        lengths = [len(each) for each in data.omega]
+        inputs = np.concatenate(data.inputs, axis=1)
+        bins = RationalBins(inputs, whole[1], lengths, order, order + 1 + SPARE)
+        return cls(basis, ends, whole, data.inputs, bins)
+
+    @cached_property
+    def fixed(self) -> list[Complex]:
+        """Sensitivities times the denominator of transient and numerators, each (n_fixed, n_f)."""
+        return [
             np.concatenate([end, *(row * phi for row in u)])
-            for u, phi, end in zip(data.inputs, basis, ends, strict=True)
+            for u, phi, end in zip(self.inputs, self.basis, self.ends, strict=True)
         ]
-        return cls(basis, ends, np.concatenate(basis, axis=1), fixed)
 
     @cached_property
     def edges(self) -> list[int]:
@@ -177,8 +188,24 @@ def solve(
 ) -> tuple[Real, Real, tuple[Real, ...]]:
     """Coefficients whose weighed sensitivities come nearest to a target; a denominator from one on.
 
-    Each record's transient is eliminated by an orthogonal triangle of its own rows.
+    By corrected normal equations, whose sums are few as columns are powers of one number; where
+    columns are too alike for these, by orthogonal triangles.
     """
+    size, n_records = len(columns.basis[0]), len(columns.basis)
+    found = columns.bins.solve(output, np.abs(weights) ** 2, np.conj(weights) * target)
+    if found is None:
+        return _by_triangles(columns, output, weights, target)
+    split = len(found) - n_records * (size + SPARE)
+    first = split - (size - 1)
+    denominator = np.concatenate([[1.0], found[first:split]])
+    transients = tuple(found[split:].reshape(n_records, -1))
+    return found[:first].reshape(-1, size), denominator, transients
+
+
+def _by_triangles(
+    columns: PilotColumns, output: Complex, weights: Real | Complex, target: Complex
+) -> tuple[Real, Real, tuple[Real, ...]]:
+    """As `solve`, each record's transient eliminated by a triangle of its own rows."""
     triangles: list[Real] = []
     for fixed, phi, y, weight, right in zip(
         columns.fixed,
@@ -237,13 +264,9 @@ def _made(
     denominator: Real,
     transients: tuple[Real, ...],
 ) -> PilotState:
-    above = [
-        np.einsum("if,if->f", numerators @ phi, u) + transient @ end
-        for phi, end, u, transient in zip(
-            columns.basis, columns.ends, data.inputs, transients, strict=True
-        )
-    ]
-    modelled = np.concatenate(above) / (denominator @ columns.whole)
+    still = np.zeros(len(denominator) - 1)
+    above = columns.bins.numerator(np.concatenate([numerators.ravel(), still, *transients]))
+    modelled = above / (denominator @ columns.whole)
     residual = weights * (np.concatenate(data.output) - modelled)
     cost = float(np.mean(np.abs(residual) ** 2))
     return PilotState(numerators, denominator, transients, modelled, residual, cost)

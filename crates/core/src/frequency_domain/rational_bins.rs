@@ -1,0 +1,393 @@
+//! Least squares of a rational response with transients over the Fourier bins of records.
+//! (Python side: responses/errors/pilot_search.py)
+//!
+//! Columns are powers of numbers of unit modulus times a channel: products of two of them depend on
+//! the difference of their powers alone, so that normal equations cost a few sums for each pair of
+//! channels. One step of correction gives back the digits that normal equations lose.
+
+use num_complex::Complex64;
+
+use crate::error::CoreError;
+use crate::frequency_domain::bordered_normal::{BorderedNormal, Record, Unknowns};
+use crate::numerics::widest::widest;
+
+/// Bins that are worked on together; unused ones count nothing.
+const CHUNK: usize = 64;
+/// Running sums of one product, and products side by side.
+const LANES: usize = 8;
+const ABREAST: usize = 4;
+/// Share of the unknowns that a correction may move; a larger one finds the equations unsound.
+const MOST_MOVED: f64 = 1e-2;
+/// Share from which on a correction is followed by another.
+const SETTLED: f64 = 1e-10;
+const CORRECTIONS: usize = 3;
+
+type Sums = [f64; LANES];
+
+/// Fourier bins of the inputs of some records, and the turns whose powers make a basis.
+#[derive(Debug, Clone)]
+pub struct RationalBins {
+    inputs: Vec<Complex64>,
+    n_inputs: usize,
+    turns: Vec<Complex64>,
+    lengths: Vec<usize>,
+    order: usize,
+    n_own: usize,
+}
+
+/// What is fitted: an output, squares of weights, and the target pulled back by the weights.
+#[derive(Debug, Clone, Copy)]
+struct Wanted<'a> {
+    output: &'a [Complex64],
+    power: &'a [f64],
+    pulled: &'a [Complex64],
+}
+
+/// Values of one chunk, each row `CHUNK` long.
+struct Chunk {
+    from: usize,
+    count: usize,
+    powers: [Vec<f64>; 2],
+    channels: [Vec<f64>; 2],
+}
+
+impl RationalBins {
+    /// Bins of all inputs (row after row), turns by bin, bins of each record, order, and terms of each
+    /// record's transient.
+    ///
+    /// # Errors
+    /// `Shape` where lengths do not fit.
+    pub fn new(
+        inputs: Vec<Complex64>,
+        turns: Vec<Complex64>,
+        lengths: Vec<usize>,
+        order: usize,
+        n_own: usize,
+    ) -> Result<Self, CoreError> {
+        let n = turns.len();
+        let shape = |what, found, needed| Err(CoreError::Shape { what, found, needed });
+        if n == 0 || !inputs.len().is_multiple_of(n) {
+            return shape("bins of the inputs", inputs.len(), n);
+        }
+        let whole = lengths.iter().fold(0_usize, |sum, each| sum.saturating_add(*each));
+        if whole != n {
+            return shape("bins of the records", whole, n);
+        }
+        if !(order + 1..=n).contains(&n_own) {
+            return shape("terms of a transient", n_own, order + 1);
+        }
+        let n_inputs = inputs.len() / n;
+        Ok(Self { inputs, n_inputs, turns, lengths, order, n_own })
+    }
+
+    /// Number of bins.
+    pub fn size(&self) -> usize {
+        self.turns.len()
+    }
+
+    fn unknowns(&self) -> Unknowns {
+        Unknowns { n_own: self.n_own, order: self.order, n_inputs: self.n_inputs }
+    }
+
+    /// Coefficients that come nearest: numerators, denominator but its first (which is one), and the
+    /// transient of each record. None where columns are so alike that these equations cannot tell.
+    ///
+    /// By bin: the output that the denominator multiplies, squared moduli of the weights, and the
+    /// target times the conjugate weights.
+    ///
+    /// # Errors
+    /// `Shape` where lengths do not fit.
+    ///
+    /// Reference: Björck, "Stability analysis of the method of seminormal equations for linear least
+    /// squares problems", *Linear Algebra and its Applications* 88/89 (1987): one correction.
+    pub fn solve(
+        &self,
+        output: &[Complex64],
+        power: &[f64],
+        pulled: &[Complex64],
+    ) -> Result<Option<Vec<f64>>, CoreError> {
+        let needed = self.size();
+        for found in [output.len(), power.len(), pulled.len()] {
+            if found != needed {
+                return Err(CoreError::Shape { what: "bins of the output", found, needed });
+            }
+        }
+        let wanted = Wanted { output, power, pulled };
+        let records = widest(|| self.products(wanted));
+        let Some(normal) = BorderedNormal::of(self.unknowns(), &records) else { return Ok(None) };
+        let right: Vec<&[f64]> = records.iter().map(|each| each.right.as_slice()).collect();
+        let mut solved = normal.solve(&right);
+        for turn in 0..CORRECTIONS {
+            let left = widest(|| self.pulled_rest(wanted, &solved));
+            let rows: Vec<&[f64]> = left.iter().map(Vec::as_slice).collect();
+            let change = normal.solve(&rows);
+            let moved = normal.size(&change) / normal.size(&solved).max(f64::MIN_POSITIVE);
+            if turn == 0 && !moved.le(&MOST_MOVED) {
+                return Ok(None);
+            }
+            for (value, more) in solved.iter_mut().zip(&change) {
+                *value += more;
+            }
+            if moved < SETTLED {
+                break;
+            }
+        }
+        Ok(Some(solved))
+    }
+
+    /// Numerators times inputs, and transients, at each bin: the response's output times its
+    /// denominator.
+    ///
+    /// # Errors
+    /// `Shape` where coefficients do not fit.
+    pub fn numerator(&self, coefficients: &[f64]) -> Result<Vec<Complex64>, CoreError> {
+        let needed = self.unknowns().all(self.lengths.len());
+        if coefficients.len() != needed {
+            let found = coefficients.len();
+            return Err(CoreError::Shape { what: "coefficients", found, needed });
+        }
+        let nothing = vec![Complex64::default(); self.size()];
+        let mut found = nothing.clone();
+        widest(|| {
+            self.each_chunk(&nothing, |record, chunk| {
+                let (re, im) = self.values(record, chunk, coefficients);
+                let places = found[chunk.from..chunk.from + chunk.count].iter_mut();
+                for ((place, re), im) in places.zip(re).zip(im) {
+                    *place = Complex64::new(re, im);
+                }
+            });
+        });
+        Ok(found)
+    }
+
+    #[inline(always)]
+    fn each_chunk(&self, output: &[Complex64], mut work: impl FnMut(usize, &Chunk)) {
+        let rows = self.n_own.next_multiple_of(ABREAST);
+        let wide = || [vec![0.0; rows * CHUNK], vec![0.0; rows * CHUNK]];
+        let sources = || vec![0.0; (self.n_inputs + 2) * CHUNK];
+        let mut chunk =
+            Chunk { from: 0, count: 0, powers: wide(), channels: [sources(), sources()] };
+        let mut begin = 0;
+        for (record, length) in self.lengths.iter().enumerate() {
+            let end = begin + length;
+            for from in (begin..end).step_by(CHUNK) {
+                (chunk.from, chunk.count) = (from, CHUNK.min(end - from));
+                self.fill(&mut chunk, output);
+                work(record, &chunk);
+            }
+            begin = end;
+        }
+    }
+
+    /// Powers of the turns; channels: one for transients, the inputs, the output turned about.
+    #[inline(always)]
+    fn fill(&self, chunk: &mut Chunk, output: &[Complex64]) {
+        let (from, count, n) = (chunk.from, chunk.count, self.size());
+        let [re, im] = &mut chunk.powers;
+        re[..CHUNK].fill(1.0);
+        im[..CHUNK].fill(0.0);
+        let mut turns = [[0.0; CHUNK]; 2];
+        for (k, turn) in self.turns[from..from + count].iter().enumerate() {
+            (turns[0][k], turns[1][k]) = (turn.re, turn.im);
+        }
+        for row in 1..re.len() / CHUNK {
+            let at = row * CHUNK;
+            for k in 0..CHUNK {
+                let (a, b) = (re[at - CHUNK + k], im[at - CHUNK + k]);
+                re[at + k] = a * turns[0][k] - b * turns[1][k];
+                im[at + k] = a * turns[1][k] + b * turns[0][k];
+            }
+        }
+        let [re, im] = &mut chunk.channels;
+        re.fill(0.0);
+        im.fill(0.0);
+        re[..count].fill(1.0);
+        for channel in 0..self.n_inputs {
+            let source = &self.inputs[channel * n + from..][..count];
+            for (k, value) in source.iter().enumerate() {
+                re[(channel + 1) * CHUNK + k] = value.re;
+                im[(channel + 1) * CHUNK + k] = value.im;
+            }
+        }
+        for (k, value) in output[from..from + count].iter().enumerate() {
+            re[(self.n_inputs + 1) * CHUNK + k] = -value.re;
+            im[(self.n_inputs + 1) * CHUNK + k] = -value.im;
+        }
+    }
+
+    /// Products of all pairs of columns, and of each with the target, by record.
+    #[inline(always)]
+    fn products(&self, wanted: Wanted<'_>) -> Vec<Record> {
+        let (n_channels, rows) = (self.n_inputs + 2, self.n_own.next_multiple_of(ABREAST));
+        let n_pairs = n_channels * (n_channels + 1) / 2;
+        let mut sums = vec![[0.0; LANES]; self.lengths.len() * (2 * n_pairs + n_channels) * rows];
+        let size = (2 * n_pairs + n_channels) * rows;
+        self.each_chunk(wanted.output, |record, chunk| {
+            let (pairs, right) =
+                sums[record * size..(record + 1) * size].split_at_mut(2 * n_pairs * rows);
+            let mut power = [0.0; CHUNK];
+            power[..chunk.count]
+                .copy_from_slice(&wanted.power[chunk.from..chunk.from + chunk.count]);
+            let mut places = pairs.chunks_exact_mut(2 * rows);
+            for a in 0..n_channels {
+                for b in a..n_channels {
+                    let Some(place) = places.next() else { continue };
+                    let (re, im) = chunk.weighed_product(a, b, &power);
+                    let (first, second) = place.split_at_mut(rows);
+                    add_products(&re, &chunk.powers[0], first);
+                    if a != b {
+                        add_products(&im, &chunk.powers[1], second);
+                    }
+                }
+            }
+            let pulled = apart(&wanted.pulled[chunk.from..chunk.from + chunk.count]);
+            chunk.pull(&pulled, right, rows);
+        });
+        let whole =
+            |part: &[Sums]| part.iter().map(|lanes| lanes.iter().sum()).collect::<Vec<f64>>();
+        sums.chunks_exact(size)
+            .map(|each| {
+                let (pairs, right) = each.split_at(2 * n_pairs * rows);
+                Record { pairs: whole(pairs), right: self.by_column(&whole(right)), rows }
+            })
+            .collect()
+    }
+
+    /// Products of the columns with what coefficients leave of the target, by record.
+    #[inline(always)]
+    fn pulled_rest(&self, wanted: Wanted<'_>, coefficients: &[f64]) -> Vec<Vec<f64>> {
+        let rows = self.n_own.next_multiple_of(ABREAST);
+        let size = (self.n_inputs + 2) * rows;
+        let mut sums = vec![[0.0; LANES]; self.lengths.len() * size];
+        self.each_chunk(wanted.output, |record, chunk| {
+            let (mut re, mut im) = self.values(record, chunk, coefficients);
+            let span = chunk.from..chunk.from + chunk.count;
+            let pulled = &wanted.pulled[span.clone()];
+            for (k, (power, pulled)) in wanted.power[span].iter().zip(pulled).enumerate() {
+                re[k] = pulled.re - power * re[k];
+                im[k] = pulled.im - power * im[k];
+            }
+            re[chunk.count..].fill(0.0);
+            im[chunk.count..].fill(0.0);
+            chunk.pull(&[re, im], &mut sums[record * size..(record + 1) * size], rows);
+        });
+        sums.chunks_exact(size)
+            .map(|each| {
+                let whole: Vec<f64> = each.iter().map(|lanes| lanes.iter().sum()).collect();
+                self.by_column(&whole)
+            })
+            .collect()
+    }
+
+    /// Sums by channel and power as sums by column: of the transient, the inputs, the output.
+    fn by_column(&self, sums: &[f64]) -> Vec<f64> {
+        let rows = self.n_own.next_multiple_of(ABREAST);
+        self.unknowns()
+            .columns()
+            .iter()
+            .map(|&(channel, power)| sums[channel * rows + power])
+            .collect()
+    }
+
+    /// Columns times coefficients at the bins of a chunk.
+    #[inline(always)]
+    fn values(
+        &self,
+        record: usize,
+        chunk: &Chunk,
+        coefficients: &[f64],
+    ) -> ([f64; CHUNK], [f64; CHUNK]) {
+        let mut found = ([0.0; CHUNK], [0.0; CHUNK]);
+        let unknowns = self.unknowns();
+        for channel in 0..self.n_inputs + 2 {
+            let (first, part) = unknowns.of_channel(channel, record, coefficients);
+            let mut made = ([0.0; CHUNK], [0.0; CHUNK]);
+            for (power, factor) in part.iter().enumerate() {
+                let at = (first + power) * CHUNK;
+                for k in 0..CHUNK {
+                    made.0[k] += factor * chunk.powers[0][at + k];
+                    made.1[k] += factor * chunk.powers[1][at + k];
+                }
+            }
+            let at = channel * CHUNK;
+            let (re, im) = (&chunk.channels[0][at..at + CHUNK], &chunk.channels[1][at..at + CHUNK]);
+            for k in 0..CHUNK {
+                found.0[k] += made.0[k] * re[k] - made.1[k] * im[k];
+                found.1[k] += made.0[k] * im[k] + made.1[k] * re[k];
+            }
+        }
+        found
+    }
+}
+
+impl Chunk {
+    /// Power times the conjugate of one channel times another.
+    #[inline(always)]
+    fn weighed_product(
+        &self,
+        a: usize,
+        b: usize,
+        power: &[f64; CHUNK],
+    ) -> ([f64; CHUNK], [f64; CHUNK]) {
+        let mut found = ([0.0; CHUNK], [0.0; CHUNK]);
+        let [re, im] = &self.channels;
+        let (p, q) = (&re[a * CHUNK..][..CHUNK], &im[a * CHUNK..][..CHUNK]);
+        let (r, s) = (&re[b * CHUNK..][..CHUNK], &im[b * CHUNK..][..CHUNK]);
+        for k in 0..CHUNK {
+            found.0[k] = power[k] * (p[k] * r[k] + q[k] * s[k]);
+            found.1[k] = power[k] * (p[k] * s[k] - q[k] * r[k]);
+        }
+        found
+    }
+
+    /// Add the products of each channel's columns with values.
+    #[inline(always)]
+    fn pull(&self, values: &[[f64; CHUNK]; 2], sums: &mut [Sums], rows: usize) {
+        for (channel, sums) in sums.chunks_exact_mut(rows).enumerate() {
+            let (re, im) =
+                (&self.channels[0][channel * CHUNK..], &self.channels[1][channel * CHUNK..]);
+            let mut made = ([0.0; CHUNK], [0.0; CHUNK]);
+            for k in 0..CHUNK {
+                made.0[k] = re[k] * values[0][k] + im[k] * values[1][k];
+                made.1[k] = re[k] * values[1][k] - im[k] * values[0][k];
+            }
+            add_products(&made.0, &self.powers[0], sums);
+            add_products(&made.1, &self.powers[1], sums);
+        }
+    }
+}
+
+/// Real and imaginary parts, nothing behind their end.
+fn apart(values: &[Complex64]) -> [[f64; CHUNK]; 2] {
+    let mut found = [[0.0; CHUNK]; 2];
+    for (k, value) in values.iter().enumerate() {
+        (found[0][k], found[1][k]) = (value.re, value.im);
+    }
+    found
+}
+
+/// Add the products of one row with several: `ABREAST` at a time, so that no sum waits for another.
+#[inline(always)]
+fn add_products(row: &[f64; CHUNK], others: &[f64], sums: &mut [Sums]) {
+    let several = others.chunks_exact(ABREAST * CHUNK).zip(sums.chunks_exact_mut(ABREAST));
+    for (others, sums) in several {
+        let mut running = [[0.0; LANES]; ABREAST];
+        for at in (0..CHUNK).step_by(LANES) {
+            for (which, lanes) in running.iter_mut().enumerate() {
+                let other = &others[which * CHUNK + at..][..LANES];
+                for k in 0..LANES {
+                    lanes[k] += row[at + k] * other[k];
+                }
+            }
+        }
+        for (sum, lanes) in sums.iter_mut().zip(&running) {
+            for k in 0..LANES {
+                sum[k] += lanes[k];
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+#[path = "tests/rational_bins.rs"]
+mod tests;
