@@ -12,6 +12,7 @@ import inspect
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from operator import attrgetter
 from reprlib import recursive_repr
 from typing import TYPE_CHECKING, Any
 
@@ -102,20 +103,26 @@ def _repr_of(names: Sequence[str]) -> Callable[[object], str]:
 
 
 def _eq_of(names: Sequence[str]) -> Callable[[object, object], object]:
+    values = _reader(names)
+
     def equal(self: object, other: object) -> object:
         if other.__class__ is not self.__class__:
             return NotImplemented
-        return _values(self, names) == _values(other, names)
+        return values(self) == values(other)
 
     return equal
 
 
 def _hash_of(names: Sequence[str]) -> Callable[[object], int]:
-    return lambda self: hash(_values(self, names))
+    values = _reader(names)
+    return lambda self: hash(values(self))
 
 
-def _values(thing: object, names: Sequence[str]) -> tuple[object, ...]:
-    return tuple([getattr(thing, name) for name in names])
+def _reader(names: Sequence[str]) -> Callable[[object], tuple[object, ...]]:
+    """From a thing to the tuple of its fields."""
+    if len(names) > 1:
+        return attrgetter(*names)
+    return lambda thing: tuple([getattr(thing, name) for name in names])
 
 
 def _first_init(cls: type) -> Callable[..., None]:

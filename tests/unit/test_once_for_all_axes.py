@@ -54,6 +54,26 @@ def test_roots_found_together_are_those_found_one_by_one() -> None:
     np.testing.assert_allclose(sorted(roots.imag), sorted([known[0].imag, -known[0].imag]))
 
 
+def test_a_root_among_the_seeds_leaves_the_others_together(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A pole of its own at −1 makes F singular at its seed; 30 others go on side by side."""
+    a, b, c = np.diag([0.0, -1.0]), np.array([[-3.0], [0.0]]), np.array([[1.0, 0.0]])
+    parts = (a, b, c, np.zeros((1, 1)), np.array([0.4]))
+    others = [complex(-1.0 - k, 4.0 * k) for k in range(1, 31)]
+    alone = newton_roots(*parts, np.array(others))
+    solved: list[int] = []
+    solve = np.linalg.solve
+
+    def counted(f: np.ndarray, right: np.ndarray) -> np.ndarray:
+        solved.append(len(f))
+        return np.asarray(solve(f, right))
+
+    monkeypatch.setattr(np.linalg, "solve", counted)
+    assert newton_roots(*parts, np.array([-1.0 + 0.0j, *others])) == [-1.0 + 0.0j, *alone]
+    assert solved[:2] == [31, 30]
+
+
 def test_roots_with_a_direct_part_solve_their_equation() -> None:
     a, b, c, d = (np.array([[each]]) for each in (-1.0, 1.0, 2.0, 0.3))
     tau = 0.2

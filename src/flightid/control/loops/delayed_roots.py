@@ -97,7 +97,8 @@ def _traces(
 ) -> tuple[Complex, NDArray[np.bool_]]:
     """Trace of F⁻¹F' at some places, and where F has no inverse: those are roots."""
     try:
-        return _traces_of(a, b, c, d, delays, s), np.zeros(len(s), dtype=bool)
+        f, slopes = _pencils(a, b, c, d, delays, s)
+        return _solved(f, slopes)
     except np.linalg.LinAlgError:
         if len(s) == 1:
             return np.ones(1, dtype=np.complex128), np.ones(1, dtype=bool)
@@ -105,7 +106,22 @@ def _traces(
     return np.concatenate([each[0] for each in parts]), np.concatenate([each[1] for each in parts])
 
 
-def _traces_of(a: Array, b: Array, c: Array, d: Array, delays: Array, s: Complex) -> Complex:
+def _solved(f: Complex, slopes: Complex) -> tuple[Complex, NDArray[np.bool_]]:
+    """Traces where F has an inverse, all at once; one elsewhere."""
+    traces, roots = np.ones(len(f), dtype=np.complex128), np.zeros(len(f), dtype=bool)
+    try:
+        solved = np.linalg.solve(f, slopes)
+    except np.linalg.LinAlgError:
+        roots = np.linalg.slogdet(f)[0] == 0.0
+        solved = np.linalg.solve(f[~roots], slopes[~roots])
+    traces[~roots] = np.trace(solved, axis1=1, axis2=2)
+    return traces, roots
+
+
+def _pencils(
+    a: Array, b: Array, c: Array, d: Array, delays: Array, s: Complex
+) -> tuple[Complex, Complex]:
+    """F and F' at some places, shapes (n_s, n, n)."""
     one, inner = np.eye(len(a)), np.eye(len(delays))
     apart = np.multiply.outer(s.real, delays)
     late = np.exp(np.clip(-apart, -200.0, 200.0) - 1j * np.multiply.outer(s.imag, delays))
@@ -116,9 +132,7 @@ def _traces_of(a: Array, b: Array, c: Array, d: Array, delays: Array, s: Complex
         slope = (left * (-delays * late)[:, None, :]) @ right
     else:  # what goes around inside has no direct part: both inverses are one
         gain, slope = late[:, :, None] * inner, (-delays * late)[:, :, None] * inner
-    f = s[:, None, None] * one - a - b @ gain @ c
-    solved = np.linalg.solve(f, one - b @ slope @ c)
-    return np.asarray(np.trace(solved, axis1=1, axis2=2))
+    return s[:, None, None] * one - a - b @ gain @ c, one - b @ slope @ c
 
 
 def line_right_of_axis(a: Array, delays_s: Array) -> float:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,9 +24,8 @@ SINGULAR = 1e-12
 """Reciprocal condition number below which an algebraic loop has no solution worth the name."""
 
 
-@dataclass(frozen=True)
-class Row:
-    """One driven column of a core.
+class Row(NamedTuple):
+    """One driven column of a core; a tuple, as one is looked for among hundreds.
 
     Attributes
     ----------

@@ -173,11 +173,13 @@ def disturbance_rejection(
     )
     omega, metrics = measured_up(loop)
     drawn = drawn_points(loop, omega)
+    places = np.searchsorted(omega, drawn)
     sensitivity = 1.0 / (1.0 + loop.of(loop.uncertain.value, drawn))
 
     def all_of(things: list[Any]) -> Array:
-        found = loop.metrics(omega, np.array([loop.of(each, omega) for each in things]))
-        ratio = 1.0 / ((1.0 + np.array([loop.of(each, drawn) for each in things])) * sensitivity)
+        values = np.array([loop.of(each, omega) for each in things])
+        found = loop.metrics(omega, values)
+        ratio = 1.0 / ((1.0 + values[:, places]) * sensitivity)
         numbers = np.array([getattr(found, name) for _, _, name, _ in QUANTITIES]).T
         return np.hstack([numbers, 20 * np.log10(np.abs(ratio)), np.degrees(np.angle(ratio))])
 

@@ -116,7 +116,14 @@ def loop_numbers(
     for place, each in enumerate(things if whole is not None else ()):
         assert whole is not None
         own = {name: float(row[place]) for name, row in numbers.items()}
-        for name, value in gain_limits(own, loop, whole, loop.of(each, whole)).items():
+        if loop.whole_rad_s is None:
+            # All frequencies are those of the band and one below them.
+            seen = np.concatenate([loop.of(each, whole[:1]), values[place]])
+        elif all(own[at] > whole[1] for at in GAIN_LIMITS.values()):
+            continue  # a band that holds both limits has told them
+        else:
+            seen = loop.of(each, whole)
+        for name, value in gain_limits(own, loop, whole, seen).items():
             numbers[name][place] = value
     return np.array([numbers[name] for name in names]).T, values
 

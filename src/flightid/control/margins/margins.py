@@ -326,12 +326,11 @@ def _carried(loop: BrokenLoop, omega: Array) -> tuple[list[tuple[Any, Reading]],
     """Every number with its interval, and the curve with its standard errors."""
     names = [name for _, name, _ in QUANTITIES]
     drawn = drawn_points(loop, omega)
-    centre = loop.of(loop.uncertain.value, drawn)
+    centre, places = loop.of(loop.uncertain.value, drawn), np.searchsorted(omega, drawn)
 
     def all_of(things: list[Any]) -> Array:
         numbers, values = loop_numbers(loop, omega, things, names)
-        at_drawn = values if drawn is omega else np.array([loop.of(each, drawn) for each in things])
-        ratio = at_drawn / centre
+        ratio = values[:, places] / centre
         return np.hstack([numbers, 20.0 * np.log10(np.abs(ratio)), np.degrees(np.angle(ratio))])
 
     carried = loop.uncertain.carried_together(all_of)
