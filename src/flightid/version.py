@@ -1,6 +1,6 @@
-"""The version of flightid, as installed."""
+"""The version of flightid, as built."""
 
-from importlib.metadata import version
+from flightid import _native
 
-VERSION: str = version("flightid")
-"""Version string of the installed package."""
+VERSION: str = _native.version()
+"""Version string of both halves: reading the installed package's own loads a mail parser."""

@@ -17,7 +17,9 @@ LOADED = (
     "sys.stderr.write('\\n'.join([*sys.modules, *told]))"
 )
 HEAVY = frozenset({"plotly", "pint", "pyarrow", "h5py", "jinja2"})
-HEAVY |= {f"scipy.{part}" for part in ("signal", "stats", "optimize", "interpolate", "sparse")}
+HEAVY |= {
+    f"scipy.{part}" for part in ("signal", "stats", "optimize", "special", "interpolate", "sparse")
+}
 HEAVY |= {f"flightid.{room}" for room in ("study", "identification", "control", "export")}
 
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
-import scipy
 from numpy.typing import NDArray
+
+from flightid.uncertainty.student import student_chance
 
 Array = NDArray[np.float64]
 
@@ -40,7 +43,7 @@ def rank_correlation(first: Array, second: Array) -> tuple[float, float]:
     left = max((1.0 - rank) * (1.0 + rank), 0.0)
     if left == 0.0:
         return rank, 0.0
-    return rank, float(2.0 * scipy.special.stdtr(freedom, -abs(rank) * np.sqrt(freedom / left)))
+    return rank, student_chance(abs(rank) * math.sqrt(freedom / left), freedom)
 
 
 def _ranks(values: Array) -> Array:

@@ -12,6 +12,7 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from flightid.errors import OptionError
+from flightid.uncertainty.student import normal_quantile, student_quantile
 
 LEVEL = 0.95
 """Level of an interval unless told; verdicts always rest on it."""
@@ -97,10 +98,10 @@ def half_width(level: float = LEVEL, freedom: float | None = None) -> float:
     """
     upper = 0.5 + 0.5 * checked_level(level)
     if freedom is None or math.isinf(freedom):
-        return float(scipy.special.ndtri(upper))
+        return normal_quantile(upper)
     if not freedom > 0.0:
         raise OptionError("degrees of freedom must be positive", found=freedom, needed="above 0")
-    return float(scipy.special.stdtrit(freedom, upper))
+    return student_quantile(upper, float(freedom))
 
 
 def checked_level(level: float) -> float:
@@ -189,7 +190,7 @@ def two_sided_chance(deviations: float) -> float:
     >>> round(two_sided_chance(1.959964), 3)
     0.05
     """
-    return float(2.0 * scipy.special.ndtr(-abs(deviations)))
+    return math.erfc(abs(deviations) / math.sqrt(2.0))
 
 
 def interval_words(level: float) -> str:

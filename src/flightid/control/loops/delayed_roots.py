@@ -132,7 +132,8 @@ def _pencils(
         slope = (left * (-delays * late)[:, None, :]) @ right
     else:  # what goes around inside has no direct part: both inverses are one
         gain, slope = late[:, :, None] * inner, (-delays * late)[:, :, None] * inner
-    return s[:, None, None] * one - a - b @ gain @ c, one - b @ slope @ c
+    f = s[:, None, None] * one - a - b @ gain @ c
+    return np.asarray(f), np.asarray(one - b @ slope @ c, dtype=np.complex128)
 
 
 def line_right_of_axis(a: Array, delays_s: Array) -> float:
