@@ -71,11 +71,14 @@ def test_a_run_does_without_what_loads_for_a_second(tmp_path: Path) -> None:
     assert not found & {"pint", "h5py", *(f"scipy.{part}" for part in parts)}
 
 
-def test_peaks_of_spectra_are_found_without_the_signals_of_scipy() -> None:
-    """They took 15 % of the processor time of `flightid run rig.csv`, for one function."""
+def test_peaks_and_fleets_are_found_without_what_they_do_not_need() -> None:
+    """SciPy's signals took 15 % of `run rig.csv`, all of fleets half a second of `tune`."""
     code = (
-        "import sys\nimport numpy as np\nfrom flightid.validation.spectra.spectra import _peaks\n"
+        "import sys\nfrom pathlib import Path\n"
+        "import numpy as np\nfrom flightid.validation.spectra.spectra import _peaks\n"
+        "from flightid.fleet.recognition import is_fleet\n"
         "w = np.arange(1.0, 9.0)\nassert _peaks(w, 1.0 + 99.0 * (w == 4.0), 0.9 * w, 1.1 * w)\n"
-        "sys.exit('scipy.signal' in sys.modules)"
+        "assert not is_fleet(Path('flight.bin'))\n"
+        "sys.exit(bool({'scipy.signal', 'flightid.fleet.statistics'} & set(sys.modules)))"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

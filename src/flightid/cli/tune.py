@@ -230,7 +230,7 @@ def _show(tuning: Tuning, level: float | None) -> None:
 
 def _fleet(files: tuple[Path, ...], given: str | None) -> Path | None:
     """The fleet file or catalogue that is given; None where none is."""
-    from flightid.fleet.type_models import is_fleet
+    from flightid.fleet.recognition import is_fleet
 
     found = [file for file in files if is_fleet(file)]
     if found and len(files) > 1:

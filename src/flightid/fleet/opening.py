@@ -11,10 +11,10 @@ from flightid.fleet.catalogue.catalogue import Catalogue
 from flightid.fleet.catalogue.parts import BROKEN_JSON
 from flightid.fleet.catalogue.store import Store, store_at
 from flightid.fleet.engine.order import recipe
+from flightid.fleet.recognition import CURRENT
 from flightid.fleet.settings import FleetSettings, read_fleet
 from flightid.reading import DOCUMENT_BYTES
 
-CURRENT = "fleet.json"
 RECIPE = re.compile("[0-9a-f]{12}")
 FLEET_SCHEMA = "flightid.fleet_place/1"
 

@@ -9,29 +9,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from flightid.errors import DataError, FlightidError
-from flightid.fleet.opening import CURRENT, open_catalogue
+from flightid.errors import DataError
+from flightid.fleet.opening import open_catalogue
 from flightid.fleet.statistics.answers import RED, TypeAnswers, answer_questions
 from flightid.fleet.statistics.joint_fit import FlightPoints, MeasuredPoints, fit_population
 from flightid.fleet.statistics.pooling import pooled_model
 from flightid.models.kinds import model_from_description
-from flightid.reading import parse_toml, read_toml
+from flightid.reading import parse_toml
 
 if TYPE_CHECKING:
     from flightid.fleet.catalogue.catalogue import Catalogue
 
 Row = Mapping[str, Any]
 POOLED = ("parameters", "covariances", "models", "responses")
-
-
-def is_fleet(path: Path) -> bool:
-    """Whether a path is a fleet file or the folder of a catalogue."""
-    if path.is_dir():
-        return (path / CURRENT).is_file()
-    try:
-        return path.suffix == ".toml" and "fleet" in read_toml(path, "the file")
-    except FlightidError:
-        return False
 
 
 def type_models(

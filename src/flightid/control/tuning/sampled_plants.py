@@ -215,12 +215,18 @@ def _stacked(
     delays: Array,
 ) -> LinearSystem:
     a, b, c, d = matrices
-    n, p = len(a), len(c)
+    n, (p, m) = len(a), d.shape
+    # Filled in place: `np.block` costs more than all else that a plant of hundreds needs.
+    joined, driven = np.zeros((n + p, n + p)), np.zeros((n + p, m))
+    seen, direct = np.zeros((2 * p, n + p)), np.zeros((2 * p, m))
+    joined[:n, :n], joined[n:, :n], joined[n:, n:] = a, rise, own
+    driven[:n], driven[n:] = b, rise_direct
+    seen[:p, :n], seen[p:, n:], direct[:p] = c, np.eye(p), d
     return LinearSystem(
-        np.block([[a, np.zeros((n, p))], [rise, own]]),
-        np.vstack([b, rise_direct]),
-        np.block([[c, np.zeros((p, p))], [np.zeros((p, n)), np.eye(p)]]),
-        np.vstack([d, np.zeros_like(d)]),
+        joined,
+        driven,
+        seen,
+        direct,
         system.inputs,
         (*system.outputs, *(f"integral of {name}" for name in system.outputs)),
         delays,

@@ -103,6 +103,8 @@ def _taps(
 def _integrals(a: Array, b: Array, duration: float) -> tuple[Array, Array]:
     """∫ e^(A(h−s)) b ds and ∫ e^(A(h−s)) b s ds from 0 to h."""
     n = len(a)
+    if duration == 0.0:
+        return np.zeros(n), np.zeros(n)
     block = np.zeros((n + 2, n + 2))
     block[:n, :n], block[:n, n], block[n, n + 1] = a, b, 1.0
     found = scipy.linalg.expm(block * duration)

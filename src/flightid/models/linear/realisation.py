@@ -66,9 +66,12 @@ def side_by_side(
 
 
 def _product(factors: list[Array]) -> Array:
+    """Product of polynomials without leading zeros: most are one factor of many draws."""
     result: Array = np.ones(1)
-    for factor in factors:
-        result = np.asarray(np.polymul(result, factor), dtype=np.float64)
+    for place, factor in enumerate(factors):
+        result = np.convolve(result, factor) if place else np.asarray(factor, dtype=np.float64)
+    if len(result) and result[0] != 0.0:
+        return result
     return np.trim_zeros(result, "f")
 
 
