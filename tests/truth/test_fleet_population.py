@@ -152,6 +152,10 @@ def test_the_interval_of_a_mean_is_hartung_and_knapps_where_errors_are_alike() -
     half = 4.302653 * float(np.sqrt(squares[0] / 2.0 / total[0]))
     assert ends[1] - ends[0] > 3.0 * half
     assert ends[0] < mean[0] < ends[1]
+    # Two that agree by chance: 97.9 to 98.1 before, of errors of 1 each.
+    low, high = VehicleEstimates(np.array([98.0, 97.984]), np.ones(2)).mean_ends()
+    assert high - low == pytest.approx(2.0 * 1.959964 / np.sqrt(2.0), rel=1e-6)
+    assert 0.5 * (low + high) == pytest.approx(97.992, abs=1e-6)
 
 
 @pytest.mark.slow

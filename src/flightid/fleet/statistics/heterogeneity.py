@@ -10,7 +10,7 @@ from scipy.special import chdtrc, chdtri, ndtr, stdtr
 
 from flightid.errors import DataError
 from flightid.frozen import dataclass
-from flightid.uncertainty.quantiles import LEVEL, student_quantiles, tails
+from flightid.uncertainty.quantiles import LEVEL, half_width, student_quantiles, tails
 
 Array = NDArray[np.float64]
 FEWEST = 3
@@ -48,7 +48,8 @@ class VehicleEstimates:
     Higgins & Thompson, *Statistics in Medicine* 21 (2002), 1539–1558 (I²); IntHout, Ioannidis &
     Borm, *BMC Med. Res. Methodol.* 14:25 (2014) (Hartung–Knapp); Shoemaker, *Am. Stat.* 57 (2003),
     105–114 (freedom of a variance by the kurtosis); Nagashima, Noma & Furukawa,
-    *Stat. Methods Med. Res.* 28 (2019), 1689–1702 (interval of the next).
+    *Stat. Methods Med. Res.* 28 (2019), 1689–1702 (interval of the next); Röver, Knapp & Friede,
+    *BMC Med. Res. Methodol.* 15:99 (2015) (means of few that agree by chance).
 
     Example
     -------
@@ -159,8 +160,17 @@ class VehicleEstimates:
         """Interval of the mean, by Hartung and Knapp, over all spreads that the vehicles allow.
 
         Where errors are alike it is theirs at any spread; where they differ the spread says how
-        much each vehicle counts, and is as uncertain as its confidence distribution.
+        much each vehicle counts, and is as uncertain as its confidence distribution. Never shorter
+        than errors alone make it: where estimates agree by chance it would be, and of two vehicles
+        such intervals held the mean in 60 %, of ten in 88 %.
         """
+        low, high = self._allowed_ends(level)
+        least = half_width(level) / np.sqrt(np.sum(1.0 / self.variances))
+        more = max(float(least) - 0.5 * (high - low), 0.0)
+        return low - more, high + more
+
+    def _allowed_ends(self, level: float) -> tuple[float, float]:
+        """Quantiles of Student's t about the mean at each spread, by what it counts."""
         mean, error, weights = self._means
         if error.max() == 0.0:
             return float(mean.mean()), float(mean.mean())
