@@ -325,7 +325,7 @@ def _beside(
     apart = (value - mean[0])[where]
     distance2 = float(apart @ np.linalg.solve(total, apart))
     freedom = float(len(data.members) - 2)
-    single = np.array([_single(population, everyone[i], place, int(i)) for i in where])
+    single = np.array([_single(population, everyone[int(i)], place, int(i)) for i in where])
     odd = corrected(single) <= FALSE_SHARE
     if spreads.structure == "full":
         chance = _chance(distance2, total, between + error, freedom)
