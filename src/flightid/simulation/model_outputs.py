@@ -171,7 +171,7 @@ def driven_outputs(
     if hold != "band_limited":
         return np.asarray(sum(_driven(each, between, sample_time_s, hold) for each in modes))
     step = sample_time_s / FINER
-    return np.asarray(sum(_driven(each, between, step, "first")[:, ::FINER] for each in modes))
+    return np.asarray(sum(_driven(each, between, step, "first", FINER) for each in modes))
 
 
 def free_outputs(modes: list[ModeSubset], n_samples: int, sample_time_s: float) -> Array:
@@ -211,11 +211,13 @@ def _free(modes: ModeSubset, n_samples: int, sample_time_s: float) -> Array:
     return found[:, :, ::-1] if modes.backwards else found
 
 
-def _driven(modes: ModeSubset, values: Array, sample_time_s: float, hold: str) -> Array:
-    start = np.zeros(len(modes.matrices[0]))
+def _driven(
+    modes: ModeSubset, values: Array, sample_time_s: float, hold: str, every: int = 1
+) -> Array:
+    """Outputs at every so many samples, from rest where the run begins."""
     first = hold == "first"
     if not modes.backwards:
-        return _run(modes, values, start, modes.delays_s, sample_time_s, first=first)
+        return _run(modes, values, modes.delays_s, sample_time_s, first=first, every=every)
     # From the end a delay is a lead. The run starts so long after the record, whose last samples
     # last on, that what is left of the lead is a delay again; it starts from a free state anyway.
     extra = int(np.ceil(np.max(modes.delays_s, initial=0.0) / sample_time_s - 1e-9))
@@ -223,24 +225,23 @@ def _driven(modes: ModeSubset, values: Array, sample_time_s: float, hold: str) -
     turned = np.pad(values[:, ::-1], ((0, 0), (0, extra + 1)), mode="edge")
     # A step held after its sample is held before it when time runs backwards.
     turned = turned[:, :-1] if first else turned[:, 1:]
-    found = _run(modes, turned, start, rest, sample_time_s, first=first)
-    return np.asarray(found[:, extra:][:, ::-1])
+    found = _run(modes, turned, rest, sample_time_s, first=first)
+    return np.asarray(found[:, extra:][:, ::-1][:, ::every])
 
 
 def _run(
     modes: ModeSubset,
     values: Array,
-    start: Array,
     delays_s: Array,
     sample_time_s: float,
     *,
     first: bool,
+    every: int = 1,
 ) -> Array:
     sign = -1.0 if modes.backwards else 1.0
     a, b, c, d = (np.ascontiguousarray(each, dtype=np.float64) for each in modes.matrices)
     driven = np.ascontiguousarray(values, dtype=np.float64)
-    late, at_rest = np.ascontiguousarray(delays_s), np.ascontiguousarray(start)
-    _, found = _native.simulate_linear(
-        sign * a, sign * b, c, d, late, driven, at_rest, sample_time_s, first
+    late, at_rest = np.ascontiguousarray(delays_s), np.zeros(len(a))
+    return _native.linear_outputs(
+        sign * a, sign * b, c, d, late, driven, at_rest, sample_time_s, first, every
     )
-    return np.asarray(found)

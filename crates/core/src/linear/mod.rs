@@ -4,6 +4,7 @@ pub(crate) mod block_recursion;
 pub mod discretisation;
 pub mod drift_errors;
 pub mod hold_integrals;
+pub mod linear_outputs;
 pub mod linear_recursion;
 pub mod linear_response;
 pub mod linear_simulation;

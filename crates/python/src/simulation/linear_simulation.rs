@@ -5,6 +5,7 @@ use crate::fits::output_error::hold as named;
 use crate::row_major::{RowMajor1, RowMajor2, RowMajor3};
 use flightid_core::linear::discretisation::discretise;
 use flightid_core::linear::discretisation::{Hold, StateSpace};
+use flightid_core::linear::linear_outputs::outputs;
 use flightid_core::linear::linear_response::responses;
 use flightid_core::linear::linear_simulation::Discrete;
 use flightid_core::numerics::matrix_exponential::exponential;
@@ -59,6 +60,44 @@ fn simulate_linear<'py>(
         .detach(|| Discrete::new(&system, sample_time_s, hold)?.run(u, n_samples, x0))
         .map_err(from_core)?;
     Ok((matrix(py, states, x0.len(), n_samples)?, matrix(py, outputs, n_outputs, n_samples)?))
+}
+
+/// linear_outputs(a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64], d: NDArray[np.float64], delays_s: NDArray[np.float64], inputs: NDArray[np.float64], initial_state: NDArray[np.float64], sample_time_s: float, first_order_hold: bool, every: int) -> NDArray[np.float64]
+///
+/// Outputs alone of such a simulation, at every so many samples from the first on.
+#[pyfunction]
+#[allow(clippy::too_many_arguments)]
+fn linear_outputs<'py>(
+    py: Python<'py>,
+    a: RowMajor2<'py, f64>,
+    b: RowMajor2<'py, f64>,
+    c: RowMajor2<'py, f64>,
+    d: RowMajor2<'py, f64>,
+    delays_s: RowMajor1<'py, f64>,
+    inputs: RowMajor2<'py, f64>,
+    initial_state: RowMajor1<'py, f64>,
+    sample_time_s: f64,
+    first_order_hold: bool,
+    every: usize,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let (n_outputs, n_samples) = (c.as_array().nrows(), inputs.as_array().ncols());
+    let system = StateSpace {
+        a: a.as_slice()?,
+        b: b.as_slice()?,
+        c: c.as_slice()?,
+        d: d.as_slice()?,
+        delays_s: delays_s.as_slice()?,
+        n_outputs,
+    };
+    let (u, x0) = (inputs.as_slice()?, initial_state.as_slice()?);
+    let hold = if first_order_hold { Hold::First } else { Hold::Zero };
+    let found = py
+        .detach(|| {
+            let (sampled, _) = discretise(&system, &[], sample_time_s, hold)?;
+            outputs(&sampled, (system.c, n_outputs), u, n_samples, x0, every)
+        })
+        .map_err(from_core)?;
+    matrix(py, found, n_outputs, n_samples.div_ceil(every.max(1)))
 }
 
 /// linear_response(a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64], d: NDArray[np.float64], points: NDArray[np.complex128]) -> NDArray[np.complex128]
@@ -199,6 +238,7 @@ fn matrix_exponential<'py>(
 /// Add this area to the module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(simulate_linear, module)?)?;
+    module.add_function(wrap_pyfunction!(linear_outputs, module)?)?;
     module.add_function(wrap_pyfunction!(discretise_linear, module)?)?;
     module.add_function(wrap_pyfunction!(discretise_directions, module)?)?;
     module.add_function(wrap_pyfunction!(linear_response, module)?)?;
