@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.signal
 
 import flightid as fid
 from flightid.conventions import Light
 from flightid.inspection.actuators import find_actuators
+from flightid.inspection.axes import AxisChannels
 from flightid.inspection.flight_phases import FlightPhases, flight_phases
 from flightid.inspection.gap_findings import gap_findings
 from flightid.inspection.rates import stream_rates
 from flightid.inspection.signals import Signal, find, inside, records
-from flightid.inspection.usable_band import _whole_window
+from flightid.inspection.stretches import packed
+from flightid.inspection.thresholds import INDEPENDENT_WINDOWS
+from flightid.inspection.usable_band import _explained, _whole_window
 from flightid.logs import Log, read_log
 from flightid.logs.dataflash.writer import DataflashWriter
 from flightid.logs.ulog.reader import UlogSource
@@ -146,3 +151,22 @@ def test_gaps_do_not_leave_an_axis_without_windows(shared_data: Path, tmp_path: 
     cut.write_bytes(content[: len(content) * 39 // 50])
     # A log cut a little earlier has bands on all axes.
     assert all(band.coherent_rad_s for band in fid.inspect_log(cut).bands)
+
+
+def test_two_chirps_of_20_s_are_judged_at_every_frequency() -> None:
+    """Seven windows of 5.7 s lie in 40 s, but six in two halves: one too few of the longest."""
+    rng, time_s = np.random.default_rng(0), 0.002 * np.arange(24_000)
+    axes = [AxisChannels(f"u{axis}", f"y{axis}", "") for axis in "pqr"]
+    sweep = scipy.signal.chirp(np.mod(time_s, 25.0), 2.0, 20.0, 60.0, "logarithmic")
+    signals = []
+    for place, names in enumerate(axes):
+        command = 0.02 * rng.standard_normal(time_s.size) + (sweep if place == 0 else 0.0)
+        rate = scipy.signal.lfilter([0.01], [1.0, -0.99], command)
+        rate += 0.003 * rng.standard_normal(time_s.size)
+        signals += [Signal(names.command, time_s, command, "1", names.command),
+                    Signal(names.rate, time_s, rate, "rad/s", names.rate)]  # fmt: skip
+    found = _explained(packed(signals), axes, ((0.0, 20.0), (25.0, 45.0)))
+    assert not isinstance(found, str)
+    assert found.composite.n_independent.min() >= INDEPENDENT_WINDOWS.value - 0.5
+    swept = (found.omega_rad_s > 3.0 * math.tau) & (found.omega_rad_s < 30.0 * math.tau)
+    assert found.composite.coherence[0, 0][swept].min() > 0.9

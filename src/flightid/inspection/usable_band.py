@@ -211,12 +211,18 @@ def _explained(
     cut = _cut(lengths, stretches)
     found: AxesCoherence | str = "no window"
     ends = _longest_window(lengths, wanted), _whole_window(lengths, wanted)
-    # Parts of windows count for less than their length where gaps cut a flight.
+    # Parts of windows count for less than their length; where the longest of the windows weighs
+    # most, enough at other frequencies alone tears a band apart.
+    some: AxesCoherence | str = ""
     for window in np.geomspace(*ends, SHORTENED):
         found = _of_windows(flown, (tuple(inputs), tuple(outputs)), float(window), step_s, cut)
-        if isinstance(found, str) or np.any(_enough(found.composite.n_independent)):
+        if isinstance(found, str):
             break
-    return found
+        enough = _enough(found.composite.n_independent)
+        if np.all(enough):
+            return found
+        some = some or (found if np.any(enough) else "")
+    return some or found
 
 
 def _of_windows(
