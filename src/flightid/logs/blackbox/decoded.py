@@ -87,9 +87,9 @@ def open_decoded(path: Path) -> TableSource:
     read, words = _read(path, columns, skipped)
     names = {each.name for each in columns}
     firmware = firmware_of(header.get(REVISION, ""))
-    is_inav = firmware.is_inav or (not firmware.name and {*OF_INAV} <= names)
+    is_inav = firmware.is_inav or (not firmware.name and not names.isdisjoint(OF_INAV))
     known = {GYRO_SCALE: DEGREES, **header}
-    scales, untold = scales_of(known)
+    scales, untold = scales_of(known, is_inav=is_inav)
     time_s = read["time"] / A_SECOND.get(_unit_of(columns, "time"), 1e6)
     values = {
         each.name: read[each.name] * scale

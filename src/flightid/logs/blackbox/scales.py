@@ -22,8 +22,17 @@ INAV_BATTERY = ((2, 0), 0.01, ("vbat", "amperage"))
 """Since that version of INAV a count is so many V and A, in these fields."""
 
 
-def scales_of(header: Mapping[str, str]) -> tuple[dict[str, float], dict[str, str]]:
-    """Factor by the beginning of a field's name; of fields without one, what the header lacks."""
+def scales_of(
+    header: Mapping[str, str], *, is_inav: bool = False
+) -> tuple[dict[str, float], dict[str, str]]:
+    """Factor by the beginning of a field's name; of fields without one, what the header lacks.
+
+    Parameters
+    ----------
+    header : mapping of str to str
+    is_inav : bool
+        Whether it is INAV's, where the header does not say so.
+    """
     fine = 1.0 / HIGH_RESOLUTION if header.get("blackbox_high_resolution") == "1" else 1.0
     gyro, gravity = _gyro_scale(header), settings_of(header).get(GRAVITY, 0.0)
     firmware = firmware_of(header.get(REVISION, ""))
@@ -34,11 +43,12 @@ def scales_of(header: Mapping[str, str]) -> tuple[dict[str, float], dict[str, st
         VOLTAGE: ("version of Betaflight that logs volts", volts),
         CURRENT: ("version of Betaflight that logs amperes", amperes),
     }
+    if is_inav or firmware.is_inav:
+        since, count, fields = INAV_BATTERY
+        known = count if firmware.version >= since else None
+        told |= dict.fromkeys(fields, ("version of INAV from 2 on", known))
     scales = dict.fromkeys(FINE, fine)
     scales |= {name: scale for name, (_, scale) in told.items() if scale is not None}
-    since, count, fields = INAV_BATTERY
-    if firmware.is_inav and firmware.version >= since:
-        scales |= dict.fromkeys(fields, count)
     return scales, {name: lacks for name, (lacks, scale) in told.items() if scale is None}
 
 
