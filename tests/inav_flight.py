@@ -23,7 +23,7 @@ GAINS = {"p": (40, 44, 85), "i": (75, 75, 45), "d": (25, 25, 0), "cd": (60, 60, 
 GYRO_LPF_HZ, DTERM_LPF_HZ, CD_LPF_HZ, YAW_LPF_HZ, RELAX_HZ = 110.0, 90.0, 30.0, 40.0, 15.0
 TPA_RATE, TPA_BREAKPOINT, MAXTHROTTLE, MINTHROTTLE = 20, 1300, 1900, 1050
 SUM_LIMIT, I_LIMIT, RELAX_DEG_S = 500.0, 165.0, 40.0
-CHIRP_S, CHIRP_HZ, CHIRP_DEG_S, SETTLE_S = 20.0, (2.0, 60.0), 25.0, 2.0
+CHIRP_S, CHIRP_HZ, CHIRP_DEG_S, SETTLE_S = 20.0, (2.0, 60.0), 60.0, 2.0
 
 
 @dataclass(frozen=True)
@@ -119,8 +119,7 @@ def schedule(rounds: int = 2, lengths_s: float = CHIRP_S) -> tuple[np.ndarray, .
 
 
 def fly(
-    quad: Quad, gains: Mapping[str, tuple[float, ...]], target: np.ndarray, *, seed: int = 0,
-    noise: float = 1.0, probe: np.ndarray | None = None,
+    quad: Quad, gains: Mapping[str, tuple[float, ...]], target: np.ndarray, *, seed: int = 0
 ) -> dict[str, np.ndarray]:  # fmt: skip
     """Columns (n, 3) by name: target, gyro, P, I, D, F, sum."""
     rng = np.random.default_rng(seed)
@@ -136,17 +135,17 @@ def fly(
     motor, rate, slow, gust = (np.zeros(3) for _ in range(4))
     waiting = np.zeros((quad.delay_loops + 1, 3))
     rows = {name: np.empty_like(target) for name in ("gyro", "P", "I", "D", "F", "sum")}
-    drawn = rng.standard_normal((len(target), 2, 3)) * noise
+    drawn = rng.standard_normal((len(target), 2, 3))
     for k, wanted in enumerate(target):
         slow = slow + gyro_gain * (np.degrees(rate) + 1.5 * drawn[k, 0] - slow)
         terms = controller.step(wanted, slow)
-        command = terms[4] if probe is None else terms[4] + probe[k]
+        command = terms[4]
         for name, each in zip(("P", "I", "D", "F", "sum", "gyro"), (*terms[:4], command, slow),
                               strict=True):  # fmt: skip
             rows[name][k] = each
         waiting[k % len(waiting)] = command / 1000.0
         late = waiting[(k + 1) % len(waiting)]
-        gust = gust * (1.0 - STEP / 0.2) + 0.02 * drawn[k, 1]
+        gust = gust * (1.0 - STEP / 0.2) + 0.05 * drawn[k, 1]
         moved = a[:, 0, 0] * motor + b[:, 0] * late
         rate = a[:, 1, 0] * motor + a[:, 1, 1] * rate + b[:, 1] * late + gust * STEP
         motor = moved
