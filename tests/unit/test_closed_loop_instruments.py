@@ -43,6 +43,8 @@ def looped(seed: int, *, n: int = 2000, noise: float = 0.3, shown: bool = True) 
 ARX = fid.PolynomialModel.arx("u", "y", na=2, nb=2, nk=1, method="iv4")
 OE = fid.PolynomialModel.oe("u", "y", nb=2, nf=2, nk=1, method="riv")
 
+PLAIN = replace(OE, method="prediction_error")
+
 
 def departures(structure: PolynomialStructure, seed: int) -> np.ndarray:
     found = fid.identify(structure, looped(seed)).parameters
@@ -58,11 +60,30 @@ def test_the_excitation_takes_the_bias_of_the_loop_away(structure: PolynomialStr
     else:
         with pytest.raises(DataError, match="the records do not tell what was injected"):
             fid.identify(structure, looped(0, shown=False))
-        direct = fid.identify(replace(structure, method="prediction_error"), looped(0)).parameters
+        direct = fid.identify(PLAIN, looped(0, shown=False))
         # Noise that comes back through the loop pulls the plain fit: by -0.047 in the mean.
-        assert direct["b1"].value < TRUTH["b1"] - 0.02
+        assert direct.parameters["b1"].value < TRUTH["b1"] - 0.02
+        assert direct.covariance is None
+        assert ("loop-biases", "amber") in {(f.code, str(f.light)) for f in direct.findings}
     all_of = [departures(structure, seed) for seed in range(4)]
     assert np.abs(np.mean(all_of, axis=0)).max() < 1.5
+
+
+def test_output_error_takes_what_was_injected_by_itself() -> None:
+    """With the loop declared, or seen; noise far above the answer hides nothing from it."""
+    record = looped(3)
+    asked, taken = fid.identify(OE, record), fid.identify(PLAIN, record)
+    assert taken.structure.method == "riv"
+    for name in OE.names:
+        assert taken.parameters[name].value == asked.parameters[name].value
+        assert taken.parameters[name].stderr == asked.parameters[name].stderr
+    loop = taken.evidence.check("loop")
+    assert loop is not None
+    assert str(loop.light) == "green"
+    seen = fid.identify(PLAIN, looped(0, noise=1.5).declare(loop=None))
+    assert seen.covariance is not None
+    assert "nothing-told" not in {finding.code for finding in seen.findings}
+    assert fid.identify(PLAIN, record, loop="open").structure.method == "prediction_error"
 
 
 @pytest.mark.parametrize("structure", [ARX, OE], ids=["arx", "oe"])

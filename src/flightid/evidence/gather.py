@@ -82,6 +82,8 @@ BELONGS = {
     "errors-not-white": RESIDUALS,
     "inputs-in-errors": RESIDUALS,
     "excitation-refutes": RESIDUALS,
+    "loop-biases": LOOP,
+    "by-excitation": LOOP,
     "nothing-told": BAND,
 }
 

@@ -9,7 +9,13 @@ from functools import partial
 from typing import Any
 
 from flightid.conventions import Role
-from flightid.errors import OptionError
+from flightid.errors import FitError, OptionError
+from flightid.identification.fed_back import (
+    by_excitation,
+    closed_around,
+    with_bias_said,
+    with_way_said,
+)
 from flightid.identification.fit import Fit
 from flightid.identification.fit_evidence import evidence_of
 from flightid.identification.held_inputs import hold_for, with_hold_said
@@ -190,6 +196,14 @@ def identify(
         declared_loop(loop)
     chosen = method_of(model, data, method)
     _require_roles(model, flat(data))
+    closed = closed_around(model, flat(data), loop)
+    if closed is not None and (excited := by_excitation(model, flat(data))) is not None:
+        try:
+            fit = identify(excited, data, loop=loop, **options)
+        except FitError:
+            pass
+        else:
+            return with_way_said(fit, closed, flat(data)[0].excitations)
     held = hold_for(chosen.options, flat(data), options)
     given = options if held is None else {**options, "hold": held.hold}
     fit = chosen.run(model, data, given)
@@ -204,6 +218,8 @@ def identify(
     if not in_doubt(fit.findings):
         fit = with_residuals_judged(fit)
     fit = with_loop_judged(fit, loop)
+    if closed is not None:
+        fit = with_bias_said(fit, closed)
     fit = replace(fit, provenance={**fit.provenance, LEFT: left_by_fit(fit)})
     # Gathered once somebody asks for it, in the words of who asked for the fit.
     gathered: Any = partial(copy_context().run, evidence_of, fit, flat(data), loop)

@@ -19,6 +19,7 @@ from flightid.identification.prediction_error.coloured_errors import (
     noise_bias,
     output_error_covariance,
 )
+from flightid.identification.prediction_error.excited_inputs import noise_free_inputs
 from flightid.identification.prediction_error.findings import ELSEWHERE, NOISE_AT_CIRCLE
 from flightid.identification.prediction_error.likelihoods import ALIKE
 from flightid.identification.prediction_error.part_blocks import errors_at, part_blocks
@@ -145,7 +146,14 @@ def compared(
     if _reach(structure, found.theta, plain, "d", UNIT_ROOT) >= 1.0:
         found = replace(found, noise_reason=DRIFT)
     tests = judged_tests(tests, data, found, errors)
-    if not has_noise_model(structure) and _tells_nothing(data, errors, plain):
+    # Inputs that are fed back hold noise of the output: what was injected is what tells.
+    excited = replace(data, inputs=noise_free_inputs(data))
+    told_errors = (
+        errors
+        if data.excitations is None
+        else errors_at(structure, excited, found.memory, found.theta)
+    )
+    if not has_noise_model(structure) and _tells_nothing(data, told_errors, plain):
         return replace(found, covariance=None, reason=NOTHING)
     times = tests.widening(biased=shares_poles(structure))
     if times is None:

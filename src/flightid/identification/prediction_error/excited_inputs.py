@@ -59,6 +59,11 @@ def with_excitations(
     return data if moved is None else replace(data, excitations=moved)
 
 
+def is_injected(structure: PolynomialStructure, records: Sequence[Record]) -> bool:
+    """Whether the records hold an excitation that moves for each input."""
+    return _injected(structure, records) is not None
+
+
 def _injected(structure: PolynomialStructure, records: Sequence[Record]) -> Array | None:
     """Excitations that move, without their means; None where they are fewer than the inputs."""
     names = records[0].excitations
