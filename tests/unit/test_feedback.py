@@ -142,6 +142,32 @@ def test_residuals_of_a_direct_path_do_not_call_a_loop_within_the_sample_open() 
     assert "cannot be told" in str(found.summary().notes)
 
 
+@pytest.mark.parametrize("seed", [1, 5])
+def test_what_a_model_misses_is_no_noise_that_is_fed_back(seed: int) -> None:
+    """Two light modes that stiffen, swept: what output error leaves goes with inputs to come."""
+    rng = np.random.default_rng([seed, 11])
+    modes = zip([rng.uniform(0.3, 0.45), rng.uniform(0.7, 0.95)], rng.uniform(0.003, 0.02, 2),
+                strict=True)  # fmt: skip
+    turned = 2 * np.pi * np.cumsum(np.linspace(0.01, 0.16, 512))
+    u = np.tile(np.sin(turned + rng.uniform(0, 6.28)), 3) + 1e-3 * rng.standard_normal(1536)
+    y = np.zeros(u.size)
+    for omega, zeta in modes:
+        b, a, _ = signal.cont2discrete(([omega**2], [1, 2 * zeta * omega, omega**2]), 1.0)
+        y += rng.uniform(0.3, 1) * signal.lfilter(b.ravel(), a, u)
+    y += 0.01 * y.std() * (y / y.std()) ** 3
+    y += 1e-3 * y.std() * rng.standard_normal(y.size)
+    part = slice(512, 1024)
+    record = fid.Record.from_arrays(
+        np.arange(512.0), inputs={"u": u[part]}, outputs={"y": y[part]}, hold="zero"
+    )
+    fit = fid.identify(fid.PolynomialModel.oe("u", "y", nb=5, nf=4), record)
+    left = fit.records[0].residual("y")[None]
+    rows = record.matrix(["u"])
+    centred = [each - each.mean() for each in (rows, left)]
+    assert find_feedback([centred[0]], [centred[1]], ["u"]).loop == "closed"
+    assert fid.residual_tests(fit).feedback.loop == "open"
+
+
 def test_a_controller_that_answers_within_the_sample_is_not_called_open() -> None:
     noise = signal.lfilter([1.0], [1.0, -0.8], np.random.default_rng(0).standard_normal(1000))
     u, y = np.zeros(1000), np.zeros(1000)

@@ -188,7 +188,8 @@ def _loop(
     """What is declared; else whether past residuals move what is new in the inputs.
 
     A direct path that was fitted takes a loop within the sample out of the residuals: where they
-    see none, the measured outputs are asked, too.
+    see none, the measured outputs are asked, too. So they are where residuals see a loop: what a
+    model misses of lightly damped or nonlinear motion follows the inputs as no noise does.
     """
     if declared is not None:
         chosen = _choice(Loop, declared)
@@ -201,9 +202,11 @@ def _loop(
     channels = (*data.inputs, *data.residuals)
     found = find_feedback(inputs, left, tuple(data.inputs), repeats=repeats)
     found = unless_spread(found, [each.history for each in records], channels)
-    if found.loop == "open" and records and all(n in r for r in records for n in channels):
+    held = bool(records) and all(name in record for record in records for name in channels)
+    if held and found.source == "test":
         measured = feedback_test(records, inputs=data.inputs, outputs=data.residuals)
-        found = measured if measured.loop == "unknown" else found
+        overruled = "open" if found.is_closed else "unknown"
+        found = measured if measured.loop == overruled else found
     return (Loop.CLOSED if found.is_closed else Loop.OPEN), found
 
 
