@@ -17,7 +17,7 @@ from flightid.conventions import Light
 from flightid.evidence.spans import Span, judge_span
 from flightid.identification.fit_findings import DETERMINED
 from flightid.inspection.thresholds import BAND_LEAST
-from flightid.study.proposal.of_records import AS_GOOD, study_of_records
+from flightid.study.proposal.of_records import RUNS_ALIKE, study_of_records
 from flightid.study.proposal.stretches import RICHER
 from flightid.uncertainty.coloured_residuals import WELL_TOLD, colour_findings
 from flightid.uncertainty.foretold import MATERIAL_PERCENT, NEGLIGIBLE_PERCENT
@@ -35,7 +35,7 @@ TABLE = {
     "WELL_TOLD": WELL_TOLD,
     "PEAK_PERCENT": PEAK_PERCENT,
     "NO_MATTER_PERCENT": NO_MATTER_PERCENT,
-    "AS_GOOD": AS_GOOD,
+    "RUNS_ALIKE": RUNS_ALIKE,
     "RICHER": RICHER,
 }
 

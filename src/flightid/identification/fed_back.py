@@ -65,8 +65,9 @@ def by_excitation(structure: Asked, records: Sequence[object]) -> Asked | None:
     return replace(structure, method=REFINED, denominators="separate")
 
 
-def with_way_said(fit: Fit, test: FeedbackTest, names: Sequence[str]) -> Fit:
+def with_way_said(fit: Fit, test: FeedbackTest) -> Fit:
     """The fit by way of what was injected, which says why."""
+    names = fit.records[0].measured.excitations
     said = f"fitted by way of {', '.join(names)} (riv), which a closed loop does not bias; {test}"
     return replace(fit, findings=(*fit.findings, Finding(TAKEN, Light.GREEN, said)))
 

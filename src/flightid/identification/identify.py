@@ -203,7 +203,7 @@ def identify(
         except FitError:
             pass
         else:
-            return with_way_said(fit, closed, flat(data)[0].excitations)
+            return with_way_said(fit, closed)
     held = hold_for(chosen.options, flat(data), options)
     given = options if held is None else {**options, "hold": held.hold}
     fit = chosen.run(model, data, given)

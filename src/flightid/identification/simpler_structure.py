@@ -16,7 +16,7 @@ from flightid.models.polynomial.structure import PolynomialStructure
 
 MOST_LEFT_OUT = 3
 """Poles that are left out at most: a structure further off is another question."""
-AS_GOOD = 1.02
+NO_WORSE = 1.02
 """Ratio of free-run errors on the records of the fit that chance explains."""
 CLEAR = 6.0
 """Gain of AICc that says a structure is better: odds of 1 to 20."""
@@ -167,7 +167,7 @@ def _predicts_as_well(made: Fit, rich: Fit) -> bool:
     if None not in (least, known) and known <= least + CLEAR:
         return True
     ours, theirs = _free_run(made), _free_run(rich)
-    return all(ours[name] <= AS_GOOD * theirs[name] for name in theirs)
+    return all(ours[name] <= NO_WORSE * theirs[name] for name in theirs)
 
 
 def _free_run(fit: Fit) -> dict[str, float]:

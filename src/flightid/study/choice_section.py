@@ -41,7 +41,7 @@ def choice_blocks(item: ModelResults) -> tuple[Block, ...]:
     if structure.rule == "balanced":
         words += (
             ". Free runs do not see the noise model; so of all structures whose free-run error "
-            "lies within 10 % of the smallest, those count whose AICc is within 6 of the smallest, "
+            "lies within 5 % of the smallest, those count whose AICc is within 6 of the smallest, "
             "and of them the one with fewest coefficients is taken. Structures with fewer "
             "coefficients of B than of F come last: sampling gives B as many, and a model that "
             "leaves them out has intervals that are too short"

@@ -61,7 +61,7 @@ class StructureSettings(OrderOptions):
         None,
         choices=CHOICES,
         doc="balanced: fewest coefficients within 6 of the smallest AICc, of free-run errors "
-        "within 10 % of the smallest; free_run: that one; simplest: fewest coefficients within "
+        "within 5 % of the smallest; free_run: that one; simplest: fewest coefficients within "
         "2 % of it; default: what fits the kind.",
     )
     options: Mapping[str, Any] = field(default_factory=dict)

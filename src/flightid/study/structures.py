@@ -26,7 +26,7 @@ from flightid.validation.order_scan.trials import fit_of
 from flightid.validation.spectra.spectra import lags_of_spectrum
 
 Choice = OrderScan | NarxSearch
-AS_GOOD = 0.10
+RUNS_ALIKE = 0.05
 """Free-run errors that differ by less are alike: a minute of a slow mode tells them no better."""
 TRIED = 4
 """Structures that are fitted whole, at most, for one that `_is_clean`."""
@@ -170,7 +170,9 @@ def _less_sure(scan: OrderScan, taken: OrderTrial) -> list[OrderTrial]:
         trial = scan.trials[place]
         if aicc < _aicc(taken) - CLEAR and rms <= (1 + DOUBTED) * least:
             likelier.append(trial)
-        elif (trial.n_parameters or 0) < (taken.n_parameters or 0) and rms <= (1 + AS_GOOD) * least:
+        elif (trial.n_parameters or 0) < (taken.n_parameters or 0) and rms <= (
+            1 + RUNS_ALIKE
+        ) * least:
             fewer.append(trial)
     return [*likelier[:FURTHER], *fewer[:FURTHER]]
 
@@ -196,7 +198,7 @@ def ranked(scan: OrderScan, how: str) -> list[OrderTrial]:
         return [scan.smallest("bic")]
     if first.free_run_rms is None:
         return [first]
-    limit = (1 + AS_GOOD) * first.free_run_rms
+    limit = (1 + RUNS_ALIKE) * first.free_run_rms
     alike = [
         (not _has_zeros_of_sampling(trial.structure), trial.criteria.aicc, place)
         for place, trial in enumerate(scan.trials)

@@ -39,7 +39,7 @@ from flightid.study.proposal.stretches import (
 )
 from flightid.study.proposal.unit_steps import unit_steps
 from flightid.study.stage_runner import StageRunner
-from flightid.study.structures import AS_GOOD, ranked
+from flightid.study.structures import RUNS_ALIKE, ranked
 from flightid.surface import as_key, speaking
 
 KINDS = ("arx", "armax", "bj", "oe")
@@ -331,7 +331,7 @@ def _structure(
     said = ", ".join(f"{kind} {reached[kind]:.3g}" for kind in KINDS if kind in reached)
     least = min(reached.values())
     # What comes last assumes least of the noise, so that its intervals hold for more of it.
-    good = [kind for kind in KINDS if reached.get(kind, math.inf) <= (1 + AS_GOOD) * least]
+    good = [kind for kind in KINDS if reached.get(kind, math.inf) <= (1 + RUNS_ALIKE) * least]
     return good[-1], f"{said} {unit}".rstrip(), of_kind[good[-1]]
 
 
