@@ -127,6 +127,11 @@ def test_a_command_takes_what_was_injected(
         for name in structure.names:
             assert found[name]["value"] == pytest.approx(expected[name].value, rel=1e-6)
             assert found[name]["stderr"] is not None
+    np.savetxt(file, rows, delimiter=",", header="time,tau_phi,p [rad/s],r", comments="")
+    asked = ["identify", str(file), "--model", "rate_first_order", "--method", "output_error"]
+    assert run([*asked, "--hold", "zero", "--excitation", "r"]) == 1
+    assert "is no option" not in capsys.readouterr().err
+    np.savetxt(file, rows, delimiter=",", header="time,u,y,r", comments="")
     assert run(["identify", str(file), "--kind", "bj", *told, "--excitation", "r"]) == 2
     assert "arx (method iv4), oe (method riv); bj has a noise model" in capsys.readouterr().err
 

@@ -77,6 +77,10 @@ def fits_of(
     from flightid.responses.options import AUTOMATIC
 
     way, loop = method or USUAL, options.pop("loop", None)
+    # Records keep what was injected: what a free run in a loop leaves is tested against that.
+    beside_inputs = (
+        () if way in methods() and _on_responses(way) else options.pop("excitations", ())
+    )
     of_response, of_method, *of_files = _divided(way, options)
     models = {name: load_structure(name, axis=axis) for name in names}
     _require_same_channels(models)
@@ -87,7 +91,7 @@ def fits_of(
             f"--method {JOINT} and --records belong together: the response comes from FILES, "
             "the records stand beside it"
         )
-    injected = of_response.get("excitations")
+    injected = beside_inputs or of_response.get("excitations")
     read = read_files(files, *of_files, **channels, units=first.units, excitations=injected)
     more: list[Record] = []
     if way == JOINT:
