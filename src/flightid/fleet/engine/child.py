@@ -50,6 +50,10 @@ def main() -> None:
     lines: SimpleQueue[str] = SimpleQueue()
     threading.Thread(target=_listen, args=(lines,), daemon=True).start()
     order = json.loads(lines.get())
+    # A library that finds no room later would seem the fault of a log: all load before the limit.
+    room = import_module("flightid.fleet")
+    for name in room.__all__:
+        getattr(room, name)
     limit_memory(order["memory_mib"])
     with tempfile.TemporaryDirectory() as folder:
         try:
