@@ -56,14 +56,16 @@ def fleet(
     return made
 
 
-def by_fits(flights: list[FlightPoints]) -> Population:
+def by_fits(flights: list[FlightPoints], *, errors_at_type: bool = True) -> Population:
+    """The type by each flight's own fit."""
     return estimate_population(
         FlightEstimates.of(
             NAMES,
             [each.vehicle for each in flights],
             [each.estimate for each in flights],
             [each.covariance for each in flights],
-        )
+        ),
+        errors_at_type=errors_at_type,
     )
 
 
