@@ -89,13 +89,13 @@ def test_the_study_is_written_with_a_model_and_edited_as_text(desk: Desk, tmp_pa
     said = _findings(page)
     page.get_by_role("button", name="Write the study").press("Enter")
     page.locator("pre", has_text='template = "rate_first_order"').wait_for()
-    assert _study(desk, page)["conditioning"] == [{"actuators": {"volts": 12.0}}]
-    page.get_by_role("alert").filter(has_text="No column is named tau_phi, p").wait_for()
-    servo = page.get_by_label("Servo of volts, rad/s")
+    units = {"units": {"p": "rad/s"}}
+    assert _study(desk, page)["conditioning"] == [units, {"actuators": {"tau_phi": 12.0}}]
+    servo = page.get_by_label("Servo of tau_phi, rad/s")
     servo.fill("")
     servo.press("Tab")
     page.locator("pre", has_text="actuators").wait_for(state="detached")
-    assert not _study(desk, page).get("conditioning")
+    assert _study(desk, page)["conditioning"] == [units]
     page.get_by_role("button", name="Edit", exact=True).press("Enter")
     field = page.get_by_label("Study file, to be written")
     text = field.input_value()

@@ -407,7 +407,7 @@ def test_a_log_whose_run_is_gone_is_taken(tmp_path: Path, monkeypatch: pytest.Mo
     _claimed(monkeypatch, tmp_path, "1.bin")
     waited = list[float]()
     monkeypatch.setattr("flightid.fleet.run.sleep", waited.append)
-    monkeypatch.setattr("flightid.fleet.engine.claims.STALE_S", 0.0)
+    monkeypatch.setattr("flightid.fleet.engine.claims.STALE_S", 1e-3)
     done = run_fleet(tmp_path / "fleet.toml", workers=1)
     assert (done.found, done.kept, done.outcomes) == (3, 0, {"refused": 3})
     assert waited
