@@ -152,6 +152,31 @@ def fly(
     return {"target": target, **rows}
 
 
+def phase_margin(quad: Quad, gains: Mapping[str, float], place: int) -> float:
+    """Least phase margin of an axis, deg: firmware and vehicle in z, not run but multiplied."""
+    hertz = np.geomspace(0.3, 200.0, 20_000)
+    back = np.exp(-2j * np.pi * hertz * STEP)
+
+    def one_pole(weight: float) -> np.ndarray:
+        return np.asarray(weight / (1.0 - (1.0 - weight) * back))
+
+    tpa = tpa_of(quad.throttle)[place]
+    p = gains["p"] / P_DIVISOR * tpa * (one_pole(pt_gain(YAW_LPF_HZ)) if place == 2 else 1.0)
+    i = gains["i"] / I_DIVISOR * STEP * back / (1.0 - back)
+    d = gains["d"] / D_DIVISOR * tpa / STEP * (1.0 - back)
+    controller = p + i + d * one_pole(pt_gain(DTERM_LPF_HZ, 2)) ** 2
+    motor = 1.0 / quad.motor_s
+    whole = np.zeros((3, 3))
+    whole[:2] = [[-motor, 0.0, motor], [quad.gain[place], -quad.damping_1_s[place], 0.0]]
+    step = expm(whole * STEP)
+    shifted = np.eye(2) / back[:, None, None] - step[:2, :2]
+    rate = np.linalg.solve(shifted, np.tile(step[:2, 2:], (back.size, 1, 1)))[:, 1, 0]
+    gyro = 180.0 / np.pi * rate / 1000.0 * one_pole(pt_gain(GYRO_LPF_HZ))
+    loop = controller * gyro * back**quad.delay_loops
+    crossed = np.flatnonzero(np.diff(np.sign(np.log(np.abs(loop)))))
+    return min(180.0 - abs(float(np.degrees(np.angle(loop[k])))) for k in crossed)
+
+
 def header(gains: Mapping[str, tuple[float, ...]], **changes: str) -> dict[str, str]:
     """Lines that INAV's blackbox.c writes, as far as anybody reads them."""
     own = {f"{a}PID": ",".join(str(gains[g][k]) for g in ("p", "i", "d", "cd"))

@@ -21,6 +21,7 @@ from flightid.errors import DataError
 from flightid.inspection.carried import carried_axes
 from flightid.inspection.rate_chirps import chirps
 from flightid.logs.blackbox.settings import settings_of
+from flightid.study.proposal import propose_study
 from tests import inav_flight as inav
 from tests.closeness import assert_close
 
@@ -150,8 +151,8 @@ def test_a_plan_of_its_flight_is_by_stick_with_its_settings(tmp_path: Path) -> N
 
 
 @pytest.mark.slow
-def test_chirps_of_a_simulated_flight_carry_every_axis(tmp_path: Path) -> None:
-    """Two of 20 s an axis, logged in whole degrees a second."""
+def test_gains_from_chirps_of_a_simulated_flight_keep_their_margins(tmp_path: Path) -> None:
+    """Two chirps of 20 s an axis, logged in whole degrees a second, to gains of all three axes."""
     quad, told = inav.Quad(), inav.schedule(2)
     flown = inav.fly(quad, inav.GAINS, told[0], seed=1)
     path = tmp_path / "LOG00012.TXT"
@@ -162,3 +163,13 @@ def test_chirps_of_a_simulated_flight_carry_every_axis(tmp_path: Path) -> None:
         assert band.span > 12.0
         assert band.coherence is not None
         assert band.coherence > 0.9
+    made = propose_study([path], folder=tmp_path, tune=True)
+    tuning = fid.run_study(made.write(tmp_path / "study.toml"), output=tmp_path / "out").tuning
+    assert tuning is not None
+    assert tuple(each.axis for each in tuning.designs) == inav.AXES
+    for place, design in enumerate(tuning.designs):
+        gains = {name: design.gains[f"mc_{name}_{design.axis}"] for name in ("p", "i", "d")}
+        promised = design.worst_case("rate loop", "phase margin").worst
+        assert promised is not None
+        assert promised > 44.0
+        assert promised < inav.phase_margin(quad, gains, place) < promised + 12.0
