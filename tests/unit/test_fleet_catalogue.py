@@ -16,6 +16,7 @@ import pytest
 pytest.importorskip("duckdb")
 pytest.importorskip("pyarrow")
 
+from flightid.cli.program import run
 from flightid.errors import DataError, OptionError
 from flightid.fleet.catalogue.catalogue import Catalogue
 from flightid.fleet.catalogue.compaction import MOST_SMALL, compact, merge, rewrite, set_aside
@@ -26,6 +27,7 @@ from flightid.fleet.catalogue.record import LogRecord
 from flightid.fleet.catalogue.store import FolderStore
 from flightid.fleet.engine.address_space import bounded_memory
 from flightid.fleet.opening import open_catalogue, opened_store
+from flightid.fleet.status import fleet_status
 
 
 def record(number: int) -> LogRecord:
@@ -142,6 +144,35 @@ def test_broken_files_go_to_quarantine_and_are_told(tmp_path: Path) -> None:
     file.write_bytes(file.read_bytes()[:-9])
     parts, broken = read_parts(store)
     assert (parts, broken) == ([], [part.name])
+    (reason,) = fleet_status(_placed(store, tmp_path)).reasons
+    assert (reason.reason, reason.action) == ("record", "flightid fleet run takes the log again")
+
+
+def _placed(store: FolderStore, folder: Path) -> str:
+    """A catalogue's place whose present records are those of a store."""
+    place = folder / "place"
+    (place / "abc").parent.mkdir()
+    (place / "abc").symlink_to(store.root)
+    (place / "fleet.json").write_text('{"current": "abc"}')
+    return str(place)
+
+
+def test_an_answer_without_damaged_parts_is_red(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    store = filled(tmp_path, range(3))
+    part = compact(store)
+    assert part is not None
+    file = tmp_path / part.file("parameters")
+    file.write_bytes(file.read_bytes()[:-9])
+    place = _placed(store, tmp_path)
+    said = "1 part of the catalogue damaged: the logs in it are in no answer"
+    assert run(["fleet", "report", place]) == 1
+    assert said in " ".join(capsys.readouterr().out.split())
+    assert run(["fleet", "query", place, "select count(*), 'nan'::double from logs", "--json"]) == 1
+    told = capsys.readouterr()
+    assert said in told.err
+    assert json.loads(told.out) == [[0, None]]
 
 
 @pytest.mark.parametrize("at", [0, 40, -10])

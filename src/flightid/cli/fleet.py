@@ -10,6 +10,7 @@ from flightid.cli.output import (
     WRITTEN,
     emit,
     emit_values,
+    finite,
     json_option,
     leave_by_verdict,
     note,
@@ -134,13 +135,18 @@ def query(
     """
     from flightid import fleet
     from flightid.fleet.engine.address_space import bounded_memory
+    from flightid.fleet.page import damaged_light
 
     with fleet.open(place, earlier=earlier) as catalogue, bounded_memory():
         answer = catalogue.answer(sql, time_s=time_s, most_rows=most_rows)
+        lost = damaged_light(len(catalogue.broken))
     if as_json:
-        emit_values(answer.to_dict()["rows"])
+        emit_values(finite(answer.to_dict()["rows"]))
     else:
         click.echo(answer)
+    if lost is not None:
+        note(f"[red] {lost.message} — {lost.action}")
+        leave_by_verdict([lost])
 
 
 @command.command("report", short_help="One page: vehicles, types, what changed, refused logs.")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from enum import IntEnum
@@ -111,6 +112,21 @@ def emit(result: CommandResult, *, as_json: bool, level: float | None = None) ->
 def emit_values(values: object) -> None:
     """Print plain values as one JSON document; a number that is not finite is a fault."""
     click.echo(json.dumps(values, indent=2, allow_nan=False, ensure_ascii=False))
+
+
+def finite(values: Any) -> Any:  # noqa: ANN401 - plain values of any depth
+    """The same plain values with null for numbers that JSON does not have.
+
+    Example
+    -------
+    >>> finite([{"r": float("nan")}, {"r": 0.5}])
+    [{'r': None}, {'r': 0.5}]
+    """
+    if isinstance(values, dict):
+        return {name: finite(each) for name, each in values.items()}
+    if isinstance(values, list | tuple):
+        return [finite(each) for each in values]
+    return None if isinstance(values, float) and not math.isfinite(values) else values
 
 
 def note(text: str) -> None:

@@ -42,13 +42,23 @@ def fleet_document(answers: FleetAnswers, title: str = "Fleet") -> Document:
     answers : FleetAnswers
     title : str
     """
+    lost = damaged_light(answers.damaged)
     sections = [
+        *([Section("The catalogue", (Lights((lost,)),))] if lost else []),
         Section("Vehicles", tuple(_vehicles(answers))),
         *(Section(_type_title(each), tuple(_type_blocks(each))) for each in answers.types),
         Section("Logs that could not be used", tuple(_refused(answers))),
     ]
     footer, lights = f"Made by flightid {VERSION}.", _lights_counted(answers)
     return Document(title, fleet_words(answers), tuple(sections), footer, lights)
+
+
+def damaged_light(parts: int) -> Finding | None:
+    """What damaged parts of a catalogue mean for an answer; None where all can be read."""
+    if not parts:
+        return None
+    said = f"{counted(parts, 'part')} of the catalogue damaged: the logs in it are in no answer"
+    return Finding("damaged-parts", Light.RED, said, "flightid fleet run takes them again")
 
 
 def _lights_counted(answers: FleetAnswers) -> str:

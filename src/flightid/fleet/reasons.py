@@ -76,7 +76,7 @@ def grouped_reasons(rows: Iterable[Mapping[str, Any]]) -> tuple[RefusalReason, .
         if told is not None:
             found[outcome, reason] = replace(told, logs=told.logs + 1)
             continue
-        words = (str(row[key] or "") for key in ("message", "action", "address"))
+        words = (str(row.get(key) or "") for key in ("message", "action", "address"))
         found[outcome, reason] = RefusalReason(outcome, reason, 1, *words)
     return tuple(sorted(found.values(), key=lambda each: -each.logs))
 

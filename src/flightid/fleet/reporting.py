@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -55,7 +56,8 @@ def ask_fleet(place: str | Path) -> FleetAnswers:
     questions = FleetQuestions() if settings is None else settings.questions
     with open_catalogue(place) as catalogue:
         rows = {name: _rows(catalogue, name) for name in ASKED}
-    return answer_questions(
+        damaged = len(catalogue.broken)
+    answers = answer_questions(
         rows,
         events=[] if settings is None else _events(settings),
         covariates=questions.covariates,
@@ -64,6 +66,7 @@ def ask_fleet(place: str | Path) -> FleetAnswers:
         drift=questions.drift,
         outliers=questions.outliers,
     )
+    return replace(answers, damaged=damaged)
 
 
 def fleet_report(place: str | Path) -> Document:

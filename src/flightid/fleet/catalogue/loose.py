@@ -13,6 +13,7 @@ from flightid.fleet.catalogue.store import Store
 
 LOOSE = "loose"
 QUARANTINE = "quarantine"
+AGAIN = "flightid fleet run takes the log again"
 SUFFIX = ".json"
 BROKEN = "record"
 """Kind of a failure: the record of a log could not be read again."""
@@ -70,7 +71,7 @@ def _quarantined(store: Store, log: str, content: bytes, error: DataError) -> Lo
 def broken_record(log: str, message: str) -> LogRecord:
     """The record of a log whose record is broken: a failure, until the log is run again."""
     common: Mapping[str, Any] = {"log": log, "light": str(Light.RED)}
-    entry = {"outcome": FAILED, "reason": BROKEN, "message": message, "models": 0}
+    entry = {"outcome": FAILED, "reason": BROKEN, "message": message, "models": 0, "action": AGAIN}
     failure = {"kind": BROKEN, "message": message, "stage": BROKEN}
     every: dict[str, list[dict[str, Any]]] = {"logs": [entry], "failures": [failure]}
     rows = {name: [{**common, **row} for row in every.get(name, ())] for name in TABLES}

@@ -76,12 +76,15 @@ class FleetAnswers:
         Flights without a date, which are in no history.
     red : mapping of str to sequence of str
         By model: addresses of logs of which another model counts, and this one is red.
+    damaged : int
+        Parts of the catalogue that cannot be read: their logs are in no answer.
     """
 
     types: tuple[TypeAnswers, ...]
     logs: Sequence[Row]
     undated: int = 0
     red: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    damaged: int = 0
 
 
 def answer_questions(

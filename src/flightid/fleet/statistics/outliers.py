@@ -328,7 +328,7 @@ def _beside(
     single = np.array([_single(population, everyone[int(i)], place, int(i)) for i in where])
     odd = corrected(single) <= FALSE_SHARE
     if spreads.structure == "full":
-        chance = _chance(distance2, total, between + error, freedom)
+        chance = _chance(distance2, len(where), freedom)
     else:
         # A diagonal does not know how parameters of vehicles hang together: each for itself.
         chance = min(1.0, len(single) * float(single.min()))
@@ -358,13 +358,14 @@ def _single(population: Population, everyone: VehicleEstimates, place: int, i: i
     return VehicleEstimates(*_column(population, there, i)).next_chance(*one)
 
 
-def _chance(distance2: float, total: Array, uncertain: Array, freedom: float) -> float:
-    """Chance of a distance as large, a full spread known as well as its vehicles tell it."""
-    q = len(total)
-    share = float(np.trace(np.linalg.solve(total, uncertain))) / q
-    known = min(freedom / max(share, 1e-6) ** 2, 1e9)
-    left = known - q + 1.0
-    return float(fdtrc(q, left, distance2 * left / (known * q)))
+def _chance(distance2: float, q: int, freedom: float) -> float:
+    """Chance of a distance as large (Hotelling), all of the spread known by the vehicles alone.
+
+    What is known of the estimates' errors is not counted for more freedom: the spread is told by
+    the same estimates, and 13 of 72 fleets of normal vehicles had one called unlike then, not 2.
+    """
+    left = freedom - q + 1.0
+    return float(fdtrc(q, left, distance2 * left / (freedom * q))) if left > 0.0 else 1.0
 
 
 def _deviation(
