@@ -89,7 +89,7 @@ def test_flights_too_few_for_change_leave_a_sentence_and_no_empty_picture() -> N
     said = " ".join(to_text(document).split())
     assert "Not answered: whether a vehicle changed: that takes 6 flights of it" in said
     assert "and the most is 4." in said
-    assert "(of 6 vehicles 6 not judged; errors of 2 parameters not borne out)" in said
+    assert "(of 6 vehicles 6 not judged; errors of 1 parameter not borne out)" in said
     # No heading claims of vehicles what is true of a few.
     assert "Changed, or unlike" not in said
     alike = answer_questions(fleet_rows(3, 4, 7), covariates=["battery"])

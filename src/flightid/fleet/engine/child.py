@@ -6,6 +6,7 @@ memory. Where the parent goes, it goes too.
 
 from __future__ import annotations
 
+import faulthandler
 import json
 import os
 import shutil
@@ -28,6 +29,10 @@ from flightid.fleet.settings import read_order
 
 ORPHAN = 3
 """Exit code of a child whose parent is gone."""
+GONE = threading.Event()
+"""Set where the parent is: what fails from then on is no fault of a log."""
+LONGER_S = 60.0
+"""Time beyond its clock after which a process ends by itself: its parent could not end it."""
 
 
 def limit_memory(mebibytes: int) -> None:
@@ -76,6 +81,7 @@ def _listen(lines: SimpleQueue[str]) -> None:
     for line in sys.stdin:
         lines.put(line)
     # The parent is gone or has had enough: nobody wants the rest.
+    GONE.set()
     scratch = Path(tempfile.gettempdir())
     if scratch.name.startswith(SCRATCH):
         shutil.rmtree(scratch, ignore_errors=True)
@@ -104,15 +110,22 @@ def _ready(
         each = LogOrder.from_dict(asked)
         tables = FleetTables(order.vehicles, {each.address.name: each.flight})
         task = LogTask(settings, tables, known, reports, tell)
+        # A regular expression or a foreign library may hold the interpreter, and with it the thread
+        # that listens for the parent's end; this clock needs neither.
+        faulthandler.dump_traceback_later(order.time_s + LONGER_S, exit=True)
         try:
             record = run_one(each.address, task, attempts=each.attempts)
             if record is None:
                 return {"outcome": KNOWN, "log": ""}
+            if GONE.is_set():
+                raise SystemExit(ORPHAN)
             write_loose(store, record)
         except OSError as error:
             if error.errno not in FULL:
                 raise
             return _full(error)
+        finally:
+            faulthandler.cancel_dump_traceback_later()
         entry = record.rows["logs"][0]
         names = ("outcome", "log", "reason", "message", "memory_bytes", "action")
         return {name: entry.get(name) for name in names}

@@ -8,6 +8,7 @@ that slopes give it. Together that is generalised least squares of all flights a
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -227,3 +228,13 @@ def own_slopes(values: Array, variances: Array, x: Array, slope: Array, error: A
     information = np.linalg.inv(error)
     total = information + (flat.T * weights) @ flat
     return np.asarray(np.linalg.solve(total, information @ slope + (flat.T * weights) @ values))
+
+
+def without_covariates(
+    data: FlightEstimates, design: CovariateDesign, fitted: Sequence[CovariateSlopes]
+) -> FlightEstimates:
+    """Estimates without what covariates explain."""
+    if not design.names:
+        return data
+    moved = np.column_stack([design.columns @ each.slopes for each in fitted])
+    return replace(data, values=np.where(data.known, data.values - moved, 0.0))

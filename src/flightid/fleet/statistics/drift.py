@@ -17,7 +17,10 @@ from flightid.fleet.statistics.covariates import (
     design_covariates,
     fit_covariates,
     own_slopes,
+    without_covariates,
 )
+from flightid.fleet.statistics.days import covariance_by_day, shared_by_day
+from flightid.fleet.statistics.errors_by_value import errors_at_each_vehicle
 from flightid.fleet.statistics.events import (
     EventEffect,
     FleetEvent,
@@ -252,9 +255,10 @@ def find_drift(
     errors: dict[str, ErrorScale] = {}
     newest: list[NewestFlight] = []
     scales: list[VehicleScale] = []
+    data = errors_at_each_vehicle(data)
     every, parameters = data, range(len(data.names))
     bare = [fit_covariates(data, i, design, _variances(data, i)) for i in parameters]
-    explained = _explained(data, design, bare)
+    explained = without_covariates(data, design, bare)
     shared = [shared_level(explained, i) for i in parameters]
     for i, one in enumerate(shared):
         data, explained = without_shared(data, i, one), without_shared(explained, i, one)
@@ -264,6 +268,9 @@ def find_drift(
         errors[name] = error_scale(explained, i, repeated)
         usual = errors[name].variances(_variances(data, i))
         level = without_events(explained, i, usual, events)
+        by_day = shared_by_day(level, i, usual)
+        usual = usual + by_day
+        errors[name] = errors[name].beside_days(by_day, _variances(data, i))
         _, off = variances_with_odd_ones(level, i, usual)
         own = own_scales(level, i, usual, off)
         scales += own
@@ -275,7 +282,7 @@ def find_drift(
         slopes[name] = fitted.effects
         moved = every.values[:, i] - data.values[:, i]
         for vehicle in data.members:
-            found = _history(data, i, vehicle, design, fitted, variances, events, moved)
+            found = _history(data, i, vehicle, design, fitted, variances, by_day, events, moved)
             if found is not None:
                 histories.append(found)
     return FleetDrift(
@@ -289,16 +296,6 @@ def _variances(data: FlightEstimates, i: int) -> Array:
     return np.where(data.known[:, i], data.covariances[:, i, i], 1.0)
 
 
-def _explained(
-    data: FlightEstimates, design: CovariateDesign, fitted: Sequence[CovariateSlopes]
-) -> FlightEstimates:
-    """Estimates without what covariates explain."""
-    if not design.names:
-        return data
-    moved = np.column_stack([design.columns @ each.slopes for each in fitted])
-    return replace(data, values=np.where(data.known, data.values - moved, 0.0))
-
-
 def _history(
     data: FlightEstimates,
     i: int,
@@ -306,6 +303,7 @@ def _history(
     design: CovariateDesign,
     fitted: CovariateSlopes,
     errors: Array,
+    by_day: Array,
     events: Sequence[FleetEvent],
     moved: Array,
 ) -> Asked | None:
@@ -315,7 +313,7 @@ def _history(
     rows = rows[np.argsort(data.time_s[rows], kind="stable")]
     name, unit, time_s = data.names[i], data.units[i], data.time_s[rows]
     values, variances = data.values[rows, i], errors[rows]
-    covariance, tested = np.diag(variances), values
+    covariance, tested = covariance_by_day(variances, time_s, by_day[rows]), values
     if design.names:
         slope, error = fitted.without[vehicle]
         x = design.columns[rows]

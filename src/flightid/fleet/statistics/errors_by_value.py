@@ -57,16 +57,28 @@ def errors_at_the_type(data: FlightEstimates) -> FlightEstimates:
     >>> np.sqrt(errors_at_the_type(data).covariances[:, 0, 0]).round(6).tolist()
     [1.0, 1.0, 1.0, 1.0]
     """
+    return _at_a_median(data, np.zeros(len(data.member_of), dtype=np.intp))
+
+
+def errors_at_each_vehicle(data: FlightEstimates) -> FlightEstimates:
+    """As `errors_at_the_type`, the errors of each vehicle's flights taken at its own median.
+
+    For what a vehicle did over time: how far apart vehicles are is no matter there.
+    """
+    return _at_a_median(data, data.member_of)
+
+
+def _at_a_median(data: FlightEstimates, group: NDArray[np.intp]) -> FlightEstimates:
     scale = np.ones_like(data.values)
     for i in range(len(data.names)):
-        _set_scale(scale[:, i], data, i)
+        _set_scale(scale[:, i], data, i, group)
     if np.all(scale == 1.0):
         return data
     outer = scale[:, :, None] * scale[:, None, :]
     return replace(data, covariances=data.covariances * outer)
 
 
-def _set_scale(scale: Array, data: FlightEstimates, i: int) -> None:
+def _set_scale(scale: Array, data: FlightEstimates, i: int, group: NDArray[np.intp]) -> None:
     """Factors of the standard errors of one parameter, where its errors may be relative."""
     there = data.known[:, i]
     values, errors = data.values[:, i], np.sqrt(data.covariances[:, i, i])
@@ -75,7 +87,9 @@ def _set_scale(scale: Array, data: FlightEstimates, i: int) -> None:
         return
     size = np.log(np.abs(values[sure]))
     share = relative_share(size, np.log(errors[sure]))
-    scale[sure] = np.exp(share * (float(np.median(size)) - size))
+    for one in np.unique(group[sure]):
+        mine = group[sure] == one
+        scale[np.flatnonzero(sure)[mine]] = np.exp(share * (np.median(size[mine]) - size[mine]))
 
 
 def _one_sided(values: Array, errors: Array, there: Flags) -> Flags:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
 from flightid.fleet.statistics.neighbours import histories_in_time
+from flightid.fleet.statistics.repeats import days_of
 from flightid.frozen import dataclass
 
 Array = NDArray[np.float64]
@@ -17,6 +20,8 @@ NORMAL_MEDIAN = 0.6744897501960817
 """Of the size of a standard normal number."""
 NOTABLE = 1.1
 """Of the typical factor: below it errors count as stated in words."""
+DAYS_NOTABLE = 0.5
+"""What days differ by, in errors of a flight, below which it is not said."""
 REPEATS, STEPS = "flights of one day", "flights in a row"
 
 
@@ -38,6 +43,8 @@ class ErrorScale:
         Median over flights of the error that is used, in stated errors.
     source : str
         What told it: ``"flights of one day"`` or ``"flights in a row"``; empty where nothing did.
+    days : float
+        What days differ by beside that, which flights of one day share, in typical stated errors.
 
     Example
     -------
@@ -49,9 +56,15 @@ class ErrorScale:
     added: float
     typical: float
     source: str
+    days: float = 0.0
 
     def words(self) -> str:
         """What was done, in words."""
+        if self.days >= DAYS_NOTABLE:
+            return f"{self._own_words()}; days differ by {self.days:.2f} errors of a flight"
+        return self._own_words()
+
+    def _own_words(self) -> str:
         if not self.source:
             return "its errors are taken as stated: too few flights tell"
         if self.typical < NOTABLE:
@@ -59,6 +72,11 @@ class ErrorScale:
         return (
             f"its errors count {self.typical:.2f} times as stated, for so far scatter {self.source}"
         )
+
+    def beside_days(self, shared: Array, stated: Array) -> ErrorScale:
+        """The same with what days differ by: variances that flights of one share."""
+        ratios = np.sqrt(shared / stated)
+        return replace(self, days=float(np.median(ratios)) if len(ratios) else 0.0)
 
     def variances(self, stated: Array) -> Array:
         """What stated variances are taken for, in the square of the unit."""
@@ -69,7 +87,8 @@ def error_scale(data: FlightEstimates, i: int, repeated: float | None) -> ErrorS
     """Find what stated errors of one parameter are taken for.
 
     From flight to flight of a vehicle the median size of standardised steps, over the fleet, is
-    that of normal ones (0.6745): a step or a slow drift moves few of them, an odd flight two.
+    that of normal ones (0.6745): a step or a slow drift moves few of them, an odd flight two. Eight
+    steps or more between flights of one day count alone: days may differ by more (`shared_by_day`).
 
         f = median |Δ| / √(s₁² + s₂²) / 0.6745,   q: median |Δ| / √(s₁² + s₂² + 2 q) = 0.6745
 
@@ -94,13 +113,16 @@ def error_scale(data: FlightEstimates, i: int, repeated: float | None) -> ErrorS
     next, the median scatters: of 11 by a fifth.
     """
     stated = data.covariances[data.known[:, i], i, i]
-    steps, variances = _steps(data, i)
+    steps, variances = _steps(data, i, within=True)
+    apart = len(steps) < FEWEST_STEPS
+    if apart:
+        steps, variances = _steps(data, i)
     factor, added = 1.0, 0.0
     if len(steps) >= FEWEST_STEPS:
         factor = max(1.0, float(np.median(steps / np.sqrt(variances))) / NORMAL_MEDIAN)
-        added = _added(steps, variances)
+        added = added_spread(steps, variances)
     told = len(steps) >= FEWEST_STEPS
-    source = STEPS if told else ""
+    source = (STEPS if apart else REPEATS) if told else ""
     if repeated is not None and (not told or np.sqrt(repeated) >= factor):
         factor, source = max(1.0, float(np.sqrt(repeated))), REPEATS
     bare = ErrorScale(factor, added, 1.0, source)
@@ -108,17 +130,21 @@ def error_scale(data: FlightEstimates, i: int, repeated: float | None) -> ErrorS
     return ErrorScale(factor, added, float(np.median(ratios)) if len(ratios) else 1.0, source)
 
 
-def _steps(data: FlightEstimates, i: int) -> tuple[Array, Array]:
-    """Sizes of steps between neighbouring flights of a vehicle, and their stated variances."""
+def _steps(data: FlightEstimates, i: int, *, within: bool = False) -> tuple[Array, Array]:
+    """Sizes of steps between neighbouring flights of a vehicle, and their stated variances.
+
+    Where `within`, those between flights of one day alone.
+    """
     steps, variances = [np.zeros(0)], [np.zeros(0)]
     for rows in histories_in_time(data, i):
         own = data.covariances[rows, i, i]
-        steps.append(np.abs(np.diff(data.values[rows, i])))
-        variances.append(own[1:] + own[:-1])
+        kept = np.diff(days_of(data.time_s[rows])) <= (0 if within else np.inf)
+        steps.append(np.abs(np.diff(data.values[rows, i]))[kept])
+        variances.append((own[1:] + own[:-1])[kept])
     return np.concatenate(steps), np.concatenate(variances)
 
 
-def _added(steps: Array, variances: Array) -> float:
+def added_spread(steps: Array, variances: Array) -> float:
     """Standard deviation beside the stated errors that makes the median step a normal one."""
 
     def beyond(q: float) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import chdtrc, chdtri
 
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
@@ -67,6 +68,11 @@ class RepeatScatter:
         return float(ends[0]), float(ends[1])
 
 
+def days_of(time_s: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Number of the day (UTC) of each time, s."""
+    return np.floor(time_s / DAY_S).astype(np.int64)
+
+
 def repeat_scatter(data: FlightEstimates) -> tuple[RepeatScatter, ...]:
     """Scatter of each parameter between flights of one vehicle on one day.
 
@@ -79,8 +85,9 @@ def repeat_scatter(data: FlightEstimates) -> tuple[RepeatScatter, ...]:
     -------
     tuple of RepeatScatter, length p
     """
-    day = np.floor(data.time_s / DAY_S).astype(np.int64)
-    _, group = np.unique(np.column_stack([data.member_of, day]), axis=0, return_inverse=True)
+    _, group = np.unique(
+        np.column_stack([data.member_of, days_of(data.time_s)]), axis=0, return_inverse=True
+    )
     group, count = group.ravel(), int(group.max(initial=-1)) + 1
     found = []
     for i, name in enumerate(data.names):
