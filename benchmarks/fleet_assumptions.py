@@ -20,7 +20,8 @@ class BrokenFleet:
 
     Errors are `understated` times as large, flights differ by `spread` more, all move by `season`
     in a sine over the whole time, and the last flights of the last vehicles by `change`. Errors of
-    the first vehicle are `first_understated` times as large again.
+    the first vehicle are `first_understated` times as large again. Of `a_day` flights on each third
+    day all share `days`. Errors that are `relative` are of that size, and told of each estimate.
     """
 
     vehicles: int = VEHICLES
@@ -33,24 +34,34 @@ class BrokenFleet:
     changed: int = 0
     last: int = 14
     first_understated: float = 1.0
+    a_day: int = 1
+    days: float = 0.0
+    relative: float | None = None
 
     def drift(self, seed: int) -> FleetDrift:
         """What is found of one drawn fleet."""
         rng, shape = np.random.default_rng(seed), (self.vehicles, self.flights)
         base = 10.0 * (1.0 + 0.1 * rng.normal(size=(self.vehicles, 1)))
         errors = rng.uniform(self.least, 0.05, shape)
+        if self.relative is not None:
+            errors[:] = self.relative
         moved = self.understated * errors * rng.normal(size=shape)
         moved[0] *= self.first_understated
         moved += self.spread * rng.normal(size=shape)
         moved += self.season * np.sin(2.0 * np.pi * np.arange(self.flights) / self.flights)
+        by_day = self.days * rng.normal(size=(self.vehicles, -(-self.flights // self.a_day)))
+        moved += np.repeat(by_day, self.a_day, axis=1)[:, : self.flights]
         moved[self.vehicles - self.changed :, self.flights - self.last :] += self.change
+        sized = base if self.relative is None else base * (1.0 + moved)
+        flight = np.arange(self.flights)
+        time_s = DAY_S * (3.0 * (flight // self.a_day) + 0.1 * (flight % self.a_day))
         return find_drift(
             FlightEstimates.of(
                 ["gain"],
                 np.repeat([f"{i:03}" for i in range(self.vehicles)], self.flights).tolist(),
                 (base * (1.0 + moved)).reshape(-1, 1),
-                ((base * errors) ** 2).reshape(-1, 1, 1),
-                time_s=np.tile(3.0 * DAY_S * np.arange(self.flights), self.vehicles),
+                ((sized * errors) ** 2).reshape(-1, 1, 1),
+                time_s=np.tile(time_s, self.vehicles),
             )
         )
 
@@ -103,6 +114,12 @@ def small_fleets() -> Iterator[tuple[str, BrokenFleet]]:
         words = f"{vehicles} of {flights} flights, errors of one understated by {first:g}"
         yield words, BrokenFleet(vehicles, flights, first_understated=first)
     yield "8 of 12 flights, season of 3 %", BrokenFleet(8, 12, season=0.03)
+    for vehicles, days in ((10, 0.0), (10, 0.04), (1, 0.04)):
+        words = f"{vehicles} of 24 flights, two a day, days differ by {days:.0%}"
+        yield words, BrokenFleet(vehicles, 24, a_day=2, days=days)
+    for relative in (0.1, 0.2):
+        words = f"10 of 20 flights, errors {relative:.0%} of each estimate"
+        yield words, BrokenFleet(10, 20, relative=relative)
     yield "1 of 12 flights, step of 10 %", BrokenFleet(1, 12, change=0.1, changed=1, last=5)
 
 

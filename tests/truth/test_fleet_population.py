@@ -135,9 +135,12 @@ def test_errors_about_zero_or_with_both_signs_are_taken_as_stated() -> None:
     names = [f"{i:02}" for i in range(13)]
     data = FlightEstimates.of(["a"], names, ratio[:, None], variance[:, None, None])
     assert errors_at_the_type(data) is data
-    assert relative_share(np.log([1.0, 2.0, 4.0]), np.log([0.1, 0.2, 0.4])) == pytest.approx(1.0)
-    assert relative_share(np.log([1.0, 2.0, 4.0]), np.zeros(3)) == pytest.approx(0.0)
-    assert relative_share(np.zeros(3), np.zeros(3)) == 0.5
+    sizes, one = np.log([1.0, 2.0, 4.0]), np.zeros(3, dtype=np.intp)
+    assert relative_share(sizes, np.log([0.1, 0.2, 0.4]), one) == pytest.approx(1.0)
+    assert relative_share(sizes, np.zeros(3), one) == pytest.approx(0.0)
+    assert relative_share(np.zeros(3), np.zeros(3), one) == 0.5
+    # Vehicles that differ, each with the errors that all have: nothing goes with its own flights.
+    assert relative_share(np.repeat(sizes, 2), np.repeat(sizes, 2), np.repeat([0, 1, 2], 2)) == 0.5
 
 
 def test_the_interval_of_a_mean_is_hartung_and_knapps_where_errors_are_alike() -> None:

@@ -24,10 +24,10 @@ def errors_at_the_type(data: FlightEstimates) -> FlightEstimates:
     error c without spread, of 20 vehicles 2.7 of its standard errors at c = 0.3. How much of an
     error is relative its flights tell, as they scatter about either rule:
 
-        share = 1 / (1 + (R₁ / R₀)^((n − 1)/2)),   s → s (m / |y|)^share
+        share = 1 / (1 + (R₁ / R₀)^((n − g)/2)),   s → s (m / |y|)^share
 
-    R₀ and R₁ are the sums of squares of log s and of log s − log|y| about their means, m the median
-    |y|. Where they do not tell, half of it counts.
+    R₀ and R₁ are the sums of squares of log s and of log s − log|y| of n flights about the means of
+    their g groups (here one: the type), m the median |y|. Where they do not tell, half counts.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def _set_scale(scale: Array, data: FlightEstimates, i: int, group: NDArray[np.in
     if np.count_nonzero(sure) < max(3.0, MOST * np.count_nonzero(there)):
         return
     size = np.log(np.abs(values[sure]))
-    share = relative_share(size, np.log(errors[sure]))
+    share = relative_share(size, np.log(errors[sure]), group[sure])
     for one in np.unique(group[sure]):
         mine = group[sure] == one
         scale[np.flatnonzero(sure)[mine]] = np.exp(share * (np.median(size[mine]) - size[mine]))
@@ -98,24 +98,31 @@ def _one_sided(values: Array, errors: Array, there: Flags) -> Flags:
     return np.asarray(side * values > SURE * errors)
 
 
-def relative_share(log_values: Array, log_errors: Array) -> float:
-    """How likely errors are relative rather than absolute.
+def relative_share(log_values: Array, log_errors: Array, group: NDArray[np.intp]) -> float:
+    """How likely errors are relative rather than absolute, by how they go with values of a group.
 
     Parameters
     ----------
     log_values, log_errors : ndarray, shape (n,)
         Logarithms of sizes and of standard errors.
+    group : ndarray of int, shape (n,)
+        Within which they are compared.
 
     Returns
     -------
     float
         From 0, absolute, to 1, relative; 0.5 where nothing tells.
     """
-    absolute, relative = (
-        float(np.sum((each - each.mean()) ** 2)) for each in (log_errors, log_errors - log_values)
-    )
+    _, place, count = np.unique(group, return_inverse=True, return_counts=True)
+
+    def squares(each: Array) -> float:
+        means = np.bincount(place, each) / count
+        return float(np.sum((each - means[place]) ** 2))
+
+    absolute, relative = squares(log_errors), squares(log_errors - log_values)
     least = 1e-12 * (absolute + relative)
     if least == 0.0:
         return 0.5
-    odds = 0.5 * (len(log_values) - 1) * np.log((absolute + least) / (relative + least))
+    freedom = len(log_values) - len(count)
+    odds = 0.5 * freedom * np.log((absolute + least) / (relative + least))
     return float(1.0 / (1.0 + np.exp(-np.clip(odds, -700.0, 700.0))))
