@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from flightid.errors import DataError
+from flightid.fleet.catalogue.loose import REWRITE
+from flightid.fleet.catalogue.soundness import unsound_logs
 from flightid.fleet.opening import open_catalogue
 from flightid.fleet.statistics.answers import RED, TypeAnswers, answer_questions
 from flightid.fleet.statistics.joint_fit import FlightPoints, MeasuredPoints, fit_population
@@ -81,9 +83,20 @@ def type_models(
                 f"SELECT * FROM {name} WHERE type = '{chosen}' AND light <> '{RED}'"
             )
             rows[name] = [dict(zip(told.columns, row, strict=True)) for row in told.fetchall()]
+    _require_sound(rows)
     answers = answer_questions(rows, drift=False, outliers=False)
     points = rows["responses"] if joint else None
     return {each.model: _pooled(each, rows["models"], points) for each in answers.types}
+
+
+def _require_sound(rows: Mapping[str, Sequence[Row]]) -> None:
+    """Refuse what a part of an earlier version may hold, by the log whose record it is."""
+    for log, flaw in unsound_logs(rows).items():
+        raise DataError(
+            "a record of the catalogue cannot be computed with",
+            found=f"log {log[:16]}…: {flaw}",
+            action=REWRITE,
+        )
 
 
 def _chosen(catalogue: Catalogue, type_name: str | None) -> str:
@@ -110,7 +123,7 @@ def _pooled(answers: TypeAnswers, rows: Sequence[Row], points: Sequence[Row] | N
         raise DataError("a type cannot be pooled", found=f"{name}: {'; '.join(answers.reasons)}")
     flights = set(answers.data.flights)
     members: dict[str, Any] = {
-        row["log"]: model_from_description(parse_toml(row["file"], "a model file", name))
+        row["log"]: model_from_description(parse_toml(row["file"], "a model file", row["log"]))
         for row in rows
         if row["model"] == answers.model and row["log"] in flights
     }

@@ -12,6 +12,14 @@ from flightid.table import Cell, Column, Table
 from flightid.wrapping import wrapped
 
 WIDTH = 100
+IN_WORDS = {
+    "record": "damaged record",
+    "time": "out of time",
+    "memory": "out of memory",
+    "killed": "its process was killed",
+    "fault": "a fault of flightid",
+}
+"""Codes that say too little by themselves."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +54,8 @@ class RefusalReason:
     @property
     def words(self) -> str:
         """The code as people read it."""
-        return self.reason.replace("-", " ") or "no reason is known"
+        plain = self.reason.replace("-", " ") or "no reason is known"
+        return IN_WORDS.get(self.reason, plain)
 
     @property
     def name(self) -> str:

@@ -6,6 +6,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from flightid.conventions import Light
+from flightid.fleet.catalogue.loose import BROKEN, REWRITE
+from flightid.fleet.catalogue.schema import FAILED
+from flightid.fleet.catalogue.soundness import unsound_logs
 from flightid.fleet.opening import names_fleet_file, open_catalogue
 from flightid.fleet.page import fleet_document
 from flightid.fleet.settings import FleetQuestions, FleetSettings, read_fleet
@@ -55,7 +59,7 @@ def ask_fleet(place: str | Path) -> FleetAnswers:
     settings = _settings(place)
     questions = FleetQuestions() if settings is None else settings.questions
     with open_catalogue(place) as catalogue:
-        rows = {name: _rows(catalogue, name) for name in ASKED}
+        rows = _sound({name: _rows(catalogue, name) for name in ASKED})
         damaged = len(catalogue.broken)
     answers = answer_questions(
         rows,
@@ -126,3 +130,22 @@ def _events(settings: FleetSettings) -> list[FleetEvent]:
 def _rows(catalogue: Catalogue, name: str) -> list[dict[str, Any]]:
     found = catalogue.table(name)
     return [dict(zip(found.columns, row, strict=True)) for row in found.fetchall()]
+
+
+def _sound(rows: dict[str, list[dict[str, Any]]]) -> dict[str, list[dict[str, Any]]]:
+    """The rows without those of logs that cannot be computed with, which stand as failures.
+
+    Loose records are held against this when they are read; parts of earlier versions were not.
+    """
+    flaws = unsound_logs(rows)
+    if not flaws:
+        return rows
+    kept = {name: [row for row in held if row["log"] not in flaws] for name, held in rows.items()}
+    told = {"outcome": FAILED, "reason": BROKEN, "light": str(Light.RED), "action": REWRITE}
+    kept["logs"] = [
+        row | told | {"message": f"its record cannot be computed with: {flaws[row['log']]}"}
+        if row["log"] in flaws
+        else row
+        for row in rows["logs"]
+    ]
+    return kept

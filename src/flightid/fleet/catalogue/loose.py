@@ -7,13 +7,14 @@ from typing import Any
 
 from flightid.conventions import Light
 from flightid.errors import DataError
-from flightid.fleet.catalogue.record import KEY_LENGTH, LogRecord
+from flightid.fleet.catalogue.record import KEY_LENGTH, LogRecord, legible
 from flightid.fleet.catalogue.schema import FAILED, TABLES
 from flightid.fleet.catalogue.store import Store
 
 LOOSE = "loose"
 QUARANTINE = "quarantine"
 AGAIN = "flightid fleet run takes the log again"
+REWRITE = "move parts/ of the catalogue away and run the fleet again: it takes those logs again"
 SUFFIX = ".json"
 BROKEN = "record"
 """Kind of a failure: the record of a log could not be read again."""
@@ -63,15 +64,19 @@ def read_loose(store: Store, logs: Iterable[str]) -> Iterator[LogRecord]:
 def _quarantined(store: Store, log: str, content: bytes, error: DataError) -> LogRecord:
     """Keep the bytes for whoever looks into it, and put a failure in their place."""
     store.write(f"{QUARANTINE}/{log}{SUFFIX}", content)
-    record = broken_record(log, str(error))
+    known = {name: legible(content, "logs", name) for name in ("vehicle", "address")}
+    record = broken_record(log, str(error), **known)
     write_loose(store, record)
     return record
 
 
-def broken_record(log: str, message: str) -> LogRecord:
+def broken_record(
+    log: str, message: str, vehicle: str | None = None, address: str | None = None
+) -> LogRecord:
     """The record of a log whose record is broken: a failure, until the log is run again."""
-    common: Mapping[str, Any] = {"log": log, "light": str(Light.RED)}
+    common: Mapping[str, Any] = {"log": log, "light": str(Light.RED), "vehicle": vehicle}
     entry = {"outcome": FAILED, "reason": BROKEN, "message": message, "models": 0, "action": AGAIN}
+    entry["address"] = address
     failure = {"kind": BROKEN, "message": message, "stage": BROKEN}
     every: dict[str, list[dict[str, Any]]] = {"logs": [entry], "failures": [failure]}
     rows = {name: [{**common, **row} for row in every.get(name, ())] for name in TABLES}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime
 import json
+import math
 import re
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeGuard
@@ -21,6 +22,7 @@ from flightid.fleet.catalogue.schema import (
     WHOLE,
     FleetTable,
 )
+from flightid.fleet.catalogue.soundness import flaw_of
 from flightid.frozen import dataclass
 
 KEY_LENGTH = 64
@@ -90,7 +92,8 @@ class LogRecord:
         Raises
         ------
         DataError
-            It is cut short, of another version, or holds what a column cannot.
+            It is cut short, of another version, holds what a column cannot, or numbers that
+            nothing can be computed with.
         """
         try:
             values = json.loads(content)
@@ -104,6 +107,8 @@ class LogRecord:
                 raise DataError("a record of no log")
             if any(row["log"] != log for part in rows.values() for row in part):
                 raise DataError("a record of several logs")
+            if flaw := flaw_of(rows):
+                raise DataError("numbers of this record are not as they were written", found=flaw)
         except FlightidError:
             raise
         except BROKEN_JSON as error:
@@ -113,6 +118,22 @@ class LogRecord:
                 needed=f"a document of {SCHEMA}",
             ) from error
         return cls(log, rows)
+
+
+def legible(content: bytes, table: str, column: str) -> str | None:
+    """A text of a record's first row in a table, of one that is broken elsewhere; None: it is too.
+
+    Parameters
+    ----------
+    content : bytes
+    table, column : str
+    """
+    try:
+        values = json.loads(content)
+        value = values["tables"][table][0][values["columns"][table].index(column)]
+    except (*BROKEN_JSON, LookupError):
+        return None
+    return value if isinstance(value, str) and _fits(value, TEXT) else None
 
 
 def _rows(table: FleetTable, given: list[list[Any]]) -> list[dict[str, Any]]:
@@ -136,7 +157,8 @@ def _fits(value: object, kind: str) -> bool:
     if kind == TEXT:
         return isinstance(value, str) and not SURROGATE.search(value)
     if kind == NUMBER:
-        return isinstance(value, float) or (_is_whole(value) and abs(value) <= MOST_EXACT)
+        is_number = isinstance(value, float) and math.isfinite(value)
+        return is_number or (_is_whole(value) and abs(value) <= MOST_EXACT)
     if kind == WHOLE:
         return _is_whole(value) and -MOST_WHOLE <= value < MOST_WHOLE
     if kind == INSTANT:
