@@ -16,6 +16,7 @@ from flightid.cli.bar import Bar
 from flightid.conventions import Light
 from flightid.errors import DataError
 from flightid.findings import Finding
+from flightid.fleet.run import FleetInterrupt
 from flightid.table import Column, Table
 from flightid.version import VERSION
 
@@ -103,7 +104,8 @@ def test_flightid_error_is_a_sentence(
 @pytest.mark.parametrize(
     ("raised", "code", "said"),
     [
-        (KeyboardInterrupt(), 130, "Interrupted"),
+        (KeyboardInterrupt(), 130, "Interrupted; nothing was left half-written."),
+        (FleetInterrupt(3, 4), 130, "Interrupted: 3 of 4 logs in the catalogue; the same command"),
         (FileNotFoundError(2, "No such file", "x.bin"), 2, "Error: x.bin: no such file"),
         (RuntimeError("inner"), 70, "fault in flightid"),
         (BrokenPipeError(), 0, ""),
@@ -185,6 +187,16 @@ def test_bar_is_quiet_for_short_work_and_vanishes(monkeypatch: pytest.MonkeyPatc
     shown.close()
     assert f"long[2J {'━' * 15:<30} 1/2" in stream.getvalue()
     assert stream.getvalue().endswith(bar.CLEAR)
+    # In a file, where nothing was to be seen of a run of hours, whole lines now and then.
+    for name, wait_s in (("FIRST_LINE_S", 0.01), ("LINE_S", 0.01)):
+        monkeypatch.setattr(bar, name, wait_s)
+    lines = StringIO()
+    told = Bar("logs", 2, lines)
+    told.advance()
+    while lines.getvalue().count("\n") < 2:
+        time.sleep(0.01)
+    told.close()
+    assert lines.getvalue().splitlines()[-1] == "logs 1/2 0:00 (about 0:00 left)"
 
 
 @pytest.mark.skipif(shutil.which("bash") is None, reason="no bash here")

@@ -69,6 +69,9 @@ def test_what_an_inspection_finds_comes_before_where_the_study_stopped(
         first = FELL if code == "tipped-over" else SHORT
         assert found["message"].startswith(f"{first.message}. The study stopped at this: channel")
         assert first.action in found["action"]
+        # One piece of advice: what stopped the study, and what to fly, follow from the length.
+        one = f"copy the log again where it is cut off, else {SHORT.action}"
+        assert (found["action"] == one) == (code == "too-short")
     monkeypatch.setattr(room, "inspect_log", lambda _: seen.with_findings(()))
     assert refusal(STOPPED, log)["reason"] == "data-unusable"
 
@@ -98,8 +101,11 @@ def test_reasons_are_counted_with_an_example_and_what_to_do() -> None:
     found = grouped_reasons(rows)
     assert [(each.outcome, each.words, each.logs) for each in found] == [
         ("refused", "not a log", 3),
-        ("failed", "time", 1),
+        ("failed", "out of time", 1),
     ]
+    assert room.joined(["set X 1 and fly again", "fly", "set X 1", "fly"]) == "; ".join(
+        ("set X 1 and fly again", "fly")
+    )
     lines = reason_lines(found)
     assert lines[:2] == [
         "  3 refused: not a log (such as 0.bin: an empty file)",

@@ -13,17 +13,18 @@ import threading
 import time
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 import pytest
 
-from flightid.errors import DataError
+from flightid.errors import DataError, StudyError
 from flightid.fleet import fleet_status, run_fleet
 from flightid.fleet.addresses import LogAddress, find_logs
 from flightid.fleet.catalogue.loose import write_loose
 from flightid.fleet.catalogue.record import LogRecord
 from flightid.fleet.engine import plain
+from flightid.fleet.engine.interrupts import interrupts_held
 from flightid.fleet.engine.order import (
     KILLED,
     STORAGE,
@@ -35,8 +36,9 @@ from flightid.fleet.engine.order import (
 from flightid.fleet.engine.sandbox import DEAD, MEMORY, TIME, Sandbox
 from flightid.fleet.identity import FleetTables, read_tables
 from flightid.fleet.opening import current_store, open_catalogue
-from flightid.fleet.run_one import LogTask, run_one
+from flightid.fleet.run_one import NAMING, LogTask, run_one
 from flightid.fleet.settings import read_fleet
+from flightid.fleet.shares import copy_lines
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "fleet"
 
@@ -275,23 +277,35 @@ def test_a_log_longer_than_the_fleet_allows_is_refused(fleet: Path, tmp_path: Pa
     assert "at most 1 MiB" in made.rows["failures"][0]["message"]
 
 
-def test_nobody_tries_a_pattern_without_a_clock(
+def test_a_pattern_that_backtracks_is_named_and_blamed_on_no_log(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def never(*_: object) -> None:
-        raise AssertionError("a pattern of the user in the parent")
-
-    (tmp_path / "aaaa.bin").write_bytes(b"no log")
+    """Each log took all its time, and stood as one that is not done after time_s."""
+    (tmp_path / f"{'a' * 60}.bin").write_bytes(b"no log")
     text = "[fleet]\ntitle = 't'\nlogs = ['.']\n[vehicles]\nby = 'name'\npattern = '^(a*)*_'\n"
     (tmp_path / "fleet.toml").write_text(text)
+    monkeypatch.setattr("flightid.fleet.pattern_clock.LEAST_S", 0.05)
+    with pytest.raises(StudyError, match=r"pattern does not come to an end: found '\^\(a\*\)\*_'"):
+        run_fleet(tmp_path / "fleet.toml")
+    assert signal.getsignal(signal.SIGVTALRM) == signal.SIG_DFL
+    assert signal.getitimer(signal.ITIMER_VIRTUAL) == (0.0, 0.0)
+    # Where there is no such clock the process of the log has one, and says what it was at.
+    monkeypatch.setattr("flightid.fleet.pattern_clock._has_clock", lambda: False)
     monkeypatch.setattr("flightid.fleet.run.find_spec", lambda _: None)
     monkeypatch.setattr("flightid.fleet.identity.re.search", never)
-
-    def killed(_: RunOrder, logs: list[LogOrder], __: int | None) -> Iterator[LogOutcome]:
-        return (LogOutcome(log, KILLED, log.address.digest, TIME) for log in logs)
-
     monkeypatch.setattr("flightid.fleet.run.run_plain", killed)
     assert run_fleet(tmp_path / "fleet.toml").outcomes == {"failed": 1}
+    with open_catalogue(tmp_path / "fleet.toml") as catalogue:
+        ((told,),) = catalogue.query("SELECT action FROM logs").fetchall()
+    assert told.startswith("write the pattern of [vehicles] so that it comes to an end")
+
+
+def never(*_: object) -> None:
+    raise AssertionError("a pattern of the user in the parent")
+
+
+def killed(_: RunOrder, logs: list[LogOrder], __: int | None) -> Iterator[LogOutcome]:
+    return (LogOutcome(log, KILLED, log.address.digest, TIME, stage=NAMING) for log in logs)
 
 
 def test_an_address_has_one_record_that_counts(
@@ -333,9 +347,32 @@ def test_one_content_under_three_names_is_one_log(
     assert (done.found, done.kept, done.outcomes) == (3, 0, {"refused": 1})
     assert [each.code for each in done.findings] == ["copied-logs", "nothing-fitted"]
     assert done.findings[0].message.startswith("2 logs with the bytes of another")
-    assert fleet_status(tmp_path / "fleet.toml").outcomes == {"refused": 1}
+    assert done.found == done.kept + sum(done.outcomes.values()) + len(done.copies)
     again = run_fleet(tmp_path / "fleet.toml", workers=1)
     assert (again.found, again.kept, again.outcomes) == (3, 3, {})
+    # Three files of which one was refused and nothing was said of the others did not add up.
+    (tmp_path / "d.bin").write_bytes(b"another")
+    status = fleet_status(tmp_path / "fleet.toml")
+    assert status.outcomes == {"refused": 1}
+    shares = status.shares
+    assert shares is not None
+    assert (shares.outcomes, len(shares.copies), len(shares.waiting)) == ({"refused": 1}, 2, 1)
+    assert status.found == 4
+    (line,) = copy_lines(shares)
+    assert line.startswith("  2 copies: ")
+    first = PurePosixPath(next(iter(shares.copies.values()))).name
+    assert f".bin is {first}, " in line
+    # One that was moved keeps its record; one that is gone is no copy of it.
+    (tmp_path / first).rename(tmp_path / "moved.bin")
+    (tmp_path / next(name for name in ("a.bin", "b.bin") if name != first)).unlink()
+    after = fleet_status(tmp_path / "fleet.toml").shares
+    assert after is not None
+    assert (after.outcomes, len(after.copies), len(after.waiting)) == ({"refused": 1}, 1, 1)
+    for name in ("moved.bin", "c.bin", "b.bin", "a.bin"):
+        (tmp_path / name).unlink(missing_ok=True)
+    none = fleet_status(tmp_path / "fleet.toml")
+    assert none.shares is not None
+    assert (none.shares.outcomes, len(none.shares.gone), none.reasons) == ({}, 1, ())
     # A fleet without one model is as red when nothing is left to take.
     assert [(each.code, each.light) for each in again.findings] == [("nothing-fitted", "red")]
 
@@ -369,6 +406,41 @@ def test_a_run_in_which_all_fails_says_so(fleet: Path, monkeypatch: pytest.Monke
     monkeypatch.setattr("flightid.fleet.run.run_plain", dead)
     done = run_fleet(fleet)
     assert [each.code for each in done.findings if each.light == "red"] == ["all-failed"]
+
+
+def test_an_interrupt_tells_how_far_it_came_and_reaches_no_worker(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ctrl-C printed where Dask and every worker stood, and nothing of what is kept."""
+    blocked = []
+
+    def held() -> None:
+        """What a thread has, and so each process that it begins."""
+        with interrupts_held():
+            os.kill(os.getpid(), signal.SIGINT)
+            asked = threading.Thread(
+                target=lambda: blocked.extend(signal.pthread_sigmask(signal.SIG_BLOCK, []))
+            )
+            asked.start()
+            asked.join()
+
+    with pytest.raises(KeyboardInterrupt):
+        held()
+    assert signal.SIGINT in blocked
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, [])
+    for name in ("a.bin", "b.bin", "c.bin"):
+        (tmp_path / name).write_bytes(name.encode())
+    (tmp_path / "fleet.toml").write_text("[fleet]\ntitle = 't'\nlogs = ['.']\n")
+
+    def stopped(order: RunOrder, logs: list[LogOrder], _: int | None) -> Iterator[LogOutcome]:
+        yield LogOutcome(logs[0], "refused", order.claimant)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("flightid.fleet.run.find_spec", lambda _: None)
+    monkeypatch.setattr("flightid.fleet.run.run_plain", stopped)
+    with pytest.raises(KeyboardInterrupt, match="1 of 3 logs in the catalogue; the same command"):
+        run_fleet(tmp_path / "fleet.toml")
 
 
 def _claimed(monkeypatch: pytest.MonkeyPatch, folder: Path, name: str) -> tuple[Any, LogAddress]:

@@ -1,4 +1,4 @@
-"""A progress bar on standard error, for work that takes longer than a second."""
+"""Progress on standard error: a bar on a terminal, a line now and then in a file."""
 
 from __future__ import annotations
 
@@ -13,10 +13,15 @@ REDRAWN_S = 0.1
 WIDTH = 30
 LABEL_WIDTH = 40
 CLEAR = "\r\x1b[K"
+FIRST_LINE_S, LINE_S, LINE_SHARE = 10.0, 30.0, 0.1
+"""In a file: when the first line comes, and after how long the next, or what share of the time."""
 
 
 class Bar:
     """One bar; appears after `PATIENCE_S` and vanishes when the work ends.
+
+    Where there is no terminal a line is written after `FIRST_LINE_S`, and then the more seldom the
+    longer the work takes.
 
     Parameters
     ----------
@@ -25,7 +30,7 @@ class Bar:
     total : int or None
         Number of steps.
     stream : text stream
-        Where to draw; one that is no terminal shows nothing.
+        Where to draw.
     """
 
     def __init__(self, label: str, total: int | None, stream: TextIO) -> None:
@@ -33,9 +38,9 @@ class Bar:
         self._total, self._done = total, 0
         self._stream, self._begun = stream, time.monotonic()
         self._ended = Event()
-        self._thread = Thread(target=self._draw, daemon=True)
-        if stream.isatty():
-            self._thread.start()
+        draw = self._draw if stream.isatty() else self._tell
+        self._thread = Thread(target=draw, daemon=True)
+        self._thread.start()
 
     def advance(self, steps: int = 1) -> None:
         """Count steps that are done."""
@@ -44,8 +49,7 @@ class Bar:
     def close(self) -> None:
         """Take the bar away."""
         self._ended.set()
-        if self._thread.ident is not None:
-            self._thread.join()
+        self._thread.join()
 
     def _draw(self) -> None:
         if self._ended.wait(PATIENCE_S):
@@ -58,13 +62,40 @@ class Bar:
         self._stream.write(CLEAR)
         self._stream.flush()
 
+    def _tell(self) -> None:
+        """Whole lines, for whoever follows or keeps a file."""
+        wait_s = FIRST_LINE_S
+        while not self._ended.wait(wait_s):
+            passed_s = time.monotonic() - self._begun
+            left = self._left(passed_s)
+            said = " ".join(filter(None, (self._label, self._counted(), left)))
+            try:
+                self._stream.write(f"{said}\n")
+                self._stream.flush()
+            except (OSError, ValueError):
+                return  # Nobody reads it any more; the work goes on.
+            wait_s = max(LINE_S, LINE_SHARE * passed_s)
+
     def _line(self) -> str:
-        minutes, seconds = divmod(int(time.monotonic() - self._begun), 60)
-        clock = f"{minutes}:{seconds:02d}"
-        if not self._total:
-            return f"{self._label} {clock}"
-        full = WIDTH * min(self._done, self._total) // self._total
-        return f"{self._label} {'━' * full:<{WIDTH}} {self._done}/{self._total} {clock}"
+        drawn = ""
+        if self._total:
+            drawn = f"{'━' * (WIDTH * min(self._done, self._total) // self._total):<{WIDTH}}"
+        return " ".join(filter(None, (self._label, drawn, self._counted())))
+
+    def _counted(self) -> str:
+        """Steps that are done, and the time that they took."""
+        clock = _clock(time.monotonic() - self._begun)
+        return f"{self._done}/{self._total} {clock}" if self._total else clock
+
+    def _left(self, passed_s: float) -> str:
+        """The time that the rest takes if it goes on like this."""
+        if not self._total or not 0 < self._done < self._total:
+            return ""
+        return f"(about {_clock(passed_s * (self._total / self._done - 1.0))} left)"
+
+
+def _clock(seconds: float) -> str:
+    return f"{int(seconds) // 60}:{int(seconds) % 60:02d}"
 
 
 def bar_display(label: str, total: int | None) -> Bar:

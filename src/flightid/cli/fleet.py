@@ -45,9 +45,9 @@ def run(
     Of a FOLDER of logs a fleet file with comments is written beside it first, and what was chosen
     is said: <folder>-fleet.toml is what the other commands take from then on.
 
-    A log that fails costs itself alone. Interrupt a run at any time: the next one takes what is
-    missing. The exit code is 1 where no log was found, every one that was taken failed, or none of
-    the catalogue has a model.
+    A log that fails costs itself alone. Interrupt a run at any time (Ctrl-C): the same command
+    takes what is missing. The exit code is 1 where no log was found, every one that was taken
+    failed, or none of the catalogue has a model.
     """
     from flightid.fleet import run_fleet
     from flightid.fleet.reasons import reason_lines
@@ -66,6 +66,8 @@ def run(
         click.echo(f"{done.found} logs, {done.kept} of them in the catalogue before")
         for outcome, number in sorted(done.outcomes.items()):
             click.echo(f"{number} {outcome}")
+        if done.copies:
+            click.echo(f"{len(done.copies)} with the bytes of another")
         for line in reason_lines(done.reasons):
             click.echo(line)
         note(f"Wrote {done.catalogue}")
@@ -95,11 +97,12 @@ def status(place: str, as_json: bool) -> None:
     """Count the logs of a fleet file, or of a catalogue by its folder or address."""
     from flightid.fleet import fleet_status
     from flightid.fleet.reasons import reason_lines
+    from flightid.fleet.shares import copy_lines
 
     found = fleet_status(place)
     emit(found, as_json=as_json)
     if not as_json:
-        for line in reason_lines(found.reasons):
+        for line in (*copy_lines(found.shares), *reason_lines(found.reasons)):
             click.echo(line)
 
 

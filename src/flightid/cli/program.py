@@ -161,8 +161,10 @@ def run(arguments: Sequence[str] | None = None) -> int:
         if where and (hint := missing_hint(error.format_message(), where.command_path)):
             note(f"Hint: {hint}")
         return error.exit_code
-    except (KeyboardInterrupt, click.Abort):
-        note("Interrupted; nothing was left half-written.")
+    except (KeyboardInterrupt, click.Abort) as stop:
+        # Click makes an abort of Ctrl-C: what a verb has to say of it stands in its cause.
+        told = stop.__cause__ if isinstance(stop, click.Abort) else stop
+        note(str(told or "") or "Interrupted; nothing was left half-written.")
         return Exit.INTERRUPTED
     except BrokenPipeError:
         return Exit.DONE

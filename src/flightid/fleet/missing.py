@@ -47,12 +47,12 @@ def missing_logs(
     """
     there = {each.address: each for each in addresses}
     done, again, earlier = set[str](), set[str](), dict[str, set[str]]()
-    for entry in _entries(store):
+    for entry in catalogue_entries(store):
         is_stale = entry.told != tables.told(entry.id or None, entry.address)
         if entry.reason == BROKEN or is_stale or (retry and entry.outcome == FAILED):
             again.add(entry.log)
         elif entry.address in there:
-            if _stands_for(entry, there[entry.address]):
+            if stands_for(entry, there[entry.address]):
                 done.add(entry.address)
             else:
                 earlier.setdefault(entry.address, set()).add(entry.log)
@@ -62,13 +62,13 @@ def missing_logs(
     return [each for each in addresses if each.address not in done], earlier
 
 
-def _stands_for(entry: LogEntry, address: LogAddress) -> bool:
+def stands_for(entry: LogEntry, address: LogAddress) -> bool:
     """Whether a log is still the one that was taken; stores of objects tell that by the stamp."""
     is_as_long = address.local is None or entry.bytes == str(address.n_bytes)
     return entry.stamp == address.stamp and is_as_long
 
 
-def _entries(store: Store) -> Iterator[LogEntry]:
+def catalogue_entries(store: Store) -> Iterator[LogEntry]:
     """Of every record."""
     names = [each.name for each in fields(LogEntry)]
     parts, _ = read_parts(store)

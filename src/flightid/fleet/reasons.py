@@ -18,6 +18,7 @@ IN_WORDS = {
     "memory": "out of memory",
     "killed": "its process was killed",
     "fault": "a fault of flightid",
+    "pattern": "pattern without an end",
 }
 """Codes that say too little by themselves."""
 

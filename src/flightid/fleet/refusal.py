@@ -26,8 +26,11 @@ from flightid.study.proposal import Proposal
 
 MESSAGE_LENGTH = 2000
 MOST_ACTIONS = 3
-MEMORY, FAULT, FELL = "memory", "fault", "tipped-over"
-"""More memory than the fleet allows one log; an error that no log should raise; a fall."""
+MEMORY, FAULT, FELL, PATTERN = "memory", "fault", "tipped-over", "pattern"
+"""More memory than the fleet allows one log; an error that no log should raise; a fall; a pattern
+of the fleet file that does not come to an end."""
+SHORT = "too-short"
+"""Code of an inspection's verdict on a log that ends too early."""
 GRAVITY = (Light.RED, Light.AMBER, Light.UNKNOWN, Light.GREEN)
 SETTING = re.compile(r"\b[A-Z][A-Z0-9]+_[A-Z0-9_]+\b|\blog(ged|ging)?\b")
 """An action that speaks of the logging, or of a parameter of the autopilot."""
@@ -53,6 +56,8 @@ ACTIONS = {
     "time": "raise time_s in [limits] of the fleet file, then flightid fleet run --retry",
     MEMORY: "raise memory_mib in [limits] of the fleet file, then flightid fleet run --retry",
     "killed": "see whether the machine ran out of memory, then flightid fleet run --retry",
+    PATTERN: "write the pattern of [vehicles] so that it comes to an end, without repeats inside "
+    "repeats, then flightid fleet run",
     FAULT: "a fault of flightid and not of the log: report it with these words",
 }
 """What to do where an error does not say it."""
@@ -100,7 +105,7 @@ def refusal(error: Exception, log: Log | None) -> dict[str, Any]:
         worst = decisive(seen)
         if worst is not None:
             code, words = worst.code, f"{worst.message}. The study stopped at this: {words}"
-            actions = [*(each.action for each in seen if each.light is worst.light), *actions]
+            actions = _against_it(worst, seen) or actions
     return {
         "outcome": REFUSED if known else FAILED,
         "reason": code,
@@ -151,14 +156,27 @@ def unidentified(made: Proposal) -> LogRefusalError:
     refused = LogRefusalError(
         "no model can be identified from this log",
         found=None if worst is None else worst.message,
-        action=joined(each.action for each in bad) or None,
+        action=joined(_against_it(worst, bad)) or None,
     )
     if worst is not None:
         refused.code = worst.code
     return refused
 
 
+def _against_it(worst: Finding | None, seen: Sequence[Finding]) -> list[str]:
+    """What to do about what decided, and about what weighs as much; else about anything.
+
+    Where a log is too short all else follows from that: one thing is to be done.
+    """
+    if worst is not None and worst.code == SHORT and worst.action:
+        return [f"copy the log again where it is cut off, else {worst.action}"]
+    light = None if worst is None else worst.light
+    grave = [each.action for each in seen if each.light is light and each.action]
+    return grave or [each.action for each in seen if each.action]
+
+
 def joined(actions: Iterable[str]) -> str:
-    """What to do, settings of the logging first, each once and three at most."""
+    """What to do, settings of the logging first, three at most; none that another begins with."""
     told = sorted(filter(None, actions), key=lambda action: SETTING.search(action) is None)
-    return "; ".join(list(dict.fromkeys(told))[:MOST_ACTIONS])
+    once = [a for a in dict.fromkeys(told) if not any(b != a and b.startswith(a) for b in told)]
+    return "; ".join(once[:MOST_ACTIONS])

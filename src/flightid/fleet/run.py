@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import replace
+from dataclasses import field, replace
 from importlib.util import find_spec
 from multiprocessing import current_process
 from pathlib import Path
@@ -32,12 +32,14 @@ from flightid.fleet.engine.order import (
     run_order,
 )
 from flightid.fleet.engine.plain import run_plain
+from flightid.fleet.engine.sandbox import TIME
 from flightid.fleet.identity import FleetTables, identify_log, read_tables
 from flightid.fleet.missing import forget, missing_logs
 from flightid.fleet.opening import current_store
+from flightid.fleet.pattern_clock import require_quick
 from flightid.fleet.reasons import RefusalReason
-from flightid.fleet.refusal import ACTIONS
-from flightid.fleet.run_one import FULL, made_record
+from flightid.fleet.refusal import ACTIONS, PATTERN
+from flightid.fleet.run_one import FULL, NAMING, made_record
 from flightid.fleet.settings import FleetSettings, read_fleet
 from flightid.fleet.taken import TakenContents
 from flightid.frozen import dataclass
@@ -63,6 +65,9 @@ class FleetRun(Result, schema="flightid.fleet_run/1"):
     findings : tuple of Finding
     reasons : tuple of RefusalReason
         Why those that were taken and gave no model did not, the commonest first.
+    copies : mapping of str to str
+        Addresses whose bytes another log had that was taken, and its address: found is the sum of
+        what was kept, all outcomes and these.
 
     Example
     -------
@@ -76,11 +81,13 @@ class FleetRun(Result, schema="flightid.fleet_run/1"):
     outcomes: dict[str, int]
     findings: tuple[Finding, ...] = ()
     reasons: tuple[RefusalReason, ...] = ()
+    copies: Mapping[str, str] = field(default_factory=dict)
 
     def summary(self) -> Table:
         """Table of the numbers."""
         rows: list[tuple[str, int]] = [("logs found", self.found), ("kept", self.kept)]
         rows += [(f"{name} logs", n) for name, n in sorted(self.outcomes.items())]
+        rows += [("copies of these", len(self.copies))] if self.copies else []
         columns = (Column("what"), Column("number"))
         return Table(f"Run of {self.catalogue}", columns, tuple(rows))
 
@@ -88,6 +95,22 @@ class FleetRun(Result, schema="flightid.fleet_run/1"):
         """Numbers of logs on one line."""
         told = ", ".join(f"{n} {name}" for name, n in sorted(self.outcomes.items())) or "none taken"
         return f"FleetRun({self.found} logs, {self.kept} kept, {told})"
+
+
+class FleetInterrupt(KeyboardInterrupt):
+    """Ctrl-C in a run: what is in the catalogue, and how to go on.
+
+    Parameters
+    ----------
+    done, found : int
+        Logs that are in the catalogue, and all at the places of the fleet file.
+    """
+
+    def __init__(self, done: int, found: int) -> None:
+        super().__init__(
+            f"Interrupted: {done} of {counted(found, 'log')} in the catalogue; the same command "
+            "takes the rest."
+        )
 
 
 def run_fleet(
@@ -125,6 +148,8 @@ def run_fleet(
         No scheduler answers, or a library is missing.
     DataError
         The cluster is gone, or the catalogue cannot be written any more.
+    FleetInterrupt
+        Ctrl-C, with how many logs are done: the next run takes the others.
 
     Example
     -------
@@ -151,20 +176,25 @@ def _run(path: str | Path, workers: int | None, scheduler: str | None, *, retry:
     order = replace(run_order(settings, tables, store.root), claimant=claimant)
     aside = set_aside(store)
     addresses = find_logs([settings.place(place) for place in settings.words.logs])
+    require_quick(settings.vehicles.pattern, (each.name for each in addresses))
     missing, earlier = missing_logs(store, addresses, tables, retry=retry)
     findings = [*_findings(scheduler, addresses), *([] if claims else [UNCLAIMED])]
     replaced, taken = set[str](), TakenContents()
     run = _Run(settings, tables, store, order, workers, scheduler)
-    with progress(len(missing), settings.path.stem) as advance:
-        for outcome in run.outcomes(orders(missing, tables)):
-            taken.add(outcome)
-            replaced |= earlier.get(outcome.order.address.address, set())
-            advance()
+    before = len(addresses) - len(missing)
+    try:
+        with progress(len(missing), settings.path.stem) as advance:
+            for outcome in run.outcomes(orders(missing, tables)):
+                taken.add(outcome)
+                replaced |= earlier.get(outcome.order.address.address, set())
+                advance()
+    except KeyboardInterrupt as stop:
+        raise FleetInterrupt(before + taken.names, len(addresses)) from stop
     replaced -= taken.outcomes.keys()
     forget(store, replaced)
     run.tidy(1)
     counts = taken.counts()
-    kept = len(addresses) - len(missing) + counts.pop(KNOWN, 0)
+    kept = before + counts.pop(KNOWN, 0)
     if aside:
         text = (
             f"{len(aside)} tables were damaged: they lie in quarantine, their logs were taken again"
@@ -176,8 +206,9 @@ def _run(path: str | Path, workers: int | None, scheduler: str | None, *, retry:
     findings += taken.findings()
     findings += _nothing_fitted(counts, store, len(addresses))
     return FleetRun(
-        settings.catalogue, len(addresses), kept, counts, tuple(findings), taken.reasons()
-    )
+        settings.catalogue, len(addresses), kept, counts, tuple(findings), taken.reasons(),
+        taken.copies,
+    )  # fmt: skip
 
 
 def _findings(scheduler: str | None, addresses: list[LogAddress]) -> Iterator[Finding]:
@@ -305,6 +336,9 @@ class _Run:
         """The record of a log that killed its process twice."""
         address = outcome.order.address
         rules = self.settings.vehicles
+        if outcome.stage == NAMING and outcome.reason == TIME:
+            said = f"the pattern {rules.pattern!r} of [vehicles] does not come to an end here"
+            outcome = replace(outcome, reason=PATTERN, message=said)
         if rules.by == "name":
             # The pattern may be what hung the process: here nobody has a clock on it.
             rules = replace(rules, by="log", pattern=None)

@@ -40,7 +40,7 @@ from flightid.logs import Log, read_log
 from flightid.study import Study, run_study
 from flightid.study.proposal import propose_study
 
-ADDRESS, READING, STUDY, PROCESS = "address", "reading", "study", "process"
+ADDRESS, NAMING, READING, STUDY = "address", "naming", "reading", "study"
 Tell = Callable[[str, str], None]
 """Takes what was begun, and the digest of the log once it is known: ahead of what may kill."""
 FULL = {errno.ENOSPC, errno.EDQUOT, errno.EROFS}
@@ -119,12 +119,15 @@ def run_one(address: LogAddress, task: LogTask, *, attempts: int = 1) -> LogReco
     try:
         with tempfile.TemporaryDirectory(prefix="flightid-fleet-") as scratch:
             path = _fetched(address, Path(scratch), task, state)
-            task.tell(READING, state.log)
+            # A pattern that backtracks is not the log's fault: what holds it up is told ahead.
+            state.stage = NAMING
+            task.tell(NAMING, state.log)
             if task.known(state.log):
                 return None
-            state.stage = READING
             rules, tables = task.settings.vehicles, task.tables
             identity = identify_log(None, address.address, address.changed_s, rules, tables)
+            state.stage = READING
+            task.tell(READING, state.log)
             log = read_log(path)
             identity = identify_log(log, address.address, address.changed_s, rules, tables)
             entry = {"autopilot": log.kind, "firmware": log.firmware or None}

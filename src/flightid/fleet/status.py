@@ -1,9 +1,10 @@
-"""How far a fleet is, from names and manifests alone: no query, and no library of the extra."""
+"""How far a fleet is: which files are taken, which are copies, and why some gave no model."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from flightid.fleet.catalogue.store import Store
 from flightid.fleet.opening import catalogue_place, names_fleet_file, opened_store
 from flightid.fleet.reasons import RefusalReason, grouped_reasons
 from flightid.fleet.settings import read_fleet
+from flightid.fleet.shares import FleetShares
 from flightid.frozen import dataclass
 from flightid.result import Result
 from flightid.table import Column, Table
@@ -41,6 +43,8 @@ class FleetStatus(Result, schema="flightid.fleet_status/1"):
         Size of parts and loose files, B.
     reasons : tuple of RefusalReason
         Why logs gave no model, the commonest first; of compacted ones where the extra is installed.
+    shares : FleetShares or None
+        Where each file stands; None where the catalogue alone was named, or without the extra.
 
     Example
     -------
@@ -56,6 +60,7 @@ class FleetStatus(Result, schema="flightid.fleet_status/1"):
     quarantine: tuple[str, ...] = ()
     n_bytes: int = 0
     reasons: tuple[RefusalReason, ...] = ()
+    shares: FleetShares | None = None
 
     @property
     def n_logs(self) -> int:
@@ -63,9 +68,18 @@ class FleetStatus(Result, schema="flightid.fleet_status/1"):
         return sum(self.outcomes.values())
 
     def summary(self) -> Table:
-        """Table of the numbers."""
+        """Table of the numbers: what is found is the sum of what stands below it."""
         rows: list[tuple[str, int | str | None]] = [("logs found", self.found)]
-        rows += [(f"{name} logs", n) for name, n in sorted(self.outcomes.items())]
+        shares = self.shares
+        outcomes = self.outcomes if shares is None else shares.outcomes
+        rows += [(f"{name} logs", n) for name, n in sorted(outcomes.items())]
+        if shares is not None:
+            rows += [
+                ("copies of these", len(shares.copies)),
+                ("not taken yet", len(shares.waiting)),
+            ]
+            gone = len(shares.gone)
+            rows += [("records of files that are gone", gone)] if gone else []
         rows += [("parts", self.parts), ("loose files", self.loose)]
         rows += [
             ("in quarantine", len(self.quarantine)),
@@ -99,14 +113,18 @@ def fleet_status(place: str | Path) -> FleetStatus:
     FleetStatus(40 fitted, 3 refused)
     """
     where = catalogue_place(place)
-    found = None
-    if names_fleet_file(place):
-        settings = read_fleet(place)
-        found = len(find_logs([settings.place(each) for each in settings.words.logs]))
-    return _counted(opened_store(where), where, found)
+    if not names_fleet_file(place):
+        return _counted(opened_store(where), where)
+    settings = read_fleet(place)
+    found = find_logs([settings.place(each) for each in settings.words.logs])
+    store = opened_store(where)
+    shares = FleetShares.of(store, found)
+    gone = frozenset(() if shares is None else shares.gone)
+    return replace(_counted(store, where, gone), found=len(found), shares=shares)
 
 
-def _counted(store: Store, where: str, found: int | None) -> FleetStatus:
+def _counted(store: Store, where: str, gone: Collection[str] = ()) -> FleetStatus:
+    """All of a catalogue; reasons without those of files that are gone."""
     parts, broken = read_parts(store)
     known = KnownLogs(store, parts)
     loose = [log for log in loose_logs(store) if not known.in_parts(log)]
@@ -122,8 +140,8 @@ def _counted(store: Store, where: str, found: int | None) -> FleetStatus:
     kept = (f"{QUARANTINE}/{name}" for name in sorted(store.names(QUARANTINE)))
     unusable = (*kept, *(f"{PARTS}/{name}" for name in broken))
     return FleetStatus(
-        where, found, dict(counts), len(parts), len(loose), unusable, n_bytes,
-        grouped_reasons(told),
+        where, None, dict(counts), len(parts), len(loose), unusable, n_bytes,
+        grouped_reasons(row for row in told if row["address"] not in gone),
     )  # fmt: skip
 
 

@@ -205,7 +205,7 @@ FAILURES = _table(
     "Logs that gave an error, ran out of time or memory, or killed their worker.",
     FleetColumn("kind", TEXT, "Class of the error, or time, memory, killed, record."),
     FleetColumn("message", TEXT, "What was found, what was needed, what to do."),
-    FleetColumn("stage", TEXT, "address, reading, study, process or record."),
+    FleetColumn("stage", TEXT, "address, naming, reading, study, process or record."),
     FleetColumn("signal", WHOLE, "Signal that ended the process; null where none did."),
     FleetColumn("elapsed_s", NUMBER, "Until it failed; of this run.", "s"),
     FleetColumn("memory_bytes", WHOLE, "Most memory until then; null where unknown.", "B"),

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flightid.conventions import Light
 from flightid.fleet.catalogue.schema import from_lower_triangle
@@ -83,20 +84,20 @@ def _covariance_flaw(row: Mapping[str, Any]) -> str:
         return f"has {len(lower)} numbers for {len(names)} parameters"
     if not all(value is not None and math.isfinite(value) for value in lower):
         return "holds what is no number"
-    if not lower or row.get("light") == str(Light.RED):
-        return ""  # Nothing is computed with a red model.
-    matrix = np.array(from_lower_triangle(lower))
+    # Nothing is computed with a red model.
+    is_counted = bool(lower) and row.get("light") != str(Light.RED)
+    return _matrix_flaw(np.array(from_lower_triangle(lower))) if is_counted else ""
+
+
+def _matrix_flaw(matrix: NDArray[np.float64]) -> str:
     variances = np.diag(matrix)
     if variances.min() < 0.0:
         return "has a variance below zero"
     places = np.flatnonzero(variances)
-    if not len(places):
-        return ""
     scale = np.sqrt(variances[places])
     alike = matrix[np.ix_(places, places)] / scale / scale[:, None]
-    if not np.isfinite(alike).all() or np.linalg.eigvalsh(alike)[0] < -ROUNDING:
-        return "is none: correlations beyond one"
-    return ""
+    is_one = np.isfinite(alike).all() and np.all(np.linalg.eigvalsh(alike) >= -ROUNDING)
+    return "" if is_one else "is none: correlations beyond one"
 
 
 def unsound_logs(rows: Rows) -> dict[str, str]:

@@ -12,6 +12,7 @@ from flightid.conventions import Light
 from flightid.errors import DataError, FlightidError, OptionError
 from flightid.extras import extra_module
 from flightid.findings import Finding
+from flightid.fleet.engine.interrupts import interrupts_held
 from flightid.fleet.engine.order import KILLED, LogOrder, LogOutcome, RunOrder
 from flightid.fleet.engine.plain import WINDOW, machine_workers
 from flightid.fleet.engine.sandbox import DEAD, Sandbox
@@ -162,40 +163,58 @@ def _lost(error: BaseException) -> DataError:
 @contextlib.contextmanager
 def _client(distributed: Any, workers: int | None, scheduler: str | None) -> Iterator[Any]:  # noqa: ANN401
     dask = extra_module("dask", PURPOSE)
-    with dask.config.set(SETTINGS), contextlib.ExitStack() as stack:
-        if scheduler is None:
-            cluster = distributed.LocalCluster(
-                n_workers=workers or machine_workers(),
-                threads_per_worker=1,
-                processes=True,
-                dashboard_address=None,
-                # Any free port; 8787 is warned of where a second run takes it.
-                scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},
-                host="127.0.0.1",
-                memory_limit=0,
-                silence_logs="ERROR",
-            )
-            stack.enter_context(cluster)
-            scheduler = cluster.scheduler_address
+    with dask.config.set(SETTINGS):
+        stack = contextlib.ExitStack()
         try:
-            client = distributed.Client(scheduler, timeout="30s", set_as_default=False)
-        except (OSError, TimeoutError) as error:
-            raise OptionError(
-                "no scheduler answers",
-                found=f"{scheduler}: {error}"[:300],
-                needed="the address of one that runs",
-                action="start one: dask scheduler; then dask worker ADDRESS on every machine",
-            ) from error
-        except TypeError as error:  # Of Dask, where tls:// is asked for and no certificate named.
-            raise OptionError(
-                "no certificate for the scheduler",
-                found=f"{scheduler}: {error}"[:300],
-                needed="distributed.comm.tls: ca-file, and client.cert and client.key",
-                action="name them in Dask's configuration, or in DASK_DISTRIBUTED__COMM__TLS__…",
-            ) from error
-        stack.enter_context(client)
-        stack.enter_context(client.as_current())
-        yield client
+            with interrupts_held():
+                client = _begun(distributed, stack, workers, scheduler)
+            yield client
+        finally:
+            # Whoever is impatient presses twice: a cluster that ends halfway prints where it stood.
+            with interrupts_held():
+                stack.close()
+
+
+def _begun(
+    distributed: Any,  # noqa: ANN401 - of an extra's library
+    stack: contextlib.ExitStack,
+    workers: int | None,
+    scheduler: str | None,
+) -> Any:  # noqa: ANN401
+    """A client of a scheduler, or of a cluster that is made; the stack ends both."""
+    if scheduler is None:
+        cluster = distributed.LocalCluster(
+            n_workers=workers or machine_workers(),
+            threads_per_worker=1,
+            processes=True,
+            dashboard_address=None,
+            # Any free port; 8787 is warned of where a second run takes it.
+            scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},
+            host="127.0.0.1",
+            memory_limit=0,
+            silence_logs="ERROR",
+        )
+        stack.enter_context(cluster)
+        scheduler = cluster.scheduler_address
+    try:
+        client = distributed.Client(scheduler, timeout="30s", set_as_default=False)
+    except (OSError, TimeoutError) as error:
+        raise OptionError(
+            "no scheduler answers",
+            found=f"{scheduler}: {error}"[:300],
+            needed="the address of one that runs",
+            action="start one: dask scheduler; then dask worker ADDRESS on every machine",
+        ) from error
+    except TypeError as error:  # Of Dask, where tls:// is asked for and no certificate named.
+        raise OptionError(
+            "no certificate for the scheduler",
+            found=f"{scheduler}: {error}"[:300],
+            needed="distributed.comm.tls: ca-file, and client.cert and client.key",
+            action="name them in Dask's configuration, or in DASK_DISTRIBUTED__COMM__TLS__…",
+        ) from error
+    stack.enter_context(client)
+    stack.enter_context(client.as_current())
+    return client
 
 
 def _flown(distributed: Any, client: Any, logs: Iterable[LogOrder]) -> Iterator[LogOutcome]:  # noqa: ANN401

@@ -175,7 +175,7 @@ class UlogSource:
                     Light.AMBER,
                     f"{lost} of {self._native.size()} bytes could not be read, in "
                     f"{counted(len(damaged), 'place')}; all records between them were kept",
-                    "copy the log from the card again and compare; Log.skipped lists the places",
+                    "copy the log from the card again and compare",
                 )
             )
         lost_s = [gap.duration_s for gap in self.gaps if gap.duration_s > 0]

@@ -1,0 +1,110 @@
+"""Where each file of a fleet stands: taken, a copy of one that is, or not taken yet."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from functools import lru_cache
+from typing import Any
+
+from flightid.errors import OptionError
+from flightid.files import sha256_of_file
+from flightid.fleet.addresses import LogAddress
+from flightid.fleet.catalogue.loose import BROKEN
+from flightid.fleet.catalogue.store import Store
+from flightid.fleet.missing import LogEntry, catalogue_entries, stands_for
+from flightid.fleet.reasons import WIDTH
+from flightid.fleet.taken import copies_named
+from flightid.frozen import dataclass
+from flightid.wrapping import wrapped
+
+
+@dataclass(frozen=True)
+class FleetShares:
+    """Files at the places of a fleet, each counted once.
+
+    Attributes
+    ----------
+    outcomes : mapping of str to int
+        Files whose record is in the catalogue, by outcome.
+    copies : mapping of str to str
+        Files with the bytes of one of these, and its address.
+    waiting : tuple of str
+        Files that the next run takes.
+    gone : tuple of str
+        Addresses of records whose file is no longer there, or has other bytes.
+    """
+
+    outcomes: Mapping[str, int]
+    copies: Mapping[str, str]
+    waiting: tuple[str, ...]
+    gone: tuple[str, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values."""
+        return asdict(self)
+
+    @classmethod
+    def of(cls, store: Store, addresses: Sequence[LogAddress]) -> FleetShares | None:
+        """Of a catalogue; None without the library that reads its parts.
+
+        A file without a record is read where one of its size has one, for it may be a copy.
+        """
+        try:
+            entries = {each.log: each for each in catalogue_entries(store)}
+        except OptionError:
+            return None
+        there = {each.address: each for each in addresses}
+        own = {e.address: e for e in entries.values() if _is_there(e, there)}
+        sizes = {entry.bytes for entry in entries.values()}
+        copies, waiting, of = (
+            dict[str, str](),
+            list[str](),
+            {e.log: e.address for e in own.values()},
+        )
+        for each in addresses:
+            if each.address in own:
+                continue
+            log = _digest(each) if str(each.n_bytes) in sizes else ""
+            if log in of:
+                copies[each.address] = of[log]
+            elif log in entries:  # It was moved: its record stands for it under the new name.
+                own[each.address], of[log] = entries[log], each.address
+            else:
+                waiting.append(each.address)
+        counts = Counter(entry.outcome for entry in own.values())
+        gone = tuple(sorted(e.address for log, e in entries.items() if log not in of))
+        return cls(dict(counts), copies, tuple(waiting), gone)
+
+
+def _is_there(entry: LogEntry, there: Mapping[str, LogAddress]) -> bool:
+    """Whether the file of a record lies where it lay; a broken record keeps no more than that."""
+    found = there.get(entry.address)
+    return found is not None and (entry.reason == BROKEN or stands_for(entry, found))
+
+
+def _digest(address: LogAddress) -> str:
+    """Digest of a file of this machine; empty where it cannot be read, or is read from afar."""
+    if address.local is None or address.problem:
+        return ""
+    try:
+        return _digest_of(address.address, address.n_bytes, address.stamp)
+    except OSError:
+        return ""
+
+
+@lru_cache(maxsize=1 << 16)
+def _digest_of(path: str, n_bytes: int, stamp: str) -> str:
+    """Taken once as long as size and time of change stay."""
+    del n_bytes, stamp
+    return sha256_of_file(path)
+
+
+def copy_lines(shares: FleetShares | None) -> list[str]:
+    """Lines of a terminal that name copies: each with what it is a copy of."""
+    if shares is None or not shares.copies:
+        return []
+    number = len(shares.copies)
+    said = f"{number} cop{'y' if number == 1 else 'ies'}: {copies_named(shares.copies)}"
+    return wrapped(said, WIDTH, first="  ", later="      ")
