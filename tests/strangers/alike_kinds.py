@@ -27,7 +27,6 @@ from flightid.identification.uncertain_of import uncertain_of
 from flightid.responses import CoherentPairs
 from flightid.study import structures
 from flightid.study.pipeline import identify_models
-from flightid.study.proposal import of_records
 from flightid.study.proposal.propose import propose_study
 from flightid.study.settings import read_settings
 from flightid.study.stage_runner import StageRunner
@@ -60,7 +59,7 @@ def fitted(
     path: Path, limit: float, cache: MutableMapping[str, Any]
 ) -> tuple[str, str, fid.Fit | None]:
     """Light and kind of `flightid run` with a limit, and the fit."""
-    structures.RUNS_ALIKE = of_records.RUNS_ALIKE = limit
+    structures.RUNS_ALIKE = limit
     for key in [key for key, made in cache.items() if not isinstance(made, KEPT)]:
         del cache[key]
     folder = path.parent

@@ -17,8 +17,9 @@ from flightid.conventions import Light
 from flightid.evidence.spans import Span, judge_span
 from flightid.identification.fit_findings import DETERMINED
 from flightid.inspection.thresholds import BAND_LEAST
-from flightid.study.proposal.of_records import RUNS_ALIKE, study_of_records
+from flightid.study.proposal.of_records import study_of_records
 from flightid.study.proposal.stretches import RICHER
+from flightid.study.structures import RUNS_ALIKE
 from flightid.uncertainty.coloured_residuals import WELL_TOLD, colour_findings
 from flightid.uncertainty.foretold import MATERIAL_PERCENT, NEGLIGIBLE_PERCENT
 from flightid.validation import residual_tests

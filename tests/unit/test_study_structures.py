@@ -51,9 +51,10 @@ def test_a_richer_structure_must_be_clearly_better() -> None:
         criteria = SimpleNamespace(aicc=aicc)
         return SimpleNamespace(
             structure=None,
-            criteria=criteria,
+            likelihood=criteria,
             settled=True,
             free_run_rms=rms,
+            independent_errors=1000.0,
             n_parameters=n_parameters,
         )
 
@@ -66,6 +67,32 @@ def test_a_richer_structure_must_be_clearly_better() -> None:
     ]
     taken = ranked(SimpleNamespace(trials=trials), "balanced")
     assert [each.n_parameters for each in taken] == [4, 5, 9, 3]
+
+
+def drifting() -> fid.Record:
+    """A second-order rig by SciPy whose output drifts off its level, slower than a run is long."""
+    random = np.random.default_rng(7)
+    u = np.repeat(np.sign(random.standard_normal(250)), 3)
+    y = signal.lfilter([0.0, 0.0, 0.1, 0.08], [1.0, -1.3, 0.45], u)
+    drift = signal.lfilter([0.1], [1.0, -0.995], random.standard_normal(1250))[500:]
+    y += 0.1 * np.sqrt(1.0 - 0.995**2) * np.std(y) * drift
+    return fid.Record.from_arrays(
+        np.arange(750) * 0.1, inputs={"u": u}, outputs={"y": y}, hold="zero"
+    )
+
+
+def test_a_level_that_drifted_asks_for_no_slow_mode() -> None:
+    """A pole slower than the run takes its level of the first stretch: chance that ran ahead."""
+    whole = drifting()
+    orders = {"nb": (2, 3), "nf": (2, 3, 4), "nk": (2,)}
+    settings = StructureSettings(structure="oe", inputs=("u",), outputs=("y",), **orders)
+    fit, scan = fit_structure(
+        settings, ("u",), [whole.segment(0.0, 50.0)], [whole.segment(50.05, 80.0)]
+    )
+    slowest = max(abs(np.roots(fit.model.f[0])))
+    assert -0.1 / np.log(slowest) < 0.3, "seconds: the rig has a pole of 0.25 s and no slower one"
+    assert EDGE not in {each.code for each in fit.findings}
+    assert scan.trials[0].structure.nf[0] > 2, "the free run alone would have taken the slow one"
 
 
 def third_order(n: int = 1200) -> fid.Record:
@@ -107,7 +134,7 @@ def test_an_edge_that_stays_is_amber_without_intervals(monkeypatch) -> None:
 def test_a_neighbour_beyond_the_edge_is_clearly_better_by_six(gain: float, doubted) -> None:
     inner, beyond = (fid.PolynomialModel.oe("u", "y", nb=nb, nf=2) for nb in (2, 3))
     trials = [
-        SimpleNamespace(structure=each, criteria=SimpleNamespace(bic=bic), settled=True)
+        SimpleNamespace(structure=each, likelihood=SimpleNamespace(bic=bic), settled=True)
         for each, bic in ((inner, 100.0), (beyond, 100.0 - gain))
     ]
     found = widened_scan._better(inner, {"nb": 3}, trials)

@@ -61,8 +61,8 @@ class StructureSettings(OrderOptions):
         None,
         choices=CHOICES,
         doc="balanced: fewest coefficients within 6 of the smallest AICc, of free-run errors "
-        "within 5 % of the smallest; free_run: that one; simplest: fewest coefficients within "
-        "2 % of it; default: what fits the kind.",
+        "within 5 % or chance of the smallest; free_run: that one; simplest: fewest coefficients "
+        "within 2 % of it; default: what fits the kind.",
     )
     options: Mapping[str, Any] = field(default_factory=dict)
 

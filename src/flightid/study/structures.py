@@ -28,6 +28,8 @@ from flightid.validation.spectra.spectra import lags_of_spectrum
 Choice = OrderScan | NarxSearch
 RUNS_ALIKE = 0.05
 """Free-run errors that differ by less are alike: a minute of a slow mode tells them no better."""
+ALIKE_BY_CHANCE = 3.841458820694124
+"""Twice the difference of log likelihoods, of one degree of freedom, that 1 of 20 is beyond."""
 TRIED = 4
 """Structures that are fitted whole, at most, for one that `_is_clean`."""
 FURTHER, DOUBTED = 2, 0.3
@@ -157,7 +159,7 @@ def _less_sure(scan: OrderScan, taken: OrderTrial) -> list[OrderTrial]:
     short; and those with fewer coefficients that run as well: where errors are slow, likelihoods
     of white errors differ by many times 6 for nothing, and chance takes a pole too many.
     """
-    least = scan.trials[0].free_run_rms or 0.0
+    least = scan.trials[0]
     known = {
         place: (_aicc(trial), trial.free_run_rms)
         for place, trial in enumerate(scan.trials)
@@ -168,18 +170,43 @@ def _less_sure(scan: OrderScan, taken: OrderTrial) -> list[OrderTrial]:
     likelier, fewer = [], []
     for place, (aicc, rms) in sorted(known.items(), key=lambda each: each[1]):
         trial = scan.trials[place]
-        if aicc < _aicc(taken) - CLEAR and rms <= (1 + DOUBTED) * least:
+        if aicc < _aicc(taken) - CLEAR and rms <= (1 + DOUBTED) * (least.free_run_rms or 0.0):
             likelier.append(trial)
-        elif (trial.n_parameters or 0) < (taken.n_parameters or 0) and rms <= (
-            1 + RUNS_ALIKE
-        ) * least:
+        elif (trial.n_parameters or 0) < (taken.n_parameters or 0) and runs_as_well(trial, least):
             fewer.append(trial)
     return [*likelier[:FURTHER], *fewer[:FURTHER]]
 
 
 def _aicc(trial: OrderTrial) -> float:
-    known = None if trial.criteria is None else trial.criteria.aicc
+    known = None if trial.likelihood is None else trial.likelihood.aicc
     return math.inf if known is None else known
+
+
+def runs_as_well(trial: OrderTrial, best: OrderTrial) -> bool:
+    """Whether a free run errs no more than the best one, but for what chance makes of slow errors.
+
+    A run that slow noise has carried off its level tells little of what follows the inputs, and a
+    pole slower than the run starts at the level of its first stretch. Variances of so many
+    independent errors as the best run holds are compared by their likelihoods.
+
+    Example
+    -------
+    >>> import flightid as fid
+    >>> asked = fid.PolynomialModel.oe("u", "y", nb=1, nf=1)
+    >>> best, other = (
+    ...     OrderTrial(asked, None, None, rms, 90.0, independent_errors=5.0) for rms in (1.0, 1.3)
+    ... )
+    >>> runs_as_well(other, best), runs_as_well(other, replace(best, independent_errors=50.0))
+    (True, False)
+    """
+    if trial.free_run_rms is None or best.free_run_rms is None:
+        return False
+    if trial.free_run_rms <= (1 + RUNS_ALIKE) * best.free_run_rms:
+        return True
+    samples = best.independent_errors
+    if samples is None or best.free_run_rms <= 0.0:
+        return False
+    return 2.0 * samples * math.log(trial.free_run_rms / best.free_run_rms) < ALIKE_BY_CHANCE
 
 
 def ranked(scan: OrderScan, how: str) -> list[OrderTrial]:
@@ -198,15 +225,10 @@ def ranked(scan: OrderScan, how: str) -> list[OrderTrial]:
         return [scan.smallest("bic")]
     if first.free_run_rms is None:
         return [first]
-    limit = (1 + RUNS_ALIKE) * first.free_run_rms
     alike = [
-        (not _has_zeros_of_sampling(trial.structure), trial.criteria.aicc, place)
+        (not _has_zeros_of_sampling(trial.structure), _aicc(trial), place)
         for place, trial in enumerate(scan.trials)
-        if trial.criteria is not None
-        and trial.criteria.aicc is not None
-        and trial.settled
-        and trial.free_run_rms is not None
-        and trial.free_run_rms <= limit
+        if math.isfinite(_aicc(trial)) and trial.settled and runs_as_well(trial, first)
     ]
     order = _by_evidence(scan, alike) if how == BALANCED else alike
     return [scan.trials[each[-1]] for each in order] or [first]

@@ -83,9 +83,9 @@ def _better(
 ) -> tuple[Finding, ...]:
     """What neighbours beyond the edges would gain."""
     known = {
-        each.structure.orders_text: each.criteria.bic
+        each.structure.orders_text: each.likelihood.bic
         for each in more
-        if each.criteria is not None and each.criteria.bic is not None and each.settled
+        if each.likelihood is not None and each.likelihood.bic is not None and each.settled
     }
     own = known.pop(best.orders_text, None)
     if own is None or not known or own - min(known.values()) <= CLEAR:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -25,7 +26,7 @@ from flightid.identification.prediction_error.findings import (
 from flightid.identification.prediction_error.information_criteria import Criteria, criteria
 from flightid.identification.prediction_error.instrumental_variables import four_stage
 from flightid.identification.prediction_error.kernel_regression import kernel_estimate
-from flightid.identification.prediction_error.likelihoods import End, likeliest
+from flightid.identification.prediction_error.likelihoods import End, coloured_cost, likeliest
 from flightid.identification.prediction_error.linear_regression import (
     inverse_square,
     regress_structure,
@@ -52,10 +53,11 @@ SPARE_SAMPLES = 3
 
 def search_polynomial(
     structure: PolynomialStructure, data: SampledChannels
-) -> tuple[PolynomialModel, Criteria, bool]:
+) -> tuple[PolynomialModel, tuple[Criteria, Criteria], bool]:
     """Where a fit ends, and whether at a minimum: without intervals, roots or findings.
 
-    For scans, which fit whole what they take.
+    For scans, which fit whole what they take. Criteria are those of its errors and, where it has no
+    model of the noise, those of its errors with their colour taken out.
     """
     (taken, found), _ = optimum(structure, data)
     about = about_levels(taken, data, found.memory, found.theta)
@@ -69,8 +71,11 @@ def search_polynomial(
         units=data.units,
         operating_point=about.operating_point,
     )
-    settled = found.minima[0].termination in CONVERGED
-    return model, criteria(squares, n, taken.n_parameters), settled
+    own = white = criteria(squares, n, taken.n_parameters)
+    if not has_noise_model(taken):
+        cost, rows = coloured_cost(taken, data, found.theta, found.memory, found.skip)
+        white = criteria(rows * math.exp(cost / rows), rows, taken.n_parameters)
+    return model, (own, white), found.minima[0].termination in CONVERGED
 
 
 def optimum(

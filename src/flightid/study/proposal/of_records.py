@@ -39,8 +39,9 @@ from flightid.study.proposal.stretches import (
 )
 from flightid.study.proposal.unit_steps import unit_steps
 from flightid.study.stage_runner import StageRunner
-from flightid.study.structures import RUNS_ALIKE, ranked
+from flightid.study.structures import ranked, runs_as_well
 from flightid.surface import as_key, speaking
+from flightid.validation.order_scan.result import OrderTrial
 
 KINDS = ("arx", "armax", "bj", "oe")
 ORDERS = {"na": (1, 2, 3, 4), "nb": (1, 2, 3), "nc": (1, 2), "nd": (1, 2), "nf": (1, 2, 3, 4)}
@@ -316,22 +317,22 @@ def _structure(
     flown = scans.flown(output, inputs)
     orders = ORDERS | {"nk": delays_to_scan([flown], inputs, output)}
     of_kind = dict.fromkeys(KINDS, orders)
-    reached: dict[str, float] = {}
+    reached: dict[str, OrderTrial] = {}
     for kind in sorted(KINDS, key=("arx", "armax", "oe", "bj").index):
         tried = {order: of_kind[kind][order] for order in USED[kind]}
         scan = scans.scan(kind, output, tried, inputs)
-        best = scan.trials[0].free_run_rms
-        if best is not None:
-            reached[kind] = best
+        if scan.trials[0].free_run_rms is not None:
+            reached[kind] = scan.trials[0]
         if kind == "oe":
             taken = ranked(scan, "balanced")[0].structure
             of_kind["bj"] = orders | {name: getattr(taken, name)[:1] for name in OF_VEHICLE}
     if not reached:
         raise StudyError("no structure runs freely", needed="a record that moves the output")
-    said = ", ".join(f"{kind} {reached[kind]:.3g}" for kind in KINDS if kind in reached)
-    least = min(reached.values())
+    errors = {kind: best.free_run_rms or 0.0 for kind, best in reached.items()}
+    said = ", ".join(f"{kind} {errors[kind]:.3g}" for kind in KINDS if kind in errors)
+    least = reached[min(errors, key=lambda kind: errors[kind])]
     # What comes last assumes least of the noise, so that its intervals hold for more of it.
-    good = [kind for kind in KINDS if reached.get(kind, math.inf) <= (1 + RUNS_ALIKE) * least]
+    good = [kind for kind in KINDS if kind in reached and runs_as_well(reached[kind], least)]
     return good[-1], f"{said} {unit}".rstrip(), of_kind[good[-1]]
 
 

@@ -32,8 +32,10 @@ class OrderTrial:
     """One structure: its model and criteria, and its free run on the validation records.
 
     `free_run_rms` is in the output's unit; None where `note` says why there is none. `criteria` are
-    of polynomials. A fit that is not `settled` ended at no minimum and stands behind all others.
-    `fit` is kept of the best of a kind alone.
+    of polynomials, `whitened` those with the colour of the errors taken out where there is no model
+    of the noise. A fit that is not `settled` ended at no minimum and stands behind all others.
+    `fit` is kept of the best of a kind alone; `independent_errors` is how many independent samples
+    the free run's errors are worth: few where noise is slow.
 
     Example
     -------
@@ -51,6 +53,13 @@ class OrderTrial:
     note: str = ""
     settled: bool = True
     fit: Fit | None = field(default=None, repr=False)
+    whitened: Criteria | None = None
+    independent_errors: float | None = None
+
+    @property
+    def likelihood(self) -> Criteria | None:
+        """Criteria that compare structures: slow errors that count as white are likely of none."""
+        return self.whitened or self.criteria
 
     @property
     def kind(self) -> str:

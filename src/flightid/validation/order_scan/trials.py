@@ -24,6 +24,7 @@ from flightid.models.sampled.channels import SampledChannels
 from flightid.progress import progress, track
 from flightid.record import Record
 from flightid.simulation.metrics import fit_percent, rms_error
+from flightid.uncertainty.foretold import independent_samples
 from flightid.validation.order_scan.edges import Structure
 from flightid.validation.order_scan.result import OrderTrial, is_settled, rank_of
 
@@ -149,8 +150,8 @@ def _first_of(trials: Sequence[OrderTrial]) -> int | None:
 
 def _fitted_trial(structure: Structure, data: SampledChannels, scan: ScanRecords) -> OrderTrial:
     if isinstance(structure, PolynomialStructure):
-        model, measures, settled = search_polynomial(structure, data)
-        trial = _judged(structure, model, measures, scan)
+        model, (measures, white), settled = search_polynomial(structure, data)
+        trial = replace(_judged(structure, model, measures, scan), whitened=white)
         return trial if settled else replace(trial, settled=False, note="not converged")
     fit = identify(structure, list(scan.fitted))
     straight = any(finding.code == LINEAR for finding in fit.findings)
@@ -168,8 +169,10 @@ def _judged(
     pairs = [run.scored(model.outputs[0]) for run in runs]
     measured, predicted = (np.concatenate([pair[side] for pair in pairs]) for side in (0, 1))
     rms = float(rms_error(measured, predicted))
+    independent = independent_samples([np.subtract(*pair) for pair in pairs])
+    percent = float(fit_percent(measured, predicted))
     return OrderTrial(
-        structure, model, measures, rms, float(fit_percent(measured, predicted)), note
+        structure, model, measures, rms, percent, note, independent_errors=independent
     )
 
 
@@ -213,6 +216,7 @@ def delivered(trials: Sequence[OrderTrial], scan: ScanRecords) -> tuple[list[Ord
             failed.append(replace(trial, free_run_rms=None, fit_percent=None, note=reason))
             continue
         judged = _judged(trial.structure, fit.model, trial.criteria, scan, trial.note)
+        judged = replace(judged, whitened=trial.whitened)
         made.append((_ended(judged, fit), fit))
     if not made:
         raise FitError(
