@@ -10,7 +10,7 @@ from flightid.uncertainty.blocks import RecordBlock
 from flightid.uncertainty.coloured_residuals import residual_covariance
 from flightid.uncertainty.fitted_correlation import LAGS
 from tests.closeness import assert_close
-from tests.strangers import closed_loops, noises
+from tests.strangers import closed_loops, false_lights, noises
 from tests.strangers.output_error import COLOURS, flight, late, model
 
 N = 4000
@@ -108,3 +108,23 @@ def test_slow_smooth_noise_denies_no_response_that_is_there() -> None:
     noise = {"y": noises.ar2(random, u.size, 0.98, 0.05)}
     barren = fid.Record.from_arrays(record.time_s, inputs={"u": u}, outputs=noise, hold="zero")
     assert fid.identify(asked, barren).covariance is None
+
+
+def test_samples_that_nobody_measured_have_no_bars_and_spikes_have() -> None:
+    bars = {}
+    for name in ("wrong units", "dead sensor", "spikes"):
+        columns = false_lights.BARREN_FLIGHTS[name](np.random.default_rng([0, 12]))
+        record = false_lights.one_record(columns)
+        fit = fid.identify(model(), record, method="output_error")
+        assert str(fit.evidence.light) == "red"
+        bars[name] = fit.covariance is not None
+        if not bars[name]:
+            (found,) = [each for each in fit.evidence.checks if each.name == "samples"]
+            assert {each.reason for each in fit.parameters.values()} == {found.what}
+    assert bars == {"wrong units": False, "dead sensor": False, "spikes": True}
+    columns = false_lights.BARREN_FLIGHTS["wrong units"](np.random.default_rng([0, 12]))
+    structure = fid.PolynomialModel.oe("da", "p", nb=1, nf=1, nk=1)
+    fit = fid.identify(structure, false_lights.one_record(columns))
+    made = [*fit.details.gains.values(), fit.details.modes[0].natural_frequency]
+    assert [each.interval95 for each in made] == [None, None]
+    assert fit.model.covariance is None

@@ -12,7 +12,7 @@ from flightid.errors import FlightidError
 from flightid.evidence.evidence import BAND, COHERENCE, LOOP, SAMPLES, TIME, Check
 from flightid.evidence.feedback import feedback_test
 from flightid.evidence.spans import judge_coherence, judge_span, spans_of
-from flightid.findings import counted, worst
+from flightid.findings import Finding, counted, worst
 from flightid.record import Record
 from flightid.record.checks import data_findings, record_findings
 from flightid.record.time_question import time_question
@@ -58,11 +58,11 @@ def time_checks(records: Sequence[Record]) -> list[Check]:
     return [] if asked is None else [Check(TIME, asked.light, asked.message, asked.action)]
 
 
-def sample_checks(
+def sample_findings(
     data: Sequence[Record | FrequencyResponse], channels: Collection[str]
-) -> list[Check]:
-    """The worst that was found in the samples of the fitted channels, with what else there is."""
-    found = [
+) -> list[Finding]:
+    """All that was found in the samples of some channels, record by record."""
+    return [
         finding
         for each in data
         for finding in (
@@ -71,6 +71,13 @@ def sample_checks(
             else data_findings(each.history, channels)
         )
     ]
+
+
+def sample_checks(
+    data: Sequence[Record | FrequencyResponse], channels: Collection[str]
+) -> list[Check]:
+    """The worst that was found in the samples of the fitted channels, with what else there is."""
+    found = sample_findings(data, channels)
     if not found:
         return []
     first = next(finding for finding in found if finding.light is worst(tuple(found)))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import field
-from typing import Any
+from typing import Any, Self
 
 from flightid.frozen import dataclass
 from flightid.table import Table
@@ -35,6 +35,10 @@ class Details:
     def quantities(self, parameters: Mapping[str, Estimate]) -> Sequence[Estimate]:
         """Numbers that the fit's table lists."""
         return tuple(parameters.values())
+
+    def without_intervals(self, reason: str) -> Self:  # noqa: ARG002 - each kind's own
+        """The same without error bars of numbers that the fit's parameters have none of."""
+        return self
 
     def notes(self, structure: Any) -> tuple[str, ...]:  # noqa: ANN401, ARG002 - each kind's own
         """Lines below the fit's table."""

@@ -10,6 +10,7 @@ from typing import Any
 
 from flightid.conventions import Role
 from flightid.errors import FitError, OptionError
+from flightid.identification.damaged_samples import with_damage_judged
 from flightid.identification.fed_back import (
     by_excitation,
     closed_around,
@@ -213,6 +214,7 @@ def identify(
     channels = (*fit.model.inputs, *fit.model.outputs)
     known = data_provenance(flat(data), channels)
     fit = replace(fit, provenance={**fit.provenance, **known, "told": told})
+    fit = with_damage_judged(fit, flat(data))
     if held is not None:
         fit = with_hold_said(*with_hold_tested(fit, chosen, data, given, held, loop))
     if not in_doubt(fit.findings):

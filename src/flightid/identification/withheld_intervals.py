@@ -11,6 +11,7 @@ from flightid.identification.fit_findings import (
     judge_correlation,
     judge_parameters,
 )
+from flightid.models import PolynomialModel
 
 _OF_INTERVALS = {
     "residuals-coloured",
@@ -37,7 +38,7 @@ def without_intervals(fit: Fit, reason: str) -> Fit:
         Without covariance, so that nothing computed from it has intervals either.
     """
     bare = {
-        name: replace(each, stderr=None, reason=each.reason or reason)
+        name: replace(each, stderr=None, ends=None, reason=each.reason or reason)
         for name, each in fit.parameters.items()
     }
     findings = (
@@ -45,8 +46,13 @@ def without_intervals(fit: Fit, reason: str) -> Fit:
         *judge_parameters(bare),
         *(judge_correlation(fit.names, fit.correlation, bare) if fit.details is None else ()),
     )
+    model = fit.model
+    if isinstance(model, PolynomialModel):
+        model = replace(model, covariance=None)
     return replace(
         fit,
+        model=model,
+        details=fit.details and fit.details.without_intervals(reason),
         parameters=bare,
         covariance=None,
         intervals_from=UNKNOWN,

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import replace
+from typing import Any, Self
 
 from flightid.frozen import dataclass
 from flightid.identification.details import Details
@@ -101,6 +102,10 @@ class NarxDetails(Details):
     def words(self) -> str:
         """Error in free run beside that of the linear model of the same lags."""
         return f"free-run rms {self.free_run_rms:.4g}, linear {self.baseline_free_run_rms:.4g}"
+
+    def without_intervals(self, reason: str) -> Self:
+        """Terms whose standard errors are not shown."""
+        return replace(self, why_biased=self.why_biased or reason)
 
     def notes(self, structure: Any) -> tuple[str, ...]:  # noqa: ANN401 - each kind's own
         """Structure, what the errors mean, and the errors on the training records."""

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
-from typing import Any
+from dataclasses import asdict, replace
+from typing import Any, Self
 
 from flightid.frozen import dataclass
 from flightid.identification.details import Details
 from flightid.identification.prediction_error.information_criteria import Criteria
-from flightid.identification.prediction_error.roots import POLE, FittedRoot
+from flightid.identification.prediction_error.roots import (
+    NO_ERRORS,
+    POLE,
+    FittedRoot,
+    without_errors,
+)
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Estimate
 from flightid.uncertainty.quantiles import half_width
@@ -86,6 +91,15 @@ class PolynomialDetails(Details):
     def quantities(self, parameters: Mapping[str, Estimate]) -> Sequence[Estimate]:
         """Coefficients and steady gains."""
         return (*parameters.values(), *self.gains.values())
+
+    def without_intervals(self, reason: str) -> Self:  # noqa: ARG002 - that of the coefficients
+        """Roots and gains without error bars."""
+        bare = {
+            name: replace(gain, stderr=None, ends=None, reason=gain.reason or NO_ERRORS)
+            for name, gain in self.gains.items()
+        }
+        roots = without_errors(self.roots, self.roots, NO_ERRORS, noted=False)
+        return replace(self, roots=roots, gains=bare)
 
     def notes(self, structure: Any) -> tuple[str, ...]:  # noqa: ANN401 - each kind's own
         """Equation, scores, criteria and what was done about start and offsets."""

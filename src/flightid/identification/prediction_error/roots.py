@@ -226,9 +226,13 @@ def coefficients_of(model: PolynomialModel, responses: Collection[str]) -> set[i
 
 
 def without_errors(
-    roots: Sequence[FittedRoot], which: Sequence[FittedRoot], reason: str
+    roots: Sequence[FittedRoot],
+    which: Sequence[FittedRoot],
+    reason: str,
+    *,
+    noted: bool = True,
 ) -> tuple[FittedRoot, ...]:
-    """The roots, some without error bars and with the reason."""
+    """The roots, some without error bars and with the reason, noted beside each or not."""
 
     def bare(estimate: Estimate | None) -> Estimate | None:
         return estimate and replace(estimate, stderr=None, ends=None, reason=reason)
@@ -239,7 +243,7 @@ def without_errors(
             covariance=None,
             natural_frequency=bare(root.natural_frequency),
             damping=bare(root.damping),
-            note="; ".join(filter(None, (root.note, reason))),
+            note="; ".join(filter(None, (root.note, reason if noted else ""))),
         )
         if any(root is each for each in which)
         else root
