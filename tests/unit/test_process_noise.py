@@ -10,6 +10,7 @@ import flightid as fid
 from flightid.conventions import Light
 from flightid.identification.output_error.process_noise import state_noise
 from tests.strangers.noises import ar1
+from tests.strangers.turbulence import CASES
 
 A = np.array([[0.97, 0.02], [-0.06, 0.95]])
 C = np.eye(2)
@@ -50,6 +51,15 @@ def test_noise_of_sensors_is_not(pole: float, flights: int, most: int) -> None:
         found = state_noise([rows], [(A, C)])
         hits += found is not None and found.is_found
     assert hits <= most
+
+
+def test_gusts_with_a_pole_of_their_own_are_found_behind_one_output() -> None:
+    """A Dutch roll in air that changes over 0.3 s: long autoregressions account for it as well."""
+    for name, found in (("gust 0.3 of its size, 0.3 s", True), ("noise AR(1) 0.95", False)):
+        (case,) = [each for each in CASES if each.name == f"output error, dutch roll, {name}"]
+        trials = [case.fly(seed) for seed in (3000, 3006)]
+        assert [trial.light == "red" for trial in trials] == 2 * [found]
+        assert all((each.stderr is None) is found for t in trials for each in t.readings)
 
 
 def test_too_little_and_unseen_states_are_no_ground() -> None:

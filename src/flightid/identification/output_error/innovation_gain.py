@@ -61,6 +61,13 @@ def observable(a: Array, c: Array) -> tuple[Array, Array]:
     return basis @ a @ basis.T, c @ basis.T
 
 
+def with_pole(a: Array, c: Array, pole: float) -> tuple[Array, Array]:
+    """A system beside a state of that pole for each output: innovations may have it too."""
+    n, p = len(a), len(c)
+    beside = np.block([[a, np.zeros((n, p))], [np.zeros((p, n)), pole * np.eye(p)]])
+    return beside, np.hstack([c, np.eye(p)])
+
+
 def _first_gain(a: Array, c: Array) -> Array | None:
     """Of a filter whose states move by a tenth of what the outputs show of them."""
     n, p = len(a), len(c)

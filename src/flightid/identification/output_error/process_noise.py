@@ -3,7 +3,8 @@
 Turbulence drives the states, and a free run does not follow: its residuals are innovations e of a
 Kalman filter, seen through the model's own modes, v = [C (qI - A)^-1 K + I] e. Three accounts of v
 are compared by their likelihood: white noise, autoregressive noise or drift of each output for
-itself (sensors), and noise on the states with the best K. The third has to beat the first at a
+itself (sensors), and noise on the states with the best K, white or, where the model oscillates,
+with a pole of its own as gusts have. The third has to beat the first at a
 nominal false-alarm rate. Against the second it has to win by far, or outputs have to move together
 at different times: sensors do not. Where the model oscillates it need not win by far: no sensor has
 that colour. A single output whose noise has the colour of one real mode is left to sensors: nothing
@@ -27,6 +28,7 @@ from flightid.identification.output_error.innovation_gain import (
     innovations,
     log_size,
     observable,
+    with_pole,
 )
 from flightid.identification.output_error.sensor_noise import (
     FALSE_ALARMS,
@@ -53,6 +55,11 @@ TURBULENT = (
     "method='filter_error' does"
 )
 """Why there are no intervals."""
+GUST_POLES = (0.8, 0.9, 0.95, 0.98)
+"""Of gusts on an oscillating model, a sample: white noise on the states is a poor account of them,
+and long autoregressions of a sensor may be a better one."""
+LARGEST = 16
+"""Numbers of a gain beyond which that is not asked: many outputs tell by moving together."""
 HALF = 0.5
 """Share of an output's residual variance that innovations leave, below which it is red."""
 
@@ -172,7 +179,7 @@ def state_noise(
     System Identification*, 2nd ed., sec. 5.2; Schwarz (1978), Annals of Statistics 6.
     """
     cut = [each[:, :LONGEST] for each in residuals]
-    p, n = systems[0][1].shape[0], systems[0][0].shape[0]
+    p, n = systems[0][1].shape
     n_rows = sum(each.shape[1] - ORDER for each in cut)
     if n == 0 or n_rows < SAMPLES_PER_NUMBER * p * max(ORDER, n):
         return None
@@ -181,25 +188,43 @@ def state_noise(
         return None
     white = [each / scale[:, None] for each in cut]
     placed = [observable(a, c / scale[:, None]) for a, c in systems]
-    n = placed[0][0].shape[0]
     if any(spectral_radius(a) > 1.0 + 1.0 / LONGEST for a, _ in placed):
         return None
     if is_white(white):
         return None
-    ahead, found = innovations(white, placed)
-    tails = [each[:, ORDER:] for each in white]
-    plain = log_size(tails)
-    sensors, orders = sensor_errors(white)
-    gain = n_rows * (plain - found)
-    bic = n_rows * (log_size([sensors]) - found) + np.log(n_rows) * (orders - n * p)
-    left = _variances([each[:, ORDER:] for each in ahead]) / _variances(tails)
+    sensors = sensor_errors(white)
     oscillates = any(np.any(np.abs(np.imag(np.linalg.eigvals(a))) > 0.0) for a, _ in placed)
+    best = _account(white, placed, sensors, oscillates=oscillates)
+    asked = oscillates and (len(placed[0][0]) + p) * p <= LARGEST
+    for pole in GUST_POLES if asked else ():
+        if best.is_found:
+            break
+        beside = [with_pole(*each, pole) for each in placed]
+        gusts = _account(white, beside, sensors, oscillates=True, chosen=1)
+        best = max(best, gusts, key=lambda each: each.advantage)
+    return best
+
+
+def _account(
+    white: Sequence[Array],
+    placed: Sequence[tuple[Array, Array]],
+    sensors: tuple[Array, int],
+    *,
+    oscillates: bool,
+    chosen: int = 0,
+) -> StateNoise:
+    """Noise on the states of one system beside white noise and that of sensors."""
+    (errors, orders), (n, p) = sensors, placed[0][1].T.shape
+    tails = [each[:, ORDER:] for each in white]
+    n_rows, count = errors.shape[1], n * p + chosen
+    ahead, size = innovations(white, placed)
+    gain = n_rows * (log_size(tails) - size)
     return StateNoise(
-        float(scipy.special.chdtrc(n * p, max(gain, 0.0))),
-        float(bic),
-        crossed(sensors),
-        bool(oscillates),
-        left,
+        float(scipy.special.chdtrc(count, max(gain, 0.0))),
+        float(n_rows * (log_size([errors]) - size) + np.log(n_rows) * (orders - count)),
+        crossed(errors),
+        oscillates,
+        _variances([each[:, ORDER:] for each in ahead]) / _variances(tails),
     )
 
 
