@@ -120,10 +120,13 @@ def test_chirps_are_found_by_their_fields(tmp_path: Path) -> None:
     assert_close(found[0].span_s, [7.0, 11.0], why="after the settling", atol=0.01)
     assert_close(found[0].low_hz, 2.0, why="its start", atol=0.02)
     assert_close(found[0].size_deg_s, inav.CHIRP_DEG_S, why="its size", rtol=0.02)
-    record = log.record(names=["p", "chirp"], span_s=found[0].span_s)
+    record = log.record(names=["p", "chirp", "p_ref"], span_s=found[0].span_s)
     assert_close(
         np.abs(record["chirp"]).max(), np.radians(inav.CHIRP_DEG_S), why="its size", rtol=0.02
     )
+    # Cut towards zero in the log: 1 % too small, and what answers it seemed 1 % too large.
+    slope = (record["p_ref"] @ record["chirp"]) / (record["chirp"] @ record["chirp"])
+    assert_close(slope, 1.0, why="half of what was cut is given back", atol=2e-3)
 
 
 def test_gains_are_those_of_the_header_and_go_back(tmp_path: Path) -> None:

@@ -30,7 +30,7 @@ DEFAULTS = {
 ANGLES = ("roll", "pitch", "yaw")
 _SOURCE_KEYS = {
     "message", "field", "instance", "unit", "factor", "stamp", "quaternion", "angle", "phase_scale",
-    "frame", "note", "zero",
+    "frame", "note", "zero", "cut",
 }  # fmt: skip
 _CHANNEL_KEYS = {"unit", "role", "unwrap", "sets_rate", "on_request", "sources"}
 
@@ -63,6 +63,8 @@ class ChannelSource:
         field is. None for plain numbers.
     zero : float
         What is logged where the channel is zero, in the log's own numbers.
+    cut : bool
+        Whether the firmware logs whole numbers cut towards zero: half a one is given back.
     note : str
         What the source is.
 
@@ -82,6 +84,7 @@ class ChannelSource:
     frame: str | None = None
     phase_scale: float | None = None
     zero: float = 0.0
+    cut: bool = False
     note: str = ""
 
     def __str__(self) -> str:
@@ -289,6 +292,7 @@ def _source(name: str, item: dict[str, Any]) -> ChannelSource:
         item.get("frame"),
         item.get("phase_scale"),
         float(item.get("zero", 0.0)),
+        bool(item.get("cut", False)),
         item.get("note", ""),
     )
 
