@@ -11,6 +11,7 @@ import numpy as np
 from flightid.errors import FlightidError
 from flightid.review.deconvolution import LoopDraws, LoopSamples, closed_loop
 from flightid.review.step_features import frequency_features, step_features
+from flightid.review.told_band import told_by, told_hz
 from flightid.uncertainty.quantiles import tails
 from tests.strangers.counting import Case, Reading, Trial
 from tests.strangers.ordinary_flights import Axis, ordinary, step
@@ -88,7 +89,8 @@ def fly_step(
         for k in np.linspace(2, time_s.size - 1, INSTANTS).round().astype(int)
         for ends in [(float(low[k]), float(high[k]))]
     ]
-    for found in (*step_features(steps, time_s), *frequency_features(loop, SLOWEST_HZ)):
+    features = (*step_features(steps, time_s), *frequency_features(loop, SLOWEST_HZ))
+    for found in told_by(features, told_hz(samples)):
         truth = known[found.name]
         if found.name.startswith(READ) and truth is not None and found.value is not None:
             readings.append(Reading(found.name, truth, found.value, None, found.interval95))

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
+from scipy.signal import butter, lfilter
 
+from flightid.review.deconvolution import LoopSamples
 from flightid.review.step_features import step_features
+from flightid.review.told_band import told_by, told_hz
 
 TIME_S = 0.01 * np.arange(50)
 DAMPING, OMEGA = 0.83, 30.0
@@ -53,3 +55,32 @@ def test_a_step_that_has_not_settled_has_no_level(
     assert all((each.value is not None) is told for each in found[:1])
     if not told:
         assert {each.reason for each in found} == {"not settled in this window of 0.49 s"}
+
+
+def test_what_is_quicker_than_the_set_point_ever_was_is_not_told() -> None:
+    """Slow sticks on quick loops: 23 of 27 rise times missed the truth, all too long."""
+    random = np.random.default_rng(2)
+    step_s, seconds = 0.01, 120
+    sticks = random.standard_normal(round(seconds / step_s))
+    top, bottom = butter(4, 4.0, fs=1.0 / step_s)
+    set_point = lfilter(top, bottom, sticks)
+    followed = lfilter([0.0, 0.4], [1.0, -0.6], set_point)
+    followed += 0.05 * random.standard_normal(followed.size)
+    samples = LoopSamples(set_point, followed, None, (7000, 5000), step_s)
+    seen = told_hz(samples)
+    # Coherence of white noise through filter and loop with white noise added.
+    hertz = np.arange(5.0, 20.0)
+    behind = 0.4 / np.abs(1.0 - 0.6 * np.exp(-2j * np.pi * hertz * step_s))
+    power = np.square(behind) / (1.0 + (np.tan(np.pi * hertz * step_s) / np.tan(0.04 * np.pi)) ** 8)
+    coherence = power / (power + 0.05**2)
+    assert seen == pytest.approx(hertz[coherence >= 0.2][-1], abs=1.0)
+    assert told_hz(LoopSamples(set_point, followed, None, (50, 50), step_s)) == 0.0
+    readings = step_features(np.tile(_curve(), (401, 1)), TIME_S)
+    rise = readings[2].value
+    assert rise is not None
+    kept = told_by(readings, 0.41 / rise)
+    assert kept == readings
+    left = {each.name: each for each in told_by(readings, 0.39 / rise)}
+    assert left["rise time"].value is None
+    assert left["rise time"].reason.endswith("quicker sticks")
+    assert left["delay to half"].value == readings[1].value

@@ -34,6 +34,7 @@ from flightid.review.thresholds import (
     WIDEST_LEVEL,
     WIDEST_TRACKING,
 )
+from flightid.review.told_band import told_by, told_hz
 from flightid.uncertainty.estimate import Estimate, Reading
 from flightid.uncertainty.quantiles import LEVEL
 from flightid.uncertainty.uneven import LogarithmicEnds
@@ -231,7 +232,9 @@ def _step(begun: LoopResponse, samples: LoopSamples, tick_s: float, advised: str
     if refused is not None:
         return refused
     by_frequency = frequency_features(draws, SLOWEST_HZ[begun.loop])
-    readings = (*step_features(steps, time_s), *by_frequency)
+    readings = told_by(
+        (*step_features(steps, time_s), *by_frequency), told_hz(samples, pace_s=pace)
+    )
     return replace(begun, time_s=time_s, step=steps[0], draws=steps[1:], readings=readings)
 
 
