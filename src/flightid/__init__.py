@@ -235,7 +235,7 @@ _HOMES = {
     "close_loop": "flightid.control.closed_loop.close_loop",
     "open_loop": "flightid.control.closed_loop.open_loop",
     "connect": "flightid.control.loops.connect",
-    "loops": "flightid.control",
+    "loops": "flightid.control.loops",
     "excitation": "flightid.excitation",
     "fleet": "flightid.fleet",
     "identify": "flightid.identification.identify",
@@ -310,7 +310,8 @@ def __getattr__(name: str) -> object:
             raise AttributeError(name)
         raise AttributeError(f"module 'flightid' has no attribute {name!r}{_nearest(name)}")
     module = import_module(home)
-    return module if home == f"flightid.{name}" else getattr(module, name)
+    is_room = home in (f"flightid.{name}", f"flightid.control.{name}")
+    return module if is_room else getattr(module, name)
 
 
 def _nearest(name: str) -> str:

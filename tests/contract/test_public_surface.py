@@ -13,6 +13,8 @@ import pytest
 import flightid
 from tests.contract.source import PACKAGE, tree
 
+LOOPS = "flightid.control.loops"
+
 
 def _names_for_the_type_checker() -> dict[str, str]:
     found: dict[str, str] = {}
@@ -28,7 +30,8 @@ def _names_for_the_type_checker() -> dict[str, str]:
 def test_the_three_lists_agree() -> None:
     homes = flightid._HOMES
     expected = {
-        name: "flightid" if home == f"flightid.{name}" else home for name, home in homes.items()
+        name: home.rpartition(".")[0] if home in (f"flightid.{name}", LOOPS) else home
+        for name, home in homes.items()
     }
     assert _names_for_the_type_checker() == expected
     assert sorted(flightid.__all__) == sorted([*homes, "__version__"])
@@ -103,3 +106,17 @@ def test_help_does_not_load_what_it_does_not_need() -> None:
     )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stderr
+
+
+def test_each_room_is_there_before_anything_else_is_asked_for() -> None:
+    """`flightid.loops` was an error until something else had loaded it."""
+    rooms = [each.__name__.rpartition(".")[2] for each in _public_rooms()]
+    code = (
+        "import sys\n"
+        "for room in sys.argv[1:]:\n"
+        "    ours = [n for n in sys.modules if n.startswith('flightid') and '_native' not in n]\n"
+        "    [sys.modules.pop(n) for n in ours]\n"
+        "    import flightid\n"
+        "    assert getattr(flightid, room).__name__.endswith(room)\n"
+    )
+    subprocess.run([sys.executable, "-c", code, *rooms], check=True)
