@@ -1,12 +1,13 @@
 """Units that most logs and models are written in, told without pint, whose loading takes 0.3 s.
 
-Only a unit in flightid's own spelling is told here; whatever else, and whatever lies between two
-units of unlike kind, is pint's to say.
+Products, quotients, powers and brackets of the symbols below are told here; whatever else, and
+whatever lies between two units of unlike kind, is pint's to say.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from functools import cache
 from math import pi
 from typing import NamedTuple
@@ -38,7 +39,11 @@ NAMES = {
 """By whose order the canonical spelling goes."""
 SHORT = {"us": "µs"} | {name: symbol for symbol, name in NAMES.items()}
 """Units that go by their names, and microseconds in plain letters."""
-FACTOR = re.compile(r"([*/]|^1/|^)([A-Za-zµ]+)(?:\^([2-9]))?")
+LONGEST = 60
+"""Letters from which on pint is asked."""
+TOKEN = re.compile(r"\^[1-9]|[*/()1]|[A-Za-zµ]+")
+"""A power, a sign, a bracket or a name."""
+SPACED = re.compile(r" ?([*/]) ?")
 
 
 class CommonUnit(NamedTuple):
@@ -59,40 +64,78 @@ class CommonUnit(NamedTuple):
 
 @cache
 def common_unit(text: str) -> CommonUnit | None:
-    """What a unit in its canonical spelling or by its name stands for; None where pint must say.
+    """What a unit of symbols and names stands for; None where pint must say.
 
     Example
     -------
     >>> common_unit("ft/s^2")[1:]
     (0.3048, {'meter': 1, 'second': -2}, {'foot': 1, 'second': -2})
-    >>> common_unit("radian / second") is common_unit("s*rad") is common_unit("g") is None
+    >>> common_unit("(radian/second) / (in*s)").text
+    'rad/in/s^2'
+    >>> common_unit("radian second") is common_unit("g") is None
     True
     """
-    if text == "1":
-        return CommonUnit(text, 1.0, {}, {})
-    if text in SHORT:
-        return common_unit(SHORT[text])
-    parts = list(FACTOR.finditer(text))
-    if text[:1] in "*/" or "".join(part[0] for part in parts) != text:
+    if len(text) > LONGEST:
         return None
-    if any(part[2] not in SYMBOLS for part in parts):
+    tokens = TOKEN.findall(text)
+    if "".join(tokens) != SPACED.sub(r"\1", text):
         return None
-    above = [part[2] for part in parts if part[1] in ("", "*")]
-    below = [part[2] for part in parts if part[1] not in ("", "*")]
-    order = [*sorted(above, key=NAMES.__getitem__), *sorted(below, key=NAMES.__getitem__)]
-    if order != [part[2] for part in parts] or len(set(order)) < len(order):
+    symbols = _product(tokens)
+    if symbols is None or tokens:
         return None
+    return _written(symbols)
+
+
+def _product(tokens: list[str]) -> dict[str, int] | None:
+    """Powers of symbols in the factors that stand first, taken off; None where they are none."""
+    found, sign = dict[str, int](), 1
+    while True:
+        factor = _factor(tokens)
+        if factor is None:
+            return None
+        _add(found, factor, sign)
+        if not tokens or tokens[0] not in ("*", "/"):
+            return found
+        sign = 1 if tokens.pop(0) == "*" else -1
+
+
+def _factor(tokens: list[str]) -> dict[str, int] | None:
+    """A symbol, a name, a one or a bracket, with its power."""
+    first = tokens.pop(0) if tokens else ""
+    if first == "(":
+        found = _product(tokens)
+        if found is None or not tokens or tokens.pop(0) != ")":
+            return None
+    elif first == "1":
+        found = {}
+    elif (symbol := SHORT.get(first, first)) in SYMBOLS:
+        found = {symbol: 1}
+    else:
+        return None
+    power = int(tokens.pop(0)[1:]) if tokens and tokens[0].startswith("^") else 1
+    return {symbol: times * power for symbol, times in found.items()}
+
+
+def _written(symbols: Mapping[str, int]) -> CommonUnit:
+    """A unit of powers of symbols, above and below in the order of names."""
+    order = sorted(symbols, key=NAMES.__getitem__)
+    above = [_power(symbol, symbols[symbol]) for symbol in order if symbols[symbol] > 0]
+    below = [_power(symbol, -symbols[symbol]) for symbol in order if symbols[symbol] < 0]
     factor, powers, names = 1.0, dict[str, int](), dict[str, int]()
-    for part in parts:
-        power = int(part[3] or 1) * (1 if part[1] in ("", "*") else -1)
-        size, bases = SYMBOLS[part[2]]
-        factor *= size**power
-        _add(powers, bases, power)
-        _add(names, bases if size == 1.0 else {NAMES[part[2]]: 1}, power)
+    for symbol in order:
+        size, bases = SYMBOLS[symbol]
+        factor *= size ** symbols[symbol]
+        _add(powers, bases, symbols[symbol])
+        _add(names, bases if size == 1.0 else {NAMES[symbol]: 1}, symbols[symbol])
+    text = "/".join(["*".join(above) or "1", *below])
     return CommonUnit(text, factor, powers, names)
 
 
-def _add(total: dict[str, int], powers: dict[str, int], times: int) -> None:
+def _power(symbol: str, power: int) -> str:
+    return symbol if power == 1 else f"{symbol}^{power}"
+
+
+def _add(total: dict[str, int], powers: Mapping[str, int], times: int) -> None:
     for name, power in powers.items():
         total[name] = total.get(name, 0) + times * power
         if total[name] == 0:

@@ -189,7 +189,7 @@ def convert(values: ArrayLike, source: str, target: str) -> NDArray[np.float64]:
     (array([9.80665]), array([1.]))
     """
     one, two = common_unit(source), common_unit(target)
-    if one is not None and two is not None and one.powers == two.powers:
+    if one is not None and two is not None and one.without_angle() == two.without_angle():
         factor = 1.0 if source == target else one.factor / two.factor
         return np.asarray(values, dtype=np.float64) * factor
     registry = _registry()
@@ -300,8 +300,9 @@ def match(found: str, needed: str) -> bool:
     >>> match("g", "1"), match("g", "m/s^2"), match("deg/s", "rad/s")
     (True, False, False)
     """
-    if found == needed and common_unit(found) is not None:
-        return True
+    known, other = common_unit(found), common_unit(needed)
+    if known is not None and other is not None:
+        return known.text == other.text
     one, two = _pair(found, needed)
     return bool(one == two)
 
