@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import h5py
@@ -18,6 +20,7 @@ from hypothesis import strategies as st
 from flightid.conventions import Role
 from flightid.errors import DataError, FileFormatError, OptionError, UnitError
 from flightid.record import Channel, Record, Step, read_records, write_records
+from flightid.record.formats import netcdf
 
 SUFFIXES = [".parquet", ".nc"]
 CELLS = st.none() | st.booleans() | st.integers(-(2**53), 2**53) | st.floats(allow_nan=False)
@@ -156,6 +159,27 @@ def test_changed_parquet_is_refused(tmp_path: Path) -> None:
     pq.write_table(table.drop_columns(["p"]), path)
     with pytest.raises(FileFormatError, match=r"no column \['p'\]"):
         read_records(path)
+
+
+def test_records_of_one_file_are_read_in_one_opening(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each opening looks through all objects: sixteen records took sixteen times as long."""
+    opened = []
+    plain = netcdf.plain_datasets
+
+    def counted(path: Path) -> AbstractContextManager[Mapping[str, h5py.Dataset]]:
+        opened.append(path)
+        return plain(path)
+
+    monkeypatch.setattr(netcdf, "plain_datasets", counted)
+    counts = []
+    for n in (2, 7):
+        path = write_records([_record()] * n, tmp_path / f"{n}.nc")
+        opened.clear()
+        assert len(read_records(path)) == n
+        counts.append(len(opened))
+    assert counts[0] == counts[1]
 
 
 def test_changed_netcdf_is_refused(tmp_path: Path) -> None:

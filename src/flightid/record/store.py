@@ -167,10 +167,9 @@ def _write_netcdf(path: Path, records: list[Record]) -> None:
 
 
 def _from_netcdf(path: Path, labels: list[RecordLabels]) -> list[Record]:
+    wanted = {_group_name(k): [TIME, *item.variables] for k, item in enumerate(labels)}
     records = []
-    for index, item in enumerate(labels):
-        names = [TIME, *item.variables]
-        arrays = netcdf.read_group(path, _group_name(index), names)
+    for item, arrays in zip(labels, netcdf.read_groups(path, wanted).values(), strict=True):
         if any(array.shape != (item.n_samples,) for array in arrays.values()):
             raise _changed(path, f"other lengths than {item.n_samples} samples")
         records.append(item.record(arrays[TIME], arrays))

@@ -67,8 +67,14 @@ def read_labels(path: Path) -> str | None:
     return value if isinstance(value, str) else None
 
 
-def read_group(path: Path, group: str, names: list[str]) -> dict[str, np.ndarray]:
-    """Arrays of one group, bit for bit.
+def read_groups(path: Path, groups: Mapping[str, list[str]]) -> dict[str, dict[str, np.ndarray]]:
+    """Arrays of some groups by name, bit for bit; the file is opened once.
+
+    Parameters
+    ----------
+    path : Path
+    groups : mapping of str to list of str
+        Variables by group.
 
     Raises
     ------
@@ -76,14 +82,18 @@ def read_group(path: Path, group: str, names: list[str]) -> dict[str, np.ndarray
         A variable is missing.
     """
     with plain_datasets(path) as datasets:
-        missing = [name for name in names if f"{group}/{name}" not in datasets]
-        if missing:
-            raise FileFormatError(
-                f"{path.name} lacks variables that its labels name",
-                found=f"no {', '.join(missing)} in group {group}",
-                action="the file was changed by another program: write it again",
-            )
-        return {name: read_dataset(path, datasets[f"{group}/{name}"]) for name in names}
+        for group, names in groups.items():
+            missing = [name for name in names if f"{group}/{name}" not in datasets]
+            if missing:
+                raise FileFormatError(
+                    f"{path.name} lacks variables that its labels name",
+                    found=f"no {', '.join(missing)} in group {group}",
+                    action="the file was changed by another program: write it again",
+                )
+        return {
+            group: {name: read_dataset(path, datasets[f"{group}/{name}"]) for name in names}
+            for group, names in groups.items()
+        }
 
 
 def _variables(path: Path) -> Variables:
