@@ -106,6 +106,10 @@ class Table:
             isinstance(cell, int | float) and not isinstance(cell, bool) for cell in cells
         )
 
+    def _numeric(self) -> list[bool]:
+        """Of each column, whether it holds numbers."""
+        return [self.is_numeric(index) for index in range(len(self.columns))]
+
     def without_empty_columns(self) -> Table:
         """Copy without columns in which no row says anything."""
         keep = [
@@ -147,11 +151,12 @@ class Table:
         headings = [_told(column.heading) for column in self.columns]
         body = [[_told(cell) for cell in row] for row in self.shown()]
         widths = [max(map(len, cells)) for cells in zip(headings, *body, strict=True)]
+        numeric = self._numeric()
 
         def line(cells: list[str]) -> str:
             return "  ".join(
-                cell.rjust(width) if self.is_numeric(index) else cell.ljust(width)
-                for index, (cell, width) in enumerate(zip(cells, widths, strict=True))
+                cell.rjust(width) if is_numeric else cell.ljust(width)
+                for is_numeric, cell, width in zip(numeric, cells, widths, strict=True)
             ).rstrip()
 
         rule = "  ".join("-" * width for width in widths)
@@ -174,11 +179,12 @@ class Table:
 
     def _repr_html_(self) -> str:
         head = "".join(f"<th>{escape(column.heading)}</th>" for column in self.columns)
+        kinds = ["number" if is_numeric else "text" for is_numeric in self._numeric()]
         body = "".join(
             "<tr>"
             + "".join(
-                f'<td class="{"number" if self.is_numeric(i) else "text"}">{escape(cell)}</td>'
-                for i, cell in enumerate(row)
+                f'<td class="{kind}">{escape(cell)}</td>'
+                for kind, cell in zip(kinds, row, strict=True)
             )
             + "</tr>"
             for row in self.shown()

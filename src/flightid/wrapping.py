@@ -11,6 +11,8 @@ ARGUMENT = r"(?: --?[a-z][\w-]*(?: (?!-)[^\s,;:]+)?| [A-Z]+\b| [^\s,;:]*[./_\d][
 COMMAND = re.compile(rf"flightid [a-z][a-z-]*{ARGUMENT}*")
 """A verb with options, their values, files and placeholders, up to the first other word."""
 
+BROKEN = re.compile(r"[\t\n\v\f\r]|\s\Z")
+"""What does not stay in a line as it is."""
 CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
 """What terminals obey, and what turns the direction of text."""
 
@@ -42,6 +44,8 @@ def wrapped(text: str, width: int, *, first: str = "", later: str = "") -> list[
     >>> wrapped("next: flightid run monday-flight.toml --all, then look", 24)
     ['next:', 'flightid run monday-flight.toml --all,', 'then look']
     """
+    if len(first) + len(text) <= width and not BROKEN.search(text):
+        return [first + text] if text else []
     whole = COMMAND.sub(lambda found: found[0].replace(" ", GLUE), text)
     lines = wrap(
         whole, width, initial_indent=first, subsequent_indent=later,

@@ -37,9 +37,10 @@ def folded_table(table: Table, width: int) -> list[str]:
     heads = [column.heading for column in table.columns]
     widths = _widths(table, [heads, *body], width)
     rule = "  ".join("-" * each for each in widths)
-    lines = [*_row(table, heads, widths), rule]
+    numeric = [table.is_numeric(index) for index in range(len(heads))]
+    lines = [*_row(numeric, heads, widths), rule]
     for row in body:
-        lines += _row(table, row, widths)
+        lines += _row(numeric, row, widths)
     return [without_controls(table.title), *lines] if table.title else lines
 
 
@@ -60,7 +61,7 @@ def _widths(table: Table, rows: list[list[str]], width: int) -> list[int]:
     ]
 
 
-def _row(table: Table, row: list[str], widths: list[int]) -> list[str]:
+def _row(numeric: list[bool], row: list[str], widths: list[int]) -> list[str]:
     folded = [wrapped(cell, width) or [""] for cell, width in zip(row, widths, strict=True)]
     lines = []
     for place in range(max(map(len, folded))):
@@ -68,8 +69,8 @@ def _row(table: Table, row: list[str], widths: list[int]) -> list[str]:
         lines.append(
             (" " * GAP)
             .join(
-                text.rjust(width) if table.is_numeric(index) else text.ljust(width)
-                for index, (text, width) in enumerate(zip(cells, widths, strict=True))
+                text.rjust(width) if is_numeric else text.ljust(width)
+                for is_numeric, text, width in zip(numeric, cells, widths, strict=True)
             )
             .rstrip()
         )
