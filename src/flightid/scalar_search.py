@@ -18,13 +18,21 @@ GOLDEN = 0.5 * (3.0 - math.sqrt(5.0))
 ROUNDED = math.sqrt(2.2e-16)
 
 
-def root_between(function: Callable[[float], float], low: float, high: float) -> float:
+def root_between(
+    function: Callable[[float], float],
+    low: float,
+    high: float,
+    *,
+    ends: tuple[float, float] | None = None,
+) -> float:
     """Root of a continuous function between two places where it has unlike signs.
 
     Parameters
     ----------
     function : callable
     low, high : float
+    ends : tuple of float, optional
+        Values there, where they are known.
 
     Returns
     -------
@@ -46,7 +54,7 @@ def root_between(function: Callable[[float], float], low: float, high: float) ->
     1.414213562373
     """
     before, here = low, high
-    f_before, f_here = function(before), function(here)
+    f_before, f_here = ends or (function(before), function(here))
     if f_before == 0.0 or f_here == 0.0:
         return before if f_before == 0.0 else here
     if (f_before < 0.0) == (f_here < 0.0):

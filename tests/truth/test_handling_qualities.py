@@ -10,10 +10,17 @@ from scipy.optimize import brentq
 
 import flightid as fid
 from flightid.dynamics import attitude_bandwidth
-from flightid.dynamics.handling_qualities.attitude_bandwidth import bandwidth_numbers
-from flightid.dynamics.handling_qualities.curve import GainPhaseCurve, Pair, smoother_of
+from flightid.dynamics.handling_qualities import attitude_bandwidth as attitude_module
+from flightid.dynamics.handling_qualities.attitude_bandwidth import FEW_POINTS, bandwidth_numbers
+from flightid.dynamics.handling_qualities.curve import (
+    GRID_POINTS,
+    GainPhaseCurve,
+    Pair,
+    smoother_of,
+)
 from flightid.dynamics.handling_qualities.rating_charts_reading import rating_chart
 from flightid.errors import DataError, OptionError, UnknownNameError
+from flightid.uncertainty.uncertain import Uncertain
 from tests.closeness import assert_close
 
 # τ, T: ω_180, phase bandwidth, gain bandwidth, phase delay.
@@ -53,6 +60,32 @@ def test_printed_values(case: tuple[float, float]) -> None:
         assert_close(found.phase_delay_s, delay, atol=digits * 1e-6, why=why)
         assert found.bandwidth_rad_s == found.phase_bandwidth_rad_s
         assert found.findings == ()
+
+
+@pytest.mark.parametrize(("damping", "few"), [(0.05, True), (0.003, False)])
+def test_errors_by_fewer_points_are_those_by_all(
+    damping: float, few: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A mode narrower than the coarse grid, beside −180°, is what it would not see."""
+    mode = 5.47**2  # rad/s, squared; ω_180 is 5.41
+
+    def vehicle(numbers: np.ndarray) -> fid.LinearSystem:
+        gain, late, lag = numbers
+        above = [1.0, 0.8 * damping * np.sqrt(mode), mode]
+        below = np.polymul([lag, 1.0, 0.0], [1.0, 2.0 * damping * np.sqrt(mode), mode])
+        return fid.loops.transfer("lat", "phi", gain * np.array(above), below, delay_s=late).part
+
+    covariance = np.diag([0.05, 0.002, 0.01]) ** 2
+    known = Uncertain(np.array([2.0, 0.1, 0.3]), covariance, vehicle)
+    found = attitude_bandwidth(known, "lat", "phi").uncertain
+    pair = Pair("phi", "lat", 0.1, 100.0)
+    assert (attitude_module._enough(known, pair, found.numbers) == FEW_POINTS) == few
+    monkeypatch.setattr(attitude_module, "FEW_POINTS", GRID_POINTS)
+    whole = attitude_bandwidth(known, "lat", "phi").uncertain
+    assert found.stderr is not None
+    assert whole.stderr is not None
+    assert_close(found.stderr, whole.stderr, rtol=1e-3, why="a slope over straight pieces")
+    assert_close(found.stderr[:4], whole.stderr[:4], rtol=1e-9, why="refined by the model")
 
 
 def test_against_the_equations() -> None:

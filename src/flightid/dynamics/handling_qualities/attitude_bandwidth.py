@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.conventions import Light
-from flightid.dynamics.handling_qualities.curve import GainPhaseCurve, Pair, smoother_of
+from flightid.dynamics.handling_qualities.curve import (
+    GRID_POINTS,
+    GainPhaseCurve,
+    Pair,
+    smoother_of,
+)
 from flightid.dynamics.handling_qualities.result import AttitudeBandwidth
 from flightid.errors import DataError, OptionError
 from flightid.findings import Finding
@@ -36,6 +42,8 @@ NO_FALL = "widen the band; take the attitude, or say that it is a rate, with its
 NO_LEAD = "above its unstable pair the phase never passes −135°: close an inner loop first"
 AMBIGUOUS = 3.0
 """Width of all places where noise may put a passage, over that of its interval of first order."""
+FEW_POINTS, SAME = 500, 1e-3
+"""Points of a coarser grid, and how near its numbers are to be to those of the whole one."""
 MOST_POINTS = 160
 """Measured points that carry errors: more say the same again."""
 Array = NDArray[np.float64]
@@ -175,13 +183,27 @@ def _errors(data: object, pair: Pair, values: Array) -> Uncertain[Array]:
     if isinstance(data, FrequencyResponse):
         data = _thinned(data, pair, values)
         smoother = smoother_of(data, pair)
-    found = uncertain_of(data, pair.output, pair.input).carried(
-        lambda thing: bandwidth_numbers(GainPhaseCurve.of(thing, pair, smoother))
+    source = uncertain_of(data, pair.output, pair.input)
+    points = GRID_POINTS if isinstance(data, FrequencyResponse) else _enough(source, pair, values)
+    found = source.carried(
+        lambda thing: bandwidth_numbers(GainPhaseCurve.of(thing, pair, smoother, points))
     )
     covariance = found.covariance
     if covariance is not None and isinstance(data, FrequencyResponse):
         covariance = _certain(covariance, data, pair)
     return uncertain_numbers(values, covariance, found.reason)
+
+
+def _enough(source: Uncertain[Any], pair: Pair, values: Array) -> int:
+    """Points of a model's grid by which its errors are found: few where they see what all do.
+
+    Passages are refined by the model itself, whatever grid they are first seen on.
+    """
+    if not source.known:
+        return GRID_POINTS
+    seen = bandwidth_numbers(GainPhaseCurve.of(source.value, pair, points=FEW_POINTS))
+    same = np.allclose(seen, values, rtol=SAME, atol=0.0, equal_nan=True)
+    return FEW_POINTS if same else GRID_POINTS
 
 
 def _certain(covariance: Array, data: FrequencyResponse, pair: Pair) -> NDArray[np.float64]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import cmath
+import math
 from collections.abc import Callable
 from functools import cached_property
 
@@ -80,7 +82,13 @@ class GainPhaseCurve:
     branch: Branch
 
     @classmethod
-    def of(cls, thing: object, pair: Pair, smoother: Array | None = None) -> GainPhaseCurve:
+    def of(
+        cls,
+        thing: object,
+        pair: Pair,
+        smoother: Array | None = None,
+        points: int = GRID_POINTS,
+    ) -> GainPhaseCurve:
         """Curve of a response, a model or a system.
 
         Parameters
@@ -89,6 +97,8 @@ class GainPhaseCurve:
         pair : Pair
         smoother : ndarray, shape (n, n), optional
             Of measured decibels and degrees, from `smoother_of`.
+        points : int
+            Of the grid of a model.
 
         Raises
         ------
@@ -105,7 +115,7 @@ class GainPhaseCurve:
             values = pair.attitude(omega, measured.response[inside])
         else:
             respond, high = _evaluator(thing, pair)
-            omega = np.geomspace(pair.low, min(pair.high, high), GRID_POINTS)
+            omega = np.geomspace(pair.low, min(pair.high, high), points)
             values = respond(omega)
 
             def exact(at: float) -> complex:
@@ -127,14 +137,14 @@ class GainPhaseCurve:
 
     def at(self, omega: float) -> tuple[float, float]:
         """Decibels and degrees at one frequency: of a model exactly, else between neighbours."""
-        wanted = np.log(omega)
+        wanted = math.log(omega)
         degrees = float(np.interp(wanted, self._logs, self.degrees))
         if self.exact is None:
             return float(np.interp(wanted, self._logs, self.decibels)), degrees
         value = self.exact(omega)
-        angle = float(np.degrees(np.angle(value)))
+        angle = math.degrees(cmath.phase(value))
         turns = round((degrees - angle) / 360.0)
-        return float(20.0 * np.log10(abs(value))), angle + 360.0 * turns
+        return 20.0 * math.log10(abs(value)), angle + 360.0 * turns
 
     @cached_property
     def _logs(self) -> Array:
@@ -173,14 +183,17 @@ class GainPhaseCurve:
         """
         omega = np.linspace(low, high, SLOPE_POINTS)
         phase = np.interp(np.log(omega), self._logs, self.degrees)
-        line = np.polyfit(omega - low, phase, 1)
-        misfit = phase - np.polyval(line, omega - low)
-        return float(-line[0] / (2.0 * DEGREES_PER_RADIAN)), float(np.sqrt(np.mean(misfit**2)))
+        away, phase = omega - omega.mean(), phase - phase.mean()
+        slope = float(away @ phase / (away @ away))
+        misfit = phase - slope * away
+        return -slope / (2.0 * DEGREES_PER_RADIAN), float(np.sqrt(np.mean(misfit**2)))
 
     def _between(self, place: int, part: int, level: float) -> float:
-        left = float(self.omega[place])
-        right = float(self.omega[min(place + 1, len(self.omega) - 1)])
-        return root_between(lambda at: self.at(at)[part] - level, left, right)
+        pair = np.minimum([place, place + 1], len(self.omega) - 1)
+        left, right = self.omega[pair].tolist()
+        known = (self.decibels, self.degrees)[part][pair] - level
+        ends = float(known[0]), float(known[1])
+        return root_between(lambda at: self.at(at)[part] - level, left, right, ends=ends)
 
 
 def smoother_of(response: FrequencyResponse, pair: Pair) -> Array | None:
