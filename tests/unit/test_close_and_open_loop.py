@@ -10,7 +10,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import flightid as fid
-from flightid.errors import DataError, OptionError, ShapeError, SingularError, UnknownNameError
+from flightid.control.closed_loop.result import PLANT
+from flightid.control.loops.same_wires import with_part
+from flightid.errors import (
+    DataError,
+    ModelError,
+    OptionError,
+    ShapeError,
+    SingularError,
+    UnknownNameError,
+)
 from flightid.responses.opened import open_loops
 from tests.closeness import assert_close
 from tests.examples import examples
@@ -149,6 +158,24 @@ def test_errors_of_opened_responses_are_those_of_draws() -> None:
     wanted = np.cov(scatter[:, 0, 0, 0].real, scatter[:, 0, 1, 0].real)[0, 1]
     size = np.sqrt(covariance[first, first] * covariance[second, second])
     assert_close(covariance[first, second] / size, wanted / size, atol=0.06, why="800 draws")
+
+
+def test_another_vehicle_in_the_same_loop_is_the_loop_closed_anew() -> None:
+    closed = fid.close_loop(vehicle(1), controller(), draws=0)
+    other = fid.close_loop(vehicle(2), controller(), draws=0).loops
+    first = closed.loops
+    assert first.stability() is first.stability()
+    assert first.frequency_response(OMEGA).size
+    moved = with_part(first, PLANT, vehicle(2))
+    for one, two in ((moved, other), (moved.broken_at("lat_total"), other.broken_at("lat_total"))):
+        assert np.array_equal(one.frequency_response(OMEGA), two.frequency_response(OMEGA))
+        assert np.array_equal(one.poles(), two.poles())
+        assert np.array_equal(one.linear_system().a, two.linear_system().a)
+    assert not np.allclose(moved.poles()[:3], first.poles()[:3])
+    with pytest.raises(ModelError, match=r"takes no other kind of part.*same inputs"):
+        with_part(first, PLANT, vehicle(2).select(inputs=["lat"]))
+    with pytest.raises(ModelError, match="takes no other kind of part"):
+        with_part(first, PLANT, replace(vehicle(2), delays_s=[]).sampled(0.02))
 
 
 def test_a_fit_gives_intervals_and_says_when_its_vehicles_are_unstable() -> None:

@@ -13,11 +13,12 @@ from flightid.control.closed_loop.controller_blocks import (
     moved_by,
     require_channels,
 )
-from flightid.control.closed_loop.result import ClosedLoop, ClosedPole
+from flightid.control.closed_loop.result import PLANT, ClosedLoop, ClosedPole
 from flightid.control.loops.block import Block, Equations
 from flightid.control.loops.connect import connect
 from flightid.control.loops.elements import sum_of, system
 from flightid.control.loops.interconnection import Interconnection
+from flightid.control.loops.same_wires import with_part
 from flightid.control.loops.stability_over import followed_poles, unstable_count
 from flightid.conventions import Light
 from flightid.errors import OptionError
@@ -105,14 +106,15 @@ def close_loop(
     around = controller_blocks(controller, vehicle.units)
     moved = tuple(moved_by(around, vehicle.inputs, vehicle.outputs))
 
+    estimate = _closed(vehicle if linear else model, vehicle, around, moved, name)
+
     def closed(model: object) -> Interconnection:
-        plant = linear_system(model) if linear else model
-        return _closed(plant, vehicle, around, moved, name)
+        part = linear_system(model) if linear else system(model).part
+        return with_part(estimate, PLANT, part)
 
     drawn = uncertain.then(closed)
     # Poles and the margins at each actuator are read off the same loops; draws but once.
     loops = drawn.kept()
-    estimate = loops.value
     poles, propagated = _poles(loops, estimate)
     tried = drawn.draws(draws, seed) if draws and drawn.known else []
     unstable = sum(unstable_count(each) > 0 for each in tried)

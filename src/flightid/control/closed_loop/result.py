@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from operator import methodcaller
 
 from flightid.control.loops.interconnection import Interconnection
+from flightid.control.loops.same_wires import with_part
 from flightid.control.margins.margins import Margins, margins
 from flightid.errors import UnknownNameError
 from flightid.findings import Finding
@@ -15,6 +15,9 @@ from flightid.table import Column, Table
 from flightid.uncertainty.estimate import Reading
 from flightid.uncertainty.quantiles import interval_words, shown
 from flightid.uncertainty.uncertain import Uncertain
+
+PLANT = 0
+"""Place of the vehicle among the blocks of a closed loop."""
 
 
 @dataclass(frozen=True)
@@ -114,9 +117,13 @@ class ClosedLoop(
         """
         found = {}
         for name in self.actuators:
-            broken = self.uncertain.then(methodcaller("broken_at", self._total(name)))
-            found[name] = margins(broken, band_rad_s=band_rad_s)
+            found[name] = margins(self._broken(name), band_rad_s=band_rad_s)
         return found
+
+    def _broken(self, actuator: str) -> Uncertain[Interconnection]:
+        """The loop broken at an actuator over the uncertainty: cut once, for every vehicle."""
+        cut = self.broken_at(actuator)
+        return self.uncertain.then(lambda loops: with_part(cut, PLANT, loops.blocks[PLANT].part))
 
     def _total(self, actuator: str) -> str:
         if actuator not in self.actuators:

@@ -175,6 +175,13 @@ def _diagonal(parts: Sequence[Array]) -> Array:
 def _inverse(matrix: Array, names: Sequence[str]) -> Array:
     if not len(matrix):
         return matrix
+    try:
+        inverse = np.asarray(np.linalg.inv(matrix))
+    except np.linalg.LinAlgError:
+        inverse = np.full_like(matrix, np.inf)
+    # Norms by all entries bound those by singular values, which take longer.
+    if SINGULAR * max(1.0, float(np.linalg.norm(matrix))) * float(np.linalg.norm(inverse)) <= 1.0:
+        return inverse
     _, sizes, directions = np.linalg.svd(matrix)
     if sizes[-1] < SINGULAR * max(1.0, sizes[0]):
         share = np.abs(directions[-1])
@@ -184,7 +191,7 @@ def _inverse(matrix: Array, names: Sequence[str]) -> Array:
             found=f"gain of one around {', '.join(loop)}",
             needed="a loop gain other than one, or dynamics or a delay in the loop",
         )
-    return np.asarray(np.linalg.inv(matrix))
+    return inverse
 
 
 def _with_direct_parts(core: Core, carriers: Sequence[str]) -> Core:
