@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import flightid as fid
+from flightid.study.proposal.order_scans import ProposedScans, record_file
+from flightid.study.stage_runner import StageRunner
 
 RIGS = {
     "exchanger": (["q_flow"], ["th_out"]),
@@ -45,3 +48,14 @@ def test_the_evaporator_runs_as_well_as_its_peer(shared_data: Path) -> None:
     _, percent = _unseen(shared_data, "evaporator", refine=True)
     for name, peer in {"y1": 61.0, "y2": 58.0, "y3": 56.0}.items():
         assert percent[name] >= peer, (name, percent)
+
+
+@pytest.mark.parametrize("output", ["y1", "y2", "y3"])
+def test_all_inputs_drive_the_evaporator(shared_data: Path, tmp_path: Path, output: str) -> None:
+    """u2 is coherent with y1 over 0.29 decades, u1 with y3 over as much."""
+    inputs, outputs = (tuple(each) for each in RIGS["evaporator"])
+    path = os.path.relpath(shared_data / "records" / "evaporator.csv", tmp_path)
+    lines = ["[[record]]", 'name = "half"', f'path = "{path}"', "sample_time_s = 1.0"]
+    half = record_file([*lines, "span_s = [0.0, 3152.0]"], tmp_path)
+    scans = ProposedScans(half, half, inputs, outputs, (), StageRunner())
+    assert scans.driving((output,), (0.0166, 0.628)) == inputs

@@ -15,6 +15,12 @@ from flightid.table import Cell, Column, Table
 
 MINIMUM_DECADES = 0.3
 """An octave."""
+DRIVING_DECADES = 0.2
+"""Coherent decades from which an input counts in a fit to samples, which no band of it enters.
+
+Of 400 idle inputs beside one that drives the widest band was 0.15; what drives slowly has less than
+an octave above the lowest frequency of a record (0.22 and 0.29 in DaISy's evaporator).
+"""
 
 
 @dataclass(frozen=True)

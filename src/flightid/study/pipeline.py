@@ -15,7 +15,7 @@ from flightid.inspection import Inspection
 from flightid.models import GreyBoxModel
 from flightid.record import Record
 from flightid.responses import CoherentPairs, FrequencyResponse
-from flightid.responses.coherent_pairs import MINIMUM_DECADES
+from flightid.responses.coherent_pairs import DRIVING_DECADES, MINIMUM_DECADES
 from flightid.responses.options import AUTOMATIC
 from flightid.study.evidence import examined
 from flightid.study.identified import ModelFits, ModelResults
@@ -215,12 +215,13 @@ def _fit(
     first = next(iter(responses.values()), None)
     if first is not None and (settings.by_coherence or task.model is None):
         decades = settings.response.minimum_decades
+        usual = DRIVING_DECADES if task.model is None else MINIMUM_DECADES
         coherent = runner.stage(
             f"coherence: {settings.name}",
             select_coherent,
             first,
             settings.response.minimum_coherence,
-            MINIMUM_DECADES if decades is None else decades,
+            usual if decades is None else decades,
             settings.responses == (UNBROKEN,),
             task.model is None and decades is None,
         )

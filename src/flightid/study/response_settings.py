@@ -33,8 +33,8 @@ class ResponseSettings(ResponseOptions):
     minimum_decades: float | None = option(
         None,
         above=0.0,
-        doc="Width of the coherent band that a response needs to be chosen; not told: 0.3, and no "
-        "narrow response takes its only inputs from a structure without equations.",
+        doc="Width of the coherent band that a response needs to be chosen; not told: 0.3; 0.2 "
+        "for an input of a structure without equations, which keeps its only inputs all the same.",
     )
     loop: str = option(  # type: ignore[assignment]  # a file has no word for None
         TEST, choices=(TEST, *LOOPS), doc="Whether a loop was closed, where it is known."

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Iterator, Mapping, MutableMapping, Sequence
 from dataclasses import replace
@@ -12,11 +11,9 @@ from typing import Any
 import numpy as np
 
 from flightid.conventions import Light
-from flightid.errors import FlightidError, StudyError
+from flightid.errors import StudyError
 from flightid.findings import Finding
-from flightid.identification.advice.delays import delays_to_scan
 from flightid.logs.joinable import joinable
-from flightid.models.polynomial.orders import USED
 from flightid.models.save import toml_value
 from flightid.record import read_records
 from flightid.record.formats.columns import channel_name
@@ -28,30 +25,20 @@ from flightid.study.proposal.options import DataOptions, told
 from flightid.study.proposal.order_scans import ProposedScans, record_file
 from flightid.study.proposal.proposal import Proposal
 from flightid.study.proposal.stretches import (
-    FITTED,
     Group,
     Segments,
     Stretch,
     one_experiment,
-    rounded,
     segments_of,
     too_short,
 )
+from flightid.study.proposal.structures_of import GroupScans, structures_of
 from flightid.study.proposal.unit_steps import unit_steps
 from flightid.study.stage_runner import StageRunner
-from flightid.study.structures import ranked, runs_as_well
 from flightid.surface import as_key, speaking
-from flightid.validation.order_scan.result import OrderTrial
 
-KINDS = ("arx", "armax", "bj", "oe")
-ORDERS = {"na": (1, 2, 3, 4), "nb": (1, 2, 3), "nc": (1, 2), "nd": (1, 2), "nf": (1, 2, 3, 4)}
-"""Orders that are tried: two modes; delays are those that the record tells."""
-OF_VEHICLE = ("nb", "nf", "nk")
-"""Orders of Box-Jenkins that are those of the best output error, whose noise models are tried."""
 SHORTEST = 0.1
 """Part of the longest manoeuvre's samples below which another is a rag between gaps."""
-CYCLES, SAMPLES_PER_CYCLE = 10.0, 10.0
-"""What a response needs: cycles of its lowest frequency in a record, samples of its highest."""
 
 
 def study_of_records(
@@ -121,6 +108,7 @@ def study_of_records(
         groups = [swept[0]]
     runner = StageRunner(cache)
     names: list[str] = []
+    together: list[str] = []
     for whole in groups:
         segments = segments_of(whole) if swept is None else swept[1]
         short = too_short(whole, segments) if model is None else None
@@ -138,23 +126,21 @@ def study_of_records(
             record_file(tables[n], folder) for n in (segments.fitted, segments.choice)
         )
         scans = ProposedScans(fitted, choice, group.inputs, columns.outputs, injected, runner)
-        for output in columns.outputs if model is None else columns.outputs[:1]:
-            name = (
-                f"{output} from {' and '.join(group.inputs)}" if model is None else Path(model).stem
-            )
-            try:
-                made = _model(name, group, segments, output, model, scans, renamed)
-                body += list(made)
-            except FlightidError as error:
-                why = str(error).partition(". Next: ")[0]
-                said = f"{name}: no model, {why}"
-                missed.append(Finding("no-model", Light.RED, said, error.action or ""))
-                continue
-            names.append(name)
+        asked = GroupScans(group, segments, scans)
+        if model is not None:
+            names.append(Path(model).stem)
+            body += _equations(model, asked, renamed)
+            continue
+        found, without = structures_of(asked)
+        missed += without
+        names += [each.name for each in found]
+        for each in found:
+            body += each.lines
+            together += each.said
     with speaking(as_key):
         keyed = _times(read)
-    told_of = (*columns.said, *converted, *_times(read), *_stamps(read))
-    head = _head(paths, (*columns.said, *converted, *keyed, *_stamps(read)), missed)
+    told_of = (*columns.said, *converted, *_times(read), *_stamps(read), *together)
+    head = _head(paths, (*columns.said, *converted, *keyed, *_stamps(read), *together), missed)
     return Proposal((*head, *body), tuple(names), tuple(missed), said=told_of)
 
 
@@ -263,77 +249,24 @@ def _driven(group: Group, segments: Segments) -> tuple[Group, list[Finding]]:
     return replace(group, inputs=moving), [Finding("input-still", Light.AMBER, said, action)]
 
 
-def _model(
-    name: str,
-    group: Group,
-    segments: Segments,
-    output: str,
-    model: str | None,
-    scans: ProposedScans,
-    renamed: Mapping[str, str],
-) -> Iterator[str]:
-    injected = scans.injected
-    lines = [f"identify = {toml_value(list(segments.together) or segments.fitted)}"]
-    lines += [f"verify = {toml_value(list(segments.unseen))}"]
-    record = group.parts[0].record
-    span_s = record.duration_s * (1.0 if segments.together else FITTED)
-    low = CYCLES * math.tau / span_s
-    high = math.tau * record.sample_rate_hz / SAMPLES_PER_CYCLE
-    if model is not None:
-        template = [f"template = {toml_value(model)}"]
-        if not injected:
-            template += ['fit = { method = "output_error" }']
-        elif high > 2 * low:
-            said = "# By way of what was injected: a controller in the loop does not bias that."
-            names = toml_value(list(injected))
-            template += [f"band_rad_s = {toml_value([rounded(low), rounded(high)])}", said]
-            template += [f'response = {{ estimator = "instrument", excitations = {names} }}']
-        if segments.together:
-            # Of inputs times outputs some say nothing: coherence tells which are fitted.
-            channels = {column: channel for channel, column in renamed.items()}
-            told_outputs = [channels.get(output, output) for output in scans.outputs]
-            template += ['responses = "coherent"', f"outputs = {toml_value(told_outputs)}"]
-        return iter(["", "[[model]]", f"name = {toml_value(name)}", *template, *lines])
-    band = (rounded(low), rounded(high)) if high > 2 * low else None
-    driving = scans.driving(output, band)
-    kind, found, orders_of = _structure(scans, output, driving, record.unit(output))
-    orders = [f"{order} = {toml_value(list(orders_of[order]))}" for order in USED[kind]]
-    coherent = () if band is None else (f"band_rad_s = {toml_value(list(band))}",)
-    return iter(
-        [
-            "", "[[model]]", f"name = {toml_value(name)}",
-            f"# Error of free runs on what was not fitted: {found}.",
-            f"structure = {toml_value(kind)}",
-            f"inputs = {toml_value(list(group.inputs))}", f"outputs = {toml_value(output)}",
-            *lines, f"select = {toml_value(segments.choice)}", *coherent, *orders,
-        ]
-    )  # fmt: skip
-
-
-def _structure(
-    scans: ProposedScans, output: str, inputs: tuple[str, ...], unit: str
-) -> tuple[str, str, dict[str, tuple[int, ...]]]:
-    """The structure that runs freely with the least error, what each reached, and orders tried."""
-    flown = scans.flown(output, inputs)
-    orders = ORDERS | {"nk": delays_to_scan([flown], inputs, output)}
-    of_kind = dict.fromkeys(KINDS, orders)
-    reached: dict[str, OrderTrial] = {}
-    for kind in sorted(KINDS, key=("arx", "armax", "oe", "bj").index):
-        tried = {order: of_kind[kind][order] for order in USED[kind]}
-        scan = scans.scan(kind, output, tried, inputs)
-        if scan.trials[0].free_run_rms is not None:
-            reached[kind] = scan.trials[0]
-        if kind == "oe":
-            taken = ranked(scan, "balanced")[0].structure
-            of_kind["bj"] = orders | {name: getattr(taken, name)[:1] for name in OF_VEHICLE}
-    if not reached:
-        raise StudyError("no structure runs freely", needed="a record that moves the output")
-    errors = {kind: best.free_run_rms or 0.0 for kind, best in reached.items()}
-    said = ", ".join(f"{kind} {errors[kind]:.3g}" for kind in KINDS if kind in errors)
-    least = reached[min(errors, key=lambda kind: errors[kind])]
-    # What comes last assumes least of the noise, so that its intervals hold for more of it.
-    good = [kind for kind in KINDS if kind in reached and runs_as_well(reached[kind], least)]
-    return good[-1], f"{said} {unit}".rstrip(), of_kind[good[-1]]
+def _equations(model: str, asked: GroupScans, renamed: Mapping[str, str]) -> list[str]:
+    """A model of equations, by way of what was injected where that is known."""
+    scans, segments = asked.scans, asked.segments
+    template = [f"template = {toml_value(model)}"]
+    if not scans.injected:
+        template += ['fit = { method = "output_error" }']
+    elif asked.band is not None:
+        said = "# By way of what was injected: a controller in the loop does not bias that."
+        names = toml_value(list(scans.injected))
+        template += [f"band_rad_s = {toml_value(list(asked.band))}", said]
+        template += [f'response = {{ estimator = "instrument", excitations = {names} }}']
+    if segments.together:
+        # Of inputs times outputs some say nothing: coherence tells which are fitted.
+        channels = {column: channel for channel, column in renamed.items()}
+        told_outputs = [channels.get(output, output) for output in scans.outputs]
+        template += ['responses = "coherent"', f"outputs = {toml_value(told_outputs)}"]
+    name = f"name = {toml_value(Path(model).stem)}"
+    return ["", "[[model]]", name, *template, *asked.records]
 
 
 def _stamps(read: Sequence[Stretch]) -> Iterator[str]:

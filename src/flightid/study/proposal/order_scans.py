@@ -3,20 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
+
+import numpy as np
 
 from flightid.conventions import Role
 from flightid.errors import StudyError
 from flightid.frozen import dataclass
+from flightid.identification.prediction.predict import predict
 from flightid.reading import parse_toml
 from flightid.record import Record
-from flightid.responses.coherent_pairs import MINIMUM_DECADES
+from flightid.responses.coherent_pairs import DRIVING_DECADES
+from flightid.simulation.metrics import rms_error
 from flightid.study.reading import TableReader
 from flightid.study.record_files import RecordFile, load_records, read_record_file
 from flightid.study.response_settings import ResponseSettings
 from flightid.study.stage_runner import StageResult, StageRunner
-from flightid.study.stages import estimate, scan_records, select_coherent
+from flightid.study.stages import (
+    estimate,
+    fit_without_equations,
+    scan_records,
+    select_coherent,
+)
+from flightid.study.structure_settings import SUBSPACE, StructureSettings
 from flightid.study.task import narrowed
 from flightid.surface import as_key, speaking
 from flightid.validation import OrderScan
@@ -69,12 +80,13 @@ class ProposedScans:
         )
         return first, second
 
-    def driving(self, output: str, band_rad_s: Band | None) -> tuple[str, ...]:
-        """Inputs that the study will take for an output: those whose responses are coherent.
+    def driving(self, outputs: tuple[str, ...], band_rad_s: Band | None) -> tuple[str, ...]:
+        """Inputs that the study will take for outputs: those whose responses are coherent.
 
         Parameters
         ----------
-        output : str
+        outputs : tuple of str
+            Of one model.
         band_rad_s : tuple of float or None
             Of the model in the study; None: it estimates no response and takes all inputs.
 
@@ -87,17 +99,18 @@ class ProposedScans:
             return self.inputs
         asked = ResponseSettings()
         response = self.runner.stage(
-            f"response: {output}, {asked.estimator}",
+            f"response: {', '.join(outputs)}, {asked.estimator}",
             estimate,
             [self._records[0]],
             self.inputs,
-            (output,),
+            outputs,
             band_rad_s,
             asked.estimator,
             asked.of_estimates,
         )
-        limits = (asked.minimum_coherence, MINIMUM_DECADES, False, True)
-        found = self.runner.stage(f"coherence: {output}", select_coherent, response, *limits).value
+        limits = (asked.minimum_coherence, DRIVING_DECADES, False, True)
+        name = f"coherence: {', '.join(outputs)}"
+        found = self.runner.stage(name, select_coherent, response, *limits).value
         kept = {name.split("/", 1)[1] for name in found.names}
         # Where none is coherent the study gives no model, whatever is scanned.
         return tuple(name for name in self.inputs if name in kept) or self.inputs
@@ -113,6 +126,45 @@ class ProposedScans:
         (record,) = self._records[0].value
         whole = narrowed(record, inputs, (output,))
         return whole.select([*inputs, output])
+
+    def subspace_errors(
+        self, outputs: tuple[str, ...], inputs: tuple[str, ...], settle_s: float
+    ) -> dict[str, float] | None:
+        """Rms by output of a subspace model's free runs, which the study fits as it is fitted here.
+
+        None where a run diverges.
+
+        Parameters
+        ----------
+        outputs, inputs : tuple of str
+            Inputs: `driving` ones.
+        settle_s : float
+            First stretch of a run, s: its start is solved for there, and no score counts it.
+
+        Raises
+        ------
+        FlightidError
+            The study could not read the records, or fit the model.
+        """
+        asked = StructureSettings(structure=SUBSPACE, inputs=self.inputs, outputs=outputs)
+        asked = replace(asked, coherence=())
+        with speaking(as_key):
+            fitted = self.runner.stage(
+                f"fit: {', '.join(outputs)}",
+                *(fit_without_equations, asked, inputs, [self._records[0]], [], None),
+            ).value
+        if fitted.fit is None:
+            return None
+        unseen = [narrowed(each, inputs, outputs) for each in self._records[1].value]
+        runs = predict(fitted.fit.model, unseen, settle_s=settle_s)
+        if any(run.diverged_at is not None for run in runs):
+            return None
+        found = {}
+        for name in outputs:
+            pairs = [run.scored(name) for run in runs]
+            measured, predicted = (np.concatenate([pair[i] for pair in pairs]) for i in (0, 1))
+            found[name] = float(rms_error(measured, predicted))
+        return found
 
     def scan(self, kind: str, output: str, orders: Orders, inputs: tuple[str, ...]) -> OrderScan:
         """Structures of a kind for an output from `driving` inputs, as the study scans them.
