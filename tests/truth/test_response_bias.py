@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy.signal
 
 import flightid as fid
+from flightid.responses.response_band import response_bands
 from tests.closeness import assert_close
 from tests.strangers.response_bands import discrete, oscillator_record
 
@@ -22,6 +24,31 @@ def test_the_bias_at_a_light_mode_is_taken_out(estimator: str) -> None:
     assert band is not None
     assert_close(band.centre, clean.response[0, 0], rtol=1e-12, why="the same numbers")
     assert "taken out" in band.reason
+
+
+def test_bands_of_pairs_together_are_those_of_each() -> None:
+    random = np.random.default_rng(2)
+    sticks = random.standard_normal((2, 3000))
+    moved = {"p": sticks[0] + 0.3 * sticks[1], "r": 0.5 * sticks[1] - 0.2 * sticks[0]}
+    outputs = {
+        name: scipy.signal.lfilter([0.1], [1.0, -0.9], each) + 0.02 * random.standard_normal(3000)
+        for name, each in moved.items()
+    }
+    record = fid.Record.from_arrays(
+        np.arange(3000) / 50.0, inputs={"lat": sticks[0], "ped": sticks[1]}, outputs=outputs
+    )
+    response = fid.estimate_response(record, band_rad_s=(2.0, 40.0), n_omega=12)
+    pairs = [("r", "lat"), ("p", "ped"), ("p", "lat")]
+    together = response_bands(response, pairs)
+    assert list(together) == pairs
+    for (output, source), found in together.items():
+        alone = fid.response_band(response, source, output)
+        assert alone is not None
+        assert found is not None
+        assert found.reason == alone.reason
+        assert "taken out" in found.reason
+        assert_close(found.gain, alone.gain, rtol=1e-9, why="the same kernels")
+        assert_close(found.phase_rad, alone.phase_rad, atol=1e-9, why="the same kernels")
 
 
 def test_a_response_without_records_says_what_its_band_leaves_out() -> None:

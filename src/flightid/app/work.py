@@ -23,7 +23,7 @@ from flightid.files import write_atomically
 from flightid.logs import Log, read_log
 from flightid.reading import memory_budget
 from flightid.responses import FrequencyResponse
-from flightid.responses.response_band import response_band
+from flightid.responses.response_band import ResponseIntervals, response_bands
 from flightid.review import review_flight
 from flightid.review.timeline import flight_timeline
 from flightid.study.preview import preview_responses
@@ -161,27 +161,27 @@ def _log(path: Path, cache: dict[str, Any]) -> Log:
 
 
 def _curves(name: str, response: FrequencyResponse, *, intervals: bool) -> list[ResponseCurve]:
+    pairs = [(output, source) for output in response.outputs for source in response.inputs]
+    bands = response_bands(response, pairs) if intervals else dict.fromkeys(pairs)
     made = []
-    for output in response.outputs:
-        for source in response.inputs:
-            pair = response.pair(output, source)
-            curve = ResponseCurve(
-                estimator=name,
-                output=output,
-                input=source,
-                unit=pair.unit,
-                omega_rad_s=pair.omega_rad_s.tolist(),
-                gain=[abs(each) for each in pair.response.tolist()],
-                phase_rad=pair.phase_rad.tolist(),
-                coherence=pair.coherence.tolist(),
-                random_error=pair.random_error.tolist(),
-            )
-            made.append(_with_intervals(curve, response) if intervals else curve)
+    for output, source in pairs:
+        pair = response.pair(output, source)
+        curve = ResponseCurve(
+            estimator=name,
+            output=output,
+            input=source,
+            unit=pair.unit,
+            omega_rad_s=pair.omega_rad_s.tolist(),
+            gain=[abs(each) for each in pair.response.tolist()],
+            phase_rad=pair.phase_rad.tolist(),
+            coherence=pair.coherence.tolist(),
+            random_error=pair.random_error.tolist(),
+        )
+        made.append(_with_intervals(curve, bands[output, source]))
     return made
 
 
-def _with_intervals(curve: ResponseCurve, response: FrequencyResponse) -> ResponseCurve:
-    band = response_band(response, curve.input, curve.output)
+def _with_intervals(curve: ResponseCurve, band: ResponseIntervals | None) -> ResponseCurve:
     if band is None:
         return curve
     # Where noise could hide all, the phase is not known: an interval of a turn and more.

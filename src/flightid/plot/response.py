@@ -10,7 +10,7 @@ from flightid.plot import look
 from flightid.plot.frequency_response import Curve, bode
 from flightid.responses import FrequencyResponse
 from flightid.responses.excited_band import excited_to
-from flightid.responses.response_band import response_band
+from flightid.responses.response_band import response_bands
 from flightid.uncertainty.quantiles import shown
 
 
@@ -39,6 +39,7 @@ def response_figure(
     """
     chosen = list(pairs) if pairs is not None else leading_pairs(response)
     drawn = [response.pair(output, name) for output, name in chosen]
+    bands = response_bands(response, chosen, level=shown())
     curves = [
         Curve(
             f"{pair.output} / {pair.input}",
@@ -47,7 +48,7 @@ def response_figure(
             look.MEASURED if len(drawn) == 1 else look.SERIES[index % len(look.SERIES)],
             look.DASHES[index % len(look.DASHES)],
             pair.coherence,
-            intervals=response_band(response, pair.input, pair.output, level=shown()),
+            intervals=bands[pair.output, pair.input],
         )
         for index, pair in enumerate(drawn)
     ]

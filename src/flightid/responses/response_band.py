@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -94,10 +96,46 @@ def response_band(
     >>> bool(np.max(np.abs(band.centre) / truth - 1.0) < 0.01)
     True
     """
-    pair = source.select(outputs=[outputs], inputs=[inputs])
-    clean = unbiased(pair)
-    reason = RANDOM if clean is None else TAKEN_OUT
-    known = pair if clean is None else clean
+    return response_bands(source, [(outputs, inputs)], level=level)[outputs, inputs]
+
+
+def response_bands(
+    source: FrequencyResponse, pairs: Sequence[tuple[str, str]], *, level: float = LEVEL
+) -> dict[tuple[str, str], ResponseIntervals | None]:
+    """Intervals of several pairs, those of one input worked out together; see `response_band`.
+
+    Parameters
+    ----------
+    source : FrequencyResponse
+    pairs : sequence of (str, str)
+        Output and input of each.
+    level : float
+
+    Returns
+    -------
+    dict of (str, str) to ResponseIntervals or None
+        By pair, in their order.
+
+    Raises
+    ------
+    UnknownNameError
+        There is no such channel.
+    """
+    known: dict[tuple[str, str], tuple[FrequencyResponse, str]] = {}
+    for control in dict.fromkeys(name for _, name in pairs):
+        outputs = list(dict.fromkeys(output for output, name in pairs if name == control))
+        whole = unbiased(source.select(outputs=outputs, inputs=[control]))
+        for output in outputs:
+            pair = source.select(outputs=[output], inputs=[control])
+            if whole is not None:
+                clean: FrequencyResponse | None = whole.select(outputs=[output])
+            else:  # what one output lacks, others may have
+                clean = unbiased(pair) if len(outputs) > 1 else None
+            known[output, control] = (pair, RANDOM) if clean is None else (clean, TAKEN_OUT)
+    return {pair: _intervals(*known[pair], level) for pair in pairs}
+
+
+def _intervals(known: FrequencyResponse, reason: str, level: float) -> ResponseIntervals | None:
     centre = known.response[0, 0]
     spread = spread_of(known)
     if spread is None:
@@ -107,7 +145,7 @@ def response_band(
     phase = np.unwrap(np.angle(centre))
     turned = np.where(across < size, np.arcsin(np.minimum(across / size, 1.0)), np.pi)
     return ResponseIntervals(
-        pair.omega_rad_s,
+        known.omega_rad_s,
         centre,
         np.stack([np.maximum(size - along, 0.0), size + along]),
         np.stack([phase - turned, phase + turned]),

@@ -9,13 +9,16 @@ from flightid.plot import look
 from flightid.plot.frequency_response import Curve, bode, bode_page
 from flightid.report.content import Figure
 from flightid.report.figures import figure_block
-from flightid.responses.response_band import response_band
+from flightid.responses.response_band import ResponseIntervals, response_bands
 from flightid.study.estimate_tables import WORDS
 from flightid.uncertainty.quantiles import interval_words, shown
 
 MODEL, GUIDE = "model", 0.6
 ALONE, PAGE = 4, 9
 """Most responses that have a picture each, and how many small ones make a picture else."""
+
+Known = Mapping[tuple[str, str], ResponseIntervals | None]
+"""Intervals by output and input."""
 
 if TYPE_CHECKING:
     from flightid.study.identified import ModelResults
@@ -44,10 +47,18 @@ def response_figures(item: ModelResults, truth: Truth | None) -> list[Figure]:
     else:
         names = [f"{output}/{name}" for output in response.outputs for name in response.inputs]
     bands = {} if fit is None else {each.name: each.band_rad_s for each in fit.responses}
+    first = next(iter(item.responses.values()))
+    known = response_bands(first, [_pair(name) for name in names], level=shown())
     if len(names) <= ALONE:
-        return [_figure(item, name, truth, bands.get(name)) for name in names]
+        return [_figure(item, name, truth, bands.get(name), known) for name in names]
     parts = [names[start : start + PAGE] for start in range(0, len(names), PAGE)]
-    return [_page(item, part, truth, bands) for part in parts]
+    return [_page(item, part, truth, bands, known) for part in parts]
+
+
+def _pair(name: str) -> tuple[str, str]:
+    """Output and input of a response."""
+    output, source = name.split("/")
+    return output, source
 
 
 def _page(
@@ -55,9 +66,10 @@ def _page(
     names: list[str],
     truth: Truth | None,
     bands: Mapping[str, tuple[float, float]],
+    known: Known,
 ) -> Figure:
     """Small pictures of several responses."""
-    cells, costs = {name: _curves(item, name, truth)[0] for name in names}, {}
+    cells, costs = {name: _curves(item, name, truth, known)[0] for name in names}, {}
     if item.fit is not None:
         costs = {name: f" ({item.fit.costs[name]:.3g})" for name in names if name in bands}
     first = WORDS[next(iter(item.responses))]
@@ -77,10 +89,14 @@ def _least(item: ModelResults) -> float:
 
 
 def _figure(
-    item: ModelResults, name: str, truth: Truth | None, band: tuple[float, float] | None
+    item: ModelResults,
+    name: str,
+    truth: Truth | None,
+    band: tuple[float, float] | None,
+    known: Known,
 ) -> Figure:
-    curves, said = _curves(item, name, truth)
-    output, source = name.split("/")
+    curves, said = _curves(item, name, truth, known)
+    output, source = _pair(name)
     response = item.response
     assert response is not None
     unit = response.pair(output, source).unit
@@ -91,13 +107,15 @@ def _figure(
     return figure_block(picture, f"{said}{grey}.")
 
 
-def _curves(item: ModelResults, name: str, truth: Truth | None) -> tuple[list[Curve], str]:
+def _curves(
+    item: ModelResults, name: str, truth: Truth | None, known: Known
+) -> tuple[list[Curve], str]:
     """Curves of one response, and what they are in words."""
-    output, source = name.split("/")
+    output, source = _pair(name)
     curves = []
     for number, (method, response) in enumerate(item.responses.items()):
         pair = response.pair(output, source)
-        own = response_band(response, source, output, level=shown()) if number == 0 else None
+        own = known[output, source] if number == 0 else None
         curves.append(
             Curve(
                 WORDS[method],
