@@ -38,6 +38,8 @@ WHOLE = 1e-9
 """Samples by which a delay may miss a whole number of them."""
 JUST = 1e-6
 """Samples by which a delay stands clear of the jump at its lower end."""
+TOGETHER = 64
+"""Outputs of moved models that are transformed at once: more leave the caches."""
 
 
 def why_unknown(data: FrequencyResponse) -> str:
@@ -126,7 +128,10 @@ class Correction:
         moved = [self._moved(model, parameter) for parameter in model.parameters.free]
         changes = self._records.slopes(model, moved)
         weights = self._weights(frequencies)
-        return np.stack([weights(one) for one in zip(*changes, strict=True)])
+        at_once = max(1, TOGETHER // changes[0].shape[1])
+        starts = range(0, len(moved), at_once)
+        parts = [weights([each[at : at + at_once] for each in changes]) for at in starts]
+        return np.concatenate(parts)
 
     def halves(self, model: GreyBoxModel, frequencies: Places) -> tuple[Complex, Complex]:
         """Estimates of what the model leaves, and makes, of each half of each record.

@@ -102,6 +102,11 @@ class _InitialConditions:
         bases, triangles = np.linalg.qr(free.transpose(1, 2, 0))
         return cls(free, lengths, bases, triangles)
 
+    @cached_property
+    def projections(self) -> Array:
+        """Onto what the unknowns can do to each output by itself, (n_outputs, k, k)."""
+        return np.asarray(self.triangles @ np.linalg.pinv(self.triangles, rcond=_RANK))
+
     def fitter(self, rest: Array) -> _Fitter:
         """Least squares of all outputs together.
 
@@ -110,13 +115,10 @@ class _InitialConditions:
         (n_outputs, n), in such a fit of their own.
         """
         inside = np.einsum("ynk,yn->yk", self.bases, rest, optimize=True)
-        scales = []
-        for basis, triangle, part, each in zip(
-            self.bases, self.triangles, inside, rest, strict=True
-        ):
-            alone = np.linalg.lstsq(triangle, part, rcond=_RANK)[0]
-            scales.append(max(float(np.std(each - basis @ (triangle @ alone))), TINY))
-        scale = np.array(scales)
+        # Each output's own fit, by the same unknowns, is a projection inside its basis.
+        alone = np.einsum("yjk,yk->yj", self.projections, inside)
+        left = rest - np.einsum("ynk,yk->yn", self.bases, alone, optimize=True)
+        scale = np.maximum(np.std(left, axis=1), TINY)
         stacked = (self.triangles / scale[:, None, None]).reshape(-1, self.triangles.shape[2])
         inverse = np.linalg.pinv(stacked, rcond=_RANK)
         gain = inverse.reshape(-1, *self.triangles.shape[:2]) / scale[:, None]
@@ -152,6 +154,10 @@ class _FollowedRun:
     driven: Array
     fitter: _Fitter
     start: Array
+
+    def weighed(self, kept: Places) -> Array:
+        """What is left of the fitted outputs, by the squares of their weights."""
+        return np.asarray(self.rest[kept] / self.fitter.scale[:, None] ** 2)
 
 
 @dataclass(frozen=True)
@@ -208,23 +214,21 @@ class ModelResiduals:
         kept = self._kept(model)
         changes = [np.zeros((len(moved), *each.shape)) for each in self.linear.output_records]
         turns = [np.zeros((len(moved), len(each.start))) for each in followed]
-        for place, (other, step) in enumerate(moved):
-            motions: dict[int, tuple[list[_SystemRun], Array]] = {}
-            for change, turn, one, between in zip(
-                changes, turns, followed, self._between, strict=True
-            ):
-                n = change.shape[2]
-                free, unknown = known[n][1:]
-                if n not in motions:
-                    there, beyond = self._motion(other, kept, n)
-                    motions[n] = there, (beyond - free) / step
-                driven = self._driven(motions[n][0], kept, between, n)
-                turned = motions[n][1]
-                direct = (driven - one.driven) / step + np.tensordot(one.start, turned, axes=1)
-                change[place, kept] = direct - direct.mean(axis=1, keepdims=True)
+        for n, (_, free, unknown) in known.items():
+            alike = [place for place, change in enumerate(changes) if change.shape[2] == n]
+            starts = np.array([followed[each].start for each in alike])
+            left = np.array([followed[each].weighed(kept).ravel() for each in alike])
+            for place, (other, step) in enumerate(moved):
+                motions, beyond = self._motion(other, kept, n)
+                turned = ((beyond - free) / step).reshape(len(free), -1)
+                by_start = (starts @ turned).reshape(len(alike), len(kept), n)
                 # What is left of the outputs turns with the space that was taken out of them.
-                left = one.rest[kept] / one.fitter.scale[:, None] ** 2
-                turn[place] = np.tensordot(turned, left, axes=2) / unknown.lengths
+                turning = left @ turned.T / unknown.lengths
+                for each, direct, turn in zip(alike, by_start, turning, strict=True):
+                    driven = self._driven(motions, kept, self._between[each], n)
+                    change = (driven - followed[each].driven) / step + direct
+                    changes[each][place, kept] = change - change.mean(axis=1, keepdims=True)
+                    turns[each][place] = turn
         for change, turn, one in zip(changes, turns, followed, strict=True):
             _take_motion_out(change, kept, one.fitter, known[change.shape[2]][2], turn)
         return changes

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from flightid.errors import ShapeError
 from flightid.frozen import dataclass
 from flightid.responses.errors.covariance import WindowedErrors
-from flightid.responses.errors.functional import Functional
+from flightid.responses.errors.functional import Functional, one_by_one
 from flightid.responses.errors.local_errors import LocalErrors
 from flightid.responses.errors.noise import NoiseSpectrum, noise_of_residuals
 from flightid.responses.errors.pilot import Pilot, Pilots
@@ -78,17 +78,20 @@ class WindowedWeights:
         shape = (len(outputs), len(inputs), len(frequencies))
 
         def apply(changes: Sequence[Real]) -> Complex:
-            total = np.zeros((2, *shape))
+            ahead = changes[0].shape[:-2]
+            rows = [each.reshape(-1, each.shape[-1]) for each in changes]
+            moving = [bool(np.any(each)) for each in rows]
+            total = np.zeros((2, *ahead, *shape))
             for place, (basis, turn) in enumerate(zip(bases, turns, strict=True)):
-                moved = np.zeros(shape, dtype=np.complex128)
-                for each, change in zip(weights, changes, strict=True):
-                    if not (basis.plan.count(change.shape[1]) and np.any(change)):
+                moved = np.zeros((len(rows[0]), *shape[1:]), dtype=np.complex128)
+                for each, change, moves in zip(weights, rows, moving, strict=True):
+                    if not (moves and basis.plan.count(change.shape[1])):
                         continue
                     real, imaginary = transform(change, basis)
                     window = (real + 1j * imaginary).transpose(0, 2, 1)
                     moved += (each[place].transpose(1, 0, 2) @ window).transpose(2, 1, 0)
-                parts = np.stack([moved.real, moved.imag])
-                total += np.einsum("aboif,boif->aoif", turn, parts)
+                parts = np.stack([moved.real, moved.imag]).reshape(2, *ahead, *shape)
+                total += np.einsum("aboif,b...oif->a...oif", turn, parts)
             return np.asarray(total[0] + 1j * total[1])
 
         return apply
@@ -137,7 +140,7 @@ class LocalWeights:
                     found[:, :, place] += bins @ fit.weights[index][inputs].T
             return found
 
-        return apply
+        return one_by_one(apply)
 
     def errors_of(self, residuals: Sequence[Real], outputs: Places) -> CovarianceSource | None:
         """None: local polynomials have taken the leakage out of their noise already."""

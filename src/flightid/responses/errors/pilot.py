@@ -168,8 +168,9 @@ def _fit_output(data: PilotBins) -> Pilot | None:
         return None
     last, first = max(each[-1] for each in data.omega), min(each[0] for each in data.omega)
     scale = float(np.sqrt(last * first))
+    best: PilotState | None = None
+    slopes, taken = np.zeros(0, dtype=np.complex128), (np.zeros(0), np.zeros(0))
     weights = np.ones(data.size)
-    best: Pilot | None = None
     for _ in range(2):
         lowest, found, since = np.inf, None, 0
         for order in ORDERS:
@@ -188,18 +189,24 @@ def _fit_output(data: PilotBins) -> Pilot | None:
             if since > PATIENCE:
                 break
         if found is None:
-            return best
-        best = _pilot(data, found, scale, weights)
-        weights = _weights(target - found.modelled, target, np.concatenate(best.spent))
-    return best
+            break
+        best, slopes = found, _slopes(data, found, scale)
+        taken = _taken(slopes, weights)
+        weights = _weights(target - found.modelled, target, taken[0])
+    return None if best is None else _pilot(data, best, scale, slopes, taken)
 
 
-def _pilot(data: PilotBins, state: PilotState, scale: float, weights: Real) -> Pilot:
+def _slopes(data: PilotBins, state: PilotState, scale: float) -> Complex:
+    """Derivatives of the modelled bins by the coefficients, shape (n_coefficients, n_bins)."""
     order = len(state.denominator) - 1
     basis = [turns(omega, scale, order) for omega in data.omega]
     ends = [turns(omega, scale, order + SPARE) for omega in data.omega]
     under = state.denominator @ np.concatenate(basis, axis=1)
-    slopes = joined(columns_of(data, basis, ends, state.modelled)) / under
+    return np.asarray(joined(columns_of(data, basis, ends, state.modelled)) / under)
+
+
+def _taken(slopes: Complex, weights: Real) -> tuple[Real, Real]:
+    """Share of each bin's noise that the coefficients took, and their covariance in unit noise."""
     weighed = slopes * weights
     left = np.concatenate([weighed.real, weighed.imag], axis=1)
     norms = np.maximum(np.linalg.norm(left, axis=1), np.finfo(float).tiny)
@@ -207,6 +214,13 @@ def _pilot(data: PilotBins, state: PilotState, scale: float, weights: Real) -> P
     inverse = np.linalg.pinv(left @ left.T, hermitian=True)
     taken = 0.5 * np.einsum("ib,ij,jb->b", left, inverse, left, optimize=True)
     spent = np.minimum(taken.reshape(2, -1).sum(axis=0), MOST_SPENT)
+    return spent, inverse / np.outer(norms, norms)
+
+
+def _pilot(
+    data: PilotBins, state: PilotState, scale: float, slopes: Complex, taken: tuple[Real, Real]
+) -> Pilot:
+    spent, covariance = taken
     variance = state.cost * data.size / max(2.0 * data.size - len(slopes), 1.0)
     return Pilot(
         scale,
@@ -214,7 +228,7 @@ def _pilot(data: PilotBins, state: PilotState, scale: float, weights: Real) -> P
         state.denominator,
         data.samples(state.modelled),
         data.samples(slopes),
-        variance * inverse / np.outer(norms, norms),
+        variance * covariance,
         tuple(np.split(spent, np.cumsum([len(each) for each in data.omega])[:-1])),
     )
 

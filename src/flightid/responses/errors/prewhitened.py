@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from flightid.errors import DataError
 from flightid.frozen import dataclass
-from flightid.responses.errors.functional import Functional
+from flightid.responses.errors.functional import Functional, one_by_one
 from flightid.responses.errors.random_error import CovarianceSource, JointErrors, Points
 
 Complex = NDArray[np.complex128]
@@ -280,7 +280,7 @@ class PrewhitenedWeights:
                 np.einsum("abpif,pb->aif", slopes, model.inverse @ total, optimize=True)
             )
 
-        return apply
+        return one_by_one(apply)
 
     def errors_of(self, residuals: Sequence[Real], outputs: Places) -> CovarianceSource | None:
         """None: innovations are the noise already."""
