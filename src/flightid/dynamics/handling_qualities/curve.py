@@ -193,6 +193,8 @@ class GainPhaseCurve:
         left, right = self.omega[pair].tolist()
         known = (self.decibels, self.degrees)[part][pair] - level
         ends = float(known[0]), float(known[1])
+        if self.exact is None and ends[0] != ends[1]:  # a straight line over log frequency
+            return left * (right / left) ** (ends[0] / (ends[0] - ends[1]))
         return root_between(lambda at: self.at(at)[part] - level, left, right, ends=ends)
 
 
