@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import hashlib
 from collections.abc import AsyncIterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -65,6 +66,11 @@ def test_what_is_taken_off_the_list_stays_in_its_place(tmp_path: Path) -> None:
     removed.put_back("b" * 16)
     removed.put_back("c" * 16)
     assert removed.ids() == ["a" * 16]
+    # Two servers on one folder lost what the other had taken off meanwhile.
+    more = [f"{n:016x}" for n in range(24)]
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(lambda item: RemovedList(workspace).take_off(item), more))
+    assert set(removed.ids()) == {"a" * 16, *more}
     path = tmp_path / ".flightid" / "removed.json"
     for broken in (b"", b"[1]", b'{"removed": 3}', b'{"removed": ["../x", 4]}', b"\xff"):
         path.write_bytes(broken)

@@ -28,13 +28,21 @@ def fleet(folder: Path, text: str) -> FleetSettings:
 def test_all_errors_of_a_fleet_file_are_told_at_once(tmp_path: Path) -> None:
     text = (
         "study = 'gone.toml'\n[vehicles]\nby = 'name'\n[limits]\ntime = 3\n[questions]\nlevel = 2\n"
+        "drift = 'yes'\n"  # of one table all are told, too
         "[[event]]\ndate = 'soon'\nwhat = 'new motor'\n"
     )
     with pytest.raises(StudyError) as caught:
         fleet(tmp_path, text)
     said = str(caught.value)
-    assert "the fleet file has 5 errors" in said
-    for part in ("gone.toml", "pattern belongs to", "time_s", "level is too large", "'soon'"):
+    assert "the fleet file has 6 errors" in said
+    for part in (
+        "gone.toml",
+        "pattern belongs to",
+        "time_s",
+        "level is too large",
+        "drift has",
+        "'soon'",
+    ):
         assert part in said
 
 

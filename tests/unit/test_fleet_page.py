@@ -71,6 +71,8 @@ def test_vehicles_too_few_to_be_judged_are_grey_and_not_green() -> None:
     logs = set({row["vehicle"]: row["log"] for row in mine}.values())
     few = {key: [e for e in rows[key] if e.get("log") in logs] for key in rows}
     found = fleet_document(answer_questions(few)).findings
+    (drawn,) = [e for e in fleet_document(answer_questions(few)).walk() if isinstance(e, Figure)]
+    assert "shaded" not in drawn.caption, "two vehicles say nothing of the next"
     lights = [each for each in found if each.code == "vehicle"]
     assert [each.light for each in lights] == [Light.UNKNOWN, Light.UNKNOWN]
     for each in lights:
@@ -89,7 +91,8 @@ def test_flights_too_few_for_change_leave_a_sentence_and_no_empty_picture() -> N
     said = " ".join(to_text(document).split())
     assert "Not answered: whether a vehicle changed: that takes 6 flights of it" in said
     assert "and the most is 4." in said
-    assert "(of 6 vehicles 6 not judged; errors of 1 parameter not borne out)" in said
+    told = "standard errors of 1 parameter not borne out by flights"
+    assert f"(of 6 vehicles 6 not judged; {told})" in said
     # No heading claims of vehicles what is true of a few.
     assert "Changed, or unlike" not in said
     alike = answer_questions(fleet_rows(3, 4, 7), covariates=["battery"])
@@ -246,11 +249,15 @@ def test_sentences_of_small_and_of_red_fleets_stand() -> None:
     two = said(fleet_rows(3, 2, 2), outliers=False)
     assert "the next vehicle lies between" not in two
     assert "fewer than 3 vehicles say nothing of the next." in two
-    assert "; errors of 2 parameters" not in two, "each flew twice a day"
+    assert "errors of 2 parameters" not in two, "each flew twice a day"
     once = fleet_rows(1, 2, 12)
     for table in once.values():
         table[:] = [each for each in table if "T09" in (each["flown_at"] or "")]
-    assert "errors of 1 parameter not borne out; errors of 1 parameter not tested)" in said(once)
+    untested = "taken as stated, for no vehicle flew twice a day)"
+    borne = (
+        "standard errors of 1 parameter not borne out by flights; standard errors of 1 parameter"
+    )
+    assert f"{borne} {untested}" in said(once)
     rows = fleet_rows(3, 2, 8)
     for table in rows.values():
         for each in table:
@@ -318,6 +325,13 @@ def test_equal_estimates_and_panels_of_one_order() -> None:
     assert [list(each["text"]) for each in shown] == [[*"abcde"]] * 2
     axes = [value for key, value in spec["layout"].items() if key.startswith("xaxis")]
     assert [list(each["ticktext"]) for each in axes] == [[*"abcde"]] * 2
+    # Below its panel a title lay inside the panel of the next row.
+    notes = spec["layout"]["annotations"]
+    assert [(each["text"], each["y"], each["yanchor"]) for each in notes] == [
+        ("Lp", 1.0, "bottom"),
+        ("Ltphi", 1.0, "bottom"),
+    ]
+    assert not any("title" in axis for axis in axes)
 
 
 @pytest.mark.parametrize(("odd", "light"), [(1.6, Light.UNKNOWN), (1.0, Light.GREEN)])

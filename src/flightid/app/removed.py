@@ -6,15 +6,18 @@
 from __future__ import annotations
 
 import json
+import os
 import threading
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import ExitStack, contextmanager
+from importlib import import_module
 from pathlib import Path
 
-from flightid.app.own_folders import own_folder, read_plain
+from flightid.app.own_folders import NO_LINK, own_folder, read_plain
 from flightid.app.workspace import HIDDEN, ID, Workspace
 from flightid.files import write_atomically
 
-FILE = "removed.json"
+FILE, LOCK = "removed.json", "removed.lock"
 MOST_BYTES = 1 << 20
 
 
@@ -42,15 +45,32 @@ class RemovedList:
 
     def take_off(self, item: str) -> None:
         """Leave a log or records out of the list."""
-        with self._lock:
+        with self._alone():
             self._write([*(each for each in self.ids() if each != item), item])
 
     def put_back(self, item: str) -> None:
         """List it again; nothing happens where it is listed."""
-        with self._lock:
+        with self._alone():
             known = self.ids()
             if item in known:
                 self._write(each for each in known if each != item)
+
+    @contextmanager
+    def _alone(self) -> Iterator[None]:
+        """Nobody else changes the file meanwhile, another server on the folder included.
+
+        Where the system has no such locks the threads of this server alone are kept apart.
+        """
+        with self._lock, ExitStack() as stack:
+            try:
+                locks = import_module("fcntl")
+            except ModuleNotFoundError:
+                yield
+                return
+            handle = os.open(self._path().with_name(LOCK), os.O_RDWR | os.O_CREAT | NO_LINK, 0o600)
+            stack.callback(os.close, handle)  # The lock goes with it, however this ends.
+            locks.flock(handle, locks.LOCK_EX)
+            yield
 
     def _write(self, ids: Iterable[str]) -> None:
         write_atomically(self._path(), json.dumps({"removed": list(ids)}))

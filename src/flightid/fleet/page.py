@@ -72,8 +72,11 @@ def _lights_counted(answers: FleetAnswers) -> str:
         for finding in errors_lights(each.drift, each.labels)
     )
     rest = "".join(
-        f"; errors of {counted(errors[light], 'parameter')} {words}"
-        for light, words in ((Light.AMBER, "not borne out"), (Light.UNKNOWN, "not tested"))
+        f"; standard errors of {counted(errors[light], 'parameter')} {words}"
+        for light, words in (
+            (Light.AMBER, "not borne out by flights"),
+            (Light.UNKNOWN, "taken as stated, for no vehicle flew twice a day"),
+        )
         if errors[light]
     )
     return f"of {counted(found.total(), 'vehicle')} {said}{rest}" if said else ""
@@ -213,10 +216,10 @@ def _type_blocks(each: TypeAnswers) -> Iterator[Block]:
             yield Paragraph(
                 f"Flights far off those beside them are left out of these tables: {told}."
             )
-        caption = (
-            "Every vehicle's own estimate with its interval, and, shaded, where the next vehicle "
-            f"lies with {interval_words(shown())}."
-        )
+        caption = f"Every vehicle's own estimate with its interval of {interval_words(shown())}"
+        ends = (e.next_vehicle.interval(shown()) for e in each.population.parameters.values())
+        shaded = ", and, shaded, where the next vehicle lies" if any(ends) else ""
+        caption += f"{shaded}, by name from left to right."
         yield figure_block(type_picture(each.population, each.labels), caption)
     if each.outliers is not None:
         many = len(each.outliers.vehicles) > SHOWN

@@ -15,6 +15,8 @@ from flightid.uncertainty.quantiles import half_width, shown
 
 COLUMNS = 3
 ROW_PX = 190
+TITLED_GAP_PX = 58
+"""Between rows of panels, of which each has a title above it."""
 MOST_NAMED = 8
 """Vehicles named at an axis; of more every second, third …."""
 
@@ -103,7 +105,8 @@ def type_picture(population: Population, labels: Mapping[str, str] | None = None
     names = [n for n in population.names if population.parameters[n].mean.value != 0.0]
     columns = min(COLUMNS, max(len(names), 1))
     rows = max(1, -(-len(names) // columns))
-    made = look.figure(rows, columns, shared_x=False, height_px=110 + ROW_PX * rows)
+    height = 110 + (ROW_PX + TITLED_GAP_PX - look.GAP_PX) * rows
+    made = look.figure(rows, columns, shared_x=False, height_px=height, gap_px=TITLED_GAP_PX)
     made.update_layout(hovermode="closest", showlegend=False)
     every = population.data.members
     apart = -(-len(every) // MOST_NAMED)
@@ -142,10 +145,16 @@ def type_picture(population: Population, labels: Mapping[str, str] | None = None
             column,
         )  # fmt: skip
         title = "beside the mean [%]" if column == 1 else ""
+        made.add_annotation(
+            row, column, text=(labels or {}).get(name, name), showarrow=False, x=0.5, y=1.0,
+            xanchor="center", yanchor="bottom", font={"size": 12},
+        )  # fmt: skip
+        # Above its own panel, wherever a narrow page puts that.
+        note = made.layout["annotations"][-1]
+        note.update({"xref": f"{note['xref']} domain", "yref": f"{note['yref']} domain"})
         made.update_xaxes(
             row=row,
             col=column,
-            title_text=f"{(labels or {}).get(name, name)}: vehicles",
             tickmode="array",
             tickvals=list(range(0, len(every), apart)),
             ticktext=every[::apart],

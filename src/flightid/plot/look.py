@@ -60,6 +60,7 @@ def figure(
     column_titles: Sequence[str] | None = None,
     shared_x: bool = True,
     height_px: int | None = None,
+    gap_px: int = GAP_PX,
 ) -> go.PlotFigure:
     """Empty figure in the shared look, with a grid of plots that share their x axes by column.
 
@@ -77,6 +78,8 @@ def figure(
         Zooming one plot zooms those above and below.
     height_px : int, optional
         Height; default: by the number of rows.
+    gap_px : int
+        Between rows whose x axes have numbers of their own; a title between them takes more.
 
     Returns
     -------
@@ -84,7 +87,7 @@ def figure(
     """
     height = height_px or MARGIN_PX + ROW_HEIGHT_PX * rows
     heights, titles = tuple(row_heights or ()), tuple(column_titles or ())
-    return _empty(rows, columns, title, heights, titles, shared_x, height).copied()
+    return _empty(rows, columns, title, heights, titles, shared_x, height, gap_px).copied()
 
 
 @lru_cache(maxsize=64)
@@ -96,9 +99,10 @@ def _empty(
     titles: tuple[str, ...],
     shared_x: bool,
     height: int,
+    gap_px: int,
 ) -> go.PlotFigure:
     """What figures of one form are copies of: a copy costs a fiftieth of a figure."""
-    free = 0.07 if shared_x else min(0.5, GAP_PX * (rows - 1) / (height - 90))
+    free = 0.07 if shared_x else min(0.5, gap_px * (rows - 1) / (height - 90))
     made = go.PlotFigure(
         rows,
         columns,

@@ -10,6 +10,19 @@ from flightid.errors import FlightidError, StudyError
 from flightid.frozen import dataclass
 
 Part = TypeVar("Part")
+
+
+class CollectedStudyError(StudyError):
+    """Errors that are told together; a list of errors takes them one by one.
+
+    Attributes
+    ----------
+    errors : tuple of FlightidError or OSError
+    """
+
+    errors: tuple[FlightidError | OSError, ...] = ()
+
+
 Value = TypeVar("Value")
 
 
@@ -31,7 +44,7 @@ class ErrorList:
     >>> collected.read(refuse, None, "path")
     >>> collected.finish()
     Traceback (most recent call last):
-    flightid.errors.StudyError: the study file has 2 errors:
+    flightid.study.error_list.CollectedStudyError: the study file has 2 errors:
     - name is missing
     - path is missing
     """
@@ -47,6 +60,9 @@ class ErrorList:
         """What a part reads, or what stands in its place while the others are read."""
         try:
             return work(*inputs)
+        except CollectedStudyError as several:
+            self.errors += several.errors
+            return instead  # type: ignore[no-any-return]
         except (FlightidError, OSError) as error:
             self.errors.append(error)
             return instead  # type: ignore[no-any-return]
@@ -73,7 +89,7 @@ class ErrorList:
         ------
         FlightidError, OSError
             Of the part, where there is one.
-        StudyError
+        CollectedStudyError
             With all of them.
         """
         if len(self.errors) == 1:
@@ -83,4 +99,6 @@ class ErrorList:
             each = (str(error).removeprefix(f"{subject}, ") for error in self.errors)
             told = list(dict.fromkeys(each))
             lines = "".join(f"\n- {line}" for line in told)
-            raise StudyError(f"the {subject} has {len(told)} errors:{lines}")
+            several = CollectedStudyError(f"the {subject} has {len(told)} errors:{lines}")
+            several.errors = tuple(self.errors)
+            raise several

@@ -4,12 +4,21 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import MISSING, replace
+from functools import partial
 from typing import Any, TypeVar
 
 from flightid.errors import StudyError
 from flightid.option_forms import EACH, ONE
-from flightid.options import Option, Options, option_values, options_of, read_options, unknown_key
+from flightid.options import (
+    Option,
+    Options,
+    option_values,
+    options_of,
+    read_options,
+    unknown_key,
+)
+from flightid.study.error_list import ErrorList
 
 Made = TypeVar("Made", bound=Options)
 TOP = "top level"
@@ -112,11 +121,13 @@ class TableReader:
         Raises
         ------
         StudyError
-            Names the key and the nearest known one.
+            Names each key and the nearest known one.
         """
-        for key in self._values:
-            if key not in self._known:
-                raise unknown_key(self.told, key, self._known, StudyError)
+        unknown = [key for key in self._values if key not in self._known]
+        collected = ErrorList(
+            [unknown_key(self.told, key, self._known, StudyError) for key in unknown]
+        )
+        collected.finish(self._subject)
 
     def error(self, key: str, problem: str, *, found: object, needed: object) -> StudyError:
         """Error about one key of this table, for checks that span several keys."""
@@ -144,10 +155,34 @@ def read_each(
     Raises
     ------
     StudyError
-        A key that none of them has, or a value that does not fit.
+        Keys that none of them has, and values that do not fit: all that are there, at once.
     """
     given = [reader.options(kind) for kind in kinds]
-    reader.finish()
+    collected = ErrorList()
+    collected.read(reader.finish, None)
+    is_known = not collected.errors
+    for kind, table in zip(kinds, given, strict=True):
+        for key, value in table.items():
+            alone = partial(option_values, kind, {key: value}, reader.told, error=StudyError)
+            collected.read(alone, None)
+    if not collected.errors:
+        return _made(kinds, given, reader, usual)
+    # A key that is written wrong is not said to be missing beside it.
+    for kind, table in zip(kinds, given, strict=True) if is_known and not any(usual) else ():
+        for each in options_of(kind):
+            if each.default is MISSING and each.name not in table:
+                problem = f"{reader.told}: {each.name} is missing"
+                collected.errors.append(StudyError(problem, needed=each.needed))
+    collected.finish(reader.told.removesuffix(f", {reader.where}"))
+    raise AssertionError("an error was found and not raised")
+
+
+def _made(
+    kinds: Sequence[type[Options]],
+    given: Sequence[Mapping[str, Any]],
+    reader: TableReader,
+    usual: Sequence[Options | None],
+) -> list[Any]:
     made = []
     for place, (kind, table) in enumerate(zip(kinds, given, strict=True)):
         base = usual[place] if place < len(usual) else None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import re
 import threading
 from collections.abc import Sequence
 from decimal import Decimal
@@ -27,6 +28,7 @@ MOST_ANSWERED, MOST_SHOWN = 50_000_000, 100_000
 MORE_TIME = "ask for less, or give it more time (--time-s)"
 HELD = "ask for no huge value; open the catalogue anew, for this one is held until it is made"
 ZONED = "TIMESTAMP WITH TIME ZONE"
+MEMORY_WORDS = re.compile("(?i)out of memory|failed to allocate|could not allocate")
 
 
 class Catalogue:
@@ -160,7 +162,7 @@ class Catalogue:
                 action=HELD if self._timed.is_held else MORE_TIME,
             ) from error
         except self._errors as error:
-            raise OptionError("the catalogue cannot answer this", found=str(error)) from error
+            raise _unanswered(error) from error
         if found.num_rows > most_rows:
             raise OptionError(
                 "the answer is too long",
@@ -178,9 +180,7 @@ class Catalogue:
             if kinds == ["SELECT"]:
                 return self._connection.sql(sql)
         except self._errors as error:
-            raise OptionError(
-                "the catalogue cannot answer this", found=str(error).strip(), needed=needed
-            ) from error
+            raise _unanswered(error, needed) from error
         found = ", ".join(kinds) or "no statement"
         raise OptionError("the catalogue takes questions alone", found=found, needed=needed)
 
@@ -240,6 +240,15 @@ class Catalogue:
     def __repr__(self) -> str:
         """Place and number of logs."""
         return f"Catalogue({self._store.root!r}, {sum(self.counts().values())} logs)"
+
+
+def _unanswered(error: Exception, needed: str | None = None) -> OptionError:
+    """DuckDB's words; where memory is short without its advice to SET what is locked here."""
+    said = str(error).strip()
+    is_full = MEMORY_WORDS.search(said) is not None
+    said = said.partition("\n")[0] if is_full else said
+    action = "ask for less, or give it more memory (--memory)" if is_full else None
+    return OptionError("the catalogue cannot answer this", found=said, needed=needed, action=action)
 
 
 def _plain(found: Any) -> Any:  # noqa: ANN401 - of a library that an extra installs

@@ -49,8 +49,8 @@
   }
 
   // Black and blue would vanish on a dark page: both lines and their bands are lightened.
-  const lighter = [["#3a3f44", "#c6ccd2"], ["rgba(58,63,68,", "rgba(198,204,210,"],
-    ["#0072b2", "#4fa9e0"], ["rgba(0,114,178,", "rgba(79,169,224,"]];
+  const lighter = [["#3a3f44", "#eef1f4"], ["rgba(58,63,68,", "rgba(238,241,244,"],
+    ["#0072b2", "#2f8fdd"], ["rgba(0,114,178,", "rgba(47,143,221,"]];
   const recolour = (text) =>
     isDark() ? lighter.reduce((now, [from, to]) => now.replaceAll(from, to), text) : text;
 
