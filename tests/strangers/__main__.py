@@ -1,6 +1,7 @@
 """Print the table: `python -m tests.strangers [PART OF A NAME ...] --runs 500 --jobs 2`.
 
-`--keep FILE` adds every flight to a file and flies only those that it has not, so that runs add up;
+`--keep FILE` adds every flight to a file and flies only those that it has not, so that runs add up,
+the cheapest case first; several numbers after `--runs` bring all cases to each of them in turn;
 `--runs 0 --keep FILE` prints what it holds; with `--page docs/coverage.md` it becomes that page,
 with `--before FILE` beside what the flights of an earlier tree held.
 """
@@ -8,19 +9,20 @@ with `--before FILE` beside what the flights of an earlier tree held.
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from tests.strangers.cases import CASES, LIGHTS
-from tests.strangers.counting import HEADING, count
+from tests.strangers.counting import HEADING, Case, Tally, count
 from tests.strangers.coverage_page import write
-from tests.strangers.kept import collected, read
+from tests.strangers.kept import KeptFlights, read
 
 
 def main() -> None:
     """Count the named cases, or all."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("names", nargs="*", help="parts of names of cases; all where none is given")
-    parser.add_argument("--runs", type=int, default=100)
+    parser.add_argument("--runs", type=int, nargs="+", default=[100])
     parser.add_argument("--first-seed", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--keep", type=Path, help="file that flights are added to, and read from")
@@ -31,14 +33,12 @@ def main() -> None:
     if asked.page and not asked.keep:
         parser.error("--page is made of the file of --keep")
     print(HEADING, flush=True)
-    for case in (*CASES, *LIGHTS):
-        if asked.names and not any(part in case.name for part in asked.names):
-            continue
-        if asked.keep:
-            seeds = range(asked.first_seed, asked.first_seed + asked.runs)
-            tally = collected(case, seeds, asked.keep)
-        else:
-            tally = count(case, asked.runs, first_seed=asked.first_seed, jobs=asked.jobs)
+    cases = [
+        case
+        for case in (*CASES, *LIGHTS)
+        if not asked.names or any(part in case.name for part in asked.names)
+    ]
+    for tally in _tallies(cases, asked):
         if not tally.trials:
             continue
         print(tally.row(), flush=True)
@@ -47,6 +47,14 @@ def main() -> None:
             print(f"    {name:40s} {100 * share:6.1f} {n:7d}", flush=True)
     if asked.page:
         write(asked.page, read(asked.keep), asked.before and read(asked.before))
+
+
+def _tallies(cases: Sequence[Case], asked: argparse.Namespace) -> Iterator[Tally]:
+    if asked.keep:
+        yield from KeptFlights(asked.keep).flown(cases, asked.first_seed, asked.runs)
+        return
+    for case in cases:
+        yield count(case, asked.runs[-1], first_seed=asked.first_seed, jobs=asked.jobs)
 
 
 if __name__ == "__main__":

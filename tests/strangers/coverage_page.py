@@ -13,6 +13,8 @@ from tests.strangers.counting import NOMINAL, Reading, Tally, Trial, Z
 
 LEAST, MOST = 0.93, 0.97
 """Shares between which a 95 % interval is as good as it says."""
+ENOUGH = (20, 500)
+"""Flights of a condition that show a gross fault, and that show a share to a point."""
 HEAD = ("condition", "flights", "intervals", "shown %", "held %", "± %", "green, amber, red %",
         "green and a miss %", "allowed %", "refused %")  # fmt: skip
 INTRODUCTION = """# Coverage, counted
@@ -21,7 +23,7 @@ What became of 95 % intervals on flights of simulators that are not flightid's o
 JSBSim), condition by condition, all options at their defaults. This page is made, not written:
 
 ```
-python -m tests.strangers --runs 500 --keep FILE
+python -m tests.strangers --runs 3 20 500 --keep FILE
 python -m tests.strangers --runs 0 --keep FILE --page docs/coverage.md
 ```
 
@@ -137,9 +139,11 @@ def page(
     read = [each for each in all_rows if each.held[1]]
     off = sum(each.is_off for each in all_rows)
     green = sum(each.is_green_too_often for each in all_rows)
-    fewest = min((len(each.tally.trials) for each in all_rows), default=0)
+    sizes = [len(each.tally.trials) for each in all_rows]
+    enough = [sum(size >= least for size in sizes) for least in ENOUGH]
     counted = (
-        f"{flights:,} flights of {len(all_rows)} conditions, {fewest} or more of each; "
+        f"{flights:,} flights of {len(all_rows)} conditions, {min(sizes, default=0)} or more of "
+        f"each, {ENOUGH[0]} or more of {enough[0]}, {ENOUGH[1]} or more of {enough[1]}; "
         f"{sum(each.held[1] for each in all_rows):,} intervals in {len(read)} conditions.\n"
         f"Outside the range by more than chance: {off}. "
         f"Green beside a miss more often than allowed: {green}."

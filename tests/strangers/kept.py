@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
+
+import numpy as np
 
 from tests.strangers.counting import Case, Reading, Tally, Trial
 
@@ -32,16 +34,40 @@ def read(path: Path) -> dict[str, dict[int, Trial]]:
     return found
 
 
-def collected(case: Case, seeds: Sequence[int], path: Path) -> Tally:
-    """A case over those seeds, flown where the file has them not, and all that it had besides."""
-    known = read(path).get(case.name, {})
-    # A line that was cut off must not swallow the next one.
-    cut = path.exists() and not path.read_bytes().endswith(b"\n") and path.stat().st_size > 0
-    with path.open("a") as file:
-        file.write("\n" if cut else "")
-        for seed in seeds:
-            if seed not in known:
-                known[seed] = case.fly(seed)
-                file.write(as_line(case.name, seed, known[seed]) + "\n")
-                file.flush()
-    return Tally(case.name, tuple(known[seed] for seed in sorted(known)))
+class KeptFlights:
+    """Flights of a file, which is read once, and to which every further one is added."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.trials = read(path)
+
+    def tally(self, case: Case) -> Tally:
+        """All that is known of a case."""
+        known = self.trials.get(case.name, {})
+        return Tally(case.name, tuple(known[seed] for seed in sorted(known)))
+
+    def seconds(self, case: Case) -> float:
+        """Median of a flight; none for a case that was never flown, which comes first."""
+        taken = [trial.seconds for trial in self.trials.get(case.name, {}).values()]
+        return float(np.median(taken)) if taken else 0.0
+
+    def fly(self, case: Case, seeds: Sequence[int]) -> None:
+        """Fly those seeds that the file has not."""
+        known = self.trials.setdefault(case.name, {})
+        # A line that was cut off must not swallow the next one.
+        with self.path.open("a+b") as file:
+            file.seek(max(file.tell() - 1, 0))
+            file.write(b"\n" if file.read(1) not in (b"", b"\n") else b"")
+            for seed in seeds:
+                if seed not in known:
+                    known[seed] = case.fly(seed)
+                    file.write(f"{as_line(case.name, seed, known[seed])}\n".encode())
+                    file.flush()
+
+    def flown(self, cases: Sequence[Case], first: int, counts: Sequence[int]) -> Iterator[Tally]:
+        """Cases brought to one count after the other, the cheapest first, and their tallies."""
+        for place, count in enumerate(counts, 1):
+            for case in sorted(cases, key=self.seconds):
+                self.fly(case, range(first, first + count))
+                if place == len(counts):
+                    yield self.tally(case)

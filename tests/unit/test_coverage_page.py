@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
 import pytest
 
 from tests.strangers.cases import CASES, LIGHTS, families
-from tests.strangers.counting import Reading, Tally, Trial
+from tests.strangers.counting import Case, Reading, Tally, Trial
 from tests.strangers.coverage_page import Counted, page
+from tests.strangers.kept import KeptFlights, read
 
 
 def _trial(*misses: bool, light: str = "green") -> Trial:
@@ -50,3 +55,23 @@ def test_the_page_tells_lights_what_was_shown_and_what_was_before() -> None:
     assert cells[6:8] == ["67, 0, 33", "33.3"]
     assert cells[-1] == "0.0"
     assert "3 flights of 1 conditions" in made
+
+
+def test_kept_flights_add_up_the_cheapest_case_first(tmp_path: Path) -> None:
+    flown: list[tuple[str, int]] = []
+
+    def fly(seed: int, name: str, seconds: float) -> Trial:
+        flown.append((name, seed))
+        return replace(_trial(False), seconds=seconds)
+
+    cases = [Case(n, partial(fly, name=n, seconds=s)) for n, s in (("dear", 2.0), ("cheap", 0.1))]
+    path = tmp_path / "flights.jsonl"
+    KeptFlights(path).fly(cases[0], [5])
+    path.write_text(path.read_text() + '{"case": "cheap", "se')
+    tallies = list(KeptFlights(path).flown(cases, 5, (1, 2)))
+    assert flown == [("dear", 5), ("cheap", 5), ("cheap", 6), ("dear", 6)]
+    assert [(each.name, len(each.trials)) for each in tallies] == [("cheap", 2), ("dear", 2)]
+    assert {name: sorted(seeds) for name, seeds in read(path).items()} == {
+        "dear": [5, 6],
+        "cheap": [5, 6],
+    }
