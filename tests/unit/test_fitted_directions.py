@@ -96,10 +96,13 @@ def test_white_noise_has_the_models_that_all_transforms_give(
 
 
 def test_a_record_is_fitted_in_less_than_five_times_its_sensitivities() -> None:
-    record = two_rates_record(1)
+    def fit(seed: int) -> None:
+        fid.identify(two_rates(), two_rates_record(seed), initial_state="trim", output_bias=False)
+
+    fit(2)  # what a process loads with its first fit is no part of it
     tracemalloc.start()
     try:
-        fid.identify(two_rates(), record, initial_state="trim", output_bias=False)
+        fit(1)
         peak = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
