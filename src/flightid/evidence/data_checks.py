@@ -10,7 +10,7 @@ import numpy as np
 from flightid.conventions import Light
 from flightid.errors import FlightidError
 from flightid.evidence.evidence import BAND, COHERENCE, LOOP, SAMPLES, TIME, Check
-from flightid.evidence.feedback import feedback_test
+from flightid.evidence.feedback import KEPT, loop_seen
 from flightid.evidence.spans import judge_coherence, judge_span, spans_of
 from flightid.findings import Finding, counted, worst
 from flightid.record import Record
@@ -20,8 +20,6 @@ from flightid.responses import FrequencyResponse, estimate_response
 from flightid.responses.windows.defaults import CYCLES_AT_LOWEST, HIGHEST_FRACTION
 from flightid.uncertainty.feedback import FeedbackTest
 
-KEPT = 4
-"""Sets of records whose examination is kept: a scan fits the same ones many times."""
 FREQUENCIES = 40
 LONGEST, SHORTEST = 1.0 / 3.0, 1.0 / 15.0
 """Windows of the quick response: shares of the longest record, if all together are as long."""
@@ -97,13 +95,12 @@ def loop_of_responses(responses: Sequence[FrequencyResponse]) -> Check | None:
     return min(checks, key=lambda check: order.index(check.light))
 
 
-@lru_cache(maxsize=KEPT)
 def loop_of_records(
     records: tuple[Record, ...], inputs: tuple[str, ...], outputs: tuple[str, ...]
 ) -> Check | None:
     """What records know of their loop, else what the test says; None where it cannot be made."""
     try:
-        return loop_check(feedback_test(records, inputs=inputs, outputs=outputs))
+        return loop_check(loop_seen(records, inputs, outputs))
     except FlightidError:
         return None
 

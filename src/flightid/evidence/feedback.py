@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import lru_cache
 
 from flightid.errors import DataError
 from flightid.record import Record
@@ -16,6 +17,17 @@ from flightid.uncertainty.feedback import (
     find_feedback,
     unless_spread,
 )
+
+KEPT = 4
+"""Sets of records whose examination is kept: a scan fits the same ones many times."""
+
+
+@lru_cache(maxsize=KEPT)
+def loop_seen(
+    records: tuple[Record, ...], inputs: tuple[str, ...], outputs: tuple[str, ...]
+) -> FeedbackTest:
+    """`feedback_test` by what records know, made once for all who ask of the same ones."""
+    return feedback_test(records, inputs=inputs, outputs=outputs)
 
 
 def feedback_test(

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from flightid.evidence.feedback import feedback_test
+from flightid.evidence.feedback import loop_seen
 from flightid.evidence.gather import CONVERGED
 from flightid.frozen import dataclass
 from flightid.identification.fit import Fit
@@ -255,7 +255,7 @@ def _gain(other: Fit, fit: Fit) -> float | None:
 def _is_fed_back(data: object, fit: Fit) -> bool:
     known = data.loop if isinstance(data, FrequencyResponse) else None
     if isinstance(data, Record):
-        known = feedback_test(data, inputs=fit.model.inputs, outputs=fit.model.outputs)
+        known = loop_seen((data,), tuple(fit.model.inputs), tuple(fit.model.outputs))
     if known is None:
         return False
     return known.loop == "closed" or known.is_taken_care_of or known.source == "same sample"
