@@ -147,16 +147,21 @@ class RightSide:
         still = np.zeros((states.shape[1], n))
         rest = np.hstack([states.T, inputs.T])
         directions = [*range(n), *range(2 * n, 2 * n + m), *(2 * n + m + k for k in free)]
-        explicit = _is_explicit(self.model)
-        first = directions if explicit else directions[:n]
-        found, slopes = self.model.native.sample(values, np.hstack([still, rest]), first)
-        moving = -_solve(slopes[:, :n, :n], found[:, :n, None])[:, :, 0]
-        if not explicit:
-            found, slopes = self.model.native.sample(values, np.hstack([moving, rest]), directions)
-            _require_affine(found[:, :n], slopes[:, :n, :n], moving)
-        rates = -_solve(slopes[:, :n, :n], slopes[:, :n, n:])
         others = [n + place for place in self.reconstruction.others]
-        outputs = slopes[:, others, n:] + slopes[:, others, :n] @ rates
+        sample, rows = self.model.native.sample, np.hstack([still, rest])
+        if _is_explicit(self.model):
+            factors = sample(values, rows[:1], directions[:n])[1][0, :n]
+            turned = -solved_rates(factors, np.eye(n))
+            found, slopes = sample(values, rows, directions[n:])
+            moving, rates = found[:, :n] @ turned.T, _turned(turned, slopes[:, :n])
+            outputs = slopes[:, others]
+        else:
+            found, slopes = sample(values, rows, directions[:n])
+            moving = -_solve(slopes[:, :n, :n], found[:, :n, None])[:, :, 0]
+            found, slopes = sample(values, np.hstack([moving, rest]), directions)
+            _require_affine(found[:, :n], slopes[:, :n, :n], moving)
+            rates = -_solve(slopes[:, :n, :n], slopes[:, :n, n:])
+            outputs = slopes[:, others, n:] + slopes[:, others, :n] @ rates
         whole = np.concatenate([rates, outputs], axis=1)
         return _StateValues(np.hstack([moving, found[:, others]]), whole[:, :, :m], whole[:, :, m:])
 
@@ -238,6 +243,14 @@ def _solve(matrix: Array, right: Array) -> Array:
     if np.array_equal(matrix, np.broadcast_to(matrix[:1], matrix.shape)):
         return np.asarray(solved_rates(matrix[0], np.eye(len(matrix[0]))) @ right)
     return solved_rates(matrix, right)
+
+
+def _turned(factor: Array, right: Array) -> Array:
+    """One factor, which mostly is one or minus one, times the right side of each sample."""
+    diagonal = np.diagonal(factor)
+    if np.array_equal(factor, np.diag(diagonal)):
+        return np.asarray(right * diagonal[:, None])
+    return np.asarray(factor @ right)
 
 
 def _require_affine(residuals: Array, factors: Array, moving: Array) -> None:
