@@ -6,11 +6,13 @@ ratio holds on any machine; `history.json` keeps it, and a check compares by it.
 Run: python -m benchmarks verbs            the table beside what was kept
      python -m benchmarks.verbs --check    1 where a line is worse by more than a quarter
      python -m benchmarks.verbs --keep     keep today's ratios; with names of lines, theirs alone
+     python -m benchmarks.verbs --beside SRC    in turn with another tree's package, built, in SRC
 """
 
 from __future__ import annotations
 
 import json
+import os
 import resource
 import subprocess
 import sys
@@ -25,12 +27,14 @@ from scipy.signal import lfilter
 
 import flightid as fid
 from benchmarks import output_error, polynomial, responses, state_space_fit, subspace
-from flightid.table import Column, Table
+from flightid.table import Cell, Column, Table
 
 HISTORY = Path(__file__).with_name("history.json")
 WORSE = 1.25
 """Ratio to what was kept above which a line is worse: twice what repeats differ by."""
 REPEATS, SECONDS = 7, 4.0
+EVIDENCE = "--evidence"
+HERE = str(Path(fid.__file__).parents[1])
 Work = Callable[[], object]
 
 
@@ -180,9 +184,21 @@ def _taken(work: Work) -> float:
     return time.process_time() - begun
 
 
-def measured(name: str) -> dict[str, float]:
+def _with_evidence(work: Work) -> Work:
+    """Work and the evidence of all that it gives, which a fit gathers once somebody asks for it."""
+
+    def asked() -> object:
+        found = work()
+        for each in found if isinstance(found, Sequence) else (found,):
+            getattr(each, "evidence", None)
+        return found
+
+    return asked
+
+
+def measured(name: str, *, evidence: bool = False) -> dict[str, float]:
     """Processor seconds of one line, its ratio to the yardstick, and its peak memory in MB."""
-    work = LINES[name]()
+    work = _with_evidence(LINES[name]()) if evidence else LINES[name]()
     work(), _yardstick()
     pairs: list[tuple[float, float]] = []
     while len(pairs) < 2 or (len(pairs) < REPEATS and sum(map(sum, pairs)) < SECONDS):
@@ -194,9 +210,11 @@ def measured(name: str) -> dict[str, float]:
     }
 
 
-def _apart(name: str) -> dict[str, float]:
-    command = [sys.executable, "-m", "benchmarks.verbs", name]
-    found = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+def _apart(name: str, source: str = "") -> dict[str, float]:
+    """One line in a process of its own, by the package in a folder or that at hand."""
+    command = [sys.executable, "-m", "benchmarks.verbs", name, *([EVIDENCE] if source else [])]
+    around = os.environ | ({"PYTHONPATH": source} if source else {})
+    found = subprocess.run(command, check=True, capture_output=True, text=True, env=around).stdout
     return dict(json.loads(found))
 
 
@@ -232,6 +250,37 @@ def compared(names: Sequence[str]) -> tuple[dict[str, dict[str, float]], Table]:
     return today, Table("Verbs with intervals and evidence", columns, tuple(rows))
 
 
+def beside(source: str, names: Sequence[str]) -> Table:
+    """Lines of this tree and of another in turn, with evidence: that, this, this, that.
+
+    Parameters
+    ----------
+    source : str
+        Folder that holds the other tree's package with its native half.
+    names : sequence of str
+        Lines; of those that the other tree cannot run the row says so.
+    """
+    rows: list[tuple[Cell, ...]] = []
+    for name in names:
+        try:
+            turns = [_apart(name, each) for each in (source, HERE, HERE, source)]
+        except subprocess.CalledProcessError as error:
+            rows.append((name, None, None, None, error.stderr.strip().splitlines()[-1]))
+            continue
+        was, now = ([turns[i]["ratio"] for i in pair] for pair in ((0, 3), (1, 2)))
+        seconds = 1e3 * min(turns[i]["seconds"] for i in (1, 2))
+        scatter = max(max(pair) / min(pair) for pair in (was, now))
+        rows.append((name, seconds, sum(now) / sum(was), scatter, ""))
+    columns = (
+        Column("verb"),
+        Column("processor time", "ms", 4),
+        Column("over the other tree", digits=3),
+        Column("turns apart by", digits=3),
+        Column("note"),
+    )
+    return Table(f"Verbs beside those of {source}", columns, tuple(rows))
+
+
 def run() -> Table:
     """The table alone."""
     return compared(list(LINES))[1]
@@ -240,7 +289,10 @@ def run() -> Table:
 def main(arguments: list[str]) -> int:
     """One line as JSON, or all of them kept or checked."""
     if arguments and arguments[0] in LINES:
-        print(json.dumps(measured(arguments[0])))
+        print(json.dumps(measured(arguments[0], evidence=EVIDENCE in arguments)))
+        return 0
+    if arguments[:1] == ["--beside"]:
+        print(beside(arguments[1], arguments[2:] or list(LINES)))
         return 0
     option, names = arguments[:1], arguments[1:] or list(LINES)
     today, table = compared(names)
