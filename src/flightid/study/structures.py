@@ -28,8 +28,8 @@ from flightid.validation.spectra.spectra import lags_of_spectrum
 Choice = OrderScan | NarxSearch
 RUNS_ALIKE = 0.05
 """Free-run errors that differ by less are alike: a minute of a slow mode tells them no better."""
-ALIKE_BY_CHANCE = 3.841458820694124
-"""Twice the difference of log likelihoods, of one degree of freedom, that 1 of 20 is beyond."""
+ALIKE_BY_CHANCE = 1.6448536269514722
+"""Standard errors of the logarithm of a ratio of variances beyond which chance takes 1 of 20."""
 TRIED = 4
 """Structures that are fitted whole, at most, for one that `_is_clean`."""
 FURTHER, DOUBTED = 2, 0.3
@@ -187,7 +187,7 @@ def runs_as_well(trial: OrderTrial, best: OrderTrial) -> bool:
 
     A run that slow noise has carried off its level tells little of what follows the inputs, and a
     pole slower than the run starts at the level of its first stretch. Variances of so many
-    independent errors as the best run holds are compared by their likelihoods.
+    independent errors as the runs hold are compared (F test, by the normal law of its logarithm).
 
     Example
     -------
@@ -196,17 +196,19 @@ def runs_as_well(trial: OrderTrial, best: OrderTrial) -> bool:
     >>> best, other = (
     ...     OrderTrial(asked, None, None, rms, 90.0, independent_errors=5.0) for rms in (1.0, 1.3)
     ... )
-    >>> runs_as_well(other, best), runs_as_well(other, replace(best, independent_errors=50.0))
+    >>> many = {"independent_errors": 500.0}
+    >>> runs_as_well(other, best), runs_as_well(replace(other, **many), replace(best, **many))
     (True, False)
     """
     if trial.free_run_rms is None or best.free_run_rms is None:
         return False
     if trial.free_run_rms <= (1 + RUNS_ALIKE) * best.free_run_rms:
         return True
-    samples = best.independent_errors
-    if samples is None or best.free_run_rms <= 0.0:
+    counts = (trial.independent_errors, best.independent_errors)
+    if None in counts or best.free_run_rms <= 0.0:
         return False
-    return 2.0 * samples * math.log(trial.free_run_rms / best.free_run_rms) < ALIKE_BY_CHANCE
+    error = math.sqrt(sum(2.0 / each for each in counts if each is not None))
+    return 2.0 * math.log(trial.free_run_rms / best.free_run_rms) < ALIKE_BY_CHANCE * error
 
 
 def ranked(scan: OrderScan, how: str) -> list[OrderTrial]:
