@@ -19,6 +19,7 @@ from flightid.inspection.carried import carried_axes, carried_sentence
 from flightid.inspection.inspection import Inspection
 from flightid.logs import Log
 from flightid.logs.ulog.reader import UlogSource
+from flightid.study.proposal.propose import propose_study
 from tests.sweep_log import SweepFlight
 from tests.ulog_builder import UlogBuilder
 
@@ -138,6 +139,18 @@ def test_without_a_sweep_no_axis_carries_a_model_and_the_verdict_is_red(
     assert "can support identification" not in found.to_text()
     why = "roll, pitch, yaw: nothing was injected, and no sweep was flown"
     assert carried_sentence(found) == f"This log can carry no model: {why}."
+
+
+def test_a_sweep_that_was_broken_off_is_a_sweep(tmp_path: Path) -> None:
+    """It was said that none was flown; what of it is wide enough gives a model."""
+    log = SweepFlight().write(tmp_path)
+    content = log.read_bytes()
+    for share, said in ((0.2, "roll: the band of its sweep that"), (0.3, "carry a model of roll,")):
+        log.write_bytes(content[: int(share * len(content))])
+        found = fid.inspect_log(log)
+        assert found.excitations[0].detail.endswith("broken off")
+        assert said in carried_sentence(found)
+    assert propose_study([log], folder=tmp_path).models == ("Roll rate",)
 
 
 def test_skew_is_measured(inspected: Callable[[SweepFlight], Inspection]) -> None:

@@ -44,15 +44,13 @@ class InspectedLog(Protocol):
 
 SEARCHED = ("sid", "chirp", "sweep", "autotune")
 """Excitations from which a model may be tried."""
-BROKEN_OFF = "broken off"
 
 
 def why_no_model(inspection: InspectedLog, band: AxisBand) -> str:
     """Why an axis carries no model; empty where one may be tried."""
     if not band.input:
         return band.reason
-    made = [e for e in inspection.excitations if e.axis == band.axis and e.kind in SEARCHED]
-    if not any(not each.detail.endswith(BROKEN_OFF) for each in made):
+    if not any(e.axis == band.axis and e.kind in SEARCHED for e in inspection.excitations):
         return "nothing was injected, and no sweep was flown"
     if band.band_rad_s is None:
         return band.reason

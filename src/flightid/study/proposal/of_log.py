@@ -137,7 +137,7 @@ def _axis(log: Log, inspection: Inspection, band: AxisBand, model: str | None) -
     why = why_no_model(inspection, band)
     if band.band_rad_s is None or why:
         return _missed(inspection, axis, why)
-    runs = [run for run in log.sid_runs if str(run.body_axis) == axis and run.is_complete]
+    runs = _runs(log, axis)
     others = [e for e in inspection.excitations if e.axis == axis and e.kind in SEARCHED]
     if model is None and axes_of(log.vehicle)[axis].command not in COMMANDS:
         return _missed(
@@ -159,6 +159,12 @@ def _axis(log: Log, inspection: Inspection, band: AxisBand, model: str | None) -
         model or TEMPLATES[axis], f"{said}, inside what was swept",
         not runs and bool(_chirped(others)),
     )  # fmt: skip
+
+
+def _runs(log: Log, axis: str) -> list[SidRun]:
+    """Sweeps of an axis that ran to their end; of none, what was flown of those broken off."""
+    made = [run for run in log.sid_runs if str(run.body_axis) == axis]
+    return [run for run in made if run.is_complete] or made
 
 
 COMMANDS = ("tau_phi", "tau_theta", "tau_psi")
