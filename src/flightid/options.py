@@ -84,10 +84,10 @@ class Option:
     @property
     def range_words(self) -> str:
         """Range in words, empty where there is none."""
-        low = f"from {self.minimum:g}" if self.minimum is not None else ""
-        low = f"above {self.above:g}" if self.above is not None else low
-        high = f"to {self.maximum:g}" if self.maximum is not None else ""
-        high = f"below {self.below:g}" if self.below is not None else high
+        low = f"from {self.minimum:.15g}" if self.minimum is not None else ""
+        low = f"above {self.above:.15g}" if self.above is not None else low
+        high = f"to {self.maximum:.15g}" if self.maximum is not None else ""
+        high = f"below {self.below:.15g}" if self.below is not None else high
         if low.startswith("from") and not high:
             return f"{low} on"
         return " ".join(part for part in (low, "and" if low and high and "b" in high[0] else "",

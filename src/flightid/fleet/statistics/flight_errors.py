@@ -70,7 +70,7 @@ class ErrorScale:
         if self.typical < NOTABLE:
             return f"{self.source} scatter as its errors say"
         return (
-            f"its errors count {self.typical:.2f} times as stated, for so far scatter {self.source}"
+            f"its errors count {self.typical:.2f} times as stated: {self.source} scatter by so much"
         )
 
     def beside_days(self, shared: Array, stated: Array) -> ErrorScale:
