@@ -1,7 +1,8 @@
 """Loops that `advise` sees in records of open ones, and the delays that it tells.
 
 Run: python -m tests.strangers.open_loops --runs 500 [--first-seed 6000]. Rigs of SciPy, moved in
-four ways, by an input that repeats, and lightly damped ones (ζ 0.02); 1 % is the nominal rate.
+four ways, by an input that repeats, lightly damped ones (ζ 0.02), and swept ones whose two light
+modes stiffen as they move; 1 % is the nominal rate.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from scipy.signal import cont2discrete, lfilter
 import flightid as fid
 from tests.strangers.rig_lights import INPUTS, STEP_S, Array, Rig, injected, noise
 
-KINDS = (*INPUTS, "repeats", "light")
+KINDS = (*INPUTS, "repeats", "light", "stiffens")
 ZETA, PERIOD, SAMPLES = 0.02, 300, 2400
 
 
@@ -24,6 +25,8 @@ def drawn(seed: int) -> tuple[str, int, fid.Record]:
     """Kind, samples until the input acts, and the record."""
     random = np.random.default_rng([seed, 1906])
     kind, rig = KINDS[seed % len(KINDS)], Rig(random)
+    if kind == "stiffens":
+        return kind, 1, _stiffening(random)
     u = _input(random, kind, rig.omega)
     y, late = rig.answer(u), rig.delay + 1
     if kind == "light":
@@ -34,6 +37,29 @@ def drawn(seed: int) -> tuple[str, int, fid.Record]:
     time_s = np.arange(y.size) * STEP_S
     record = fid.Record.from_arrays(time_s, inputs={"u": u}, outputs={"y": y}, hold="zero")
     return kind, late, record
+
+
+def _stiffening(random: np.random.Generator) -> fid.Record:
+    """The second of three sweeps of an arm, its torque measured with 0.1 % noise."""
+    n = 512
+    modes = zip(
+        (random.uniform(0.3, 0.45), random.uniform(0.7, 0.95)),
+        random.uniform(0.003, 0.02, 2),
+        strict=True,
+    )
+    turned = 2.0 * np.pi * np.cumsum(np.linspace(0.01, 0.16, n)) + random.uniform(0.0, 6.28)
+    u = np.tile(np.sin(turned), 3) + 1e-3 * random.standard_normal(3 * n)
+    y = np.zeros(3 * n)
+    for omega, zeta in modes:
+        b, a, _ = cont2discrete(([omega**2], [1.0, 2.0 * zeta * omega, omega**2]), 1.0, "zoh")
+        y += random.uniform(0.3, 1.0) * lfilter(b.ravel(), a, u)
+    y += random.choice([0.01, 0.07]) * np.std(y) * (y / np.std(y)) ** 3
+    y += 1e-3 * np.std(y) * random.standard_normal(3 * n)
+    part = slice(n, 2 * n)
+    time_s = np.arange(n) * STEP_S
+    return fid.Record.from_arrays(
+        time_s, inputs={"u": u[part]}, outputs={"y": y[part]}, hold="zero"
+    )
 
 
 def _input(random: np.random.Generator, kind: str, omega: float) -> Array:

@@ -5,7 +5,9 @@ model of the outputs leaves: it knows light damping by few numbers, where a puls
 many lags has not died out. What is new in an input is what its own past does not foretell. Past
 noise that explains a share of what is new says that a loop is closed. Either of the two being white
 is enough for the F distribution, so neither a poor model of the outputs nor a held, swept or
-two-level input raises false alarms. An input that repeats exactly cannot hold any noise.
+two-level input raises false alarms; where a loop is seen, an input's past is taken out of it once
+more, with weights that change as a sweep's frequency does (`moving_past.py`). An input that repeats
+exactly cannot hold any noise.
 
 A controller that answers within the sample hides its noise: the model of the outputs takes u(t) for
 their cause. So what is new in an input is also held against the outputs of its own sample. Where
@@ -35,6 +37,7 @@ from flightid.uncertainty.lagged_products import (
     products_with_past,
     weights_of,
 )
+from flightid.uncertainty.moving_past import moving_chance
 
 Array = NDArray[np.float64]
 Pair = tuple[Array, Array]
@@ -46,6 +49,7 @@ MAXIMUM_SAMPLES = 20_000
 """Of all records together that a test looks at."""
 LAGS = 12
 """Past samples of noise that may move an input."""
+PAST = range(1, LAGS + 1)
 SAMPLES_PER_NUMBER = 10
 FEWEST_FREE = 30
 SMALLEST_NOISE = 1e-8
@@ -238,13 +242,18 @@ def find_feedback(
     noisy = sum(np.sum(e**2, axis=1) for e in noise) > SMALLEST_NOISE * power
     past_noise = FeedbackTest("open", "no noise")
     if np.any(noisy):
-        past_noise = _worst(_shares(pairs, [e[noisy] for e in noise], order), names, "test")
+        heard = [e[noisy] for e in noise]
+        past_noise = _worst(
+            _moving(_shares(pairs, heard, order), pairs, heard, order, PAST), names, "test"
+        )
     if past_noise.p_value is not None and past_noise.p_value < LEVEL:
         return replace(past_noise, loop="closed")
     if unthinned:
         pairs = [(u, y) for u, y in zip(whole, unthinned[1], strict=True) if u.shape[1] > order]
         news = _news([np.concatenate(pair) for pair in pairs], order, n_in + n_out)
-    at_once = _worst(_shares_at_once(pairs, news, order), names, "same sample")
+    outputs_news = [new[n_in:] for new in news]
+    shares = _moving(_shares_at_once(pairs, news, order), pairs, outputs_news, order, range(1))
+    at_once = _worst(shares, names, "same sample")
     if at_once.p_value is not None and at_once.p_value < LEVEL:
         return replace(at_once, loop="unknown")
     return past_noise
@@ -255,6 +264,29 @@ def _worst(found: Sequence[tuple[float, float]], names: Sequence[str], source: s
     place = int(np.argmin([p for _, p in found]))
     share, p_value = found[place]
     return FeedbackTest("open", source, min(1.0, len(names) * p_value), names[place], share)
+
+
+def _moving(
+    found: Sequence[tuple[float, float]],
+    pairs: Sequence[Pair],
+    noise: Sequence[Array],
+    order: int,
+    lags: range,
+) -> list[tuple[float, float]]:
+    """By input: share and probability, of those that look fed back also as if they were sweeps.
+
+    The surest first, until one stays: that one is named.
+    """
+    judged = list(found)
+    for place in np.argsort([chance for _, chance in found]).tolist():
+        share, chance = found[place]
+        if chance * len(found) >= LEVEL:
+            break
+        again = moving_chance(pairs, noise, place, order, lags, LEVEL / len(found))
+        if again is None or again * len(found) < LEVEL:
+            break
+        judged[place] = share, max(again, chance)
+    return judged
 
 
 def usable_order(inputs: Sequence[Array], n_out: int) -> int:
