@@ -52,6 +52,8 @@ SPELLINGS = {
     "pu": "1",
 }
 """Spellings of logs and test reports that pint does not read, or reads as something else."""
+KNOT = re.compile(r"(?<![A-Za-z])kn(?![A-Za-z])")
+"""Pint's symbol of a knot; aircraft's manuals and logs have kt."""
 LONGEST = 100
 """Letters of a unit; what is longer is none."""
 DIGIT_POWER = re.compile(r"(?<![A-Za-z_0-9])(s|sec|m|ft|in|kg|rad|deg|slug)([2-4])(?![A-Za-z_0-9])")
@@ -126,13 +128,15 @@ def canonical(unit: str) -> str:
     -------
     >>> canonical("radian / second"), canonical("ft/s**2"), canonical("")
     ('rad/s', 'ft/s^2', '1')
+    >>> canonical("knots"), canonical("kn/s")
+    ('kt', 'kt/s')
     """
     if (known := common_unit(unit)) is not None:
         return known.text
     parsed = _parse(unit)
     if parsed == _registry().dimensionless:
         return DIMENSIONLESS
-    return f"{parsed:~C}".replace("**", "^")
+    return KNOT.sub("kt", f"{parsed:~C}".replace("**", "^"))
 
 
 def conversion_factor(source: str, target: str) -> float:

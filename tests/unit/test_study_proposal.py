@@ -131,7 +131,7 @@ def test_columns_go_to_the_units_of_equations_that_are_named_from_anywhere(
     monkeypatch.chdir(tmp_path)
     asked = {"inputs": ["F"], "outputs": ["w"], "hold": "zero"}
     made = propose_study(["flights/r.csv"], folder="flights", model="heave.toml", **asked)
-    assert "w converted from kn to ft/s, its unit in ../heave.toml" in made.said
+    assert "w converted from kt to ft/s, its unit in ../heave.toml" in made.said
     fit = run_study(made.write(Path("flights/r-study.toml"))).identified[0].fit
     assert fit is not None
     assert fit.parameters["m"].value == pytest.approx(12.0, rel=0.02)
@@ -235,15 +235,17 @@ def test_data_without_a_model_give_no_study(tmp_path: Path) -> None:
     assert "the record is too short: 30 samples, 7 of them to choose orders by" in said
 
 
-def test_a_fall_comes_first_then_the_commands_that_go_on(tmp_path: Path) -> None:
+def test_units_and_a_fall_come_first_then_the_commands_that_go_on(tmp_path: Path) -> None:
     write_ordinary_log(tmp_path / "day.bin", duration_s=20.0)
     looked = inspect_log(tmp_path / "day.bin")
     fall = Finding("tipped-over", Light.AMBER, "it falls", "look for its cause")
+    units = Finding("scale-contradicted", Light.RED, "57 times the turning", "state the true unit")
     missed = (Finding("no-model", Light.RED, "roll: no model, no sweep", "fly a sweep"),)
-    said = Proposal((), (), missed, replace(looked, findings=(*looked.findings, fall))).refusal()
+    found = replace(looked, findings=(*looked.findings, fall, units))
+    said = Proposal((), (), missed, found).refusal()
     todo = said.partition("What to do, the first first\n")[2].splitlines()
-    assert [line.split(":")[0] for line in todo[:2]] == [
-        "- look for its cause", "- flightid flight day.bin",
+    assert [line.split(":")[0] for line in todo[:3]] == [
+        "- state the true unit", "- look for its cause", "- flightid flight day.bin",
     ]  # fmt: skip
     assert sum("flightid plan day.bin" in line for line in todo) == 1, "a command is said once"
     assert any(line == "- fly a sweep" for line in todo)

@@ -87,7 +87,7 @@ def test_round_brackets_hold_units_as_square_ones_do(tmp_path: Path) -> None:
     path = write(tmp_path, heading, *columns)
     (record,) = read_records(path)
     assert {name: record.unit(name) for name in record.channels} == {
-        "p": "deg/s", "wind": "kn", "aileron (L)": "1", "u (min)": "1", "h (ft)": "ft",
+        "p": "deg/s", "wind": "kt", "aileron (L)": "1", "u (min)": "1", "h (ft)": "ft",
         "h (m)": "m", "v": "%",
     }  # fmt: skip
     assert_close(record.time_s, [0.0, 0.3, 0.6], rtol=1e-12, why="of its heading")
@@ -95,5 +95,5 @@ def test_round_brackets_hold_units_as_square_ones_do(tmp_path: Path) -> None:
     both = read_records(
         path, "v (%)", ["p", "wind (kt)", "h (m)"], units=told, time_column="Time (ms)"
     )[0]
-    assert [both.unit(name) for name in ("v", "p", "wind", "h (m)")] == ["%", "rad/s", "kn", "km"]
+    assert [both.unit(name) for name in ("v", "p", "wind", "h (m)")] == ["%", "rad/s", "kt", "km"]
     assert_close(both.time_s, [0.0, 300.0, 600.0], rtol=1e-12, why="what is told goes first")

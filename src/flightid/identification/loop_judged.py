@@ -60,9 +60,9 @@ def with_loop_judged(fit: Fit, loop: Loop | None) -> Fit:
         return fit
     light = Light.RED if is_material(tests.worth_percent) else Light.AMBER
     why = (
-        "what is left of the outputs goes with the injected excitation "
-        f"(p = {tests.independent:.2g}, worth {tests.worth_percent:.2g} % of the output), which "
-        "feedback does not explain: the model's response is off by more than intervals would say"
+        "the model misses a part of the answer to what was injected "
+        f"({tests.worth_percent:.2g} % of the output; p = {tests.independent:.2g} by chance), and "
+        "no feedback makes that: its response is further off than intervals would say"
     )
     bare = without_intervals(fit, why)
     said = Finding("excitation-refutes", light, f"{why}; there are none", INSTRUMENT)

@@ -17,6 +17,8 @@ from flightid.surface import spoken
 from flightid.wrapping import wrapped
 
 WIDTH = 100
+FIRST = ("scale-contradicted", "tipped-over")
+"""Findings of a log that come before a flight anew: another one would show the same."""
 STAMP = "# Written by flightid, which replaces this file as long as nobody changes it: "
 """Begins the last line, with the hash of the lines above it."""
 
@@ -70,10 +72,10 @@ class Proposal:
         if self.inspection is not None:
             said += ["", self.inspection.in_short()]
             noted = self.inspection.findings
-            fallen = [each.action for each in noted if each.code == "tipped-over"]
+            first = [each.action for code in FIRST for each in noted if each.code == code]
             found = [*actions, *(each.action for each in noted if each.action)]
             planned = [each for each in found if "flightid plan" in each]
-            actions = [*fallen, *self._next(planned=bool(planned)), *planned, *found]
+            actions = [*first, *self._next(planned=bool(planned)), *planned, *found]
         said += ["", "What to do, the first first"] if actions else []
         said += [line for each in dict.fromkeys(actions) for line in _wrapped(f"- {each}")]
         return "\n".join(said)
