@@ -27,6 +27,28 @@ pub(crate) fn matrix<'py>(
     Ok(array.into_pyarray(py))
 }
 
+/// Matrices and delays as they were given, which the core checks.
+fn system_of<'a>(
+    a: &'a RowMajor2<'_, f64>,
+    b: &'a RowMajor2<'_, f64>,
+    c: &'a RowMajor2<'_, f64>,
+    d: &'a RowMajor2<'_, f64>,
+    delays_s: &'a RowMajor1<'_, f64>,
+) -> PyResult<StateSpace<'a>> {
+    Ok(StateSpace {
+        a: a.as_slice()?,
+        b: b.as_slice()?,
+        c: c.as_slice()?,
+        d: d.as_slice()?,
+        delays_s: delays_s.as_slice()?,
+        n_outputs: c.as_array().nrows(),
+    })
+}
+
+fn between_samples(first_order_hold: bool) -> Hold {
+    if first_order_hold { Hold::First } else { Hold::Zero }
+}
+
 /// simulate_linear(a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64], d: NDArray[np.float64], delays_s: NDArray[np.float64], inputs: NDArray[np.float64], initial_state: NDArray[np.float64], sample_time_s: float, first_order_hold: bool) -> tuple[NDArray[np.float64], NDArray[np.float64]]
 ///
 /// States (n, n_samples) and outputs (p, n_samples) of a linear system over sampled inputs.
@@ -44,18 +66,10 @@ fn simulate_linear<'py>(
     sample_time_s: f64,
     first_order_hold: bool,
 ) -> PyResult<States<'py>> {
-    let n_outputs = c.as_array().nrows();
-    let n_samples = inputs.as_array().ncols();
-    let system = StateSpace {
-        a: a.as_slice()?,
-        b: b.as_slice()?,
-        c: c.as_slice()?,
-        d: d.as_slice()?,
-        delays_s: delays_s.as_slice()?,
-        n_outputs,
-    };
+    let system = system_of(&a, &b, &c, &d, &delays_s)?;
+    let (n_outputs, n_samples) = (system.n_outputs, inputs.as_array().ncols());
     let (u, x0) = (inputs.as_slice()?, initial_state.as_slice()?);
-    let hold = if first_order_hold { Hold::First } else { Hold::Zero };
+    let hold = between_samples(first_order_hold);
     let (states, outputs) = py
         .detach(|| Discrete::new(&system, sample_time_s, hold)?.run(u, n_samples, x0))
         .map_err(from_core)?;
@@ -80,17 +94,10 @@ fn linear_outputs<'py>(
     first_order_hold: bool,
     every: usize,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let (n_outputs, n_samples) = (c.as_array().nrows(), inputs.as_array().ncols());
-    let system = StateSpace {
-        a: a.as_slice()?,
-        b: b.as_slice()?,
-        c: c.as_slice()?,
-        d: d.as_slice()?,
-        delays_s: delays_s.as_slice()?,
-        n_outputs,
-    };
+    let system = system_of(&a, &b, &c, &d, &delays_s)?;
+    let (n_outputs, n_samples) = (system.n_outputs, inputs.as_array().ncols());
     let (u, x0) = (inputs.as_slice()?, initial_state.as_slice()?);
-    let hold = if first_order_hold { Hold::First } else { Hold::Zero };
+    let hold = between_samples(first_order_hold);
     let found = py
         .detach(|| {
             let (sampled, _) = discretise(&system, &[], sample_time_s, hold)?;
@@ -149,15 +156,8 @@ fn discretise_linear<'py>(
     first_order_hold: bool,
 ) -> PyResult<(Bound<'py, PyArray2<f64>>, Taps<'py>)> {
     let n = a.as_array().nrows();
-    let system = StateSpace {
-        a: a.as_slice()?,
-        b: b.as_slice()?,
-        c: c.as_slice()?,
-        d: d.as_slice()?,
-        delays_s: delays_s.as_slice()?,
-        n_outputs: c.as_array().nrows(),
-    };
-    let hold = if first_order_hold { Hold::First } else { Hold::Zero };
+    let system = system_of(&a, &b, &c, &d, &delays_s)?;
+    let hold = between_samples(first_order_hold);
     let (found, _) = discretise(&system, &[], sample_time_s, hold).map_err(from_core)?;
     let taps = found
         .taps
