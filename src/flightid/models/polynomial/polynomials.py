@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
+from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
@@ -108,7 +109,7 @@ class Polynomials:
             denominators=COMMON if structure.is_common else SEPARATE,
         )
 
-    @property
+    @cached_property
     def structure(self) -> PolynomialStructure:
         """Orders of the model, with the default options of `identify`."""
         return PolynomialStructure(
