@@ -190,11 +190,11 @@ class GainPhaseCurve:
 
     def _between(self, place: int, part: int, level: float) -> float:
         pair = np.minimum([place, place + 1], len(self.omega) - 1)
-        left, right = self.omega[pair].tolist()
+        left, right = map(float, self.omega[pair])
         known = (self.decibels, self.degrees)[part][pair] - level
         ends = float(known[0]), float(known[1])
         if self.exact is None and ends[0] != ends[1]:  # a straight line over log frequency
-            return left * (right / left) ** (ends[0] / (ends[0] - ends[1]))
+            return float(left * (right / left) ** (ends[0] / (ends[0] - ends[1])))
         return root_between(lambda at: self.at(at)[part] - level, left, right, ends=ends)
 
 
