@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from flightid.frozen import dataclass
 from flightid.responses.errors.noise import NoiseOfRecords, NoiseSpectrum
 from flightid.responses.errors.random_error import JointErrors, Points, union
-from flightid.responses.windows.window_weights import WindowShare, WindowWeights
+from flightid.responses.windows.window_weights import WindowWeights
 
 KEPT = 256
 """Transforms of a window that are kept: one fit asks several times for the same."""
@@ -153,7 +153,10 @@ class WindowedErrors(JointErrors):
             )
             for share in shares
         ]
-        turns = [_turns(*one, angle) for one in zip(shares, records[0], strict=True)]
+        turns = [
+            _kept_turns(share.plan.length // 2, share.plan.hop, weight.shape[2], angle.tobytes())
+            for share, weight in zip(shares, records[0], strict=True)
+        ]
         for weights in records:
             kernels = []
             for weight, turn, (above, below) in zip(weights, turns, bases, strict=True):
@@ -236,8 +239,9 @@ class _Part:
 
     def _mine(self, kernels: Complex, near: Places) -> tuple[Places, Complex]:
         """Which of the frequencies the kernels reach, and the kernels there."""
-        here = np.flatnonzero(np.isin(self.frequencies, near))
-        columns = np.searchsorted(near, self.frequencies[here])
+        first = near[0] if len(near) else np.inf  # all frequencies from one on
+        here = np.flatnonzero(self.frequencies >= first)
+        columns = self.frequencies[here] - int(first) if len(here) else here
         return here, kernels[self.inputs[:, None], columns]
 
 
@@ -248,14 +252,17 @@ def _mixing(sensitivity: Real) -> Real:
     return np.ascontiguousarray(ordered).reshape(inputs, count, 2, 2 * windows)
 
 
-def _turns(share: WindowShare, weight: Complex, angle: Real) -> Complex:
+@lru_cache(KEPT)
+def _kept_turns(middle: int, hop: int, count: int, angle: bytes) -> Complex:
     """Transform of unit samples at the windows' middles, shape (n_windows, n_angles).
 
     Windows are copies of one basis function, so the transform of g is that of the windows' weights
     at their places times the function's.
     """
-    middles = share.plan.length // 2 + share.plan.hop * np.arange(weight.shape[2])
-    return np.asarray(np.exp(-1j * np.multiply.outer(middles, angle)))
+    middles = middle + hop * np.arange(count)
+    found = np.exp(-1j * np.multiply.outer(middles, np.frombuffer(angle)))
+    found.setflags(write=False)
+    return np.asarray(found)
 
 
 @lru_cache(KEPT)
