@@ -17,6 +17,7 @@ from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.record import Record
 from flightid.study.structure_settings import NARX, SUBSPACE, StructureSettings
 from flightid.study.widened_scan import CLEAR, doubted, widened
+from flightid.uncertainty.quantiles import half_width
 from flightid.validation import NarxSearch, OrderScan, scan_orders, search_narx
 from flightid.validation.order_scan.edges import Structure
 from flightid.validation.order_scan.narx_search import search_further
@@ -28,8 +29,8 @@ from flightid.validation.spectra.spectra import lags_of_spectrum
 Choice = OrderScan | NarxSearch
 RUNS_ALIKE = 0.05
 """Free-run errors that differ by less are alike: a minute of a slow mode tells them no better."""
-ALIKE_BY_CHANCE = 1.6448536269514722
-"""Standard errors of the logarithm of a ratio of variances beyond which chance takes 1 of 20."""
+BY_CHANCE = 0.9
+"""Level, of two sides, of ratios of variances that are alike: chance takes 1 of 20 beyond."""
 TRIED = 4
 """Structures that are fitted whole, at most, for one that `_is_clean`."""
 FURTHER, DOUBTED = 2, 0.3
@@ -208,7 +209,7 @@ def runs_as_well(trial: OrderTrial, best: OrderTrial) -> bool:
     if None in counts or best.free_run_rms <= 0.0:
         return False
     error = math.sqrt(sum(2.0 / each for each in counts if each is not None))
-    return 2.0 * math.log(trial.free_run_rms / best.free_run_rms) < ALIKE_BY_CHANCE * error
+    return 2.0 * math.log(trial.free_run_rms / best.free_run_rms) < half_width(BY_CHANCE) * error
 
 
 def ranked(scan: OrderScan, how: str) -> list[OrderTrial]:
