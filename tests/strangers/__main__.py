@@ -29,6 +29,7 @@ def main() -> None:
     parser.add_argument("--each", action="store_true", help="coverage of every quantity too")
     parser.add_argument("--page", type=Path, help="Markdown to make of the file of flights")
     parser.add_argument("--before", type=Path, help="flights of an earlier tree, for the page")
+    parser.add_argument("--note", default="", help="where the flights come from, for the page")
     asked = parser.parse_args()
     if asked.page and not asked.keep:
         parser.error("--page is made of the file of --keep")
@@ -46,7 +47,8 @@ def main() -> None:
             share, n = tally.coverage(name)
             print(f"    {name:40s} {100 * share:6.1f} {n:7d}", flush=True)
     if asked.page:
-        write(asked.page, read(asked.keep), asked.before and read(asked.before))
+        before = asked.before and read(asked.before)
+        write(asked.page, read(asked.keep), before, asked.note)
 
 
 def _tallies(cases: Sequence[Case], asked: argparse.Namespace) -> Iterator[Tally]:

@@ -115,6 +115,7 @@ class Counted:
 def page(
     kept: Mapping[str, Mapping[int, Trial]],
     before: Mapping[str, Mapping[int, Trial]] | None = None,
+    note: str = "",
 ) -> str:
     """Markdown of all conditions that the kept flights hold, family by family.
 
@@ -124,6 +125,8 @@ def page(
         Trials by case and seed.
     before : mapping, optional
         The same of an earlier tree: its shares stand beside today's.
+    note : str
+        Where the flights come from, below their number.
     """
     parts, all_rows = [], []
     for title, cases in families():
@@ -148,6 +151,7 @@ def page(
         f"Outside the range by more than chance: {off}. "
         f"Green beside a miss more often than allowed: {green}."
     )
+    counted += f"\n\n{note}" if note else ""
     top = INTRODUCTION.format(
         counted=counted, z=Z, least=100 * LEAST, most=100 * MOST, rows=len(read),
         expected=1e-3 * len(read),
@@ -159,9 +163,10 @@ def write(
     path: Path,
     kept: Mapping[str, Mapping[int, Trial]],
     before: Mapping[str, Mapping[int, Trial]] | None = None,
+    note: str = "",
 ) -> None:
     """The page as a file."""
-    path.write_text(page(kept, before), encoding="utf-8")
+    path.write_text(page(kept, before, note), encoding="utf-8")
 
 
 def _in_order(trials: Mapping[int, Trial]) -> tuple[Trial, ...]:
