@@ -76,7 +76,9 @@ class PanelSpace:
         """
         local = exponentials(omega, self.size) @ self.functions
         place = np.exp(1j * np.multiply.outer(omega, self.size * np.arange(count)))
-        return np.asarray((place[:, :, None] * local[:, None, :]).reshape(len(omega), -1))
+        # No frequency may fall to a level: its size does not follow from the others'.
+        whole = count * local.shape[1]
+        return np.asarray((place[:, :, None] * local[:, None, :]).reshape(len(omega), whole))
 
 
 @dataclass(frozen=True)
