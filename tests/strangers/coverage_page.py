@@ -146,7 +146,7 @@ def page(
     enough = [sum(size >= least for size in sizes) for least in ENOUGH]
     counted = (
         f"{flights:,} flights of {len(all_rows)} conditions, {min(sizes, default=0)} or more of "
-        f"each, {ENOUGH[0]} or more of {enough[0]}, {ENOUGH[1]} or more of {enough[1]}; "
+        f"each, {ENOUGH[0]} or more of {enough[0]}, {ENOUGH[1]} or more of {enough[1]};\n"
         f"{sum(each.held[1] for each in all_rows):,} intervals in {len(read)} conditions.\n"
         f"Outside the range by more than chance: {off}. "
         f"Green beside a miss more often than allowed: {green}."
