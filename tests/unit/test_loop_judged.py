@@ -76,3 +76,15 @@ def test_one_right_model_in_a_hundred_is_refused_at_most() -> None:
         for flown in map(_flown, range(100, 180))
     ]
     assert sum(refused) <= 4
+
+
+def test_a_model_that_answers_within_the_sample_of_a_loop_is_red() -> None:
+    """A controller turned round: gain -196 = -1 / K of a rig whose own is positive, amber."""
+    flown = _flown(0)
+    record = fid.Record.from_arrays(
+        flown.time_s, inputs={"u": flown["u"]}, outputs={"p": flown["p"]}, hold="zero"
+    )
+    for nk, light in ((0, "red"), (1, "amber")):
+        structure = fid.PolynomialModel.oe("u", "p", nb=2, nf=1, nk=nk)
+        fit = fid.identify(structure, record, loop="closed")
+        assert str(fit.evidence.check("loop").light) == light

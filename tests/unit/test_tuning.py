@@ -22,6 +22,8 @@ from flightid.control.tuning.requirements import TuningRequirements
 from flightid.control.tuning.tune_pid import naming_filters, noise_density
 from flightid.conventions import Light
 from flightid.errors import DataError, ModelError, OptionError, UnknownNameError
+from flightid.evidence import Evidence
+from flightid.evidence.spans import Span, judge_span
 from flightid.findings import Finding
 from flightid.vehicles import fly, write_ardupilot_log
 from tests.closeness import assert_close
@@ -246,6 +248,12 @@ def test_red_evidence_is_refused(fit: fid.Fit) -> None:
     red = dataclasses.replace(fit, findings=(Finding("cost", Light.RED, "cost 900"),))
     with pytest.raises(DataError, match="the fit is red"):
         fid.tune_pid(red, gains=FLOWN)
+    # Sticks of 0.03 and 0.07 Hz on a pendulum of 0.6 Hz: 74 deg promised, 4.4 dB of the 6 left.
+    narrow = dataclasses.replace(fit)
+    seen = judge_span([Span("p/tau_phi", (1.0, 2.0), 0.9)])
+    narrow.__dict__["evidence"] = Evidence((seen,), ())
+    with pytest.raises(DataError, match="too narrow a band for gains"):
+        fid.tune_pid(narrow, gains=FLOWN)
 
 
 def test_what_the_model_leaves_unexplained_is_refused_or_stands_in_the_result(

@@ -50,6 +50,27 @@ def loop_check(test: FeedbackTest) -> Check:
     return Check(LOOP, Light.GREEN, str(test))
 
 
+def not_turned_round(loop: Check, at_once: Sequence[str]) -> Check:
+    """The check of a loop, red where the model may be the controller turned round.
+
+    With a loop closed, what goes together within a sample is the controller's doing: an input is
+    worked out from outputs of the same sample, a vehicle moves by the next one.
+
+    Example
+    -------
+    >>> closed = loop_check(FeedbackTest("closed", "declared"))
+    >>> not_turned_round(closed, ("u",)).light.value, not_turned_round(closed, ()).light.value
+    ('red', 'amber')
+    """
+    if loop.light is not Light.AMBER or not at_once:
+        return loop
+    what = (
+        f"{loop.what}, and the model answers {', '.join(at_once)} within the same sample, as "
+        "the controller turned round does"
+    )
+    return Check(LOOP, Light.RED, what, "set nk to 1 or more, and " + loop.action)
+
+
 def time_checks(records: Sequence[Record]) -> list[Check]:
     """The question that a record's stamps raise, if they raise one."""
     asked = next(filter(None, map(time_question, records)), None)

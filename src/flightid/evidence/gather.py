@@ -13,6 +13,7 @@ from flightid.evidence.data_checks import (
     loop_check,
     loop_of_records,
     loop_of_responses,
+    not_turned_round,
     power_of_records,
     sample_checks,
     time_checks,
@@ -112,6 +113,8 @@ class FitFacts:
         Of parts of the data, where they were compared.
     values : ndarray or None
         Estimates, in its order.
+    at_once : tuple of str
+        Inputs that a sampled model answers within the same sample.
     """
 
     data: Sequence[FrequencyResponse | Record]
@@ -124,6 +127,7 @@ class FitFacts:
     loop: Loop | None = None
     agreement: Agreement | None = None
     values: NDArray[np.float64] | None = None
+    at_once: tuple[str, ...] = ()
 
 
 def gather_evidence(made: FitFacts) -> Evidence:
@@ -147,7 +151,7 @@ def gather_evidence(made: FitFacts) -> Evidence:
     loop = declared or (loop_of_responses(responses) if responses else None)
     if loop is None and records:
         loop = loop_of_records(tuple(records), made.inputs, made.outputs)
-    checks += [] if loop is None else [loop]
+    checks += [] if loop is None else [not_turned_round(loop, made.at_once)]
     if made.agreement is not None:
         checks.append(agreement_check(made.agreement, made.values))
     if made.signs:

@@ -14,6 +14,8 @@ from flightid.responses import FrequencyResponse
 from flightid.responses.bands import coherent_band, coherent_parts
 
 MORE = "fly a sweep or multisine over a decade around the crossover, or excite more"
+NARROW = "too narrow for more than a gain"
+"""Last words of a check of the band: what was seen holds no dynamics."""
 MOST_PARTS = 3
 """Unbroken runs of frequencies that are named one by one."""
 
@@ -109,7 +111,7 @@ def judge_span(spans: Sequence[Span], *, predicted: bool = False) -> Check:
         return Check(BAND, Light.GREEN, f"narrowest band: {narrow}", band_rad_s=band)
     if narrow.ratio >= BAND_LEAST.value:
         return Check(BAND, Light.AMBER, f"{narrow}: less than a decade", MORE, band)
-    return Check(BAND, Light.AMBER, f"{narrow}: too narrow for more than a gain", MORE, band)
+    return Check(BAND, Light.AMBER, f"{narrow}: {NARROW}", MORE, band)
 
 
 def judge_coherence(spans: Sequence[Span]) -> Check:

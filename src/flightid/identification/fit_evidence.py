@@ -14,7 +14,9 @@ from flightid.evidence.parameter_checks import Signed
 from flightid.evidence.spans import Span
 from flightid.identification.fit import Fit
 from flightid.identification.fitted_response import FittedResponse
+from flightid.models.innovations.model import InnovationsModel
 from flightid.models.parameters import Parameters
+from flightid.models.polynomial.model import PolynomialModel
 from flightid.record.hold import Loop
 from flightid.uncertainty.estimate import Estimate
 
@@ -46,8 +48,18 @@ def evidence_of(fit: Fit, data: Sequence[Any], loop: Loop | None = None) -> Evid
             loop,
             fit.agreement,
             _compared(fit),
+            _at_once(fit.model),
         )
     )
+
+
+def _at_once(model: object) -> tuple[str, ...]:
+    """Inputs of a sampled model that its outputs answer within the same sample."""
+    if isinstance(model, PolynomialModel):
+        return tuple(name for name, k in zip(model.inputs, model.nk, strict=True) if k == 0)
+    if isinstance(model, InnovationsModel):
+        return tuple(np.asarray(model.inputs)[np.any(model.d != 0.0, axis=0)].tolist())
+    return ()
 
 
 def _compared(fit: Fit) -> NDArray[np.float64] | None:

@@ -13,7 +13,8 @@ from flightid.control.tuning.structure_error import Band, errors_of, identified_
 from flightid.conventions import Light
 from flightid.dynamics.continuous import to_continuous
 from flightid.errors import DataError, FlightidError
-from flightid.evidence.evidence import LOOP
+from flightid.evidence.evidence import BAND, LOOP
+from flightid.evidence.spans import NARROW
 from flightid.findings import Finding
 from flightid.frozen import dataclass
 from flightid.identification.fit import WITHHOLDING, Fit
@@ -22,6 +23,7 @@ from flightid.identification.model_error import ModelErrorBound
 from flightid.identification.prediction_error.findings import CANCELLATION
 from flightid.identification.simpler_structure import simpler_fit
 from flightid.identification.uncertain_of import evidence_behind, uncertain_of
+from flightid.inspection.thresholds import BAND_LEAST
 from flightid.models import InnovationsModel, PolynomialModel
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.models.model import linear_system, model_of
@@ -206,6 +208,15 @@ def _refusals(
         yield _red(f"the fit of {' and '.join(pairs)}", examined.verdict)
     else:
         yield from _first_red("the fit", source)
+        seen = None if examined is None else examined.check(BAND)
+        if seen is not None and seen.what.endswith(NARROW):
+            # Dynamics beside such a band are the form's word: a mode there took the margins away.
+            yield DataError(
+                "the model was seen in too narrow a band for gains",
+                found=seen.what,
+                needed=f"{BAND_LEAST.value:g} to 1 at least",
+                action=seen.action,
+            )
         loop = None if examined is None else examined.check(LOOP)
         if loop is not None and loop.light is Light.UNKNOWN:
             yield DataError(
