@@ -21,10 +21,10 @@ KINDS = (*INPUTS, "repeats", "light", "stiffens")
 ZETA, PERIOD, SAMPLES = 0.02, 300, 2400
 
 
-def drawn(seed: int) -> tuple[str, int, fid.Record]:
-    """Kind, samples until the input acts, and the record."""
+def drawn(seed: int, kind: str = "") -> tuple[str, int, fid.Record]:
+    """Kind, that of the seed unless named, samples until the input acts, and the record."""
     random = np.random.default_rng([seed, 1906])
-    kind, rig = KINDS[seed % len(KINDS)], Rig(random)
+    kind, rig = kind or KINDS[seed % len(KINDS)], Rig(random)
     if kind == "stiffens":
         return kind, 1, _stiffening(random)
     u = _input(random, kind, rig.omega)

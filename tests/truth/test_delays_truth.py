@@ -117,7 +117,7 @@ def test_a_slow_sweep_does_not_take_any_delay(seed: int) -> None:
 @pytest.mark.parametrize("seed", [9001, 9007])
 def test_a_swept_rig_of_third_order_hides_its_delay_and_none_is_told(seed: int) -> None:
     """Poles far above the sweep pass for a delay, as any delay from 0 on does; 12 was told of 5."""
-    _, late, record = open_loops.drawn(seed)
+    _, late, record = open_loops.drawn(seed, "sweep")
     data = gather_channels([record], "y", ("u",), "mean")
     (found,) = find_delays(data, 20)
     assert found.samples is None or abs(found.samples - late) <= 1
