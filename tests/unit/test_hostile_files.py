@@ -21,6 +21,8 @@ import flightid as fid
 from flightid.errors import DataError, FileFormatError, FlightidError, OptionError
 from flightid.logs.channels.channel_map import channel_map
 from flightid.reading import VARIABLE, memory_budget, parse_json, parse_toml, require_memory
+from flightid.record.contents import table_contents
+from flightid.record.formats.csv import read_columns
 from flightid.record.formats.matlab_bytes import inflated
 
 SECONDS = 2.0
@@ -134,14 +136,23 @@ def test_the_budget_is_stated_and_settable(monkeypatch: pytest.MonkeyPatch) -> N
             memory_budget()
 
 
-@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "cp1252"])
 def test_csv_as_the_world_writes_it(tmp_path: Path, encoding: str) -> None:
     text = (
-        '# from a logger\n"time";"p; left [deg/s]";day\n'
-        "0;0,5;2024-05-01T10:00:00\n1;1,5;2024-05-01T10:00:01\n2;-2,5e0;2024-05-01T10:00:02\n"
+        '# from a logger\n"time";"p; left [deg/s]";day;"Größe (°)";Weg\n'
+        "0;0,5;2024-05-01T10:00:00;1;vor\n1;1,5;2024-05-01T10:00:01;2;zurück\n"
+        "2;-2,5e0;2024-05-01T10:00:02;3;– €\n"
     )
     (tmp_path / "a.csv").write_bytes(text.encode(encoding))
-    (record,) = fid.read_records(tmp_path / "a.csv")
+    (record, *_) = fid.read_records(
+        tmp_path / "a.csv", others=["p; left", "day", "Größe"], units={"day": "s"}
+    )
+    assert record.unit("Größe") == "deg"
+    is_windows = encoding == "cp1252"
+    assert record.history[0].options.get("encoding") == ("Windows-1252" if is_windows else None)
+    told = " ".join(table_contents(tmp_path / "a.csv").notes)
+    assert ("a.csv is no UTF-8: read as Windows-1252." in told) is is_windows
+    assert read_columns(tmp_path / "a.csv").raw("Weg").tolist() == ["vor", "zurück", "– €"]
     assert record["p; left"].tolist() == [0.5, 1.5, -2.5]
     assert record.unit("p; left") == "deg/s"
     assert record["day"].tolist() == [0.0, 1.0, 2.0]

@@ -126,11 +126,15 @@ def test_columns_go_to_the_units_of_equations_that_are_named_from_anywhere(
     (tmp_path / "flights").mkdir()
     (tmp_path / "heave.toml").write_text(HEAVE)
     rows = np.column_stack([time_s, force, knots])
-    head = "time [s],F [lbf],w [kt]"
+    head = "time [s],lever [V],w [kt]"
     np.savetxt(tmp_path / "flights/r.csv", rows, "%.6g", ",", header=head, comments="")
     monkeypatch.chdir(tmp_path)
-    asked = {"inputs": ["F"], "outputs": ["w"], "hold": "zero"}
-    made = propose_study(["flights/r.csv"], folder="flights", model="heave.toml", **asked)
+    asked = {"inputs": ["lever"], "outputs": ["w"], "hold": "zero"}
+    asked |= {"folder": "flights", "model": "heave.toml"}
+    of_channel, made = (
+        propose_study(["flights/r.csv"], **asked, units={name: "lbf"}) for name in ("F", "lever")
+    )
+    assert of_channel.lines == made.lines
     assert "w converted from kt to ft/s, its unit in ../heave.toml" in made.said
     fit = run_study(made.write(Path("flights/r-study.toml"))).identified[0].fit
     assert fit is not None

@@ -17,9 +17,10 @@ SCALES = {
     "timestamp": 1, "seconds": 1, "TimeUS": 1e6, "timeus": 1e6, "time_us": 1e6, "Time (µs)": 1e6,
     "msec": 1e3, "t_ms": 1e3, "tMs": 1e3, "TimeMS": 1e3, "Timestamp(ms)": 1e3, "%time": 1,
     "time_boot_ms": 1e3, "elapsed time [s]": 1, "timestamp_ns": 1e9, "timeSinceStart": 1,
-    "millis": 1e3, "time_min": 1 / 60,
+    "millis": 1e3, "time_min": 1 / 60, "Zeit (ms)": 1e3, "Temps [s]": 1, "Tiempo": 1,
+    "Zeit in ms": 1e3, "Tiempo (segundos)": 1,
 }  # fmt: skip
-OTHERS = ("temperature", "time_of_flight", "tau", "dt", "t1", "timer_count", "u")
+OTHERS = ("temperature", "time_of_flight", "tau", "dt", "t1", "timer_count", "u", "t_in")
 
 
 def write(folder: Path, heading: str, *columns: tuple[float, ...], name: str = "a.csv") -> Path:

@@ -43,6 +43,7 @@ def table_contents(path: str | Path) -> Table:
     rows = tuple(_row(table, name) for name in table.lengths)
     moving = tuple(row for row in rows if row[-2] is None or row[-2] != row[-1])
     notes = [table.advice] if table.advice else []
+    notes += [f"{path.name} is no UTF-8: read as {table.encoding}."] if table.encoding else []
     notes += _time(table)
     if table.clock is not None:
         notes += dict.fromkeys(table.clock(name).said for name in table.lengths)

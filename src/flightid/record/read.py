@@ -27,7 +27,13 @@ from flightid.record.options import RECORD_COLUMN
 from flightid.record.record import Record
 from flightid.record.row_grids import ChannelColumn, RowGrid
 from flightid.record.rows import column_unit
-from flightid.record.selection import Names, pairs_of, refuse_columns, selected_records
+from flightid.record.selection import (
+    Names,
+    channel_units,
+    pairs_of,
+    refuse_columns,
+    selected_records,
+)
 from flightid.record.source_rows import SourceRows, moves
 from flightid.record.stamps import mean_spacing_s
 from flightid.record.tables import read_table
@@ -100,8 +106,8 @@ def read_records(
     time_unit : str, optional
         Unit of the stamps, such as "ms".
     units : mapping of str to str, optional
-        Unit by channel name, or by the name of the time column. It goes over what a heading says,
-        and the channel's note says so; converting is `Record.to_units`.
+        Unit by channel, by its column, or by the column of the time. It goes over what a heading
+        says, and the channel's note says so; converting is `Record.to_units`.
     column_names : sequence of str
         Names of the columns in their order, in place of those of the file, which then need not have
         any; ``"time,u,y"`` is three. A unit may stand in brackets, as in a heading.
@@ -333,7 +339,8 @@ def _wanted(
         raise OptionError(
             "a channel is named twice", found=", ".join(sorted(repeated)), needed="one role each"
         )
-    for name in units:
+    by_channel = channel_units(units, [pair[1:] for pair in pairs], table.lengths)
+    for name in by_channel:
         if name not in (*names, *sources, time):
             raise UnknownNameError(
                 "a unit is declared for no channel", found=name, needed="one of " + ", ".join(names)
@@ -343,9 +350,9 @@ def _wanted(
         ChannelColumn(
             Channel(
                 name,
-                column_unit(table, column, name, units, default="1"),
+                column_unit(table, column, name, by_channel, default="1"),
                 role,
-                _note(table, column, name, units),
+                _note(table, column, name, by_channel),
             ),
             column,
         )

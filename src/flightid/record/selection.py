@@ -44,6 +44,23 @@ def pairs_of(names: Names | None, columns: Container[str] = ()) -> list[tuple[st
     return [(channel_name(name, columns), name) for name in names]
 
 
+def channel_units(
+    units: Mapping[str, str], pairs: Iterable[tuple[str, str]], columns: Container[str] = ()
+) -> dict[str, str]:
+    """Units by channel, of units that were declared by channel or by column.
+
+    Example
+    -------
+    >>> channel_units({"u": "1", "time": "ms"}, [("tau_phi", "u"), ("phi", "y")])
+    {'tau_phi': '1', 'time': 'ms'}
+    """
+    known = list(pairs)
+    channels = {channel_name(column, columns): name for name, column in known}
+    own = {name for name, _ in known}
+    by_column = {channels[k]: unit for k, unit in units.items() if k in channels and k not in own}
+    return by_column | {k: unit for k, unit in units.items() if k in own or k not in channels}
+
+
 def refuse_columns(path: Path, names: Sequence[str], derive: Mapping[str, str]) -> None:
     """Refuse options of columns for a file that flightid wrote.
 
@@ -73,7 +90,8 @@ def _selected(
     """A stored record with only the named channels, in the roles they are named under."""
     pairs = [(role, *pair) for role, names in roles.items() for pair in pairs_of(names)]
     named = stored if not pairs else _renamed(stored, pairs)
-    for name, unit in units.items():
+    renamed = [pair[1:] for pair in pairs]
+    for name, unit in channel_units(units, renamed).items():
         if canonical(unit) != named.unit(name):
             raise UnitError(
                 f"the declared unit of {name!r} contradicts the file",

@@ -78,13 +78,15 @@ class SourceRows:
         column_names: Sequence[str],
         derive: Mapping[str, str],
     ) -> dict[str, Cell]:
-        """What the history tells: stamps of their own, files that were joined, names, formulas."""
+        """What the history tells: own stamps, an encoding, files joined, names, formulas."""
         found: dict[str, Cell] = {}
         if self.table.clock is not None:
             stamps = dict.fromkeys(self.table.clock(item.column).said for item in self.wanted)
             found["stamps"] = "; ".join(stamps)
         paths = [Path(file) for file in files if not isinstance(file, Record)]
         found |= {f"joined {path.name}": sha256_of_file(path) for path in paths}
+        if self.table.encoding:
+            found["encoding"] = self.table.encoding
         if column_names:
             found["column_names"] = ",".join(column_names)
         return found | {f"derived {name}": formula for name, formula in derive.items()}

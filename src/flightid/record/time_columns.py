@@ -21,13 +21,20 @@ USUAL = "time"
 """A column of this name is the time, whatever else there is."""
 TOKEN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
 GLUED = re.compile(r"(time|timestamp)(ns|us|usec|ms|msec|s|sec)")
-TIMES = frozenset({"t", "time", "timestamp", "timestamps", "stamp", "elapsed", "uptime"})
+TIMES = frozenset(
+    {"t", "time", "timestamp", "timestamps", "stamp", "elapsed", "uptime", "zeit", "zeitstempel",
+     "temps", "tiempo", "tempo"}
+)  # fmt: skip
+"""Words for time, in English, German, French, Spanish and Italian."""
 BESIDE = frozenset(
     {"abs", "absolute", "boot", "epoch", "log", "rel", "relative", "run", "sample", "sim", "since",
      "start"}
 )  # fmt: skip
 """Words that stand beside those."""
-SPELLED = {"millis": "ms", "micros": "us", "nanos": "ns", "msecs": "ms", "usecs": "us"}
+SPELLED = {
+    "millis": "ms", "micros": "us", "nanos": "ns", "msecs": "ms", "usecs": "us", "sekunden": "s",
+    "secondes": "s", "segundos": "s",
+}  # fmt: skip
 ALONE = frozenset(
     {*SPELLED, "sec", "secs", "second", "seconds", "ms", "msec", "us", "usec", "ns", "nsec"}
 )
@@ -52,6 +59,8 @@ def unit_in_name(name: str) -> str | None:
     words = GLUED.sub(r"\1 \2", parted).split()
     units = [word for word in words if word not in TIMES | BESIDE]
     is_time = bool(TIMES & {*words}) or (len(words) == 1 and words[0] in ALONE)
+    if units[:-1] == ["in"]:
+        del units[0]  # "Time in ms", "Zeit in s"
     if not is_time or len(units) > 1:
         return None
     unit = SPELLED.get(units[0], units[0]) if units else ""

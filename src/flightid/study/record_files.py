@@ -217,7 +217,8 @@ def _reading(file: RecordFile, roles: Mapping[str, Role]) -> dict[str, Any]:
     asked = {each.name: getattr(file, each.name) for each in fields(TableOptions)}
     asked["join"] = joinable(file.join)
     times = (file.time_column,) if file.time_column else ()
-    known = {*map(channel_name, (*roles, *times, *sources_of(file.derive)))}
+    read = (file.columns.get(role, role) for role in roles)
+    known = {*map(channel_name, (*roles, *read, *times, *sources_of(file.derive)))}
     asked["units"] = {
         key: unit
         for key, unit in file.units.items()

@@ -1,10 +1,12 @@
 //! A column as it grows: numbers, times or text.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
 
 use super::cell;
 use super::date;
 use super::fault::Fault;
+use super::windows;
 
 /// What a text takes beside its letters, bytes.
 const TEXT_BYTES: usize = 96;
@@ -101,7 +103,11 @@ impl Growing {
     }
 
     fn text(&mut self, content: &[u8]) -> Result<(), Fault> {
-        let text = std::str::from_utf8(content).map_err(|_| Fault::NotText)?.trim();
+        let text = match std::str::from_utf8(content) {
+            Ok(text) => Cow::Borrowed(text),
+            Err(_) => Cow::Owned(windows::text(content).ok_or(Fault::NotText)?),
+        };
+        let text = text.trim();
         let code = if let Some(&code) = self.known.get(text) {
             code
         } else {

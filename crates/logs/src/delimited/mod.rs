@@ -10,6 +10,7 @@ mod fault;
 mod lines;
 mod passes;
 mod utf16;
+mod windows;
 
 pub use column::Column;
 pub use fault::DelimitedError;

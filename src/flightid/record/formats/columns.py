@@ -66,6 +66,8 @@ class ColumnTable:
     clock : callable or None
         Takes a column name, returns its stamps, where not all columns have the same; None: the
         time column holds them.
+    encoding : str
+        That the text was read by, where it is neither UTF-8 nor UTF-16.
 
     Example
     -------
@@ -80,6 +82,7 @@ class ColumnTable:
     units: Mapping[str, str] = field(default_factory=dict)
     advice: str = ""
     clock: Callable[[str], ColumnStamps] | None = None
+    encoding: str = ""
 
     def named(self, headings: Sequence[str]) -> ColumnTable:
         """The same columns under other headings, in their order.
@@ -101,6 +104,7 @@ class ColumnTable:
             {n: self.units[key] for n, key in old.items() if key in self.units} | units,
             self.advice,
             None if own is None else lambda name: own(old[name]),
+            self.encoding,
         )
 
     def require(self, name: str) -> str:

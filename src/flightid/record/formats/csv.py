@@ -27,6 +27,8 @@ from flightid.record.formats.foreign import NO_DATA
 
 DELIMITERS = (",", ";", "\t")
 LONGEST_LINE = 1 << 20
+WINDOWS = "Windows-1252"
+"""What spreadsheets of western Europe write where they do not write UTF-8; Latin-1 is within it."""
 DATE = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:")
 QUOTED = re.compile(r'"[^"]*"')
 MOST_HEADING_LINES = 1000
@@ -44,7 +46,8 @@ def read_columns(path: Path, headings: Sequence[str] = ()) -> ColumnTable:
     Parameters
     ----------
     path : Path
-        The file, UTF-8, or UTF-16 with its mark.
+        The file, UTF-8, or UTF-16 with its mark; what is neither and holds no zero byte is
+        Windows-1252, and the table says so.
     headings : sequence of str
         Used in place of those of the file, which then need not have any: a first row that holds a
         number is a row of samples.
@@ -92,7 +95,9 @@ def read_columns(path: Path, headings: Sequence[str] = ()) -> ColumnTable:
     by_name = dict(zip(names, columns, strict=True))
     dates = {name: "s" for name, text in zip(names, second, strict=False) if DATE.match(text)}
     units = {**dates, **units}
-    return ColumnTable(path, dict.fromkeys(names, n_rows), by_name.__getitem__, units)
+    lengths = dict.fromkeys(names, n_rows)
+    said = encoding if encoding == WINDOWS else ""
+    return ColumnTable(path, lengths, by_name.__getitem__, units, encoding=said)
 
 
 def _columns(
@@ -117,8 +122,19 @@ def _columns(
 
 def _encoding(path: Path) -> str:
     with path.open("rb") as stream:
-        mark = stream.read(2)
-    return "utf-16" if mark in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE) else "utf-8"
+        if stream.read(2) in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE):
+            return "utf-16"
+        stream.seek(0)
+        decoder = codecs.getincrementaldecoder("utf-8")()
+        is_utf8 = True
+        while block := stream.read(LONGEST_LINE):
+            if b"\0" in block:
+                return "utf-8"
+            try:
+                decoder.decode(block)
+            except UnicodeDecodeError:
+                is_utf8 = False
+    return "utf-8" if is_utf8 else WINDOWS
 
 
 def _first_rows(path: Path, encoding: str) -> tuple[list[str], list[str], str, list[int]]:
@@ -152,7 +168,9 @@ def _first_rows(path: Path, encoding: str) -> tuple[list[str], list[str], str, l
                     lines.append(number)
     except UnicodeError as error:
         raise FileFormatError(
-            f"{path.name} is not text", found=str(error), needed="UTF-8 or UTF-16"
+            f"{path.name} is not text",
+            found=str(error),
+            needed="UTF-8, UTF-16 or Windows-1252",
         ) from error
     if not rows:
         raise FileFormatError(f"{path.name} holds no row", needed="a heading row and numbers")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from flightid.conventions import Role
 from flightid.errors import StudyError, UnknownNameError
@@ -65,6 +65,21 @@ def columns_of_model(model: str, columns: Columns) -> dict[str, str]:
         if len(free) == len(waiting):
             pairs |= dict(zip(waiting, free, strict=True))
     return pairs
+
+
+def units_of_channels(model: str, units: Mapping[str, str]) -> dict[str, str]:
+    """Units that are declared by the names of channels of equations, not of columns.
+
+    Raises
+    ------
+    FlightidError
+        The model cannot be loaded.
+    """
+    if not units:
+        return {}
+    found = load_model(model)
+    channels = {*found.inputs, *found.outputs}
+    return {name: unit for name, unit in units.items() if name in channels}
 
 
 def columns_of(

@@ -13,17 +13,15 @@ import numpy as np
 from flightid.conventions import Light
 from flightid.errors import StudyError
 from flightid.findings import Finding
-from flightid.logs.joinable import joinable
 from flightid.models.save import toml_value
-from flightid.record import read_records
-from flightid.record.formats.columns import channel_name
 from flightid.record.time_question import time_said
 from flightid.simulation.actuators import check_actuators
 from flightid.study.model_settings import placed
-from flightid.study.proposal.columns import Columns, columns_of, columns_of_model
+from flightid.study.proposal.columns import Columns
 from flightid.study.proposal.options import DataOptions, told
 from flightid.study.proposal.order_scans import ProposedScans, record_file
 from flightid.study.proposal.proposal import Proposal
+from flightid.study.proposal.source import read_source
 from flightid.study.proposal.stretches import (
     Group,
     Segments,
@@ -81,19 +79,13 @@ def study_of_records(
     UnknownNameError, OptionError
         An actuator belongs to no input, or its bandwidth has no meaning.
     """
-    reading = reading or DataOptions()
-    # What is named alone is read, so that no other column's gaps part its manoeuvres.
-    named = {"inputs": inputs, "outputs": outputs} if inputs and outputs else {}
-    named |= {"excitations": excitations} if excitations and named else {}
-    read = [part for path in paths for part in _parts(path, {**vars(reading), **named})]
-    inputs, outputs, injected = (
-        tuple(channel_name(name, read[0].record.channels) for name in names)
-        for names in (inputs, outputs, excitations)
-    )
+    equations = None if model is None else placed(folder, model)
+    source = read_source(
+        paths, reading or DataOptions(), equations, inputs, outputs, excitations
+    )  # fmt: skip
+    read, columns, injected, renamed = source.parts, source.columns, source.injected, source.renamed
     records = [part.record for part in read]
-    columns = columns_of(records, inputs, outputs, injected)
-    keys = _keys(reading, folder)
-    renamed = {} if model is None else columns_of_model(placed(folder, model), columns)
+    keys = _keys(source.reading, folder)
     if renamed:
         keys.append(f"columns = {toml_value(renamed)}")
     if injected and model is None:
@@ -119,7 +111,7 @@ def study_of_records(
         missed += still
         tables = {}
         for name, part, span in segments.all:
-            timed = [] if reading.time_column else part.time_key()
+            timed = [] if source.reading.time_column else part.time_key()
             tables[name] = [*part.lines(name, span, folder), *keys, *timed]
             body += tables[name]
         fitted, choice = (
@@ -183,14 +175,6 @@ def _servos(
 def _times(read: Sequence[Stretch]) -> list[str]:
     """What is to be said of the stamps, in the words of where it is said."""
     return [*filter(None, dict.fromkeys(time_said(part.record) for part in read))]
-
-
-def _parts(path: Path, reading: Mapping[str, Any]) -> list[Stretch]:
-    """Manoeuvres of a file."""
-    found = read_records(path, **{**reading, "join": joinable(reading["join"])})
-    if len(found) == 1:
-        return [Stretch(found[0], path)]
-    return [Stretch(record, path, str(record.name)) for record in found]
 
 
 def _keys(reading: DataOptions, folder: Path) -> list[str]:
@@ -270,14 +254,18 @@ def _equations(model: str, asked: GroupScans, renamed: Mapping[str, str]) -> lis
 
 
 def _stamps(read: Sequence[Stretch]) -> Iterator[str]:
-    """Where stamps come from, of records whose channels have clocks of their own."""
-    said = dict.fromkeys(
-        step.options.get("stamps")
+    """Where stamps come from that channels have of their own; by what text of no UTF-8 was read."""
+    told = [
+        step.options
         for part in read
         for step in part.record.history
         if step.operation == "read_records"
+    ]
+    yield from (
+        f"Stamps of {text}" for text in dict.fromkeys(s.get("stamps") for s in told) if text
     )
-    yield from (f"Stamps of {text}" for text in said if text)
+    coded = {s.get("file"): s["encoding"] for s in told if s.get("encoding")}
+    yield from (f"{file} is no UTF-8: read as {encoding}" for file, encoding in coded.items())
 
 
 def _head(paths: Sequence[Path], said: Sequence[str], missed: Sequence[Finding]) -> list[str]:
