@@ -51,7 +51,7 @@ def test_every_command_takes_every_form_of_a_fit(
         ["modes", model],
         ["verify", model, flight],
         ["simulate", "model", model, "--input", "tau_phi=step:0.1", *once],
-        ["export", model, str(tmp_path / "roll.c"), "--sample-time-s", "0.01"],
+        ["export", model, str(tmp_path / "roll.c"), "--sample-time-s", "1/100"],
         ["fly", model, *once],
     ):
         assert run([*words, "--json"]) == 0, words

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from flightid.cli.compared_loops import compared_loops, paired_models, short_names
+from flightid.cli.figures import QuotientRange
 from flightid.cli.hints import PARAMETERS
 from flightid.cli.lists import ListOption, ListsCommand
 from flightid.cli.model_commands import feedback_option
@@ -47,7 +48,7 @@ PART = re.compile(r"(.+)@([\d.]*):([\d.]*)")
 @feedback_option
 @click.option(
     "--loop-rate-hz",
-    type=click.FloatRange(min=0.0, min_open=True),
+    type=QuotientRange(min=0.0, min_open=True),
     help="Rate of the controllers of --gains, where nothing tells it.",
 )
 @level_option

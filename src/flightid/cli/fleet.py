@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from flightid.cli.figures import QuotientRange
 from flightid.cli.output import (
     WRITTEN,
     emit,
@@ -111,7 +112,7 @@ def status(place: str, as_json: bool) -> None:
 @click.argument("sql")
 @click.option(
     "--time-s",
-    type=click.FloatRange(min=0.0, min_open=True, max=1e6),
+    type=QuotientRange(min=0.0, min_open=True, max=1e6),
     default=60.0,
     show_default=True,
     help="Longest time for the answer, s.",

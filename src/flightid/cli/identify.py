@@ -10,6 +10,7 @@ import click
 
 from flightid.cli.black_boxes import KINDS, black_boxes, structure_of
 from flightid.cli.equations import equations, fits_of
+from flightid.cli.figures import FIGURE
 from flightid.cli.lists import ListOption
 from flightid.cli.option_fields import OptionsCommand
 from flightid.cli.output import all_option, emit, json_option, leave_by_verdict, level_option, note
@@ -49,7 +50,7 @@ def _fields() -> dict[str, type[Options]]:
     multiple=True,
     help="Of method joint: records fitted beside the response of FILES, best of another flight.",
 )
-@click.option("--records-span-s", nargs=2, type=float, help="Part of --records, s.")
+@click.option("--records-span-s", nargs=2, type=FIGURE, help="Part of --records, s.")
 @click.option(
     "--reduce", "reduced", is_flag=True, help="Drop the parameters that the data do not determine."
 )

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from flightid.cli.figures import FIGURE, QuotientRange, quotient
 from flightid.cli.lists import ListOption, ListsCommand
 from flightid.cli.pairs import pairs
 from flightid.options import OFF
@@ -71,7 +72,7 @@ def _in_hertz(one: click.Option) -> click.Option:
     name = hertz(str(one.name))
     text = f"{one.opts[-1]} in Hz, in place of rad/s."
     return click.Option(
-        [f"--{name.replace('_', '-')}", name], nargs=one.nargs, type=float, help=text
+        [f"--{name.replace('_', '-')}", name], nargs=one.nargs, type=FIGURE, help=text
     )
 
 
@@ -196,7 +197,7 @@ def _click_option(name: str, uses: list[tuple[str, Option]], *, everywhere: bool
     forms = {form for _, use in uses for form in use.forms}
     choices = list(dict.fromkeys(word for _, use in uses for word in use.choices))
     if BAND in forms:
-        return made(nargs=2, type=float, help=help_text)
+        return made(nargs=2, type=FIGURE, help=help_text)
     if {NAMES, FIGURES, TABLE, WORDS} & forms:
         extra = "several with commas, or repeated"
         if {FIGURES, TABLE, WORDS} & forms:
@@ -209,7 +210,7 @@ def _click_option(name: str, uses: list[tuple[str, Option]], *, everywhere: bool
         return ListOption(
             [*flags_of(name), name],
             multiple=True,
-            type=int if WHOLE in forms else float,
+            type=int if WHOLE in forms else FIGURE,
             help=f"{help_text} (several with commas, or repeated)",
         )
     if FLAG in forms:
@@ -260,14 +261,14 @@ def _numbers(each: Option, forms: set[Form]) -> click.ParamType[Any]:
         return click.STRING
     bounds = (low, high, each.above, each.below)
     if not any(bound is not None for bound in bounds):
-        return click.INT if WHOLE in forms else click.FLOAT if NUMBER in forms else click.STRING
+        return click.INT if WHOLE in forms else FIGURE if NUMBER in forms else click.STRING
     if WHOLE in forms:
         return click.IntRange(
             None if low is None else int(low), None if high is None else int(high)
         )
     if NUMBER not in forms:
         return click.STRING
-    return click.FloatRange(
+    return QuotientRange(
         low if each.above is None else each.above,
         high if each.below is None else each.below,
         min_open=each.above is not None,
@@ -367,7 +368,7 @@ def _several(each: Option, value: tuple[Any, ...]) -> Any:  # noqa: ANN401
 
 
 def _number_or_word(text: str) -> float | str:
-    for read in (int, float):
+    for read in (int, lambda text: float(quotient(text))):
         try:
             return read(text)
         except ValueError:

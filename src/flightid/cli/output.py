@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import click
 
+from flightid.cli.figures import QuotientRange
+
 if TYPE_CHECKING:
     from flightid.findings import Finding
 
@@ -52,7 +54,7 @@ def level_option(function: Function) -> Function:
     """Add ``--level`` to a command that prints intervals; its argument is ``level``."""
     decorate = click.option(
         "--level",
-        type=click.FloatRange(0.0, 1.0, min_open=True, max_open=True),
+        type=QuotientRange(0.0, 1.0, min_open=True, max_open=True),
         help="Probability of the intervals printed, for example 0.9; default: 0.95.",
     )
     return decorate(function)

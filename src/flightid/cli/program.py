@@ -53,6 +53,7 @@ NOT_VERBS = frozenset(
         "black_boxes",
         "compared_loops",
         "equations",
+        "figures",
         "gain_files",
         "hints",
         "lists",

@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from flightid.cli.figures import FIGURE
 from flightid.cli.option_fields import flags_of
 from flightid.cli.output import all_option, json_option
 from flightid.cli.pages import html_option, show
@@ -17,7 +18,7 @@ from flightid.cli.sources import AXES
 @click.command(short_help="Run an autopilot's controller on its log's own signals.")
 @click.argument("log", type=FILES)
 @click.option("--axis", type=AXES, required=True, help="Axis of the controller.")
-@click.option(*flags_of("span_s"), "span_s", nargs=2, type=float, help="Part of the log, s.")
+@click.option(*flags_of("span_s"), "span_s", nargs=2, type=FIGURE, help="Part of the log, s.")
 @html_option
 @all_option
 @json_option
