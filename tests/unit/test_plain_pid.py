@@ -12,11 +12,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.signal
 
 import flightid as fid
 from flightid.cli.program import run
 from flightid.control.autopilots.pid_loop import PidLoop
 from flightid.control.tuning.order_statistics import least_share
+from flightid.control.tuning.standing_error import judge_standing, standing_errors
+from flightid.conventions import Light
 from flightid.errors import DataError, ExportError, OptionError
 from flightid.models.linear.linear_system import LinearSystem
 from tests.closeness import assert_close
@@ -121,6 +124,24 @@ def test_margins_are_those_of_the_continuous_loop() -> None:
     assert design.exists
     assert margin is not None
     assert margin >= 45.0
+
+
+def test_a_step_that_p_alone_does_not_follow_is_told() -> None:
+    design, drawn = _tuned(controller="p"), {f.code: f for f in _tuned(controller="pi").findings}
+    assert "standing-error" not in drawn
+    kp = design.gains["Kp"]
+    _, steps = scipy.signal.step(([10.0 * kp], [1.0, 5.0 + 10.0 * kp]), T=np.linspace(0.0, 9.0, 99))
+    told = next(each for each in design.findings if each.code == "standing-error")
+    assert told.light is Light.AMBER
+    assert f"ends {1.0 - steps[-1]:.0%} short of it" in told.message
+    falling = LinearSystem([[2.0]], [[1.0]], [[-3.0]], [[0.0]], ("u",), ("y",))
+    integrator = LinearSystem([[0.0]], [[1.0]], [[3.0]], [[0.0]], ("u",), ("y",))
+    loop = _loop(direct=True).with_gains(Kp=4.0, Ki=0.0, b=1.0)
+    _, steps = scipy.signal.step(([12.0], [1.0, -2.0 + 12.0]), T=np.linspace(0.0, 9.0, 99))
+    assert_close(standing_errors(loop, [falling], "y", "u"), 1.0 - steps[-1:], atol=1e-9, why="end")
+    loop = replace(loop, direct=False)
+    assert_close(standing_errors(loop, [integrator], "y", "u"), [0.0], atol=1e-12, why="integrates")
+    assert not judge_standing(loop, LAG, [], "y", "u")
 
 
 @pytest.mark.parametrize(

@@ -18,6 +18,7 @@ from flightid.control.tuning.options import DRAWS
 from flightid.control.tuning.pid_design import PidDesign
 from flightid.control.tuning.requirements import TuningRequirements
 from flightid.control.tuning.responses import responses
+from flightid.control.tuning.standing_error import judge_standing, slow_gain
 from flightid.control.tuning.structure_error import Band
 from flightid.control.tuning.tune_pid import SHOWN, design_of, make_setting, noise_density
 from flightid.conventions import Light
@@ -41,7 +42,6 @@ LOOKED_AT_RAD_S = (1e-4, 1e4)
 POINTS = 4000
 WIDEST_P, HIGHEST_I, HIGHEST_D = (1e-3, 10.0), 50.0, 0.5
 WEIGHTS_TRIED = np.linspace(1.0, 0.0, 21)
-AT_ZERO, ON_AXIS = 1e-6, 1e-9
 MOST_AGAINST = 0.05
 """Share of the plants drawn that may answer a steady input the other way."""
 
@@ -148,6 +148,9 @@ def tune_controller(
             if steps_over <= asked.overshoot:
                 break
     design = design_of(setting, replace(result, loop=made), [start], 0, [start], [], seed)
+    if design.exists:
+        held = judge_standing(made, evidence.estimate, evidence.fresh, *channels)
+        design = replace(design, findings=(*design.findings, *held))
     if steps_over <= asked.overshoot:
         return design
     said = f"a step of the set-point overshoots by up to {steps_over:.0%}, P without set-point"
@@ -230,17 +233,8 @@ def _of_one_sign(evidence: TuningEvidence, output: str, input: str) -> tuple[boo
 
 
 def _sign(system: LinearSystem, output: str, input: str) -> float:
-    chosen = system.select(outputs=[output], inputs=[input])
-    poles = np.linalg.eigvals(np.asarray(chosen.a))
-    step = chosen.sample_time_s
-    if step is not None:
-        poles = np.log(np.where(np.abs(poles) > 0.0, poles, 1e-300).astype(complex)) / step
-    scale = max(float(np.abs(poles[np.abs(poles) < np.inf]).max(initial=0.0)), 1e-3)
-    integrators = np.abs(poles) < AT_ZERO * scale
-    real = (np.abs(poles.imag) < ON_AXIS * scale) & ~integrators
-    low = np.array([AT_ZERO * scale])
-    held = chosen.frequency_response(low)[0, 0, 0] * (1j * low[0]) ** int(integrators.sum())
-    return float(np.sign(held.real) * (-1.0) ** int((real & (poles.real > 0.0)).sum()))
+    gain, _, unstable = slow_gain(system, output, input)
+    return float(np.sign(gain) * (-1.0) ** unstable)
 
 
 def _turn(
