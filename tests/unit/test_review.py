@@ -25,10 +25,11 @@ from flightid.plot.glance import flight_glance
 from flightid.review.apart import gains_between
 from flightid.review.deconvolution import LoopSamples, closed_loop
 from flightid.review.gyro_noise import GyroNoise
-from flightid.review.loops import _pair, tracking_error
+from flightid.review.loops import _pair, refused, tracking_error
 from flightid.review.motors import motor_use, turning, yaw_trim
 from flightid.review.verdicts import judge_flight
 from flightid.uncertainty.estimate import Estimate
+from flightid.uncertainty.uneven import DrawnEnds
 from tests.closeness import assert_close
 from tests.ordinary_log import write_ordinary_log
 from tests.strangers.ordinary_flights import Axis, step
@@ -87,6 +88,19 @@ def test_a_quiet_flight_says_what_to_fly(tmp_path: Path) -> None:
     loop = fid.review_flight(tmp_path / "quiet.bin")["roll attitude"]
     assert "not enough motion" in loop.reason
     assert "roll stick" in loop.action
+    # A yaw that nobody moved: 0.22 deg/s, a level near nothing, half way there at once or late.
+    ends = [(0.11, 0.05, 0.17), (0.397, 0.006, 0.46), (0.083, 0.002, 0.47), (21.6, 0.0, 215.0)]
+    read = tuple(
+        Estimate("r", value, "s", ends=DrawnEnds(np.linspace(low, high, 801)))
+        for value, low, high in ends
+    )
+    yaw = replace(loop, axis="yaw", loop="rate", rate_hz=100.0, moved=0.004)
+    still = refused(yaw, read, 0.01, "")
+    assert still is not None
+    assert "the set-point hardly moved: the step ends at 0.11" in still.reason
+    assert "raise" not in still.action
+    sure = tuple(Estimate("r", value, "s", 0.05 * value) for value, _, _ in ends)
+    assert refused(yaw, sure, 0.01, "") is None
 
 
 def test_a_slow_log_says_what_to_log(tmp_path: Path) -> None:

@@ -30,7 +30,9 @@ from flightid.review.thresholds import (
     FASTEST_RATE,
     LIVELY_ATTITUDE,
     LIVELY_RATE,
+    OVERSHOOT,
     SAMPLES_IN_RISE,
+    WIDEST_DELAY,
     WIDEST_LEVEL,
     WIDEST_TRACKING,
 )
@@ -47,6 +49,8 @@ WINDOW_S = {"rate": 0.5, "attitude": 1.5}
 SLOWEST_HZ = {"rate": 2.0, "attitude": 0.5}
 PACE = {"rate": 1.0, "attitude": 2.5}
 STRETCHES = 10
+HARDLY = 0.1
+"""Of what counts as quick sticks: a set-point that moves less was not meant to move."""
 TRACKING = "tracking error, rms"
 FINER = 4.0
 """Times the usual samples, of a log that has them, where a step rises within too few."""
@@ -228,9 +232,9 @@ def _step(begun: LoopResponse, samples: LoopSamples, tick_s: float, advised: str
         reason = ", ".join(str(clause) for clause in clauses if clause)
         return replace(begun, reason=reason, action=what_to_fly(begun))
     steps, time_s = _longest(draws, WINDOW_S[begun.loop], tick_s)
-    refused = _refusal(begun, window_features(steps, time_s), samples.sample_time_s, advised)
-    if refused is not None:
-        return refused
+    unfit = refused(begun, window_features(steps, time_s), samples.sample_time_s, advised)
+    if unfit is not None:
+        return unfit
     by_frequency = frequency_features(draws, SLOWEST_HZ[begun.loop])
     readings = told_by(
         (*step_features(steps, time_s), *by_frequency), told_hz(samples, pace_s=pace)
@@ -265,13 +269,14 @@ def _steps(draws: LoopDraws, window_s: float, tick_s: float) -> tuple[Array, Arr
     return draws.step(count), np.asarray(middles - 0.5 * tick_s)
 
 
-def _refusal(
+def refused(
     begun: LoopResponse, readings: tuple[Reading, ...], sample_time_s: float, advised: str
 ) -> LoopResponse | None:
+    """The loop without a step, where readings of it tell too little; None where they tell one."""
     level, rise = readings[0], readings[2]
     half = level.half_width95
     steep = rise.value is not None and rise.value < SAMPLES_IN_RISE.value * sample_time_s
-    told = _is_told(level) and rise.value is not None
+    told = _is_told(level) and rise.value is not None and not _is_late_or_early(readings)
     if steep or (not told and begun.loop == "rate" and begun.rate_hz < RATE_LEAST.value):
         return replace(
             begun,
@@ -282,10 +287,22 @@ def _refusal(
     if told:
         return None
     why = "" if half is None else f": the step ends at {level.text}"
+    if half is not None and _is_late_or_early(readings):
+        why += f", half way there after {readings[1].text}"
     if (begun.moved or 0.0) > LIVELY[begun.loop].value:
         reason = f"gusts, limits or the other axes move it more than the set-point does{why}"
         return replace(begun, reason=reason, action="see motors at limits; fly in calm air")
-    return replace(begun, reason=f"not enough motion{why}", action=what_to_fly(begun))
+    is_still = begun.moved is not None and begun.moved < HARDLY * LIVELY[begun.loop].value
+    reason = f"not enough motion{', the set-point hardly moved' if is_still else ''}{why}"
+    return replace(begun, reason=reason, action=what_to_fly(begun))
+
+
+def _is_late_or_early(readings: tuple[Reading, ...]) -> bool:
+    """Whether half of the step may come at once or late, and its overshoot be none or large."""
+    delay, over = (readings[at].interval95 for at in (1, 3))
+    if delay is None or over is None or over[1] - over[0] <= OVERSHOOT.value:
+        return False
+    return delay[1] > WIDEST_DELAY.value * max(delay[0], 0.0)
 
 
 def _is_told(level: Reading) -> bool:

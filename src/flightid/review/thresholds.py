@@ -29,6 +29,9 @@ RISE_BAND = Threshold(
 WIDEST_LEVEL = Threshold(
     0.5, "1", "half of the step either way: such a step tells nothing about gains"
 )
+WIDEST_DELAY = Threshold(
+    9, "1", "latest over earliest: a delay that may be a third or three times its value (ours)"
+)
 WIDEST_TRACKING = Threshold(
     3, "1", "a tracking error that may be a third or three times its value tells no loop (ours)"
 )
