@@ -38,7 +38,7 @@ def test_every_control_is_reached_by_keyboard(desk: Desk, tmp_path: Path) -> Non
     said += _of(page, "Response", page.locator(".handle").first)
     said += _of(page, "Fleet", page.get_by_role("link", name="fleet.toml"))
     page.get_by_role("link", name="fleet.toml").press("Enter")
-    page.get_by_role("img", name="v02: roll control power").wait_for()
+    page.get_by_role("application", name="v02: roll control power").wait_for()
     said += looked_at(page)
     found = _of(page, "Fly", page.get_by_text("ready", exact=True))
     said += [each for each in found if not each.startswith(STICKS)]
