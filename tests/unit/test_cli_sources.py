@@ -132,6 +132,8 @@ def test_kinds_that_do_not_fit(
 ) -> None:
     assert run(["identify", str(saved / "flight.parquet"), *words]) == 2
     assert said in " ".join(capsys.readouterr().err.split())
+    assert run(["lower-order", str(saved / "roll.toml")]) == 2
+    assert "needs --kind: Equivalent system. Choose of short_period," in capsys.readouterr().err
 
 
 def test_units_of_a_table(saved: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -56,6 +57,10 @@ def test_instrument_removes_the_bias_of_feedback() -> None:
     assert bias.max() > 0.3, "the direct estimate must show the bias that the instrument removes"
     assert "loop-closed" in {finding.code for finding in direct.findings}
     assert "loop-closed" not in {finding.code for finding in ours.findings}
+    bright, faint = (replace(ours, coherence=0 * ours.coherence + each) for each in (0.9, 0.5))
+    assert ["no band is usable" in " ".join(r.summary().notes) for r in (bright, faint)] == [
+        False, True,
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.01, 0.3])

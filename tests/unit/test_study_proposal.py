@@ -314,7 +314,8 @@ def test_an_injected_channel_is_the_instrument_of_a_closed_loop(tmp_path: Path) 
     plain = propose_study([tmp_path / "closed.csv"], **asked)
     assert 'method = "output_error"' in plain.text
     with pytest.raises(
-        StudyError, match=r"closed loop.*model='rate_first_order'.*flightid response"
+        StudyError,
+        match=r"closed loop.*model='rate_first_order'.*flightid response.*--estimator instrument",
     ):
         propose_study([tmp_path / "closed.csv"], folder=tmp_path, excitations=["chirp"])
     made = propose_study([tmp_path / "closed.csv"], excitations=["chirp"], **asked)

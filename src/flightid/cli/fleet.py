@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import click
@@ -71,7 +72,8 @@ def run(
             click.echo(f"{len(done.copies)} with the bytes of another")
         for line in reason_lines(done.reasons):
             click.echo(line)
-        note(f"Wrote {done.catalogue}")
+        place = done.catalogue
+        note(f"Wrote {place if '://' in place else os.path.normpath(place)}")
     for finding in done.findings:
         note(str(finding))
     leave_by_verdict(done.findings)

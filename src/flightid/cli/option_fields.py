@@ -335,7 +335,8 @@ def parted(
     for user, one in zip(fields_of, known, strict=True):
         for name, each in one.items():
             if each.default is MISSING and name not in given:
-                raise click.UsageError(f"{user} needs {flags_of(name)[-1]}: {each.doc}")
+                choices = f" Choose of {', '.join(each.choices)}." if each.choices else ""
+                raise click.UsageError(f"{user} needs {flags_of(name)[-1]}: {each.doc}{choices}")
     return [
         {name: _read(one[name], value) for name, value in given.items() if name in one}
         for one in known

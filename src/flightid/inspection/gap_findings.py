@@ -53,7 +53,7 @@ def _remedy(log: Log, gaps: list[Span]) -> str:
         setting = "blackbox_sample_rate" if log.kind == BETAFLIGHT else "blackbox_rate_denom"
         return f"log at a lower rate ({setting}), or to a faster card"
     if lost or any(finding.code == "messages-dropped" for finding in log.findings):
-        return "use a faster card, or log less"
+        return "the logger itself counted lost samples: use a faster card, or log less"
     if log.kind == "px4" or "DSF" in log:
         return (
             f"{logging(log)}: the logger counts no lost samples there, so that no card is to blame"

@@ -113,3 +113,19 @@ def end_findings(response: ExcitedResponse) -> list[Finding]:
                 )
             )
     return found
+
+
+def no_band(response: ExcitedResponse) -> list[Finding]:
+    """Amber where no pair of a response is coherent in any band; nothing else."""
+    pairs = [(y, u) for y in response.outputs for u in response.inputs]
+    if any(excited_band(response, *pair) for pair in pairs):
+        return []
+    return [
+        Finding(
+            "no-usable-band",
+            Light.AMBER,
+            f"no band is usable: no neighbouring frequencies with a coherence of {COHERENT:g} or "
+            f"more (the largest is {np.max(response.coherence):.2g})",
+            "excite more strongly or for longer, inside the band that is asked for",
+        )
+    ]

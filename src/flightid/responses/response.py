@@ -18,7 +18,7 @@ from flightid.record.hold import InputShape
 from flightid.responses.bands import choose_frequencies, nearest
 from flightid.responses.errors.linear_estimate import LinearEstimate
 from flightid.responses.errors.random_error import CovarianceSource, ErrorSelection
-from flightid.responses.excited_band import excited_band
+from flightid.responses.excited_band import excited_band, no_band
 from flightid.responses.pair import PairResponse, quotient_unit
 from flightid.result import Result
 from flightid.table import Column, Table
@@ -348,7 +348,8 @@ class FrequencyResponse(
                         100.0 * float(np.median(pair.random_error)),
                     )
                 )
-        return Table(repr(self), columns, tuple(rows), tuple(map(str, self.findings)))
+        notes = tuple(map(str, (*self.findings, *no_band(self))))
+        return Table(repr(self), columns, tuple(rows), notes)
 
     def _computed(self) -> dict[str, object]:
         return {"history": [str(step) for step in self.history]}

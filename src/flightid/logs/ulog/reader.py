@@ -186,7 +186,7 @@ class UlogSource:
                     Light.AMBER,
                     f"the logger lost samples {counted(len(lost_s), 'time')}, {sum(lost_s):.3g} s "
                     f"in all, the longest {max(lost_s):.3g} s",
-                    "use a faster card, or log fewer topics",
+                    "the card did not keep up with the log: use a faster card, or log fewer topics",
                 )
             )
         return found

@@ -148,7 +148,8 @@ def _needs_equations(
         f"{', '.join(columns.inputs)} moves free runs, which would choose a biased one",
         found=f"{', '.join(injected)} injected, and no equations to fit by way of it",
         needed="model='rate_first_order', another of the library, or a file of equations",
-        action=f"name it; what the loop tells without one: flightid response {files} {named}",
+        action=f"name it; what the loop tells without one: flightid response {files} {named} "
+        "--estimator instrument",
     )
 
 
