@@ -78,6 +78,6 @@ def judge_standing(
     if abs(worst) <= MOST:
         return [Finding("standing-error", Light.GREEN, said)]
     said += ": the controller has no integrator, and the plant none that makes up for it"
-    action = "take a form with I (controller='pi' or 'pid'), or give the plant the input that "
+    action = "take a form with I (controller='pi'), or give the plant the input that "
     action += "holds the set-point beside the controller's"
     return [Finding("standing-error", Light.AMBER, said, action)]
