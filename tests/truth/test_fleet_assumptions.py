@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from flightid.fleet.drift_lights import errors_lights
 from flightid.fleet.statistics.change_kind import DRIFT
 from flightid.fleet.statistics.drift import FleetDrift, find_drift
 from flightid.fleet.statistics.events import FleetEvent
@@ -90,6 +91,15 @@ def test_days_that_differ_and_errors_of_each_estimate_are_no_change() -> None:
     (errors,) = _drift(5, 10, 24, a_day=2, days=0.04).errors.values()
     assert errors.typical < 1.2
     assert 0.7 < errors.days < 1.8
+    far = _drift(5, 8, 24, a_day=2, days=0.08)
+    assert "days differ by" in errors_lights(far, {})[0].message
+    rng = np.random.default_rng(5)
+    ids, day = np.repeat([*"abcdefgh"], 24).tolist(), np.tile(np.arange(24) // 2, 8)
+    values = 10.0 + np.repeat(0.8 * rng.normal(size=96), 2) + 0.3 * rng.normal(size=192)
+    times = DAY_S * (3.0 * day + 0.1 * (np.arange(192) % 2))
+    errors = np.full((192, 1, 1), 0.09)
+    sound = FlightEstimates.of(["Lp"], ids, values[:, None], errors, time_s=times)
+    assert sum(without_odd_flights(sound)[1].values()) <= 2, "by the pairs of days alone 14"
 
 
 def test_a_change_of_all_is_said_and_is_no_vehicles_own() -> None:
@@ -102,6 +112,11 @@ def test_a_change_of_all_is_said_and_is_no_vehicles_own() -> None:
     assert "all vehicles changed together by -8" in one.words({})
     assert "from 1970-03-14" in found.summary().notes[1]
     assert not _drift(7, 30, 40, change=-0.1, changed=12, last=16).shared
+    # Of fewer than five that all move alike nobody knows whose it is; a witness tells.
+    (few,) = _drift(7, 3, 20, season=0.06).alike
+    assert few.vehicles == ("000", "001", "002")
+    assert "all 3 vehicles moved alike" in few.words({})
+    assert not _drift(7, 4, 20, change=-0.12, changed=2, last=8).alike
 
 
 def test_few_flights_tell_that_their_errors_are_understated() -> None:

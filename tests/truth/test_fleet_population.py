@@ -230,6 +230,11 @@ def test_vehicles_that_agree_by_chance_do_not_bind_the_next() -> None:
     assert found.chance_alike == pytest.approx(0.3485, abs=1e-4)
     assert found.next_ends() == pytest.approx((-2.061, 6.061), abs=2e-3)
     assert VehicleEstimates(np.full(5, 2.0), np.ones(5)).next_ends() is None
+    # Estimates that agree by chance: the next one had 0.09 of the interval of the mean.
+    agreeing = VehicleEstimates(np.array([98.0, 97.99, 98.01]), np.ones(3))
+    (low, high), mean = agreeing.next_ends() or (0.0, 0.0), agreeing.mean_ends()
+    assert low <= mean[0]
+    assert high >= mean[1]
 
 
 def _vehicles(kind: str, k: int, rng: np.random.Generator) -> np.ndarray:

@@ -31,7 +31,7 @@ from flightid.fleet.statistics.population import estimate_population
 from flightid.report.content import Figure, TableBlock
 from flightid.report.html import to_html
 from flightid.report.text import to_text
-from tests.fleet_rows import Rows, fleet_rows
+from tests.fleet_rows import START, Rows, fleet_rows
 
 MOTOR = FleetEvent(
     "motor replaced",
@@ -63,6 +63,21 @@ def test_each_vehicle_has_the_light_that_its_truth_asks_for(answers: FleetAnswer
     assert " at the event “motor replaced”; beyond that no change, like" in lights["v02"].message
     sound = [each for name, each in lights.items() if name not in ("v00", "v01")]
     assert all(each.light is Light.GREEN for each in sound), sound
+
+
+def test_few_vehicles_that_all_moved_alike_are_amber() -> None:
+    """Season in a fleet of three made 120 of 120 vehicles red."""
+    rows = fleet_rows(3, 3)
+    late = str(START + datetime.timedelta(days=21))[:10]
+    for row in rows["parameters"]:
+        if row["vehicle"] != "v00" and row["name"] == "Ltphi" and row["flown_at"][:10] >= late:
+            row["value"] *= 0.8
+    document = fleet_document(answer_questions(rows, covariates=["battery"]))
+    lights = [each.light for each in document.findings if each.code == "vehicle"]
+    assert lights == [Light.AMBER] * 3
+    (told,) = [each for each in document.findings if each.code == "moved-alike"]
+    assert "all 3 vehicles moved alike: of the type (season, firmware) or of each" in told.message
+    assert "where flights are independent beside" in " ".join(to_text(document).split())
 
 
 def test_vehicles_too_few_to_be_judged_are_grey_and_not_green() -> None:

@@ -28,8 +28,12 @@ def shared_lights(drift: FleetDrift, labels: Mapping[str, str]) -> tuple[Finding
         "look for what all share: air, season, firmware; vehicles are held beside the others of "
         "their days"
     )
-    return tuple(
-        Finding("shared-change", Light.AMBER, each.words(labels), act) for each in drift.shared
+    few = (
+        "look for what all share: air, season, firmware; five vehicles or more tell it from theirs"
+    )
+    return (
+        *(Finding("shared-change", Light.AMBER, each.words(labels), act) for each in drift.shared),
+        *(Finding("moved-alike", Light.AMBER, each.words(labels), few) for each in drift.alike),
     )
 
 
@@ -53,6 +57,7 @@ def _errors_light(scatter: RepeatScatter, errors: ErrorScale, name: str) -> Find
         f"{name}: flights of one day scatter {scatter.understated:.2f} times their errors "
         f"({ends[0]:.2f} to {ends[1]:.2f}; χ² {scatter.chi2:.0f} of {scatter.freedom})"
     )
+    words += errors.days_words()
     if scatter.errors_hold and errors.typical < NOTABLE:
         return Finding("repeats", Light.GREEN, words)
     act = f"errors count {errors.typical:.2f} times as stated before anything is called a change"

@@ -160,10 +160,13 @@ def vehicle_light(vehicle: str, types: Sequence[TypeAnswers]) -> Finding:
         for history, effect in each.drift.by_event if each.drift is not None else ():
             if history.vehicle == vehicle:
                 done.append(event_words(history, effect, each.labels))
+        alike = each.drift.alike if each.drift is not None else ()
         for history in each.drift.alarms if each.drift is not None else ():
             if history.vehicle == vehicle:
                 said.append(change_words(history, each.labels))
-                light = Light.RED
+                shared = any(e.name == history.name and vehicle in e.vehicles for e in alike)
+                said[-1] += ", as the others did" if shared else ""
+                light = Light.AMBER if shared and light is not Light.RED else Light.RED
         for newest in each.drift.newest_off if each.drift is not None else ():
             if newest.vehicle == vehicle:
                 said.append(newest.words(each.labels))
@@ -237,7 +240,7 @@ def _type_blocks(each: TypeAnswers) -> Iterator[Block]:
 def _drift_blocks(drift: FleetDrift, labels: Mapping[str, str]) -> Iterator[Block]:
     errors = (*errors_lights(drift, labels), *scale_lights(drift, labels))
     yield Lights(errors, "Errors of the estimates")
-    if drift.shared:
+    if drift.shared or drift.alike:
         yield Lights(shared_lights(drift, labels), "What all vehicles did together")
     slopes = _slopes(drift, labels)
     if slopes.rows:

@@ -9,7 +9,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.fleet.statistics.change_kind import DRIFT, STEP, change_kind
 from flightid.fleet.statistics.covariates import (
     Covariate,
     CovariateDesign,
@@ -31,16 +30,16 @@ from flightid.fleet.statistics.events import (
 )
 from flightid.fleet.statistics.flight_errors import NOTABLE, ErrorScale, error_scale
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
+from flightid.fleet.statistics.judged_histories import Asked, judged_histories
 from flightid.fleet.statistics.largest_step import (
     FEWEST,
     NEWEST,
     SHORTEST,
-    scan_changes,
-    scan_drifts,
     scan_steps,
     step_places,
 )
 from flightid.fleet.statistics.local_level import follow_level
+from flightid.fleet.statistics.moved_alike import MovedAlike, moved_alike
 from flightid.fleet.statistics.multiple_testing import FALSE_SHARE, chance_cell, corrected
 from flightid.fleet.statistics.neighbours import variances_with_odd_ones
 from flightid.fleet.statistics.newest_flight import NewestFlight, judged_newest, newest_flights
@@ -62,13 +61,6 @@ from flightid.uncertainty.quantiles import interval_words, shown
 
 Array = NDArray[np.float64]
 TOO_FEW = f"fewer than {FEWEST} flights"
-
-
-Asked = tuple[ParameterHistory, Array, Array, Array]
-"""A history, and values with their covariance as they are tested, and the steps of its events.
-
-Slopes are those of others, and what events explain is out.
-"""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -122,6 +114,11 @@ class FleetDrift(Result, schema="flightid.fleet_drift/1"):
         """Histories that changed, the surest first."""
         found = [each for each in self.histories if each.is_alarm]
         return tuple(sorted(found, key=lambda each: each.chance or 0.0))
+
+    @cached_property
+    def alike(self) -> tuple[MovedAlike, ...]:
+        """Parameters of too few vehicles that moved alike, of all or of each."""
+        return moved_alike(self.histories)
 
     @cached_property
     def by_event(self) -> tuple[tuple[ParameterHistory, EventEffect], ...]:
@@ -193,7 +190,8 @@ class FleetDrift(Result, schema="flightid.fleet_drift/1"):
         asked = len(self.judged)
         note = (
             f"{asked} {'history' if asked == 1 else 'histories'} asked, at most "
-            f"{100 * FALSE_SHARE:.0f} % of the alarms false (Benjamini and Hochberg)."
+            f"{100 * FALSE_SHARE:.0f} % of the alarms false (Benjamini and Hochberg), where "
+            "flights are independent beside the days they share."
         )
         odd = ", ".join(
             f"{n} of {named.get(name, name)}" for name, n in self.odd_flights.items() if n
@@ -202,11 +200,12 @@ class FleetDrift(Result, schema="flightid.fleet_drift/1"):
             note,
             *((f"Flights far off those beside them count for less: {odd}.",) if odd else ()),
             *(f"{each.words(named)}; no change of one." for each in self.shared),
+            *(f"{each.words(named)}." for each in self.alike),
             *(f"{each.vehicle}: {each.words(named)}." for each in self.newest_off),
             *(
                 f"{named.get(name, name)}: {each.words()}."
                 for name, each in self.errors.items()
-                if each.typical >= NOTABLE
+                if each.typical >= NOTABLE or each.days_words()
             ),
             *(f"{each.words(named)}." for each in self.scales if each.is_sure),
         )
@@ -286,7 +285,7 @@ def find_drift(
             if found is not None:
                 histories.append(found)
     return FleetDrift(
-        *(_judged(histories), repeats, slopes, design.missing, odd, errors),
+        *(judged_histories(histories), repeats, slopes, design.missing, odd, errors),
         *(tuple(each for each in shared if each is not None), judged_newest(newest)),
         judged_scales(scales),
     )
@@ -356,37 +355,3 @@ def _tested(
         change_percent=change,
         changed_s=(float(history.time_s[first]), float(history.time_s[last + 1])),
     )
-
-
-def _judged(asked: Sequence[Asked]) -> tuple[ParameterHistory, ...]:
-    """Every history with its share of false alarms among all."""
-    chances = [each.chance for each, *_ in asked]
-    shares = iter(corrected([chance for chance in chances if chance is not None]))
-    judged = (
-        each if chance is None else replace(each, false_share=float(next(shares)))
-        for (each, *_), chance in zip(asked, chances, strict=True)
-    )
-    return tuple(
-        _named(each, *tested) if each.is_alarm else each
-        for each, (_, *tested) in zip(judged, asked, strict=True)
-    )
-
-
-def _named(
-    history: ParameterHistory, values: Array, covariance: Array, known: Array
-) -> ParameterHistory:
-    """An alarm as a step or drift, as far as its flights tell, with the size of that."""
-    kind = change_kind(values, covariance, history.time_s)
-    named = replace(history, kind=kind)
-    change = history.change_percent
-    if kind == STEP or change.value is None or history.time_s[0] >= history.time_s[-SHORTEST]:
-        return named
-    drift = scan_drifts(values, covariance, history.time_s)
-    scan = drift if kind == DRIFT else scan_changes(values, covariance, history.time_s, known)
-    percent = 100.0 * scan.size / abs(scan.level)
-    size = Estimate(history.name, percent, "%", ends=StepEnds(scan))
-    if kind != DRIFT:
-        return replace(named, change_percent=size)
-    began = drift.place_ends()[0]
-    spanned = (float(history.time_s[began]), float(history.time_s[-1]))
-    return replace(named, change_percent=size, changed_s=spanned)

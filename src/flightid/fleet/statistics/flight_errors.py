@@ -60,9 +60,13 @@ class ErrorScale:
 
     def words(self) -> str:
         """What was done, in words."""
-        if self.days >= DAYS_NOTABLE:
-            return f"{self._own_words()}; days differ by {self.days:.2f} errors of a flight"
-        return self._own_words()
+        return self._own_words() + self.days_words()
+
+    def days_words(self) -> str:
+        """What days differ by, as the end of a sentence; empty where that is little."""
+        if self.days < DAYS_NOTABLE:
+            return ""
+        return f"; days differ by {self.days:.2f} errors of a flight"
 
     def _own_words(self) -> str:
         if not self.source:

@@ -208,7 +208,8 @@ class VehicleEstimates:
         """Interval that holds the next vehicle; None with fewer than three, or of equal values.
 
         The next vehicle is normal about the mean; mean and spread are as uncertain as their
-        confidence distributions say. No random numbers.
+        confidence distributions say. No random numbers. Never inside the interval of the mean,
+        which is no shorter than errors alone make it.
         """
         if len(self.values) < FEWEST:
             return None
@@ -225,7 +226,9 @@ class VehicleEstimates:
                 below = float(np.sum(weights * inside))
                 low, high = (middle, high) if below < share else (low, middle)
             found.append(float(0.5 * (low + high)))
-        return found[0], found[1]
+        # The next one lies about the mean, which is known no better than its interval says.
+        low, high = self.mean_ends(level)
+        return min(found[0], low), max(found[1], high)
 
     def next_chance(self, value: float, variance: float) -> float:
         """Chance that the next vehicle, estimated with a variance, lies as far to either side."""

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from flightid.fleet.statistics.days import shared_by_day
 from flightid.fleet.statistics.flight_errors import error_scale
 from flightid.fleet.statistics.flight_estimates import Flags, FlightEstimates
 from flightid.fleet.statistics.neighbours import variances_with_odd_ones
@@ -33,13 +34,15 @@ def without_odd_flights(data: FlightEstimates) -> tuple[FlightEstimates, dict[st
 
     Notes
     -----
-    Odd is what `variances_with_odd_ones` calls so, beside the errors of `error_scale`, of a quarter
-    of a vehicle's flights at most: with fewer than four flights a wild estimate stands.
+    Odd is what `variances_with_odd_ones` calls so, beside the errors of `error_scale` and what days
+    differ by, of a quarter of a vehicle's flights at most: with fewer than four flights a wild
+    estimate stands.
     """
     known, odd = data.known.copy(), {}
     for i, name in enumerate(data.names):
         stated = np.where(data.known[:, i], data.covariances[:, i, i], 1.0)
         usual = error_scale(data, i, None).variances(stated)
+        usual = usual + shared_by_day(data, i, usual)
         _, off = variances_with_odd_ones(data, i, usual)
         off &= _few_of_vehicle(data, i, off)
         if off.any():

@@ -1,0 +1,56 @@
+"""Histories judged together: what is an alarm among all of them, and of which kind and size."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.fleet.statistics.change_kind import DRIFT, STEP, change_kind
+from flightid.fleet.statistics.largest_step import SHORTEST, scan_changes, scan_drifts
+from flightid.fleet.statistics.multiple_testing import corrected
+from flightid.fleet.statistics.parameter_history import ParameterHistory, StepEnds
+from flightid.uncertainty.estimate import Estimate
+
+Array = NDArray[np.float64]
+Asked = tuple[ParameterHistory, Array, Array, Array]
+"""A history, and values with their covariance as they are tested, and the steps of its events.
+
+Slopes are those of others, and what events explain is out.
+"""
+
+
+def judged_histories(asked: Sequence[Asked]) -> tuple[ParameterHistory, ...]:
+    """Every history with its share of false alarms among all."""
+    chances = [each.chance for each, *_ in asked]
+    shares = iter(corrected([chance for chance in chances if chance is not None]))
+    judged = (
+        each if chance is None else replace(each, false_share=float(next(shares)))
+        for (each, *_), chance in zip(asked, chances, strict=True)
+    )
+    return tuple(
+        _named(each, *tested) if each.is_alarm else each
+        for each, (_, *tested) in zip(judged, asked, strict=True)
+    )
+
+
+def _named(
+    history: ParameterHistory, values: Array, covariance: Array, known: Array
+) -> ParameterHistory:
+    """An alarm as a step or drift, as far as its flights tell, with the size of that."""
+    kind = change_kind(values, covariance, history.time_s)
+    named = replace(history, kind=kind)
+    change = history.change_percent
+    if kind == STEP or change.value is None or history.time_s[0] >= history.time_s[-SHORTEST]:
+        return named
+    drift = scan_drifts(values, covariance, history.time_s)
+    scan = drift if kind == DRIFT else scan_changes(values, covariance, history.time_s, known)
+    percent = 100.0 * scan.size / abs(scan.level)
+    size = Estimate(history.name, percent, "%", ends=StepEnds(scan))
+    if kind != DRIFT:
+        return replace(named, change_percent=size)
+    began = drift.place_ends()[0]
+    spanned = (float(history.time_s[began]), float(history.time_s[-1]))
+    return replace(named, change_percent=size, changed_s=spanned)
