@@ -12,6 +12,7 @@ from flightid.fleet.statistics.events import FleetEvent
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
 from flightid.fleet.statistics.odd_flights import without_odd_flights
 from flightid.fleet.statistics.population import estimate_population
+from flightid.fleet.statistics.repeats import days_of
 
 DAY_S = 86400.0
 
@@ -93,6 +94,8 @@ def test_days_that_differ_and_errors_of_each_estimate_are_no_change() -> None:
     assert 0.7 < errors.days < 1.8
     far = _drift(5, 8, 24, a_day=2, days=0.08)
     assert "days differ by" in errors_lights(far, {})[0].message
+    # Morning and evening of a day of the Pacific are two days of UTC.
+    assert days_of(3600.0 * np.array([18.0, 25.5, 42.0, 49.5])).tolist() == [0, 0, 1, 1]
     rng = np.random.default_rng(5)
     ids, day = np.repeat([*"abcdefgh"], 24).tolist(), np.tile(np.arange(24) // 2, 8)
     values = 10.0 + np.repeat(0.8 * rng.normal(size=96), 2) + 0.3 * rng.normal(size=192)

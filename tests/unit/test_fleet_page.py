@@ -65,6 +65,15 @@ def test_each_vehicle_has_the_light_that_its_truth_asks_for(answers: FleetAnswer
     assert all(each.light is Light.GREEN for each in sound), sound
 
 
+def test_logs_with_a_model_of_no_vehicle_are_counted() -> None:
+    rows = fleet_rows(3, 3, 4)
+    for row in (e for key in rows for e in rows[key] if e.get("vehicle") == "v02"):
+        row["vehicle"] = None
+    found = [e for e in fleet_document(answer_questions(rows)).findings if e.code == "no-vehicle"]
+    assert [each.light for each in found] == [Light.AMBER]
+    assert "4 logs with a model count nowhere" in found[0].message
+
+
 def test_few_vehicles_that_all_moved_alike_are_amber() -> None:
     """Season in a fleet of three made 120 of 120 vehicles red."""
     rows = fleet_rows(3, 3)

@@ -106,6 +106,8 @@ def test_reasons_are_counted_with_an_example_and_what_to_do() -> None:
     assert room.joined(["set X 1 and fly again", "fly", "set X 1", "fly"]) == "; ".join(
         ("set X 1 and fly again", "fly")
     )
+    other = {**rows[0], "action": "unpack it", "address": "zip.bin"}  # Of one alone: said of all.
+    assert [each.action for each in grouped_reasons([other, *rows[:3]])][1] == "unpack it"
     lines = reason_lines(found)
     assert lines[:2] == [
         "  3 refused: not a log (such as 0.bin: an empty file)",

@@ -101,12 +101,15 @@ def status(place: str, as_json: bool) -> None:
     from flightid.fleet import fleet_status
     from flightid.fleet.reasons import reason_lines
     from flightid.fleet.shares import copy_lines
+    from flightid.fleet.unnamed import unnamed_light
 
     found = fleet_status(place)
     emit(found, as_json=as_json)
     if not as_json:
         for line in (*copy_lines(found.shares), *reason_lines(found.reasons)):
             click.echo(line)
+        if unnamed := unnamed_light(found.unnamed):
+            note(str(unnamed))
 
 
 @command.command("query", short_help="Answer one SELECT over the tables of the catalogue.")

@@ -19,6 +19,7 @@ from flightid.fleet.statistics.drift import FleetDrift
 from flightid.fleet.statistics.events import EventEffect
 from flightid.fleet.statistics.multiple_testing import chance_cell
 from flightid.fleet.statistics.parameter_history import ParameterHistory
+from flightid.fleet.unnamed import unnamed_light, unnamed_logs
 from flightid.report.content import Block, Document, Lights, Paragraph, Section, TableBlock
 from flightid.report.figures import figure_block
 from flightid.table import Cell, Column, Table
@@ -126,6 +127,8 @@ def _vehicles(answers: FleetAnswers) -> Iterator[Block]:
     if not any(each.data.members for each in answers.types):
         none = "counts: see below why" if answers.red else "intervals: see below what to change"
         yield Paragraph(f"No vehicle has a model {'that' if answers.red else 'with'} {none}.")
+    if unnamed := unnamed_light(unnamed_logs(answers.logs)):
+        yield Lights((unnamed,))
     if not found:
         return
     if len(found) <= NAMED:

@@ -69,25 +69,26 @@ class RefusalReason:
 
 
 def grouped_reasons(rows: Iterable[Mapping[str, Any]]) -> tuple[RefusalReason, ...]:
-    """Reasons of the logs without a model, the commonest first.
+    """Reasons of the logs without a model, by what to do, the commonest first.
 
     Parameters
     ----------
     rows : iterable of mapping
         ``outcome``, ``reason``, ``message``, ``action`` and ``address`` of each log.
     """
-    found: dict[tuple[str, str], RefusalReason] = {}
+    found: dict[tuple[str, str, str], RefusalReason] = {}
     for row in rows:
         outcome, reason = str(row["outcome"]), str(row["reason"] or "")
         # Only what became of a log is a reason: what is known already, say, is none.
         if outcome not in OUTCOMES or outcome == FITTED:
             continue
-        told = found.get((outcome, reason))
+        key = outcome, reason, str(row.get("action") or "")
+        told = found.get(key)
         if told is not None:
-            found[outcome, reason] = replace(told, logs=told.logs + 1)
+            found[key] = replace(told, logs=told.logs + 1)
             continue
-        words = (str(row.get(key) or "") for key in ("message", "action", "address"))
-        found[outcome, reason] = RefusalReason(outcome, reason, 1, *words)
+        words = (str(row.get(name) or "") for name in ("message", "action", "address"))
+        found[key] = RefusalReason(outcome, reason, 1, *words)
     return tuple(sorted(found.values(), key=lambda each: -each.logs))
 
 

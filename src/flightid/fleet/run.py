@@ -42,6 +42,7 @@ from flightid.fleet.refusal import ACTIONS, PATTERN
 from flightid.fleet.run_one import FULL, NAMING, made_record
 from flightid.fleet.settings import FleetSettings, read_fleet
 from flightid.fleet.taken import TakenContents
+from flightid.fleet.unnamed import named_logs, unnamed_light, unnamed_logs
 from flightid.frozen import dataclass
 from flightid.progress import progress
 from flightid.result import Result
@@ -204,6 +205,7 @@ def _run(path: str | Path, workers: int | None, scheduler: str | None, *, retry:
         text = f"{len(replaced)} earlier records count no more: their logs have other bytes now"
         findings.append(Finding("replaced-records", Light.GREEN, text))
     findings += taken.findings()
+    findings += filter(None, [unnamed_light(unnamed_logs(named_logs(store)))])
     findings += _nothing_fitted(counts, store, len(addresses))
     return FleetRun(
         settings.catalogue, len(addresses), kept, counts, tuple(findings), taken.reasons(),

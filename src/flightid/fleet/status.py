@@ -18,6 +18,7 @@ from flightid.fleet.opening import catalogue_place, names_fleet_file, opened_sto
 from flightid.fleet.reasons import RefusalReason, grouped_reasons
 from flightid.fleet.settings import read_fleet
 from flightid.fleet.shares import FleetShares
+from flightid.fleet.unnamed import unnamed_logs
 from flightid.frozen import dataclass
 from flightid.result import Result
 from flightid.table import Column, Table
@@ -45,6 +46,8 @@ class FleetStatus(Result, schema="flightid.fleet_status/1"):
         Why logs gave no model, the commonest first; of compacted ones where the extra is installed.
     shares : FleetShares or None
         Where each file stands; None where the catalogue alone was named, or without the extra.
+    unnamed : int
+        Logs with a model that name no vehicle, and count in no answer.
 
     Example
     -------
@@ -61,6 +64,7 @@ class FleetStatus(Result, schema="flightid.fleet_status/1"):
     n_bytes: int = 0
     reasons: tuple[RefusalReason, ...] = ()
     shares: FleetShares | None = None
+    unnamed: int = 0
 
     @property
     def n_logs(self) -> int:
@@ -142,12 +146,13 @@ def _counted(store: Store, where: str, gone: Collection[str] = ()) -> FleetStatu
     return FleetStatus(
         where, None, dict(counts), len(parts), len(loose), unusable, n_bytes,
         grouped_reasons(row for row in told if row["address"] not in gone),
+        unnamed=unnamed_logs(told),
     )  # fmt: skip
 
 
 def _told(store: Store, parts: Sequence[TablePart]) -> Iterator[Mapping[str, Any]]:
     """What became of the logs of parts; nothing without the library that reads them."""
-    names = ("outcome", "reason", "message", "action", "address")
+    names = ("outcome", "reason", "message", "action", "address", "vehicle")
     try:
         for row in read_columns(store, parts, "logs", names):
             yield dict(zip(names, row, strict=True))

@@ -94,4 +94,5 @@ def _correlation(one: ParameterHistory, others: Sequence[ParameterHistory]) -> f
 def _course(history: ParameterHistory) -> Array:
     """Level about its mean, in shares of it: vehicles differ."""
     level = history.track.level
-    return (level - level.mean()) / max(abs(float(level.mean())), np.finfo(np.float64).tiny)
+    scale = max(abs(float(level.mean())), float(np.finfo(np.float64).tiny))
+    return np.asarray((level - level.mean()) / scale)

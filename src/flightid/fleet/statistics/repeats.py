@@ -10,7 +10,8 @@ from flightid.fleet.statistics.flight_estimates import FlightEstimates
 from flightid.frozen import dataclass
 from flightid.uncertainty.quantiles import LEVEL, tails
 
-DAY_S = 86400.0
+DAY_S = 12.0 * 3600.0
+"""From the first flight of a day to its last: a day of UTC ends within those of the Pacific."""
 
 
 @dataclass(frozen=True)
@@ -69,8 +70,21 @@ class RepeatScatter:
 
 
 def days_of(time_s: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Number of the day (UTC) of each time, s."""
-    return np.floor(time_s / DAY_S).astype(np.int64)
+    """Number of the day of each time, s, of one vehicle: flights up to 12 h from the day's first.
+
+    Example
+    -------
+    >>> days_of(3600.0 * np.array([18.0, 25.5, 42.0, 49.5])).tolist()
+    [0, 0, 1, 1]
+    """
+    order = np.argsort(time_s, kind="stable")
+    sorted_s, day = time_s[order], np.zeros(len(time_s), dtype=np.int64)
+    begin, number = 0, 0
+    while begin < len(sorted_s):
+        end = int(np.searchsorted(sorted_s, sorted_s[begin] + DAY_S, side="right"))
+        day[order[begin:end]] = number
+        begin, number = end, number + 1
+    return day
 
 
 def repeat_scatter(data: FlightEstimates) -> tuple[RepeatScatter, ...]:
@@ -79,15 +93,17 @@ def repeat_scatter(data: FlightEstimates) -> tuple[RepeatScatter, ...]:
     Parameters
     ----------
     data : FlightEstimates
-        Times in s; days begin at multiples of 86,400 s.
+        Times in s; days as `days_of` has them.
 
     Returns
     -------
     tuple of RepeatScatter, length p
     """
-    _, group = np.unique(
-        np.column_stack([data.member_of, days_of(data.time_s)]), axis=0, return_inverse=True
-    )
+    day = np.zeros(len(data.vehicles), dtype=np.int64)
+    order = np.lexsort((data.time_s, data.member_of))
+    for own in np.split(order, np.flatnonzero(np.diff(data.member_of[order])) + 1):
+        day[own] = days_of(data.time_s[own])
+    _, group = np.unique(np.column_stack([data.member_of, day]), axis=0, return_inverse=True)
     group, count = group.ravel(), int(group.max(initial=-1)) + 1
     found = []
     for i, name in enumerate(data.names):
