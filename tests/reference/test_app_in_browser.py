@@ -179,7 +179,15 @@ def test_from_a_dropped_log_to_a_dragged_band(desk: Desk, tmp_path: Path) -> Non
     page.wait_for_selector("pre .changed")
     named = desk.study["model"][0]["identify"]
     assert {"name": named[0], "span_s": [40.0, 55.5]} in desk.study["segment"]
-    page.click("text=Undo")
+    # Twice at once takes two changes back, one after the other.
+    page.click("text=fit Pitch rate")
+    for _ in range(100):
+        if desk.study["model"][1]["identify"] == ["pitch 40 s to 55.5 s"]:
+            break
+        page.wait_for_timeout(100)
+    assert desk.study["model"][1]["identify"] == ["pitch 40 s to 55.5 s"]
+    page.locator("pre .changed", has_text='["pitch 40').wait_for()
+    page.get_by_role("button", name="Undo").dblclick()
     page.locator("pre .changed", has_text='["roll sweep"]').wait_for()
     assert desk.study == before
     # The band: by arrow key, then by the mouse.
@@ -193,6 +201,19 @@ def test_from_a_dropped_log_to_a_dragged_band(desk: Desk, tmp_path: Path) -> Non
         before["model"][0]["band_rad_s"][0],
         pytest.approx(before["model"][0]["band_rad_s"][1] / 1.03, rel=1e-3),
     ]
+    # A key that is held: one change under way, and the last value is the one that is stored.
+    page.evaluate(
+        """() => { const handle = document.querySelectorAll(".handle")[1];
+        const held = () => new KeyboardEvent("keydown", { key: "ArrowRight", bubbles: true });
+        for (let k = 0; k < 8; k++) handle.dispatchEvent(held()); }"""
+    )
+    for _ in range(100):
+        if desk.study["model"][0]["band_rad_s"][1] > 1.25 * high:
+            break
+        page.wait_for_timeout(100)
+    high = desk.study["model"][0]["band_rad_s"][1]
+    assert high == pytest.approx(before["model"][0]["band_rad_s"][1] * 1.03**7, rel=1e-2)
+    assert not page.locator("dialog[open]").count()
     box = page.locator(".handle").nth(0).bounding_box()
     middle = (box["x"] + box["width"] / 2.0, box["y"] + box["height"] / 2.0)
     page.mouse.move(*middle)

@@ -1,3 +1,4 @@
+import * as api from "./api";
 import type { Reply, Job, Question } from "./types";
 
 /** A question waiting for its answer, and who hears it. */
@@ -7,12 +8,19 @@ interface Waiting {
   hear: (answer: never) => void;
 }
 
+/** How long a page says no more than that it connects, and how often it tries. */
+const PATIENCE_MS = 4000;
+const AGAIN_MS = 1500;
+
 /** The socket: of each kind the newest question alone is answered; news of jobs come on it too. */
 class Live {
   connected = $state(false);
+  /** Why nothing goes on: nobody answers, or one who was started after this page was opened. */
+  lost = $state<"" | "silent" | "anew">("");
   jobs: Record<string, Job> = $state({});
   #socket: WebSocket | null = null;
   #last = 0;
+  #since = performance.now();
   #waiting: Record<string, Waiting> = {};
   #news = new Set<(job: Job) => void>();
 
@@ -21,11 +29,15 @@ class Live {
     this.#socket = socket;
     socket.onopen = () => {
       this.connected = true;
+      this.lost = "";
+      this.#recount();
       for (const each of Object.values(this.#waiting)) if (!each.answered) socket.send(JSON.stringify(each.question));
     };
     socket.onclose = () => {
+      if (this.connected) this.#since = performance.now();
       this.connected = false;
-      setTimeout(() => this.open(), 1500);
+      if (performance.now() - this.#since > PATIENCE_MS - AGAIN_MS) this.#why();
+      setTimeout(() => this.open(), AGAIN_MS);
     };
     socket.onmessage = (event) => {
       const told = JSON.parse(event.data);
@@ -46,6 +58,28 @@ class Live {
     const made = { ...question, kind, request: ++this.#last } as unknown as Q;
     this.#waiting[kind] = { question: made, answered: false, hear };
     if (this.#socket?.readyState === WebSocket.OPEN) this.#socket.send(JSON.stringify(made));
+  }
+
+  /** What a socket does not tell: whether anybody is there, and knows this page. */
+  async #why() {
+    try {
+      await api.jobs();
+    } catch (problem) {
+      const { status } = problem as api.Refusal;
+      if (!this.connected) this.lost = status === 0 ? "silent" : [401, 403].includes(status) ? "anew" : "";
+    }
+  }
+
+  /** Jobs that the server knows; what it does not know any more has ended unheard. */
+  async #recount() {
+    const told = await api.jobs().catch(() => null);
+    if (!told) return;
+    const known = new Set(told.map((job) => job.id));
+    const ended = Object.values(this.jobs).filter((job) => job.state === "waiting" && !known.has(job.id));
+    for (const job of [...told, ...ended.map((each) => ({ ...each, state: "done" as const }))]) {
+      this.jobs[job.id] = job;
+      for (const hear of this.#news) hear(job);
+    }
   }
 
   /** Hear of jobs; returns what ends it. */

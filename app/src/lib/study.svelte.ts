@@ -10,13 +10,26 @@ export interface ModelTable {
   response?: Record<string, unknown>;
 }
 
+/** Edits that wait for their turn; whoever changes the same keys meanwhile puts newer values in. */
+interface Waiting {
+  edits: Edit[];
+  stored: Promise<boolean>;
+}
+const keysOf = (edits: Edit[]) => JSON.stringify(edits.map((each) => each.path));
+
 /** The study file of a log: every click of the page changes it here, and nowhere else. */
 export class Study {
   file: StudyText | null = $state(null);
   error = $state("");
   conflict: { mine: Edit[]; text: string; etag: string } | null = $state(null);
   changed: string[] = $state([]);
+  /** Whether the server was asked once: before that nobody knows whether there is a study. */
+  known = $state(false);
+  /** Requests that wait or are under way; each begins when the one before it has ended. */
+  pending = $state(0);
   #before: string[] = [];
+  #turn: Promise<unknown> = Promise.resolve();
+  #waiting: Waiting | null = null;
   undoable = $state(0);
 
   constructor(readonly log: string) {}
@@ -39,32 +52,60 @@ export class Study {
     return model.response?.[key] ?? all[key];
   }
 
-  async load() {
-    try {
-      this.file = await api.study(this.log);
-      this.error = "";
-    } catch (error) {
-      this.error = (error as Error).message;
-    }
+  load(): Promise<void> {
+    return this.#inTurn(async () => {
+      try {
+        this.file = await api.study(this.log);
+        this.error = "";
+      } catch (error) {
+        this.error = (error as Error).message;
+      }
+      this.known = true;
+    });
   }
 
-  async edit(edits: Edit[]): Promise<boolean> {
-    if (!this.file) return false;
-    return this.#store(edits, () => api.change(this.log, this.file!.etag, edits));
+  /** Change keys; while others of the same keys wait, these take their place. */
+  edit(edits: Edit[]): Promise<boolean> {
+    const behind = this.#waiting;
+    if (behind && keysOf(behind.edits) === keysOf(edits)) {
+      behind.edits = edits;
+      return behind.stored;
+    }
+    const waiting: Waiting = { edits, stored: Promise.resolve(false) };
+    waiting.stored = this.#inTurn(() => {
+      if (this.#waiting === waiting) this.#waiting = null;
+      return this.#store(waiting.edits, (etag) => api.change(this.log, etag, waiting.edits));
+    });
+    this.#waiting = waiting;
+    return waiting.stored;
   }
 
   /** Put a whole text in place, as a proposal made anew; it can be taken back. */
-  async replace(text: string): Promise<boolean> {
-    if (!this.file) return false;
-    return this.#store([], () => api.replace(this.log, this.file!.etag, text));
+  replace(text: string): Promise<boolean> {
+    return this.#inTurn(() => this.#store([], (etag) => api.replace(this.log, etag, text)));
   }
 
-  async undo() {
-    const text = this.#before.at(-1);
-    if (text === undefined || !this.file) return;
-    if (await this.#store([], () => api.replace(this.log, this.file!.etag, text))) {
-      this.#before.splice(-2);
-      this.undoable = this.#before.length;
+  undo(): Promise<void> {
+    return this.#inTurn(async () => {
+      const text = this.#before.at(-1);
+      if (text === undefined) return;
+      if (await this.#store([], (etag) => api.replace(this.log, etag, text))) {
+        this.#before.splice(-2);
+        this.undoable = this.#before.length;
+      }
+    });
+  }
+
+  /** One after the other: a request that went beside another would name a version that is gone. */
+  async #inTurn<T>(task: () => Promise<T>): Promise<T> {
+    this.#waiting = null;
+    this.pending += 1;
+    const turn = this.#turn.then(task);
+    this.#turn = turn.catch(() => {});
+    try {
+      return await turn;
+    } finally {
+      this.pending -= 1;
     }
   }
 
@@ -76,10 +117,15 @@ export class Study {
     if (!keepTheirs && mine.length) await this.edit(mine);
   }
 
-  async #store(edits: Edit[], store: () => Promise<StudyText>): Promise<boolean> {
-    const before = this.file!.text;
+  async #store(edits: Edit[], store: (etag: string) => Promise<StudyText>): Promise<boolean> {
+    if (!this.file) return false;
+    if (this.conflict) {
+      this.conflict.mine.push(...edits);
+      return false;
+    }
+    const before = this.file.text;
     try {
-      this.file = await store();
+      this.file = await store(this.file.etag);
       this.error = "";
     } catch (error) {
       const refusal = error as api.Refusal;
