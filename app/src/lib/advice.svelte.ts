@@ -1,6 +1,8 @@
 /** The log that the page is on; empty on records of a rig and where no log is open. */
 class Here {
   log = $state("");
+  /** Screens that a link leads to: those of this log, without the one that is open. */
+  screens = $state<string[]>([]);
 }
 export const here = new Here();
 
@@ -14,14 +16,15 @@ const COMMAND = /flightid (tune|plan|inspect|flight|compare|response)\b((?: (?:[
 
 export interface AdvicePart { text: string; href: string | null }
 
-/** What to do, with the page's own screens in place of commands that they stand for. */
-export function adviceParts(text: string, log: string): AdvicePart[] {
+/** What to do, with screens that there are in place of the commands that they stand for. */
+export function adviceParts(text: string, log: string, screens: string[]): AdvicePart[] {
   const parts: AdvicePart[] = [];
   let done = 0;
   for (const found of log ? text.matchAll(COMMAND) : []) {
     const [all, verb, rest] = found;
     if (rest.includes("--controller")) continue;
     const [screen, title] = SCREEN_OF[verb];
+    if (!screens.includes(screen)) continue;
     parts.push({ text: text.slice(done, found.index), href: null }, { text: title, href: `#/${screen}/${log}` });
     done = found.index + all.length;
   }
