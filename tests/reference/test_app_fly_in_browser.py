@@ -28,6 +28,9 @@ def test_by_keyboard_from_take_off_to_a_rated_record(desk: Desk) -> None:
     start.focus()
     page.keyboard.press("Enter")
     page.get_by_text("flying", exact=True).wait_for()
+    # The keys are of the flight now: Space presses no button, above all none that starts anew.
+    page.locator(".view:focus").wait_for()
+    assert page.get_by_role("button", name="Reset").is_enabled()
     page.keyboard.down("ArrowRight")
     page.get_by_role("img", name="roll 25 %").wait_for()
     page.keyboard.up("ArrowRight")
