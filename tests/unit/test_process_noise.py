@@ -31,6 +31,11 @@ def test_noise_on_states_is_found_and_what_a_filter_leaves() -> None:
     assert found.is_found
     assert np.all(found.left < 0.9)
     assert np.min(found.left) < 0.6
+    # A piece shorter than the lags tells nothing; beside another it ended in a fault.
+    beside = state_noise([_of_states(1, 6), _of_states(0)], [(A, C), (A, C)])
+    assert beside is not None
+    assert beside.advantage == found.advantage
+    assert state_noise([_of_states(1, 6)], [(A, C)]) is None
 
 
 @pytest.mark.parametrize(

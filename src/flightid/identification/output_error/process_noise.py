@@ -161,6 +161,7 @@ def state_noise(
     Parameters
     ----------
     residuals : sequence of ndarray, shape (n_outputs, n_samples)
+        Of each record; those no longer than the lags tell nothing.
     systems : sequence of tuple of ndarray
         Sampled A (n, n) and C (n_outputs, n) of each record.
 
@@ -178,7 +179,10 @@ def state_noise(
     Ljung, *System Identification*, 2nd ed., sec. 7.4 (innovations); Jategaonkar, *Flight Vehicle
     System Identification*, 2nd ed., sec. 5.2; Schwarz (1978), Annals of Statistics 6.
     """
-    cut = [each[:, :LONGEST] for each in residuals]
+    told = [k for k, each in enumerate(residuals) if each.shape[1] > ORDER]
+    if not told:
+        return None
+    cut, systems = [residuals[k][:, :LONGEST] for k in told], [systems[k] for k in told]
     p, n = systems[0][1].shape
     n_rows = sum(each.shape[1] - ORDER for each in cut)
     if n == 0 or n_rows < SAMPLES_PER_NUMBER * p * max(ORDER, n):
