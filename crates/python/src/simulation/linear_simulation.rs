@@ -28,7 +28,7 @@ pub(crate) fn matrix<'py>(
 }
 
 /// Matrices and delays as they were given, which the core checks.
-fn system_of<'a>(
+pub(crate) fn system_of<'a>(
     a: &'a RowMajor2<'_, f64>,
     b: &'a RowMajor2<'_, f64>,
     c: &'a RowMajor2<'_, f64>,

@@ -2,7 +2,7 @@
 
 use crate::error::from_core;
 use crate::row_major::{RowMajor1, RowMajor2};
-use crate::simulation::linear_simulation::{States, matrix};
+use crate::simulation::linear_simulation::{States, matrix, system_of};
 use flightid_core::linear::discretisation::{Hold, StateSpace};
 use flightid_core::linear::linear_simulation::Discrete;
 use flightid_core::vehicles::vehicle_loop::{ClosedLoop, Disturbance};
@@ -19,14 +19,7 @@ pub(crate) type Matrices<'py> = (
 
 pub(crate) fn system<'a>(matrices: &'a Matrices<'_>) -> PyResult<StateSpace<'a>> {
     let (a, b, c, d, delays_s) = matrices;
-    Ok(StateSpace {
-        a: a.as_slice()?,
-        b: b.as_slice()?,
-        c: c.as_slice()?,
-        d: d.as_slice()?,
-        delays_s: delays_s.as_slice()?,
-        n_outputs: c.as_array().nrows(),
-    })
+    system_of(a, b, c, d, delays_s)
 }
 
 /// fly_closed_loop(vehicle: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]], controller: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]], watched: Sequence[int], driven: Sequence[int], added: NDArray[np.float64], disturbances: Sequence[tuple[float, float]], noise: Sequence[float], sample_time_s: float, first_order_hold: bool, seed: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]
