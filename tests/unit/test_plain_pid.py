@@ -141,7 +141,9 @@ def test_a_step_that_p_alone_does_not_follow_is_told() -> None:
     assert_close(standing_errors(loop, [falling], "y", "u"), 1.0 - steps[-1:], atol=1e-9, why="end")
     loop = replace(loop, direct=False)
     assert_close(standing_errors(loop, [integrator], "y", "u"), [0.0], atol=1e-12, why="integrates")
-    assert not judge_standing(loop, LAG, [], "y", "u")
+    # An integral gain of zero is no integrator.
+    assert [each.code for each in judge_standing(loop, LAG, [], "y", "u")] == ["standing-error"]
+    assert not judge_standing(loop.with_gains(Ki=0.1), LAG, [], "y", "u")
 
 
 @pytest.mark.parametrize(

@@ -67,7 +67,7 @@ def judge_standing(
     loop: PidLoop, estimate: LinearSystem, drawn: Iterable[LinearSystem], output: str, input: str
 ) -> list[Finding]:
     """What stays of a step, of the estimate and at worst; nothing of a controller with I."""
-    if "i" in loop.values:
+    if loop.values.get("i", 0.0) > 0.0:
         return []
     first, *others = standing_errors(loop, [estimate, *drawn], output, input)
     worst = max((first, *others), key=abs)
@@ -78,6 +78,6 @@ def judge_standing(
     if abs(worst) <= MOST:
         return [Finding("standing-error", Light.GREEN, said)]
     said += ": the controller has no integrator, and the plant none that makes up for it"
-    action = "take a form with I (controller='pi'), or give the plant the input that "
-    action += "holds the set-point beside the controller's"
+    action = "take a form with I (controller='pi'), its gain above zero, or give the plant the "
+    action += "input that holds the set-point beside the controller's"
     return [Finding("standing-error", Light.AMBER, said, action)]
