@@ -14,7 +14,7 @@ from flightid.conventions import Light, Role
 from flightid.errors import FlightidError
 from flightid.findings import Finding
 from flightid.report.text import to_text
-from flightid.study.answer import _models
+from flightid.study.answer import _gains, _margin_table, _models
 from flightid.study.identified import LEFT_OUT, ModelResults
 from flightid.study.settings import Segment
 from flightid.study.stage_runner import digest
@@ -304,6 +304,26 @@ def test_what_was_left_out_is_no_model_to_use() -> None:
     said = _models(study, "study.toml").message  # type: ignore[arg-type]
     assert said.startswith("1 of 2 models to use: it predicts 93 %"), said
     assert said.endswith("none of p/da, as said below")
+
+
+def test_margins_below_what_is_asked_and_columns_left_out_are_told() -> None:
+    """44 deg stood green beside 45 that are required, and a dash was explained that nobody saw."""
+    worst = [
+        SimpleNamespace(loop="loop", name="phase margin", worst=44.1, flown_worst=None),
+        SimpleNamespace(loop="loop", name="gain margin", worst=None, flown_worst=None),
+    ]
+    asked = SimpleNamespace(phase_margin_deg=45.0, gain_margin_db=6.0, angle_phase_margin_deg=60.0)
+    beyond = Finding("margin-beyond-band", Light.GREEN, "read above the band")
+    roll = SimpleNamespace(
+        axis="roll", loop=None, worst_cases=worst, requirements=asked, findings=(beyond,),
+        share_met=0.984, stages=(None,), flown=SimpleNamespace(autopilot="px4"),
+    )  # fmt: skip
+    tuning = SimpleNamespace(sound=[roll], findings=(), left_out={})
+    said = _gains(tuning, "study.toml").message  # type: ignore[arg-type]
+    assert "at least 44°" in said
+    assert said.endswith("(98.4 % of them or more keep 45° and all else asked)")
+    notes = _margin_table((roll,)).notes  # type: ignore[arg-type]
+    assert notes[1].startswith("gain margin: not promised")
 
 
 def test_no_model_is_none_to_use() -> None:

@@ -240,6 +240,10 @@ def _gains(tuning: Tuning, source: str) -> Finding:
         )
     what = "rig" if plain else "vehicle"
     message = f"gains of {axes}{promise} at the worst {what} that the data allow"
+    asked = designs[0].requirements.phase_margin_deg
+    if least and min(least) < asked:
+        share = min(design.share_met for design in designs)
+        message += f" ({100.0 * share:.1f} % of them or more keep {asked:g}° and all else asked)"
     if left:
         message += f"; none to fly, they stay as flown: {left}"
     return Finding("gains", worst(findings) if findings else Light.GREEN, message, way)
@@ -301,7 +305,13 @@ def _margin_table(designs: tuple[PidDesign, ...]) -> Table:
     note = f"Required: {asked.phase_margin_deg:g} deg{angle} and {asked.gain_margin_db:g} dB."
     notes = [note]
     if any(f.code == "margin-beyond-band" for each in designs for f in each.findings):
-        notes.append("–: not promised, for what lies above the band to which the model was shown.")
+        shown = [[row[2 + 2 * place] for row in rows] for place in range(len(MARGINS))]
+        gone = [name for name, cells in zip(MARGINS, shown, strict=True) if {*cells} == {None}]
+        dashed = any(None in cells and {*cells} != {None} for cells in shown)
+        what = " and ".join(["–"] * (dashed or not gone) + gone)
+        notes.append(
+            f"{what}: not promised, for what lies above the band to which the model was shown."
+        )
     what = "rig" if any(isinstance(each.loop, PidLoop) for each in designs) else "vehicle"
     title = f"Margins of the worst {what} that the data allow"
     return Table(title, tuple(columns), tuple(rows), tuple(notes)).without_empty_columns()
