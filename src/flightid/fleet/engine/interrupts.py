@@ -25,6 +25,9 @@ def interrupts_held() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield  # No other thread has signals.
         return
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        yield  # As for a run behind a shell's `&`: who ignores it goes on doing so, workers too.
+        return
     came: list[int] = []
 
     def note(number: int, _: FrameType | None) -> None:
