@@ -77,6 +77,22 @@ def test_damage_has_a_name_and_health_has_none(
     assert codes(samples, unit) == found
 
 
+def test_a_command_that_is_held_is_no_slow_measurement() -> None:
+    clocked = np.repeat(np.sign(NOISE[2, : N // 12]), 12)
+    three = np.repeat(np.random.default_rng(5).integers(-1, 2, N // 12), 12).astype(float)
+    random, slow = np.repeat(NOISE[1, : N // 12], 12), np.repeat(ROLL[::12], 12)
+    columns = {"clocked": clocked, "three": three, "random": random, "slow": slow}
+    untold = record_findings(Record.from_arrays(TIME_S, others=columns))
+    # What neither its role nor its levels tell may be either, and the sentence says so.
+    assert [each.message.split()[0] for each in untold] == ["random", "slow"]
+    assert all("held as a command is, or measured 12 times slower" in f.message for f in untold)
+    assert record_findings(Record.from_arrays(TIME_S, inputs=columns)) == ()
+    assert record_findings(Record.from_arrays(TIME_S, excitations=columns)) == ()
+    told = record_findings(Record.from_arrays(TIME_S, outputs=columns))
+    assert [each.message.split()[0] for each in told] == ["three", "random", "slow"]
+    assert not any("command" in each.message for each in told)
+
+
 def test_a_pulse_between_the_levels_of_an_input_is_no_spike() -> None:
     pulses = np.where(np.arange(N) % 400 == 7, 1.0, -1.0)
     record = Record.from_arrays(TIME_S, inputs={"u": pulses})

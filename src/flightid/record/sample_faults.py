@@ -16,7 +16,7 @@ from flightid.findings import Finding, counted
 from flightid.frozen import dataclass
 from flightid.record.commanded_edges import Surroundings, answered, answers
 from flightid.record.outlying import distances, none_stands_out, spread_of
-from flightid.record.repeats import found_staircase
+from flightid.record.repeats import found_staircase, is_switched, stands_still
 from flightid.units import DIMENSIONLESS, is_convertible, si_base
 
 Array = NDArray[np.float64]
@@ -76,7 +76,8 @@ def sample_faults(
         Increasing stamps, s; samples that are not finite are passed over.
     unit : str
     role : Role
-        Inputs may step, stand still and meet limits: they are examined for spikes and wraps alone.
+        Inputs, and what was injected, may step, stand still and meet limits: they are examined for
+        spikes and wraps alone.
     around : Surroundings
         What else was recorded then: edges of a command and what answers them are no spikes.
 
@@ -98,7 +99,7 @@ def sample_faults(
         stamps, values = time_s[present], samples[present]
     if values.size < FEWEST or np.ptp(values) == 0.0:
         return []
-    if role is Role.INPUT:
+    if role in (Role.INPUT, Role.EXCITATION):
         checks = [_input_spikes, _wraps]
     else:
         checks = [_spikes, _wraps, _dead, _held, _clipped]
@@ -312,13 +313,18 @@ def _held(channel: _ExaminedChannel) -> SampleFault | None:
     found = found_staircase(values)
     if found is None or found.samples < 2:
         return None
-    said = (
-        f"{name} repeats its samples: it changes every {found.samples} rows, so that it was "
-        f"measured {found.samples} times slower than it is stored, and lags by half of that"
-    )
+    # Of a channel without a role nobody knows whether it commands: one that steps far does.
+    unknown = channel.role is Role.OTHER
+    if is_switched(values) or (unknown and stands_still(values)):
+        return None
+    slow = f"measured {found.samples} times slower than it is stored, and lags by half of that"
+    said = f"{name} repeats its samples: it changes every {found.samples} rows, so that it was "
+    said += f"held as a command is, or {slow}" if unknown else slow
     places = {2: "second", 3: "third"}
     place = places.get(found.samples, f"{found.samples}th")
     action = f"resample the record to every {place} row (resample_to_s)"
+    if unknown:
+        action = f"a command: nothing; what was measured: {action}"
     ends = np.array([0, values.size - 1])
     return channel.fault(ends, ("samples-repeated", Light.AMBER, said, action))
 
