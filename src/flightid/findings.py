@@ -10,6 +10,10 @@ from flightid.conventions import Light
 from flightid.frozen import dataclass
 from flightid.surface import spoken
 
+GRAVITY = (Light.RED, Light.AMBER, Light.UNKNOWN, Light.GREEN)
+FIRST = ("scale-contradicted", "tipped-over")
+"""Codes of what comes before all advice on a log: another flight would meet it again."""
+
 
 class Statement(Protocol):
     """Whatever states a fact under a code."""
@@ -81,9 +85,21 @@ def worst(findings: list[Finding] | tuple[Finding, ...]) -> Light:
     >>> worst([Finding("a", Light.GREEN, "fine"), Finding("b", Light.AMBER, "doubtful")]).value
     'amber'
     """
-    order = (Light.RED, Light.AMBER, Light.UNKNOWN, Light.GREEN)
     lights = {finding.light for finding in findings}
-    return next((light for light in order if light in lights), Light.GREEN)
+    return next((light for light in GRAVITY if light in lights), Light.GREEN)
+
+
+def urgency(finding: Finding) -> tuple[int, int]:
+    """What findings are sorted by where a reader does the first first: a fall, then the worst.
+
+    Example
+    -------
+    >>> fell, short = Finding("tipped-over", Light.AMBER, ""), Finding("too-short", Light.RED, "")
+    >>> [each.code for each in sorted([short, fell], key=urgency)]
+    ['tipped-over', 'too-short']
+    """
+    first = FIRST.index(finding.code) if finding.code in FIRST else len(FIRST)
+    return first, GRAVITY.index(finding.light)
 
 
 def unsaid(findings: Iterable[Said], others: Iterable[Said]) -> list[Said]:

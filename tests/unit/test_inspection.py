@@ -123,11 +123,17 @@ def test_a_fall_ends_the_flight(inspected: Callable[[SweepFlight], Inspection]) 
     assert inspection.phases.airborne[-1][1] <= 75.4
 
 
-def test_a_fall_is_the_first_thing_that_is_said(
-    inspected: Callable[[SweepFlight], Inspection],
+def test_a_fall_is_the_first_thing_that_is_said_and_done(
+    inspected: Callable[[SweepFlight], Inspection], tmp_path: Path
 ) -> None:
-    said = carried_sentence(inspected(SweepFlight(tips_over=True, sweep_s=20.0)))
-    assert said.startswith("The vehicle falls over at ")
+    flight = SweepFlight(tips_over=True, sweep_s=20.0, rate_hz=10.0)
+    found = inspected(flight)
+    assert carried_sentence(found).startswith("The vehicle falls over at ")
+    # Red stands behind it: another flight would meet what made it fall again.
+    assert [each.light for each in found.findings[:2]] == [Light.AMBER, Light.RED]
+    assert found.findings[0].code == "tipped-over"
+    review = fid.review_flight(flight.write(tmp_path))
+    assert review.findings[-1].code == "tipped-over", "where eyes are on a terminal"
 
 
 def test_without_a_sweep_no_axis_carries_a_model_and_the_verdict_is_red(

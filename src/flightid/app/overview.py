@@ -20,7 +20,7 @@ from flightid.app.schemas import (
     StripEvent,
     StripLine,
 )
-from flightid.findings import Finding
+from flightid.findings import FIRST, Finding
 from flightid.inspection import Inspection
 from flightid.inspection.carried import carried_sentence
 from flightid.inspection.usable_band import hertz_words
@@ -147,7 +147,9 @@ def _card(
     why = next((f for f in missed if f.message.startswith(f"{axis}:")), None)
     reason = "" if band is None else band.reason
     said = reason if why is None else why.message.partition("no model, ")[2]
-    action = next((f.action for f in (why, finding) if f is not None and f.action), "")
+    # No sweep is advised of a vehicle that fell: what made it fall is still there.
+    before = next((f for f in inspection.findings if f.code in FIRST), None)
+    action = next((f.action for f in (before, why, finding) if f is not None and f.action), "")
     return AxisCard(
         axis=axis,
         kind="nothing",
@@ -171,6 +173,7 @@ def _verdicts(findings: Iterable[Finding], blocks: Iterable[TimelineBlock]) -> l
                 message=finding.message,
                 action=action,
                 spans_s=[(b.start_s, b.stop_s) for b in listed if _shows(b, finding.code)][:50],
+                first=finding.code in FIRST,
             )
         )
     return made

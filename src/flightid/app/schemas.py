@@ -26,6 +26,8 @@ class ShownFinding(Message):
     message: str
     action: str
     spans_s: list[tuple[float, float]]
+    first: bool = False
+    """Whether it comes before all other advice, whatever its light: a fall."""
 
 
 class AxisCard(Message):
@@ -187,11 +189,20 @@ class FieldGroup(Message):
     fields: dict[str, str]
 
 
+class StudyParts(Message):
+    """What parts of a study are known by: a change of one leaves what rests on others as it is."""
+
+    models: str
+    """All but ``[tune]``, which no model rests on."""
+    gains: str
+
+
 class StudyText(Message):
     """A study file, its tag, and what the page reads off it."""
 
     text: str
     etag: str
+    parts: StudyParts
     settings: dict[str, Any]
     python: str
     outside: list[str] = []

@@ -18,7 +18,7 @@ from flightid.errors import (
     SingularError,
     UnknownNameError,
 )
-from flightid.findings import Finding
+from flightid.findings import FIRST, Finding, urgency
 from flightid.fleet.catalogue.schema import FAILED, REFUSED
 from flightid.inspection import Inspection, inspect_log
 from flightid.logs import Log
@@ -26,12 +26,11 @@ from flightid.study.proposal import Proposal
 
 MESSAGE_LENGTH = 2000
 MOST_ACTIONS = 3
-MEMORY, FAULT, FELL, PATTERN = "memory", "fault", "tipped-over", "pattern"
-"""More memory than the fleet allows one log; an error that no log should raise; a fall; a pattern
-of the fleet file that does not come to an end."""
+MEMORY, FAULT, PATTERN = "memory", "fault", "pattern"
+"""More memory than the fleet allows one log; an error that no log should raise; a pattern of the
+fleet file that does not come to an end."""
 SHORT = "too-short"
 """Code of an inspection's verdict on a log that ends too early."""
-GRAVITY = (Light.RED, Light.AMBER, Light.UNKNOWN, Light.GREEN)
 SETTING = re.compile(r"\b[A-Z][A-Z0-9]+_[A-Z0-9_]+\b|\blog(ged|ging)?\b")
 """An action that speaks of the logging, or of a parameter of the autopilot."""
 EMPTY = "an empty file"
@@ -126,7 +125,7 @@ def _code(error: Exception) -> str:
 
 
 def _inspected(log: Log) -> tuple[Finding, ...]:
-    """What an inspection says against a log, a fall first; nothing where it cannot be made."""
+    """What an inspection says against a log; nothing where it cannot be made."""
     try:
         return against(inspect_log(log))
     except (FlightidError, ArithmeticError, ValueError, np.linalg.LinAlgError):
@@ -136,13 +135,12 @@ def _inspected(log: Log) -> tuple[Finding, ...]:
 def against(inspection: Inspection | None) -> tuple[Finding, ...]:
     """Findings that are not green, a fall first, for it comes before all that follows from it."""
     seen = () if inspection is None else inspection.findings
-    bad = [each for each in seen if each.light is not Light.GREEN]
-    return tuple(sorted(bad, key=lambda each: each.code != FELL))
+    return tuple(sorted((f for f in seen if f.light is not Light.GREEN), key=urgency))
 
 
 def decisive(seen: Sequence[Finding]) -> Finding | None:
     """What decides against a log whose study stopped: a fall, what is red, or no sweep."""
-    first = next((each for each in seen if each.code == FELL), None)
+    first = next((each for each in seen if each.code in FIRST), None)
     red = next((each for each in seen if each.light is Light.RED), None)
     return first or red or next((each for each in seen if each.code == "no-model"), None)
 
@@ -152,7 +150,7 @@ def unidentified(made: Proposal) -> LogRefusalError:
     bad = [*against(made.inspection)]
     bad += [each for each in made.findings if each.light is not Light.GREEN]
     # A fall comes first, then the worst; of several the inspection's, which looks at the logging.
-    worst = min(bad, key=lambda each: (each.code != FELL, GRAVITY.index(each.light)), default=None)
+    worst = min(bad, key=urgency, default=None)
     refused = LogRefusalError(
         "no model can be identified from this log",
         found=None if worst is None else worst.message,
@@ -166,8 +164,10 @@ def unidentified(made: Proposal) -> LogRefusalError:
 def _against_it(worst: Finding | None, seen: Sequence[Finding]) -> list[str]:
     """What to do about what decided, and about what weighs as much; else about anything.
 
-    Where a log is too short all else follows from that: one thing is to be done.
+    Where it fell, or where a log is too short, all else follows from that: one thing is to be done.
     """
+    if worst is not None and worst.code in FIRST and worst.action:
+        return [worst.action]
     if worst is not None and worst.code == SHORT and worst.action:
         return [f"copy the log again where it is cut off, else {worst.action}"]
     light = None if worst is None else worst.light

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from flightid.conventions import Light
-from flightid.findings import Finding, counted
+from flightid.findings import Finding, counted, urgency
 from flightid.inspection import advice
 from flightid.inspection.carried import carried_axes
 from flightid.inspection.gap_findings import gap_findings
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 def judge(log: Log, found: Inspection) -> tuple[Finding, ...]:
-    """All verdicts on a log, the worst first."""
+    """All verdicts on a log: what comes before all advice, then the worst."""
     # Sizes mean nothing until units do: what contradicts these comes first.
     scales = _scales(log, found)
     findings = [*scales, *log.findings, *_flight(log, found)]
@@ -37,7 +37,7 @@ def judge(log: Log, found: Inspection) -> tuple[Finding, ...]:
         findings += [*_length(found), *_bands(log, found), *_loop(log, found)]
     findings += [*_logging(log, found), *_excitation(log, found, scales)]
     findings += _quality(log, found)
-    return _ranked([*findings, *_without_model(log, found, findings)])
+    return tuple(sorted([*findings, *_without_model(log, found, findings)], key=urgency))
 
 
 def _without_model(log: Log, found: Inspection, told: list[Finding]) -> list[Finding]:
@@ -55,14 +55,6 @@ def _scales(log: Log, found: Inspection) -> list[Finding]:
     span = max(found.phases.airborne, key=lambda span: span[1] - span[0], default=None)
     checks = check_scales(log, map_of(log), span)
     return [check.finding for check in checks if check.finding is not None]
-
-
-_RANK = {Light.RED: 0, Light.AMBER: 1, Light.UNKNOWN: 2, Light.GREEN: 3}
-
-
-def _ranked(findings: list[Finding]) -> tuple[Finding, ...]:
-    """Worst first."""
-    return tuple(sorted(findings, key=lambda finding: _RANK[finding.light]))
 
 
 def _flight(log: Log, found: Inspection) -> list[Finding]:

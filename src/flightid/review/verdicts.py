@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from flightid.conventions import Light
-from flightid.findings import Finding
+from flightid.findings import Finding, urgency
 from flightid.inspection.advice import LOGGING
 from flightid.review.filter_findings import filter_findings
 from flightid.review.loop_response import LoopResponse
@@ -27,9 +27,8 @@ SHAKEN = "balance propellers, damp the autopilot's mount, look for loose parts"
 
 
 def judge_flight(review: FlightReview) -> tuple[Finding, ...]:
-    """All verdicts, the worst last, where eyes are on a terminal."""
-    order = (Light.GREEN, Light.UNKNOWN, Light.AMBER, Light.RED)
-    return tuple(sorted(_all(review), key=lambda finding: order.index(finding.light)))
+    """All verdicts, the worst and then a fall last, where eyes are on a terminal."""
+    return tuple(sorted(_all(review), key=urgency, reverse=True))
 
 
 def _all(review: FlightReview) -> Iterator[Finding]:

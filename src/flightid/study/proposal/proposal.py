@@ -9,7 +9,7 @@ from pathlib import Path
 from flightid.conventions import Light
 from flightid.errors import StudyError
 from flightid.files import write_atomically
-from flightid.findings import Finding
+from flightid.findings import FIRST, Finding, urgency
 from flightid.frozen import dataclass
 from flightid.inspection import Inspection
 from flightid.inspection.carried import carried_sentence
@@ -17,8 +17,6 @@ from flightid.surface import spoken
 from flightid.wrapping import wrapped
 
 WIDTH = 100
-FIRST = ("scale-contradicted", "tipped-over")
-"""Findings of a log that come before a flight anew: another one would show the same."""
 STAMP = "# Written by flightid, which replaces this file as long as nobody changes it: "
 """Begins the last line, with the hash of the lines above it."""
 
@@ -72,7 +70,7 @@ class Proposal:
         if self.inspection is not None:
             said += ["", self.inspection.in_short()]
             noted = self.inspection.findings
-            first = [each.action for code in FIRST for each in noted if each.code == code]
+            first = [f.action for f in sorted(noted, key=urgency) if f.code in FIRST]
             found = [*actions, *(each.action for each in noted if each.action)]
             planned = [each for each in found if "flightid plan" in each]
             actions = [*first, *self._next(planned=bool(planned)), *planned, *found]
