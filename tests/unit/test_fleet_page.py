@@ -19,7 +19,7 @@ from flightid.fleet.catalogue.loose import write_loose
 from flightid.fleet.catalogue.record import LogRecord
 from flightid.fleet.normality import quiet_light
 from flightid.fleet.opening import current_store
-from flightid.fleet.page import fleet_document
+from flightid.fleet.page import fleet_document, fleet_vehicles
 from flightid.fleet.pictures import type_picture
 from flightid.fleet.settings import read_fleet
 from flightid.fleet.statistics.answers import FleetAnswers, TypeAnswers, answer_questions
@@ -63,6 +63,13 @@ def test_each_vehicle_has_the_light_that_its_truth_asks_for(answers: FleetAnswer
     assert " at the event “motor replaced”; beyond that no change, like" in lights["v02"].message
     sound = [each for name, each in lights.items() if name not in ("v00", "v01")]
     assert all(each.light is Light.GREEN for each in sound), sound
+    # The worst first, and of one light the least likely.
+    least: dict[str, float] = {}
+    for history in (h for each in answers.types if each.drift for h in each.drift.judged):
+        least.setdefault(history.vehicle, history.chance or 0.0)
+    listed = [*fleet_vehicles(answers)]
+    assert listed[:2] == ["v00", "v01"]
+    assert listed[2:] == sorted(listed[2:], key=lambda name: least[name])
 
 
 def test_logs_with_a_model_of_no_vehicle_are_counted() -> None:

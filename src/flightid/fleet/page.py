@@ -102,7 +102,19 @@ def fleet_vehicles(answers: FleetAnswers) -> dict[str, Finding]:
         (name, vehicle_light(name, answers.types) if name in members else _bare(name, flown[name]))
         for name in sorted(members | set(flown))
     ]
-    return dict(sorted(found, key=lambda pair: ORDER.index(pair[1].light)))
+    chances = _least_chances(answers.types)
+    found.sort(key=lambda pair: (ORDER.index(pair[1].light), chances.get(pair[0], 1.0)))
+    return dict(found)
+
+
+def _least_chances(types: Sequence[TypeAnswers]) -> dict[str, float]:
+    """Of each vehicle, the chance of its least likely history: of two lights the worse."""
+    found: dict[str, float] = {}
+    for each in types:
+        for history in each.drift.judged if each.drift is not None else ():
+            chance = 1.0 if history.chance is None else history.chance
+            found[history.vehicle] = min(chance, found.get(history.vehicle, 1.0))
+    return found
 
 
 def _bare(vehicle: str, flown: Sequence[Row]) -> Finding:
