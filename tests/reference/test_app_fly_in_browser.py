@@ -30,7 +30,11 @@ def test_by_keyboard_from_take_off_to_a_rated_record(desk: Desk) -> None:
     page.get_by_text("flying", exact=True).wait_for()
     # The keys are of the flight now: Space presses no button, above all none that starts anew.
     page.locator(".view:focus").wait_for()
-    assert page.get_by_role("button", name="Reset").is_enabled()
+    # Reset asks before it ends a flight, and the flight goes on meanwhile.
+    page.get_by_role("button", name="Reset").press("Enter")
+    page.get_by_role("group", name="Reset").get_by_role("button", name="Go on").press("Enter")
+    page.locator(".view:focus").wait_for()
+    assert len(list((desk.folder / "flights").iterdir())) == 1
     page.keyboard.down("ArrowRight")
     page.get_by_role("img", name="roll 25 %").wait_for()
     page.keyboard.up("ArrowRight")
@@ -54,6 +58,7 @@ def test_by_keyboard_from_take_off_to_a_rated_record(desk: Desk) -> None:
     page.keyboard.press("Enter")
     page.get_by_text("landed", exact=True).wait_for()
     page.get_by_role("link", name="record", exact=True).wait_for()
+    assert page.title() == "Fly · flightid"
     page.get_by_role("group", name="Was it controllable?").get_by_role("button", name="No").press(
         "Enter"
     )
@@ -66,6 +71,12 @@ def test_by_keyboard_from_take_off_to_a_rated_record(desk: Desk) -> None:
     assert max(record["stick_lat"]) == pytest.approx(0.25 * 4.5, rel=0.02)
     assert max(abs(record["sweep_lon"])) > 0.0
     assert '"rating": 10' in (folder / "rating.json").read_text(encoding="utf-8")
+    # The flight is opened as records: its sticks and sweeps, whose model can be identified.
+    page.get_by_role("button", name=f"Open {folder.name} under Records").press("Enter")
+    page.get_by_role("heading", name=f"{folder.name}.nc").wait_for()
+    page.get_by_role("combobox", name="Role of q").wait_for()
+    assert page.get_by_role("combobox", name="Role of q").input_value() == "output"
+    assert [each.name for each in (desk.folder / "records").rglob("*.nc")] == [f"{folder.name}.nc"]
     assert not said
     assert not own_complaints(window)
     page.close()

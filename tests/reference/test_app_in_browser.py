@@ -136,8 +136,8 @@ def _findings(page: Any) -> list[str]:
     return found
 
 
-def zoomed_by_keys(chart: Any, whole: Any) -> None:
-    """Plus, minus, an arrow and 0 on a chart over time, values by Shift; the whole by a button."""
+def zoomed_by_keys(chart: Any, whole: Any, reading: str = " s: ") -> None:
+    """Plus, minus, an arrow and 0 on a chart, values by Shift; the whole by a button."""
     for back in ("-", "0"):
         chart.press("+")
         chart.press("ArrowLeft")
@@ -145,7 +145,7 @@ def zoomed_by_keys(chart: Any, whole: Any) -> None:
         chart.press(back)
         whole.wait_for(state="detached")
     chart.press("Shift+ArrowRight")
-    chart.get_by_role("status").filter(has_text=" s: ").wait_for()
+    chart.get_by_role("status").filter(has_text=reading).wait_for()
     chart.press("+")
     whole.click()
     whole.wait_for(state="detached")
@@ -194,6 +194,9 @@ def test_from_a_dropped_log_to_a_dragged_band(desk: Desk, tmp_path: Path) -> Non
     page.click("nav >> text=Response")
     page.wait_for_selector(".handle")
     page.locator(".uplot canvas").nth(2).wait_for()
+    assert page.title().startswith("Response · sweeps.bin")
+    chart = page.locator("[role=application][aria-label^='Gain, phase and coherence']")
+    zoomed_by_keys(chart, page.get_by_role("button", name="Whole response"), " Hz: ")
     page.locator(".handle").nth(1).press("ArrowLeft")
     page.locator("pre .changed", has_text="band_rad_s").wait_for()
     low, high = desk.study["model"][0]["band_rad_s"]

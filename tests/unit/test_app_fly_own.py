@@ -24,6 +24,7 @@ from flightid.app.fly_shelf import ModelFile, choice_of, make_shelf, model_files
 from flightid.app.fly_track import GroundTrack
 from flightid.app.fly_vehicles import fly_vehicle
 from flightid.app.run_schemas import RunPart
+from flightid.app.schemas import StudyParts
 from flightid.app.workspace import Workspace
 from flightid.simulation.stepper import Stepper
 from flightid.units import conversion_factor
@@ -95,8 +96,8 @@ def test_a_folder_tells_which_models_fly_and_why_others_do_not(tmp_path: Path) -
         RATE.format(name="Roll", output="p", unit="rad/s")
     )
     part = RunPart(
-        etag="1", folder="run-0123456789abcdef", title="Tuesday", verdict="green", tally="",
-        seconds=1.0, figures=0, sections=[],
+        etag="1", parts=StudyParts(models="1", gains="1"), folder="run-0123456789abcdef",
+        title="Tuesday", verdict="green", tally="", seconds=1.0, figures=0, sections=[],
     )  # fmt: skip
     workspace.keep_result("ab" * 8, "run", part.model_dump())
     if os.name != "nt":

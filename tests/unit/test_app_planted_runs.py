@@ -19,8 +19,9 @@ from flightid.app import run_work
 from flightid.app.kept_parts import kept_part
 from flightid.app.rigs import Rigs
 from flightid.app.run_routes import _left_out, _packed
+from flightid.app.run_schemas import RunPart
 from flightid.app.studies import Studies
-from flightid.app.study_edits import etag_of
+from flightid.app.study_edits import KeyEdit, edited, etag_of, parts_of
 from flightid.app.workspace import Workspace
 from flightid.errors import OptionError, StudyError
 from flightid.report.content import Document
@@ -79,12 +80,17 @@ def test_a_run_takes_and_removes_nothing_that_a_link_leads_to(
     run_work.make_run(study, folder, folder / "run.json")
     assert [each.name for each in mine.iterdir()] == ["notes.txt"]
     assert sorted(each.name for each in folder.glob("run-*") if each.is_dir()) == [own.name]
+    ran = RunPart.model_validate_json((folder / "run.json").read_text()).parts
+    # Words and gains asked for since leave what a run has found of the models as it is.
+    more = f"# mine\n{study.read_text()}\n[tune]\npreset = 'firm'\n"
+    assert (parts_of(more).models, parts_of(more).gains != ran.gains) == (ran.models, True)
+    assert parts_of(edited(more, [KeyEdit(("fit", "starts"), 1)])).models != ran.models
 
 
 def test_a_run_that_names_another_folder_is_none(tmp_path: Path) -> None:
     workspace = Workspace(tmp_path)
-    whole = {"etag": "e", "title": "t", "verdict": "green", "tally": "", "seconds": 1.0,
-             "figures": 0, "sections": []}  # fmt: skip
+    whole = {"etag": "e", "parts": {"models": "m", "gains": "g"}, "title": "t", "tally": "",
+             "verdict": "green", "seconds": 1.0, "figures": 0, "sections": []}  # fmt: skip
     for folder, held in ((f"run-{'a' * 16}", True), ("..", False), ("/etc", False),
                          (f"run-{'a' * 16}\n", False)):  # fmt: skip
         path = workspace.result_path("0" * 16, "run.json")

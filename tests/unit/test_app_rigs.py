@@ -18,7 +18,7 @@ from flightid.app.study_edits import KeyEdit, edited
 from flightid.app.work import answered
 from flightid.app.workspace import Workspace
 from flightid.errors import FileFormatError, OptionError, StudyError
-from flightid.record import read_records
+from flightid.record import read_records, write_records
 from flightid.study.proposal.columns import columns_of
 
 TABLE = b"t,u,y\n0,1,2\n1,0,3\n2,1,1\n"
@@ -112,6 +112,13 @@ def test_a_column_that_stands_still_has_a_row_as_well(tmp_path: Path) -> None:
     assert columns["u2"] | {"unit": ""} == {
         "name": "u2", "unit": "", "samples": 40, "least": 0.5, "most": 0.5,
     }  # fmt: skip
+    # A file of records, as a flight on the page leaves one, has no table of contents.
+    (record,) = read_records(path)
+    write_records(record, tmp_path / "flown.nc")
+    (told,) = make_rig([tmp_path / "flown.nc"], {})["files"]
+    moves = {each["name"]: (each["least"], each["most"]) for each in told["columns"]}
+    assert moves == {"u1": (0.0, 1.0), "u2": (0.5, 0.5), "y": (0.0, 39.0)}
+    assert told["notes"] == []
 
 
 def test_a_table_of_a_list_is_taken_out() -> None:

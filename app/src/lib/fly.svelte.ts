@@ -1,5 +1,5 @@
 import { Refusal } from "./api";
-import type { CooperHarperRating, FlownItem, FlyChoice, FlyFrame, FlyNews, FlyStart, FlySweep, FlySwitch, OwnVehicles } from "./types";
+import type { CooperHarperRating, FlownItem, FlownRecords, FlyChoice, FlyFrame, FlyNews, FlyStart, FlySweep, FlySwitch, OwnVehicles } from "./types";
 
 export type Hand = "pitch" | "roll" | "yaw" | "heave";
 export type Sticks = Record<Hand, number>;
@@ -17,6 +17,8 @@ export const vehicles = () => json<FlyChoice[]>("/api/fly/vehicles");
 export const ownVehicles = () => json<OwnVehicles>("/api/fly/own");
 export const flights = () => json<FlownItem[]>("/api/fly/flights");
 export const finish = (id: string) => json<FlownItem[]>(`/api/fly/flights/${id}/finish`, {});
+/** A copy of the record among the records of rigs, where it can be identified. */
+export const asRecords = (id: string) => json<FlownRecords>(`/api/fly/flights/${id}/records`, {});
 export const rate = (id: string, rating: CooperHarperRating) => json<FlownItem[]>(`/api/fly/flights/${id}/rating`, rating);
 
 /** One instant of the strip: time, stick of the hand, attitude. */

@@ -261,6 +261,11 @@ export interface FlownItem {
   rating: CooperHarperRating | null;
 }
 
+/** The set of records that holds a flight. */
+export interface FlownRecords {
+  id: string;
+}
+
 /** A vehicle to fly; `name` is what `load_model` takes in the folder of the page. */
 export interface FlyChoice {
   name: string;
@@ -827,6 +832,7 @@ export interface RigScreen {
 /** What a run of the study made: its report as a tree, figures by their number. */
 export interface RunPart {
   etag: string;
+  parts: StudyParts;
   folder: string;
   title: string;
   verdict: "green" | "amber" | "red" | "unknown";
@@ -857,6 +863,7 @@ export interface ShownFinding {
   message: string;
   action: string;
   spans_s: [number, number][];
+  first: boolean;
 }
 
 /** A model with equations: what it says of itself. */
@@ -926,10 +933,17 @@ export interface StripLine {
   high: (number | null)[];
 }
 
+/** What parts of a study are known by: a change of one leaves what rests on others as it is. */
+export interface StudyParts {
+  models: string;
+  gains: string;
+}
+
 /** A study file, its tag, and what the page reads off it. */
 export interface StudyText {
   text: string;
   etag: string;
+  parts: StudyParts;
   settings: Record<string, unknown>;
   python: string;
   outside: string[];

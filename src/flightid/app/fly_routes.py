@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import AsyncIterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
@@ -10,6 +11,7 @@ from typing import Annotated
 from fastapi import FastAPI, HTTPException, Response, WebSocket, WebSocketDisconnect
 from pydantic import Field, TypeAdapter, ValidationError
 
+from flightid.app import rig_work
 from flightid.app.backstage import Backstage, made
 from flightid.app.fly_deck import FlightDeck
 from flightid.app.fly_journal import (
@@ -22,6 +24,7 @@ from flightid.app.fly_journal import (
 from flightid.app.fly_schemas import (
     CooperHarperRating,
     FlownItem,
+    FlownRecords,
     FlyChoice,
     FlyNews,
     FlyOrder,
@@ -34,6 +37,8 @@ from flightid.app.fly_schemas import (
 from flightid.app.fly_shelf import choice_of, make_shelf, model_files
 from flightid.app.fly_vehicles import VEHICLES
 from flightid.app.own_folders import is_link
+from flightid.app.removed import RemovedList
+from flightid.app.rigs import Rigs
 from flightid.errors import FlightidError
 
 FlyCommand = FlyStart | FlyStick | FlySwitch | FlySweep | FlyOrder
@@ -90,11 +95,24 @@ def add_fly_routes(app: FastAPI, backstage: Backstage) -> None:
 
     @app.get("/api/fly/flights/{flight}/record", response_class=Response)
     def record(flight: str) -> Response:
-        path = _known(workspace, flight) / RECORD
-        if is_link(path) or not path.is_file() or path.stat().st_size > MOST_RECORD_BYTES:
-            raise HTTPException(404, "This flight has no record.")
+        content = _record_bytes(_known(workspace, flight))
         attached = {"content-disposition": f'attachment; filename="{flight}.nc"'}
-        return Response(path.read_bytes(), media_type="application/x-netcdf", headers=attached)
+        return Response(content, media_type="application/x-netcdf", headers=attached)
+
+    @app.post("/api/fly/flights/{flight}/records")
+    async def shelve(flight: str) -> FlownRecords:
+        """Its record among those of rigs, as if it had been dropped; once more, it is the same."""
+        folder = await asyncio.to_thread(_known, workspace, flight)
+
+        async def check(path: Path) -> str:
+            return (await backstage.workers.live(rig_work.require_table, path))[1]
+
+        async def pieces() -> AsyncIterator[bytes]:
+            yield await asyncio.to_thread(_record_bytes, folder)
+
+        taken = await Rigs(backstage.workspace).take(f"{flight}.nc", pieces(), check=check)
+        await asyncio.to_thread(RemovedList(backstage.workspace).put_back, taken)
+        return FlownRecords(id=taken)
 
     _add_socket(app, deck)
 
@@ -193,6 +211,13 @@ async def _obey(deck: FlightDeck, asked: FlyCommand, news: NewestFrame) -> None:
             await asyncio.to_thread(deck.stop)
     except (FlightidError, OSError) as error:
         news.put(FlyNews(state="refused", words=str(error)))
+
+
+def _record_bytes(folder: Path) -> bytes:
+    path = folder / RECORD
+    if is_link(path) or not path.is_file() or path.stat().st_size > MOST_RECORD_BYTES:
+        raise HTTPException(404, "This flight has no record.")
+    return path.read_bytes()
 
 
 def _known(workspace: Path, flight: str) -> Path:

@@ -157,6 +157,12 @@ class FlownItem(Message):
     rating: CooperHarperRating | None
 
 
+class FlownRecords(Message):
+    """The set of records that holds a flight."""
+
+    id: str
+
+
 class FlyNews(Message):
     """What the socket tells: a frame, a state with its words, or a flight that was kept."""
 

@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from flightid.app.overview import light_of
 from flightid.app.own_folders import is_link
 from flightid.app.pyramid import Pyramid
@@ -105,10 +107,11 @@ def _file(path: Path, reading: Mapping[str, Any]) -> RigFile:
     try:
         table = table_contents(path)
         columns = [_column(row) for row in table.rows]
-        notes = [each for each in table.notes if not each.startswith("Next:")]
+        # What is said of columns holds for tables; a file of records has none.
+        notes = [each for each in table.notes if columns and not each.startswith("Next:")]
         records = _records(path, reading)
         manoeuvres = [_manoeuvre(each) for each in records]
-        columns += _still(records, {each.name for each in columns})
+        columns += _unlisted(records, {each.name for each in columns})
     except FlightidError as error:
         said = str(error)
     return RigFile(name=path.name, columns=columns, notes=notes, manoeuvres=manoeuvres, error=said)
@@ -119,19 +122,24 @@ def _column(row: tuple[Any, ...]) -> RigColumn:
     return RigColumn(name=name, unit=unit or "", samples=samples, least=least, most=most)
 
 
-def _still(records: Sequence[Record], told: set[str]) -> list[RigColumn]:
-    """Channels that never move in this file, which its table of contents leaves out."""
-    still: dict[str, RigColumn] = {}
+def _unlisted(records: Sequence[Record], told: set[str]) -> list[RigColumn]:
+    """Channels that a table of contents leaves out: what never moves, or all of a file of records.
+
+    Their ends are unknown where a file holds no number of them.
+    """
+    found: dict[str, list[np.ndarray]] = {}
+    units: dict[str, str] = {}
     for record in records:
-        for name in record.channels:
-            if name not in told and name not in still:
-                held = float(record[name][0])
-                unit = record.unit(name)
-                column = RigColumn(name=name, unit=unit, samples=0, least=held, most=held)
-                still[name] = column
-            if name in still:
-                still[name].samples += record.n_samples
-    return list(still.values())
+        for name in (each for each in record.channels if each not in told):
+            found.setdefault(name, []).append(record[name])
+            units.setdefault(name, record.unit(name))
+    return [_of_samples(name, units[name], np.concatenate(parts)) for name, parts in found.items()]
+
+
+def _of_samples(name: str, unit: str, samples: np.ndarray) -> RigColumn:
+    held = samples[np.isfinite(samples)]
+    least, most = (float(held.min()), float(held.max())) if held.size else (None, None)
+    return RigColumn(name=name, unit=unit, samples=samples.size, least=least, most=most)
 
 
 def _manoeuvre(record: Record) -> RigManoeuvre:

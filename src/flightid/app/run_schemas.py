@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import Field
 
-from flightid.app.schemas import Job, Light, Message
+from flightid.app.schemas import Job, Light, Message, StudyParts
 
 RUN = r"^run-[0-9a-f]{16}$"
 """Name of the folder of a run: nothing that leads elsewhere."""
@@ -16,6 +16,7 @@ class RunPart(Message):
     """What a run of the study made: its report as a tree, figures by their number."""
 
     etag: str
+    parts: StudyParts
     folder: str = Field(pattern=RUN)
     title: str
     verdict: Light

@@ -11,7 +11,7 @@ from typing import Any
 from flightid.app.overview import light_of
 from flightid.app.own_folders import is_link
 from flightid.app.run_schemas import RunPart
-from flightid.app.study_edits import etag_of
+from flightid.app.study_edits import etag_of, parts_of
 from flightid.app.study_reach import require_inside
 from flightid.app.work import KEPT
 from flightid.files import write_atomically
@@ -24,7 +24,8 @@ FIGURES = "page-figures.json"
 def make_run(study: Path, folder: Path, result: Path) -> None:
     """Run a study into a folder named by its version, and write what the page shows of it."""
     require_inside(study.parent.parent, study)
-    etag = etag_of(study.read_text(encoding="utf-8"))
+    text = study.read_text(encoding="utf-8")
+    etag = etag_of(text)
     begun = time.perf_counter()
     name = f"run-{etag.strip(chr(34))[:16]}"
     if is_link(folder / name):  # Planted: a run would take, and later delete, what it leads to.
@@ -37,6 +38,7 @@ def make_run(study: Path, folder: Path, result: Path) -> None:
     write_atomically(folder / f"{name}-{FIGURES}", json.dumps(figures, allow_nan=False))
     part = RunPart(
         etag=etag,
+        parts=parts_of(text),
         folder=name,
         title=made.document.title,
         verdict=light_of(made.document.verdict),

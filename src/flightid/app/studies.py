@@ -11,7 +11,7 @@ from fastapi import HTTPException
 from flightid.app.own_folders import read_plain, shown_name
 from flightid.app.python_lines import python_lines
 from flightid.app.schemas import Edits, StudyText, WholeText
-from flightid.app.study_edits import KeyEdit, edited, etag_of, write_study
+from flightid.app.study_edits import KeyEdit, edited, etag_of, parts_of, write_study
 from flightid.app.study_reach import outside_places
 from flightid.app.workspace import ID, Workspace
 from flightid.errors import FlightidError, StudyError
@@ -61,6 +61,7 @@ class Studies:
         return StudyText(
             text=text,
             etag=etag_of(text),
+            parts=parts_of(text),
             settings=_tables(path),
             python=UNOPENED if outside else _python(path),
             outside=outside,
