@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
@@ -31,13 +33,14 @@ def write_ordinary_log(
     size: float = 0.25,
     motors_us: tuple[float, ...] = (1500.0, 1500.0, 1500.0, 1500.0),
     vibe: float = 8.0,
+    parameters: Mapping[str, float] = MappingProxyType({}),
 ) -> Flown:
     """Write a log whose roll axis flew in angle mode, logged at every `every`-th tick."""
     flown = ordinary(axis or Axis(), seed, duration_s, acro=False, size=size)
     stamps = (1e7 + 1e6 * flown.time_s).astype(np.int64)
     writer = DataflashWriter()
     writer.message(int(stamps[0]), "ArduCopter V4.6.0 (test)")
-    for name, value in PARAMETERS.items():
+    for name, value in {**PARAMETERS, **parameters}.items():
         writer.parameter(name, value)
     rows = slice(None, None, every)
     writer.add(

@@ -21,7 +21,8 @@ Array = noises.Array
 class Axis:
     """A body axis: effectiveness, damping, motor lag and delay, and the gains about it.
 
-    Gains in the autopilot's own units: rad/s in, normalised command out.
+    Gains in the autopilot's own units: rad/s in, normalised command out. An error of the angle that
+    would ask for more than the acceleration `brake` (rad/s²; 0: none) is answered by its root.
     """
 
     form: str = "ardupilot"
@@ -34,6 +35,7 @@ class Axis:
     i: float = 0.12
     d: float = 0.0035
     angle_p: float = 4.5
+    brake: float = 0.0
     target_hz: float = 20.0
     derivative_hz: float = 20.0
     gyro_hz: float = 40.0
@@ -93,7 +95,7 @@ def fly(
         raw = rate + noisy[k]
         seen = b[0] * raw + z1
         z1, z2 = b[1] * raw - a[1] * seen + z2, b[2] * raw - a[2] * seen
-        asked = axis.angle_p * (angles[k] - angle) if angles is not None else wanted[k]
+        asked = _turned(axis, angles[k] - angle) if angles is not None else wanted[k]
         target += at * (asked - target)
         error = target - seen
         total += axis.i * error * h
@@ -114,6 +116,14 @@ def fly(
         np.zeros(n) if angle_wanted is None else angle_wanted,
         *np.array(out).T.copy(),
     )
+
+
+def _turned(axis: Axis, error: float) -> float:
+    """Rate that an angle's error asks for: what stops in time at the acceleration, if any."""
+    most = axis.brake / axis.angle_p**2
+    if axis.brake <= 0.0 or abs(error) <= most:
+        return axis.angle_p * error
+    return float(np.copysign(np.sqrt(2.0 * axis.brake * (abs(error) - most / 2.0)), error))
 
 
 def _biquad(hz: float, rate_hz: float) -> tuple[list[float], list[float]]:

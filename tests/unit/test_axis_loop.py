@@ -17,6 +17,7 @@ from flightid.control.autopilots import (
     defaults,
     gain_ranges,
 )
+from flightid.control.autopilots.angle_law import angle_law
 from flightid.control.autopilots.arducopter import ArduCopterLoop
 from flightid.control.autopilots.gyro_notches import (
     GyroNotches,
@@ -25,6 +26,7 @@ from flightid.control.autopilots.gyro_notches import (
     px4_notches,
 )
 from flightid.control.autopilots.parameter_table import parameter_entries
+from flightid.vehicles import Autopilot
 from tests.closeness import assert_close
 
 COPTER = {**defaults("arducopter", "roll"), "SCHED_LOOP_RATE": 400.0}
@@ -104,8 +106,37 @@ def test_angle_controller_brakes_with_half_the_acceleration(axis: str, degrees: 
     small, edge, large = loop.rate_setpoint([0.5 * linear, linear, 2.0 * linear])
     assert_close([small, edge], [2.25 * linear, 4.5 * linear], rtol=1e-12, why="proportional")
     assert_close(large, np.sqrt(2 * most * 1.5 * linear), rtol=1e-12, why="square root")
+    flown = Autopilot().to_native()["acceleration_rad_s2"][0 if axis == "roll" else 2]
+    assert_close(flown, most, rtol=2e-3, why="the simulated autopilot plans as the real one")
     free = loop.with_gains({loop.names["acceleration"]: 0.0}).rate_setpoint(2.0 * linear)
     assert_close(free, [9.0 * linear], rtol=1e-12, why="no bound")
+
+
+@pytest.mark.parametrize(
+    ("autopilot", "axis", "parameters", "degrees"),
+    [
+        ("arducopter", "roll", {"ATC_ANG_RLL_P": 9.0, "ATC_ACCEL_R_MAX": 110_000.0}, 550 / 81),
+        ("arduheli", "pitch", {"ATC_ANG_PIT_P": 9.0, "ATC_ACC_P_MAX": 1_100.0}, 550 / 81),
+        ("arducopter", "yaw", {"ATC_ANG_YAW_P": 4.0, "ATC_ACCEL_Y_MAX": 27_000.0}, 120 / 16),
+        (
+            "arducopter", "roll",
+            {"ATC_ANG_RLL_P": 9.0, "ATC_ACCEL_R_MAX": 110_000.0, "ATC_RATE_R_MAX": 45.0}, 5.0,
+        ),
+        ("arducopter", "roll", {"ATC_ANG_RLL_P": 9.0, "ATC_ACCEL_R_MAX": 0.0}, np.inf),
+        ("px4_multicopter", "roll", {"MC_ROLL_P": 4.0, "MC_ROLLRATE_MAX": 70.0}, 17.5),
+        ("arduplane", "pitch", {"PTCH2SRV_TCONST": 0.5, "PTCH2SRV_RMAX_DN": 20.0}, 10.0),
+        ("px4_fixed_wing", "roll", {"FW_R_TC": 0.4, "FW_R_RMAX": 70.0}, 28.0),
+        ("arduplane", "pitch", {"PTCH2SRV_TCONST": 0.5, "Q_ENABLE": 1.0}, None),
+        ("betaflight", "roll", {"rc_rates": 100.0}, None),
+    ],
+)  # fmt: skip
+def test_angle_controllers_are_proportional_up_to_what_their_parameters_say(
+    autopilot: str, axis: str, parameters: dict[str, float], degrees: float | None
+) -> None:
+    found = angle_law(autopilot, parameters, axis)
+    assert (None if found is None else np.degrees(found.proportional_to_rad)) == (
+        degrees if degrees is None else pytest.approx(degrees, rel=1e-9)
+    )
 
 
 def test_run_goes_on_from_a_given_state() -> None:

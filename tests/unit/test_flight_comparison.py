@@ -18,7 +18,7 @@ from flightid.errors import DataError
 from flightid.plot.flight import compared_steps
 from flightid.review.changes import BY_FREQUENCY, TRACKING, change_of, verdicts
 from flightid.review.comparison import compare_loops
-from flightid.review.next_step import flown_step
+from flightid.review.next_step import FlownStep, flown_step
 from flightid.review.promised import promised_loops
 from flightid.uncertainty.estimate import Estimate
 from flightid.uncertainty.uneven import DrawnEnds
@@ -26,6 +26,7 @@ from flightid.vehicles import Autopilot, Turbulence, fly, rate_truth, write_ardu
 from tests.closeness import assert_close
 from tests.ordinary_log import write_ordinary_log
 from tests.strangers.ordinary_flights import Axis
+from tests.strangers.ordinary_flights import step as true_step
 from tests.unit.test_flight_plan import ordinary
 
 LIVELIER = {"ATC_RAT_RLL_P": 0.12, "ATC_RAT_RLL_I": 0.12, "ATC_RAT_RLL_D": 0.0033}
@@ -104,6 +105,38 @@ def test_a_slower_loop_is_amber_and_its_way_back_is_not(
         3.0 * (again[f"{quick.name}, {TRACKING}"].before.value or 0.0),
         rtol=1e-9, why="the same error of a third of the set-point",
     )  # fmt: skip
+
+
+def test_large_moves_of_an_angle_are_not_held_against_small_ones(tmp_path: Path) -> None:
+    """Of 10 such flights the whole flight's rise time is 26 % long in the mean, none inside."""
+    log, axis = tmp_path / "some.bin", Axis(angle_p=8.0, brake=9.6)
+    told = {"ATC_ANG_RLL_P": 8.0, "ATC_ACCEL_R_MAX": 110_008.0}
+    small = true_step(replace(axis, brake=0.0), 1.5, angle=True)
+    truth = np.argmax(small >= 0.5) / axis.loop_hz
+    loops = {}
+    for name, size in (("some", 0.25), ("all", 0.6)):
+        made = log.with_stem(name)
+        write_ordinary_log(made, axis=axis, size=size, duration_s=40.0, parameters=told)
+        loops[name] = fid.review_flight(made)["roll attitude"]
+    low, high = loops["some"]["delay to half"].interval95 or (0.0, 0.0)
+    assert low < truth < high
+    assert "ATC_ACCEL_R_MAX makes the angle controller" in loops["some"].how
+    assert not loops["some"].is_bent
+    large = loops["all"]
+    assert large.is_bent
+    assert (large["delay to half"].interval95 or (0.0, 0.0))[0] > 1.1 * truth
+    rate = replace(large, loop="rate", is_bent=False)
+    quick = (replace(loops["some"], beyond=""), rate)
+    promise = compare_loops(quick, (large, rate), ("models", "b"), promised=True)
+    assert {each.loop for each in promise.changes} == {"roll rate"}
+    assert promise.findings[-1].code == "beyond-angle-law"
+    assert "moves of the roll stick by 8.6 deg at once" in promise.findings[-1].action
+    assert promise.kept is None
+    back = FlownStep(log, log, log).finding(kept=promise.kept)
+    assert (back.light, "load" in back.action) == (Light.UNKNOWN, False)
+    flights = compare_loops(quick[:1], (large,), ("a", "b"), promised=False)
+    assert [each.light for each in flights.findings] == [Light.UNKNOWN]
+    assert "whose sticks moved as far" in flights.findings[0].action
 
 
 def test_gains_filters_and_other_vehicles_are_said(

@@ -28,7 +28,7 @@ from flightid.review.gyro_noise import GyroNoise
 from flightid.review.loops import _pair, refused, tracking_error
 from flightid.review.motors import motor_use, turning, yaw_trim
 from flightid.review.verdicts import judge_flight
-from flightid.uncertainty.estimate import Estimate
+from flightid.uncertainty.estimate import Estimate, Reading
 from flightid.uncertainty.uneven import DrawnEnds
 from tests.closeness import assert_close
 from tests.ordinary_log import write_ordinary_log
@@ -203,11 +203,16 @@ def test_measured_loops_stand_beside_what_models_have(review: fid.FlightReview) 
 
 
 @pytest.mark.parametrize(
-    ("over", "error", "light"),
-    [(10.0, 5.0, Light.GREEN), (50.0, 5.0, Light.AMBER), (40.0, 25.0, Light.UNKNOWN)],
+    ("over", "error", "light", "gains"),
+    [
+        (10.0, 5.0, Light.GREEN, ""),
+        (50.0, 5.0, Light.AMBER, "lower I"),
+        (33.0, 4.0, Light.AMBER, "which gain, sweeps tell: flightid plan"),
+        (40.0, 25.0, Light.UNKNOWN, ""),
+    ],
 )
 def test_large_overshoot_is_amber_and_wide_intervals_are_not_green(
-    review: fid.FlightReview, over: float, error: float, light: Light
+    review: fid.FlightReview, over: float, error: float, light: Light, gains: str
 ) -> None:
     loop = review["roll rate"]
     told = Estimate("overshoot", over, "%", error)
@@ -216,14 +221,22 @@ def test_large_overshoot_is_amber_and_wide_intervals_are_not_green(
     step = next(f for f in found if f.code == "step-roll-rate")
     assert step.light is light
     assert bool(step.action) is (light is not Light.GREEN)
+    assert gains in step.action
+    _with_sweeps(review, readings, gains)
 
 
 @pytest.mark.parametrize(
-    ("level", "error", "said"),
-    [(0.54, 0.03, "short of"), (1.5, 0.1, "beyond"), (0.54, 0.3, ""), (0.95, 0.01, "")],
+    ("level", "error", "said", "gains"),
+    [
+        (0.54, 0.03, "short of", "raise I"),
+        (0.8, 0.05, "short of", "which gain, sweeps tell: flightid plan"),
+        (1.5, 0.1, "beyond", ""),
+        (0.54, 0.3, "", ""),
+        (0.95, 0.01, "", ""),
+    ],
 )
 def test_a_loop_that_ends_far_from_what_is_asked_is_amber(
-    review: fid.FlightReview, level: float, error: float, said: str
+    review: fid.FlightReview, level: float, error: float, said: str, gains: str
 ) -> None:
     loop = review["roll rate"]
     told = Estimate("level", level, "1", error)
@@ -234,6 +247,17 @@ def test_a_loop_that_ends_far_from_what_is_asked_is_amber(
     assert step.light is (Light.AMBER if said else Light.GREEN)
     assert (f"it stays {said} what is asked" in step.message) is bool(said)
     assert bool(step.action) is bool(said)
+    assert gains in step.action
+    _with_sweeps(review, readings, gains)
+
+
+def _with_sweeps(review: fid.FlightReview, readings: tuple[Reading, ...], gains: str) -> None:
+    """Where sweeps were flown no gain is named: a model weighs them, and may say otherwise."""
+    loop = replace(review["roll rate"], readings=readings)
+    found = judge_flight(replace(review, loops=(loop,), swept=True))
+    step = next(f for f in found if f.code == "step-roll-rate")
+    assert ("flightid tune" in step.action) is bool(gains)
+    assert not any(word in step.action for word in ("raise I", "lower I"))
 
 
 def test_a_yaw_moment_is_mended_before_the_limits_that_it_leads_to(

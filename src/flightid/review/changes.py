@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence
 
 from flightid.conventions import Light
 from flightid.dynamics.conditions.ratios import chance_of, difference_of, holm
@@ -151,9 +151,16 @@ def change_table(
 
 
 def verdicts(
-    changes: Sequence[LoopChange], significant: Sequence[str], *, promised: bool = False
+    changes: Sequence[LoopChange],
+    significant: Sequence[str],
+    *,
+    promised: bool = False,
+    bent: Container[str] = (),
 ) -> Iterator[Finding]:
-    """One verdict for each loop that changed, or that none did."""
+    """One verdict for each loop that changed, or that none did.
+
+    Loops that are `bent` were moved farther than their controller is proportional to.
+    """
     by_loop: dict[str, list[LoopChange]] = {}
     for each in changes:
         if each.key in significant and (each.is_material or not promised):
@@ -166,7 +173,7 @@ def verdicts(
                 "look at the steps before you fly more",
             )  # fmt: skip
         else:
-            yield _changed(f"{loop}, before → after: {said}", found)
+            yield _changed(f"{loop}, before → after: {said}", found, bent=loop in bent)
     if not any(each.chance is not None for each in changes):
         yield Finding(
             "loops-not-judged", Light.UNKNOWN,
@@ -185,8 +192,11 @@ def verdicts(
         yield Finding(code, Light.GREEN, f"{said}: {told}")
 
 
-def _changed(said: str, found: list[LoopChange]) -> Finding:
-    """Amber where something got worse; not judged where it did by little, or tracking alone."""
+def _changed(said: str, found: list[LoopChange], *, bent: bool) -> Finding:
+    """Amber where something got worse; not judged by little, by tracking alone, or of large moves.
+
+    A bent loop answers large moves less than in proportion: its step goes by how far it was moved.
+    """
     worse = [each.name for each in found if each.is_worse]
     if not worse:
         little = [each.name for each in found if each.is_slightly_worse]
@@ -197,5 +207,8 @@ def _changed(said: str, found: list[LoopChange]) -> Finding:
     if worse == [TRACKING]:
         action = "compare flights whose sticks moved alike: quicker sticks are tracked worse"
         return Finding("loop-changed", Light.UNKNOWN, said, action)
+    if bent:
+        action = "compare flights whose sticks moved as far: the angle controller answers large "
+        return Finding("loop-changed", Light.UNKNOWN, said, action + "moves more slowly than small")
     action = f"worse: {', '.join(worse)}; look at the loops and at what was set otherwise, and go "
     return Finding("loop-changed", Light.AMBER, said, action + "back unless you wanted it")

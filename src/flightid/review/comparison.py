@@ -73,9 +73,12 @@ class FlightComparison(Result, schema="flightid.flight_comparison/1"):
     findings: tuple[Finding, ...]
 
     @property
-    def kept(self) -> bool:
-        """Whether nothing was found that asks for a look."""
-        return all(each.light is Light.GREEN for each in self.findings)
+    def kept(self) -> bool | None:
+        """Whether nothing was found that asks for a look; None where a part was not judged."""
+        lights = {each.light for each in self.findings}
+        if lights & {Light.AMBER, Light.RED}:
+            return False
+        return None if Light.UNKNOWN in lights else True
 
     def __getitem__(self, name: str) -> LoopChange:
         """A change by ``"roll rate, rise time"``.
@@ -180,7 +183,8 @@ def compare_loops(
     promised: bool,
 ) -> FlightComparison:
     """Put the loops of two flights, or of a promise and a flight, side by side."""
-    later = {loop.name: loop for loop in after}
+    bent = {loop.name: loop for loop in (*before, *after) if loop.is_bent and loop.is_told}
+    later = {loop.name: loop for loop in after if not (promised and loop.is_bent)}
     changes = tuple(
         change_of(loop.name, reading, answer)
         for loop in before
@@ -198,11 +202,12 @@ def compare_loops(
             action="see flightid flight LOG of each for what to fly",
         )
     kept = significant_of(changes)
-    judged = list(verdicts(changes, kept, promised=promised))
+    judged = list(verdicts(changes, kept, promised=promised, bent=bent))
     if "vehicle" in unlike or "frame" in unlike:
         # Of two vehicles no difference praises what was set, and no likeness either.
         judged = [replace(e, light=Light.UNKNOWN) if e.light is Light.GREEN else e for e in judged]
-    findings = (*_unlike(unlike), *judged)
+    unfit = [bent[loop.name] for loop in before if promised and loop.name in bent]
+    findings = (*_unlike(unlike), *judged, *map(_beyond, unfit))
     return FlightComparison(
         names, promised, changes, before, after, gains, filters, unlike, kept, findings
     )
@@ -229,6 +234,12 @@ def _readings(loop: LoopResponse, end_s: float) -> dict[str, Reading]:
     if loop.tracking is not None and loop.moved:
         found[TRACKING] = loop.tracking.scaled(100.0 / loop.moved, name=TRACKING, unit="%")
     return found
+
+
+def _beyond(loop: LoopResponse) -> Finding:
+    """That a promise, which is of small moves, is not held against large ones."""
+    said = f"{loop.name}: not compared with what was promised of small moves: {loop.beyond}"
+    return Finding("beyond-angle-law", Light.UNKNOWN, said, f"{loop.action}, and compare again")
 
 
 def _unlike(unlike: Mapping[str, tuple[str, str]]) -> Iterator[Finding]:

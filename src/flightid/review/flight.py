@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from flightid.inspection.actuators import find_actuators
+from flightid.inspection.excitation_found import injected_spans
 from flightid.inspection.flight_phases import flight_phases
 from flightid.inspection.signals import find
 from flightid.inspection.stamps import log_span
@@ -85,5 +86,6 @@ def review_flight(
         noise=noise,
         filters=filter_review(opened, phases.airborne, noise, loops),
         throttle=find(opened, "thrust"),
+        swept=bool(injected_spans(opened)),
     )
     return replace(found, findings=judge_flight(found))

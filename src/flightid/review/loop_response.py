@@ -47,6 +47,11 @@ class LoopResponse(
         Why there is no step.
     action : str
         What to fly or log for one.
+    beyond : str
+        How far errors went beyond those to which the angle controller is proportional; empty where
+        they did not.
+    is_bent : bool
+        Whether the step holds such moves: it is slower than that of small ones.
 
     Example
     -------
@@ -70,6 +75,8 @@ class LoopResponse(
     readings: tuple[Reading, ...] = ()
     reason: str = ""
     action: str = ""
+    beyond: str = ""
+    is_bent: bool = False
 
     @property
     def name(self) -> str:
@@ -142,9 +149,11 @@ class LoopResponse(
         if not self.used_s:
             return ""
         pieces = f" in {self.pieces} pieces" if self.pieces > 1 else ""
+        large = "" if self.is_bent else ": left out"
+        beyond = f" In the flight {self.beyond}{large}." if self.beyond else ""
         return (
             f"{self.set_point} to {self.measured}, {self.used_s:.3g} s{pieces} at "
-            f"{self.rate_hz:.3g} Hz."
+            f"{self.rate_hz:.3g} Hz.{beyond}"
         )
 
     def _computed(self) -> dict[str, object]:

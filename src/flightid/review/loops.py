@@ -19,6 +19,7 @@ from flightid.logs import Log
 from flightid.record import Record
 from flightid.review.deconvolution import LoopDraws, LoopSamples, closed_loop
 from flightid.review.loop_response import LoopResponse
+from flightid.review.proportional import Excess, excess_of
 from flightid.review.step_features import (
     frequency_features,
     step_features,
@@ -109,21 +110,40 @@ def _loop(log: Log, spans: tuple[Span, ...], axis: str, loop: str) -> LoopRespon
     blank = LoopResponse(axis, loop, *labels, 0.0, 0.0, 0, None, None, EMPTY, EMPTY, EMPTY)
     if not spans:
         return replace(blank, reason="nothing was flown", action="hand in a log of a flight")
-    uneven = _uneven(pair, spans)
-    if uneven:
-        return replace(blank, reason=uneven, action=logging(log))
     pieces = _pieces(pair, spans)
-    if not pieces:
-        return replace(blank, reason="no span in the air of 2 s holds both", action=logging(log))
-    begun = replace(
-        blank,
-        pieces=len(pieces),
-        tracking=tracking_error(pieces, "rad/s" if loop == "rate" else "rad"),
-    )
-    tick_s = 1.0 / loop_rate_hz(log) if loop_rate_hz(log) else 0.0
-    made = _stepped(begun, pieces, FASTEST[loop].value, tick_s, logging(log))
+    unfit = _uneven(pair, spans) or ("" if pieces else "no span in the air of 2 s holds both")
+    if unfit:
+        return replace(blank, reason=unfit, action=logging(log))
+    begun = replace(blank, tracking=tracking_error(pieces, "rad/s" if loop == "rate" else "rad"))
+    excess = excess_of(log, axis, pieces) if loop == "attitude" else None
+    if excess is None:
+        return _read(log, begun, pieces)
+    small = _pieces(pair, without(spans, list(excess.spans)))
+    return _in_proportion(log, begun, excess, pieces, small)
+
+
+def _in_proportion(
+    log: Log, begun: LoopResponse, excess: Excess, pieces: list[Record], small: list[Record]
+) -> LoopResponse:
+    """The step of small errors where the flight tells it, else that of all, which says so."""
+    made = _read(log, begun, small) if small else begun
+    if made.is_told:
+        return replace(made, beyond=excess.words)
+    made = _read(log, begun, pieces)
+    if not made.is_told:
+        return made
+    return replace(made, beyond=excess.words, is_bent=True, action=excess.action)
+
+
+def _read(log: Log, begun: LoopResponse, pieces: list[Record]) -> LoopResponse:
+    """The step of pieces of a flight, of finer samples where it rises within too few."""
+    known = replace(begun, pieces=len(pieces))
+    fastest_hz, tick_s = FASTEST[begun.loop].value, 0.0
+    if rate_hz := loop_rate_hz(log):
+        tick_s = 1.0 / rate_hz
+    made = _stepped(known, pieces, fastest_hz, tick_s, logging(log))
     if TOO_SLOW in made.reason and made.rate_hz < 0.7 * pieces[0].sample_rate_hz:
-        made = _stepped(begun, pieces, FINER * FASTEST[loop].value, tick_s, logging(log))
+        made = _stepped(known, pieces, FINER * fastest_hz, tick_s, logging(log))
     return made
 
 

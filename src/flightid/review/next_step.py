@@ -33,9 +33,14 @@ class FlownStep:
     following: Path | None
     back: Path | None
 
-    def finding(self, *, kept: bool) -> Finding:
-        """What to do after this step, by whether the flight kept what was promised."""
+    def finding(self, *, kept: bool | None) -> Finding:
+        """What to do after this step, by whether the flight kept its promise; None: in part."""
         said = f"this log flew {self.flown.name}"
+        if kept is None:
+            return Finding(
+                "step-not-judged", Light.UNKNOWN, f"{said}; not all that it promised was judged",
+                "fly these gains again as asked for above before the next step",
+            )  # fmt: skip
         if not kept:
             back = "the gains before it" if self.back is None else str(self.back)
             return Finding("step-back", Light.AMBER, f"{said}, and not as promised", f"load {back}")

@@ -76,10 +76,11 @@ def promised_loops(sources: Iterable[object], log: Log) -> tuple[LoopResponse, .
 def _angle_alone(log: Log, axis: str) -> bool:
     """Whether an angle's set-point acts by the angle controller alone, as the promise has it.
 
-    Sticks ask for yaw rates, and ArduPilot adds the set-point's own rate unless told not to.
+    Sticks ask for yaw rates. ArduPilot adds the set-point's own rate unless told not to, and PX4
+    that of its reference model where it has one (MC_REF_FF).
     """
     fed = log.kind == "ardupilot" and log.parameters.get("ATC_RATE_FF_ENAB", 1.0) != 0.0
-    return axis != "yaw" and not fed
+    return axis != "yaw" and not fed and log.parameters.get("MC_REF_FF", 0.0) <= 0.0
 
 
 def _promised(source: object, axes: list[str], loops: list[AxisLoop]) -> list[LoopResponse]:

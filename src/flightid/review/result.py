@@ -59,6 +59,8 @@ class FlightReview(
         Verdicts with what to do.
     throttle : Signal or None
         Thrust that was asked for, share of the most; None where it is not logged.
+    swept : bool
+        Whether the autopilot flew sweeps, whose models weigh gains as no step does.
 
     Example
     -------
@@ -84,6 +86,7 @@ class FlightReview(
     filters: FilterReview
     findings: tuple[Finding, ...] = ()
     throttle: Signal | None = None
+    swept: bool = False
 
     @property
     def verdict(self) -> Light:

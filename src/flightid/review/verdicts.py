@@ -91,7 +91,10 @@ def _loops(review: FlightReview) -> Iterator[Finding]:
             f"{loop.name}: ends at {cell(loop['level'])} of what is asked, half way there after "
             f"{half} ms, overshoots by {over} %"
         )
-        yield Finding(f"step-{loop.axis}-{loop.loop}", *_level(loop, *_overshoot(loop, said)))
+        if loop.is_bent:
+            said += f" (of large moves: {loop.beyond})"
+        told = _level(review, loop, *_overshoot(review, loop, said))
+        yield Finding(f"step-{loop.axis}-{loop.loop}", *told)
     if not review.phases.airborne:
         return
     for loop in review.loops:
@@ -127,7 +130,17 @@ CALMER = {
 }
 
 
-def _overshoot(loop: LoopResponse, said: str) -> tuple[Light, str, str]:
+def _gains(review: FlightReview, sure: str) -> str:
+    """What to do about gains: what sweeps of the log say, else what a step says that is sure.
+
+    A step does not weigh P against I, as a model does: no gain is named where sweeps were flown.
+    """
+    if review.swept:
+        return f"flightid tune {review.name} weighs the gains by the log's sweeps"
+    return sure or f"which gain, sweeps tell: flightid plan {review.name}, then flightid tune"
+
+
+def _overshoot(review: FlightReview, loop: LoopResponse, said: str) -> tuple[Light, str, str]:
     """Light, message and action: amber where it may be beyond the limit, unknown where all may."""
     over, limit = loop["overshoot"], OVERSHOOT.value
     low, high = over.interval95 or (over.value or 0.0, over.value or 0.0)
@@ -135,13 +148,14 @@ def _overshoot(loop: LoopResponse, said: str) -> tuple[Light, str, str]:
         return Light.UNKNOWN, f"{said}: too uncertain to judge", what_to_fly(loop)
     if high <= limit:
         return Light.GREEN, said, ""
-    said = f"{said}; beyond {limit:g} % damping is poor"
-    return Light.AMBER, said, CALMER[loop.loop]
+    sure, may = low > limit, "" if low > limit else "may be "
+    said = f"{said}; {may}beyond {limit:g} %, where damping is poor"
+    return Light.AMBER, said, _gains(review, CALMER[loop.loop] if sure else "")
 
 
 SHORT = {
-    "rate": "raise I of this loop, and look for motors at a limit, wind, and what the set-point "
-    "is scaled by; replies slower than the window of this step count as missing too",
+    "rate": "look for motors at a limit, wind, and what the set-point is scaled by; replies slower "
+    "than the window of this step count as missing too",
     "attitude": "mend the rate loop first; then look for a trim or wind that holds the angle off",
 }
 LONG = {
@@ -150,13 +164,18 @@ LONG = {
 }
 
 
-def _level(loop: LoopResponse, light: Light, said: str, action: str) -> tuple[Light, str, str]:
+def _level(
+    review: FlightReview, loop: LoopResponse, light: Light, said: str, action: str
+) -> tuple[Light, str, str]:
     """The same, amber where the step ends far from one and its interval leaves one out."""
     level, off = loop["level"], LEVEL_OFF.value
     value = 1.0 if level.value is None else level.value
     ends = level.interval95 or (value, value)
     if value < 1.0 - off and ends[1] < 1.0:
         what, do = "short of what is asked: sticks do not give the motion they stand for", SHORT
+        if loop.loop == "rate":
+            sure = "raise I of this loop" if ends[1] < 1.0 - off else ""
+            action = action or _gains(review, sure)
     elif value > 1.0 + off and ends[0] > 1.0:
         what, do = "beyond what is asked: sticks give more motion than they stand for", LONG
     else:

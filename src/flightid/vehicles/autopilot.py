@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, field, replace
 from typing import Any
 
+from flightid.control.autopilots.angle_law import planned_acceleration
 from flightid.control.autopilots.parameter_table import AXES, Axis
 from flightid.errors import OptionError, UnknownNameError
 from flightid.frozen import dataclass
@@ -170,6 +171,8 @@ class Autopilot(Options):
         """Fields by name, as the native half reads them."""
         fields = asdict(self)
         fields["rate"] = [gains.to_native() for gains in self.rate]
+        most = zip(AXES, self.acceleration_rad_s2, strict=True)
+        fields["acceleration_rad_s2"] = tuple(planned_acceleration(*each) for each in most)
         return fields
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from flightid import _native
+from flightid.control.autopilots.angle_law import planned_acceleration
 from flightid.control.autopilots.ardupilot_loop import ArduPilotLoop
 from flightid.control.autopilots.filters import Omega, Response, delay_operator, difference_response
 from flightid.control.autopilots.loop_run import LoopFlags
@@ -15,8 +16,6 @@ from flightid.frozen import dataclass
 
 LEAK_SHARE = 0.02
 """Part of the excess over ILMI that a helicopter's integrator loses in each loop."""
-BOUNDS_DEG_S2, YAW_BOUNDS_DEG_S2 = (40.0, 720.0), (10.0, 120.0)
-"""Accelerations that the angle controller may plan with."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -61,8 +60,7 @@ class ArduCopterLoop(ArduPilotLoop):
         """
         error = np.ascontiguousarray(np.atleast_1d(angle_error_rad), dtype=np.float64)
         most = np.radians(self.values["acceleration"] / 100.0)
-        bounds = YAW_BOUNDS_DEG_S2 if self.axis == "yaw" else BOUNDS_DEG_S2
-        planned = float(np.clip(most / 2, *np.radians(bounds))) if most > 0 else 0.0
+        planned = planned_acceleration(self.axis, most)
         return _native.square_root_law(error, self.angle_gain_1_s, planned)
 
     def _feedback_terms(self, omega: Omega) -> dict[str, Response]:
