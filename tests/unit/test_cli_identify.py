@@ -9,7 +9,10 @@ import numpy as np
 import pytest
 
 import flightid as fid
+from flightid.cli.log_parts import log_records
 from flightid.cli.program import run
+from flightid.study.proposal import propose_study
+from flightid.vehicles import PilotDoublet, SidActivation, fly, write_ardupilot_log
 
 STEP_S = 0.01
 
@@ -52,3 +55,31 @@ def test_structures_stand_side_by_side(tmp_path: Path, capsys: pytest.CaptureFix
     assert made["rows"]["rate_integrator"]["light"] == "green"
     assert run(words) == 2
     assert "two structures or more" in capsys.readouterr().err
+
+
+def test_a_log_gives_its_sweep_and_its_instrument_as_the_study_of_it_does(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = tmp_path / "flight.BIN"
+    sweep = SidActivation(
+        axis=10, start_s=3.0, start_hz=0.5, stop_hz=8.0, fade_in_s=1.0, record_s=16.0,
+        fade_out_s=1.0, leave_after_s=20.0,
+    )  # fmt: skip
+    doublet = PilotDoublet("roll", start_s=26.0, amplitude=0.2)
+    write_ardupilot_log(fly(runs=[sweep], doublets=[doublet], duration_s=36.0, seed=2), log)
+    asked = ["response", str(log), "--inputs", "tau_phi", "--outputs", "p", "--json"]
+    assert run(asked) in (0, 1)
+    alone = capsys.readouterr()
+    assert "flight.BIN: roll sweep, 14.0 to 30.0 s" in alone.err
+    assert run([*asked, "--run", "0", "--estimator", "instrument"]) in (0, 1)
+    by_hand = capsys.readouterr()
+    assert "roll sweep" not in by_hand.err
+    for key in ("response", "coherence", "estimator"):
+        assert json.loads(alone.out)[key] == json.loads(by_hand.out)[key]
+    study = propose_study([log], folder=tmp_path).text
+    kept = log_records(fid.read_log(log), ["tau_phi", "p"], ["tau_phi"], "unseen")
+    assert kept is not None
+    assert [record.name for record in kept] == ["roll flying"]
+    start_s = kept[0].time_s[0]
+    assert f"span_s = [{round(start_s, 3)}" in study
+    assert log_records(fid.read_log(log), ["tau_psi", "r"], ["tau_psi"], "flown") is None

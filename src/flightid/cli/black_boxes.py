@@ -51,7 +51,7 @@ def channels_of(
     click.UsageError
         Nothing says which channels drive or answer.
     """
-    records = read_files(files, *of_files, **channels)
+    records = read_files(files, *of_files, **channels, take="flown")
     inputs = channels.get("inputs") or records[0].inputs
     outputs = channels.get("outputs") or records[0].outputs
     if not inputs or not outputs:

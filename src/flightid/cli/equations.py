@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from flightid.cli.log_parts import with_instrument
 from flightid.cli.option_fields import parted
 from flightid.cli.records import read_files, reading
 
@@ -92,7 +93,9 @@ def fits_of(
             "the records stand beside it"
         )
     injected = beside_inputs or of_response.get("excitations")
-    read = read_files(files, *of_files, **channels, units=first.units, excitations=injected)
+    read = read_files(
+        files, *of_files, **channels, units=first.units, excitations=injected, take="flown"
+    )
     more: list[Record] = []
     if way == JOINT:
         span = {} if beside_span_s is None else {"span_s": beside_span_s}
@@ -108,6 +111,7 @@ def fits_of(
 
     if not _on_responses(way):
         return fitted(read)
+    of_response = with_instrument(of_response, files, read, first.inputs)
     estimate = partial(estimate_response, read, **channels, loop=loop)
     response = estimate(**of_response)
     found = fitted(response)

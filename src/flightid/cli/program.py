@@ -57,6 +57,7 @@ NOT_VERBS = frozenset(
         "gain_files",
         "hints",
         "lists",
+        "log_parts",
         "model_commands",
         "next_comparison",
         "option_fields",

@@ -12,6 +12,7 @@ from flightid.cli.option_fields import flags_of
 from flightid.cli.output import note
 
 if TYPE_CHECKING:
+    from flightid.cli.log_parts import Take
     from flightid.options import Options
     from flightid.record import Record
 
@@ -52,6 +53,7 @@ def read_files(
     outputs: Sequence[str] | None = None,
     excitations: Sequence[str] | None = None,
     units: Mapping[str, str] | None = None,
+    take: Take | None = None,
 ) -> list[Record]:
     """Records of files, in the units that a model has.
 
@@ -67,6 +69,8 @@ def read_files(
         Channels by role; without them all of a log, and those with a role of a table.
     units : mapping of str to str, optional
         Unit of the model by channel.
+    take : {"flown", "unseen"}, optional
+        Of a log, where no part is named: its sweeps, or what they leave to verify on.
 
     Raises
     ------
@@ -80,7 +84,9 @@ def read_files(
     for file in track(list(files), "Reading"):
         if is_log(file) and not (_names_columns(of_tables, inputs, outputs) and is_table_too(file)):
             _refuse(of_tables, f"tables, and {file.name} is a log")
-            found.append(_from_log(file, of_logs, inputs, outputs, excitations))
+            named = [*(inputs or ()), *(outputs or ()), *(excitations or ())]
+            asked = None if of_logs or not inputs else take
+            found += _from_log(file, of_logs, list(dict.fromkeys(named)), inputs or (), asked)
             continue
         _refuse({"sid_run": None} if "sid_run" in of_logs else {}, "logs")
         found += _from_table(file, of_tables, of_logs, inputs, outputs, excitations)
@@ -103,14 +109,16 @@ def _refuse(given: Mapping[str, Any], owner: str) -> None:
 def _from_log(
     file: Path,
     of_logs: Mapping[str, Any],
-    inputs: Sequence[str] | None,
-    outputs: Sequence[str] | None,
-    excitations: Sequence[str] | None,
-) -> Record:
+    names: list[str],
+    inputs: Sequence[str],
+    take: Take | None,
+) -> list[Record]:
     from flightid import read_log
+    from flightid.cli.log_parts import log_records
 
-    names = [*(inputs or ()), *(outputs or ()), *(excitations or ())]
-    return read_log(file).record(names=list(dict.fromkeys(names)) or None, **of_logs)
+    log = read_log(file)
+    parts = None if take is None else log_records(log, names, inputs, take)
+    return parts or [log.record(names=names or None, **of_logs)]
 
 
 def _from_table(

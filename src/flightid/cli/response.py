@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from flightid.cli.log_parts import with_instrument
 from flightid.cli.option_fields import OptionsCommand, parted
 from flightid.cli.output import (
     WRITTEN,
@@ -63,7 +64,8 @@ def command(
 
     channels, of_response, *of_files = parted(options, _fields())
     injected = of_response.get("excitations")
-    records = read_files(files, *of_files, **channels, excitations=injected)
+    records = read_files(files, *of_files, **channels, excitations=injected, take="flown")
+    of_response = with_instrument(of_response, files, records, channels.get("inputs") or ())
     with progress(None, "Estimating"):
         response = estimate_response(records, **channels, **of_response)
     show_response(response, target, html, as_json=as_json, level=level)

@@ -82,7 +82,7 @@ def command(
     compared = channels.get("outputs") or shared
     flown = read_files(
         records, *of_files, inputs=chosen.inputs, outputs=compared, units=chosen.units,
-        excitations=of_tests.get("excitations"),
+        excitations=of_tests.get("excitations"), take="unseen",
     )  # fmt: skip
     result: Verification | Comparison
     if rivals:

@@ -14,42 +14,17 @@ from flightid.frozen import dataclass
 from flightid.inspection import Inspection, inspect_log
 from flightid.inspection.axes import axes_of
 from flightid.inspection.carried import why_no_model
-from flightid.inspection.excitation_found import FoundExcitation
 from flightid.inspection.log_clock import begins_later
 from flightid.inspection.signals import Span
 from flightid.inspection.usable_band import AxisBand, hertz_words
 from flightid.logs import Log, read_log
-from flightid.logs.dataflash.sid_runs import SidRun
 from flightid.models.save import toml_value
-from flightid.study.proposal.manoeuvres import liveliest
+from flightid.study.proposal.parts import AxisParts, Stretch, axis_parts
 from flightid.study.proposal.proposal import Proposal
 from flightid.study.stage_runner import StageRunner
 
 TEMPLATES = {"roll": "rate_motor_lag", "pitch": "rate_motor_lag", "yaw": "rate_rotor_inertia"}
 """Rate of a multirotor to its mixer's command; in yaw the rotors' own inertia turns it first."""
-CHIRP = "chirp"
-"""Channel of the maps: the chirp of Betaflight, of whichever axis."""
-SEARCHED = ("chirp", "sweep", "autotune")
-"""Excitations without a logged injection from which a model may be tried."""
-
-
-@dataclass(frozen=True)
-class _Segment:
-    """A stretch of the log: a run of the system-identification mode, or a span."""
-
-    name: str
-    run: tuple[int, int] | None = None
-    span_s: Span | None = None
-
-    def lines(self) -> Iterator[str]:
-        yield from ("", "[[segment]]", f"name = {toml_value(self.name)}")
-        if self.run is not None:
-            axis, number = self.run
-            yield f"sid_axis = {axis}"
-            if number:
-                yield f"run = {number}"
-        if self.span_s is not None:
-            yield f"span_s = {toml_value([round(each, 3) for each in self.span_s])}"
 
 
 @dataclass(frozen=True)
@@ -57,13 +32,10 @@ class _Axis:
     """What is identified of one axis."""
 
     axis: str
-    flown: tuple[_Segment, ...]
-    unseen: tuple[_Segment, ...]
+    parts: AxisParts
     band_rad_s: Span
-    estimator: str
     template: str
     found: str
-    chirped: bool = False
 
     @property
     def name(self) -> str:
@@ -73,21 +45,32 @@ class _Axis:
         yield from ("", "[[model]]", f"name = {toml_value(self.name)}")
         yield f"template = {toml_value(self.template)}"
         yield f"axis = {toml_value(self.axis)}"
-        yield f"identify = {toml_value([each.name for each in self.flown])}"
-        if self.unseen:
-            yield f"verify = {toml_value([each.name for each in self.unseen])}"
+        yield f"identify = {toml_value([each.name for each in self.parts.flown])}"
+        if self.parts.unseen:
+            yield f"verify = {toml_value([each.name for each in self.parts.unseen])}"
         else:
             yield "# Nothing else moved this axis: fly a doublet, and name its span for verify."
         yield f"# {hertz_words(self.band_rad_s)}: {self.found}"
         yield f"band_rad_s = {toml_value(list(self.band_rad_s))}"
         if self.template == "rate_motor_lag":
             yield "parameters.T_m = { maximum = 0.15 } # the motor is the faster of the two lags"
-        if self.chirped:
+        if self.parts.excitations:
             yield "# The chirp is logged, so a controller in the loop does not bias the estimate."
-            yield f'response = {{ estimator = "instrument", excitations = ["{CHIRP}"] }}'
-        elif self.estimator != "instrument":
+            told = toml_value(list(self.parts.excitations))
+            yield f'response = {{ estimator = "instrument", excitations = {told} }}'
+        elif self.parts.estimator != "instrument":
             yield "# No injection was logged here: a direct estimate, with the loop's bias in it."
-            yield f"response = {{ estimator = {toml_value(self.estimator)} }}"
+            yield f"response = {{ estimator = {toml_value(self.parts.estimator)} }}"
+
+
+def _segment(stretch: Stretch) -> Iterator[str]:
+    yield from ("", "[[segment]]", f"name = {toml_value(stretch.name)}")
+    if stretch.run is not None:
+        yield f"sid_axis = {stretch.run.axis}"
+        if stretch.number:
+            yield f"run = {stretch.number}"
+    if stretch.span_s is not None:
+        yield f"span_s = {toml_value([round(each, 3) for each in stretch.span_s])}"
 
 
 def study_of_log(
@@ -137,67 +120,22 @@ def _axis(log: Log, inspection: Inspection, band: AxisBand, model: str | None) -
     why = why_no_model(inspection, band)
     if band.band_rad_s is None or why:
         return _missed(inspection, axis, why)
-    runs = _runs(log, axis)
-    others = [e for e in inspection.excitations if e.axis == axis and e.kind in SEARCHED]
     if model is None and axes_of(log.vehicle)[axis].command not in COMMANDS:
         return _missed(
             inspection, axis, "there is no usual model of this vehicle's surfaces",
             "name one of the library or of your own: --model short_period",
         )  # fmt: skip
-    flown, unseen = _flown(log, axis, runs, others)
-    if not unseen:
-        avoid = [(e.start_s, e.stop_s) for e in inspection.excitations if e.is_injected]
-        sid = [(run.start_s - 1.0, run.stop_s + 1.0) for run in log.sid_runs]
-        spans = tuple(each.span_s or _span_of(runs[0]) for each in flown)
-        quiet = liveliest(log, axis, inspection.phases.airborne, [*avoid, *sid, *spans], spans)
-        unseen = tuple(_Segment(f"{axis} flying", span_s=each) for each in quiet)
     said = (
         f"coherence {band.coherence:.2f} on average" if band.coherence is not None else "coherent"
     )
     return _Axis(
-        axis, flown, unseen, band.band_rad_s, "instrument" if runs else "composite",
-        model or TEMPLATES[axis], f"{said}, inside what was swept",
-        not runs and bool(_chirped(others)),
+        axis, axis_parts(log, inspection, axis), band.band_rad_s, model or TEMPLATES[axis],
+        f"{said}, inside what was swept",
     )  # fmt: skip
-
-
-def _runs(log: Log, axis: str) -> list[SidRun]:
-    """Sweeps of an axis that ran to their end; of none, what was flown of those broken off."""
-    made = [run for run in log.sid_runs if str(run.body_axis) == axis]
-    return [run for run in made if run.is_complete] or made
 
 
 COMMANDS = ("tau_phi", "tau_theta", "tau_psi")
 """Mixer commands of multirotors, which the usual models take."""
-
-
-def _flown(
-    log: Log, axis: str, runs: list[SidRun], others: list[FoundExcitation]
-) -> tuple[tuple[_Segment, ...], tuple[_Segment, ...]]:
-    """Segments of the fit, and a run kept back where there are several."""
-    if not runs:
-        # A chirp is told from what else moved the axis, which is no part of its fit.
-        told = _chirped(others) or others
-        numbered = enumerate(((each.start_s, each.stop_s) for each in told), 1)
-        made = [_Segment(f"{axis} {k}", span_s=span) for k, span in numbered]
-        kept = made[-1:] if len(made) > 1 and _chirped(others) else []
-        return tuple(made[: len(made) - len(kept)]), tuple(kept)
-    segments = []
-    for k, run in enumerate(runs, 1):
-        alike = [each for each in log.sid_runs if each.axis == run.axis]
-        name = f"{axis} sweep" + (f" {k}" if len(runs) > 1 else "")
-        segments.append(_Segment(name, run=(run.axis, alike.index(run))))
-    kept = segments[-1:] if len(segments) > 1 else []
-    return tuple(segments[: len(segments) - len(kept)]), tuple(kept)
-
-
-def _chirped(others: list[FoundExcitation]) -> list[FoundExcitation]:
-    """Chirps, whose set-point is an instrument."""
-    return [each for each in others if each.kind == "chirp"]
-
-
-def _span_of(run: SidRun) -> Span:
-    return run.chirp_span_s
 
 
 def _missed(inspection: Inspection, axis: str, why: str, action: str = "") -> Finding:
@@ -230,10 +168,10 @@ def _lines(
     relative = Path(os.path.relpath(path, folder)).as_posix()
     yield from ("", "[log]", f"path = {toml_value(relative)}")
     for axis in axes:
-        for segment in (*axis.flown, *axis.unseen):
-            yield from segment.lines()
+        for stretch in (*axis.parts.flown, *axis.parts.unseen):
+            yield from _segment(stretch)
             yield from (f"{name} = {toml_value(value)}" for name, value in declared.items())
-    if any(axis.estimator == "instrument" for axis in axes):
+    if any(axis.parts.estimator == "instrument" for axis in axes):
         yield ""
         yield "# The injection is logged, so a controller in the loop does not bias the estimate."
         yield from ("[response]", 'estimator = "instrument"')
