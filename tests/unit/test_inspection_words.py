@@ -12,10 +12,10 @@ import pytest
 
 import flightid as fid
 from flightid.conventions import Light
-from flightid.evidence import inspection_check
+from flightid.evidence import inspection_check, sweep_check
 from flightid.findings import Finding
 from flightid.inspection import advice
-from flightid.inspection.excitation_found import _plain, _steps, _sweep
+from flightid.inspection.excitation_found import FoundExcitation, _plain, _steps, _sweep
 from flightid.inspection.flight_phases import FlightPhases
 from flightid.inspection.gap_findings import _remedy
 from flightid.inspection.inspection import Inspection
@@ -175,6 +175,12 @@ def test_evidence_of_an_axis_is_not_that_of_another() -> None:
     assert inspection_check(seen, ("tau_theta", "q")).light is Light.GREEN
     assert inspection_check(seen, ("tau_phi", "p")).what == "roll: too narrow"
     assert inspection_check(seen, ("u", "y")).light is Light.AMBER
+    assert sweep_check(seen, ("u", "y")) == ()
+    (plain,) = sweep_check(seen, ("tau_phi", "p", "tau_psi"))
+    assert plain.what.startswith("nothing was injected about roll, and no sweep was flown")
+    assert plain.action == "sweep it: flightid plan a"
+    sweep = FoundExcitation("sweep", "roll", 1.0, 9.0, "")
+    assert sweep_check(replace(seen, excitations=(sweep,)), ("tau_phi", "p")) == ()
 
 
 @pytest.mark.parametrize(

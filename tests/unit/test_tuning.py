@@ -22,7 +22,7 @@ from flightid.control.tuning.requirements import TuningRequirements
 from flightid.control.tuning.tune_pid import naming_filters, noise_density
 from flightid.conventions import Light
 from flightid.errors import DataError, ModelError, OptionError, UnknownNameError
-from flightid.evidence import Evidence
+from flightid.evidence import Check, Evidence
 from flightid.evidence.spans import Span, judge_span
 from flightid.findings import Finding
 from flightid.vehicles import fly, write_ardupilot_log
@@ -254,6 +254,12 @@ def test_red_evidence_is_refused(fit: fid.Fit) -> None:
     narrow.__dict__["evidence"] = Evidence((seen,), ())
     with pytest.raises(DataError, match="too narrow a band for gains"):
         fid.tune_pid(narrow, gains=FLOWN)
+    # Slow and quick sticks, prewhitened: gains stood beside “no axis carries a model”.
+    flying = dataclasses.replace(fit)
+    swept = Check("sweep", Light.UNKNOWN, "nothing was injected about roll: no gains", "sweep it")
+    flying.__dict__["evidence"] = Evidence((swept,), ())
+    with pytest.raises(DataError, match=r"carries no gains.*injected about roll; needed.*sweep it"):
+        fid.tune_pid(flying, gains=FLOWN)
 
 
 def test_what_the_model_leaves_unexplained_is_refused_or_stands_in_the_result(

@@ -119,13 +119,14 @@ def command(
 def _with_inspection(result: Fit | Reduction, file: Path) -> Fit | Reduction:
     """The fit, or every fit of a reduction, with the verdict on the log among its evidence."""
     import flightid
-    from flightid.evidence import inspection_check
+    from flightid.evidence import inspection_check, sweep_check
 
     inspection = flightid.inspect_log(file)
 
     def examined(fit: Fit) -> Fit:
-        check = inspection_check(inspection, (*fit.model.inputs, *fit.model.outputs))
-        return replace(fit, evidence=fit.evidence.with_checks([check]))
+        channels = (*fit.model.inputs, *fit.model.outputs)
+        checks = [inspection_check(inspection, channels), *sweep_check(inspection, channels)]
+        return replace(fit, evidence=fit.evidence.with_checks(checks))
 
     if not isinstance(result, flightid.Reduction):
         return examined(result)

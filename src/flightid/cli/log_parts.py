@@ -11,7 +11,7 @@ from flightid.cli.output import note
 if TYPE_CHECKING:
     from flightid.logs import Log
     from flightid.record import Record
-    from flightid.study.proposal.parts import AxisParts, Stretch
+    from flightid.study.proposal.parts import AxisParts, LogPart
 
 Take = Literal["flown", "unseen"]
 """What a fit takes of a log, or what is left to verify it on."""
@@ -79,6 +79,6 @@ def _parts(log: Log, inputs: Sequence[str]) -> list[AxisParts]:
     return [axis_parts(log, inspection, axis) for axis in moved]
 
 
-def _said(part: Stretch) -> str:
+def _said(part: LogPart) -> str:
     start_s, stop_s = part.chirp_span_s
     return f"{part.name}, {start_s:.1f} to {stop_s:.1f} s"

@@ -2,7 +2,12 @@
 
 from flightid.evidence.evidence import Check, Evidence
 from flightid.evidence.feedback import feedback_test
-from flightid.evidence.gather import gather_evidence, inspection_check, residual_check
+from flightid.evidence.gather import (
+    gather_evidence,
+    inspection_check,
+    residual_check,
+    sweep_check,
+)
 from flightid.uncertainty.feedback import FeedbackTest
 
 __all__ = [
@@ -13,4 +18,5 @@ __all__ = [
     "gather_evidence",
     "inspection_check",
     "residual_check",
+    "sweep_check",
 ]

@@ -15,6 +15,7 @@ from flightid.surface import spoken
 from flightid.table import Column, Table
 
 INSPECTION = "inspection"
+SWEEP = "sweep"
 TIME = "time base"
 SAMPLES = "samples"
 BAND = "excitation band"
@@ -28,14 +29,15 @@ RESIDUALS = "residuals"
 PREDICTION = "prediction"
 GUIDELINES = "guidelines"
 NAMES = (
-    INSPECTION, TIME, SAMPLES, BAND, COHERENCE, LOOP, HOLD, SETTLED, AGREEMENT, SIGNS, RESIDUALS,
-    PREDICTION, GUIDELINES,
+    INSPECTION, SWEEP, TIME, SAMPLES, BAND, COHERENCE, LOOP, HOLD, SETTLED, AGREEMENT, SIGNS,
+    RESIDUALS, PREDICTION, GUIDELINES,
 )  # fmt: skip
 ALWAYS = (BAND, COHERENCE, LOOP, SETTLED, AGREEMENT)
 """What every result needs before it may be green."""
 
 _ABSENT: Mapping[str, tuple[str, str]] = {
     INSPECTION: ("the log was not inspected", "run inspect_log, or `flightid inspect`"),
+    SWEEP: ("whether a sweep was flown was not examined", "run inspect_log, or `flightid inspect`"),
     TIME: ("the time base was not examined", ""),
     SAMPLES: ("the samples were not examined", ""),
     BAND: ("the band that the inputs excite was not examined", "fit records or their responses"),

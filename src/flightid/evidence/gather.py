@@ -28,6 +28,7 @@ from flightid.evidence.evidence import (
     RESIDUALS,
     SETTLED,
     SIGNS,
+    SWEEP,
     Check,
     Evidence,
 )
@@ -37,6 +38,8 @@ from flightid.evidence.spans import Span, judge_coherence, judge_span
 from flightid.findings import Finding, worst
 from flightid.frozen import dataclass
 from flightid.inspection import Inspection
+from flightid.inspection.axes import axes_of
+from flightid.inspection.carried import is_swept
 from flightid.models.narx.structure import STOPS
 from flightid.record import Record
 from flightid.record.history import is_of_log
@@ -239,6 +242,24 @@ def inspection_check(inspection: Inspection, channels: Iterable[str]) -> Check:
     if light is Light.GREEN or not reasons:
         return Check(INSPECTION, light, f"{inspection.name} can support identification")
     return Check(INSPECTION, light, reasons[0].message, reasons[0].action)
+
+
+def sweep_check(inspection: Inspection, channels: Iterable[str]) -> tuple[Check, ...]:
+    """That axes of a fit were not swept, so that gains are not made of it; none where they were.
+
+    A model may be tried of plain flying, and is judged by what it predicts; its gains would be
+    promised by a log that carries none.
+    """
+    wanted = set(channels)
+    known = axes_of(inspection.vehicle).items()
+    fitted = [axis for axis, own in known if own.command in wanted and own.rate in wanted]
+    still = [axis for axis in fitted if not is_swept(inspection, axis)]
+    if not still:
+        return ()
+    told = (f.action for f in inspection.findings if f.code == "no-model" and f.action)
+    said = f"nothing was injected about {' and '.join(still)}, and no sweep was flown"
+    action = next(told, f"sweep it: flightid plan {inspection.name}")
+    return (Check(SWEEP, Light.UNKNOWN, f"{said}: no gains are made of this model", action),)
 
 
 def residual_check(findings: Iterable[Finding]) -> Check:

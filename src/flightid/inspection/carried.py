@@ -50,13 +50,18 @@ def why_no_model(inspection: InspectedLog, band: AxisBand) -> str:
     """Why an axis carries no model; empty where one may be tried."""
     if not band.input:
         return band.reason
-    if not any(e.axis == band.axis and e.kind in SEARCHED for e in inspection.excitations):
+    if not is_swept(inspection, band.axis):
         return "nothing was injected, and no sweep was flown"
     if band.band_rad_s is None:
         return band.reason
     if band.span < BAND_LEAST.value:
         return "the band of its sweep that coherence supports is narrow"
     return ""
+
+
+def is_swept(inspection: InspectedLog, axis: str) -> bool:
+    """Whether anything was flown about an axis that a model may be tried from."""
+    return any(e.axis == axis and e.kind in SEARCHED for e in inspection.excitations)
 
 
 def carried_axes(inspection: InspectedLog) -> tuple[str, ...]:

@@ -93,8 +93,8 @@ def _loops(review: FlightReview) -> Iterator[Finding]:
         )
         if loop.is_bent:
             said += f" (of large moves: {loop.beyond})"
-        told = _level(review, loop, *_overshoot(review, loop, said))
-        yield Finding(f"step-{loop.axis}-{loop.loop}", *told)
+        judged = _level(review, loop, *_overshoot(review, loop, said))
+        yield Finding(f"step-{loop.axis}-{loop.loop}", *judged)
     if not review.phases.airborne:
         return
     for loop in review.loops:

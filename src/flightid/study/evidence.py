@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 from flightid.conventions import Light
-from flightid.evidence import Check, Evidence, inspection_check, residual_check
+from flightid.evidence import Check, Evidence, inspection_check, residual_check, sweep_check
 from flightid.evidence.data_checks import band_checks, power_of_records, sample_checks
 from flightid.evidence.evidence import GUIDELINES, LOOP, PREDICTION, RESIDUALS, SAMPLES, SETTLED
 from flightid.evidence.gather import BELONGS, loop_of_residuals, worse
@@ -37,6 +37,7 @@ def examined(fit: Fit, item: ModelResults, inspection: Inspection | None) -> Fit
     if inspection is not None:
         channels = (*fit.model.inputs, *fit.model.outputs)
         checks.append(inspection_check(inspection, channels))
+        checks += sweep_check(inspection, channels)
     if item.tests is not None and item.tests.findings:
         residuals = residual_check(item.tests.findings)
         checks.append(worse(fit.evidence.check(RESIDUALS), residuals))

@@ -13,7 +13,7 @@ from flightid.control.tuning.structure_error import Band, errors_of, identified_
 from flightid.conventions import Light
 from flightid.dynamics.continuous import to_continuous
 from flightid.errors import DataError, FlightidError
-from flightid.evidence.evidence import BAND, LOOP
+from flightid.evidence.evidence import BAND, LOOP, SWEEP
 from flightid.evidence.spans import NARROW
 from flightid.findings import Finding
 from flightid.frozen import dataclass
@@ -216,6 +216,14 @@ def _refusals(
                 found=seen.what,
                 needed=f"{BAND_LEAST.value:g} to 1 at least",
                 action=seen.action,
+            )
+        swept = None if examined is None else examined.check(SWEEP)
+        if swept is not None:
+            yield DataError(
+                "the log of this model carries no gains",
+                found=swept.what.partition(":")[0],
+                needed="a sweep or an injection about each axis",
+                action=swept.action,
             )
         loop = None if examined is None else examined.check(LOOP)
         if loop is not None and loop.light is Light.UNKNOWN:

@@ -19,7 +19,7 @@ from flightid.inspection.signals import Span
 from flightid.inspection.usable_band import AxisBand, hertz_words
 from flightid.logs import Log, read_log
 from flightid.models.save import toml_value
-from flightid.study.proposal.parts import AxisParts, Stretch, axis_parts
+from flightid.study.proposal.parts import AxisParts, LogPart, axis_parts
 from flightid.study.proposal.proposal import Proposal
 from flightid.study.stage_runner import StageRunner
 
@@ -63,7 +63,7 @@ class _Axis:
             yield f"response = {{ estimator = {toml_value(self.parts.estimator)} }}"
 
 
-def _segment(stretch: Stretch) -> Iterator[str]:
+def _segment(stretch: LogPart) -> Iterator[str]:
     yield from ("", "[[segment]]", f"name = {toml_value(stretch.name)}")
     if stretch.run is not None:
         yield f"sid_axis = {stretch.run.axis}"

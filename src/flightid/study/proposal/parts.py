@@ -17,7 +17,7 @@ SEARCHED = ("chirp", "sweep", "autotune")
 
 
 @dataclass(frozen=True)
-class Stretch:
+class LogPart:
     """A stretch of a log: a run of the system-identification mode, or a span.
 
     Attributes
@@ -47,7 +47,7 @@ class AxisParts:
 
     Attributes
     ----------
-    flown, unseen : tuple of Stretch
+    flown, unseen : tuple of LogPart
         Of the fit, and kept back from it.
     estimator : str
         Of the responses.
@@ -55,8 +55,8 @@ class AxisParts:
         Channels that are instruments, besides the injection that a run brings along.
     """
 
-    flown: tuple[Stretch, ...]
-    unseen: tuple[Stretch, ...]
+    flown: tuple[LogPart, ...]
+    unseen: tuple[LogPart, ...]
     estimator: str
     excitations: tuple[str, ...] = ()
 
@@ -80,7 +80,7 @@ def axis_parts(log: Log, inspection: Inspection, axis: str) -> AxisParts:
         spans = tuple(each.chirp_span_s for each in flown)
         airborne = inspection.phases.airborne
         quiet = liveliest(log, axis, airborne, [*avoid, *sid, *spans], spans)
-        unseen = tuple(Stretch(f"{axis} flying", span_s=each) for each in quiet)
+        unseen = tuple(LogPart(f"{axis} flying", span_s=each) for each in quiet)
     estimator = "instrument" if runs else "composite"
     chirped = not runs and bool(_chirped(others))
     return AxisParts(flown, unseen, estimator, (CHIRP,) if chirped else ())
@@ -94,20 +94,20 @@ def _runs(log: Log, axis: str) -> list[SidRun]:
 
 def _flown(
     log: Log, axis: str, runs: list[SidRun], others: list[FoundExcitation]
-) -> tuple[tuple[Stretch, ...], tuple[Stretch, ...]]:
+) -> tuple[tuple[LogPart, ...], tuple[LogPart, ...]]:
     """Stretches of the fit, and a run kept back where there are several."""
     if not runs:
         # A chirp is told from what else moved the axis, which is no part of its fit.
         told = _chirped(others) or others
         numbered = enumerate(((each.start_s, each.stop_s) for each in told), 1)
-        made = [Stretch(f"{axis} {k}", span_s=span) for k, span in numbered]
+        made = [LogPart(f"{axis} {k}", span_s=span) for k, span in numbered]
         kept = made[-1:] if len(made) > 1 and _chirped(others) else []
         return tuple(made[: len(made) - len(kept)]), tuple(kept)
     stretches = []
     for k, run in enumerate(runs, 1):
         alike = [each for each in log.sid_runs if each.axis == run.axis]
         name = f"{axis} sweep" + (f" {k}" if len(runs) > 1 else "")
-        stretches.append(Stretch(name, run, alike.index(run)))
+        stretches.append(LogPart(name, run, alike.index(run)))
     kept = stretches[-1:] if len(stretches) > 1 else []
     return tuple(stretches[: len(stretches) - len(kept)]), tuple(kept)
 
