@@ -21,7 +21,8 @@ class BrokenFleet:
     Errors are `understated` times as large, flights differ by `spread` more, all move by `season`
     in a sine over the whole time, and the last flights of the last vehicles by `change`. Errors of
     the first vehicle are `first_understated` times as large again. Of `a_day` flights on each third
-    day all share `days`. Errors that are `relative` are of that size, and told of each estimate.
+    day all share `days`, correlated from day to day by `memory`. Errors that are `relative` are of
+    that size, and told of each estimate.
     """
 
     vehicles: int = VEHICLES
@@ -37,6 +38,7 @@ class BrokenFleet:
     a_day: int = 1
     days: float = 0.0
     relative: float | None = None
+    memory: float = 0.0
 
     def drift(self, seed: int) -> FleetDrift:
         """What is found of one drawn fleet."""
@@ -50,6 +52,9 @@ class BrokenFleet:
         moved += self.spread * rng.normal(size=shape)
         moved += self.season * np.sin(2.0 * np.pi * np.arange(self.flights) / self.flights)
         by_day = self.days * rng.normal(size=(self.vehicles, -(-self.flights // self.a_day)))
+        for day in range(1, by_day.shape[1]):
+            by_day[:, day] *= np.sqrt(1.0 - self.memory**2)
+            by_day[:, day] += self.memory * by_day[:, day - 1]
         moved += np.repeat(by_day, self.a_day, axis=1)[:, : self.flights]
         moved[self.vehicles - self.changed :, self.flights - self.last :] += self.change
         sized = base if self.relative is None else base * (1.0 + moved)
@@ -117,6 +122,9 @@ def small_fleets() -> Iterator[tuple[str, BrokenFleet]]:
     for vehicles, days in ((10, 0.0), (10, 0.04), (1, 0.04)):
         words = f"{vehicles} of 24 flights, two a day, days differ by {days:.0%}"
         yield words, BrokenFleet(vehicles, 24, a_day=2, days=days)
+    for a_day, days, memory in ((1, 0.04, 0.5), (1, 0.05, 0.9), (2, 0.04, 0.5), (2, 0.05, 0.9)):
+        words = f"10 of 24 flights, {a_day} a day, days differ by {days:.0%} and go on by {memory}"
+        yield words, BrokenFleet(10, 24, a_day=a_day, days=days, memory=memory)
     for relative in (0.1, 0.2):
         words = f"10 of 20 flights, errors {relative:.0%} of each estimate"
         yield words, BrokenFleet(10, 20, relative=relative)

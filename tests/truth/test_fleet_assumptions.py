@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flightid.fleet.drift_lights import errors_lights
+from flightid.fleet.drift_lights import errors_lights, persistent_lights
 from flightid.fleet.statistics.change_kind import DRIFT
 from flightid.fleet.statistics.drift import FleetDrift, find_drift
 from flightid.fleet.statistics.events import FleetEvent
@@ -13,6 +13,7 @@ from flightid.fleet.statistics.flight_estimates import FlightEstimates
 from flightid.fleet.statistics.odd_flights import without_odd_flights
 from flightid.fleet.statistics.population import estimate_population
 from flightid.fleet.statistics.repeats import days_of
+from flightid.fleet.vehicle_lights import going_on_words
 
 DAY_S = 86400.0
 
@@ -33,6 +34,8 @@ def _drift(
     a_day: int = 1,
     days: float = 0.0,
     relative: float | None = None,
+    hour: float = 0.0,
+    memory: float = 0.0,
 ) -> FleetDrift:
     """Days of flights three days apart, errors up to 5 %; the last of the first vehicles change.
 
@@ -47,17 +50,23 @@ def _drift(
     moved += spread * rng.normal(size=(vehicles, n))
     moved += season * np.sin(2.0 * np.pi * np.arange(n) / n)
     moved[:changed, n - last :] += change
-    moved += np.repeat(days * rng.normal(size=(vehicles, n // a_day)), a_day, axis=1)
+    by_day = days * rng.normal(size=(vehicles, n // a_day))
+    for day in range(1, n // a_day):
+        by_day[:, day] *= np.sqrt(1.0 - memory**2)
+        by_day[:, day] += memory * by_day[:, day - 1]
+    moved += np.repeat(by_day, a_day, axis=1)
     base = 10.0 * (1.0 + 0.1 * rng.normal(size=(vehicles, 1)))
     sized = base if relative is None else base * (1.0 + moved)
-    day = np.arange(n) // a_day
+    flown = np.arange(n) // a_day
     return find_drift(
         FlightEstimates.of(
             ["Lp"],
             np.repeat([f"{i:03}" for i in range(vehicles)], n).tolist(),
             (base * (1.0 + moved)).reshape(-1, 1),
             ((sized * errors) ** 2).reshape(-1, 1, 1),
-            time_s=np.tile(DAY_S * (3.0 * day + 0.1 * (np.arange(n) % a_day)), vehicles),
+            time_s=np.tile(
+                3600.0 * hour + DAY_S * (3.0 * flown + 0.1 * (np.arange(n) % a_day)), vehicles
+            ),
         )
     )
 
@@ -115,11 +124,18 @@ def test_a_change_of_all_is_said_and_is_no_vehicles_own() -> None:
     assert "all vehicles changed together by -8" in one.words({})
     assert "from 1970-03-14" in found.summary().notes[1]
     assert not _drift(7, 30, 40, change=-0.1, changed=12, last=16).shared
+    # An afternoon of the Pacific is one day, though midnight of UTC lies in it.
+    (one,) = _drift(7, 12, 24, change=-0.12, changed=12, last=10, a_day=2, hour=22.5).shared
+    assert one.since_s == 7 * 3.0 * DAY_S + 22.5 * 3600.0
     # Of fewer than five that all move alike nobody knows whose it is; a witness tells.
     (few,) = _drift(7, 3, 20, season=0.06).alike
     assert few.vehicles == ("000", "001", "002")
     assert "all 3 vehicles moved alike" in few.words({})
     assert not _drift(7, 4, 20, change=-0.12, changed=2, last=8).alike
+    # Three of four that stepped together were "of the type" though the fourth had stayed.
+    stepped = _drift(7, 4, 20, change=-0.15, changed=3, last=8)
+    assert _alarmed(stepped) == {0, 1, 2}
+    assert not stepped.alike
 
 
 def test_few_flights_tell_that_their_errors_are_understated() -> None:
@@ -215,3 +231,31 @@ def test_a_flight_soon_after_a_declared_event_is_not_off(behind: int) -> None:
     assert effect.percent.interval95[0] < 20.0 < effect.percent.interval95[1]
     untold = find_drift(data)
     assert "a" in {each.vehicle for each in (*untold.newest_off, *untold.alarms)}
+
+
+def test_flights_that_go_on_as_their_neighbours_did_are_no_change() -> None:
+    """Of 40 fleets 33 had a red vehicle, where days go on by half; changes beside that stay."""
+    found = _drift(3, 10, 24, days=0.04, memory=0.5, change=0.3, changed=1, last=9)
+    assert _alarmed(found) == {0}
+    seen = found.persistent["Lp"]
+    assert 0.3 <= seen.correlation <= 0.9
+    assert "flights go on as their neighbours did" in " ".join(found.summary().notes)
+    alone = _drift(5, 10, 24, days=0.04, memory=0.9)
+    assert len(_alarmed(alone)) <= 1 < len(alone.going_on)
+    (light, *_) = persistent_lights(alone, {})
+    assert (light.code, light.light) == ("days-go-on", "amber")
+    said = going_on_words(alone.going_on[0], {})
+    assert "% (" in said
+    assert "or its flights go on as their neighbours did" in said
+    # Half of them changed at one date: that is no memory.
+    assert _alarmed(_drift(6, 10, 24, change=0.2, changed=5, last=9)) == set(range(5))
+
+
+@pytest.mark.slow
+def test_few_fleets_whose_days_go_on_alarm_and_independent_ones_keep_their_power() -> None:
+    """Of 24 fleets 20 alarmed; of 48 steps of 10 % all were found."""
+    alarmed = [_alarmed(_drift(seed, 10, 24, days=0.04, memory=0.5)) for seed in range(24)]
+    assert sum(map(bool, alarmed)) <= 5
+    assert sum(map(len, alarmed)) <= 8
+    found = [_drift(seed, 10, 24, change=0.1, changed=2, last=8) for seed in range(24)]
+    assert sum(len(_alarmed(each) & {0, 1}) for each in found) >= 44

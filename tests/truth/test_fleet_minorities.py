@@ -9,7 +9,6 @@ import pytest
 from scipy.special import erfinv
 
 from flightid.conventions import Light
-from flightid.fleet.page import vehicle_light
 from flightid.fleet.statistics import outliers
 from flightid.fleet.statistics.answers import TypeAnswers
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
@@ -18,6 +17,7 @@ from flightid.fleet.statistics.minorities import find_minorities, widest_gaps
 from flightid.fleet.statistics.outliers import find_outliers
 from flightid.fleet.statistics.population import estimate_population
 from flightid.fleet.statistics.spread_search import SpreadFit, search_spreads
+from flightid.fleet.vehicle_lights import vehicle_light
 
 
 def _fleet(values: np.ndarray) -> FlightEstimates:

@@ -30,7 +30,6 @@ from flightid.fleet import open as open_fleet
 from flightid.fleet.engine.address_space import bounded_memory
 from flightid.fleet.opening import names_fleet_file
 from flightid.fleet.page import (
-    change_words,
     events_table,
     fleet_vehicles,
     fleet_words,
@@ -39,6 +38,7 @@ from flightid.fleet.page import (
 )
 from flightid.fleet.statistics.answers import FleetAnswers, TypeAnswers
 from flightid.fleet.statistics.parameter_history import ParameterHistory
+from flightid.fleet.vehicle_lights import change_words
 from flightid.table import Table
 from flightid.uncertainty.quantiles import half_width, showing, shown
 

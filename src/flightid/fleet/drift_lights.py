@@ -29,7 +29,8 @@ def shared_lights(drift: FleetDrift, labels: Mapping[str, str]) -> tuple[Finding
         "their days"
     )
     few = (
-        "look for what all share: air, season, firmware; five vehicles or more tell it from theirs"
+        "look for what all share: air, season, firmware; flights of another vehicle of the type, "
+        "from before and after, decide: it stayed, and each changed, or it moved, and the type did"
     )
     return (
         *(Finding("shared-change", Light.AMBER, each.words(labels), act) for each in drift.shared),
@@ -44,6 +45,15 @@ def scale_lights(drift: FleetDrift, labels: Mapping[str, str]) -> tuple[Finding,
         Finding("vehicle-errors", Light.AMBER, each.words(labels), act)
         for each in drift.scales
         if each.is_sure
+    )
+
+
+def persistent_lights(drift: FleetDrift, labels: Mapping[str, str]) -> tuple[Finding, ...]:
+    """Parameters whose flights go on as their neighbours did."""
+    act = "look for what lasts for days: air, battery, payload; name it in [questions] covariates"
+    return tuple(
+        Finding("days-go-on", Light.AMBER, each.words(labels.get(name, name)), act)
+        for name, each in drift.persistent.items()
     )
 
 

@@ -4,26 +4,27 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 
 from flightid.conventions import Light
 from flightid.findings import Finding, counted
 from flightid.fleet.catalogue.schema import FITTED
-from flightid.fleet.drift_lights import errors_lights, scale_lights, shared_lights
-from flightid.fleet.normality import MORE, quiet_light
+from flightid.fleet.drift_lights import (
+    errors_lights,
+    persistent_lights,
+    scale_lights,
+    shared_lights,
+)
+from flightid.fleet.normality import MORE
 from flightid.fleet.pictures import history_picture, type_picture
 from flightid.fleet.reasons import grouped_reasons, reasons_table
 from flightid.fleet.statistics.answers import RED, FleetAnswers, Row, TypeAnswers, fitted_share
-from flightid.fleet.statistics.change_kind import DRIFT, STEP
 from flightid.fleet.statistics.drift import FleetDrift
-from flightid.fleet.statistics.events import EventEffect
 from flightid.fleet.statistics.multiple_testing import chance_cell
-from flightid.fleet.statistics.parameter_history import ParameterHistory
 from flightid.fleet.unnamed import unnamed_light, unnamed_logs
+from flightid.fleet.vehicle_lights import vehicle_light
 from flightid.report.content import Block, Document, Lights, Paragraph, Section, TableBlock
 from flightid.report.figures import figure_block
 from flightid.table import Cell, Column, Table
-from flightid.uncertainty.estimate import Reading
 from flightid.uncertainty.quantiles import interval_words, shown
 from flightid.version import VERSION
 
@@ -43,9 +44,10 @@ def fleet_document(answers: FleetAnswers, title: str = "Fleet") -> Document:
     answers : FleetAnswers
     title : str
     """
-    lost = damaged_light(answers.damaged)
+    damaged = damaged_light(answers.damaged)
+    lost = (*([damaged] if damaged else []), *answers.outdated)
     sections = [
-        *([Section("The catalogue", (Lights((lost,)),))] if lost else []),
+        *([Section("The catalogue", (Lights(lost),))] if lost else []),
         Section("Vehicles", tuple(_vehicles(answers))),
         *(Section(_type_title(each), tuple(_type_blocks(each))) for each in answers.types),
         Section("Logs that could not be used", tuple(_refused(answers))),
@@ -168,61 +170,6 @@ def _counts(found: Sequence[Finding]) -> Iterator[Finding]:
         yield Finding("vehicles-unknown", Light.UNKNOWN, words, MORE)
 
 
-def vehicle_light(vehicle: str, types: Sequence[TypeAnswers]) -> Finding:
-    """Light of one vehicle: changed is red; its newest flight off, or unlike its type, amber."""
-    said, done, light = [], [], Light.GREEN
-    for each in types:
-        for history, effect in each.drift.by_event if each.drift is not None else ():
-            if history.vehicle == vehicle:
-                done.append(event_words(history, effect, each.labels))
-        alike = each.drift.alike if each.drift is not None else ()
-        for history in each.drift.alarms if each.drift is not None else ():
-            if history.vehicle == vehicle:
-                said.append(change_words(history, each.labels))
-                shared = any(e.name == history.name and vehicle in e.vehicles for e in alike)
-                said[-1] += ", as the others did" if shared else ""
-                light = Light.AMBER if shared and light is not Light.RED else Light.RED
-        for newest in each.drift.newest_off if each.drift is not None else ():
-            if newest.vehicle == vehicle:
-                said.append(newest.words(each.labels))
-                light = Light.RED if light is Light.RED else Light.AMBER
-        if each.outliers is not None:
-            unlike = each.outliers.differences(vehicle, each.labels)
-            said += unlike
-            light = Light.AMBER if unlike and light is not Light.RED else light
-    if not said:
-        quiet = quiet_light(vehicle, types)
-        if not done:
-            return quiet
-        rest = quiet.message.removeprefix(f"{vehicle}: ")
-        return replace(quiet, message=f"{vehicle}: {'; '.join(done)}; beyond that {rest}")
-    said += done
-    act = "look at what was done to it, and verify its model on a new flight"
-    return Finding("vehicle", light, f"{vehicle}: {'; '.join(said)}", act)
-
-
-def change_words(history: ParameterHistory, labels: Mapping[str, str]) -> str:
-    """What changed, by how much, in words."""
-    how = {STEP: " at once", DRIFT: " by and by, the last flight beside those before"}.get(
-        history.kind, ""
-    )
-    name, size = labels.get(history.name, history.name), _size_words(history.change_percent)
-    beyond = ", beside what its events explain" if history.events else ""
-    return f"{name} changed{size}{how}{beyond}"
-
-
-def event_words(history: ParameterHistory, effect: EventEffect, labels: Mapping[str, str]) -> str:
-    """What an event changed, by how much: of what was told, no reason to look at it."""
-    name = labels.get(history.name, history.name)
-    return f"{name} changed{_size_words(effect.percent)} at the event “{effect.event.what}”"
-
-
-def _size_words(change: Reading) -> str:
-    ends = change.interval(shown())
-    size = "" if change.value is None else f" by {change.value:+.2g} %"
-    return size + ("" if ends is None else f" ({ends[0]:+.2g} to {ends[1]:+.2g} %)")
-
-
 def _type_blocks(each: TypeAnswers) -> Iterator[Block]:
     for reason in each.reasons:
         yield Paragraph(f"Not answered: {reason}.")
@@ -253,7 +200,11 @@ def _type_blocks(each: TypeAnswers) -> Iterator[Block]:
 
 
 def _drift_blocks(drift: FleetDrift, labels: Mapping[str, str]) -> Iterator[Block]:
-    errors = (*errors_lights(drift, labels), *scale_lights(drift, labels))
+    errors = (
+        *errors_lights(drift, labels),
+        *scale_lights(drift, labels),
+        *persistent_lights(drift, labels),
+    )
     yield Lights(errors, "Errors of the estimates")
     if drift.shared or drift.alike:
         yield Lights(shared_lights(drift, labels), "What all vehicles did together")

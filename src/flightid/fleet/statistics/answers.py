@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from flightid.errors import FlightidError
+from flightid.findings import Finding
 from flightid.fleet.catalogue.schema import FITTED, from_lower_triangle
 from flightid.fleet.parameter_words import told_apart
 from flightid.fleet.statistics.covariates import Covariate
@@ -78,6 +79,8 @@ class FleetAnswers:
         By model: addresses of logs of which another model counts, and this one is red.
     damaged : int
         Parts of the catalogue that cannot be read: their logs are in no answer.
+    outdated : tuple of Finding
+        What of the catalogue is not as the fleet file and its logs are by now.
     """
 
     types: tuple[TypeAnswers, ...]
@@ -85,6 +88,7 @@ class FleetAnswers:
     undated: int = 0
     red: Mapping[str, Sequence[str]] = field(default_factory=dict)
     damaged: int = 0
+    outdated: tuple[Finding, ...] = ()
 
 
 def answer_questions(

@@ -3,47 +3,40 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import field
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.fleet.statistics.asked_histories import asked_history, beside_persistence
 from flightid.fleet.statistics.covariates import (
     Covariate,
-    CovariateDesign,
-    CovariateSlopes,
     design_covariates,
     fit_covariates,
-    own_slopes,
     without_covariates,
 )
-from flightid.fleet.statistics.days import covariance_by_day, shared_by_day
+from flightid.fleet.statistics.days import shared_by_day
 from flightid.fleet.statistics.errors_by_value import errors_at_each_vehicle
 from flightid.fleet.statistics.events import (
     EventEffect,
     FleetEvent,
-    beside_steps,
-    event_effects,
-    event_steps,
     without_events,
 )
 from flightid.fleet.statistics.flight_errors import NOTABLE, ErrorScale, error_scale
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
-from flightid.fleet.statistics.judged_histories import Asked, judged_histories
+from flightid.fleet.statistics.judged_histories import judged_histories
 from flightid.fleet.statistics.largest_step import (
     FEWEST,
-    NEWEST,
-    SHORTEST,
-    scan_steps,
-    step_places,
 )
-from flightid.fleet.statistics.local_level import follow_level
 from flightid.fleet.statistics.moved_alike import MovedAlike, moved_alike
 from flightid.fleet.statistics.multiple_testing import FALSE_SHARE, chance_cell, corrected
 from flightid.fleet.statistics.neighbours import variances_with_odd_ones
 from flightid.fleet.statistics.newest_flight import NewestFlight, judged_newest, newest_flights
-from flightid.fleet.statistics.parameter_history import ParameterHistory, StepEnds
+from flightid.fleet.statistics.parameter_history import AskedHistory, ParameterHistory
+from flightid.fleet.statistics.persistence import (
+    Persistence,
+)
 from flightid.fleet.statistics.repeats import RepeatScatter, repeat_scatter
 from flightid.fleet.statistics.shared_level import SharedLevel, shared_level, without_shared
 from flightid.fleet.statistics.vehicle_errors import (
@@ -52,15 +45,13 @@ from flightid.fleet.statistics.vehicle_errors import (
     own_scales,
     variance_factors,
 )
-from flightid.fleet.statistics.wandering import wandering_chance
 from flightid.frozen import dataclass
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
-from flightid.uncertainty.estimate import Estimate, Reading
+from flightid.uncertainty.estimate import Reading
 from flightid.uncertainty.quantiles import interval_words, shown
 
 Array = NDArray[np.float64]
-TOO_FEW = f"fewer than {FEWEST} flights"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -86,6 +77,8 @@ class FleetDrift(Result, schema="flightid.fleet_drift/1"):
         The newest flight of each vehicle beside those before it; of no change.
     scales : tuple of VehicleScale
         Vehicles whose own flights scatter further than the fleet's.
+    persistent : mapping of str to Persistence
+        Parameters whose days go on as those before them did.
 
     Example
     -------
@@ -108,12 +101,18 @@ class FleetDrift(Result, schema="flightid.fleet_drift/1"):
     shared: tuple[SharedLevel, ...]
     newest: tuple[NewestFlight, ...]
     scales: tuple[VehicleScale, ...]
+    persistent: Mapping[str, Persistence] = field(default_factory=dict)
 
     @cached_property
     def alarms(self) -> tuple[ParameterHistory, ...]:
         """Histories that changed, the surest first."""
         found = [each for each in self.histories if each.is_alarm]
         return tuple(sorted(found, key=lambda each: each.chance or 0.0))
+
+    @property
+    def going_on(self) -> tuple[ParameterHistory, ...]:
+        """Histories that would have changed, were it not for days that go on."""
+        return tuple(each for each in self.histories if each.goes_on)
 
     @cached_property
     def alike(self) -> tuple[MovedAlike, ...]:
@@ -201,6 +200,7 @@ class FleetDrift(Result, schema="flightid.fleet_drift/1"):
             *((f"Flights far off those beside them count for less: {odd}.",) if odd else ()),
             *(f"{each.words(named)}; no change of one." for each in self.shared),
             *(f"{each.words(named)}." for each in self.alike),
+            *(f"{e.words(named.get(name, name))}." for name, e in self.persistent.items()),
             *(f"{each.vehicle}: {each.words(named)}." for each in self.newest_off),
             *(
                 f"{named.get(name, name)}: {each.words()}."
@@ -248,7 +248,8 @@ def find_drift(
     The modules of `flightid.fleet.statistics` name those of each test.
     """
     design = design_covariates(covariates or {})
-    histories: list[Asked] = []
+    histories: list[AskedHistory] = []
+    persistent: dict[str, Persistence] = {}
     slopes: dict[str, tuple[Reading, ...]] = {}
     odd: dict[str, int] = {}
     errors: dict[str, ErrorScale] = {}
@@ -280,78 +281,22 @@ def find_drift(
         fitted = fit_covariates(data, i, design, variances)
         slopes[name] = fitted.effects
         moved = every.values[:, i] - data.values[:, i]
-        for vehicle in data.members:
-            found = _history(data, i, vehicle, design, fitted, variances, by_day, events, moved)
-            if found is not None:
-                histories.append(found)
+        asked = [
+            asked_history(data, i, vehicle, design, fitted, variances, by_day, events, moved)
+            for vehicle in data.members
+        ]
+        mine = [each for each in asked if each is not None]
+        goes_on, mine = beside_persistence(mine)
+        if goes_on is not None:
+            persistent[name] = goes_on
+        histories += mine
     return FleetDrift(
         *(judged_histories(histories), repeats, slopes, design.missing, odd, errors),
         *(tuple(each for each in shared if each is not None), judged_newest(newest)),
         judged_scales(scales),
+        persistent,
     )
 
 
 def _variances(data: FlightEstimates, i: int) -> Array:
     return np.where(data.known[:, i], data.covariances[:, i, i], 1.0)
-
-
-def _history(
-    data: FlightEstimates,
-    i: int,
-    vehicle: str,
-    design: CovariateDesign,
-    fitted: CovariateSlopes,
-    errors: Array,
-    by_day: Array,
-    events: Sequence[FleetEvent],
-    moved: Array,
-) -> Asked | None:
-    rows = np.flatnonzero((data.member_of == data.members.index(vehicle)) & data.known[:, i])
-    if not len(rows):
-        return None
-    rows = rows[np.argsort(data.time_s[rows], kind="stable")]
-    name, unit, time_s = data.names[i], data.units[i], data.time_s[rows]
-    values, variances = data.values[rows, i], errors[rows]
-    covariance, tested = covariance_by_day(variances, time_s, by_day[rows]), values
-    if design.names:
-        slope, error = fitted.without[vehicle]
-        x = design.columns[rows]
-        # An error of the slopes that is common to all flights moves the level alone.
-        apart = x - x.mean(axis=0)
-        covariance = covariance + apart @ error @ apart.T
-        own = own_slopes(values, variances, apart, slope, error)
-        tested, values = values - apart @ slope, values - apart @ own
-    track = follow_level(values, variances, time_s)
-    happened = [event for event in events if event.concerns(vehicle)]
-    bare = ParameterHistory(
-        *(vehicle, name, unit, time_s, values, variances, track, None, None),
-        Estimate(name, None, "%", reason=TOO_FEW),
-        None,
-        events=event_effects(happened, name, unit, tested, covariance, time_s, moved[rows]),
-    )
-    known = event_steps(happened, time_s)
-    tested, covariance = beside_steps(tested, covariance, known)
-    few = not len(step_places(len(rows), known))
-    found = bare if few else _tested(bare, tested, covariance, known)
-    return found, tested, covariance, known
-
-
-def _tested(
-    history: ParameterHistory, values: Array, covariance: Array, known: Array
-) -> ParameterHistory:
-    # A step is looked for with three flights behind it; where one is, it may be of the last two.
-    scan = scan_steps(values, covariance, known, newest=NEWEST)
-    asked = scan.up_to(len(values) - SHORTEST - 1)
-    first, last = scan.place_ends()
-    base = scan.level
-    change: Reading = Estimate(history.name, None, "%", reason="the level before it may be zero")
-    if np.all(np.abs(scan.before) > 3.0 * np.sqrt(scan.before_variances)):
-        percent = 100.0 * scan.size / abs(base)
-        change = Estimate(history.name, percent, "%", ends=StepEnds(scan))
-    return replace(
-        history,
-        step_chance=asked.chance,
-        walk_chance=wandering_chance(values, covariance, history.time_s),
-        change_percent=change,
-        changed_s=(float(history.time_s[first]), float(history.time_s[last + 1])),
-    )

@@ -11,29 +11,33 @@ from numpy.typing import NDArray
 from flightid.fleet.statistics.change_kind import DRIFT, STEP, change_kind
 from flightid.fleet.statistics.largest_step import SHORTEST, scan_changes, scan_drifts
 from flightid.fleet.statistics.multiple_testing import corrected
-from flightid.fleet.statistics.parameter_history import ParameterHistory, StepEnds
+from flightid.fleet.statistics.parameter_history import AskedHistory, ParameterHistory, StepEnds
 from flightid.uncertainty.estimate import Estimate
 
 Array = NDArray[np.float64]
-Asked = tuple[ParameterHistory, Array, Array, Array]
-"""A history, and values with their covariance as they are tested, and the steps of its events.
-
-Slopes are those of others, and what events explain is out.
-"""
 
 
-def judged_histories(asked: Sequence[Asked]) -> tuple[ParameterHistory, ...]:
+def judged_histories(asked: Sequence[AskedHistory]) -> tuple[ParameterHistory, ...]:
     """Every history with its share of false alarms among all."""
-    chances = [each.chance for each, *_ in asked]
-    shares = iter(corrected([chance for chance in chances if chance is not None]))
+    histories = [each.history for each in asked]
+    shares = _shares([each.chance for each in histories])
+    apart = _shares([
+        each.chance if each.apart_chance is None else each.apart_chance for each in histories
+    ])  # fmt: skip
     judged = (
-        each if chance is None else replace(each, false_share=float(next(shares)))
-        for (each, *_), chance in zip(asked, chances, strict=True)
+        replace(each, false_share=share, apart_share=None if each.apart_chance is None else beside)
+        for each, share, beside in zip(histories, shares, apart, strict=True)
     )
     return tuple(
-        _named(each, *tested) if each.is_alarm else each
-        for each, (_, *tested) in zip(judged, asked, strict=True)
+        _named(each, *(of.values, of.covariance, of.known)) if each.is_alarm else each
+        for each, of in zip(judged, asked, strict=True)
     )
+
+
+def _shares(chances: Sequence[float | None]) -> list[float | None]:
+    """Shares of false alarms of those that have a chance."""
+    shares = iter(corrected([chance for chance in chances if chance is not None]))
+    return [None if chance is None else float(next(shares)) for chance in chances]
 
 
 def _named(

@@ -1,4 +1,4 @@
-"""Few vehicles that moved alike: of what they share, or of each: flights do not tell."""
+"""Few vehicles that moved alike: of what they share, or of each: a vehicle that stayed tells."""
 
 from __future__ import annotations
 
@@ -20,6 +20,9 @@ three, of which the third is a witness."""
 ALIKE = 0.7
 """Correlation of a vehicle's level with that of the others that changed, from which half of its
 squares are theirs: two steps of one sign at the 8th and the 14th of 20 flights have 0.53."""
+STAYED, SURE = 0.5, 2.58
+"""Share of the others' movement below which a vehicle stayed, and by how many standard errors: at
+99 %."""
 
 
 @dataclass(frozen=True)
@@ -60,14 +63,16 @@ def moved_alike(histories: Sequence[ParameterHistory]) -> tuple[MovedAlike, ...]
     Returns
     -------
     tuple of MovedAlike
-        None of five vehicles or more: what these share is taken out before (`shared_level`).
+        None of five vehicles or more: what these share is taken out before (`shared_level`). None
+        where a vehicle surely stayed while the others moved: then it is theirs.
     """
     found = []
     for name in dict.fromkeys(each.name for each in histories):
         judged = [e for e in histories if e.name == name and e.false_share is not None]
-        alike = _alike([each for each in judged if each.is_alarm])
+        alike = _alike([each for each in judged if each.is_alarm or each.goes_on])
         many = len(alike) >= max(FEWEST_ALIKE, NEARLY_ALL * len(judged))
-        if len(judged) < FEWEST_VEHICLES and many:
+        others = [each for each in judged if each not in alike]
+        if len(judged) < FEWEST_VEHICLES and many and not any(_stayed(e, alike) for e in others):
             found.append(MovedAlike(name, tuple(each.vehicle for each in alike), len(judged)))
     return tuple(found)
 
@@ -79,6 +84,19 @@ def _alike(changed: Sequence[ParameterHistory]) -> list[ParameterHistory]:
         for each in changed
         if _correlation(each, [other for other in changed if other is not each]) >= ALIKE
     ]
+
+
+def _stayed(one: ParameterHistory, moved: Sequence[ParameterHistory]) -> bool:
+    """Whether a vehicle surely did not go half as far as others did, by its flights and errors."""
+    beside = np.mean([np.interp(one.time_s, e.time_s, _course(e)) for e in moved], axis=0)
+    scale = max(abs(float(one.track.level.mean())), float(np.finfo(np.float64).tiny))
+    weights = scale**2 / one.variances
+    beside, values = (v - np.average(v, weights=weights) for v in (beside, one.values / scale))
+    information = float(np.sum(weights * beside**2))
+    if information <= 0.0:
+        return False
+    share = float(np.sum(weights * beside * values)) / information
+    return share + SURE / np.sqrt(information) < STAYED
 
 
 def _correlation(one: ParameterHistory, others: Sequence[ParameterHistory]) -> float:

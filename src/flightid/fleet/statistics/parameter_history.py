@@ -54,6 +54,8 @@ class ParameterHistory:
     events : tuple of EventEffect
     kind : str
         Of an alarm: ``"a step"``, ``"drift"``, or ``"changed"`` where its flights do not tell.
+    apart_chance, apart_share : float or None
+        As `chance` and `false_share` were days independent, where they go on (`persistence`).
     """
 
     vehicle: str
@@ -70,6 +72,8 @@ class ParameterHistory:
     false_share: float | None = None
     events: tuple[EventEffect, ...] = ()
     kind: str = ""
+    apart_chance: float | None = None
+    apart_share: float | None = None
 
     @property
     def chance(self) -> float | None:
@@ -82,3 +86,38 @@ class ParameterHistory:
     def is_alarm(self) -> bool:
         """Whether it changed, false alarms of the whole fleet accounted for."""
         return self.false_share is not None and self.false_share <= FALSE_SHARE
+
+    @property
+    def goes_on(self) -> bool:
+        """Whether it would have changed, but days of the type go on as those before them did."""
+        told = self.apart_share is not None and self.apart_share <= FALSE_SHARE
+        return told and not self.is_alarm
+
+
+@dataclass(frozen=True, eq=False)
+class AskedHistory:
+    """A history with what is tested of it.
+
+    Attributes
+    ----------
+    history : ParameterHistory
+    values : ndarray, shape (n,)
+        Slopes are those of other vehicles, and what events explain is out.
+    covariance : ndarray, shape (n, n)
+        Of their errors; sizes of the steps of events are left open.
+    known : ndarray, shape (n, e)
+        Flights behind each event.
+    by_day : ndarray, shape (n,)
+        Variances that flights of one day share, a part of those of the history.
+    """
+
+    history: ParameterHistory
+    values: Array
+    covariance: Array
+    known: Array
+    by_day: Array
+
+    @property
+    def own_variances(self) -> Array:
+        """Variances of the flights without what those of one day share, shape (n,)."""
+        return np.asarray(self.history.variances - self.by_day)

@@ -70,7 +70,9 @@ class RepeatScatter:
 
 
 def days_of(time_s: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Number of the day of each time, s, of one vehicle: flights up to 12 h from the day's first.
+    """Number of the day of each time, s: flights up to 12 h from the first of their day.
+
+    Of one vehicle; of a whole type where its vehicles fly over the same hours.
 
     Example
     -------

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.special import bdtrc
 
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
+from flightid.fleet.statistics.repeats import days_of
 from flightid.frozen import dataclass
 from flightid.record.outlying import NORMAL_MAD
 from flightid.uncertainty.estimate import Estimate
@@ -22,7 +23,7 @@ from flightid.uncertainty.quantiles import shown
 
 Array = NDArray[np.float64]
 Places = NDArray[np.intp]
-WEEK_S, DAY_S = 7.0 * 86400.0, 86400.0
+WEEK_S = 7.0 * 86400.0
 FEWEST_VEHICLES = 5
 """In a week, below which nothing is called shared."""
 AGREEING = 0.85
@@ -116,10 +117,12 @@ def shared_level(data: FlightEstimates, i: int) -> SharedLevel | None:
         return None
     scale, residual, in_percent = _residuals(data, i, rows)
     member, time_s = data.member_of[rows], data.time_s[rows]
-    since = _common_step(residual, member, time_s)
+    day = days_of(time_s)
+    since = _common_step(residual, member, time_s, day)
     if since is None:
         return None
-    _, bins = np.unique(2 * np.floor(time_s / WEEK_S) + (time_s >= since), return_inverse=True)
+    begun = _first_of(time_s, day)[day]  # A day is of one week, whatever clock it is told by.
+    _, bins = np.unique(2 * np.floor(begun / WEEK_S) + (begun >= since), return_inverse=True)
     level, variance, counts = _levels(residual, member, bins)
     if np.count_nonzero(counts) < 2:
         return None
@@ -168,10 +171,17 @@ def _residuals(data: FlightEstimates, i: int, rows: Places) -> tuple[Array, Arra
     return scale, (values - own) / scale, in_percent
 
 
-def _common_step(residual: Array, member: Places, time_s: Array) -> float | None:
-    """First day behind the largest step of the days' medians; None with too few vehicles."""
-    days, day = np.unique(np.floor(time_s / DAY_S), return_inverse=True)
-    medians = np.array([np.median(residual[day == d]) for d in range(len(days))])
+def _first_of(time_s: Array, day: Places) -> Array:
+    """First instant of each day."""
+    first = np.full(int(day.max()) + 1, np.inf)
+    np.minimum.at(first, day, time_s)
+    return first
+
+
+def _common_step(residual: Array, member: Places, time_s: Array, day: Places) -> float | None:
+    """First instant behind the largest step of the days' medians; None with too few vehicles."""
+    begun = _first_of(time_s, day)
+    medians = np.array([np.median(residual[day == d]) for d in range(len(begun))])
     counts = np.bincount(day).astype(np.float64)
     best, since = -1.0, None
     total, whole = float(counts @ medians), float(counts.sum())
@@ -180,7 +190,7 @@ def _common_step(residual: Array, member: Places, time_s: Array) -> float | None
         n = float(weight[place - 1])
         apart = float(before[place - 1]) / n - (total - float(before[place - 1])) / (whole - n)
         if n * (whole - n) * apart**2 > best:
-            best, since = n * (whole - n) * apart**2, float(days[place] * DAY_S)
+            best, since = n * (whole - n) * apart**2, float(begun[place])
     return since
 
 

@@ -1,0 +1,268 @@
+"""Days that go on as the days before them did: correlated errors that no step should be held by."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence, Set
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.fleet.statistics.largest_step import scan_drifts, scan_steps
+from flightid.fleet.statistics.multiple_testing import FALSE_SHARE, corrected
+from flightid.fleet.statistics.parameter_history import AskedHistory
+from flightid.fleet.statistics.repeats import days_of
+from flightid.frozen import dataclass
+
+Array = NDArray[np.float64]
+FEWEST_DAYS = 10
+"""Of a vehicle, below which its days do not tell whether they go on."""
+CORRELATIONS = (0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.97)
+"""From one day to the next of the part that goes on, which are tried."""
+SHARES = (0.1, 0.2, 0.3, 0.45, 0.6, 0.75, 0.9, 0.98)
+"""Of the variance of a day that goes on, which are tried."""
+LIKELIER = 3.0
+"""Twice the logarithm of the ratio of likelihoods from which days go on: of independent ones one
+fleet in twenty has as much."""
+KEPT = 9.0
+"""Log likelihood that a change must explain: of a step and a movement, sizes and places chosen."""
+ALIKE = 1e-6
+"""Share of a shape that others leave, below which it is one of them."""
+CAUTION = 2.0
+"""The same, by which what counts may be less likely than the best: the longest memory of these."""
+
+
+@dataclass(frozen=True)
+class Persistence:
+    """How days of all vehicles go on, in one parameter.
+
+    Attributes
+    ----------
+    share : float
+        Of the variance of a day's mean that goes on.
+    correlation : float
+        Of that part, from one day to the next.
+    factor : float
+        Of the variances that errors and days were taken to have; 1 at least.
+    likelier : float
+        Twice the logarithm of how much likelier that is than independent days.
+    fitness, apart : float
+        Log likelihood of the days, and were they independent, less what changes that are kept out
+        cost (`KEPT` a vehicle).
+    """
+
+    share: float
+    correlation: float
+    factor: float
+    likelier: float
+    fitness: float
+    apart: float
+
+    @property
+    def is_told(self) -> bool:
+        """Whether days go on, and not by chance."""
+        return self.likelier > LIKELIER
+
+    @property
+    def long_run(self) -> float:
+        """Variance of the mean of many days, in that of independent ones."""
+        rest = self.share * self.correlation / (1.0 - self.correlation)
+        return self.factor * (1.0 + 2.0 * rest)
+
+    def words(self, name: str) -> str:
+        """What is seen, and what it does to changes."""
+        return (
+            f"{name}: flights go on as their neighbours did (up to {100.0 * self.share:.0f} % of "
+            f"what days differ by, correlated {self.correlation:.2g} from one day to the next): "
+            "what lasts as long is no change"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class DaySeries:
+    """Days of one vehicle, in the standard errors of their means.
+
+    Attributes
+    ----------
+    vehicle : str
+    values : ndarray, shape (d,)
+    level : ndarray, shape (d, e)
+        What may have any size: a level, and the steps of events.
+    change : ndarray, shape (d, m)
+        The same with the largest step and the steadiest movement; `level` where nothing changed.
+    """
+
+    vehicle: str
+    values: Array
+    level: Array
+    change: Array
+
+
+def persistence(series: Sequence[DaySeries], changed: Set[str]) -> Persistence | None:
+    """Hold days that go on beside independent ones, by the likelihood over all vehicles.
+
+    Days' means in their standard errors have the covariance f ((1 − c) δ + c ρ^|lag|), in the
+    order of days; f is common, and eliminated. A level of each vehicle, the steps of its events and
+    what changed may have any size.
+
+    Parameters
+    ----------
+    series : sequence of DaySeries
+        Of one parameter.
+    changed : set of str
+        Vehicles whose change is kept out.
+
+    Returns
+    -------
+    Persistence or None
+        None where no vehicle has ten days. Of all that are nearly as likely as the best the one
+        with the longest memory: what is wrongly called a change costs more than one missed.
+
+    Assumes
+    -------
+    The same memory for all vehicles; days in a row are as far apart as others. What most vehicles
+    do by and by, each its own way, cannot be told from days that go on.
+
+    Reference
+    ---------
+    Patterson & Thompson, *Biometrika* 58 (1971), 545–554 (restricted likelihood).
+    """
+    if not series:
+        return None
+    groups = _grouped([(e.values, e.change if e.vehicle in changed else e.level) for e in series])
+    none = _likelihood(groups, 0.0, 0.0)
+    grid = [(0.0, 0.0, *none)]
+    grid += [(c, r, *_likelihood(groups, c, r)) for c, r in product(SHARES, CORRELATIONS)]
+    best = max(each[2] for each in grid)
+    kept = sum(each.vehicle in changed for each in series)
+    likelier, apart = 2.0 * (best - none[0]), none[2] - KEPT * kept
+    found = [
+        Persistence(c, r, max(1.0, factor), likelier, whole - KEPT * kept, apart)
+        for c, r, value, factor, whole in grid
+        if 2.0 * (best - value) <= CAUTION
+    ]
+    return max(found, key=lambda each: each.long_run)
+
+
+def changed_vehicles(asked: Sequence[AskedHistory]) -> frozenset[str]:
+    """Vehicles whose history of one parameter would be an alarm by itself among those asked."""
+    judged = [each.history for each in asked if each.history.chance is not None]
+    shares = corrected([each.chance or 0.0 for each in judged])
+    told = zip(judged, shares, strict=True)
+    return frozenset(each.vehicle for each, share in told if share <= FALSE_SHARE)
+
+
+def explained(series: Sequence[DaySeries], most: Set[str], found: Persistence) -> frozenset[str]:
+    """Vehicles, of `most`, whose change explains more than it costs beside days that go on."""
+    kept = []
+    for each in (one for one in series if one.vehicle in most):
+        inverse, _ = _whitening(len(each.values), found.share, found.correlation)
+        without, beside = (
+            _left(inverse @ each.values, inverse @ x) for x in (each.level, each.change)
+        )
+        if without - beside > 2.0 * KEPT * found.factor:
+            kept.append(each.vehicle)
+    return frozenset(kept)
+
+
+def _left(values: Array, design: Array) -> float:
+    """Squares that a design leaves of values."""
+    along = np.linalg.qr(design)[0].T @ values
+    return float(values @ values - along @ along)
+
+
+def day_series(asked: Sequence[AskedHistory], changed: Set[str]) -> list[DaySeries]:
+    """Days of the histories that were judged and have ten or more, with what changed in some."""
+    judged = (each for each in asked if each.history.chance is not None)
+    found = (_days(each, each.history.vehicle in changed) for each in judged)
+    return [each for each in found if each is not None]
+
+
+def _days(asked: AskedHistory, has_changed: bool) -> DaySeries | None:
+    time_s = asked.history.time_s
+    day = days_of(time_s)
+    if day.max() + 1 < FEWEST_DAYS:
+        return None
+    own, of_day = asked.own_variances, np.bincount(day, 1.0 / asked.own_variances)
+    weights = (day == np.arange(day.max() + 1)[:, None]) / own / of_day[:, None]
+    scale = np.sqrt(day_variances(asked)[np.unique(day, return_index=True)[1]])
+    weights = weights / scale[:, None]
+    level = np.column_stack([np.ones(len(day)), asked.known])
+    change = np.column_stack([level, *_changes(asked)]) if has_changed else level
+    both = (_apart(weights @ each) for each in (level, change))
+    return DaySeries(asked.history.vehicle, weights @ asked.values, *both)
+
+
+def _apart(design: Array) -> Array:
+    """Shapes of which none is like the others: a step and a movement of the last day are one."""
+    own = np.abs(np.diag(np.linalg.qr(design)[1]))
+    return np.asarray(design[:, own > ALIKE * own.max()])
+
+
+def _changes(asked: AskedHistory) -> list[Array]:
+    """The step and the steady movement that explain most of a history."""
+    n, time_s = len(asked.values), asked.history.time_s
+    place = scan_steps(asked.values, asked.covariance, asked.known).place
+    found = [(np.arange(n) > place).astype(np.float64)[:, None]]
+    if time_s[0] < time_s[-3]:
+        start = scan_drifts(asked.values, asked.covariance, time_s).place
+        found.append(np.maximum(time_s - time_s[start], 0.0)[:, None] / (time_s[-1] - time_s[0]))
+    return found
+
+
+def day_variances(asked: AskedHistory) -> Array:
+    """Variance of the mean of each flight's day, shape (n,)."""
+    day = days_of(asked.history.time_s)
+    return np.asarray(1.0 / np.bincount(day, 1.0 / asked.own_variances)[day] + asked.by_day)
+
+
+def _grouped(series: Sequence[tuple[Array, Array]]) -> list[tuple[Array, Array]]:
+    """Series of equal shape in one array, with a last axis of one column for the values."""
+    groups: dict[tuple[int, ...], list[tuple[Array, Array]]] = {}
+    for values, design in series:
+        groups.setdefault(design.shape, []).append((values, design))
+    return [
+        (np.stack([values for values, _ in held])[:, :, None], np.stack([x for _, x in held]))
+        for held in groups.values()
+    ]
+
+
+def _whitening(n: int, share: float, correlation: float) -> tuple[Array, float]:
+    """What makes days independent, and half the logarithm of their covariance's determinant."""
+    lag = np.abs(np.subtract.outer(np.arange(n), np.arange(n)))
+    root = np.linalg.cholesky(share * correlation**lag + (1.0 - share) * np.eye(n))
+    return np.linalg.inv(root), float(np.sum(np.log(np.diag(root))))
+
+
+def _likelihood(
+    groups: Sequence[tuple[Array, Array]], share: float, correlation: float
+) -> tuple[float, float, float]:
+    """Restricted log likelihood over all vehicles, their common factor, and the plain likelihood.
+
+    The last, with means as estimated, compares designs.
+    """
+    total, squares, freedom, whole, count = 0.0, 0.0, 0, 0.0, 0
+    for values, design in groups:
+        many, n, p = design.shape
+        inverse, log_root = _whitening(n, share, correlation)
+        q, r = np.linalg.qr(inverse @ design)
+        white = inverse @ values
+        squares += float(np.sum(white**2) - np.sum((np.swapaxes(q, 1, 2) @ white) ** 2))
+        sizes = np.abs(np.diagonal(r, axis1=1, axis2=2))
+        total -= many * log_root + float(np.sum(np.log(sizes)))
+        freedom, count, whole = freedom + many * (n - p), count + many * n, whole - many * log_root
+    factor = squares / freedom
+    whole -= 0.5 * count * float(np.log(squares / count))
+    return total - 0.5 * freedom * float(np.log(factor)), factor, whole
+
+
+def persisting(asked: AskedHistory, found: Persistence) -> Array:
+    """Covariance of the flights of a vehicle whose days go on, shape (n, n)."""
+    day = days_of(asked.history.time_s)
+    lag = np.abs(np.subtract.outer(day, day))
+    sizes = np.sqrt(day_variances(asked))
+    beyond = np.where(lag > 0, found.share * found.correlation**lag, 0.0)
+    beyond = beyond * np.outer(sizes, sizes)
+    together = np.where((lag == 0) & ~np.eye(len(day), dtype=bool), asked.by_day, 0.0)
+    base = np.diag(asked.history.variances) + together
+    return asked.covariance + (found.factor - 1.0) * base + found.factor * beyond

@@ -1,0 +1,84 @@
+"""The light of one vehicle: changed is red; its newest flight off, or unlike its type, amber."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from flightid.conventions import Light
+from flightid.findings import Finding
+from flightid.fleet.normality import quiet_light
+from flightid.fleet.statistics.answers import TypeAnswers
+from flightid.fleet.statistics.change_kind import DRIFT, STEP
+from flightid.fleet.statistics.events import EventEffect
+from flightid.fleet.statistics.parameter_history import ParameterHistory
+from flightid.uncertainty.estimate import Reading
+from flightid.uncertainty.quantiles import shown
+
+
+def vehicle_light(vehicle: str, types: Sequence[TypeAnswers]) -> Finding:
+    """Light of one vehicle: changed is red; its newest flight off, or unlike its type, amber."""
+    said, done, light = [], [], Light.GREEN
+    for each in types:
+        for history, effect in each.drift.by_event if each.drift is not None else ():
+            if history.vehicle == vehicle:
+                done.append(event_words(history, effect, each.labels))
+        alike = each.drift.alike if each.drift is not None else ()
+        for history in each.drift.alarms if each.drift is not None else ():
+            if history.vehicle == vehicle:
+                said.append(change_words(history, each.labels))
+                shared = any(e.name == history.name and vehicle in e.vehicles for e in alike)
+                said[-1] += ", as the others did" if shared else ""
+                light = Light.AMBER if shared and light is not Light.RED else Light.RED
+        for history in each.drift.going_on if each.drift is not None else ():
+            if history.vehicle == vehicle:
+                said.append(going_on_words(history, each.labels))
+                light = Light.RED if light is Light.RED else Light.AMBER
+        for newest in each.drift.newest_off if each.drift is not None else ():
+            if newest.vehicle == vehicle:
+                said.append(newest.words(each.labels))
+                light = Light.RED if light is Light.RED else Light.AMBER
+        if each.outliers is not None:
+            unlike = each.outliers.differences(vehicle, each.labels)
+            said += unlike
+            light = Light.AMBER if unlike and light is not Light.RED else light
+    if not said:
+        quiet = quiet_light(vehicle, types)
+        if not done:
+            return quiet
+        rest = quiet.message.removeprefix(f"{vehicle}: ")
+        return replace(quiet, message=f"{vehicle}: {'; '.join(done)}; beyond that {rest}")
+    said += done
+    act = "look at what was done to it, and verify its model on a new flight"
+    return Finding("vehicle", light, f"{vehicle}: {'; '.join(said)}", act)
+
+
+def change_words(history: ParameterHistory, labels: Mapping[str, str]) -> str:
+    """What changed, by how much, in words."""
+    how = {STEP: " at once", DRIFT: " by and by, the last flight beside those before"}.get(
+        history.kind, ""
+    )
+    name, size = labels.get(history.name, history.name), _size_words(history.change_percent)
+    beyond = ", beside what its events explain" if history.events else ""
+    return f"{name} changed{size}{how}{beyond}"
+
+
+def going_on_words(history: ParameterHistory, labels: Mapping[str, str]) -> str:
+    """What may have changed, or may have gone on, and what would tell."""
+    name, size = labels.get(history.name, history.name), _size_words(history.change_percent)
+    return (
+        f"{name} changed{size}, or its flights go on as their neighbours did, as those of all "
+        "vehicles do: flights on more days tell"
+    )
+
+
+def event_words(history: ParameterHistory, effect: EventEffect, labels: Mapping[str, str]) -> str:
+    """What an event changed, by how much: of what was told, no reason to look at it."""
+    name = labels.get(history.name, history.name)
+    return f"{name} changed{_size_words(effect.percent)} at the event “{effect.event.what}”"
+
+
+def _size_words(change: Reading) -> str:
+    ends = change.interval(shown())
+    size = "" if change.value is None else f" by {change.value:+.2g} %"
+    return size + ("" if ends is None else f" ({ends[0]:+.2g} to {ends[1]:+.2g} %)")
