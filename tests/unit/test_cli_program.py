@@ -7,6 +7,7 @@ import sys
 import time
 from io import StringIO
 from pathlib import Path
+from types import SimpleNamespace
 
 import click
 import pytest
@@ -190,13 +191,20 @@ def test_bar_is_quiet_for_short_work_and_vanishes(monkeypatch: pytest.MonkeyPatc
     # In a file, where nothing was to be seen of a run of hours, whole lines now and then.
     for name, wait_s in (("FIRST_LINE_S", 0.01), ("LINE_S", 0.01)):
         monkeypatch.setattr(bar, name, wait_s)
-    lines = StringIO()
-    told = Bar("logs", 2, lines)
-    told.advance()
-    while lines.getvalue().count("\n") < 2:
-        time.sleep(0.01)
+    lines, clock = StringIO(), [0.0]
+    monkeypatch.setattr(bar, "time", SimpleNamespace(monotonic=lambda: clock[0]))
+    told = Bar("logs", 410, lines)
+    # Start-up is no part of the rest: 34 min were told of four after the first two of 410.
+    for at_s, steps, said in ((8.0, 2, ""), (11.0, 10, " (about 1:48 left)")):
+        clock[0] = at_s
+        for _ in range(steps):
+            told.advance()
+        before = lines.getvalue().count("\n")
+        while lines.getvalue().count("\n") < before + 2:
+            time.sleep(0.01)
+        done = 2 if steps == 2 else 12
+        assert lines.getvalue().splitlines()[-1] == f"logs {done}/410 0:{at_s:02.0f}{said}"
     told.close()
-    assert lines.getvalue().splitlines()[-1] == "logs 1/2 0:00 (about 0:00 left)"
 
 
 @pytest.mark.skipif(shutil.which("bash") is None, reason="no bash here")

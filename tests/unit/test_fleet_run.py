@@ -19,7 +19,7 @@ from typing import Any
 import pytest
 
 from flightid.errors import DataError, StudyError
-from flightid.fleet import fleet_status, run_fleet
+from flightid.fleet import ask_fleet, fleet_status, run_fleet
 from flightid.fleet.addresses import LogAddress, find_logs
 from flightid.fleet.catalogue.loose import write_loose
 from flightid.fleet.catalogue.record import LogRecord
@@ -375,6 +375,63 @@ def test_one_content_under_three_names_is_one_log(
     assert (none.shares.outcomes, len(none.shares.gone), none.reasons) == ({}, 1, ())
     # A fleet without one model is as red when nothing is left to take.
     assert [(each.code, each.light) for each in again.findings] == [("nothing-fitted", "red")]
+
+
+def test_a_renamed_log_counts_under_its_new_name_and_a_deleted_one_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It kept its old vehicle for ever, and nothing said so; nor that deleted ones count."""
+    pytest.importorskip("duckdb")
+    fleet, logs = tmp_path / "fleet.toml", tmp_path / "logs"
+    words = (
+        "[fleet]\ntitle = 't'\nlogs = ['logs']\n[vehicles]\nby = 'name'\n"
+        "pattern = '^(V[0-9]+)'\ntype = 'quad'\nflight_table = 'flights.csv'\n"
+    )
+    fleet.write_text(words)
+    (tmp_path / "flights.csv").write_text("log,load_kg\nV01-20260105.bin,2\nV09-20260105.bin,3\n")
+    logs.mkdir()
+    for number in range(1, 5):
+        (logs / f"V0{number}-20260105.bin").write_bytes(b"no log %d" % number)
+    monkeypatch.setattr("flightid.fleet.run.find_spec", lambda _: None)
+    assert run_fleet(fleet, workers=1).outcomes == {"refused": 4}
+    (logs / "V01-20260105.bin").rename(logs / "V09-20260105.bin")
+    (logs / "V02-20260105.bin").rename(logs / "V02-20260106.bin")
+    (logs / "V04-20260105.bin").unlink()
+    said = "2 logs have another name, 1 of them another vehicle than in the catalogue: "
+    for found in (fleet_status(fleet).findings, ask_fleet(fleet).outdated):
+        assert [each.code for each in found] == ["renamed-logs", "gone-logs"]
+        assert found[0].message.startswith(said)
+        assert "V01-20260105.bin is V09-20260105.bin now (vehicle V01, now V09)" in found[0].message
+        assert found[0].action == "flightid fleet run takes the new ones"
+        assert found[1].message.startswith("1 record of a log that is gone from the places")
+    # The record follows though no log is read for it: of a part as of loose files.
+    monkeypatch.setattr("flightid.fleet.identity._gps_start", never)
+    done = run_fleet(fleet, workers=1)
+    assert (done.found, done.kept, done.outcomes) == (3, 3, {})
+    assert [each.code for each in done.findings][:2] == ["renamed-logs", "gone-logs"]
+    assert "now, and so in the catalogue: V01-" in done.findings[0].message
+    with open_catalogue(fleet) as catalogue:
+        rows = catalogue.query("SELECT vehicle, flown_at, id FROM logs ORDER BY 1").fetchall()
+        load = catalogue.query("SELECT vehicle, value FROM covariates").fetchall()
+        failed = catalogue.query("SELECT DISTINCT vehicle FROM failures ORDER BY 1").fetchall()
+    assert [(v, at.day, own) for v, at, own in rows] == [
+        ("V02", 6, "V02"), ("V03", 5, "V03"), ("V04", 5, "V04"), ("V09", 5, "V09"),
+    ]  # fmt: skip
+    assert load == [("V09", 3.0)]
+    assert failed == [("V02",), ("V03",), ("V04",), ("V09",)]
+    assert [each.code for each in fleet_status(fleet).findings] == ["gone-logs"]
+    told = run_fleet(fleet, workers=1, forget_gone=True)
+    assert "taken out of the catalogue" in told.findings[0].message
+    assert fleet_status(fleet).outcomes == {"refused": 3}
+    # Another vehicle by the table: told before the next run takes it; other rules, too.
+    (tmp_path / "flights.csv").write_text("log,vehicle\nV03-20260105.bin,N1\n")
+    (told,) = fleet_status(fleet).findings
+    assert "V03-20260105.bin (vehicle V03, now N1)" in told.message
+    fleet.write_text(words.replace("quad", "hexa"))
+    assert [each.code for each in fleet_status(fleet).findings] == [
+        "earlier-records",
+        "renamed-logs",
+    ]
 
 
 def test_tables_of_vehicles_and_flights_reach_every_log(fleet: Path, tmp_path: Path) -> None:

@@ -15,6 +15,8 @@ LABEL_WIDTH = 40
 CLEAR = "\r\x1b[K"
 FIRST_LINE_S, LINE_S, LINE_SHARE = 10.0, 30.0, 0.1
 """In a file: when the first line comes, and after how long the next, or what share of the time."""
+FEWEST = 5
+"""Times that work came on, below which nothing is said of the rest: workers come in step."""
 
 
 class Bar:
@@ -37,6 +39,7 @@ class Bar:
         self._label = "".join(letter for letter in label if letter.isprintable())[:LABEL_WIDTH]
         self._total, self._done = total, 0
         self._stream, self._begun = stream, time.monotonic()
+        self._came, self._first, self._first_at = 0, 0, self._begun
         self._ended = Event()
         draw = self._draw if stream.isatty() else self._tell
         self._thread = Thread(target=draw, daemon=True)
@@ -45,6 +48,9 @@ class Bar:
     def advance(self, steps: int = 1) -> None:
         """Count steps that are done."""
         self._done += steps
+        self._came += 1
+        if self._came == 1:
+            self._first, self._first_at = self._done, time.monotonic()
 
     def close(self) -> None:
         """Take the bar away."""
@@ -67,7 +73,7 @@ class Bar:
         wait_s = FIRST_LINE_S
         while not self._ended.wait(wait_s):
             passed_s = time.monotonic() - self._begun
-            left = self._left(passed_s)
+            left = self._left(time.monotonic() - self._first_at)
             said = " ".join(filter(None, (self._label, self._counted(), left)))
             try:
                 self._stream.write(f"{said}\n")
@@ -87,11 +93,15 @@ class Bar:
         clock = _clock(time.monotonic() - self._begun)
         return f"{self._done}/{self._total} {clock}" if self._total else clock
 
-    def _left(self, passed_s: float) -> str:
-        """The time that the rest takes if it goes on like this."""
-        if not self._total or not 0 < self._done < self._total:
+    def _left(self, since_s: float) -> str:
+        """The time that the rest takes if it goes on as since the first step.
+
+        What came before that was start-up: counted, it made half an hour of four minutes.
+        """
+        since = self._done - self._first
+        if not self._total or not since or self._came < FEWEST or self._done >= self._total:
             return ""
-        return f"(about {_clock(passed_s * (self._total / self._done - 1.0))} left)"
+        return f"(about {_clock(since_s * (self._total - self._done) / since)} left)"
 
 
 def _clock(seconds: float) -> str:

@@ -38,9 +38,19 @@ def command() -> None:
     help="Dask scheduler whose workers take the logs, such as tls://host:8786.",
 )
 @click.option("--retry", is_flag=True, help="Take logs again that failed.")
+@click.option(
+    "--forget-gone",
+    is_flag=True,
+    help="Take records out of the catalogue whose log is not at the places of FLEET any more.",
+)
 @json_option
 def run(
-    fleet: Path, workers: int | None, scheduler: str | None, retry: bool, as_json: bool
+    fleet: Path,
+    workers: int | None,
+    scheduler: str | None,
+    retry: bool,
+    forget_gone: bool,
+    as_json: bool,
 ) -> None:
     """Take every log of FLEET that its catalogue lacks, and compact the catalogue.
 
@@ -61,7 +71,9 @@ def run(
             f"{fleet} is no fleet file, which is a .toml that names the logs (docs/fleet.md); one "
             f"log: flightid run {fleet}"
         )
-    done = run_fleet(fleet, workers=workers, scheduler=scheduler, retry=retry)
+    done = run_fleet(
+        fleet, workers=workers, scheduler=scheduler, retry=retry, forget_gone=forget_gone
+    )
     if as_json:
         emit_values(done.to_dict())
     else:
@@ -101,15 +113,14 @@ def status(place: str, as_json: bool) -> None:
     from flightid.fleet import fleet_status
     from flightid.fleet.reasons import reason_lines
     from flightid.fleet.shares import copy_lines
-    from flightid.fleet.unnamed import unnamed_light
 
     found = fleet_status(place)
     emit(found, as_json=as_json)
     if not as_json:
         for line in (*copy_lines(found.shares), *reason_lines(found.reasons)):
             click.echo(line)
-        if unnamed := unnamed_light(found.unnamed):
-            note(str(unnamed))
+        for finding in found.findings:
+            note(str(finding))
 
 
 @command.command("query", short_help="Answer one SELECT over the tables of the catalogue.")

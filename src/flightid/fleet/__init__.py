@@ -9,14 +9,15 @@ if TYPE_CHECKING:
     from flightid.fleet.pooled_models import type_models
     from flightid.fleet.proposal import FleetProposal, propose_fleet
     from flightid.fleet.reporting import ask_fleet, fleet_report
-    from flightid.fleet.run import FleetRun, run_fleet
+    from flightid.fleet.run import run_fleet
+    from flightid.fleet.run_result import FleetRun
     from flightid.fleet.settings import FleetSettings, read_fleet
     from flightid.fleet.status import FleetStatus, fleet_status
 
 _HOMES = {
     "Catalogue": ("flightid.fleet.catalogue.catalogue", "Catalogue"),
     "FleetProposal": ("flightid.fleet.proposal", "FleetProposal"),
-    "FleetRun": ("flightid.fleet.run", "FleetRun"),
+    "FleetRun": ("flightid.fleet.run_result", "FleetRun"),
     "FleetSettings": ("flightid.fleet.settings", "FleetSettings"),
     "FleetStatus": ("flightid.fleet.status", "FleetStatus"),
     "ask_fleet": ("flightid.fleet.reporting", "ask_fleet"),

@@ -153,6 +153,32 @@ def _lines(
     return found
 
 
+@dataclass(frozen=True)
+class LogWitness:
+    """What a log itself says of who flew it and when; nothing where it cannot be read.
+
+    Attributes
+    ----------
+    own : str or None
+        Id, where the rules look for it in the log.
+    type : str or None
+    started : datetime or None
+        By the first fix with a date, UTC.
+    """
+
+    own: str | None = None
+    type: str | None = None
+    started: datetime.datetime | None = None
+
+    @classmethod
+    def of(cls, log: Log | None, rules: VehicleRules) -> LogWitness:
+        """Of a log; its place and tables may tell more."""
+        if log is None:
+            return cls()
+        own = _id_in(log, rules.parameter) if rules.by == "log" else None
+        return cls(own, " ".join(filter(None, (log.kind, log.vehicle))), _gps_start(log))
+
+
 def identify_log(
     log: Log | None, address: str, changed_s: float | None, rules: VehicleRules, tables: FleetTables
 ) -> LogIdentity:
@@ -168,24 +194,35 @@ def identify_log(
     rules : VehicleRules
     tables : FleetTables
     """
-    own = _own_id(log, address, rules)
+    return identity_of(LogWitness.of(log, rules), address, changed_s, rules, tables)
+
+
+def identity_of(
+    seen: LogWitness,
+    address: str,
+    changed_s: float | None,
+    rules: VehicleRules,
+    tables: FleetTables,
+) -> LogIdentity:
+    """The same by what is known of the log already."""
+    own = _own_id(seen, address, rules)
     of_vehicle, of_flight = tables.of(own, address)
-    kind = of_vehicle.get("type") or rules.type or _type(log)
-    flown_at, source = _flown_at(log, address, changed_s, of_flight.get("flown_at"))
+    kind = of_vehicle.get("type") or rules.type or seen.type
+    flown_at, source = _flown_at(seen, address, changed_s, of_flight.get("flown_at"))
     others = {k: v for k, v in (of_vehicle | of_flight).items() if k not in OWN}
     name = of_flight.get("vehicle") or of_vehicle.get("vehicle") or own
     told = tables.told(own, address)
     return LogIdentity(name, kind, flown_at, source, others, own, told)
 
 
-def _own_id(log: Log | None, address: str, rules: VehicleRules) -> str | None:
+def _own_id(seen: LogWitness, address: str, rules: VehicleRules) -> str | None:
     path = PurePosixPath(address)
     if rules.by == "folder":
         return path.parent.name or None
     if rules.by == "name":
         found = re.search(rules.pattern or "(.*)", path.name)
         return None if found is None else found.group(1)
-    return None if log is None else _id_in(log, rules.parameter)
+    return seen.own
 
 
 def _id_in(log: Log, parameter: str | None) -> str | None:
@@ -198,17 +235,13 @@ def _id_in(log: Log, parameter: str | None) -> str | None:
     return log.board or None
 
 
-def _type(log: Log | None) -> str | None:
-    return None if log is None else " ".join(filter(None, (log.kind, log.vehicle)))
-
-
 def _flown_at(
-    log: Log | None, address: str, changed_s: float | None, said: str | None
+    seen: LogWitness, address: str, changed_s: float | None, said: str | None
 ) -> tuple[datetime.datetime | None, str | None]:
     if said:
         return instant_of(said), "table"
-    if log is not None and (found := _gps_start(log)) is not None:
-        return found, "log"
+    if seen.started is not None:
+        return seen.started, "log"
     named = DATES.search(PurePosixPath(address).name)
     if named is not None:
         year, month, day = map(int, named.groups())

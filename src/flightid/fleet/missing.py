@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Set
 from dataclasses import fields
 
 from flightid.fleet.addresses import LogAddress
 from flightid.fleet.catalogue.compaction import read_columns, rewrite, text_of
 from flightid.fleet.catalogue.loose import BROKEN, loose_logs, loose_name, read_loose
 from flightid.fleet.catalogue.parts import KnownLogs, read_parts
-from flightid.fleet.catalogue.schema import FAILED
+from flightid.fleet.catalogue.schema import FAILED, FITTED
 from flightid.fleet.catalogue.store import Store
 from flightid.fleet.identity import FleetTables
 from flightid.frozen import dataclass
@@ -23,6 +23,8 @@ class LogEntry:
     ----------
     log, address, stamp, bytes, outcome, reason, id, told : str
         Columns of the table of logs, numbers as text; empty for null.
+    vehicle, type, flown_at, flown_at_from : str
+        What it counts as.
     """
 
     log: str
@@ -33,33 +35,68 @@ class LogEntry:
     reason: str
     id: str
     told: str
+    vehicle: str
+    type: str
+    flown_at: str
+    flown_at_from: str
+
+    def is_outdated(self, tables: FleetTables) -> bool:
+        """Whether the tables of the fleet say something else of it by now."""
+        return self.told != tables.told(self.id or None, self.address)
+
+
+@dataclass(frozen=True)
+class MissingLogs:
+    """What a run finds of a catalogue, in one pass over its records.
+
+    Attributes
+    ----------
+    addresses : list of LogAddress
+        Logs that no record stands for.
+    earlier : dict of str to set of str
+        By address: records of what lay there before.
+    gone : dict of str to LogEntry
+        By log: records whose file is not at the places of the fleet file.
+    fitted : dict of str to str
+        By log: vehicle of those with a model; empty where it names none.
+    """
+
+    addresses: list[LogAddress]
+    earlier: dict[str, set[str]]
+    gone: dict[str, LogEntry]
+    fitted: dict[str, str]
 
 
 def missing_logs(
     store: Store, addresses: list[LogAddress], tables: FleetTables, *, retry: bool
-) -> tuple[list[LogAddress], dict[str, set[str]]]:
+) -> MissingLogs:
     """Logs that no record stands for, by address, size and stamp alone: nothing is read for it.
 
-    Beside them the records that stand at each address for what lay there before. Records of which
-    the tables of vehicles and flights say something else by now are forgotten, and so are broken
-    ones, those that another of the same address has replaced and, where that is asked, those that
-    failed.
+    Records of which the tables of vehicles and flights say something else by now are forgotten,
+    and so are broken ones, those that another of the same address has replaced and, where that is
+    asked, those that failed.
     """
     there = {each.address: each for each in addresses}
     done, again, earlier = set[str](), set[str](), dict[str, set[str]]()
+    gone, fitted = dict[str, LogEntry](), dict[str, str]()
     for entry in catalogue_entries(store):
-        is_stale = entry.told != tables.told(entry.id or None, entry.address)
-        if entry.reason == BROKEN or is_stale or (retry and entry.outcome == FAILED):
+        is_failed = retry and entry.outcome == FAILED
+        if entry.reason == BROKEN or entry.is_outdated(tables) or is_failed:
             again.add(entry.log)
-        elif entry.address in there:
-            if stands_for(entry, there[entry.address]):
-                done.add(entry.address)
-            else:
-                earlier.setdefault(entry.address, set()).add(entry.log)
+            continue
+        if entry.outcome == FITTED:
+            fitted[entry.log] = entry.vehicle
+        if entry.address not in there:
+            gone[entry.log] = entry
+        elif stands_for(entry, there[entry.address]):
+            done.add(entry.address)
+        else:
+            earlier.setdefault(entry.address, set()).add(entry.log)
     for address in done:
         again |= earlier.pop(address, set())
     forget(store, again)
-    return [each for each in addresses if each.address not in done], earlier
+    left = [each for each in addresses if each.address not in done]
+    return MissingLogs(left, earlier, gone, {k: v for k, v in fitted.items() if k not in again})
 
 
 def stands_for(entry: LogEntry, address: LogAddress) -> bool:
@@ -83,6 +120,11 @@ def forget(store: Store, logs: set[str]) -> None:
     """Take logs out of the catalogue."""
     for log in logs:
         store.remove(loose_name(log))
+    out_of_parts(store, logs)
+
+
+def out_of_parts(store: Store, logs: Set[str]) -> None:
+    """Write the parts anew that hold some of these logs, without them."""
     if not logs:
         return
     for part in read_parts(store)[0]:

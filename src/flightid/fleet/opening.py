@@ -6,7 +6,9 @@ import json
 import re
 from pathlib import Path
 
-from flightid.errors import DataError
+from flightid.conventions import Light
+from flightid.errors import DataError, FlightidError
+from flightid.findings import Finding
 from flightid.fleet.catalogue.catalogue import Catalogue
 from flightid.fleet.catalogue.parts import BROKEN_JSON
 from flightid.fleet.catalogue.store import Store, store_at
@@ -91,6 +93,20 @@ def current_store(settings: FleetSettings) -> Store:
             action="remove the link, or name what it leads to as the catalogue",
         )
     return store_at(place)
+
+
+def earlier_light(settings: FleetSettings, store: Store) -> tuple[Finding, ...]:
+    """That the records are of before the study, version or rules for vehicles were changed."""
+    try:
+        is_present = recipe(settings) == store.root.rpartition("/")[2]
+    except (FlightidError, OSError):
+        return ()  # A study that cannot be read is the run's to complain of.
+    if is_present:
+        return ()
+    said = "the catalogue is of before [vehicles], the study or flightid changed: so it answers"
+    return (
+        Finding("earlier-records", Light.AMBER, said, "flightid fleet run takes all logs anew"),
+    )
 
 
 def has_catalogue(place: str) -> bool:

@@ -7,12 +7,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from flightid.conventions import Light
+from flightid.errors import FlightidError
+from flightid.findings import Finding
 from flightid.fleet.catalogue.loose import BROKEN, REWRITE
 from flightid.fleet.catalogue.schema import FAILED
 from flightid.fleet.catalogue.soundness import unsound_logs
-from flightid.fleet.opening import names_fleet_file, open_catalogue
+from flightid.fleet.opening import (
+    catalogue_place,
+    earlier_light,
+    names_fleet_file,
+    open_catalogue,
+    opened_store,
+)
 from flightid.fleet.page import fleet_document
 from flightid.fleet.settings import FleetQuestions, FleetSettings, read_fleet
+from flightid.fleet.shares import fleet_shares
 from flightid.fleet.statistics.answers import FleetAnswers, answer_questions
 from flightid.fleet.statistics.events import FleetEvent
 from flightid.uncertainty.quantiles import showing
@@ -63,14 +72,35 @@ def ask_fleet(place: str | Path) -> FleetAnswers:
         damaged = len(catalogue.broken)
     answers = answer_questions(
         rows,
-        events=[] if settings is None else _events(settings),
-        covariates=questions.covariates,
+        **asked_of(place),
         parameters=questions.parameters,
         population=questions.population,
-        drift=questions.drift,
-        outliers=questions.outliers,
     )
-    return replace(answers, damaged=damaged)
+    outdated = () if settings is None else _outdated(settings, place)
+    return replace(answers, damaged=damaged, outdated=outdated)
+
+
+def _outdated(settings: FleetSettings, place: str | Path) -> tuple[Finding, ...]:
+    """What of the catalogue is not as the files are; nothing where these are out of reach."""
+    store = opened_store(catalogue_place(place))
+    earlier = earlier_light(settings, store)
+    try:
+        shares, _ = fleet_shares(settings, store)
+    except (FlightidError, OSError):
+        return earlier
+    return (*earlier, *(() if shares is None else shares.findings))
+
+
+def asked_of(place: str | Path) -> dict[str, Any]:
+    """What a fleet file asks of vehicles; of a catalogue alone all, without events."""
+    settings = _settings(place)
+    questions = FleetQuestions() if settings is None else settings.questions
+    return {
+        "events": [] if settings is None else _events(settings),
+        "covariates": questions.covariates,
+        "drift": questions.drift,
+        "outliers": questions.outliers,
+    }
 
 
 def fleet_report(place: str | Path) -> Document:

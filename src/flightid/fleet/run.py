@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import field, replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from dataclasses import replace
 from importlib.util import find_spec
 from multiprocessing import current_process
 from pathlib import Path
@@ -34,84 +34,24 @@ from flightid.fleet.engine.order import (
 from flightid.fleet.engine.plain import run_plain
 from flightid.fleet.engine.sandbox import TIME
 from flightid.fleet.identity import FleetTables, identify_log, read_tables
-from flightid.fleet.missing import forget, missing_logs
+from flightid.fleet.missing import LogEntry, MissingLogs, forget, missing_logs
 from flightid.fleet.opening import current_store
 from flightid.fleet.pattern_clock import require_quick
-from flightid.fleet.reasons import RefusalReason
 from flightid.fleet.refusal import ACTIONS, PATTERN
+from flightid.fleet.renamed import (
+    RenamedLog,
+    follow,
+    gone_light,
+    renamed_identity,
+    renamed_light,
+    still_there,
+)
 from flightid.fleet.run_one import FULL, NAMING, made_record
+from flightid.fleet.run_result import FleetInterrupt, FleetRun
 from flightid.fleet.settings import FleetSettings, read_fleet
 from flightid.fleet.taken import TakenContents
-from flightid.fleet.unnamed import named_logs, unnamed_light, unnamed_logs
-from flightid.frozen import dataclass
+from flightid.fleet.unnamed import unnamed_light
 from flightid.progress import progress
-from flightid.result import Result
-from flightid.table import Column, Table
-
-
-@dataclass(frozen=True, repr=False)
-class FleetRun(Result, schema="flightid.fleet_run/1"):
-    """What one run of a fleet did.
-
-    Attributes
-    ----------
-    catalogue : str
-        Folder or address.
-    found : int
-        Logs at the places of the fleet file.
-    kept : int
-        Of these, in the catalogue before, or taken by another run at the same time.
-    outcomes : mapping of str to int
-        Those that were taken, by outcome.
-    findings : tuple of Finding
-    reasons : tuple of RefusalReason
-        Why those that were taken and gave no model did not, the commonest first.
-    copies : mapping of str to str
-        Addresses whose bytes another log had that was taken, and its address: found is the sum of
-        what was kept, all outcomes and these.
-
-    Example
-    -------
-    >>> FleetRun("catalogue", 3, 1, {"fitted": 2})
-    FleetRun(3 logs, 1 kept, 2 fitted)
-    """
-
-    catalogue: str
-    found: int
-    kept: int
-    outcomes: dict[str, int]
-    findings: tuple[Finding, ...] = ()
-    reasons: tuple[RefusalReason, ...] = ()
-    copies: Mapping[str, str] = field(default_factory=dict)
-
-    def summary(self) -> Table:
-        """Table of the numbers."""
-        rows: list[tuple[str, int]] = [("logs found", self.found), ("kept", self.kept)]
-        rows += [(f"{name} logs", n) for name, n in sorted(self.outcomes.items())]
-        rows += [("copies of these", len(self.copies))] if self.copies else []
-        columns = (Column("what"), Column("number"))
-        return Table(f"Run of {self.catalogue}", columns, tuple(rows))
-
-    def __repr__(self) -> str:
-        """Numbers of logs on one line."""
-        told = ", ".join(f"{n} {name}" for name, n in sorted(self.outcomes.items())) or "none taken"
-        return f"FleetRun({self.found} logs, {self.kept} kept, {told})"
-
-
-class FleetInterrupt(KeyboardInterrupt):
-    """Ctrl-C in a run: what is in the catalogue, and how to go on.
-
-    Parameters
-    ----------
-    done, found : int
-        Logs that are in the catalogue, and all at the places of the fleet file.
-    """
-
-    def __init__(self, done: int, found: int) -> None:
-        super().__init__(
-            f"Interrupted: {done} of {counted(found, 'log')} in the catalogue; the same command "
-            "takes the rest."
-        )
 
 
 def run_fleet(
@@ -120,6 +60,7 @@ def run_fleet(
     workers: int | None = None,
     scheduler: str | None = None,
     retry: bool = False,
+    forget_gone: bool = False,
 ) -> FleetRun:
     """Take every log of a fleet file that its catalogue lacks.
 
@@ -136,6 +77,9 @@ def run_fleet(
         Address of a Dask scheduler whose workers take the logs: ``"tls://host:8786"``.
     retry : bool
         Take logs again that failed: out of time or memory, or by a fault.
+    forget_gone : bool
+        Take records out of the catalogue whose log is not at the places of the fleet file any more.
+        Without it they count all the same.
 
     Returns
     -------
@@ -159,14 +103,21 @@ def run_fleet(
     FleetRun(2 logs, 0 kept, 2 refused)
     """
     try:
-        return _run(path, workers, scheduler, retry=retry)
+        return _run(path, workers, scheduler, retry=retry, forget_gone=forget_gone)
     except OSError as error:
         if error.errno not in FULL:
             raise
         raise _no_space(str(error)) from error
 
 
-def _run(path: str | Path, workers: int | None, scheduler: str | None, *, retry: bool) -> FleetRun:
+def _run(
+    path: str | Path,
+    workers: int | None,
+    scheduler: str | None,
+    *,
+    retry: bool,
+    forget_gone: bool,
+) -> FleetRun:
     settings = read_fleet(path)
     tables = read_tables(settings)
     if scheduler is not None:
@@ -178,39 +129,62 @@ def _run(path: str | Path, workers: int | None, scheduler: str | None, *, retry:
     aside = set_aside(store)
     addresses = find_logs([settings.place(place) for place in settings.words.logs])
     require_quick(settings.vehicles.pattern, (each.name for each in addresses))
-    missing, earlier = missing_logs(store, addresses, tables, retry=retry)
+    missing = missing_logs(store, addresses, tables, retry=retry)
     findings = [*_findings(scheduler, addresses), *([] if claims else [UNCLAIMED])]
     replaced, taken = set[str](), TakenContents()
     run = _Run(settings, tables, store, order, workers, scheduler)
-    before = len(addresses) - len(missing)
+    before = len(addresses) - len(missing.addresses)
     try:
-        with progress(len(missing), settings.path.stem) as advance:
-            for outcome in run.outcomes(orders(missing, tables)):
+        with progress(len(missing.addresses), settings.path.stem) as advance:
+            for outcome in run.outcomes(orders(missing.addresses, tables)):
                 taken.add(outcome)
-                replaced |= earlier.get(outcome.order.address.address, set())
+                replaced |= missing.earlier.get(outcome.order.address.address, set())
                 advance()
     except KeyboardInterrupt as stop:
         raise FleetInterrupt(before + taken.names, len(addresses)) from stop
     replaced -= taken.outcomes.keys()
     forget(store, replaced)
+    findings += _replaced(aside, replaced)
+    findings += run.followed(missing, taken)
+    findings += _forgotten(store, missing.gone, addresses, asked=forget_gone)
     run.tidy(1)
     counts = taken.counts()
     kept = before + counts.pop(KNOWN, 0)
-    if aside:
-        text = (
-            f"{len(aside)} tables were damaged: they lie in quarantine, their logs were taken again"
-        )
-        findings.append(Finding("damaged-parts", Light.AMBER, text))
-    if replaced:
-        text = f"{len(replaced)} earlier records count no more: their logs have other bytes now"
-        findings.append(Finding("replaced-records", Light.GREEN, text))
+    fitted = {k: v for k, v in missing.fitted.items() if k not in replaced}
+    if forget_gone and addresses:
+        fitted = {k: v for k, v in fitted.items() if k not in missing.gone}
+    fitted |= taken.fitted
     findings += taken.findings()
-    findings += filter(None, [unnamed_light(unnamed_logs(named_logs(store)))])
-    findings += _nothing_fitted(counts, store, len(addresses))
+    findings += filter(None, [unnamed_light(sum(not each for each in fitted.values()))])
+    findings += _nothing_fitted(counts, store, len(addresses), bool(fitted))
     return FleetRun(
         settings.catalogue, len(addresses), kept, counts, tuple(findings), taken.reasons(),
         taken.copies,
     )  # fmt: skip
+
+
+def _replaced(aside: Sequence[str], replaced: Set[str]) -> Iterator[Finding]:
+    if aside:
+        text = (
+            f"{len(aside)} tables were damaged: they lie in quarantine, their logs were taken again"
+        )
+        yield Finding("damaged-parts", Light.AMBER, text)
+    if replaced:
+        text = f"{len(replaced)} earlier records count no more: their logs have other bytes now"
+        yield Finding("replaced-records", Light.GREEN, text)
+
+
+def _forgotten(
+    store: Store, gone: Mapping[str, LogEntry], addresses: Sequence[LogAddress], *, asked: bool
+) -> Iterator[Finding]:
+    """Take out records of logs that are gone where that is asked; else say how many there are.
+
+    Where nothing is found at all the logs are out of reach rather than gone.
+    """
+    is_taken_out = asked and bool(addresses)
+    if is_taken_out:
+        forget(store, set(gone))
+    return gone_light(len(gone), taken_out=is_taken_out)
 
 
 def _findings(scheduler: str | None, addresses: list[LogAddress]) -> Iterator[Finding]:
@@ -225,20 +199,22 @@ def _findings(scheduler: str | None, addresses: list[LogAddress]) -> Iterator[Fi
         )
 
 
-def _nothing_fitted(counts: Mapping[str, int], store: Store, found: int) -> Iterator[Finding]:
+def _nothing_fitted(
+    counts: Mapping[str, int], store: Store, found: int, fitted: bool
+) -> Iterator[Finding]:
     """That a run brought nothing but failures, or that no log of the fleet has given a model."""
     if counts.get(FAILED) and counts[FAILED] == sum(counts.values()):
         text = f"{counted(counts[FAILED], 'log')} taken, and every one failed"
         action = "see the table failures for why, then flightid fleet run with --retry"
         yield Finding("all-failed", Light.RED, text, action)
-    elif found and not _has_model(store):
+    elif found and not fitted and not _has_model(store):
         text = f"no model: none of {counted(found, 'log')} could be used"
         action = "do what the commonest reason asks for, then run the fleet again"
         yield Finding("nothing-fitted", Light.RED, text, action)
 
 
 def _has_model(store: Store) -> bool:
-    """Whether the catalogue holds a log with a model."""
+    """Whether the catalogue holds a log with a model, as of another run at the same time."""
     if any(part.outcomes.get(FITTED) for part in read_parts(store)[0]):
         return True
     return any(record.outcome == FITTED for record in read_loose(store, loose_logs(store)))
@@ -313,7 +289,8 @@ class _Run:
         if not free:
             return [], []
         places = [each.address for each in free]
-        left = {e.address for e in missing_logs(self.store, places, self.tables, retry=False)[0]}
+        missing = missing_logs(self.store, places, self.tables, retry=False)
+        left = {each.address for each in missing.addresses}
         return (
             [each for each in free if each.address.address not in left],
             [each for each in free if each.address.address in left],
@@ -366,6 +343,32 @@ class _Run:
         rows = {"failures": [failure]}
         write_loose(self.store, made_record(outcome.log, identity, entry, rows))
         return replace(outcome, outcome=FAILED, action=ACTIONS.get(outcome.reason, ""))
+
+    def followed(self, missing: MissingLogs, taken: TakenContents) -> tuple[Finding, ...]:
+        """Records of logs that lie elsewhere now, brought there; those that must be read are taken.
+
+        What was followed is gone no more, and its vehicle is the new one.
+        """
+        rules, tables, moved, again = self.settings.vehicles, self.tables, {}, set[LogAddress]()
+        renamed = list[RenamedLog]()
+        for log, address in taken.known.items():
+            entry = missing.gone.get(log)
+            if entry is None or still_there(entry.address):
+                continue
+            renamed.append(RenamedLog.of(entry, address, rules, tables))
+            found = renamed_identity(entry, address, rules, tables)
+            if found is None:
+                again.add(address)
+            else:
+                moved[log] = (address, found)
+            del missing.gone[log]
+            if log in missing.fitted:
+                missing.fitted[log] = renamed[-1].vehicle_now or ""
+        follow(self.store, moved)
+        forget(self.store, {log for log, address in taken.known.items() if address in again})
+        for outcome in self.outcomes(orders(sorted(again, key=lambda e: e.address), tables)):
+            taken.add(outcome)
+        return tuple(renamed_light(renamed, followed=True))
 
     def tidy(self, at_least: int) -> None:
         """Compact where the libraries for it are installed; loose files count all the same."""

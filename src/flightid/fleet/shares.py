@@ -10,11 +10,15 @@ from typing import Any
 
 from flightid.errors import OptionError
 from flightid.files import sha256_of_file
-from flightid.fleet.addresses import LogAddress
+from flightid.findings import Finding
+from flightid.fleet.addresses import LogAddress, find_logs
 from flightid.fleet.catalogue.loose import BROKEN
 from flightid.fleet.catalogue.store import Store
+from flightid.fleet.identity import FleetTables, read_tables
 from flightid.fleet.missing import LogEntry, catalogue_entries, stands_for
 from flightid.fleet.reasons import WIDTH
+from flightid.fleet.renamed import RenamedLog, outdated_light
+from flightid.fleet.settings import FleetSettings, VehicleRules
 from flightid.fleet.taken import copies_named
 from flightid.frozen import dataclass
 from flightid.wrapping import wrapped
@@ -34,19 +38,33 @@ class FleetShares:
         Files that the next run takes.
     gone : tuple of str
         Addresses of records whose file is no longer there, or has other bytes.
+    renamed : tuple of RenamedLog
+        Files that have another name, or another vehicle, than their records until the next run.
     """
 
     outcomes: Mapping[str, int]
     copies: Mapping[str, str]
     waiting: tuple[str, ...]
     gone: tuple[str, ...]
+    renamed: tuple[RenamedLog, ...] = ()
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What of the catalogue is not as the files are."""
+        return outdated_light(self.renamed, len(self.gone))
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values."""
         return asdict(self)
 
     @classmethod
-    def of(cls, store: Store, addresses: Sequence[LogAddress]) -> FleetShares | None:
+    def of(
+        cls,
+        store: Store,
+        addresses: Sequence[LogAddress],
+        rules: VehicleRules,
+        tables: FleetTables,
+    ) -> FleetShares | None:
         """Of a catalogue; None without the library that reads its parts.
 
         A file without a record is read where one of its size has one, for it may be a copy.
@@ -58,11 +76,11 @@ class FleetShares:
         there = {each.address: each for each in addresses}
         own = {e.address: e for e in entries.values() if _is_there(e, there)}
         sizes = {entry.bytes for entry in entries.values()}
-        copies, waiting, of = (
-            dict[str, str](),
-            list[str](),
-            {e.log: e.address for e in own.values()},
-        )
+        copies, waiting = dict[str, str](), list[str]()
+        of = {entry.log: entry.address for entry in own.values()}
+        outdated = [e for e in own.values() if e.reason != BROKEN and e.is_outdated(tables)]
+        renamed = [RenamedLog.of(e, there[e.address], rules, tables) for e in outdated]
+        renamed = [each for each in renamed if each.other_vehicle]
         for each in addresses:
             if each.address in own:
                 continue
@@ -71,11 +89,19 @@ class FleetShares:
                 copies[each.address] = of[log]
             elif log in entries:  # It was moved: its record stands for it under the new name.
                 own[each.address], of[log] = entries[log], each.address
+                renamed.append(RenamedLog.of(entries[log], each, rules, tables))
             else:
                 waiting.append(each.address)
         counts = Counter(entry.outcome for entry in own.values())
         gone = tuple(sorted(e.address for log, e in entries.items() if log not in of))
-        return cls(dict(counts), copies, tuple(waiting), gone)
+        return cls(dict(counts), copies, tuple(waiting), gone, tuple(renamed))
+
+
+def fleet_shares(settings: FleetSettings, store: Store) -> tuple[FleetShares | None, int]:
+    """Where each file of a fleet file stands in a catalogue, and how many there are."""
+    found = find_logs([settings.place(each) for each in settings.words.logs])
+    tables = read_tables(settings)
+    return FleetShares.of(store, found, settings.vehicles, tables), len(found)
 
 
 def _is_there(entry: LogEntry, there: Mapping[str, LogAddress]) -> bool:

@@ -9,16 +9,16 @@ from pathlib import Path
 from typing import Any
 
 from flightid.errors import OptionError
-from flightid.fleet.addresses import find_logs
+from flightid.findings import Finding
 from flightid.fleet.catalogue.compaction import read_columns
 from flightid.fleet.catalogue.loose import QUARANTINE, loose_logs, read_loose
 from flightid.fleet.catalogue.parts import PARTS, KnownLogs, TablePart, read_parts
 from flightid.fleet.catalogue.store import Store
-from flightid.fleet.opening import catalogue_place, names_fleet_file, opened_store
+from flightid.fleet.opening import catalogue_place, earlier_light, names_fleet_file, opened_store
 from flightid.fleet.reasons import RefusalReason, grouped_reasons
 from flightid.fleet.settings import read_fleet
-from flightid.fleet.shares import FleetShares
-from flightid.fleet.unnamed import unnamed_logs
+from flightid.fleet.shares import FleetShares, fleet_shares
+from flightid.fleet.unnamed import unnamed_light, unnamed_logs
 from flightid.frozen import dataclass
 from flightid.result import Result
 from flightid.table import Column, Table
@@ -48,6 +48,9 @@ class FleetStatus(Result, schema="flightid.fleet_status/1"):
         Where each file stands; None where the catalogue alone was named, or without the extra.
     unnamed : int
         Logs with a model that name no vehicle, and count in no answer.
+    findings : tuple of Finding
+        These, logs with another name or vehicle than their records, and records of logs that are
+        gone.
 
     Example
     -------
@@ -65,6 +68,7 @@ class FleetStatus(Result, schema="flightid.fleet_status/1"):
     reasons: tuple[RefusalReason, ...] = ()
     shares: FleetShares | None = None
     unnamed: int = 0
+    findings: tuple[Finding, ...] = ()
 
     @property
     def n_logs(self) -> int:
@@ -120,11 +124,12 @@ def fleet_status(place: str | Path) -> FleetStatus:
     if not names_fleet_file(place):
         return _counted(opened_store(where), where)
     settings = read_fleet(place)
-    found = find_logs([settings.place(each) for each in settings.words.logs])
     store = opened_store(where)
-    shares = FleetShares.of(store, found)
+    shares, found = fleet_shares(settings, store)
     gone = frozenset(() if shares is None else shares.gone)
-    return replace(_counted(store, where, gone), found=len(found), shares=shares)
+    findings = (*earlier_light(settings, store), *(() if shares is None else shares.findings))
+    counted = _counted(store, where, gone)
+    return replace(counted, found=found, shares=shares, findings=(*findings, *counted.findings))
 
 
 def _counted(store: Store, where: str, gone: Collection[str] = ()) -> FleetStatus:
@@ -147,6 +152,7 @@ def _counted(store: Store, where: str, gone: Collection[str] = ()) -> FleetStatu
         where, None, dict(counts), len(parts), len(loose), unusable, n_bytes,
         grouped_reasons(row for row in told if row["address"] not in gone),
         unnamed=unnamed_logs(told),
+        findings=tuple(filter(None, [unnamed_light(unnamed_logs(told))])),
     )  # fmt: skip
 
 

@@ -8,7 +8,8 @@ from pathlib import PurePosixPath
 
 from flightid.conventions import Light
 from flightid.findings import Finding, counted
-from flightid.fleet.catalogue.schema import FAILED, REFUSED
+from flightid.fleet.addresses import LogAddress
+from flightid.fleet.catalogue.schema import FAILED, FITTED, REFUSED
 from flightid.fleet.engine.order import KNOWN, LogOutcome
 from flightid.fleet.reasons import RefusalReason, grouped_reasons
 
@@ -17,10 +18,22 @@ MOST_NAMED = 5
 
 
 class TakenContents:
-    """What became of each content: several names of the same bytes are one log."""
+    """What became of each content: several names of the same bytes are one log.
+
+    Attributes
+    ----------
+    outcomes : dict of str to str
+        By log.
+    known : dict of str to LogAddress
+        Logs that the catalogue had, and where they lie; of copies the first.
+    fitted : dict of str to str
+        Vehicle of each log that gave a model now; empty where it names none.
+    """
 
     def __init__(self) -> None:
         self.outcomes: dict[str, str] = {}
+        self.known: dict[str, LogAddress] = {}
+        self.fitted: dict[str, str] = {}
         self._told: dict[str, Mapping[str, str]] = {}
         self._first: dict[str, str] = {}
         self._copied: dict[str, str] = {}
@@ -28,9 +41,12 @@ class TakenContents:
     def add(self, outcome: LogOutcome) -> None:
         """Note an outcome; of copies that one counts which is not merely known."""
         log, address = outcome.log, outcome.order.address.address
-        if log in self._first:
+        if self._first.setdefault(log, address) != address:
             self._copied[address] = log
-        self._first.setdefault(log, address)
+        if outcome.outcome == KNOWN:
+            self.known.setdefault(log, outcome.order.address)
+        elif outcome.outcome == FITTED:
+            self.fitted[log] = outcome.vehicle
         if self.outcomes.get(log, KNOWN) == KNOWN:
             self.outcomes[log] = outcome.outcome
             if outcome.outcome in (REFUSED, FAILED):
@@ -68,8 +84,26 @@ class TakenContents:
 
 
 def copies_named(copies: Mapping[str, str]) -> str:
-    """The first few of some copies, each with what it is a copy of, by file name."""
+    """The first few of some copies, each with what it is a copy of.
+
+    By file name; of equal names by the path below the folder that both lie in.
+
+    Example
+    -------
+    >>> copies_named({"/logs/b/1.bin": "/logs/a/1.bin", "/logs/3.bin": "/logs/2.bin"})
+    'b/1.bin is a/1.bin, 3.bin is 2.bin'
+    """
     shown = list(copies.items())[:MOST_NAMED]
-    said = [f"{PurePosixPath(copy).name} is {PurePosixPath(first).name}" for copy, first in shown]
+    said = [" is ".join(_told_apart(copy, first)) for copy, first in shown]
     left = len(copies) - len(shown)
     return ", ".join(said) + (f" and {left} more" if left else "")
+
+
+def _told_apart(one: str, other: str) -> tuple[str, str]:
+    """Two addresses as short as they can be told apart."""
+    first, second = PurePosixPath(one), PurePosixPath(other)
+    if first.name != second.name:
+        return first.name, second.name
+    pairs = zip(first.parts, second.parts, strict=False)
+    alike = next((n for n, (a, b) in enumerate(pairs) if a != b), 0)
+    return tuple("/".join(each.parts[alike:]) for each in (first, second))  # type: ignore[return-value]  # two

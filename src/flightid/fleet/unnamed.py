@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from flightid.conventions import Light
-from flightid.errors import OptionError
 from flightid.findings import Finding, counted
-from flightid.fleet.catalogue.compaction import read_columns
-from flightid.fleet.catalogue.loose import loose_logs, read_loose
-from flightid.fleet.catalogue.parts import KnownLogs, read_parts
 from flightid.fleet.catalogue.schema import FITTED
-from flightid.fleet.catalogue.store import Store
 
 ACTION = "name vehicles by folder, name or parameter in [vehicles], or in a table of it"
 
@@ -29,17 +24,3 @@ def unnamed_light(unnamed: int) -> Finding | None:
     verb = "counts" if unnamed == 1 else "count"
     said = f"{counted(unnamed, 'log')} with a model {verb} nowhere: nothing says of which vehicle"
     return Finding("no-vehicle", Light.AMBER, said, ACTION)
-
-
-def named_logs(store: Store) -> Iterator[Mapping[str, Any]]:
-    """Outcome and vehicle of every log; of compacted ones where the extra is installed."""
-    parts, _ = read_parts(store)
-    try:
-        for outcome, vehicle in read_columns(store, parts, "logs", ("outcome", "vehicle")):
-            yield {"outcome": outcome, "vehicle": vehicle}
-    except OptionError:
-        pass
-    known = KnownLogs(store, parts)
-    loose = [log for log in loose_logs(store) if not known.in_parts(log)]
-    for record in read_loose(store, loose):
-        yield record.rows["logs"][0]

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import datetime
 import hashlib
 import io
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -246,6 +247,30 @@ def read_columns(
         columns = [rows[name].to_pylist() for name in names]
         for row in zip(*columns, strict=True):
             yield tuple(map(text_of, row))
+
+
+def read_records(store: Store, parts: Sequence[TablePart], logs: Set[str]) -> Iterator[LogRecord]:
+    """Records of some logs as parts hold them, of each the first."""
+    parquet = extra_module("pyarrow.parquet", PURPOSE)
+    left = set(logs)
+    for part in parts:
+        mine = {key.tobytes().hex() for key in read_keys(store, part)} & left
+        found = {log: {name: list[dict[str, Any]]() for name in TABLES} for log in mine}
+        for name, table in TABLES.items() if mine else ():
+            if not part.rows.get(name):
+                continue
+            content = io.BytesIO(store.read(part.file(name)))
+            only = [("log", "in", sorted(mine))]
+            rows = parquet.read_table(content, columns=list(table.names), filters=only)
+            for row in rows.to_pylist():
+                found[row["log"]][name].append({key: _written(row[key]) for key in row})
+        yield from (LogRecord(log, found[log]) for log in sorted(mine))
+        left -= mine
+
+
+def _written(value: Any) -> Any:  # noqa: ANN401 - of a table
+    """A value of a part as records have it: instants as text."""
+    return value.isoformat() if isinstance(value, datetime.datetime) else value
 
 
 def text_of(value: object) -> str:

@@ -127,7 +127,7 @@ def _ready(
         finally:
             faulthandler.cancel_dump_traceback_later()
         entry = record.rows["logs"][0]
-        names = ("outcome", "log", "reason", "message", "memory_bytes", "action")
+        names = ("outcome", "log", "reason", "message", "memory_bytes", "action", "vehicle")
         return {name: entry.get(name) for name in names}
 
     return take

@@ -112,6 +112,8 @@ class LogOutcome:
     memory_bytes : int or None
     action : str
         What to do about a log without a model.
+    vehicle : str
+        Of a record that was written now; empty where it names none.
     """
 
     order: LogOrder
@@ -124,6 +126,7 @@ class LogOutcome:
     elapsed_s: float = 0.0
     memory_bytes: int | None = None
     action: str = ""
+    vehicle: str = ""
 
 
 KNOWN, CLAIMED, KILLED, STORAGE = "known", "claimed", "killed", "storage"

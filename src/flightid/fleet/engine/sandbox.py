@@ -217,6 +217,7 @@ def _outcome(order: LogOrder, said: Mapping[str, Any], log: str, elapsed_s: floa
         elapsed_s=elapsed_s,
         memory_bytes=said.get("memory_bytes"),
         action=str(said.get("action") or ""),
+        vehicle=str(said.get("vehicle") or ""),
     )
 
 
