@@ -67,6 +67,16 @@ def test_tune_takes_a_fleet_file_and_the_folder_of_its_catalogue(tmp_path: Path)
         said.append(json.loads(done.stdout))
     assert said[0] == said[1]
     assert len(said[0]["designs"]) == 1
+    assert "pooled-apart" not in str(said[0])
+    # Vehicles that the report calls unlike their type were pooled without a word.
+    store = current_store(read_fleet(fleet))
+    for number in (92, 93):
+        write_loose(store, record(number, values()[0] * [2.0, 1.0, 1.0, 1.0], "quad"))
+    done = CliRunner().invoke(command, [str(fleet), *options[:-1]])
+    said_too = " ".join(done.output.split())
+    assert "Roll: 18 flights of 9 vehicles, pooled" in said_too
+    assert "[amber] pooled with the others though apart from them: quad46: " in said_too
+    assert "a type of their own in the table of [vehicles]" in said_too
 
 
 def test_a_type_must_be_told_where_there_are_several(tmp_path: Path) -> None:

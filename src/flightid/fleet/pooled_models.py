@@ -9,13 +9,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from flightid.conventions import Light
 from flightid.errors import DataError
 from flightid.fleet.catalogue.loose import REWRITE
 from flightid.fleet.catalogue.soundness import unsound_logs
 from flightid.fleet.opening import open_catalogue
+from flightid.fleet.reporting import asked_of
 from flightid.fleet.statistics.answers import RED, TypeAnswers, answer_questions
 from flightid.fleet.statistics.joint_fit import FlightPoints, MeasuredPoints, fit_population
 from flightid.fleet.statistics.pooling import pooled_model
+from flightid.fleet.vehicle_lights import vehicle_light
 from flightid.models.kinds import model_from_description
 from flightid.reading import parse_toml
 
@@ -23,7 +26,7 @@ if TYPE_CHECKING:
     from flightid.fleet.catalogue.catalogue import Catalogue
 
 Row = Mapping[str, Any]
-POOLED = ("parameters", "covariances", "models", "responses")
+POOLED = ("logs", "parameters", "covariances", "covariates", "models", "responses")
 
 
 def type_models(
@@ -49,7 +52,9 @@ def type_models(
     Returns
     -------
     dict of str to model
-        By the name of the model in the study; flights whose model is red are left out.
+        By the name of the model in the study; flights whose model is red are left out. Vehicles
+        that changed or are unlike their type count: the provenance of the model names them
+        (``"apart"``), and so does what is tuned with it.
 
     Raises
     ------
@@ -77,14 +82,14 @@ def type_models(
     """
     with open_catalogue(place) as catalogue:
         chosen = _chosen(catalogue, type_name).replace("'", "''")
-        rows: dict[str, list[Row]] = {"logs": [], "covariates": []}
+        rows: dict[str, list[Row]] = {}
         for name in POOLED:
             told = catalogue.query(
                 f"SELECT * FROM {name} WHERE type = '{chosen}' AND light <> '{RED}'"
             )
             rows[name] = [dict(zip(told.columns, row, strict=True)) for row in told.fetchall()]
     _require_sound(rows)
-    answers = answer_questions(rows, drift=False, outliers=False)
+    answers = answer_questions(rows, **asked_of(place))
     points = rows["responses"] if joint else None
     return {each.model: _pooled(each, rows["models"], points) for each in answers.types}
 
@@ -141,7 +146,16 @@ def _pooled(answers: TypeAnswers, rows: Sequence[Row], points: Sequence[Row] | N
         mine = [row for row in points if row["model"] == answers.model]
         told = [_flight_points(plain, log, members[log], mine) for log in sorted(members)]
         population = fit_population(plain, told, answers.type_name)
-    return pooled_model(population, plain, list(members.values()))
+    made = pooled_model(population, plain, list(members.values()))
+    apart = _apart(answers)
+    told = {**made.estimated.provenance, "apart": apart} if apart else made.estimated.provenance
+    return replace(made, estimated=replace(made.estimated, provenance=told))
+
+
+def _apart(answers: TypeAnswers) -> list[str]:
+    """What is said of vehicles that changed, or are unlike the others that they are pooled with."""
+    lights = (vehicle_light(name, [answers]) for name in answers.data.members)
+    return [each.message for each in lights if each.light in (Light.RED, Light.AMBER)]
 
 
 def _flight_points(plain: Any, log: str, member: Any, rows: Sequence[Row]) -> FlightPoints:  # noqa: ANN401

@@ -274,12 +274,26 @@ def _listed(given: Verdicts | Iterable[Verdicts] | None) -> Sequence[Verdicts]:
 
 def _judged(source: object) -> tuple[Finding, ...]:
     """The light of a fit's evidence: amber goes on with its gains."""
-    examined = evidence_behind(source)
+    examined, pooled = evidence_behind(source), _pooled(source)
     if examined is None or examined.verdict.light in (Light.GREEN, Light.RED):
-        return ()
+        return pooled
     verdict = examined.verdict
     text = f"gains rest on a fit that is {verdict.light}: {verdict.message}"
-    return (Finding("fit-evidence", verdict.light, text, verdict.action),)
+    return (Finding("fit-evidence", verdict.light, text, verdict.action), *pooled)
+
+
+def _pooled(source: object) -> tuple[Finding, ...]:
+    """That vehicles of a pooled type changed, or are unlike the others."""
+    known = getattr(source, "estimated", None)
+    apart = [] if known is None else list(known.provenance.get("apart", ()))
+    if not apart:
+        return ()
+    said = f"pooled with the others though apart from them: {'; '.join(apart)}"
+    action = (
+        "look at what was done to them; a type of their own in the table of [vehicles] keeps them "
+        "out of the others' gains"
+    )
+    return (Finding("pooled-apart", Light.AMBER, said, action),)
 
 
 def _first_red(what: str, result: object) -> Iterator[DataError]:
