@@ -136,7 +136,7 @@ OWN = {
     "export": ("the target's word", "format"),
     "fleet": (
         "a catalogue, and the machines that fill it",
-        "earlier joint most_rows place retry scheduler sql text type_name workers",
+        "earlier forget_gone joint most_rows place retry scheduler sql text type_name workers",
     ),
     "identification": (
         "limits of a reduction; lags of an impulse response; data of many fits",

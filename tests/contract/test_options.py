@@ -48,6 +48,7 @@ OF_COMMANDS = {
     "blocks": "file of a law made of blocks",
     "axis": "roll, pitch or yaw, or an autopilot's number of it",
     "debug": "traceback of an error",
+    "forget_gone": "no records of logs that are nowhere",
     "joint_fit": "responses of a fleet's flights fitted together",
     "format": "tool that an export is for",
     "gains": "file of tuned gains to fly",

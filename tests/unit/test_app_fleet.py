@@ -53,6 +53,10 @@ def test_the_page_says_of_a_fleet_what_its_report_says(tmp_path: Path) -> None:
     assert ("new motor", "v02") in {(each[0], each[1]) for each in events.rows}
     drift = answers.types[0].drift
     assert drift is not None
+    # Its three refused logs are nowhere, and so are those of its flights.
+    assert (
+        "records of logs that are gone from the places of the fleet file" in part.refused.notes[-1]
+    )
     first = part.histories[0]
     told = next(h for h in drift.histories if (h.vehicle, h.name) == (first.vehicle, first.name))
     assert first.changed

@@ -188,7 +188,8 @@ def _type(each: TypeAnswers) -> FleetType:
 
 def _refused(answers: FleetAnswers) -> Table:
     table = refused_table(answers.logs)
-    return replace(table, notes=(*table.notes, *red_words(answers)))
+    outdated = (f"{each.message}: {each.action}" for each in answers.outdated)
+    return replace(table, notes=(*table.notes, *red_words(answers), *outdated))
 
 
 def _table(table: Table) -> FleetSheet:
