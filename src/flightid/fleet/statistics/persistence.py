@@ -265,4 +265,4 @@ def persisting(asked: AskedHistory, found: Persistence) -> Array:
     beyond = beyond * np.outer(sizes, sizes)
     together = np.where((lag == 0) & ~np.eye(len(day), dtype=bool), asked.by_day, 0.0)
     base = np.diag(asked.history.variances) + together
-    return asked.covariance + (found.factor - 1.0) * base + found.factor * beyond
+    return np.asarray(asked.covariance + (found.factor - 1.0) * base + found.factor * beyond)
