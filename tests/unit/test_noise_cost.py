@@ -116,3 +116,40 @@ def test_starts_around_a_fit_are_tried_whatever_noise_explains(
     fit = fid.identify(truth, data, correct_bias=False)
     assert fit.average_cost > search.LEAVES
     assert drawn == [1, search.NEARBY]
+
+
+def test_large_problems_give_hopeless_starts_up_by_some_of_their_points(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    model = fid.load_model("rate_first_order").with_values({"Lp": -5.0, "Ltphi": 150.0})
+    omega = np.geomspace(0.5, 20.0, 40)
+    errors = 0.03 * np.random.default_rng(1).standard_normal((2, 1, 1, 40))
+    data = fid.FrequencyResponse.from_values(
+        omega,
+        model.frequency_response(omega) * np.exp(errors[0] + 1j * errors[1]),
+        inputs=model.inputs,
+        outputs=model.outputs,
+        units=model.units,
+        random_error=np.full((1, 1, 40), 0.03),
+    )
+    own = [150.0, -5.0, 0.02]
+    near = np.array([own, [151.0, -5.1, 0.02], [1.0, -5.0, 0.02], [160.0, -4.0, 0.022]])
+    monkeypatch.setattr(search, "draw_starts", lambda free, starts, seed: near[:starts])
+    followed: list[tuple[int, int, int]] = []
+    follow = search._Descent.follow
+
+    def told(self: search._Descent, begin: NDArray[np.float64], *steps: int) -> object:
+        followed.append((len(begin), steps[0], len(self.selected[0].places)))
+        return follow(self, begin, *steps)
+
+    monkeypatch.setattr(search._Descent, "follow", told)
+    monkeypatch.setattr(search, "LEAVES", 0.0)
+    costs = []
+    for large in (np.inf, 0.0):
+        monkeypatch.setattr(search, "LARGE", large)
+        costs.append(fid.identify(model, data, n_omega=40, maximum_iterations=60).cost)
+    first, early = (1, 60, 40), search.EARLY_ITERATIONS
+    plain = [first, (3, early, 40), (2, 60, 40)]
+    some = [first, (2, search.FIRST_STEPS, 14), (2, early, 40), (2, 60, 40)]
+    assert followed == plain + some
+    assert costs[0] == costs[1]

@@ -78,8 +78,10 @@ def null_combination(jacobian: Array, *, tolerance: float = 1e-9) -> Array | Non
     n = len(size)
     # The triangle has the same singular values, without a left basis of thousands of rows.
     triangle = triangle_of_rows(jacobian / size)
-    _, values, right = np.linalg.svd(triangle, full_matrices=True)
+    # Directions cost several times as much, and are wanted only where one is blind.
+    values = np.linalg.svd(triangle, compute_uv=False)
     if len(values) == n and values[-1] > tolerance * values[0]:
         return None
+    right = np.linalg.svd(triangle, full_matrices=True)[2]
     share = np.abs(right[-1])
     return np.asarray(share / share.max())

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,8 +71,49 @@ class PointSensitivity:
             first += len(block)
 
 
+@dataclass(frozen=True)
+class PolarSensitivity:
+    """Derivatives of residuals two by two, each pair of which answers to one complex point.
+
+    Attributes
+    ----------
+    slopes : ndarray, shape (n, 2, 2)
+        Of each pair by the real and by the imaginary part of its point.
+    columns : ndarray of int, shape (n, 2)
+        Places of these parts among the data.
+
+    Example
+    -------
+    >>> turned = PolarSensitivity(np.array([[[0.0, 2.0], [4.0, 0.0]]]), np.array([[0, 1]]))
+    >>> np.ones((1, 2)) @ turned, turned.solved(np.ones((2, 1))).T
+    (array([[4., 2.]]), array([[0.25, 0.5 ]]))
+    """
+
+    __array_ufunc__ = None  # NumPy leaves products with this to it
+    slopes: Array
+    columns: NDArray[np.intp]
+
+    def __rmatmul__(self, left: Array) -> Array:
+        first, second = left[:, 0::2], left[:, 1::2]
+        found = np.empty(left.shape)
+        for part in range(2):
+            slopes = self.slopes[:, :, part]
+            found[:, self.columns[:, part]] = first * slopes[:, 0] + second * slopes[:, 1]
+        return found
+
+    def solved(self, right: Array) -> Array:
+        """Changes of the data that make given residuals, shape (n_data, n)."""
+        found = np.empty(right.shape)
+        pairs = right.reshape(-1, 2, right.shape[1])
+        found[self.columns] = np.linalg.solve(self.slopes, pairs)
+        return found
+
+
+Sensitivity: TypeAlias = PointSensitivity | PolarSensitivity
+
+
 def estimator_gain(
-    jacobian: Array, sensitivity: Array | PointSensitivity, *, total: Array | None = None
+    jacobian: Array, sensitivity: Array | Sensitivity, *, total: Array | None = None
 ) -> Array:
     """How far the estimates move with the data, but for the sign.
 
@@ -79,7 +121,7 @@ def estimator_gain(
     ----------
     jacobian : ndarray, shape (n_residuals, n_parameters)
         Derivatives J of the weighted residuals with respect to the parameters.
-    sensitivity : ndarray, shape (n_residuals, n_data), or PointSensitivity
+    sensitivity : ndarray, shape (n_residuals, n_data), or of either class above
         Derivatives B of the weighted residuals with respect to the data.
     total : ndarray, shape (n_residuals, n_parameters), optional
         Derivatives T of the residuals where the data follow the parameters too, as a corrected
@@ -128,8 +170,8 @@ def decibel_phase_sensitivity(
 
     Returns
     -------
-    ndarray, shape (2 n, 2 n)
-        Rows: dB and degrees of each frequency in turn; columns: all real parts, then all imaginary.
+    ndarray, shape (n, 2, 2)
+        Rows: dB and degrees of each frequency; columns: its real and its imaginary part.
 
     Reference
     ---------
@@ -138,20 +180,17 @@ def decibel_phase_sensitivity(
     Example
     -------
     >>> decibel_phase_sensitivity(np.array([1j]), np.ones(1), np.ones(1)).round(3)
-    array([[-0.   , -8.686],
-           [57.296, -0.   ]])
+    array([[[-0.   , -8.686],
+            [57.296, -0.   ]]])
     """
-    n = len(response)
     inverse = 1.0 / response
-    result = np.zeros(4 * n * n)
     db, deg = -DECIBEL * weight_db, -DEGREE * weight_deg
-    # Two rows further down a frequency's columns stand one further right.
-    step = 4 * n + 1
-    result[0::step] = db * inverse.real
-    result[n::step] = -db * inverse.imag
-    result[2 * n :: step] = deg * inverse.imag
-    result[3 * n :: step] = deg * inverse.real
-    return result.reshape(2 * n, 2 * n)
+    result = np.empty((len(response), 2, 2))
+    result[:, 0, 0] = db * inverse.real
+    result[:, 0, 1] = -db * inverse.imag
+    result[:, 1, 0] = deg * inverse.imag
+    result[:, 1, 1] = deg * inverse.real
+    return result
 
 
 def window_covariance(

@@ -23,7 +23,7 @@ from flightid.responses.errors.random_error import (
     knows_between_outputs,
 )
 from flightid.uncertainty import decibel_phase_sensitivity, window_covariance
-from flightid.uncertainty.response_errors import PointSensitivity
+from flightid.uncertainty.response_errors import PolarSensitivity
 
 Array = NDArray[np.float64]
 
@@ -213,18 +213,17 @@ def coherence_sensitivity(
     selected: Sequence[SelectedResponse],
     fitted: Sequence[NDArray[np.complex128]],
     model: ErrorModel,
-) -> PointSensitivity:
+) -> PolarSensitivity:
     """Derivatives of the weighted dB and degree residuals with respect to all runs' points."""
-    blocks, columns, first = [], [], 0
-    for run in model.runs:
-        group = range(run.first, run.first + run.count)
-        total = sum(len(selected[k].places) for k in group)
-        for k in group:
-            each = selected[k]
-            weights = np.sqrt(each.weight_db), np.sqrt(each.weight_deg)
-            blocks.append(decibel_phase_sensitivity(fitted[k], *weights))
-            span = np.arange(first, first + len(each.places))
-            columns.append(np.concatenate([span, span + total]))
-            first += len(span)
-        first += total
-    return PointSensitivity(tuple(blocks), tuple(columns))
+    weights = (
+        np.sqrt(np.concatenate([getattr(each, name) for each in selected]))
+        for name in ("weight_db", "weight_deg")
+    )
+    slopes = decibel_phase_sensitivity(np.concatenate(fitted), *weights)
+    halves = [len(run.kept) // 2 for run in model.runs]
+    starts = np.cumsum([0, *(2 * half for half in halves)])
+    columns = [
+        np.arange(start, start + half)[:, None] + [0, half]
+        for start, half in zip(starts, halves, strict=False)
+    ]
+    return PolarSensitivity(slopes, np.concatenate(columns))

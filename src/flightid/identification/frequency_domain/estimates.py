@@ -26,7 +26,8 @@ from flightid.uncertainty import (
 from flightid.uncertainty.agreement import Agreement, AgreementTest
 from flightid.uncertainty.cramer_rao import inverse_hessian
 from flightid.uncertainty.estimate import Estimate
-from flightid.uncertainty.response_errors import DECIBEL, DEGREE, PointSensitivity
+from flightid.uncertainty.response_errors import DECIBEL, DEGREE, Sensitivity
+from flightid.uncertainty.triangle import triangle_of_rows
 
 Array = NDArray[np.float64]
 Compare = Callable[[Array, NDArray[np.bool_]], AgreementTest]
@@ -75,12 +76,15 @@ def statistics(
     errors: ErrorModel,
     end: DenseEnd,
     *,
-    sensitivity: PointSensitivity | None,
+    sensitivity: Sensitivity | None,
+    weighs_coherence: bool,
     withheld: str = "",
     compare: Compare | None = None,
     bias: Array | None = None,
 ) -> Statistics:
     """Standard errors, bounds and correlations at the end of a search.
+
+    `weighs_coherence` tells that the Jacobian of the end is that of `coherence_jacobian`.
 
     `withheld` says why there shall be no intervals, though errors of the data are known; `compare`
     looks at parts of them. `bias` of the points, in the order of `ErrorModel.propagated`, moves the
@@ -93,7 +97,7 @@ def statistics(
     """
     free = fitted.parameters.free
     inner = np.array([not at_bound(parameter) for parameter in free], dtype=bool)
-    weighted = coherence_jacobian(fitted, selected)
+    weighted = end.jacobian if weighs_coherence else coherence_jacobian(fitted, selected)
     seen = np.any(end.jacobian != 0.0, axis=0) & np.any(weighted != 0.0, axis=0)
     # One that nothing answers to keeps its value and costs the others nothing.
     inner &= seen | ~np.any(inner & seen)
@@ -113,7 +117,7 @@ def statistics(
             moved = -gain @ bias
             covariance = covariance + np.outer(moved, moved)
     # Bounds and correlations ask for products of columns alone, which the triangle keeps.
-    weighted = np.asarray(np.linalg.qr(weighted[:, inner], mode="r"))
+    weighted = triangle if weighs_coherence else triangle_of_rows(weighted[:, inner])
     correlation = correlation_of(inverse_hessian(weighted, names)) if names else np.zeros((0, 0))
     parameters = fitted_parameters(fitted, names, covariance, weighted, freedom, withheld=withheld)
     source = UNKNOWN if withheld else errors.source

@@ -56,7 +56,7 @@ from flightid.identification.multistart import DenseEnd, cluster, local_minima, 
 from flightid.identification.withheld_intervals import without_intervals
 from flightid.models import GreyBoxModel
 from flightid.responses import FrequencyResponse
-from flightid.uncertainty.response_errors import DECIBEL, DEGREE, PointSensitivity
+from flightid.uncertainty.response_errors import DECIBEL, DEGREE, PointSensitivity, Sensitivity
 from flightid.units import require_match
 from flightid.version import VERSION
 
@@ -108,7 +108,9 @@ def _fit_selected(
             groups = [*done.groups, *far_from_best(groups)]
             selected, errors, fitted = list(done.selected), done.errors, done.model
             curves = done.estimates
-    sensitivity = _sensitivity(fitted, selected, errors, options, curves)
+    responses = compare_responses(fitted, selected)
+    points = [each.model[chosen.places] for each, chosen in zip(responses, selected, strict=True)]
+    sensitivity = _sensitivity(selected, errors, options, points if curves is None else curves)
     if curves is not None and errors.known is not None and sensitivity is not None:
         # Residuals answer to points and to the model's estimates with opposite signs.
         slopes = -sensitivity.solved(groups[0][0].jacobian)
@@ -120,14 +122,13 @@ def _fit_selected(
         errors,
         groups[0][0],
         sensitivity=sensitivity,
+        weighs_coherence=options.cost == "coherence" and curves is None,
         withheld=withheld,
         compare=compare,
         bias=bias_of_points(fitted, data, errors, options.hold),
     )
     bent = judge_feedback(found.names, found.covariance, found.bias)
     setup += [*bent, *judge_windows(fitted, data)]
-    responses = compare_responses(fitted, selected)
-    points = [each.model[chosen.places] for each, chosen in zip(responses, selected, strict=True)]
     noise = noise_costs(selected, points, by_noise)
     fit = _assemble(fitted, options, data, groups, responses, found, setup, noise)
     fit = replace(fit, provenance={**fit.provenance, "estimator_bias": correction})
@@ -220,22 +221,19 @@ def _minimise(
 
 
 def _sensitivity(
-    fitted: GreyBoxModel,
     selected: Sequence[SelectedResponse],
     errors: ErrorModel,
     options: FrequencyDomainOptions,
-    curves: Curves | None,
-) -> PointSensitivity | None:
+    curves: Curves,
+) -> Sensitivity | None:
     """Derivatives of the minimised residuals with respect to the measured points.
 
-    `curves` are what the points are compared with; default: the model's responses.
+    `curves` are what the points are compared with.
     """
     if not errors.runs:
         return None
     if options.cost == "likelihood":
         return PointSensitivity.of([-matrix for *_, matrix in whitening(errors)])
-    if curves is None:
-        curves = curves_of(fitted, [each.omega_rad_s for each in selected])
     return coherence_sensitivity(selected, curves, errors)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,20 +50,42 @@ def noise_costs(
     if not errors.runs:
         return {}
     sensitivity = coherence_sensitivity(selected, curves, errors)
-    blocks = zip(sensitivity.blocks, sensitivity.columns, strict=True)
+    ends = np.cumsum([0, *(len(each.places) for each in selected)])
+    spans = [slice(*span) for span in pairwise(ends)]
     found, first = {}, 0
     shares = _believed(errors.covariances, curves)
     for run, covariance, believed in zip(errors.runs, errors.covariances, shares, strict=True):
-        group = range(run.first, run.first + run.count)
-        for place, (block, columns) in zip(group, blocks, strict=False):
-            own = columns - first
-            turned = block * believed[own]
-            alone = len(own) == len(covariance)
-            part = turned @ (covariance if alone else covariance[np.ix_(own, own)]) @ turned.T
+        for place in range(run.first, run.first + run.count):
+            own = sensitivity.columns[spans[place]] - first
+            turned = sensitivity.slopes[spans[place]] * believed[own][:, None]
+            part = _carried(turned, covariance, own)
             deviation = float(np.sqrt(2.0 * np.sum(part * part)))
-            found[selected[place].name] = NoiseCost(float(np.trace(part)), deviation)
+            trace = float(np.einsum("ipip->", part))
+            found[selected[place].name] = NoiseCost(trace, deviation)
         first += len(covariance)
     return found
+
+
+def _carried(slopes: Array, covariance: Array, own: NDArray[np.intp]) -> Array:
+    """Covariance of pairs of residuals, each of which answers to two of the data alone.
+
+    Parameters
+    ----------
+    slopes : ndarray, shape (n, 2, 2)
+        Of each pair by its data.
+    covariance : ndarray, shape (m, m)
+        Of all data.
+    own : ndarray of int, shape (n, 2)
+        Data of each pair.
+
+    Returns
+    -------
+    ndarray, shape (n, 2, n, 2)
+    """
+    n = len(own)
+    half = slopes @ covariance[own[:, :, None], own.ravel()]
+    whole = slopes @ half.reshape(2 * n, n, 2).transpose(1, 2, 0)
+    return whole.reshape(n, 2, n, 2)
 
 
 def _believed(covariances: Sequence[Array], curves: Sequence[Complex]) -> list[Array]:
