@@ -320,19 +320,25 @@ def test_a_card_is_sandboxed_and_a_plan_follows_what_is_typed(
     assert b"0.05 of full" in page
 
 
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="a tuning that waits needs a pipe")
 def test_a_tuning_holds_up_neither_a_comparison_nor_a_plan(tmp_path: Path) -> None:
-    async def asked() -> list[str]:
-        workers, done = Workers(Workspace(tmp_path)), []
-        calls = (workers.tuned, workers.compared, workers.planned, workers.live)
-        slow = [each(time.sleep, 8.0 if each == workers.tuned else 0.0) for each in calls]
-        names = {asyncio.ensure_future(c): f.__name__ for f, c in zip(calls, slow, strict=True)}
-        for name in asyncio.as_completed(names):
-            await name
-            done.append(next(n for task, n in names.items() if task.done() and n not in done))
-        workers.stop()
-        return done
+    """The tuning reads a pipe that nobody writes before all others have answered."""
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
 
-    assert asyncio.run(asked())[-1] == "tuned"
+    async def asked() -> bool:
+        workers = Workers(Workspace(tmp_path))
+        slow = asyncio.ensure_future(workers.tuned(os.open, str(pipe), os.O_RDONLY))
+        try:
+            await asyncio.gather(*(f(os.getpid) for f in (workers.compared, workers.planned)))
+            await workers.live(os.getpid)
+            return slow.done()
+        finally:
+            os.close(await asyncio.to_thread(os.open, pipe, os.O_WRONLY))
+            await slow
+            workers.stop()
+
+    assert not asyncio.run(asked())
 
 
 def test_a_worker_killed_without_work_is_replaced(tmp_path: Path) -> None:
