@@ -209,6 +209,21 @@ def test_bars_reach_what_the_method_itself_makes_of_another_hold() -> None:
         assert moved <= fit.parameters[name].stderr
 
 
+def test_a_response_fit_moves_under_another_hold_as_it_is_told_to() -> None:
+    """Least squares on the same samples in time would move by the other sign in Ma."""
+    response = fid.estimate_response(holds.flight(7000, "straight", told="zero"))
+    fit, true = (
+        fid.identify(holds.model(), response, **given) for given in ({}, {"hold": "first"})
+    )
+    told = fit.provenance["other_holds"]["first"]["shift"]
+    names = [name for name in fit.names if name != "tau"]  # which every method moves alike
+    errors = np.array([true.parameters[name].stderr for name in names])
+    moved = np.array([true.parameters[n].value - fit.parameters[n].value for n in names]) / errors
+    left = moved - np.array([told[name] for name in names]) / errors
+    # Weights stay those of the fit, so that not all of it is foretold.
+    assert np.linalg.norm(left) < 0.5 * np.linalg.norm(moved)
+
+
 @pytest.mark.parametrize("shape", IN_EVERY_RUN)
 def test_a_response_tells_what_its_records_know_of_a_wrong_hold(shape: str) -> None:
     lights = []

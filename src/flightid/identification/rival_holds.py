@@ -198,14 +198,22 @@ class Rivals:
         if self.is_likeliest:
             return likely
         made = self.under([each.hold for each in likely]) or likely
-        return [replace(own, gain=each.gain) for own, each in zip(made, likely, strict=True)]
+        return [
+            replace(own, gain=each.gain, expected=each.expected)
+            for own, each in zip(made, likely, strict=True)
+        ]
 
     def _again(self, hold: InputHold) -> Fit:
         names = getattr(self.method.options, "__dataclass_fields__", {})
         fresh = {key: value for key, value in _STARTED.items() if key in names}
-        # A response keeps what its estimator adds: both holds meet the same points.
-        data = _corrected(self.data, hold, self.fit)
-        return self.method.run(self.fit.model, data, {**self.given, **fresh, "hold": hold})
+        options = {**self.given, **fresh, "hold": hold}
+        # A response keeps what its estimator adds to a model that ends where this hold takes it.
+        rounds = 2 if self.fit.responses and hold != self.assumed else 1
+        found = self.fit
+        for _ in range(rounds):
+            data = _corrected(self.data, hold, found)
+            found = self.method.run(found.model, data, options)
+        return found
 
 
 def _other(hold: InputHold, other: Fit, beside: Fit, fit: Fit) -> OtherHold:

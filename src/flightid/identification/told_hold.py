@@ -63,15 +63,25 @@ def told(fit: Fit, held: ChosenHold, rivals: Rivals) -> tuple[Fit, ChosenHold]:
     if not rivals.records:
         return fit, held
     others = _others(held.hold, rivals)
-    known = rivals.under(others) if rivals.is_fed_back else rivals.by_likelihood(others)
+    known = rivals.under(others) if rivals.is_fed_back else _by_both(others, rivals)
     matter = [each for each in known if each.moved > NEGLIGIBLE]
     if not matter:
         return fit, held
     finding, reached = _judged(matter, held, rivals)
-    fit = noted(fit, known)
-    if reached:
-        fit = widened(fit, rivals.as_fitted(reached))
+    fit = widened(noted(fit, known), reached)
     return fit, held if finding is None else replace(held, findings=(*held.findings, finding))
+
+
+def _by_both(others: Sequence[InputHold], rivals: Rivals) -> list[OtherHold]:
+    """By how much the method's own estimates move, and how likely the records make each hold.
+
+    A wrong hold bends every estimator its own way: a fit of responses can lie to the other side of
+    the truth than one of the same samples in time.
+    """
+    known = rivals.by_likelihood(others)
+    if not any(each.moved > NEGLIGIBLE for each in known):
+        return known
+    return [*rivals.as_fitted(known), *(each for each in known if not each.is_likely)]
 
 
 def _others(hold: InputHold, rivals: Rivals) -> list[InputHold]:

@@ -53,6 +53,7 @@ from flightid.identification.frequency_domain.selection import (
 from flightid.identification.frequency_domain.setup_checks import check_setup
 from flightid.identification.frequency_domain.without_bias import far_from_best, take_out
 from flightid.identification.multistart import DenseEnd, cluster, local_minima, require_free
+from flightid.identification.rival_fits import judged
 from flightid.identification.withheld_intervals import without_intervals
 from flightid.models import GreyBoxModel
 from flightid.responses import FrequencyResponse
@@ -110,7 +111,8 @@ def _fit_selected(
             curves = done.estimates
     responses = compare_responses(fitted, selected)
     points = [each.model[chosen.places] for each, chosen in zip(responses, selected, strict=True)]
-    sensitivity = _sensitivity(selected, errors, options, points if curves is None else curves)
+    compared = points if curves is None else curves
+    sensitivity = _sensitivity(selected, errors, options, compared) if judged() else None
     if curves is not None and errors.known is not None and sensitivity is not None:
         # Residuals answer to points and to the model's estimates with opposite signs.
         slopes = -sensitivity.solved(groups[0][0].jacobian)
@@ -125,11 +127,11 @@ def _fit_selected(
         weighs_coherence=options.cost == "coherence" and curves is None,
         withheld=withheld,
         compare=compare,
-        bias=bias_of_points(fitted, data, errors, options.hold),
+        bias=bias_of_points(fitted, data, errors, options.hold) if judged() else None,
     )
     bent = judge_feedback(found.names, found.covariance, found.bias)
     setup += [*bent, *judge_windows(fitted, data)]
-    noise = noise_costs(selected, points, by_noise)
+    noise = noise_costs(selected, points, by_noise) if judged() else {}
     fit = _assemble(fitted, options, data, groups, responses, found, setup, noise)
     fit = replace(fit, provenance={**fit.provenance, "estimator_bias": correction})
     reason = why_misfit(fit.average_cost, noise) or why_bent(data, found.bias, bent)

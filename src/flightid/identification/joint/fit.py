@@ -64,6 +64,7 @@ from flightid.identification.output_error.fit import (
 )
 from flightid.identification.records.findings import judge_channels
 from flightid.identification.records.setup import RecordSet, prepare_records
+from flightid.identification.rival_fits import judged
 from flightid.identification.withheld_intervals import without_intervals
 from flightid.models import GreyBoxModel
 from flightid.record import Record
@@ -138,16 +139,14 @@ def fit_jointly(model: GreyBoxModel, data: Sequence[object], options: JointOptio
         made = _without_bias(found, prepared, response, points, options)
         setup += made.outcome.findings()
     beside = made.points.beside(made.found.fitted, made.extra)
-    bias = made.points.whitened_bias(made.found.fitted, response, options.hold)
-    beside = replace(beside, bias=bias)
+    if judged():
+        bias = made.points.whitened_bias(made.found.fitted, response, options.hold)
+        beside = replace(beside, bias=bias)
     fit = conclude(made.found, options, setup, beside)
     bent = [each for each in fit.findings if each.code == LOOP_BIAS]
     bent_by = why_bent(response, beside.bias, bent)
-    noise = noise_costs(
-        points.selected,
-        curves_of(fit.model, [each.omega_rad_s for each in points.selected]),
-        points.errors,
-    )
+    curves = curves_of(fit.model, [each.omega_rad_s for each in points.selected])
+    noise = noise_costs(points.selected, curves, points.errors) if judged() else {}
     fit = _with_responses(fit, response, made.points, noise, made.outcome.provenance(options.hold))
     reason = made.outcome.withheld or why_misfit(fit.average_cost, noise) or bent_by
     return without_intervals(fit, reason) if reason else fit
