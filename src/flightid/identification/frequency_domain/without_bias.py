@@ -103,7 +103,7 @@ def take_out(
         ends = _ranked([*_searches(objective, minima[0]), *_rivals(objective, minima)])
     except (FitError, *OUTSIDE) as error:
         return not_done(str(error))
-    best = _Judgement.of(objective, ends[0].found)
+    best = ends[0].judged or _Judgement.of(objective, ends[0].found)
     if best.found.end.cost > NOISE * plain.cost and not best.is_chance:
         return not_done(
             f"it would raise the cost from {plain.cost:.3g} to {best.found.end.cost:.3g}: the "
@@ -122,14 +122,6 @@ def take_out(
     groups = [[found.end] * ends[0].count]
     groups += [[other.found.end] * other.count for other in ends[1:] if not other.found.reason]
     return WithoutBias(outcome, model, selected, best.errors, found.estimates, groups)
-
-
-@dataclass(frozen=True)
-class _Minimum:
-    """A minimum with the estimator inside, and how many starts led there."""
-
-    found: SearchOutcome
-    count: int = 1
 
 
 @dataclass(frozen=True)
@@ -161,6 +153,15 @@ class _Judgement:
         return cls(found, errors, *misfits)
 
 
+@dataclass(frozen=True)
+class _Minimum:
+    """A minimum with the estimator inside, how many starts led there, and what it was judged as."""
+
+    found: SearchOutcome
+    count: int = 1
+    judged: _Judgement | None = None
+
+
 def _misfit(objective: Objective, found: SearchOutcome, errors: ErrorModel) -> float:
     """Mean square of what the estimator makes of the model less the response, over errors."""
     selected = objective.selected
@@ -182,15 +183,17 @@ def _searches(objective: Objective, minimum: Sequence[DenseEnd]) -> list[_Minimu
     plain, count = minimum[0], len(minimum)
     first = search(objective, plain.x)
     lower = first.end.cost <= NOISE * plain.cost
-    settled = lower and first.step <= TOLERABLE and _Judgement.of(objective, first).misfit <= MISFIT
+    judged = _Judgement.of(objective, first) if lower and first.step <= TOLERABLE else None
+    settled = judged is not None and judged.misfit <= MISFIT
     bent = first.begun > BENT * first.end.cost
+    begun = _Minimum(first, count, judged)
     if settled and not (bent and objective.size <= FEW):
-        return [_Minimum(first, count)]
+        return [begun]
     own = np.array([parameter.value or 0.0 for parameter in objective.model.parameters.free])
     try:
-        return [_Minimum(first, count), _Minimum(search(objective, own))]
+        return [begun, _Minimum(search(objective, own))]
     except (FitError, *OUTSIDE):
-        return [_Minimum(first, count)]
+        return [begun]
 
 
 def far_from_best(minima: Sequence[list[DenseEnd]]) -> list[list[DenseEnd]]:
