@@ -108,6 +108,9 @@ def test_reasons_are_counted_with_an_example_and_what_to_do() -> None:
     )
     other = {**rows[0], "action": "unpack it", "address": "zip.bin"}  # Of one alone: said of all.
     assert [each.action for each in grouped_reasons([other, *rows[:3]])][1] == "unpack it"
+    # Advice that names its own log is that of others: a row a log stood for each of 30.
+    own = [{**each, "action": f"flightid plan {each['address'][5:]}"} for each in rows[:3]]
+    assert [(e.logs, e.action) for e in grouped_reasons(own)] == [(3, "flightid plan 0.bin")]
     lines = reason_lines(found)
     assert lines[:2] == [
         "  3 refused: not a log (such as 0.bin: an empty file)",

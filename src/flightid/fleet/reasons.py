@@ -82,7 +82,7 @@ def grouped_reasons(rows: Iterable[Mapping[str, Any]]) -> tuple[RefusalReason, .
         # Only what became of a log is a reason: what is known already, say, is none.
         if outcome not in OUTCOMES or outcome == FITTED:
             continue
-        key = outcome, reason, str(row.get("action") or "")
+        key = outcome, reason, _advice(row)
         told = found.get(key)
         if told is not None:
             found[key] = replace(told, logs=told.logs + 1)
@@ -90,6 +90,13 @@ def grouped_reasons(rows: Iterable[Mapping[str, Any]]) -> tuple[RefusalReason, .
         words = (str(row.get(name) or "") for name in ("message", "action", "address"))
         found[key] = RefusalReason(outcome, reason, 1, *words)
     return tuple(sorted(found.values(), key=lambda each: -each.logs))
+
+
+def _advice(row: Mapping[str, Any]) -> str:
+    """What to do, whichever log it names: one that names its own is that of all others, too."""
+    name = str(row.get("address") or "").rpartition("/")[2]
+    action = str(row.get("action") or "")
+    return action.replace(name, "LOG") if name else action
 
 
 def reason_lines(reasons: Iterable[RefusalReason]) -> list[str]:
@@ -118,10 +125,10 @@ def _said(reason: RefusalReason) -> str:
 def reasons_table(reasons: Iterable[RefusalReason]) -> Table:
     """One row a reason; no rows where every log has a model."""
     rows: list[tuple[Cell, ...]] = [
-        (e.logs, e.outcome, e.words, e.message, e.action, e.name) for e in reasons
+        (e.logs, e.outcome, e.words, e.action, e.message, e.name) for e in reasons
     ]
     columns = (
-        *(Column("logs"), Column("outcome"), Column("reason"), Column("in words")),
-        *(Column("what to change"), Column("for example")),
+        *(Column("logs"), Column("outcome"), Column("reason"), Column("what to change")),
+        *(Column("in words"), Column("for example")),
     )
     return Table("By reason", columns, tuple(rows)).without_empty_columns()

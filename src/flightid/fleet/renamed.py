@@ -174,7 +174,9 @@ def gone_light(gone: int, *, taken_out: bool = False) -> Iterator[Finding]:
     whose = f"{counted(gone, 'record')} of {'a log that is' if gone == 1 else 'logs that are'} gone"
     where = "from the places of the fleet file"
     if taken_out:
-        yield Finding("gone-logs", Light.GREEN, f"{whose} {where} taken out of the catalogue")
+        done = "was" if gone == 1 else "were"
+        said = f"{whose} {where} {done} taken out of the catalogue"
+        yield Finding("gone-logs", Light.GREEN, said)
         return
     verb = "counts" if gone == 1 else "count"
     action = "flightid fleet run with --forget-gone takes them out"

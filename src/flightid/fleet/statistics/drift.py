@@ -187,10 +187,11 @@ class FleetDrift(Result, schema="flightid.fleet_drift/1"):
                 )
             )
         asked = len(self.judged)
+        beside = "go on alike on all vehicles" if self.persistent else "are independent"
         note = (
             f"{asked} {'history' if asked == 1 else 'histories'} asked, at most "
             f"{100 * FALSE_SHARE:.0f} % of the alarms false (Benjamini and Hochberg), where "
-            "flights are independent beside the days they share."
+            f"flights {beside} beside the days they share."
         )
         odd = ", ".join(
             f"{n} of {named.get(name, name)}" for name, n in self.odd_flights.items() if n
