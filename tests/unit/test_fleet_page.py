@@ -93,7 +93,7 @@ def test_few_vehicles_that_all_moved_alike_are_amber() -> None:
     assert lights == [Light.AMBER] * 3
     (told,) = [each for each in document.findings if each.code == "moved-alike"]
     assert "all 3 vehicles moved alike: of the type (season, firmware) or of each" in told.message
-    assert "where flights are independent beside" in " ".join(to_text(document).split())
+    assert "where flights go on alike on all vehicles beside" in " ".join(to_text(document).split())
 
 
 def test_vehicles_too_few_to_be_judged_are_grey_and_not_green() -> None:
