@@ -16,7 +16,7 @@ STARTED = -n $(JOBS) --dist worksteal
 # Forked processes share what one of them collected; where a fork is not safe, each is started.
 SPREAD := $(if $(filter Linux,$(shell uname -s)),-p tests.forks --forks $(JOBS),$(STARTED))
 
-.PHONY: demo app test test-slow test-nightly docs fuzz fuzz-files kills same-wheel bench lint hooks format stubs develop wheel constraints clean help
+.PHONY: demo app test test-slow test-nightly docs fuzz fuzz-files kills mutants same-wheel bench lint hooks format stubs develop wheel constraints clean help
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/ —/'
@@ -88,6 +88,10 @@ same-wheel:  ## build the wheel twice and compare the bytes
 
 kills: develop  ## kill commands at 200 random moments and look for losses
 	$(BIN)/python -m tests.stress.kills --kills 200
+
+mutants: develop  ## change what tells users what to believe, and count what no test notices
+	$(BIN)/python tools/install_dependencies.py app dev mutants
+	$(BIN)/python -m tests.stress.mutants --sample 200 --keep build/mutants.jsonl
 
 fuzz-files: develop  ## throw damaged files at the Python readers, in children with limits
 	$(BIN)/python -m tests.fuzz --runs $(FUZZ_RUNS) --keep build/fuzz

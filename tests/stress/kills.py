@@ -39,7 +39,7 @@ def commands(folder: Path) -> dict[str, tuple[list[str], Path]]:
         "fly": (["fly", *MODEL, "--duration", 0.5, "--write"], "flown.nc"),
         "run": (["run", STUDY, "--output"], "out"),
         "tune": (["tune", swept, "--output"], "tuned"),
-        "plan": (["plan", swept, "--overwrite", "--output"], "planned"),
+        "plan": (["plan", ordinary, "--overwrite", "--output"], "planned"),
         "autotune": (["autotune", tuned, "--html"], "autotune.html"),
         "flight": (["flight", ordinary, "--html"], "flight.html"),
     }
@@ -101,6 +101,7 @@ def main() -> int:
             begun = time.monotonic()
             subprocess.run([*PROGRAM, *words], check=True, stdout=-3, stderr=-3)
             spans[verb], before[verb] = time.monotonic() - begun, contents(path)
+            assert before[verb], f"{verb} wrote nothing that a kill could lose"
         try:
             for kill in range(asked.kills):
                 verb = verbs[kill % len(verbs)]

@@ -1,0 +1,190 @@
+"""Change one operator or number at a time and see whether a test fails.
+
+`python -m tests.stress.mutants --sample 200 --keep FILE`, with the extra `mutants`: `make mutants`.
+
+Drawn by chance from all mutants of the packages that tell users what to believe, with annotations
+left out. Each meets the tests that reach its line, by a run with coverage that comes first; the
+tree is a copy. A mutant that no test notices is printed with its line: mend the test, or argue that
+the line does the same without it. Kept mutants are not tried again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import json
+import os
+import random
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+PACKAGES = ("logs", "inspection", "evidence", "uncertainty", "control/tuning")
+TESTS = ("tests/unit", "tests/truth", "tests/contract")
+SLOW = ("test_app_", "test_fleet_")  # they try other packages, in processes of their own
+OPERATORS = (
+    *("NumberReplacer", "ReplaceTrueWithFalse", "ReplaceFalseWithTrue"),
+    *("ReplaceAndWithOr", "ReplaceOrWithAnd", "AddNot", "ReplaceUnaryOperator_Delete_Not"),
+    *("ReplaceBinaryOperator_Add_Sub", "ReplaceBinaryOperator_Sub_Add"),
+    *("ReplaceBinaryOperator_Mul_Div", "ReplaceBinaryOperator_Div_Mul"),
+    *("ReplaceComparisonOperator_Lt_LtE", "ReplaceComparisonOperator_LtE_Gt"),
+    *("ReplaceComparisonOperator_Gt_LtE", "ReplaceComparisonOperator_GtE_Lt"),
+    *("ReplaceComparisonOperator_Eq_NotEq", "ReplaceComparisonOperator_NotEq_Eq"),
+    *("ReplaceUnaryOperator_USub_UAdd", "ReplaceBreakWithContinue", "ZeroIterationForLoop"),
+)
+MOST_TESTS, LONGEST_S = 60, 300.0
+Reached = Mapping[str, Mapping[int, Sequence[str]]]
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """One change of one file."""
+
+    path: str
+    operator: str
+    occurrence: int
+    line: int
+
+    @property
+    def name(self) -> str:
+        """The file, its line and what is done there."""
+        return f"{self.path}:{self.line} {self.operator} {self.occurrence}"
+
+
+def copied(folder: Path) -> Path:
+    """The tracked files and what was built in place, where mutants harm nobody."""
+    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=True)
+    native = [str(each.relative_to(ROOT)) for each in (ROOT / "src/flightid").glob("_native*.so")]
+    for name in [*filter(None, listed.stdout.decode().split("\0")), *native]:
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy2(ROOT / name, folder / name)
+    return folder
+
+
+def tested(tree: Path, words: Sequence[str], longest_s: float | None) -> int | None:
+    """How pytest ends in that tree; None where it does not in time."""
+    first = (str(tree), str(tree / "src"), *filter(None, [os.environ.get("PYTHONPATH")]))
+    given = os.environ | {"PYTHONPATH": os.pathsep.join(first)}
+    for threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "RAYON_NUM_THREADS"):
+        given[threads] = "1"
+    try:
+        return subprocess.run(
+            [sys.executable, "-m", "pytest", "-q", "--no-header", *words],
+            cwd=tree, env=given, timeout=longest_s, check=False,
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        ).returncode  # fmt: skip
+    except subprocess.TimeoutExpired:
+        return None
+
+
+def reached(tree: Path, data: Path, packages: Sequence[str], tests: Sequence[str]) -> Reached:
+    """Tests by file and line that they run; made once, for minutes, and read from `data` again."""
+    from coverage import CoverageData
+
+    if not data.exists():
+        settings = tree / "coverage.rc"
+        sources = "\n    ".join(str(tree / "src/flightid" / each) for each in packages)
+        settings.write_text(f"[run]\nrelative_files = true\nsource =\n    {sources}\n")
+        words = ["--cov", f"--cov-config={settings}", "--cov-context=test", "--cov-report=", "-n2"]
+        left_out = [f"--ignore-glob=*{each}*" for each in SLOW]
+        tested(tree, [*words, *left_out, *tests], None)
+        shutil.copy(tree / ".coverage", data)
+    known = CoverageData(str(data))
+    known.read()
+    return {
+        str(Path(file)): {
+            line: sorted({each.partition("|")[0] for each in names if each})
+            for line, names in known.contexts_by_lineno(file).items()
+        }
+        for file in known.measured_files()
+    }
+
+
+def mutants(tree: Path, packages: Sequence[str]) -> Iterator[Mutant]:
+    """All of those packages, but those of annotations."""
+    from cosmic_ray.ast import ast_nodes, get_ast
+    from cosmic_ray.plugins import get_operator
+
+    for path in sorted(
+        p for each in packages for p in (tree / "src/flightid" / each).rglob("*.py")
+    ):
+        text = path.read_text(encoding="utf-8")
+        spans = list(_annotations(ast.parse(text)))
+        nodes = list(ast_nodes(get_ast(text)))
+        for name in OPERATORS:
+            operator = get_operator(f"core/{name}")()
+            places = [at for node in nodes for at in operator.mutation_positions(node)]
+            for occurrence, (start, _) in enumerate(places):
+                if not any(low <= start < high for low, high in spans):
+                    yield Mutant(str(path.relative_to(tree)), name, occurrence, start[0])
+
+
+def _annotations(module: ast.Module) -> Iterator[tuple[tuple[int, int], tuple[int, int]]]:
+    """Where each begins and ends, line and column: `|` between types runs nowhere."""
+    for node in ast.walk(module):
+        for told in (getattr(node, "annotation", None), getattr(node, "returns", None)):
+            if isinstance(told, ast.expr) and told.end_lineno and told.end_col_offset:
+                yield (told.lineno, told.col_offset), (told.end_lineno, told.end_col_offset)
+
+
+def end_of(tree: Path, mutant: Mutant, names: Reached) -> str:
+    """Killed, survived, or not reached by any test."""
+    from cosmic_ray.mutating import mutate_code
+    from cosmic_ray.plugins import get_operator
+
+    lines = names.get(mutant.path, {})
+    # What runs on import belongs to no test: those of the whole file stand for it.
+    tests = lines.get(mutant.line) or sorted({each for found in lines.values() for each in found})
+    if not tests:
+        return "not reached"
+    stem = Path(mutant.path).stem.rstrip("s")
+    tests = sorted(tests, key=lambda each: (stem not in each, each.count("["), each))[:MOST_TESTS]
+    place = tree / mutant.path
+    text = place.read_text(encoding="utf-8")
+    changed = mutate_code(text, get_operator(f"core/{mutant.operator}")(), mutant.occurrence)
+    if changed is None or changed == text:
+        return "no change"
+    try:
+        place.write_text(changed, encoding="utf-8")
+        return "survived" if tested(tree, ["-x", *tests], LONGEST_S) == 0 else "killed"
+    finally:
+        place.write_text(text, encoding="utf-8")
+
+
+def main() -> None:
+    """Try a sample; print what nobody noticed, and the share."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--sample", type=int, default=200)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--packages", nargs="+", default=PACKAGES)
+    parser.add_argument("--tests", nargs="+", default=TESTS)
+    parser.add_argument("--keep", type=Path, required=True, help="file of what was found")
+    asked = parser.parse_args()
+    kept = [json.loads(line) for line in asked.keep.open()] if asked.keep.exists() else []
+    ends = {each["name"]: each["end"] for each in kept}
+    asked.keep.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory() as folder:
+        tree = copied(Path(folder))
+        names = reached(tree, asked.keep.with_suffix(".coverage"), asked.packages, asked.tests)
+        drawn = random.Random(asked.seed).sample(list(mutants(tree, asked.packages)), asked.sample)
+        for k, mutant in enumerate(drawn):
+            if mutant.name not in ends:
+                ends[mutant.name] = end_of(tree, mutant, names)
+                with asked.keep.open("a") as file:
+                    found = {"name": mutant.name, "end": ends[mutant.name], **asdict(mutant)}
+                    file.write(json.dumps(found) + "\n")
+            if ends[mutant.name] in ("survived", "not reached"):
+                print(f"{k + 1}/{asked.sample} {ends[mutant.name]}: {mutant.name}", flush=True)
+    counted = Counter(ends[each.name] for each in drawn)
+    tried = counted.total() - counted["no change"]
+    print(f"{dict(counted)}; unnoticed {100 * (1 - counted['killed'] / tried):.1f} % of {tried}")
+
+
+if __name__ == "__main__":
+    main()
