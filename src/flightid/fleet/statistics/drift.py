@@ -278,7 +278,6 @@ def find_drift(
         usual = usual * variance_factors(own, data.vehicles)
         variances, off = variances_with_odd_ones(level, i, usual)
         odd[name] = int(off.sum())
-        newest += newest_flights(level, i, usual, variances)
         fitted = fit_covariates(data, i, design, variances)
         slopes[name] = fitted.effects
         moved = every.values[:, i] - data.values[:, i]
@@ -290,6 +289,7 @@ def find_drift(
         goes_on, mine = beside_persistence(mine)
         if goes_on is not None:
             persistent[name] = goes_on
+        newest += newest_flights(level, i, usual, variances, goes_on)
         histories += mine
     return FleetDrift(
         *(judged_histories(histories), repeats, slopes, design.missing, odd, errors),

@@ -12,6 +12,8 @@ from scipy.special import ndtr
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
 from flightid.fleet.statistics.multiple_testing import FALSE_SHARE, corrected
 from flightid.fleet.statistics.neighbours import histories_in_time
+from flightid.fleet.statistics.persistence import Persistence
+from flightid.fleet.statistics.repeats import days_of
 from flightid.frozen import dataclass
 from flightid.uncertainty.estimate import Estimate
 
@@ -57,7 +59,11 @@ class NewestFlight:
 
 
 def newest_flights(
-    data: FlightEstimates, i: int, variances: Array, before: Array
+    data: FlightEstimates,
+    i: int,
+    variances: Array,
+    before: Array,
+    memory: Persistence | None = None,
 ) -> list[NewestFlight]:
     """Hold the newest flight of each vehicle beside those before it.
 
@@ -71,6 +77,8 @@ def newest_flights(
         Place of the parameter.
     variances, before : ndarray, shape (n,)
         Of a flight as the newest one, and as one of those before, where odd ones count for less.
+    memory : Persistence, optional
+        How days go on: then a newest flight is further off by chance.
 
     Returns
     -------
@@ -90,13 +98,27 @@ def newest_flights(
         weights = 1.0 / before[beside]
         mean = float(weights @ data.values[beside, i] / weights.sum())
         off = float(data.values[last, i]) - mean
-        stderr = float(np.sqrt(variances[last] + 1.0 / weights.sum()))
+        shares = np.append(-weights / weights.sum(), 1.0)
+        own = np.append(before[beside], variances[last])
+        around = _covariance(own, data.time_s[np.append(beside, last)], memory)
+        stderr = float(np.sqrt(shares @ around @ shares))
         sure = abs(mean) > 3.0 / np.sqrt(weights.sum())
         scale, unit = (100.0 / abs(mean), "%") if sure else (1.0, data.units[i])
         size = Estimate(data.names[i], scale * off, unit, scale * stderr)
         chance = float(2.0 * ndtr(-abs(off) / stderr))
         found.append(NewestFlight(data.vehicles[last], data.names[i], size, chance))
     return found
+
+
+def _covariance(variances: Array, time_s: Array, memory: Persistence | None) -> Array:
+    """Of flights, those of several days correlated where days go on."""
+    if memory is None:
+        return np.diag(variances)
+    day = days_of(time_s)
+    lag = np.abs(np.subtract.outer(day, day))
+    beyond = np.where(lag > 0, memory.share * memory.correlation**lag, np.eye(len(day)))
+    sizes = np.sqrt(memory.factor * variances)
+    return np.asarray(beyond * np.outer(sizes, sizes))
 
 
 def judged_newest(asked: Sequence[NewestFlight]) -> tuple[NewestFlight, ...]:
