@@ -148,8 +148,10 @@ def _pooled(answers: TypeAnswers, rows: Sequence[Row], points: Sequence[Row] | N
         population = fit_population(plain, told, answers.type_name)
     made = pooled_model(population, plain, list(members.values()))
     apart = _apart(answers)
-    told = {**made.estimated.provenance, "apart": apart} if apart else made.estimated.provenance
-    return replace(made, estimated=replace(made.estimated, provenance=told))
+    if not apart:
+        return made
+    provenance = {**made.estimated.provenance, "apart": apart}
+    return replace(made, estimated=replace(made.estimated, provenance=provenance))
 
 
 def _apart(answers: TypeAnswers) -> list[str]:

@@ -96,7 +96,7 @@ def _stayed(one: ParameterHistory, moved: Sequence[ParameterHistory]) -> bool:
     if information <= 0.0:
         return False
     share = float(np.sum(weights * beside * values)) / information
-    return share + SURE / np.sqrt(information) < STAYED
+    return bool(share + SURE / np.sqrt(information) < STAYED)
 
 
 def _correlation(one: ParameterHistory, others: Sequence[ParameterHistory]) -> float:
