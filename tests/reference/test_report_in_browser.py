@@ -114,7 +114,20 @@ def test_paper_shows_all_plots_and_columns_at_its_own_width(tmp_path: Path) -> N
                 return [before, wide, count(), frames];
             }"""
         )
+        # Printed in the moment in which it is there: nothing has been unpacked yet.
+        page.add_init_script(
+            """addEventListener("DOMContentLoaded", () => {
+                dispatchEvent(new Event("beforeprint"));
+                const count = (what) => document.querySelectorAll(what).length;
+                window.early = [count(".plot"), count(".plot .main-svg"), count(".modebar-btn")];
+            })"""
+        )
+        page.goto(file.as_uri())
+        plots, early, buttons = page.evaluate("window.early")
+        apology = page.locator("#plain").is_visible()
         browser.close()
+    assert early >= plots == 8, "each plot has layers of its own"
+    assert (buttons, apology) == (0, False)
     assert drawn < 8, "what is folded or below the screen is not drawn before"
     assert paper == 8
     assert max(widths) <= 880, "of a window 1440 px wide"

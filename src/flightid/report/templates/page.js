@@ -12,12 +12,13 @@
   let library = null;
 
   // Long texts and the arrays are stored as gzip in base64.
-  function unzipped(holder) {
-    const bytes = Uint8Array.from(atob(holder.textContent), (letter) => letter.charCodeAt(0));
-    return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip")));
-  }
+  const packed = (holder) => Uint8Array.from(atob(holder.textContent), (letter) => letter.charCodeAt(0));
+  const unzipped = (holder) =>
+    new Response(new Blob([packed(holder)]).stream().pipeThrough(new DecompressionStream("gzip")));
   const text = async (holder) =>
     holder.dataset.packed === "gzip" ? unzipped(holder).text() : holder.textContent;
+  const textNow = (holder) =>
+    holder.dataset.packed === "gzip" ? new TextDecoder().decode(inflated(packed(holder))) : holder.textContent;
 
   // Arrays are differences of bit patterns, their bytes by rank; each is stored once for all plots.
   let stored = null;
@@ -41,6 +42,10 @@
     const holder = document.getElementById("library");
     const source = await text(holder);
     holder.remove();
+    return started(source);
+  }
+  function started(source) {
+    if (window.Plotly) return window.Plotly;
     const element = document.createElement("script");
     element.textContent = source;
     document.head.append(element);
@@ -95,7 +100,8 @@
     place.style.height = `${layout.height}px`;
   }
 
-  // What a plot needs is unpacked ahead of its drawing, for paper does not wait.
+  // What a plot needs is unpacked ahead of its drawing; what paper, which does not wait, finds packed
+  // is unpacked while it is asked for.
   const texts = new Map();
   let plotly = null, all = null;
   async function prepare(place) {
@@ -105,6 +111,15 @@
     if (texts.has(name)) return;
     const source = await text(document.querySelector(`script[data-plot="${name}"]`));
     if (source.includes('"stored":')) all = await arrays();
+    texts.set(name, source);
+  }
+
+  function prepareNow(place) {
+    const name = place.dataset.spec;
+    plotly ??= window.Plotly ?? started(textNow(document.getElementById("library")));
+    if (texts.has(name)) return;
+    const source = textNow(document.querySelector(`script[data-plot="${name}"]`));
+    if (source.includes('"stored":')) all ??= inflated(packed(document.getElementById("arrays")));
     texts.set(name, source);
   }
 
@@ -127,7 +142,7 @@
       spec.layout.margin = { ...spec.layout.margin, l: 52, r: 8 };
       spec.layout.font.size = 11;
     }
-    const options = { responsive: true, displaylogo: false, displayModeBar: place.clientWidth < 520 ? false : "hover", scrollZoom: false,
+    const options = { responsive: true, displaylogo: false, displayModeBar: paper || place.clientWidth < 520 ? false : "hover", scrollZoom: false,
       modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"],
       toImageButtonOptions: { format: "svg", filename: place.id } };
     drawn.add(place);
@@ -182,7 +197,9 @@
     }));
     // Paper shows all plots at its own width, in ink for white paper, and waits for none of them.
     addEventListener("beforeprint", () => {
-      plots.forEach((place) => texts.has(place.dataset.spec) ? paint(place, true) : show(place));
+      try {
+        plots.forEach((place) => { prepareNow(place); paint(place, true); });
+      } catch { apologise(); }
     });
     addEventListener("afterprint", redraw);
   }
