@@ -114,7 +114,7 @@ def sliders(log: Path, folder: Path) -> None:
     text = study.read_text()
     begun = time.process_time()
     try:
-        found = gain_work.make_gains(study, text, [])
+        found = gain_work.gains_of(study, text).model_dump()
     except FlightidError as error:
         print(f"gain slider → margins: not measured, {log.name}: {error}")
         return

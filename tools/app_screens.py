@@ -81,6 +81,13 @@ def records(stage: Stage) -> None:
     page.locator("section[aria-label=Signals] canvas").first.wait_for()
 
 
+def rig_gains(stage: Stage) -> None:
+    """A PID around the loops of the rig."""
+    records(stage)
+    stage.open(f"gains/{stage.page.url.rpartition('/')[2]}")
+    stage.page.locator("section[aria-label=Margins]").wait_for()
+
+
 def _ran(stage: Stage) -> None:
     """The study of the demo's log, run where it was not."""
     stage.open(f"report/{stage.log}")
@@ -143,7 +150,8 @@ def fly(stage: Stage) -> None:
 SCREENS: dict[str, Callable[[Stage], None]] = {
     each.__name__: each
     for each in (
-        logs, flight, response, gains, compare, plan, records, model, verify, report, fleet, fly,
+        logs, flight, response, gains, compare, plan, records, rig_gains, model, verify, report,
+        fleet, fly,
     )
 }  # fmt: skip
 """By the name in the address."""

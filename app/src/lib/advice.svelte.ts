@@ -1,6 +1,7 @@
-/** The log that the page is on; empty on records of a rig and where no log is open. */
+/** The log or records that the page is on; empty where none is open. */
 class Here {
   log = $state("");
+  ofRig = $state(false);
   /** Screens that a link leads to: those of this log, without the one that is open. */
   screens = $state<string[]>([]);
 }
@@ -12,7 +13,7 @@ const SCREEN_OF: Record<string, [string, string]> = {
   compare: ["compare", "Compare"], response: ["response", "Response"],
 };
 /** A command with its files, options and words in capitals; the sentence goes on behind it. */
-const COMMAND = /flightid (tune|plan|inspect|flight|compare|response)\b((?: (?:[^;:()\n]*?\.(?:bin|log|ulg|bbl|bfl|tlog|px4log|toml)\b|--[\w-]+|"[^"]*"|[^\s;,:()]*[./][^\s;,:()]*[^\s;,:().]|(?:LOG|STUDY)\b))*)/gi;
+const COMMAND = /flightid (tune|plan|inspect|flight|compare|response)\b((?: (?:[^;:()\n]*?\.(?:bin|log|ulg|bbl|bfl|tlog|px4log|toml)\b|--controller \w+|--[\w-]+|"[^"]*"|[^\s;,:()]*[./][^\s;,:()]*[^\s;,:().]|(?:LOG|STUDY)\b))*)/gi;
 
 export interface AdvicePart { text: string; href: string | null }
 
@@ -22,7 +23,7 @@ export function adviceParts(text: string, log: string, screens: string[]): Advic
   let done = 0;
   for (const found of log ? text.matchAll(COMMAND) : []) {
     const [all, verb, rest] = found;
-    if (rest.includes("--controller")) continue;
+    if (rest.includes("--controller") && !here.ofRig) continue;
     const [screen, title] = SCREEN_OF[verb];
     if (!screens.includes(screen)) continue;
     parts.push({ text: text.slice(done, found.index), href: null }, { text: title, href: `#/${screen}/${log}` });

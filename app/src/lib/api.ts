@@ -1,4 +1,4 @@
-import type { RemovedItem, CompareRequest, ComparisonPart, Edit, FieldGroup, FlightScreen, GainFile, Job, Listing, LogItem, ModelAnswer, OwnModelAnswer, OwnModel, PlanPart, PlanRequest, ProposedStudy, RigItem, RigScreen, RunScreen, ShownModel, StudyText, UseEdits } from "./types";
+import type { RemovedItem, CompareRequest, ComparisonPart, Edit, FieldGroup, FlightScreen, GainsScreen, Job, Listing, LogItem, ModelAnswer, OwnModelAnswer, OwnModel, PlanPart, PlanRequest, ProposedStudy, RigItem, RigScreen, RunScreen, ShownModel, StudyText, UseEdits } from "./types";
 
 /** A refusal of the server, in its own words. */
 export class Refusal extends Error {
@@ -50,7 +50,7 @@ export const takeOff = (id: string, removed: boolean) => json<RemovedItem[]>("/a
 export const flight = (log: string) => json<FlightScreen>(`/api/logs/${log}`);
 export const fields = (log: string) => json<FieldGroup[]>(`/api/logs/${log}/fields`);
 export const study = (log: string) => json<StudyText | null>(`/api/studies/${log}`);
-export const gainFiles = (log: string) => json<GainFile[]>(`/api/studies/${log}/gains`);
+export const gains = (log: string, again = false) => json<GainsScreen>(`/api/gains/${log}?again=${again}`, sent("POST", {}));
 export const compare = (asked: CompareRequest) => json<ComparisonPart>("/api/comparisons", sent("POST", asked));
 export const plan = (asked: PlanRequest) => json<PlanPart>("/api/plans", sent("POST", asked));
 export const library = () => json<ShownModel[]>("/api/library");

@@ -44,7 +44,7 @@ export const SCREENS: Screen[] = [
   { name: "logs", title: "Logs", component: Library, ofLog: false, needsStudy: false, shows: () => true },
   { name: "flight", title: "Flight", component: Flight, ofLog: true, needsStudy: false, shows: (given) => Boolean(given.log) && !ofRecords(given) },
   { name: "response", title: "Response", component: Response, ofLog: true, needsStudy: true, shows: hasModels },
-  { name: "gains", title: "Gains", component: Gains, ofLog: true, needsStudy: true, shows: (given) => hasModels(given) && !ofRecords(given) },
+  { name: "gains", title: "Gains", component: Gains, ofLog: true, needsStudy: true, shows: hasModels },
   { name: "compare", title: "Compare", component: Compare, ofLog: true, needsStudy: false, shows: (given) => Boolean(given.log) && !ofRecords(given) },
   { name: "plan", title: "Plan", component: Plan, ofLog: true, needsStudy: false, shows: (given) => Boolean(given.log) && !ofRecords(given) },
   { name: "records", title: "Records", component: Records, ofLog: true, needsStudy: false, shows: (given) => Boolean(given.log) && ofRecords(given) },

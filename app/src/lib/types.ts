@@ -26,6 +26,7 @@ export interface AxisGains {
   steps: GainStep[];
   filters: string[];
   findings: ShownFinding[];
+  controller: RigController | null;
 }
 
 /** A number of a loop on both sides, and their difference with its interval. */
@@ -66,6 +67,13 @@ export interface ComparisonPart {
   findings: ShownFinding[];
   following: GainFile | null;
   back: GainFile | null;
+}
+
+/** A way to write a PID of its own, with its gains. */
+export interface ControllerForm {
+  name: string;
+  law: string;
+  gains: string;
 }
 
 /** Handling qualities of a flight, by the decision tree.
@@ -386,12 +394,11 @@ export interface GainStep {
   gain_margin_db: number | null;
 }
 
-/** Its answer: all gains, or the axis that moved. */
+/** Its answer: the axis that moved. */
 export interface GainsAnswer {
   request: number;
   error: string | null;
   seconds: number;
-  gains: GainsPart | null;
   moved: AxisGains | null;
 }
 
@@ -403,9 +410,11 @@ export interface GainsPart {
   n_steps: number;
   left_out: Record<string, string>;
   refusal: string;
+  files: GainFile[];
+  loops: string[];
 }
 
-/** Gains of a study; with `values` one axis is judged at once, as a slider moves. */
+/** One axis with other gains, judged at once as a slider moves. */
 export interface GainsQuestion {
   request: number;
   kind: string;
@@ -416,13 +425,24 @@ export interface GainsQuestion {
   responses: boolean;
 }
 
+/** Gains of a study as it stands, where they are known, and the work on them. */
+export interface GainsScreen {
+  etag: string;
+  gains: GainsPart | null;
+  jobs: Job[];
+}
+
 /** Long work: its state, and where it can be asked for again. */
 export interface Job {
   id: string;
-  kind: "overview" | "review" | "run" | "fleet";
+  kind: "overview" | "review" | "run" | "fleet" | "gains";
   log: string;
   state: "waiting" | "done" | "failed" | "cancelled" | "interrupted";
   reason: string;
+  of: string;
+  begun_s: number;
+  label: string;
+  share: number | null;
 }
 
 /** A job has changed. */
@@ -759,6 +779,13 @@ export interface RigColumn {
   samples: number;
   least: number | null;
   most: number | null;
+}
+
+/** A controller around a loop of a rig. */
+export interface RigController {
+  forms: ControllerForm[];
+  remarks: string[];
+  sampled: boolean;
 }
 
 /** What was found in the samples of a channel, and where. */

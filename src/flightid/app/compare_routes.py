@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from pathlib import Path
 from typing import Annotated
 
 from fastapi import FastAPI, HTTPException, Query, Response
@@ -17,6 +18,7 @@ from flightid.app.compare_schemas import (
     PlanRequest,
     PlanWishes,
 )
+from flightid.app.gain_answers import kept_gains
 from flightid.app.guard import SANDBOXED
 from flightid.app.studies import text_of
 
@@ -39,11 +41,10 @@ def add_compare_routes(app: FastAPI, backstage: Backstage) -> None:
         if not asked.before.promised:
             return ComparisonPart(**await made(workers.compared(*inputs)))
         # Which step flew rests on the study's gains; a study without any may still promise.
-        told, (files, refusal, _) = await asyncio.gather(
-            made(workers.compared(*inputs)),
-            workers.tuned(gain_work.make_files, study, text),
+        told, files = await asyncio.gather(
+            made(workers.compared(*inputs)), _files(backstage, asked.before.log, study, text)
         )
-        if not refusal:
+        if files:
             told = await made(workers.compared(*inputs, files))
         return ComparisonPart(**told)
 
@@ -65,3 +66,12 @@ def add_compare_routes(app: FastAPI, backstage: Backstage) -> None:
         return Response(
             page, media_type="text/html", headers={"content-security-policy": SANDBOXED}
         )
+
+
+async def _files(backstage: Backstage, log: str, study: Path, text: str) -> list[dict[str, str]]:
+    """Files of the study's gains, found before where they were; none where it has none to fly."""
+    *_, kept = await asyncio.to_thread(kept_gains, backstage, log)
+    if kept is not None:
+        return [each.model_dump() for each in kept.files]
+    files, refusal, _ = await backstage.workers.tuned(gain_work.make_files, study, text)
+    return [] if refusal else files

@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from flightid.app.schemas import Light, Message, Question, Reply, ShownFinding
+from flightid.app.schemas import Job, Light, Message, Question, Reply, ShownFinding
 
 
 class GainSlider(Message):
@@ -66,6 +66,23 @@ class GainStep(Message):
     gain_margin_db: float | None
 
 
+class ControllerForm(Message):
+    """A way to write a PID of its own, with its gains."""
+
+    name: str
+    law: str
+    gains: str
+
+
+class RigController(Message):
+    """A controller around a loop of a rig."""
+
+    forms: list[ControllerForm]
+    remarks: list[str]
+    sampled: bool
+    """Whether it has a rate, so that there is code of it."""
+
+
 class AxisGains(Message):
     """Gains of an axis and what they promise."""
 
@@ -80,6 +97,8 @@ class AxisGains(Message):
     steps: list[GainStep]
     filters: list[str]
     findings: list[ShownFinding]
+    controller: RigController | None = None
+    """Of a rig: what stands in place of an autopilot's own loops."""
 
 
 class RefusedGains(Message):
@@ -87,6 +106,13 @@ class RefusedGains(Message):
 
     axis: str
     finding: ShownFinding
+
+
+class GainFile(Message):
+    """A parameter file."""
+
+    name: str
+    text: str
 
 
 class GainsPart(Message):
@@ -98,27 +124,31 @@ class GainsPart(Message):
     n_steps: int
     left_out: dict[str, str]
     refusal: str
+    files: list[GainFile]
+    """Of ``flightid tune --write``: steps with their ways back; of a rig numbers and code."""
+    loops: list[str]
+    """Of a rig: every loop that its models have, as output/input."""
 
 
-class GainFile(Message):
-    """A parameter file."""
+class GainsScreen(Message):
+    """Gains of a study as it stands, where they are known, and the work on them."""
 
-    name: str
-    text: str
+    etag: str
+    gains: GainsPart | None
+    jobs: list[Job]
 
 
 class GainsQuestion(Question):
-    """Gains of a study; with `values` one axis is judged at once, as a slider moves."""
+    """One axis with other gains, judged at once as a slider moves."""
 
     kind: Literal["gains"] = "gains"
-    axis: str = ""
-    values: dict[str, float] = Field(default_factory=dict, max_length=16)
+    axis: str
+    values: dict[str, float] = Field(max_length=16)
     responses: bool = True
     """Also time responses, which a hand that moves a slider does not wait for."""
 
 
 class GainsAnswer(Reply):
-    """Its answer: all gains, or the axis that moved."""
+    """Its answer: the axis that moved."""
 
-    gains: GainsPart | None = None
     moved: AxisGains | None = None

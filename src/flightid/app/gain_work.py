@@ -14,6 +14,7 @@ import numpy as np
 
 from flightid.app.gain_schemas import (
     AxisGains,
+    ControllerForm,
     GainFile,
     GainSlider,
     GainsPart,
@@ -21,12 +22,13 @@ from flightid.app.gain_schemas import (
     MarginRow,
     NicholsCurve,
     RefusedGains,
+    RigController,
     TimeCurve,
 )
 from flightid.app.overview import light_of
 from flightid.app.schemas import ShownFinding
 from flightid.app.study_edits import KeyEdit, edited
-from flightid.app.study_reach import draft_inside
+from flightid.app.study_reach import draft_inside, named_places
 from flightid.app.work import KEPT
 from flightid.control.autopilots.parameter_files import parameter_suffix
 from flightid.control.tuning.moved_gains import MovedGains, move_gains
@@ -35,30 +37,74 @@ from flightid.control.tuning.result import Tuning
 from flightid.conventions import Light
 from flightid.errors import DataError, FlightidError, StudyError, UnknownNameError
 from flightid.export.gains import write_gains
+from flightid.files import write_atomically
 from flightid.findings import Finding, worst
-from flightid.study.gain_preview import preview_tuning
+from flightid.study.gain_preview import LoopChoice, preview_loops, preview_tuning
+from flightid.version import VERSION
 
 MOST_POINTS = 240
 """Of a curve on the page."""
 SHOWN_DB = (-40.0, 40.0)
 DIGITS = 6
+MOST_KEPT = 24
+"""Gains of one study, for other presets and values by hand, that are kept; the oldest go."""
 
 
-def make_gains(study: Path, text: str, edits: Sequence[KeyEdit]) -> Mapping[str, Any]:
-    """Gains of a study with edits that are not written yet."""
-    whole = edited(text, edits) if edits else text
-    tuning = _tuned(study, whole)
-    by_hand = _hand_gains(whole)
+def make_gains(study: Path, folder: Path) -> None:
+    """Tune a study as it stands, and write what the page shows of that beside older ones."""
+    text = study.read_text(encoding="utf-8")
+    target = folder / f"gains-{gains_version(study, text)}.json-{VERSION}"
+    write_atomically(target, gains_of(study, text).model_dump_json())
+    kept = sorted(folder.glob("gains-*"), key=lambda each: -each.lstat().st_mtime_ns)
+    for old in kept[MOST_KEPT:]:
+        old.unlink(missing_ok=True)
+
+
+def gains_version(study: Path, text: str) -> str:
+    """What the gains of a study rest on: its keys, and the files that it names as they are.
+
+    Raises
+    ------
+    StudyError
+        It names files outside the folder, or cannot be carried out as written.
+    """
+    with draft_inside(study, text) as draft:
+        places = named_places(draft)
+    known = [(str(each), *_state(each)) for each in places]
+    said = repr((tomllib.loads(text), known))
+    return hashlib.sha256(said.encode()).hexdigest()[:16]
+
+
+def _state(place: Path) -> tuple[int, int]:
+    try:
+        status = place.stat()
+    except OSError:
+        return 0, 0
+    return status.st_size, status.st_mtime_ns
+
+
+def gains_of(study: Path, text: str) -> GainsPart:
+    """What the page shows of the gains of a study."""
+    loops = _loops_of(study, text)
+    if loops is not None and not loops.chosen:
+        said = "choose the loops to close: models here have several inputs or outputs"
+        return GainsPart(
+            axes=[], refused=[], findings=[], n_steps=0, left_out={}, refusal=said, files=[],
+            loops=list(loops.offered),
+        )  # fmt: skip
+    tuning = _tuned(study, text)
+    by_hand = _hand_gains(text)
     found = tuning
     if by_hand:
-        found = _tuned(study, edited(whole, [KeyEdit(("tune", "by_hand"), None)]))
-    KEPT[_key(whole)] = tuning
+        found = _tuned(study, edited(text, [KeyEdit(("tune", "by_hand"), None)]))
+    KEPT[_key(text)] = tuning
     axes = [
         _axis(each, move_gains(each, {}), _searched(found, each.axis), by_hand)
         for each in tuning.designs
     ]
     single = {finding for each in tuning.designs for finding in each.findings}
     refused = {each.finding for each in tuning.refused}
+    refusal = _refusal(tuning)
     return GainsPart(
         axes=axes,
         refused=[
@@ -67,8 +113,16 @@ def make_gains(study: Path, text: str, edits: Sequence[KeyEdit]) -> Mapping[str,
         findings=[shown_finding(f) for f in tuning.findings if f not in single | refused],
         n_steps=max((len(each.stages) for each in tuning.sound), default=0),
         left_out=dict(tuning.left_out),
-        refusal=_refusal(tuning),
-    ).model_dump()
+        refusal=refusal,
+        files=[] if refusal else _files(tuning),
+        loops=[] if loops is None else list(loops.offered),
+    )
+
+
+def _loops_of(study: Path, text: str) -> LoopChoice | None:
+    """Loops of a study of records; None where an autopilot has its own."""
+    with draft_inside(study, text) as draft:
+        return preview_loops(draft, cache=KEPT)
 
 
 def move_axis(
@@ -98,13 +152,21 @@ def make_files(study: Path, text: str) -> list[dict[str, str]]:
     tuning = _tuned(study, text)
     if refusal := _refusal(tuning):
         raise DataError(refusal)
-    suffix = parameter_suffix(tuning.designs[0].flown.autopilot)
-    with tempfile.TemporaryDirectory() as folder:
-        written = write_gains(tuning, Path(folder) / f"gains{suffix}")
-        return [
-            GainFile(name=each.name, text=each.read_text(encoding="utf-8")).model_dump()
-            for each in written
-        ]
+    return [each.model_dump() for each in _files(tuning)]
+
+
+def _files(tuning: Tuning) -> list[GainFile]:
+    """Parameter files of an autopilot; of a PID numbers, and code where it has a rate."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        written = write_gains(tuning, folder / f"gains{_suffix(tuning)}")
+        if tuning.plain and all(each.plain.sampled for each in tuning.sound if each.plain):
+            written += write_gains(tuning, folder / "gains.c")
+        return [GainFile(name=each.name, text=each.read_text(encoding="utf-8")) for each in written]
+
+
+def _suffix(tuning: Tuning) -> str:
+    return ".toml" if tuning.plain else parameter_suffix(tuning.designs[0].flown.autopilot)
 
 
 def _tuned(study: Path, text: str) -> Tuning:
@@ -114,8 +176,6 @@ def _tuned(study: Path, text: str) -> Tuning:
         raise StudyError(
             "no model of this study can be tuned", needed="a model of a rate to its command"
         )
-    if made.plain:
-        raise StudyError("the page shows gains of an autopilot", found="a PID of its own")
     return made
 
 
@@ -193,7 +253,17 @@ def _axis(
         ],
         filters=[f"{each.name} {each.old:g} to {each.value:g}" for each in design.filters],
         findings=[shown_finding(each) for each in design.findings],
+        controller=_controller(design),
     )
+
+
+def _controller(design: PidDesign) -> RigController | None:
+    loop = design.plain
+    if loop is None:
+        return None
+    table = loop.form_table()
+    forms = [ControllerForm(name=str(a), law=str(b), gains=str(c)) for a, b, c in table.rows]
+    return RigController(forms=forms, remarks=list(table.notes), sampled=loop.sampled)
 
 
 def _margins(moved: MovedGains) -> list[MarginRow]:

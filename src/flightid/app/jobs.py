@@ -11,6 +11,7 @@ from __future__ import annotations
 import asyncio
 import json
 import os
+import time
 from collections.abc import Callable
 from concurrent.futures import CancelledError, Future
 from concurrent.futures.process import BrokenProcessPool
@@ -20,10 +21,10 @@ from typing import Any
 
 from pebble import ProcessExpired
 
-from flightid.app import fleet_work, run_work, work
+from flightid.app import fleet_work, gain_work, run_work, watched, work
 from flightid.app.crew import Crew
 from flightid.app.kept_parts import kept_part
-from flightid.app.own_folders import own_folder, read_plain
+from flightid.app.own_folders import clear_left, made_name, own_folder, read_plain
 from flightid.app.schemas import Job
 from flightid.app.workspace import Workspace
 from flightid.errors import FlightidError
@@ -34,6 +35,8 @@ LONGEST_S = 900.0
 """Of a job; a hand's request may take `PATIENCE_S`."""
 PATIENCE_S = 60.0
 NOTE_BYTES = 1 << 16
+LOOK_S, END_S = 0.5, 3.0
+"""Between looks at the progress of jobs; how long one that was cancelled may take to end itself."""
 Listener = Callable[[Job], None]
 
 
@@ -55,11 +58,16 @@ def _fleet(workspace: Workspace, log: str, path: Path) -> tuple[object, ...]:
     return fleet_work.make_fleet, path, workspace.result_path(log, "fleet.json")
 
 
+def _gains(workspace: Workspace, log: str, path: Path) -> tuple[object, ...]:
+    return gain_work.make_gains, path, workspace.result_path(log, "gains.json").parent
+
+
 WORK: dict[str, Callable[[Workspace, str, Path], tuple[object, ...]]] = {
     "overview": _overview,
     "review": _review,
     "run": _run,
     "fleet": _fleet,
+    "gains": _gains,
 }
 """Call and inputs of each kind of job (`Job.kind`); its result is a part of `kept_parts.PARTS`."""
 REPEATED = ("run", "fleet")
@@ -82,12 +90,17 @@ class Workers:
         self._workspace = workspace
         self._jobs: dict[str, Job] = {}
         self._futures: dict[str, Future[Any]] = {}
+        self._places: dict[str, Path] = {}
+        self._ending: set[Path] = set()
+        self._look: asyncio.Task[None] | None = None
         self._listeners: list[Listener] = []
         self._loop: asyncio.AbstractEventLoop | None = None
         self._live, self._tuning, self._compared, self._planned = (Crew() for _ in range(4))
         self._asked, self._fleets = Crew(), Crew()
         self._long = Crew(max(1, (os.cpu_count() or 2) - 1))
         self._folder = own_folder(workspace.folder, ".flightid", "jobs")
+        self._progress = own_folder(workspace.folder, ".flightid", "progress")
+        clear_left(self._progress)
         for job in _interrupted(self._folder):
             self._jobs[job.id] = job
 
@@ -96,15 +109,20 @@ class Workers:
         self._loop = asyncio.get_running_loop()
         for crew in (self._live, self._long):
             crew.schedule(work.warm)
+        self._look = self._loop.create_task(self._looked())
 
     def stop(self) -> None:
         """End all processes."""
+        if self._look is not None and self._loop is not None and not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(self._look.cancel)
         short = (self._live, self._tuning, self._compared, self._planned, self._asked)
         crews = (*short, self._fleets, self._long)
         for crew in crews:
             crew.stop()
         for crew in crews:
             crew.join()
+        for place in {*self._places.values(), *self._ending}:
+            watched.forget(place)
 
     def listen(self, listener: Listener) -> Callable[[], None]:
         """Hear of every change of a job; returns what ends it."""
@@ -119,18 +137,26 @@ class Workers:
         """Every job that is not done."""
         return [job for job in self._jobs.values() if job.state != "done"]
 
-    def ensure(self, kind: str, log: str, path: Path, *, again: bool = False) -> None:
-        """Begin a job, unless its result is there, it runs, or it failed and nobody asks again."""
+    def ensure(self, kind: str, log: str, path: Path, *, again: bool = False, of: str = "") -> None:
+        """Begin a job, unless its result is there, it runs, or it failed and nobody asks again.
+
+        One of the same kind that works on another version ends first.
+        """
         name = f"{kind}-{log}"
         known = self._jobs.get(name)
         repeats = again and kind in REPEATED
-        if not repeats and kept_part(self._workspace, log, kind) is not None:
+        same = known is not None and known.of == of
+        if not repeats and kept_part(self._workspace, log, kind, of) is not None:
+            if not same:
+                self.cancel(name)
             return
-        if known is not None and known.state == "waiting":
-            return
-        if known is not None and known.state in ("failed", "cancelled") and not again:
-            return
-        job = Job(id=name, kind=kind, log=log, state="waiting")  # type: ignore[arg-type]
+        if known is not None and same:
+            if known.state == "waiting":
+                return
+            if known.state in ("failed", "cancelled") and not again:
+                return
+        self._end(name)
+        job = Job(id=name, kind=kind, log=log, state="waiting", of=of, begun_s=time.time())  # type: ignore[arg-type]
         try:
             inputs = WORK[kind](self._workspace, log, path)
         except FlightidError as error:
@@ -139,22 +165,42 @@ class Workers:
             return
         write_atomically(self._folder / f"{name}.json", job.model_dump_json())
         self._jobs[name] = job
-        crew, longest = (self._fleets, None) if kind in ENDLESS else (self._long, LONGEST_S)
-        future = crew.schedule(work.answered, *inputs, timeout_s=longest)
-        self._futures[name] = future
+        crew = {"fleet": self._fleets, "gains": self._tuning}.get(kind, self._long)
+        place = self._progress / made_name("now")
+        longest = None if kind in ENDLESS else LONGEST_S
+        future = crew.schedule(watched.watched, place, *inputs, timeout_s=longest)
+        self._futures[name], self._places[name] = future, place
         self._tell(job)
         future.add_done_callback(lambda done: self._soon(self._ended, name, done))
 
     def cancel(self, name: str) -> bool:
-        """End a job; its process too, where it runs."""
+        """End a job, and its process where that does not end the work itself in a moment."""
         job = self._jobs.get(name)
         if job is None or job.state == "done":
             return False
-        future = self._futures.get(name)
-        if future is not None:
-            future.cancel()
+        self._end(name)
         self._change(name, "cancelled", "")
         return True
+
+    def _end(self, name: str) -> None:
+        """Ask the work of a job to end, where it has any: what its process holds open stays."""
+        future, place = self._futures.pop(name, None), self._places.pop(name, None)
+        if future is None or place is None:
+            return
+        if self._loop is None or not future.running():
+            future.cancel()
+            watched.forget(place)
+            return
+        watched.ask_to_end(place)
+        self._ending.add(place)
+        kill = self._loop.call_later(END_S, future.cancel)
+
+        def ended(_: Future[Any]) -> None:
+            watched.forget(place)
+            self._ending.discard(place)
+            self._soon(kill.cancel)
+
+        future.add_done_callback(ended)
 
     async def live(self, call: Callable[..., Any], *inputs: object) -> tuple[Any, str, float]:
         """Result of a hand's request, or the sentence of its refusal."""
@@ -199,8 +245,23 @@ class Workers:
         job = self._jobs[name].model_copy(update={"state": state, "reason": reason})
         self._jobs[name] = job
         self._futures.pop(name, None)
+        if (place := self._places.pop(name, None)) is not None:
+            watched.forget(place)
         (self._folder / f"{name}.json").unlink(missing_ok=True)
         self._tell(job)
+
+    async def _looked(self) -> None:
+        """Tell how far jobs are, as long as the server lives."""
+        while True:
+            await asyncio.sleep(LOOK_S)
+            for name, place in list(self._places.items()):
+                found, job = await asyncio.to_thread(watched.progress_at, place), self._jobs[name]
+                if found is None or (found.label, found.share) == (job.label, job.share):
+                    continue
+                if name in self._places:
+                    told = {"label": found.label, "share": found.share}
+                    self._jobs[name] = job.model_copy(update=told)
+                    self._tell(self._jobs[name])
 
     def _tell(self, job: Job) -> None:
         for listener in list(self._listeners):

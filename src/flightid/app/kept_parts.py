@@ -7,6 +7,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from flightid.app.fleet_schemas import FleetRunPart
+from flightid.app.gain_schemas import GainsPart
 from flightid.app.run_schemas import RunPart
 from flightid.app.schemas import FieldGroup, Message, Overview, ReviewPart
 from flightid.app.workspace import Workspace
@@ -16,6 +17,7 @@ PARTS: dict[str, type[Message]] = {
     "review": ReviewPart,
     "run": RunPart,
     "fleet": FleetRunPart,
+    "gains": GainsPart,
 }
 
 
@@ -31,15 +33,24 @@ def kept_review(workspace: Workspace, log: str) -> ReviewPart | None:
     return found if isinstance(found, ReviewPart) else None
 
 
-def kept_part(workspace: Workspace, log: str, kind: str) -> Message | None:
-    """A part by its kind; one that is not as it was written is removed, as if it had not been."""
-    found: dict[str, Any] | None = workspace.result(log, kind)
+def kept_part(workspace: Workspace, log: str, kind: str, of: str = "") -> Message | None:
+    """A part by its kind; one that is not as it was written is removed, as if it had not been.
+
+    Parameters
+    ----------
+    workspace : Workspace
+    log, kind : str
+    of : str
+        Version of what it was made of, where there may be a part for each.
+    """
+    name = f"{kind}-{of}" if of else kind
+    found: dict[str, Any] | None = workspace.result(log, name)
     if found is None:
         return None
     try:
         return PARTS[kind].model_validate(found)
     except ValidationError:
-        workspace.drop_result(log, kind)
+        workspace.drop_result(log, name)
         return None
 
 

@@ -67,7 +67,8 @@ def add_rig_routes(app: FastAPI, backstage: Backstage) -> None:
             raise HTTPException(422, f"The library has no model {asked.model}.")
         roles = asked.model_dump(include={"inputs", "outputs", "excitations", "model", "actuators"})
         reading = _options(asked) | ({"units": asked.units} if asked.units else {})
-        call = workers.live(rig_work.propose, paths, target.parent, roles, reading)
+        # Structures are tried for as long as that takes, where it holds up no hand that drags.
+        call = workers.planned(rig_work.propose, paths, target.parent, roles, reading)
         proposed = ProposedStudy(**await made(call))
         if proposed.text and studies.path(rig) is None:
             await asyncio.to_thread(write_study, target, proposed.text)

@@ -116,10 +116,18 @@ class Job(Message):
     """Long work: its state, and where it can be asked for again."""
 
     id: str
-    kind: Literal["overview", "review", "run", "fleet"]
+    kind: Literal["overview", "review", "run", "fleet", "gains"]
     log: str
     state: Literal["waiting", "done", "failed", "cancelled", "interrupted"]
     reason: str = ""
+    of: str = ""
+    """Version of what it works on, where a kind has a result for each."""
+    begun_s: float = 0.0
+    """When, s since 1970."""
+    label: str = ""
+    """What it does now."""
+    share: float | None = None
+    """How much of that is done; None where nobody knows."""
 
 
 class LogItem(Message):

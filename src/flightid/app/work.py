@@ -38,7 +38,12 @@ BESIDE_BYTES = 2 << 30
 
 
 class StageCache(OrderedDict[str, Any]):
-    """Results of stages, as many as `HELD`."""
+    """Results of stages, as many as `HELD`: those that were taken last."""
+
+    def __getitem__(self, key: str) -> Any:  # noqa: ANN401 - whatever a stage gives
+        """A result, the youngest from now on."""
+        self.move_to_end(key)
+        return super().__getitem__(key)
 
     def __setitem__(self, key: str, value: object) -> None:
         """Keep a result, and forget the oldest."""

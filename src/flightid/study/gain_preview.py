@@ -5,14 +5,18 @@ from __future__ import annotations
 from collections.abc import MutableMapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
+from flightid.control.tuning.controller_options import ControllerOptions
 from flightid.control.tuning.result import Tuning
+from flightid.frozen import dataclass
+from flightid.models import Model
+from flightid.models.model import model_of
 from flightid.study.pipeline import identify_models
 from flightid.study.previewed import PreviewedStudy
 from flightid.study.stage_runner import StageRunner
 from flightid.study.taking import take
-from flightid.study.tuning import TuneSettings, tune_by_hand, tune_models
+from flightid.study.tuning import TuneSettings, only_loop, tune_by_hand, tune_models
 from flightid.surface import as_key, speaking
 
 
@@ -43,6 +47,8 @@ def preview_tuning(
     with speaking(as_key):
         settings, runner, log, staged = _identified(Path(path), cache)
         wanted = settings.tune or TuneSettings()
+        if log is None and wanted.controller is None:
+            wanted = replace(wanted, controller=ControllerOptions())  # as `flightid tune` does
         if wanted.controller is None and wanted.options.by_hand and not wanted.has_other_filters:
             alone = replace(wanted, options=replace(wanted.options, by_hand=None))
             found = runner.stage("tuning", tune_models, staged, log, alone)
@@ -52,6 +58,51 @@ def preview_tuning(
                 return held
         tuned: Tuning | None = runner.stage("tuning", tune_models, staged, log, wanted).value
         return tuned
+
+
+@dataclass(frozen=True)
+class LoopChoice:
+    """Loops that models of records have, each as output/input.
+
+    Attributes
+    ----------
+    offered, chosen : tuple of str
+        All of them; those that a tuning closes, none where it must be told.
+    """
+
+    offered: tuple[str, ...]
+    chosen: tuple[str, ...]
+
+
+def preview_loops(
+    path: str | Path, *, cache: MutableMapping[str, Any] | None = None
+) -> LoopChoice | None:
+    """Loops around which a study of records may close a PID of its own; None where it reads a log.
+
+    Parameters
+    ----------
+    path : str or Path
+    cache : mutable mapping of str to object, optional
+        As in `run_study`.
+
+    Raises
+    ------
+    StudyError
+        The study cannot be carried out as written.
+    FlightidError
+        A stage refuses its data.
+    """
+    with speaking(as_key):
+        settings, _, log, staged = _identified(Path(path), cache)
+        asked = None if settings.tune is None else settings.tune.controller
+        if log is not None and asked is None:
+            return None
+        fits = (each.value.fit for each in staged if each.value.fit is not None)
+        models = [cast(Model, model_of(each)) for each in fits]
+        offered = [f"{y}/{u}" for each in models for y in each.outputs for u in each.inputs]
+        single = [each for model in models for each in only_loop(model)]
+        chosen = asked.loops if asked is not None and asked.loops else tuple(single)
+        return LoopChoice(tuple(dict.fromkeys(offered)), chosen)
 
 
 def preview_fits(path: str | Path, *, cache: MutableMapping[str, Any] | None = None) -> list[Any]:

@@ -257,7 +257,7 @@ def _controllers(
     errors: dict[str, FlightidError] = {}
     for model, checks in known:
         channels = cast(Model, model_of(model))
-        for name in controller.loops or _only_loop(channels):
+        for name in controller.loops or only_loop(channels):
             output, input = _loop_channels(name)
             if (
                 name in designs
@@ -293,7 +293,7 @@ def _first_loop(known: Sequence[tuple[Any, object]]) -> str:
     return f"{model.outputs[0]}/{model.inputs[0]}"
 
 
-def _only_loop(model: Model) -> tuple[str, ...]:
+def only_loop(model: Model) -> tuple[str, ...]:
     """The loop of a model with one input and one output."""
     if len(model.inputs) == len(model.outputs) == 1:
         return (f"{model.outputs[0]}/{model.inputs[0]}",)

@@ -1,0 +1,45 @@
+import * as api from "./api";
+import { live } from "./live.svelte";
+import type { GainsPart, Job } from "./types";
+
+/** Gains of a study as it stands, and the work on them; those of before stay until that is done. */
+export class Gains {
+  part: GainsPart | null = $state(null);
+  /** Version of the study that was asked about, and the one that `part` is of. */
+  etag = $state("");
+  of = $state("");
+  job: Job | null = $state(null);
+  error = $state("");
+
+  constructor(readonly log: string) {}
+
+  /** Whether the study has gone on since. */
+  get stale() {
+    return this.of !== this.etag;
+  }
+
+  async ask(again = false) {
+    try {
+      const told = await api.gains(this.log, again);
+      this.etag = told.etag;
+      this.job = told.jobs[0] ?? null;
+      this.error = this.job?.state === "failed" ? this.job.reason : "";
+      if (told.gains) {
+        this.part = told.gains;
+        this.of = told.etag;
+      }
+    } catch (problem) {
+      this.error = (problem as Error).message;
+    }
+  }
+
+  /** Hear of the work; returns what ends it. */
+  listen() {
+    return live.onNews((job) => {
+      if (job.kind !== "gains" || job.log !== this.log) return;
+      const ended = job.state !== "waiting";
+      if (!ended || job.state === "cancelled") this.job = job;
+      else this.ask();
+    });
+  }
+}

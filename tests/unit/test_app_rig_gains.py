@@ -1,0 +1,104 @@
+"""Gains of a rig on the local page: a PID of its own, as `flightid tune STUDY` gives it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+pytest.importorskip("fastapi", reason="the extra app is not installed")
+
+from flightid import run_study
+from flightid.app import gain_work
+from flightid.app.study_edits import KeyEdit, edited
+from flightid.export.gains import write_gains
+
+STUDY = """
+[study]
+title = "A rig"
+
+[[record]]
+name = "fit"
+path = "../records/rig.csv"
+
+[[model]]
+name = "Speed"
+structure = "oe"
+nb = 1
+nf = 1
+nk = 1
+identify = ["fit"]
+inputs = "u"
+outputs = "y"
+
+[[model]]
+name = "Both"
+structure = "oe"
+nb = 1
+nf = 1
+nk = 1
+identify = ["fit"]
+inputs = ["u", "v"]
+outputs = "z"
+"""
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("rig")
+    for name in ("records", "studies"):
+        (folder / name).mkdir()
+    noise = np.random.default_rng(2)
+    u, v = (np.repeat(noise.integers(0, 2, 150), 10) * 2.0 - 1.0 for _ in range(2))
+    y = lfilter([0.0, 0.2], [1.0, -0.9], u) + 0.01 * noise.standard_normal(1500)
+    z = lfilter([0.0, 0.1], [1.0, -0.8], u + v) + 0.01 * noise.standard_normal(1500)
+    rows = np.column_stack([np.arange(1500) * 0.02, u, v, y, z])
+    np.savetxt(folder / "records" / "rig.csv", rows, delimiter=",", header="time,u,v,y,z",
+               comments="")  # fmt: skip
+    path = folder / "studies" / "rig.toml"
+    path.write_text(STUDY)
+    return path
+
+
+@pytest.mark.slow
+def test_a_rig_has_the_controller_that_the_command_gives_it(study: Path, tmp_path: Path) -> None:
+    gain_work.make_gains(study, tmp_path)
+    version = gain_work.gains_version(study, STUDY)
+    (kept,) = tmp_path.glob(f"gains-{version}*")
+    told = json.loads(kept.read_text())
+    # Of the model of two inputs no loop was chosen: that of one is closed, all are offered.
+    (axis,) = told["axes"]
+    assert (axis["axis"], told["loops"]) == ("y", ["y/u", "z/u", "z/v"])
+    ran = run_study(study, output=tmp_path / "out", tune={"controller": "pi_d"}).tuning
+    assert ran is not None
+    assert {each["name"]: each["value"] for each in axis["sliders"]} == ran["y"].gains
+    (tmp_path / "own").mkdir()
+    written = {
+        path.name: path.read_text()
+        for end in ("toml", "c")
+        for path in write_gains(ran, tmp_path / "own" / f"gains.{end}")
+    }
+    assert {each["name"]: each["text"] for each in told["files"]} == written
+    assert written.keys() == {"gains.toml", "gains.c", "gains.h"}
+    worst = ran["y"].worst_case("loop", "phase margin")
+    (row,) = [each for each in axis["margins"] if each["name"] == "phase margin"]
+    assert (row["nominal"], row["worst"]) == (worst.nominal, worst.worst)
+    # Each choice of the form is a key of the study; another loop of the same file.
+    clicks = [
+        KeyEdit(("tune", "controller"), "pi"),
+        KeyEdit(("tune", "loops"), ["z/v"]),
+        KeyEdit(("tune", "output_high"), 2.0),
+    ]
+    (other,) = gain_work.gains_of(study, edited(STUDY, clicks)).axes
+    assert (other.axis, [each.name for each in other.sliders]) == ("z", ["Kp", "Ki"])
+
+
+@pytest.mark.slow
+def test_loops_of_several_inputs_are_chosen_before_anything_is_tuned(study: Path) -> None:
+    alone = STUDY[: STUDY.index("[[model]]")] + STUDY[STUDY.rindex("[[model]]") :]
+    told = gain_work.gains_of(study, alone)
+    assert (told.axes, told.loops) == ([], ["z/u", "z/v"])
+    assert told.refusal.startswith("choose the loops to close")

@@ -1,0 +1,108 @@
+"""Work of the local page beside the server: how far it is, how it ends, what takes its place."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import time
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("fastapi", reason="the extra app is not installed")
+
+from flightid.app import jobs
+from flightid.app.jobs import Workers
+from flightid.app.schemas import Job
+from flightid.app.watched import ENDED, ask_to_end, forget, progress_at, watched
+from flightid.app.work import StageCache
+from flightid.app.workspace import Workspace
+from flightid.progress import progress
+
+LOG = "0" * 16
+
+
+def steps(place: Path, end: bool) -> list[object]:
+    """Work in two parts, the inner told while it goes on; it may be asked to end meanwhile."""
+    seen: list[object] = []
+    with progress(None, "tuning"):
+        seen.append(progress_at(place))
+        with progress(4, "roll") as advance:
+            for _ in range(4):
+                time.sleep(0.21)
+                if end:
+                    ask_to_end(place)
+                advance()
+                seen.append(progress_at(place))
+    return seen
+
+
+def test_work_tells_how_far_it_is_and_ends_where_it_is_asked(tmp_path: Path) -> None:
+    place = tmp_path / "now"
+    seen, refusal, _ = watched(place, steps, place, False)
+    assert not refusal
+    told = [(each.label, each.share) for each in seen]
+    assert told == [("tuning", None), *(("roll", k / 4) for k in range(1, 5))]
+    assert watched(place, steps, place, True)[:2] == (None, ENDED)
+    forget(place)
+    assert (progress_at(place), [*tmp_path.iterdir()]) == (None, [])
+    place.write_text('{"label": "half')
+    assert progress_at(place) is None
+
+
+def test_results_that_were_taken_last_are_kept() -> None:
+    cache = StageCache()
+    for k in range(60):
+        cache[str(k)] = k
+        assert cache["0"] == 0
+    assert ("1" in cache, "0" in cache, len(cache)) == (False, True, 48)
+
+
+@pytest.mark.slow
+def test_work_on_a_newer_version_takes_the_place_of_the_older(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The process that holds plants and fits lives on where its work ends by itself."""
+    place = tmp_path / "pids"
+    monkeypatch.setitem(jobs.WORK, "gains", lambda *_: (slow, place))
+    monkeypatch.setattr(jobs, "LOOK_S", 0.05)
+
+    async def asked() -> tuple[list[Job], list[str]]:
+        workers, heard = Workers(Workspace(tmp_path)), list[Job]()
+        workers.start()
+        workers.listen(heard.append)
+        workers.ensure("gains", LOG, tmp_path, of="a")
+        await _until(lambda: any(each.label == "slow" for each in heard))
+        workers.ensure("gains", LOG, tmp_path, of="a")  # It runs.
+        workers.ensure("gains", LOG, tmp_path, of="b")
+        await _until(lambda: len(place.read_text().split()) == 2)
+        assert workers.cancel(f"gains-{LOG}")
+        workers.ensure("gains", LOG, tmp_path, of="b")  # Cancelled: nobody asks again.
+        states = [(each.of, each.state) for each in workers.of_log(LOG)]
+        assert states == [("b", "cancelled")]
+        pids = place.read_text().split()
+        await asyncio.to_thread(workers.stop)
+        return heard, pids
+
+    heard, pids = asyncio.run(asked())
+    assert len(set(pids)) == 1, "one process did both"
+    assert {each.of for each in heard} == {"a", "b"}
+    assert all(each.begun_s > 0.0 for each in heard)
+    assert not list((tmp_path / ".flightid" / "progress").iterdir())
+
+
+def slow(place: Path) -> None:
+    with place.open("a") as stream:
+        stream.write(f"{os.getpid()}\n")
+    with progress(1000, "slow") as advance:
+        for _ in range(1000):
+            time.sleep(0.02)
+            advance()
+
+
+async def _until(true: object) -> None:
+    for _ in range(600):
+        if true():  # type: ignore[operator]
+            return
+        await asyncio.sleep(0.05)
+    pytest.fail("nothing came")
