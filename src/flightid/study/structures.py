@@ -17,6 +17,7 @@ from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.record import Record
 from flightid.study.structure_settings import NARX, SUBSPACE, StructureSettings
 from flightid.study.widened_scan import CLEAR, doubted, widened
+from flightid.uncertainty.paired_errors import excess_score
 from flightid.uncertainty.quantiles import half_width
 from flightid.validation import NarxSearch, OrderScan, scan_orders, search_narx
 from flightid.validation.order_scan.edges import Structure
@@ -29,8 +30,8 @@ from flightid.validation.spectra.spectra import lags_of_spectrum
 Choice = OrderScan | NarxSearch
 RUNS_ALIKE = 0.05
 """Free-run errors that differ by less are alike: a minute of a slow mode tells them no better."""
-BY_CHANCE = 0.9
-"""Level, of two sides, of ratios of variances that are alike: chance takes 1 of 20 beyond."""
+BY_CHANCE = 0.98
+"""Level, of two sides, of paired errors that are alike: the best of dozens ran ahead by chance."""
 TRIED = 4
 """Structures that are fitted whole, at most, for one that `_is_clean`."""
 FURTHER, DOUBTED = 2, 0.3
@@ -184,32 +185,32 @@ def _aicc(trial: OrderTrial) -> float:
 
 
 def runs_as_well(trial: OrderTrial, best: OrderTrial) -> bool:
-    """Whether a free run errs no more than the best one, but for what chance makes of slow errors.
+    """Whether a free run errs no more than the best one, but for what chance makes of errors.
 
     A run that slow noise has carried off its level tells little of what follows the inputs, and a
-    pole slower than the run starts at the level of its first stretch. Variances of so many
-    independent errors as the runs hold are compared (F test, by the normal law of its logarithm).
+    pole slower than the run starts at the level of its first stretch. Both runs hold the same
+    noise, so their errors are compared sample by sample (`excess_score`).
 
     Example
     -------
+    >>> import numpy as np
     >>> import flightid as fid
     >>> asked = fid.PolynomialModel.oe("u", "y", nb=1, nf=1)
-    >>> best, other = (
-    ...     OrderTrial(asked, None, None, rms, 90.0, independent_errors=5.0) for rms in (1.0, 1.3)
-    ... )
-    >>> many = {"independent_errors": 500.0}
-    >>> runs_as_well(other, best), runs_as_well(replace(other, **many), replace(best, **many))
-    (True, False)
+    >>> def ran(errors):
+    ...     return OrderTrial(asked, None, None, float(np.std(errors)), 90.0, errors=(errors,))
+    >>> noise, miss = np.random.default_rng(0).standard_normal((2, 500))
+    >>> best, other = ran(noise), ran(noise + 0.8 * miss)
+    >>> slow_best, slow = (ran(np.repeat(each[:5], 100)) for each in (noise, noise + 0.8 * miss))
+    >>> runs_as_well(other, best), runs_as_well(slow, slow_best)
+    (False, True)
     """
     if trial.free_run_rms is None or best.free_run_rms is None:
         return False
     if trial.free_run_rms <= (1 + RUNS_ALIKE) * best.free_run_rms:
         return True
-    counts = (trial.independent_errors, best.independent_errors)
-    if None in counts or best.free_run_rms <= 0.0:
+    if not trial.errors or not best.errors:
         return False
-    error = math.sqrt(sum(2.0 / each for each in counts if each is not None))
-    return 2.0 * math.log(trial.free_run_rms / best.free_run_rms) < half_width(BY_CHANCE) * error
+    return excess_score(trial.errors, best.errors) < half_width(BY_CHANCE)
 
 
 def ranked(scan: OrderScan, how: str) -> list[OrderTrial]:

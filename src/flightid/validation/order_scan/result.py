@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flightid.conventions import Light
 from flightid.errors import OptionError
@@ -25,6 +26,8 @@ Range = int | Iterable[int]
 CRITERIA = ("aic", "aicc", "bic", "mdl", "fpe")
 ALIKE = 0.02
 SHOWN = 20
+MUCH_WORSE = 2.0
+"""Ratio of free-run errors beyond which no chance makes trials alike."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,8 +37,8 @@ class OrderTrial:
     `free_run_rms` is in the output's unit; None where `note` says why there is none. `criteria` are
     of polynomials, `whitened` those with the colour of the errors taken out where there is no model
     of the noise. A fit that is not `settled` ended at no minimum and stands behind all others.
-    `fit` is kept of the best of a kind alone; `independent_errors` is how many independent samples
-    the free run's errors are worth: few where noise is slow.
+    `fit` is kept of the best of a kind alone, and `errors` of the free runs, by record, where they
+    are not `MUCH_WORSE` than the best: what is paired with another's tells them apart.
 
     Example
     -------
@@ -54,7 +57,7 @@ class OrderTrial:
     settled: bool = True
     fit: Fit | None = field(default=None, repr=False)
     whitened: Criteria | None = None
-    independent_errors: float | None = None
+    errors: tuple[NDArray[np.float32], ...] = field(default=(), repr=False)
 
     @property
     def likelihood(self) -> Criteria | None:

@@ -24,12 +24,13 @@ from flightid.models.sampled.channels import SampledChannels
 from flightid.progress import progress, track
 from flightid.record import Record
 from flightid.simulation.metrics import fit_percent, rms_error
-from flightid.uncertainty.foretold import independent_samples
 from flightid.validation.order_scan.edges import Structure
-from flightid.validation.order_scan.result import OrderTrial, is_settled, rank_of
+from flightid.validation.order_scan.result import MUCH_WORSE, OrderTrial, is_settled, rank_of
 
 LONGEST = 40
 ITERATIONS = 40
+MADE_LEAN = 200
+"""Trials after which errors of the worst are dropped."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,6 +106,8 @@ def _native_trials(
         measures = criteria(squares, n, structure.n_parameters)
         note = "" if converged else "not converged"
         trials.append(_judged(structure, model, measures, scan, note))
+        if len(trials) % MADE_LEAN == 0:
+            trials = _lean(trials)
     return trials
 
 
@@ -169,11 +172,17 @@ def _judged(
     pairs = [run.scored(model.outputs[0]) for run in runs]
     measured, predicted = (np.concatenate([pair[side] for pair in pairs]) for side in (0, 1))
     rms = float(rms_error(measured, predicted))
-    independent = independent_samples([np.subtract(*pair) for pair in pairs])
+    errors = tuple(np.subtract(*pair).astype(np.float32) for pair in pairs)
     percent = float(fit_percent(measured, predicted))
-    return OrderTrial(
-        structure, model, measures, rms, percent, note, independent_errors=independent
-    )
+    return OrderTrial(structure, model, measures, rms, percent, note, errors=errors)
+
+
+def _lean(trials: Sequence[OrderTrial]) -> list[OrderTrial]:
+    """Trials, those without errors that run much worse than the best: thousands fill a memory."""
+    least = min((t.free_run_rms for t in trials if t.free_run_rms is not None), default=0.0)
+    return [
+        replace(t, errors=()) if (t.free_run_rms or 0.0) > MUCH_WORSE * least else t for t in trials
+    ]
 
 
 def _ended(trial: OrderTrial, fit: Fit) -> OrderTrial:
@@ -226,4 +235,5 @@ def delivered(trials: Sequence[OrderTrial], scan: ScanRecords) -> tuple[list[Ord
         )
     made.sort(key=lambda each: rank_of(each[0]))
     rest = sorted([each for each, _ in made[1:]] + waiting + failed, key=rank_of)
-    return [made[0][0], *(replace(each, fit=None) for each in rest)], made[0][1]
+    ranked = _lean([made[0][0], *(replace(each, fit=None) for each in rest)])
+    return ranked, made[0][1]
