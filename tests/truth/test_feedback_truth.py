@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 from scipy import stats
 
-from flightid.uncertainty.feedback import LEVEL, find_feedback
+from flightid.uncertainty.feedback import find_feedback
+from flightid.uncertainty.feedback_result import LEVEL
 from tests.feedback_flights import REFERENCES, flight
 
 RUNS = 100

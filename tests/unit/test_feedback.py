@@ -17,9 +17,10 @@ from flightid.errors import OptionError
 from flightid.evidence.data_checks import _band, _windows, loop_check, loop_of_responses
 from flightid.responses.store import read_response, write_response
 from flightid.responses.windows.defaults import CYCLES_AT_LOWEST, HIGHEST_FRACTION
-from flightid.uncertainty.feedback import LEVEL, FeedbackTest, find_feedback
+from flightid.uncertainty.feedback import find_feedback
+from flightid.uncertainty.feedback_result import LEVEL, FeedbackTest
 from tests.closeness import assert_close
-from tests.feedback_flights import DT, flight
+from tests.feedback_flights import DT, flight, reference
 
 
 def _test(kind: str, **options: float) -> FeedbackTest:
@@ -170,6 +171,32 @@ def test_what_a_model_misses_is_no_noise_that_is_fed_back(seed: int) -> None:
     assert find_feedback([centred[0]], [centred[1]], ["u"]).loop == "open"
     assert fid.residual_tests(fit).feedback.loop == "open"
     assert fid.feedback_test(record).loop == "open"
+
+
+def _noisily_measured(kind: str, seed: int) -> fid.Record:
+    """A lag of two samples, noise of 5 % on its input and of 0.5 % behind it."""
+    rng = np.random.default_rng([seed, 9])
+    u = reference(kind, 1500, rng)
+    y = signal.lfilter([0.0, 0.4], [1.0, -0.6], u)
+    y += 0.005 * y.std() * rng.standard_normal(u.size)
+    seen = u + 0.05 * u.std() * rng.standard_normal(u.size)
+    return fid.Record.from_arrays(np.arange(1500) * DT, inputs={"u": seen}, outputs={"y": y})
+
+
+def test_a_noisy_sensor_of_the_input_is_no_loop() -> None:
+    """Cleaner outputs tell the input's past better than it does: all were called closed."""
+    for kind in ("prbs", "sweep", "multisine"):
+        record = _noisily_measured(kind, 2)
+        found = fid.feedback_test(record)
+        assert (found.loop, found.source) == ("unknown", "noisy input")
+        assert found.p_value is not None
+        assert found.p_value < LEVEL
+        assert_close(found.input_noise, 0.05, rtol=0.4, why="5 % of noise, from 1,500 samples")
+        assert loop_check(found).light is Light.UNKNOWN
+    assert re.search(r"or [\d.]+ % of noise \(rms\) in what measured that input", str(found))
+    assert "feedback-unknown" in {each.code for each in fid.advise(record).findings}
+    fit = fid.identify(fid.PolynomialModel.oe("u", "y", nb=1, nf=1), record)
+    assert fid.residual_tests(fit).feedback.loop != "closed"
 
 
 def test_a_controller_that_answers_within_the_sample_is_not_called_open() -> None:

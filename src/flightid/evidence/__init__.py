@@ -8,7 +8,7 @@ from flightid.evidence.gather import (
     residual_check,
     sweep_check,
 )
-from flightid.uncertainty.feedback import FeedbackTest
+from flightid.uncertainty.feedback_result import FeedbackTest
 
 __all__ = [
     "Check",

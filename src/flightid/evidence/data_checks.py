@@ -18,7 +18,7 @@ from flightid.record.checks import data_findings, record_findings
 from flightid.record.time_question import time_question
 from flightid.responses import FrequencyResponse, estimate_response
 from flightid.responses.windows.defaults import CYCLES_AT_LOWEST, HIGHEST_FRACTION
-from flightid.uncertainty.feedback import FeedbackTest
+from flightid.uncertainty.feedback_result import FeedbackTest
 
 FREQUENCIES = 40
 LONGEST, SHORTEST = 1.0 / 3.0, 1.0 / 15.0
@@ -45,7 +45,7 @@ def loop_check(test: FeedbackTest) -> Check:
         return Check(LOOP, Light.AMBER, str(test), CLOSED_ACTION)
     if test.is_function_of_outputs:
         return Check(LOOP, Light.RED, str(test), UNKNOWN_ACTION)
-    if test.loop == "unknown" and not test.is_taken_care_of:
+    if not test.is_known and not test.is_taken_care_of:
         return Check(LOOP, Light.UNKNOWN, str(test), UNKNOWN_ACTION)
     return Check(LOOP, Light.GREEN, str(test))
 

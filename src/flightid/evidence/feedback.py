@@ -10,13 +10,8 @@ from flightid.record import Record
 from flightid.record.hold import common_loop
 from flightid.record.repeats import found_period
 from flightid.record.several import as_records
-from flightid.uncertainty.feedback import (
-    MAXIMUM_SAMPLES,
-    FeedbackTest,
-    declared_loop,
-    find_feedback,
-    unless_spread,
-)
+from flightid.uncertainty.feedback import MAXIMUM_SAMPLES, find_feedback
+from flightid.uncertainty.feedback_result import FeedbackTest, declared_loop, unless_spread
 
 KEPT = 4
 """Sets of records whose examination is kept: a scan fits the same ones many times."""

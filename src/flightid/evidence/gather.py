@@ -46,7 +46,7 @@ from flightid.record.history import is_of_log
 from flightid.record.hold import Loop
 from flightid.responses import FrequencyResponse
 from flightid.uncertainty.agreement import Agreement
-from flightid.uncertainty.feedback import FeedbackTest, declared_loop
+from flightid.uncertainty.feedback_result import FeedbackTest, declared_loop
 
 LEADS = "residuals-lead-input"
 """Of a residual that goes with inputs to come, beyond chance: feedback, or dynamics missing."""

@@ -20,7 +20,7 @@ from flightid.identification.withheld_intervals import without_intervals
 from flightid.models.polynomial.structure import METHODS, REFINED, PolynomialStructure
 from flightid.record import Record
 from flightid.record.hold import Loop
-from flightid.uncertainty.feedback import FeedbackTest
+from flightid.uncertainty.feedback_result import FeedbackTest
 
 Asked = TypeVar("Asked")
 BIASES, TAKEN = "loop-biases", "by-excitation"

@@ -33,7 +33,7 @@ from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.record import Record
 from flightid.record.hold import Loop
 from flightid.responses import FrequencyResponse
-from flightid.uncertainty.feedback import declared_loop
+from flightid.uncertainty.feedback_result import declared_loop
 
 JointData = tuple[FrequencyResponse, Record | Sequence[Record]]
 Data = FrequencyResponse | Record | Sequence[Record] | JointData

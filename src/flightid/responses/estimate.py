@@ -34,7 +34,7 @@ from flightid.responses.windows.defaults import DEFAULT_FREQUENCIES, DEFAULT_OVE
 from flightid.responses.windows.planning import plan_frequencies, plan_windows
 from flightid.responses.windows.samples import Samples, gather
 from flightid.table import Cell
-from flightid.uncertainty.feedback import FeedbackTest
+from flightid.uncertainty.feedback_result import FeedbackTest
 from flightid.version import VERSION
 
 

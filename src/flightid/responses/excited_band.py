@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.responses.bands import COHERENT, coherent_parts
-from flightid.uncertainty.feedback import FeedbackTest
+from flightid.uncertainty.feedback_result import FeedbackTest
 
 STRONG = 0.01
 """Power over the strongest, in equal parts of a decade: below it feedback outweighs a sweep."""

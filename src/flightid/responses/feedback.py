@@ -15,13 +15,8 @@ from flightid.record.repeats import found_period
 from flightid.responses.response import FrequencyResponse
 from flightid.responses.windows.samples import Samples
 from flightid.uncertainty.fed_noise import fed_noise_spectrum
-from flightid.uncertainty.feedback import (
-    MAXIMUM_SAMPLES,
-    FeedbackTest,
-    declared_loop,
-    find_feedback,
-    unless_spread,
-)
+from flightid.uncertainty.feedback import MAXIMUM_SAMPLES, find_feedback
+from flightid.uncertainty.feedback_result import FeedbackTest, declared_loop, unless_spread
 
 SAMPLES_A_CYCLE = 8.0
 """Samples kept in a cycle of the highest frequency of interest."""

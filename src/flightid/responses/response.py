@@ -22,7 +22,7 @@ from flightid.responses.excited_band import excited_band, no_band
 from flightid.responses.pair import PairResponse, quotient_unit
 from flightid.result import Result
 from flightid.table import Column, Table
-from flightid.uncertainty.feedback import FeedbackTest
+from flightid.uncertainty.feedback_result import FeedbackTest
 from flightid.units import DIMENSIONLESS
 
 SMALL_COVARIANCE = 1 << 25

@@ -26,7 +26,7 @@ from flightid.record.history import Step
 from flightid.record.hold import InputShape
 from flightid.responses.errors.random_error import StoredCovariance
 from flightid.responses.response import AXES, FrequencyResponse
-from flightid.uncertainty.feedback import FeedbackTest
+from flightid.uncertainty.feedback_result import FeedbackTest
 
 SCHEMA = "flightid.frequency_response/1"
 WHOLE = "a netCDF file of a frequency response"

@@ -9,7 +9,9 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from flightid.uncertainty.feedback import LAGS, LEVEL, past, usable_order
+from flightid.uncertainty.feedback import usable_order
+from flightid.uncertainty.feedback_result import LAGS, LEVEL
+from flightid.uncertainty.lagged_products import past
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -12,23 +12,20 @@ exactly cannot hold any noise.
 A controller that answers within the sample hides its noise: the model of the outputs takes u(t) for
 their cause. So what is new in an input is also held against the outputs of its own sample. Where
 they go together, a vehicle that answers at once and a controller that does look the same, and the
-loop is not known.
+loop is not known. Nor is it where noise in the measurement of an input would make outputs foretell
+it as they do (`noisy_input.py`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from flightid.errors import OptionError
-from flightid.frozen import dataclass
-from flightid.record.history import Step, spread_channels
-from flightid.record.hold import LOOPS
+from flightid.uncertainty.feedback_result import LAGS, LEVEL, FeedbackTest
 from flightid.uncertainty.lagged_products import (
     RIDGE,
     explained,
@@ -38,17 +35,14 @@ from flightid.uncertainty.lagged_products import (
     weights_of,
 )
 from flightid.uncertainty.moving_past import moving_chance
+from flightid.uncertainty.noisy_input import explaining_noise
 
 Array = NDArray[np.float64]
 Pair = tuple[Array, Array]
-LEVEL = 0.01
-"""Share of open loops that are called closed."""
 LARGEST_ORDER = 20
 """Past samples of every channel in the model of the outputs, and of an input in that of its own."""
 MAXIMUM_SAMPLES = 20_000
 """Of all records together that a test looks at."""
-LAGS = 12
-"""Past samples of noise that may move an input."""
 PAST = range(1, LAGS + 1)
 SAMPLES_PER_NUMBER = 10
 FEWEST_FREE = 30
@@ -56,125 +50,6 @@ SMALLEST_NOISE = 1e-8
 """Share of an output's power below which its noise is rounding, or cannot bias anything."""
 SMALLEST_NEWS = 10.0 * RIDGE
 """Share of an input's power below which what is new in it is what the ridge leaves of its past."""
-NEARLY = 0.999
-"""Share of what is new in an input from which outputs leave nothing else that moves it."""
-
-
-@dataclass(frozen=True)
-class FeedbackTest:
-    """Whether a loop was closed around the vehicle, and how that is known.
-
-    Attributes
-    ----------
-    loop : {"open", "closed", "unknown"}
-    source : {"test", "declared", "repeats", "instrument", "noise model", "no noise", ...}
-        How it is known: the test of past noise; the user's word; inputs that repeat exactly, or
-        outputs without noise, which feed nothing back; an estimate by way of an excitation or of a
-        model of the noise, which a closed loop does not bias. Or why it is not ("same sample", "too
-        short", "filtered"): input and output go together within a sample; records too short to
-        tell; samples made of later ones, which look like feedback.
-    p_value : float or None
-        Chance of so large a share with the loop open, over all inputs; None without a test.
-    input : str or None
-        Input that past noise explains most.
-    share : float or None
-        Share of what is new in it that past noise explains, or with source "same sample" the
-        outputs up to its own sample.
-    lags : int
-        Past samples of noise that were asked.
-
-    Example
-    -------
-    >>> FeedbackTest("open", "declared").is_closed
-    False
-    """
-
-    loop: Literal["open", "closed", "unknown"]
-    source: str
-    p_value: float | None = None
-    input: str | None = None
-    share: float | None = None
-    lags: int = LAGS
-
-    @property
-    def is_closed(self) -> bool:
-        """Whether estimates from these inputs straight to outputs are biased."""
-        return self.loop == "closed" and not self.is_taken_care_of
-
-    @property
-    def is_taken_care_of(self) -> bool:
-        """Whether the way of estimating keeps a closed loop from bending it."""
-        return self.source in ("instrument", "noise model")
-
-    @property
-    def is_function_of_outputs(self) -> bool:
-        """Whether outputs leave nothing else that moves an input: a model may be a controller."""
-        return self.source == "same sample" and (self.share or 0.0) >= NEARLY
-
-    def __str__(self) -> str:
-        """What is known and how, in a sentence."""
-        words = {
-            "declared": f"loop {self.loop}, as declared",
-            "repeats": "loop open: the inputs repeat exactly, so nothing is fed back",
-            "same sample": (
-                f"whether a loop is closed cannot be told: outputs up to the same sample explain "
-                f"{_percent(self.share)} % of what is new in input {self.input}, as a controller "
-                "without delay or a vehicle that answers at once would"
-            ),
-            "instrument": "estimated by way of the excitation, which a closed loop does not bias",
-            "noise model": "estimated with a model of the noise, which a closed loop does not bias",
-            "no noise": "no loop seen: the outputs hold no noise that could be fed back",
-            "filtered": (
-                "whether a loop is closed cannot be told: channels were brought to another grid "
-                "with samples from before and after it, so that outputs foretell inputs"
-            ),
-            "too short": "whether a loop is closed cannot be told: the records are too short",
-        }
-        if self.source in words:
-            return words[self.source]
-        seen, chance = "past noise of the outputs explains", f"(p = {self.p_value:.2g})"
-        if self.loop == "closed":
-            share = f"{_percent(self.share)} % of what is new in input {self.input}"
-            return f"loop closed: {seen} {share} {chance}"
-        return f"no loop seen: {seen} no more of the inputs than chance may {chance}"
-
-    def to_dict(self) -> dict[str, object]:
-        """Plain values."""
-        return {
-            "loop": self.loop,
-            "source": self.source,
-            "p_value": self.p_value,
-            "input": self.input,
-            "share": self.share,
-            "lags": self.lags,
-        }
-
-
-def _percent(share: float | None) -> str:
-    """A share in percent, cut so that only all of it reads 100."""
-    return f"{np.floor(1e4 * (share or 0.0)) / 100.0:.4g}"
-
-
-def unless_spread(
-    test: FeedbackTest, histories: Iterable[Iterable[Step]], names: Iterable[str]
-) -> FeedbackTest:
-    """A test of channels, "filtered" where some were without phase, which looks like feedback."""
-    found = test.source == "test" and test.is_closed and spread_channels(histories, names)
-    return replace(test, loop="unknown", source="filtered") if found else test
-
-
-def declared_loop(loop: str) -> FeedbackTest:
-    """The user's word.
-
-    Raises
-    ------
-    OptionError
-        Another word.
-    """
-    for word in LOOPS:
-        if loop == word:
-            return FeedbackTest(word, "declared")
-    raise OptionError("loop is not known", found=repr(loop), needed="'open' or 'closed'")
 
 
 def find_feedback(
@@ -243,11 +118,10 @@ def find_feedback(
     past_noise = FeedbackTest("open", "no noise")
     if np.any(noisy):
         heard = [e[noisy] for e in noise]
-        past_noise = _worst(
-            _moving(_shares(pairs, heard, order), pairs, heard, order, PAST), names, "test"
-        )
-    if past_noise.p_value is not None and past_noise.p_value < LEVEL:
-        return replace(past_noise, loop="closed")
+        shares = _moving(_shares(pairs, heard, order), pairs, heard, order, PAST)
+        past_noise = _worst(shares, names, "test")
+        if past_noise.p_value is not None and past_noise.p_value < LEVEL:
+            return _unless_noisy(shares, [(u, y[noisy]) for u, y in pairs], order, names)
     if unthinned:
         pairs = [(u, y) for u, y in zip(whole, unthinned[1], strict=True) if u.shape[1] > order]
         news = _news([np.concatenate(pair) for pair in pairs], order, n_in + n_out)
@@ -264,6 +138,30 @@ def _worst(found: Sequence[tuple[float, float]], names: Sequence[str], source: s
     place = int(np.argmin([p for _, p in found]))
     share, p_value = found[place]
     return FeedbackTest("open", source, min(1.0, len(names) * p_value), names[place], share)
+
+
+def _unless_noisy(
+    found: Sequence[tuple[float, float]], pairs: Sequence[Pair], order: int, names: Sequence[str]
+) -> FeedbackTest:
+    """The surest input that looks fed back and that noise of its sensor does not explain.
+
+    Where it explains all of them the loop is not known.
+    """
+    noises: dict[int, float] = {}
+    for place in np.argsort([chance for _, chance in found]).tolist():
+        share, chance = found[place]
+        p_value = min(1.0, len(names) * chance)
+        if p_value >= LEVEL:
+            break
+        noise = explaining_noise(pairs, place, order, LAGS)
+        if noise is None:
+            return FeedbackTest("closed", "test", p_value, names[place], share)
+        noises[place] = noise
+    first = next(iter(noises))
+    known = _worst([found[first]], [names[first]], "noisy input")
+    size = float(np.sqrt(noises[first]))
+    p_value = min(1.0, len(names) * found[first][1])
+    return replace(known, loop="unknown", p_value=p_value, input_noise=size)
 
 
 def _moving(
@@ -296,12 +194,6 @@ def usable_order(inputs: Sequence[Array], n_out: int) -> int:
 
 def _room(inputs: Array, order: int) -> int:
     return int(inputs.shape[1]) - order - LAGS
-
-
-def past(rows: Array, first: int, lags: range) -> Array:
-    """Columns of past samples of each row from sample `first` on, (n − first, rows · lags)."""
-    n = rows.shape[1]
-    return np.concatenate([rows[:, first - lag : n - lag] for lag in lags]).T
 
 
 def _news(records: Sequence[Array], order: int, size: int) -> list[Array]:

@@ -155,3 +155,9 @@ def products_with_past(news: Sequence[Array], records: Sequence[Array], longest:
             for lag in range(longest + 1):
                 found[lag] += rows[:, first - lag : first - lag + len(here)] @ here
     return found
+
+
+def past(rows: Array, first: int, lags: range) -> Array:
+    """Columns of past samples of each row from sample `first` on, (n − first, rows · lags)."""
+    n = rows.shape[1]
+    return np.concatenate([rows[:, first - lag : n - lag] for lag in lags]).T

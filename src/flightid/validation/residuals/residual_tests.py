@@ -14,12 +14,8 @@ from flightid.identification import Fit
 from flightid.record import Record
 from flightid.record.hold import LOOPS, common_loop
 from flightid.record.repeats import found_period
-from flightid.uncertainty.feedback import (
-    FeedbackTest,
-    declared_loop,
-    find_feedback,
-    unless_spread,
-)
+from flightid.uncertainty.feedback import find_feedback
+from flightid.uncertainty.feedback_result import FeedbackTest, declared_loop, unless_spread
 from flightid.uncertainty.residual_correlation import (
     centred,
 )
@@ -205,8 +201,11 @@ def _loop(
     held = bool(records) and all(name in record for record in records for name in channels)
     if held and found.source == "test":
         measured = feedback_test(records, inputs=data.inputs, outputs=data.residuals)
-        overruled = "open" if found.is_closed else "unknown"
-        found = measured if measured.loop == overruled else found
+        if found.is_closed:
+            overruled = measured.loop == "open" or measured.source == "noisy input"
+        else:
+            overruled = not measured.is_known
+        found = measured if overruled else found
     return (Loop.CLOSED if found.is_closed else Loop.OPEN), found
 
 

@@ -7,7 +7,7 @@ from flightid.findings import Finding
 from flightid.frozen import dataclass
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
-from flightid.uncertainty.feedback import FeedbackTest
+from flightid.uncertainty.feedback_result import FeedbackTest
 from flightid.validation.residuals.correlation_result import (
     CorrelationTest,
     Horizon,

@@ -1,0 +1,153 @@
+"""Whether a loop was closed around a vehicle, and how that is known."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from flightid.errors import OptionError
+from flightid.frozen import dataclass
+from flightid.record.history import Step, spread_channels
+from flightid.record.hold import LOOPS
+
+LEVEL = 0.01
+"""Share of open loops that are called closed."""
+LAGS = 12
+"""Past samples of noise that may move an input."""
+NEARLY = 0.999
+"""Share of what is new in an input from which outputs leave nothing else that moves it."""
+
+
+@dataclass(frozen=True)
+class FeedbackTest:
+    """Whether a loop was closed around the vehicle, and how that is known.
+
+    Attributes
+    ----------
+    loop : {"open", "closed", "unknown"}
+    source : {"test", "declared", "repeats", "instrument", "noise model", "no noise", ...}
+        How it is known: the test of past noise; the user's word; inputs that repeat exactly, or
+        outputs without noise, which feed nothing back; an estimate by way of an excitation or of a
+        model of the noise, which a closed loop does not bias. Or why it is not ("same sample", "too
+        short", "filtered", "noisy input"): input and output go together within a sample; records
+        too short to tell; samples made of later ones, which look like feedback, or noise of an
+        input's sensor, which does too.
+    p_value : float or None
+        Chance of so large a share with the loop open, over all inputs; None without a test.
+    input : str or None
+        Input that past noise explains most.
+    share : float or None
+        Share of what is new in it that past noise explains, or with source "same sample" the
+        outputs up to its own sample.
+    lags : int
+        Past samples of noise that were asked.
+    input_noise : float or None
+        With source "noisy input": rms of the noise that would explain it, over that of the input.
+
+    Example
+    -------
+    >>> FeedbackTest("open", "declared").is_closed
+    False
+    """
+
+    loop: Literal["open", "closed", "unknown"]
+    source: str
+    p_value: float | None = None
+    input: str | None = None
+    share: float | None = None
+    lags: int = LAGS
+    input_noise: float | None = None
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether estimates from these inputs straight to outputs are biased."""
+        return self.loop == "closed" and not self.is_taken_care_of
+
+    @property
+    def is_known(self) -> bool:
+        """Whether the loop is told to be open or closed."""
+        return self.loop != "unknown"
+
+    @property
+    def is_taken_care_of(self) -> bool:
+        """Whether the way of estimating keeps a closed loop from bending it."""
+        return self.source in ("instrument", "noise model")
+
+    @property
+    def is_function_of_outputs(self) -> bool:
+        """Whether outputs leave nothing else that moves an input: a model may be a controller."""
+        return self.source == "same sample" and (self.share or 0.0) >= NEARLY
+
+    def __str__(self) -> str:
+        """What is known and how, in a sentence."""
+        words = {
+            "declared": f"loop {self.loop}, as declared",
+            "repeats": "loop open: the inputs repeat exactly, so nothing is fed back",
+            "same sample": (
+                f"whether a loop is closed cannot be told: outputs up to the same sample explain "
+                f"{_percent(self.share)} % of what is new in input {self.input}, as a controller "
+                "without delay or a vehicle that answers at once would"
+            ),
+            "instrument": "estimated by way of the excitation, which a closed loop does not bias",
+            "noise model": "estimated with a model of the noise, which a closed loop does not bias",
+            "no noise": "no loop seen: the outputs hold no noise that could be fed back",
+            "filtered": (
+                "whether a loop is closed cannot be told: channels were brought to another grid "
+                "with samples from before and after it, so that outputs foretell inputs"
+            ),
+            "noisy input": (
+                f"whether a loop is closed cannot be told: past outputs explain "
+                f"{_percent(self.share)} % of what is new in input {self.input}, as a loop would, "
+                f"or {_percent(self.input_noise)} % of noise (rms) in what measured that input"
+            ),
+            "too short": "whether a loop is closed cannot be told: the records are too short",
+        }
+        if self.source in words:
+            return words[self.source]
+        seen, chance = "past noise of the outputs explains", f"(p = {self.p_value:.2g})"
+        if self.loop == "closed":
+            share = f"{_percent(self.share)} % of what is new in input {self.input}"
+            return f"loop closed: {seen} {share} {chance}"
+        return f"no loop seen: {seen} no more of the inputs than chance may {chance}"
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values."""
+        return {
+            "loop": self.loop,
+            "source": self.source,
+            "p_value": self.p_value,
+            "input": self.input,
+            "share": self.share,
+            "lags": self.lags,
+            "input_noise": self.input_noise,
+        }
+
+
+def _percent(share: float | None) -> str:
+    """A share in percent, cut so that only all of it reads 100."""
+    return f"{np.floor(1e4 * (share or 0.0)) / 100.0:.4g}"
+
+
+def unless_spread(
+    test: FeedbackTest, histories: Iterable[Iterable[Step]], names: Iterable[str]
+) -> FeedbackTest:
+    """A test of channels, "filtered" where some were without phase, which looks like feedback."""
+    found = test.source == "test" and test.is_closed and spread_channels(histories, names)
+    return replace(test, loop="unknown", source="filtered") if found else test
+
+
+def declared_loop(loop: str) -> FeedbackTest:
+    """The user's word.
+
+    Raises
+    ------
+    OptionError
+        Another word.
+    """
+    for word in LOOPS:
+        if loop == word:
+            return FeedbackTest(word, "declared")
+    raise OptionError("loop is not known", found=repr(loop), needed="'open' or 'closed'")
