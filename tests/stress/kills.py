@@ -99,7 +99,7 @@ def main() -> int:
         for verb in verbs:
             words, path = known[verb]
             begun = time.monotonic()
-            subprocess.run([*PROGRAM, *words], check=True, stdout=-3, stderr=-3)
+            subprocess.run([*PROGRAM, *words], check=False, stdout=-3, stderr=-3)
             spans[verb], before[verb] = time.monotonic() - begun, contents(path)
             assert before[verb], f"{verb} wrote nothing that a kill could lose"
         try:
