@@ -22,7 +22,8 @@ SAMPLE_S, N_SAMPLES, REPEATS = 0.01, 6001, 5
 GRAVITY = 9.80665
 
 
-def _inputs() -> np.ndarray:
+def quadrotor_inputs() -> np.ndarray:
+    """Thrust and torques over the inertias, shape (4, N_SAMPLES)."""
     t = np.arange(N_SAMPLES) * SAMPLE_S
     return np.vstack(
         [
@@ -134,7 +135,7 @@ def _diffrax(inputs: np.ndarray, start: np.ndarray, values: dict[str, float]) ->
 
 def run() -> Table:
     """Milliseconds of one evaluation with Jacobian, compilation apart, and ratios to ours."""
-    inputs, start = _inputs(), np.zeros(16)
+    inputs, start = quadrotor_inputs(), np.zeros(16)
     start[12] = 1.25 * GRAVITY
     model = fid.load_model("quadrotor_6dof")
     values = {

@@ -26,7 +26,14 @@ import numpy as np
 from scipy.signal import lfilter
 
 import flightid as fid
-from benchmarks import output_error, polynomial, responses, state_space_fit, subspace
+from benchmarks import (
+    nonlinear_output_error,
+    output_error,
+    polynomial,
+    responses,
+    state_space_fit,
+    subspace,
+)
 from flightid.table import Cell, Column, Table
 
 HISTORY = Path(__file__).with_name("history.json")
@@ -80,6 +87,26 @@ def _pitch() -> Work:
         )
         records.append(record)
     return lambda: fid.identify(model, records, method="filter_error")
+
+
+def _quadrotor() -> Work:
+    """Nonlinear quadrotor, 11 parameters, 60 s at 100 Hz, starts and biases free."""
+    model = fid.load_model("quadrotor_6dof").with_fixed(tau_d=0.0)
+    random, inputs = np.random.default_rng(0), nonlinear_output_error.quadrotor_inputs()
+    time_s = np.arange(inputs.shape[1]) * nonlinear_output_error.SAMPLE_S
+    driven = dict(zip(model.inputs, inputs, strict=True))
+    flown = fid.simulate(model, fid.Record.from_arrays(time_s, inputs=driven, units=model.units))
+    outputs = {
+        name: flown[name] + 0.01 * np.std(flown[name]) * random.standard_normal(len(time_s))
+        for name in model.outputs
+    }
+    record = fid.Record.from_arrays(
+        time_s, inputs=driven, outputs=outputs, units=model.units, hold="first", loop="open"
+    )
+    start = model.with_values(
+        {p.name: random.uniform(0.8, 1.2) * float(p.value or 0.0) for p in model.parameters.free}
+    )
+    return lambda: fid.identify(start, record, method="output_error")
 
 
 def _orders(n_samples: int) -> Work:
@@ -162,6 +189,7 @@ LINES: dict[str, Callable[[], Work]] = {
     "equation error, 130 s": lambda: _linear(13_000, method="equation_error"),
     "filter error, 130 s": lambda: _linear(13_000, method="filter_error"),
     "filter error, nonlinear, 4 × 30 s": _pitch,
+    "output error, nonlinear, 16 states, 60 s": _quadrotor,
     "output error, 60 s, starts and biases": lambda: _linear(6000),
     "subspace with order search, 10⁴": lambda: _orders(10_000),
     "subspace with order search, 10⁵": lambda: _orders(100_000),

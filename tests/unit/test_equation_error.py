@@ -10,6 +10,8 @@ from flightid.conditioning.smoothing import local_derivative, local_mean
 from flightid.errors import DataError, FitError, ModelError, OptionError, UnknownNameError
 from flightid.identification.records.nuisance import Nuisance
 from flightid.identification.regression.harmonics import Harmonics
+from flightid.identification.regression.right_side import RightSide, RightSides
+from flightid.identification.regression.sampled_equations import Reconstruction
 from flightid.uncertainty.spectral import spectral_covariance
 from tests.closeness import assert_close
 from tests.regression_flights import fly, noisy, short_period, values
@@ -63,6 +65,28 @@ def test_delays_and_left_side_factors_are_found(method: str) -> None:
     fit = fid.identify(start, fly(truth, 10.0), method=method, **_band(method))
     for name, value in values(truth).items():
         assert_close(fit.parameters[name].value, value, rtol=2e-3, why="cubics between samples")
+
+
+@pytest.mark.parametrize("hold", ["zero", "first", "band_limited"])
+def test_linear_equations_are_worked_out_from_few_points(
+    hold: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model, record = short_period(), fly(short_period(), 4.0)
+    reconstruction = Reconstruction.of(model, record)
+    motion, right = reconstruction.measured(record), RightSide(reconstruction, hold)
+    theta = np.array([0.9 * float(p.value or 0.0) for p in model.parameters.free])
+
+    def sides() -> RightSides:
+        return right.at(theta, motion, right.bends(theta, motion))
+
+    found = sides()
+    monkeypatch.setattr(fid.StateSpaceModel, "is_linear", False)
+    known = sides()
+    for name in ("rates", "rate_slopes", "others", "other_slopes"):
+        one, other = getattr(found, name), getattr(known, name)
+        size = np.max(np.abs(other), initial=0.0)
+        assert_close(one, other, atol=1e-13 * size, why=f"{name}: rounding")
+    assert np.any(known.rate_slopes)
 
 
 def _band(method: str) -> dict[str, tuple[float, float]]:

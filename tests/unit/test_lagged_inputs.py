@@ -6,7 +6,7 @@ import numpy as np
 
 from flightid.uncertainty.lagged_inputs import LaggedInputs
 from flightid.uncertainty.lagged_products import explained
-from flightid.uncertainty.triangle import ROWS, triangle_of_rows
+from flightid.uncertainty.triangle import ROWS, triangle_of_parts, triangle_of_rows
 from tests.closeness import assert_close
 
 
@@ -41,3 +41,13 @@ def test_a_triangle_holds_all_rows() -> None:
     found, known = triangle_of_rows(columns), np.linalg.qr(columns, mode="r")
     assert_close(np.abs(found) / size, np.abs(known) / size, atol=1e-14, why="rounding")
     assert triangle_of_rows(np.zeros((2 * ROWS, 0))).shape == (0, 0)
+    # Products know nothing of what one column adds to another at the twelfth digit of a square.
+    alike = columns.copy()
+    alike[:, 1] = columns[:, 0] + 1e-12 * columns[:, 1]
+    known = np.abs(np.linalg.qr(alike, mode="r"))
+    parts = triangle_of_parts(lambda: np.array_split(alike, 3))
+    for found in (triangle_of_rows(alike), parts):
+        assert_close(np.abs(found[1, 1]), known[1, 1], rtol=1e-8, why="digits of one column")
+    blank = columns * [1.0, 0.0, 1.0]
+    found = triangle_of_rows(blank)
+    assert_close(found.T @ found, blank.T @ blank, rtol=1e-12, why="a column of zeros stays one")

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields, replace
+from functools import partial
 from typing import Any, Self
 
 import numpy as np
@@ -33,7 +34,7 @@ from flightid.record.hold import InputHold
 from flightid.recursive_filter import filtered
 from flightid.responses import FrequencyResponse
 from flightid.uncertainty.foretold import expected_gain, likelihood_gain
-from flightid.uncertainty.triangle import triangle_of_parts
+from flightid.uncertainty.triangle import triangle_of_parts, triangle_of_rows
 
 Array = NDArray[np.float64]
 RIDGE = 1e-9
@@ -231,16 +232,17 @@ def _steps(
     weights = 1.0 / np.where(sizes > 0.0, sizes, 1.0)
     # Triangles hold all that least squares ask, of as many rows as there are numbers.
     triangles = [
-        triangle_of_parts(_weighed(rest, slope, weights, n_free))
+        triangle_of_parts(partial(_weighed, rest, slope, weights, n_free))
         for rest, slope in zip(left, slopes, strict=True)
     ]
     n_own = [each.shape[1] - n_free - 1 for each in triangles]
-    whole = triangle_of_parts(each[m:, m:] for each, m in zip(triangles, n_own, strict=True))
+    inner = [each[m:, m:] for each, m in zip(triangles, n_own, strict=True)]
+    whole = triangle_of_rows(np.concatenate(inner))
     shared = np.linalg.lstsq(whole[:, :-1], whole[:, -1])[0]
     found = []
     for each, m in zip(triangles, n_own, strict=True):
-        inner = each[:m, -1] - each[:m, m:-1] @ shared
-        found.append(np.concatenate([shared, np.linalg.lstsq(each[:m, :m], inner)[0]]))
+        rest = each[:m, -1] - each[:m, m:-1] @ shared
+        found.append(np.concatenate([shared, np.linalg.lstsq(each[:m, :m], rest)[0]]))
     return found
 
 

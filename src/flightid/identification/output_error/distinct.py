@@ -115,9 +115,9 @@ def _alike(
         slopes = run_with_slopes(model, prepared, runs_of, place, numbers)[1]
         if numbers.start is None and len(numbers.initial) == len(prepared.states):
             require_slopes(slopes, numbers, prepared.states, model.outputs, n)
+        slopes /= scale[:, None, None]
         # Lengths and angles are those of the triangle, of as many rows as there are numbers.
-        weighed = [triangle_of_rows(part) / size for part, size in zip(slopes, scale, strict=True)]
-        rows = triangle_of_rows(np.concatenate(weighed))
+        rows = triangle_of_rows(slopes.reshape(-1, slopes.shape[2]))
         shared.append(rows[:, :n])
         own.append(rows[:, n:])
     size = np.sqrt(np.sum([np.sum(each**2, axis=0) for each in shared], axis=0))

@@ -9,6 +9,7 @@ model's own slope makes of each corner is added to the cubic that leaves it out.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -102,6 +103,11 @@ class RightSide:
         weights = np.repeat([0.5 * (b - a) for a, b in pieces], 2)
         paths = [curve(motion.states, place) + bends.at(place) for place in places]
         driven = [late.at(place) for place in places]
+        if self.model.is_linear:
+            # Means of what is affine are its values at the means.
+            parts = (paths, *zip(*driven, strict=True))
+            path, inputs, rates = (np.tensordot(weights, np.array(part), axes=1) for part in parts)
+            paths, driven, weights = [path], [(inputs, rates)], np.ones(1)
         inside = self._computed(
             values,
             np.concatenate(paths, axis=1),
@@ -109,8 +115,10 @@ class RightSide:
         )
 
         def mean(found: Array) -> Array:
-            shaped = found.reshape(len(places), cells, *found.shape[1:])
-            return np.asarray(np.tensordot(weights, shaped, axes=1))
+            shaped = found.reshape(len(paths), cells, *found.shape[1:])
+            return (
+                np.asarray(np.tensordot(weights, shaped, axes=1)) if len(paths) > 1 else shaped[0]
+            )
 
         if self.hold == "zero":
             moving = late.changes()[1][:, :-1].T / motion.sample_time_s
@@ -147,23 +155,46 @@ class RightSide:
         still = np.zeros((states.shape[1], n))
         rest = np.hstack([states.T, inputs.T])
         directions = [*range(n), *range(2 * n, 2 * n + m), *(2 * n + m + k for k in free)]
-        others = [n + place for place in self.reconstruction.others]
-        sample, rows = self.model.native.sample, np.hstack([still, rest])
+        sample, rows = self._sampled, np.hstack([still, rest])
         if _is_explicit(self.model):
             factors = sample(values, rows[:1], directions[:n])[1][0, :n]
             turned = -solved_rates(factors, np.eye(n))
             found, slopes = sample(values, rows, directions[n:])
             moving, rates = found[:, :n] @ turned.T, _turned(turned, slopes[:, :n])
-            outputs = slopes[:, others]
+            outputs = slopes[:, n:]
         else:
             found, slopes = sample(values, rows, directions[:n])
             moving = -_solve(slopes[:, :n, :n], found[:, :n, None])[:, :, 0]
             found, slopes = sample(values, np.hstack([moving, rest]), directions)
             _require_affine(found[:, :n], slopes[:, :n, :n], moving)
             rates = -_solve(slopes[:, :n, :n], slopes[:, :n, n:])
-            outputs = slopes[:, others, n:] + slopes[:, others, :n] @ rates
+            outputs = slopes[:, n:, n:] + slopes[:, n:, :n] @ rates
         whole = np.concatenate([rates, outputs], axis=1)
-        return _StateValues(np.hstack([moving, found[:, others]]), whole[:, :, :m], whole[:, :, m:])
+        return _StateValues(np.hstack([moving, found[:, n:]]), whole[:, :, :m], whole[:, :, m:])
+
+    def _sampled(
+        self, values: Array, points: Array, directions: Sequence[int]
+    ) -> tuple[Array, Array]:
+        """Equations, then outputs that are no states, at points (ẋ, x, u), and their derivatives.
+
+        Of linear equations from those at a few points.
+        """
+        sample, (count, width) = self.model.native.sample, points.shape
+        n = len(self.model.states)
+        rows = [*range(n), *(n + place for place in self.reconstruction.others)]
+        if count <= width + 1 or not self.model.is_linear:
+            found, slopes = sample(values, points, directions)
+            return found[:, rows], slopes[:, rows]
+        # Both are affine: known at the origin and, for their digits, as far out as points lie.
+        reach = np.max(np.abs(points), axis=0)
+        reach = np.where((reach > 0.0) & np.isfinite(reach), reach, 1.0)
+        found, slopes = sample(values, np.vstack([np.zeros(width), np.diag(reach)]), directions)
+        found, slopes = found[:, rows], slopes[:, rows].reshape(width + 1, -1)
+        places = points / reach
+        moved = places @ (slopes[1:] - slopes[0])
+        moved += slopes[0]
+        values_there = found[0] + places @ (found[1:] - found[0])
+        return values_there, moved.reshape(count, len(rows), len(directions))
 
 
 def _is_explicit(model: StateSpaceModel) -> bool:
