@@ -17,6 +17,8 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
+from flightid.vehicles import fly
+from flightid.vehicles.ardupilot_log import write_ardupilot_log
 from tests.autotune_log import write_ardupilot
 from tests.ordinary_log import write_ordinary_log
 from tests.strangers.ordinary_flights import Axis
@@ -32,6 +34,7 @@ def commands(folder: Path) -> dict[str, tuple[list[str], Path]]:
     subprocess.run([*PROGRAM, "run", str(STUDY), "--output", str(flown)], stdout=-3, check=True)
     (flown / "flight.bin").replace(swept)
     ordinary, tuned = folder / "ordinary.bin", folder / "autotune.bin"
+    hover = write_ardupilot_log(fly(duration_s=20.0), folder / "hover.bin")
     write_ordinary_log(ordinary)
     write_ardupilot(tuned, Axis(), most=12)
     words: dict[str, tuple[list[object], str]] = {
@@ -39,7 +42,7 @@ def commands(folder: Path) -> dict[str, tuple[list[str], Path]]:
         "fly": (["fly", *MODEL, "--duration", 0.5, "--write"], "flown.nc"),
         "run": (["run", STUDY, "--output"], "out"),
         "tune": (["tune", swept, "--output"], "tuned"),
-        "plan": (["plan", ordinary, "--overwrite", "--output"], "planned"),
+        "plan": (["plan", hover, "--overwrite", "--output"], "planned"),
         "autotune": (["autotune", tuned, "--html"], "autotune.html"),
         "flight": (["flight", ordinary, "--html"], "flight.html"),
     }
@@ -99,7 +102,7 @@ def main() -> int:
         for verb in verbs:
             words, path = known[verb]
             begun = time.monotonic()
-            subprocess.run([*PROGRAM, *words], check=False, stdout=-3, stderr=-3)
+            subprocess.run([*PROGRAM, *words], check=True, stdout=-3, stderr=-3)
             spans[verb], before[verb] = time.monotonic() - begun, contents(path)
             assert before[verb], f"{verb} wrote nothing that a kill could lose"
         try:
