@@ -48,6 +48,10 @@ def test_a_triangle_holds_all_rows() -> None:
     parts = triangle_of_parts(lambda: np.array_split(alike, 3))
     for found in (triangle_of_rows(alike), parts):
         assert_close(np.abs(found[1, 1]), known[1, 1], rtol=1e-8, why="digits of one column")
+    for scale in (1e200, 1e-200):
+        known = np.abs(np.linalg.qr(scale * columns, mode="r"))
+        found = np.abs(triangle_of_rows(scale * columns))
+        assert_close(found / scale, known / scale, atol=1e-6, why="squares over- and underflow")
     blank = columns * [1.0, 0.0, 1.0]
     found = triangle_of_rows(blank)
     assert_close(found.T @ found, blank.T @ blank, rtol=1e-12, why="a column of zeros stays one")

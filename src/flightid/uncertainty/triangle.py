@@ -43,19 +43,20 @@ def triangle_of_rows(columns: Array) -> Array:
     >>> np.abs(triangle_of_rows(np.array([[3.0], [4.0]])))
     array([[5.]])
     """
-    if len(columns) >= ROWS:
-        found = _of_products(columns.T @ columns)
-        if found is not None:
-            return found
-    return _by_blocks(columns)
+    found = _of_products(lambda: [columns]) if len(columns) >= ROWS else None
+    return _by_blocks(columns) if found is None else found
 
 
-def _of_products(products: Array) -> Array | None:
-    """The triangle of columns whose products these are; None where they lost too many digits."""
-    length = np.sqrt(np.diag(products))
+def _of_products(parts: Callable[[], Iterable[Array]]) -> Array | None:
+    """The triangle of all rows by products of columns; None where these lost too many digits."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        products = np.sum([part.T @ part for part in parts()], axis=0)
+        length = np.sqrt(np.diag(products))
     empty = length == 0.0
     if not np.all(empty | ((length > SIZES[0]) & (length < SIZES[1]))):
         return None
+    if np.any(empty) and any(np.any(part[:, empty]) for part in parts()):
+        return None  # whose squares underflow
     scale = np.where(empty, 1.0, length)
     scaled = products / np.outer(scale, scale)
     # Columns of zeros have an effect of zero on their own.
@@ -95,7 +96,7 @@ def triangle_of_parts(parts: Callable[[], Iterable[Array]]) -> Array:
     >>> triangle_of_parts(lambda: [np.array([[3.0]]), np.array([[4.0]])])
     array([[5.]])
     """
-    found = _of_products(np.asarray(sum(part.T @ part for part in parts())))
-    if found is not None:
-        return found
-    return _by_blocks(np.concatenate([_by_blocks(part) for part in parts()]))
+    found = _of_products(parts)
+    if found is None:
+        found = _by_blocks(np.concatenate([_by_blocks(part) for part in parts()]))
+    return found
