@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from flightid import errors
 from flightid.dynamics.modes.modes import UNFITTED
 from flightid.dynamics.modes.participation import eigenpairs
 from flightid.models.sampled.discrete_modes import NO_COUNTERPART
-from flightid.study.estimate_tables import modes_cells
+from flightid.study.estimate_tables import modes_cells, short_modes_table
 from flightid.uncertainty.roots import UNSIGNED
 from tests.closeness import assert_close
 
@@ -127,7 +128,7 @@ def test_coinciding_eigenvalues_have_no_interval_and_say_why() -> None:
     near = np.array([[-2.0, 1.0], [1e-4, -2.0]])
     for pair in eigenpairs(near, 0.05 * np.ones((1, 2, 2))):
         assert pair.value_moves is None
-        assert "departs from it by" in pair.reason
+        assert "move it out of proportion, by" in pair.reason
 
 
 def test_crossing_without_coupling_keeps_its_intervals() -> None:
@@ -211,6 +212,16 @@ def test_black_box_fits_have_intervals_like_their_roots() -> None:
             half = (mine.interval95[1] - mine.interval95[0]) / 2.0
             assert_close(half, 1.959964 * theirs.stderr, rtol=2e-3, why="two ways to one slope")
         assert mode.name == "y"
+    # A study's table had dashes without a word: of errors unknown, of a sign unknown, beside green.
+    blind = SimpleNamespace(name="blind", fit=replace(polynomial, covariance=None))
+    loose = SimpleNamespace(name="loose", fit=replace(polynomial, covariance=None))
+    known = SimpleNamespace(name="known", fit=polynomial)
+    (table, alone) = (short_modes_table(each) for each in ([blind, loose], [known]))
+    (note,) = table.notes
+    character = fid.modes(polynomial).modes[0].named.character
+    assert note.startswith(f"No interval of blind, {character}; loose, {character}: ")
+    assert note.endswith(f"{fid.modes(blind.fit).reason}.")
+    assert alone.notes == ("±: half of the 95 % interval.",)
 
 
 def test_transfer_functions_take_their_slopes_from_differences() -> None:

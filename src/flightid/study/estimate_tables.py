@@ -193,15 +193,23 @@ def short_modes_table(items: Iterable[ModelResults]) -> Table:
         Column("time constant", "s", 4), Column("±", "s", 2),
     )  # fmt: skip
     rows: list[tuple[Cell, ...]] = []
+    untold: dict[str, list[str]] = {}
     for item in items:
         if item.fit is None or not isinstance(item.fit.details, PolynomialDetails):
             continue
         with suppress(ModelError):
-            rows += [(item.name, *cells) for cells in modes_cells(modes(item.fit))]
-    note = f"±: half of the {interval_words(shown())} interval."
+            found = modes(item.fit)
+            rows += [(item.name, *cells) for cells in modes_cells(found)]
+            for mode in delays_apart(found)[0]:
+                number = mode.natural_frequency if mode.is_pair else mode.time_constant
+                if number.half(shown()) is None and mode.eigenvalue is not None:
+                    why = found.reason or mode.reason or number.reason
+                    untold.setdefault(why, []).append(f"{item.name}, {mode.named.character}")
     made = Table("Modes", columns, tuple(rows)).without_empty_columns()
     told = any(column.name == "±" for column in made.columns)
-    return replace(made, notes=(note,)) if told else made
+    note = (f"±: half of the {interval_words(shown())} interval.",) if told else ()
+    gaps = [f"No interval of {'; '.join(names)}: {reason}." for reason, names in untold.items()]
+    return replace(made, notes=(*note, *gaps))
 
 
 def modes_cells(found: Iterable[Mode]) -> Iterator[tuple[Cell, ...]]:

@@ -217,8 +217,8 @@ def _moved(
             pair.value,
             pair.vector,
             pair.factors,
-            reason=f"first order does not hold: the eigenvalue departs from it by "
-            f"{shift / spread:.2g} standard errors (nearest other eigenvalue {other:.4g})",
+            reason=f"errors of the fit move it out of proportion, by {shift / spread:.2g} standard "
+            f"errors, so that no ± holds (nearest other eigenvalue {other:.4g})",
         )
     return Eigenpair(
         pair.value, pair.vector, pair.factors, moves, scale * vector_moves, factor_moves
