@@ -289,6 +289,18 @@ def test_headings_tell_their_meaning_on_hover() -> None:
     table = Table("Fits", (Column("average cost"), Column("model")), ((1.0, "roll"),))
     page = to_html(Document("Glossary", "", (Section("Fits", (TableBlock(table),)),)))
     assert page.count("<abbr title=") == 1
+    # A symbol that one table explains is explained wherever it stands, in headings and in rows.
+    told = Table(
+        "Parameters",
+        (Column("parameter"), Column("value"), Column("meaning")),
+        (("T_m", 0.045, "time constant of the motor"), ("Lp", -3.4, "")),
+    )
+    later = Table("All", (Column("parameter"), Column("T_m")), (("T_m", 1.0), ("Lp", 0.3)))
+    inner = Section("Roll rate", (TableBlock(later),))
+    whole = Document("t", "", (Section("Result", (TableBlock(told),), (inner,)),))
+    said = '<abbr title="time constant of the motor">T_m</abbr>'
+    assert to_html(whole).count(said) == 2
+    assert to_html(whole).count("<abbr title=") == 2
     assert "How far a model lies from the measured responses" in page
 
 

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 import flightid as fid
+from flightid.control.autopilots import axis_loop
 from flightid.conventions import Light, Role
 from flightid.errors import FlightidError
 from flightid.findings import Finding
 from flightid.report.text import to_text
-from flightid.study.answer import _gains, _margin_table, _models
+from flightid.study.answer import _gains, _margin_table, _models, _small_angles
 from flightid.study.identified import LEFT_OUT, ModelResults
 from flightid.study.settings import Segment
 from flightid.study.stage_runner import digest
@@ -324,6 +325,12 @@ def test_margins_below_what_is_asked_and_columns_left_out_are_told() -> None:
     assert said.endswith("(98.4 % of them or more keep 45° and all else asked)")
     notes = _margin_table((roll,)).notes  # type: ignore[arg-type]
     assert notes[1].startswith("gain margin: not promised")
+    flown = axis_loop("arducopter", "roll", loop_rate_hz=400.0)
+    angle = SimpleNamespace(axis="roll", flown=flown, loop=flown.with_gains(ATC_ANG_RLL_P=9.0))
+    (small,) = _small_angles([angle])  # type: ignore[list-item]
+    assert "errors up to 6.8 deg in roll (27 as flown)" in small
+    free = flown.with_gains(ATC_ACCEL_R_MAX=0.0)
+    assert not [*_small_angles([SimpleNamespace(axis="roll", flown=free, loop=free)])]  # type: ignore[list-item]
 
 
 def test_no_model_is_none_to_use() -> None:

@@ -309,8 +309,12 @@ def test_pictures_and_report_show_every_loop(tuning: fid.Tuning) -> None:
         responses=tuple(dataclasses.replace(each, flown=None) for each in design.responses),
     )
     alone = promised_margins([bare])
-    assert {trace.name for trace in alone.data} == {"worst vehicle, new gains", "required"}
+    names = {trace.name for trace in alone.data}
+    assert names == {"worst vehicle, new gains", "required", "not promised"}
     assert all(len(trace.x) for trace in alone.data if trace.name == "required")
+    dark = [each.loop for each in bare.worst_cases if each.worst is None]
+    words = [trace for trace in alone.data if trace.name == "not promised"]
+    assert {row for trace in words for row in trace.y} <= {f"roll, {loop}" for loop in dark}
     assert "flown" not in steps_caption([bare])
     drawn = gain_map(design)
     line = next(trace for trace in drawn.data if trace.name == "all requirements met")

@@ -146,6 +146,7 @@ def promised_margins(designs: Sequence[PidDesign]) -> go.PlotFigure:
             )  # fmt: skip
             named.add(words)
             made.add_trace(drawn, 1, column)
+        _say_what_is_not_promised(made, column, [row for row in rows if row not in labels])
         made.update_xaxes(
             title_text=look.axis_title(name, unit), rangemode="tozero", row=1, col=column
         )
@@ -156,6 +157,17 @@ def promised_margins(designs: Sequence[PidDesign]) -> go.PlotFigure:
     made.update_yaxes(showticklabels=False, col=2)
     made.update_layout(hovermode="closest")
     return made
+
+
+def _say_what_is_not_promised(made: go.PlotFigure, column: int, rows: Sequence[str]) -> None:
+    """Words in place of a bar, where a margin lies above the band to which the model was shown."""
+    if rows:
+        words = go.Scatter(
+            x=[0.0] * len(rows), y=list(rows), mode="text", text=[" not promised"] * len(rows),
+            textposition="middle right", textfont={"size": 11}, opacity=0.7,
+            showlegend=False, hoverinfo="skip", name="not promised",
+        )  # fmt: skip
+        made.add_trace(words, 1, column)
 
 
 def _say_without_limit(made: go.PlotFigure, name: str, column: int, rows: Sequence[str]) -> None:

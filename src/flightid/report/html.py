@@ -11,7 +11,7 @@ import base64
 import gzip
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.resources import files
 from itertools import groupby
@@ -23,7 +23,7 @@ from markupsafe import Markup
 from flightid.conventions import Light
 from flightid.plot.graph_objects import plotting_library
 from flightid.report.content import Document, Figure
-from flightid.report.glossary import GLOSSARY
+from flightid.report.glossary import GLOSSARY, symbols_in
 from flightid.report.json import to_dict
 from flightid.report.shared_arrays import SharedArrays
 from flightid.table import Cell, Column, Table
@@ -63,7 +63,7 @@ def to_html(document: Document, *, packed: bool = True) -> str:
         The whole page.
     """
     tree = to_dict(document)
-    numbers = _Numbering(packed)
+    numbers = _Numbering(packed, symbols_in(tree["sections"]))
     sections = [numbers.section(section) for section in tree["sections"]]
     has_plots = any(isinstance(block, Figure) for block in document.walk())
     library = plotting_library() if has_plots else ""
@@ -90,8 +90,9 @@ def to_html(document: Document, *, packed: bool = True) -> str:
 class _Numbering:
     """Adds to plain values what the template needs: identifiers, shown cells, plot payloads."""
 
-    def __init__(self, packed: bool) -> None:
+    def __init__(self, packed: bool, symbols: Mapping[str, str]) -> None:
         self._packed = packed
+        self._symbols = symbols
         self.arrays = SharedArrays()
         self._sections = 0
         self._plots = 0
@@ -111,12 +112,13 @@ class _Numbering:
         match values["kind"]:
             case "table":
                 long = len(values["rows"]) > LONG_TABLE and not opening
-                return {**values, **_shown_table(values), "folded": values["folded"] or long}
+                shown = _shown_table(values, self._symbols)
+                return {**values, **shown, "folded": values["folded"] or long}
             case "lights":
                 return {**values, **_sorted_lights(values["findings"], opening=opening)}
             case "key_values":
-                shown = [(key, _VALUE.show(value)) for key, value in values["items"]]
-                return {**values, "items": shown}
+                items = [(key, _VALUE.show(value)) for key, value in values["items"]]
+                return {**values, "items": items}
             case "figure":
                 self._plots += 1
                 spec = values["spec"]
@@ -178,7 +180,7 @@ def _is_wide(layout: dict[str, Any]) -> bool:
     return "width" in layout or sum(name.startswith("xaxis") for name in layout) > MANY_PLOTS
 
 
-def _shown_table(values: dict[str, Any]) -> dict[str, Any]:
+def _shown_table(values: dict[str, Any], symbols: Mapping[str, str]) -> dict[str, Any]:
     columns = tuple(
         Column(column["name"], column["unit"], digits)
         for column, digits in zip(values["columns"], values["digits"], strict=True)
@@ -190,19 +192,24 @@ def _shown_table(values: dict[str, Any]) -> dict[str, Any]:
             "name": column.name,
             "unit": column.unit,
             "kind": Markup(CLASSES[kind]),
-            "meaning": GLOSSARY.get(column.name, ""),
+            "meaning": GLOSSARY.get(column.name) or symbols.get(column.name, ""),
         }
         for column, kind in zip(columns, kinds, strict=True)
     ]
     rows = [_joined(*both) for both in zip(table.rows, table.shown(), strict=True)]
+    names = [column.name for column in columns]
+    if "parameter" in names and "meaning" not in names:
+        place = names.index("parameter")
+        for row in rows:
+            row["told"] = {place: symbols.get(row["cells"][place], "")}
     return {"columns": headings, "rows": rows}
 
 
-def _joined(cells: Sequence[Cell], shown: list[str]) -> dict[str, object]:
+def _joined(cells: Sequence[Cell], shown: list[str]) -> dict[str, Any]:
     """A row whose last empty cells are one, as in a triangle of correlations."""
     known = max((place for place, cell in enumerate(cells, 1) if cell is not None), default=0)
     gap = len(cells) - known if len(cells) - known >= LEAST_GAP else 0
-    return {"cells": shown[: len(shown) - gap], "gap": gap}
+    return {"cells": shown[: len(shown) - gap], "gap": gap, "told": {}}
 
 
 def _script_json(values: object) -> str:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from shlex import quote
 from statistics import median
 from typing import TYPE_CHECKING
 
+from flightid.control.autopilots.angle_law import angle_law
 from flightid.control.autopilots.parameter_files import parameter_suffix
 from flightid.control.autopilots.pid_loop import PidLoop
 from flightid.control.tuning.limits import ANGLE
@@ -282,8 +284,29 @@ def _gain_table(designs: tuple[PidDesign, ...], filters: TunedFilters | None) ->
         for design in designs
         for change in design.changes
     ]  # fmt: skip
-    notes = () if filters is None else filters.words
+    notes = (*(() if filters is None else filters.words), *_small_angles(designs))
     return Table("Gains to fly", columns, tuple(rows), notes).without_empty_columns()
+
+
+def _small_angles(designs: Iterable[PidDesign]) -> Iterator[str]:
+    """Up to which error angle controllers do what is promised, where parameters end it."""
+    said: list[str] = []
+    bounds: dict[str, None] = {}
+    for design in designs:
+        flown, new = (
+            angle_law(each.autopilot, each.gains, design.axis)
+            for each in (design.flown, design.loop)
+        )
+        if flown is None or new is None or not math.isfinite(new.proportional_to_rad):
+            continue
+        before, after = (math.degrees(each.proportional_to_rad) for each in (flown, new))
+        said.append(f"{after:.2g} deg in {design.axis} ({before:.2g} as flown)")
+        bounds[new.bound] = None
+    if said:
+        yield (
+            f"Angle steps are promised for errors up to {', '.join(said)}: larger ones are "
+            f"answered more slowly ({', '.join(bounds)})."
+        )
 
 
 def _margin_table(designs: tuple[PidDesign, ...]) -> Table:

@@ -229,14 +229,19 @@ def _result(study: StudyResults, *, sections: tuple[Section, ...] = ()) -> Itera
     yield from _interval_figure(study)
 
 
+MARGINS = (
+    "Margins of the worst vehicle that the data allow; upright: what was required; not promised: "
+    "what lies above the band to which the model was shown."
+)
+
+
 def _pictures(study: StudyResults) -> Iterator[Figure]:
     """What new gains do and promise, of all axes; without gains, what a model predicts."""
     designs = () if study.tuning is None else study.tuning.designs
     made = [each for each in designs if each.exists]
     if made:
         yield figure_block(overlaid_steps(made), steps_caption(made))
-        shown = "Margins of the worst vehicle that the data allow; upright: what was required."
-        yield figure_block(promised_margins(made), shown)
+        yield figure_block(promised_margins(made), MARGINS)
         return
     checked = [found for item in study.identified for found in item.verifications.values()]
     yield from (prediction_picture(found, 0) for found in checked[:1])

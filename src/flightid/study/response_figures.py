@@ -9,6 +9,7 @@ from flightid.plot import look
 from flightid.plot.frequency_response import Curve, bode, bode_page
 from flightid.report.content import Figure
 from flightid.report.figures import figure_block
+from flightid.report.glossary import channel_words
 from flightid.responses.response_band import ResponseIntervals, response_bands
 from flightid.study.estimate_tables import WORDS
 from flightid.uncertainty.quantiles import interval_words, shown
@@ -128,7 +129,9 @@ def _curves(
             )
         )
     omega, fit = curves[0].omega_rad_s, item.fit
-    said = f"{output} to {source}: {curves[0].name} with its {interval_words(shown())} band"
+    units = item.response.units if item.response is not None else {}
+    sides = [channel_words(each, units.get(each, "")) for each in (output, source)]
+    said = f"{' to '.join(sides)}: {curves[0].name} with its {interval_words(shown())} band"
     exact = None
     # A NARX model has no frequency response, and inputs without coherence are in no model.
     if fit is not None and source in fit.model.inputs and hasattr(fit.model, "frequency_response"):
