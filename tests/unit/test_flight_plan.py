@@ -289,7 +289,7 @@ def test_a_fall_an_unknown_rate_and_a_trim_are_said(
     monkeypatch.setattr("flightid.planning.flight_findings.LARGEST_TRIM", 0.0)
     (said,) = flight_findings(opened, replace(phases, tipped_s=None), plan.sweeps[2:], 0.0)
     assert said.code == "trim-let-go"
-    assert "ATC_RAT_YAW_I at 0" in said.message
+    assert "with ATC_RAT_YAW_I 0, and the integrator held" in said.message
 
 
 def test_what_a_log_carries_already_is_not_swept_again(

@@ -23,7 +23,7 @@ from flightid.inspection.rates import StreamRate
 from flightid.inspection.signals import Signal
 from flightid.inspection.skew import StreamSkew, _skew
 from flightid.inspection.thresholds import LONGEST_WINDOW
-from flightid.inspection.usable_band import _longest_window
+from flightid.inspection.usable_band import AxisBand, _longest_window
 from flightid.logs.source import Event, Gap
 from flightid.study.proposal import propose_study
 from flightid.study.settings import read_settings
@@ -162,6 +162,16 @@ def test_bursts_have_no_rate() -> None:
     assert not steady.is_burst
     assert replace(steady, rate_hz=2.5e5, mean_hz=1.5e5).is_burst
     assert replace(steady, rate_hz=10.2, mean_hz=3.0, jitter=5.1).is_burst
+
+
+def test_a_table_tells_the_band_that_the_verdict_tells() -> None:
+    """A fit begins at twice the lowest frequency: a verdict said 11.7, its table 23.5 rad/s."""
+    roll = AxisBand("roll", "a", "b", 47.7, (23.5, 26.5), 0.66, coherent_rad_s=(11.7, 26.5))
+    yaw = AxisBand("yaw", "a", "b", 47.7, (2.5, 7.3), 0.77, coherent_rad_s=(1.25, 7.3))
+    phases = FlightPhases(((0.0, 9.0),), True, None, "")
+    seen = Inspection("a", "px4", "", "copter", 9.0, (), phases, (), (), (), (), ())
+    rows = [row[4:8] for row in replace(seen, bands=(roll, yaw))._axes().rows]
+    assert rows == [(11.7, 26.5, 0.66, "too narrow for more than a gain"), (2.5, 7.3, 0.77, None)]
 
 
 def test_evidence_of_an_axis_is_not_that_of_another() -> None:

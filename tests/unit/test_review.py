@@ -110,6 +110,11 @@ def test_a_slow_log_says_what_to_log(tmp_path: Path) -> None:
     assert "logged at 10 Hz, too slowly" in loop.reason
     assert "LOG_BITMASK" in loop.action
     assert loop.tracking is not None
+    write_ordinary_log(tmp_path / "short.bin", every=8, duration_s=5.0)
+    short = fid.review_flight(tmp_path / "short.bin")["roll attitude"]
+    assert short.reason.startswith("too few samples")
+    assert "LOG_BITMASK" in short.action, "rows are few, whatever was flown"
+    assert "fly a minute" in short.action
 
 
 def test_a_tracking_error_of_one_wild_stretch_is_no_number() -> None:

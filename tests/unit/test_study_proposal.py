@@ -245,7 +245,9 @@ def test_units_and_a_fall_come_first_then_the_commands_that_go_on(tmp_path: Path
     fall = Finding("tipped-over", Light.AMBER, "it falls", "look for its cause")
     units = Finding("scale-contradicted", Light.RED, "57 times the turning", "state the true unit")
     missed = (Finding("no-model", Light.RED, "roll: no model, no sweep", "fly a sweep"),)
-    found = replace(looked, findings=(*looked.findings, fall, units))
+    log = Finding("slow", Light.AMBER, "slow", "log faster")
+    gaps = Finding("gaps", Light.AMBER, "gaps", "log faster: no card is to blame")
+    found = replace(looked, findings=(*looked.findings, fall, units, log, gaps))
     said = Proposal((), (), missed, found).refusal()
     todo = said.partition("What to do, the first first\n")[2].splitlines()
     assert [line.split(":")[0] for line in todo[:3]] == [
@@ -253,6 +255,7 @@ def test_units_and_a_fall_come_first_then_the_commands_that_go_on(tmp_path: Path
     ]  # fmt: skip
     assert sum("flightid plan day.bin" in line for line in todo) == 1, "a command is said once"
     assert any(line == "- fly a sweep" for line in todo)
+    assert [line for line in todo if "log faster" in line] == ["- log faster: no card is to blame"]
 
 
 def test_records_without_times_take_a_sample_time_into_the_study(tmp_path: Path) -> None:

@@ -10,11 +10,11 @@ from flightid.conventions import Light
 from flightid.evidence.evidence import BAND, COHERENCE, Check
 from flightid.frozen import dataclass
 from flightid.inspection.thresholds import BAND_GOOD, BAND_LEAST, MINIMUM_COHERENCE
+from flightid.inspection.usable_band import NARROW
 from flightid.responses import FrequencyResponse
 from flightid.responses.bands import coherent_band, coherent_parts
 
 MORE = "fly a sweep or multisine over a decade around the crossover, or excite more"
-NARROW = "too narrow for more than a gain"
 """Last words of a check of the band: what was seen holds no dynamics."""
 MOST_PARTS = 3
 """Unbroken runs of frequencies that are named one by one."""

@@ -16,7 +16,7 @@ from flightid.inspection.log_clock import logged_words
 from flightid.inspection.rates import StreamRate
 from flightid.inspection.saturation import Saturation
 from flightid.inspection.skew import StreamSkew
-from flightid.inspection.usable_band import AxisBand
+from flightid.inspection.usable_band import NARROW, AxisBand
 from flightid.inspection.verdict_lines import WIDTH, verdict_lines
 from flightid.result import Result
 from flightid.table import Column, Table
@@ -205,10 +205,9 @@ class Inspection(Result, schema="flightid.inspection/1"):
                 band.input or None,
                 band.output or None,
                 band.rate_hz or None,
-                band.band_rad_s[0] if band.band_rad_s else None,
-                band.band_rad_s[1] if band.band_rad_s else None,
+                *(band.told_rad_s or (None, None)),
                 band.coherence,
-                band.reason or None,
+                band.reason or (None if band.is_usable or not band.told_rad_s else NARROW),
             )
             for band in self.bands
         )

@@ -16,6 +16,7 @@ from flightid.inspection.excited_to import excited_to
 from flightid.inspection.signals import Signal, Span, find
 from flightid.inspection.stretches import FlightStretches, packed
 from flightid.inspection.thresholds import (
+    BAND_LEAST,
     CYCLES_IN_WINDOW,
     INDEPENDENT_WINDOWS,
     LONGEST_WINDOW,
@@ -31,6 +32,7 @@ from flightid.responses.running import SpectralSum
 
 OF_WINDOW = 2.0
 """Above the lowest coherent frequency: there a window holds two cycles, and a fit wants four."""
+NARROW = "too narrow for more than a gain"
 N_OMEGA = 60
 """Frequencies at which coherence is computed."""
 SHORTENED = 6
@@ -82,6 +84,17 @@ class AxisBand:
     def words(self) -> str:
         """The band in Hz; empty without one."""
         return hertz_words(self.band_rad_s) if self.band_rad_s else ""
+
+    @property
+    def is_usable(self) -> bool:
+        """Whether what is coherent is wide enough for a model."""
+        wide = self.coherent_rad_s or self.band_rad_s
+        return self.band_rad_s is not None and wide[1] / wide[0] >= BAND_LEAST.value
+
+    @property
+    def told_rad_s(self) -> tuple[float, float] | None:
+        """Band of fits, or what is coherent where that is too narrow for one, rad/s."""
+        return self.band_rad_s if self.is_usable else self.coherent_rad_s or self.band_rad_s
 
     @property
     def span(self) -> float:

@@ -20,7 +20,7 @@ from flightid.inspection.thresholds import (
     SATURATED_SHARE,
     SKEW,
 )
-from flightid.inspection.usable_band import AxisBand, hertz_words, lowest_hz
+from flightid.inspection.usable_band import NARROW, AxisBand, hertz_words, lowest_hz
 from flightid.logs import Log
 from flightid.logs.scale_check import check_scales
 
@@ -227,9 +227,8 @@ def _band(log: Log, band: AxisBand) -> Finding:
             advice.excitation(log),
         )
     width = coherent[1] / coherent[0]
-    usable = width >= BAND_LEAST.value and band.band_rad_s is not None
-    shown = band.band_rad_s if usable and band.band_rad_s is not None else coherent
-    word = "usable" if usable else "coherent"
+    shown = band.told_rad_s or coherent
+    word = "usable" if band.is_usable else "coherent"
     text = (
         f"{band.axis}: {word} from {hertz_words(shown)} ({shown[0]:.3g} to {shown[1]:.3g} rad/s), "
         f"mean coherence {band.coherence:.2f}"
@@ -240,7 +239,7 @@ def _band(log: Log, band: AxisBand) -> Finding:
         return Finding(
             f"narrow-band-{band.axis}",
             Light.AMBER,
-            f"{text}: too narrow for more than a gain",
+            f"{text}: {NARROW}",
             advice.excitation(log),
         )
     light = Light.GREEN if width >= BAND_GOOD.value else Light.AMBER
@@ -314,7 +313,7 @@ def _quality(log: Log, found: Inspection) -> list[Finding]:
                         "jitter",
                         Light.AMBER,
                         f"{rate.label} is logged with {100 * rate.jitter:.0f} % jitter",
-                        "log at the full rate: records are resampled by their stamps",
+                        advice.logging(log),
                     )
                 )
     findings += [

@@ -70,7 +70,8 @@ def _trims(log: Log, phases: FlightPhases, sweeps: Iterable[AxisSweep]) -> Itera
         yield Finding(
             "trim-let-go",
             Light.AMBER,
-            f"{each.axis}: {let_go[0]} at 0 lets go of {np.mean(held):+.0%} of full command, held "
-            "on the mean of this flight: the vehicle turns as the sweep begins",
+            f"{each.axis}: the sweep is flown with {let_go[0]} 0, and the integrator held "
+            f"{np.mean(held):+.0%} of full command in this flight: without it the vehicle turns as "
+            "the sweep begins",
             "take the trim out first (motors, frame, centre of gravity), or hold it by stick",
         )

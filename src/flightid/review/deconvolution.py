@@ -21,6 +21,7 @@ MEMORY_S = (0.5, 0.1, 0.4)
 FEWEST_LAGS, MOST_LAGS = 4, 50
 ROWS_PER_LAG = 10
 DRAWS = 400
+TOO_FEW = "too few samples"
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,7 +150,7 @@ def _require_rows(samples: LoopSamples, coefficients: int) -> None:
     rows = sum(max(0, length - MOST_LAGS) for length in samples.lengths)
     if rows < ROWS_PER_LAG * coefficients:
         raise DataError(
-            "too few samples",
+            TOO_FEW,
             found=f"{samples.duration_s:.3g} s",
             needed=f"{(ROWS_PER_LAG * coefficients + MOST_LAGS) * samples.sample_time_s:.3g} s "
             "in one piece",

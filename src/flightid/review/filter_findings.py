@@ -61,5 +61,5 @@ def _advice(told: str, words: str, choice: FilterChoice | None, way: str) -> str
         return "balance propellers and damp the mount: no cut-off within its range does better"
     rest = "" if choice.within_limit else "; it is not enough: balance propellers, damp the mount"
     if min(each.phase_gained_deg for each in choice.axes) < -PHASE_TO_WIN.value:
-        rest += "; tune the gains with them (flightid tune), or lower D instead"
+        rest += "; sweep with them and tune the gains (flightid plan), or lower D instead"
     return f"set {told} ({words}){rest}; {way}"

@@ -136,7 +136,7 @@ class GyroNoise(Result, schema="flightid.gyro_noise/1"):
         """Peaks with their names, and what they rest on."""
         columns = (
             Column("axis"),
-            Column("peak", "Hz", 3),
+            Column("peak", "Hz", 4),
             Column("±", "Hz", 2),
             Column("over its floor", "dB", 3),
             Column("likely"),

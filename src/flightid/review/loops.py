@@ -17,7 +17,7 @@ from flightid.inspection.signals import Signal, Span, find, inside, places, reco
 from flightid.inspection.thresholds import RATE_LEAST
 from flightid.logs import Log
 from flightid.record import Record
-from flightid.review.deconvolution import LoopDraws, LoopSamples, closed_loop
+from flightid.review.deconvolution import TOO_FEW, LoopDraws, LoopSamples, closed_loop
 from flightid.review.loop_response import LoopResponse
 from flightid.review.proportional import Excess, excess_of
 from flightid.review.step_features import (
@@ -250,7 +250,10 @@ def _step(begun: LoopResponse, samples: LoopSamples, tick_s: float, advised: str
     except FlightidError as error:
         clauses = (error.problem, error.found, error.needed and f"needed {error.needed}")
         reason = ", ".join(str(clause) for clause in clauses if clause)
-        return replace(begun, reason=reason, action=what_to_fly(begun))
+        # Pieces are short where rows are few: a pause in the log ends one, whatever was flown.
+        slow = advised if error.problem == TOO_FEW else ""
+        action = "; ".join(filter(None, (slow, what_to_fly(begun))))
+        return replace(begun, reason=reason, action=action)
     steps, time_s = _longest(draws, WINDOW_S[begun.loop], tick_s)
     unfit = refused(begun, window_features(steps, time_s), samples.sample_time_s, advised)
     if unfit is not None:

@@ -30,7 +30,11 @@ WIDEST_LEVEL = Threshold(
     0.5, "1", "half of the step either way: such a step tells nothing about gains"
 )
 WIDEST_DELAY = Threshold(
-    9, "1", "latest over earliest: a delay that may be a third or three times its value (ours)"
+    9,
+    "1",
+    "latest over earliest: a delay that may be a third or three times its value. Of 108 steps of "
+    "flights of 12 s 4 went beyond, one with a rise time 3.4 times off; of 7 from 3 to 9 all "
+    "intervals of delay and rise held; of 7 steps of real logs none went beyond 4.7 (ours)",
 )
 WIDEST_TRACKING = Threshold(
     3, "1", "a tracking error that may be a third or three times its value tells no loop (ours)"

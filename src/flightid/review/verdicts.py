@@ -156,7 +156,8 @@ def _overshoot(review: FlightReview, loop: LoopResponse, said: str) -> tuple[Lig
 SHORT = {
     "rate": "look for motors at a limit, wind, and what the set-point is scaled by; replies slower "
     "than the window of this step count as missing too",
-    "attitude": "mend the rate loop first; then look for a trim or wind that holds the angle off",
+    "attitude": "look at the rate loop first, if it falls short too; then for a trim or wind that "
+    "holds the angle off",
 }
 LONG = {
     "rate": "look for feed-forward that is too large, and for what the set-point is scaled by",

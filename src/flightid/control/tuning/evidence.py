@@ -14,7 +14,6 @@ from flightid.conventions import Light
 from flightid.dynamics.continuous import to_continuous
 from flightid.errors import DataError, FlightidError
 from flightid.evidence.evidence import BAND, LOOP, SWEEP
-from flightid.evidence.spans import NARROW
 from flightid.findings import Finding
 from flightid.frozen import dataclass
 from flightid.identification.fit import WITHHOLDING, Fit
@@ -24,6 +23,7 @@ from flightid.identification.prediction_error.findings import CANCELLATION
 from flightid.identification.simpler_structure import simpler_fit
 from flightid.identification.uncertain_of import evidence_behind, uncertain_of
 from flightid.inspection.thresholds import BAND_LEAST
+from flightid.inspection.usable_band import NARROW
 from flightid.models import InnovationsModel, PolynomialModel
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.models.model import linear_system, model_of

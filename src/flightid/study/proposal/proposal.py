@@ -75,7 +75,8 @@ class Proposal:
             planned = [each for each in found if "flightid plan" in each]
             actions = [*first, *self._next(planned=bool(planned)), *planned, *found]
         said += ["", "What to do, the first first"] if actions else []
-        said += [line for each in dict.fromkeys(actions) for line in _wrapped(f"- {each}")]
+        once = [a for a in dict.fromkeys(actions) if not any(_goes_on(b, a) for b in actions)]
+        said += [line for each in once for line in _wrapped(f"- {each}")]
         return "\n".join(said)
 
     def _next(self, *, planned: bool) -> Iterator[str]:
@@ -114,6 +115,11 @@ class Proposal:
                 action=f"run that study (flightid run {file.name}), or move it away",
             )
         return write_atomically(file, self.text)
+
+
+def _goes_on(longer: str, action: str) -> bool:
+    """Whether another advice begins with all of one, and says more."""
+    return longer != action and longer.startswith(action)
 
 
 def _wrapped(text: str) -> list[str]:
