@@ -81,6 +81,15 @@ def test_what_is_taken_off_the_list_stays_in_its_place(tmp_path: Path) -> None:
     removed.take_off("d" * 16)
     assert not path.is_symlink()
     assert removed.ids() == ["d" * 16]
+    # A file of a set, beside whole sets.
+    removed.leave_out("e" * 16, "b.csv", out=True)
+    removed.take_off("e" * 16)
+    assert (removed.files("e" * 16), removed.files("f" * 16)) == (["b.csv"], [])
+    removed.leave_out("e" * 16, "b.csv", out=False)
+    assert (removed.files("e" * 16), removed.ids()) == ([], ["d" * 16, "e" * 16])
+    for broken in (b'{"files": 3}', b'{"files": {"e": 4}}'):
+        path.write_bytes(broken)
+        assert removed.files("e") == []
 
 
 def test_a_file_without_time_says_so_and_reads_with_a_sample_time(tmp_path: Path) -> None:

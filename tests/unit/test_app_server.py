@@ -222,6 +222,21 @@ def test_a_log_off_the_list_is_where_it_was_and_comes_back(browser: Browser, flo
     assert flown.log in listed()
     table = b"t,u,y\n0,1,2\n1,0,3\n2,1,1\n"
     rig = browser.ask("/api/records?name=a.csv", "PUT", table)[1]["id"]
+    # One file of a set goes and comes alone; the last one goes with its set.
+    place, second = f"/api/records/{rig}", f"/api/records?name=b.csv&rig={rig}"
+    browser.ask(second, "PUT", table + b"3,0,2\n")
+    out = {"name": "b.csv", "out": True}
+    assert browser.ask(f"{place}/files", "POST", out)[1]["files"] == 1
+    screen = browser.ask(place)[1]
+    assert ([each["name"] for each in screen["files"]], screen["left_out"]) == (
+        ["a.csv"],
+        ["b.csv"],
+    )
+    assert browser.ask(f"{place}/files", "POST", {"name": "a.csv", "out": True})[0] == 422
+    assert browser.ask(f"{place}/files", "POST", {"name": "../x", "out": True})[0] == 404
+    assert len(list((flown.folder / "records" / rig).iterdir())) == 2
+    assert browser.ask(second, "PUT", table + b"3,0,2\n")[1]["files"] == 2  # dropped again
+    browser.ask(f"{place}/files", "POST", out)
     (item,) = browser.ask("/api/removed", "POST", {"id": rig, "removed": True})[1]
     assert (item["kind"], item["name"]) == ("records", "a.csv")
     assert browser.ask("/api/records")[1] == []

@@ -99,6 +99,8 @@ type Reading = { time_column?: string | null; sample_time_s?: number | null };
 const asked = (reading: Reading) => new URLSearchParams(Object.entries(reading).filter(([, each]) => each).map(([key, each]) => [key, String(each)]));
 export const rigs = () => json<RigItem[]>("/api/records");
 export const rig = (id: string, reading: Reading) => json<RigScreen>(`/api/records/${id}?${asked(reading)}`);
+/** Take a file out of a set, or put it back; it stays where it is. */
+export const leaveOut = (id: string, name: string, out: boolean) => json<RigItem>(`/api/records/${id}/files`, sent("POST", { name, out }));
 export const propose = (id: string, body: unknown) => json<ProposedStudy>(`/api/records/${id}/study`, sent("POST", body));
 export const lastRun = (log: string) => json<RunScreen>(`/api/runs/${log}`);
 export const run = (log: string) => json<RunScreen>(`/api/runs/${log}`, sent("POST", {}));

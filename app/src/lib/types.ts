@@ -807,6 +807,12 @@ export interface RigFile {
   error: string;
 }
 
+/** A file to take out of a set of records, or to put back. */
+export interface RigFileRequest {
+  name: string;
+  out: boolean;
+}
+
 /** A set of record files. */
 export interface RigItem {
   id: string;
@@ -853,6 +859,8 @@ export interface RigScreen {
   inputs: string[];
   outputs: string[];
   untold: string;
+  time: string;
+  left_out: string[];
   jobs: Job[];
 }
 

@@ -19,7 +19,14 @@ from flightid.app.guard import UPLOAD_BYTES
 from flightid.app.own_folders import is_link
 from flightid.app.pyramid import Pyramid, view
 from flightid.app.removed import RemovedList
-from flightid.app.rig_schemas import ProposedStudy, RigItem, RigProposal, RigReading, RigScreen
+from flightid.app.rig_schemas import (
+    ProposedStudy,
+    RigFileRequest,
+    RigItem,
+    RigProposal,
+    RigReading,
+    RigScreen,
+)
 from flightid.app.rigs import Rigs
 from flightid.app.study_edits import write_study
 from flightid.models import library_names
@@ -58,7 +65,19 @@ def add_rig_routes(app: FastAPI, backstage: Backstage) -> None:
     async def screen(rig: LogName, reading: Annotated[RigReading, Query()]) -> RigScreen:
         paths = _known(rigs, rig)
         told = await made(workers.live(rig_work.make_rig, paths, _options(reading)))
-        return RigScreen(id=rig, jobs=workers.of_log(rig), **told)
+        left = [each.name for each in rigs.all_files(rig) if each not in paths]
+        return RigScreen(id=rig, jobs=workers.of_log(rig), left_out=left, **told)
+
+    @app.post("/api/records/{rig}/files")
+    async def leave_out(rig: LogName, asked: RigFileRequest) -> RigItem:
+        """Take a file out of a set, which keeps one at least, or put it back."""
+        kept = [each.name for each in _known(rigs, rig)]
+        if asked.name not in [each.name for each in rigs.all_files(rig)]:
+            raise HTTPException(404, "The records hold no such file.")
+        if asked.out and kept == [asked.name]:
+            raise HTTPException(422, "This is the last file: remove the records from the list.")
+        await asyncio.to_thread(removed.leave_out, rig, asked.name, out=asked.out)
+        return _item(rigs, backstage, rig)
 
     @app.post("/api/records/{rig}/study")
     async def propose(rig: LogName, asked: RigProposal) -> ProposedStudy:

@@ -90,7 +90,18 @@ class RigScreen(Message):
     inputs: list[str]
     outputs: list[str]
     untold: str
+    time: str
+    """Column that was read as the time; empty where none was."""
+    left_out: list[str]
+    """Files that were taken out of the set; they stay where they are."""
     jobs: list[Job]
+
+
+class RigFileRequest(Message):
+    """A file to take out of a set of records, or to put back."""
+
+    name: str = Field(max_length=300)
+    out: bool
 
 
 class ProposedStudy(Message):

@@ -22,6 +22,7 @@ from flightid.app.own_folders import (
     new_file,
     own_folder,
 )
+from flightid.app.removed import RemovedList
 from flightid.app.workspace import HIDDEN, ID, Workspace, plain_name
 from flightid.errors import FileFormatError, OptionError
 from flightid.files import flush
@@ -54,7 +55,12 @@ class Rigs:
         return [each.name for each in found]
 
     def files(self, rig: str) -> list[Path]:
-        """Files of a set by name; none where there is no such set."""
+        """Files of a set by name, those taken out left out; none where there is no such set."""
+        left = RemovedList(self.workspace).files(rig)
+        return [each for each in self.all_files(rig) if each.name not in left]
+
+    def all_files(self, rig: str) -> list[Path]:
+        """Every file of a set, those that were taken out too."""
         folder = self.workspace.folder / FOLDER / rig
         if not ID.fullmatch(rig) or is_link(folder.parent) or is_link(folder):
             return []
@@ -65,7 +71,7 @@ class Rigs:
 
     def name_of(self, rig: str) -> str:
         """A set by the name of its first file, and how many more there are."""
-        first, *more = self.files(rig)
+        first, *more = self.files(rig) or self.all_files(rig)
         return f"{first.name} and {len(more)} more" if more else first.name
 
     async def take(
@@ -121,8 +127,13 @@ class Rigs:
             flush(temporary)
             made = rig or digest.hexdigest()[:16]
             folder = own_folder(self.workspace.folder, FOLDER, made)
-            temporary.replace(await asyncio.to_thread(_free, folder, plain, digest.hexdigest()))
+            final = await asyncio.to_thread(_free, folder, plain, digest.hexdigest())
+            temporary.replace(final)
             flush(folder)
+        # Dropped again: it is meant to be there.
+        removed = RemovedList(self.workspace)
+        if final.name in removed.files(made):
+            await asyncio.to_thread(removed.leave_out, made, final.name, out=False)
         return made
 
 
