@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from flightid.errors import FitError
+from flightid.errors import FitError, StudyError
+from flightid.reading import parse_toml
 from flightid.study import run_study
+from flightid.study.choice_section import choice_blocks
 from flightid.study.proposal import propose_study, structures_of
 from flightid.study.proposal.structures_of import GroupScans, ProposedModel
 
@@ -47,8 +49,8 @@ def test_it_is_taken_where_no_output_runs_worse_and_all_run_better(
     monkeypatch: pytest.MonkeyPatch, together: object, *, taken: bool, said: str
 ) -> None:
     alone = {
-        "p": ProposedModel("p from u", [], error=1.0),
-        "q": ProposedModel("q from u", [], error=2.0),
+        name: ProposedModel(f"{name} from u", ['tried = "oe 1."'], error=error, tried="oe 1.")
+        for name, error in (("p", 1.0), ("q", 2.0))
     }
     monkeypatch.setattr(structures_of, "_polynomial", lambda _, output, __: alone[output])
     record = SimpleNamespace(duration_s=100.0, sample_rate_hz=10.0)
@@ -60,6 +62,14 @@ def test_it_is_taken_where_no_output_runs_worse_and_all_run_better(
         ["p and q from u"] if taken else ["p from u", "q from u"]
     )
     assert said in " ".join(found[0].said)
+    for each in found:
+        (told,) = (line for line in each.lines if line.startswith("tried = "))
+        assert said in told, "the report of every model repeats it"
+        settings = SimpleNamespace(
+            tried=parse_toml(told, "", "", StudyError)["tried"], structure=None
+        )
+        blocks = choice_blocks(SimpleNamespace(settings=settings, choice=None, fit=None))
+        assert said in blocks[0].text
     if taken:
         assert 'structure = "subspace"' in found[0].lines
         assert 'outputs = ["p", "q"]' in found[0].lines

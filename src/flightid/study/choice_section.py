@@ -18,17 +18,23 @@ if TYPE_CHECKING:
 
 
 def choice_blocks(item: ModelResults) -> tuple[Block, ...]:
-    """What was tried, and which was taken by what rule.
+    """What was tried, kinds and models of several outputs too, and which was taken by what rule.
 
     Parameters
     ----------
     item : ModelResults
-        With a ``choice``.
+        With a ``choice``, or with words on what was tried beside it.
 
     Returns
     -------
     tuple of Block
     """
+    beside = (Paragraph(item.settings.tried),) if item.settings.tried else ()
+    return (*beside, *_scanned(item))
+
+
+def _scanned(item: ModelResults) -> tuple[Block, ...]:
+    """Structures of the kind that was taken."""
     choice, fit, structure = item.choice, item.fit, item.settings.structure
     if not isinstance(choice, OrderScan) or fit is None or structure is None:
         return () if choice is None else result_blocks(choice)

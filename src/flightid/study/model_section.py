@@ -129,7 +129,7 @@ def _parts(item: ModelResults, truth: Truth | None) -> Iterator[Section]:
     if item.coherent is not None:
         title = "Choice of responses" if structure is None else "Coherence"
         yield section_of(title, _coherence, item, truth)
-    if item.choice is not None:
+    if item.choice is not None or item.settings.tried:
         yield section_of("Choice of the structure", choice_blocks, item)
     if item.reduction is not None:
         yield section_of("Reduction of the structure", _reduction, item)

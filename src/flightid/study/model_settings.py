@@ -51,6 +51,7 @@ class AnyModel(Options):
         None, doc="Library name or file of a model whose parameters and modes stand beside."
     )
     published: str | None = option(None, doc="File of published figures that stand beside.")
+    tried: str = option("", doc="What was tried beside it: words that the report repeats.")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -64,6 +64,7 @@ class ProposedModel:
     said: tuple[str, ...] = ()
     error: float = 0.0
     settle_s: float = 0.0
+    tried: str = ""
 
 
 def structures_of(asked: GroupScans) -> tuple[list[ProposedModel], list[Finding]]:
@@ -97,7 +98,7 @@ def _lines(
 ) -> list[str]:
     return [
         "", "[[model]]", f"name = {toml_value(name)}",
-        f"# Error of free runs on what was not fitted: {said}.",
+        f"tried = {toml_value(f'{said}.')}",
         f"structure = {toml_value(kind)}",
         f"inputs = {toml_value(list(asked.group.inputs))}", f"outputs = {toml_value(outputs)}",
         *asked.records,
@@ -115,11 +116,12 @@ def _polynomial(name: str, output: str, asked: GroupScans) -> ProposedModel:
     unit = asked.group.parts[0].record.unit(output)
     kind, errors, best, settle_s, orders_of = _structure(asked.scans, output, driving)
     said = ", ".join(f"{each} {errors[each]:.3g}" for each in KINDS if each in errors)
+    said = f"Error of free runs on what was not fitted, by kind: {said} {unit}".rstrip()
     orders = [f"{order} = {toml_value(list(orders_of[order]))}" for order in USED[kind]]
-    head = _lines(name, f"{said} {unit}".rstrip(), kind, output, asked)
+    head = _lines(name, said, kind, output, asked)
     choice = f"select = {toml_value(asked.segments.choice)}"
     lines = [*head, choice, *_coherent(asked), *orders]
-    return ProposedModel(name, lines, error=best, settle_s=settle_s)
+    return ProposedModel(name, lines, error=best, settle_s=settle_s, tried=f"{said}.")
 
 
 def _structure(
@@ -167,10 +169,19 @@ def _or_together(
     )
     what = f"one model of all outputs: free runs on what was not fitted err by {reached}"
     if not runs_better([together[name] for name in outputs], [*errors.values()]):
-        return [replace(alone[0], said=(f"Not taken, {what}",)), *alone[1:]]
+        left = f"Not taken, {what}"
+        return [replace(_told(alone[0], left), said=(left,)), *(_told(x, left) for x in alone[1:])]
     name = f"{' and '.join(outputs)} from {' and '.join(asked.group.inputs)}"
-    lines = [*_lines(name, reached, SUBSPACE, [*outputs], asked), *_coherent(asked)]
-    return [ProposedModel(name, lines, (f"Taken, {what}",))]
+    said = f"Taken, {what}"
+    lines = [*_lines(name, said, SUBSPACE, [*outputs], asked), *_coherent(asked)]
+    return [ProposedModel(name, lines, (said,))]
+
+
+def _told(model: ProposedModel, left: str) -> ProposedModel:
+    """A model with what was left for it, where its report repeats it."""
+    tried = f"{model.tried} {left}."
+    lines = [f"tried = {toml_value(tried)}" if x.startswith("tried = ") else x for x in model.lines]
+    return replace(model, lines=lines, tried=tried)
 
 
 def runs_better(together: Sequence[float], alone: Sequence[float]) -> bool:
