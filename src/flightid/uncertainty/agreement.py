@@ -18,6 +18,8 @@ FALSE_ALARM = 0.005
 CERTAIN = 1.0 - 1e-15
 DOUBT = 0.1
 """Chance below which scatter between records is carried on: what is not proven may be there."""
+PAIR = 2
+"""Records whose scatter has one degree of freedom: Student's interval is 6.5 times as long."""
 FEWEST_RECORDS = 3
 """Records whose scatter tells enough of the others for their mean to be used."""
 
@@ -186,6 +188,9 @@ def compare_parts(
     found = scatter([*parts, *([] if rest is None else [rest])], solve, covariance)
     apart = np.sqrt(np.diag(found.covariance))
     student = found.freedom if by_records else None
+    if student is not None and plain.agree and len(whole) == PAIR:
+        # Bars reach as far as the two lie apart; how far they should, noise tells better than both.
+        student = np.maximum(student, freedom)
     stated = freedom if student is None else _of_wider(plain.by_noise, freedom, apart, student)
     agreement = Agreement(len(flights), halves, records, plain.by_noise, apart, student)
     return AgreementTest(larger(covariance, found.covariance), stated, agreement)
