@@ -30,6 +30,8 @@ from flightid.validation.spectra.spectra import lags_of_spectrum
 Choice = OrderScan | NarxSearch
 RUNS_ALIKE = 0.05
 """Free-run errors that differ by less are alike: a minute of a slow mode tells them no better."""
+NEVER_ALIKE = 0.2
+"""Free-run errors that differ by more are told apart, whatever slow noise may make by chance."""
 BY_CHANCE = 0.98
 """Level, of two sides, of paired errors that are alike: the best of dozens ran ahead by chance."""
 TRIED = 4
@@ -189,7 +191,8 @@ def runs_as_well(trial: OrderTrial, best: OrderTrial) -> bool:
 
     A run that slow noise has carried off its level tells little of what follows the inputs, and a
     pole slower than the run starts at the level of its first stretch. Both runs hold the same
-    noise, so their errors are compared sample by sample (`excess_score`).
+    noise, so their errors are compared sample by sample (`excess_score`). Where a plant drifts, few
+    errors are independent and chance allows much; likelihoods then prefer what runs far worse.
 
     Example
     -------
@@ -199,8 +202,8 @@ def runs_as_well(trial: OrderTrial, best: OrderTrial) -> bool:
     >>> def ran(errors):
     ...     return OrderTrial(asked, None, None, float(np.std(errors)), 90.0, errors=(errors,))
     >>> noise, miss = np.random.default_rng(0).standard_normal((2, 500))
-    >>> best, other = ran(noise), ran(noise + 0.8 * miss)
-    >>> slow_best, slow = (ran(np.repeat(each[:5], 100)) for each in (noise, noise + 0.8 * miss))
+    >>> best, other = ran(noise), ran(noise + 0.5 * miss)
+    >>> slow_best, slow = (ran(np.repeat(each[:5], 100)) for each in (noise, noise + 0.5 * miss))
     >>> runs_as_well(other, best), runs_as_well(slow, slow_best)
     (False, True)
     """
@@ -208,7 +211,8 @@ def runs_as_well(trial: OrderTrial, best: OrderTrial) -> bool:
         return False
     if trial.free_run_rms <= (1 + RUNS_ALIKE) * best.free_run_rms:
         return True
-    if not trial.errors or not best.errors:
+    far = trial.free_run_rms > (1 + NEVER_ALIKE) * best.free_run_rms
+    if far or not trial.errors or not best.errors:
         return False
     return excess_score(trial.errors, best.errors) < half_width(BY_CHANCE)
 
