@@ -32,8 +32,8 @@ RUNS_ALIKE = 0.05
 """Free-run errors that differ by less are alike: a minute of a slow mode tells them no better."""
 NEVER_ALIKE = 0.2
 """Free-run errors that differ by more are told apart, whatever slow noise may make by chance."""
-BY_CHANCE = 0.98
-"""Level, of two sides, of paired errors that are alike: the best of dozens ran ahead by chance."""
+BY_CHANCE = 0.9
+"""Level, of two sides, of paired errors that are alike: chance takes 1 of 20 beyond."""
 TRIED = 4
 """Structures that are fitted whole, at most, for one that `_is_clean`."""
 FURTHER, DOUBTED = 2, 0.3
@@ -147,6 +147,8 @@ def _cleanest(scan: OrderScan, choose: str, flown: list[Record]) -> Fit:
     others = order[1:TRIED]
     if choose == BALANCED:
         others += [each for each in _less_sure(scan, order[0]) if each not in others]
+    elif choose == "free_run":
+        others += [each for each in _next_best(scan) if each not in others]
     fits = (scan.best if each is scan.trials[0] else fit_of(each, flown) for each in others)
     return next((fit for fit in fits if _is_clean(fit)), first)
 
@@ -154,6 +156,16 @@ def _cleanest(scan: OrderScan, choose: str, flown: list[Record]) -> Fit:
 def _is_clean(fit: Fit) -> bool:
     doubts = {each.code for each in fit.findings if each.light is not Light.GREEN}
     return is_settled(fit) and not doubts & {CANCELLATION, INPUTS_IN_ERRORS, "local-minima"}
+
+
+def _next_best(scan: OrderScan) -> list[OrderTrial]:
+    """The next trials by free run, for a best one that its own fit puts in doubt."""
+    most = (1 + DOUBTED) * (scan.trials[0].free_run_rms or 0.0)
+    return [
+        each
+        for each in scan.trials[1:TRIED]
+        if each.settled and each.free_run_rms is not None and each.free_run_rms <= most
+    ]
 
 
 def _less_sure(scan: OrderScan, taken: OrderTrial) -> list[OrderTrial]:
