@@ -95,7 +95,8 @@ def _quadrotor() -> Work:
     random, inputs = np.random.default_rng(0), nonlinear_output_error.quadrotor_inputs()
     time_s = np.arange(inputs.shape[1]) * nonlinear_output_error.SAMPLE_S
     driven = dict(zip(model.inputs, inputs, strict=True))
-    flown = fid.simulate(model, fid.Record.from_arrays(time_s, inputs=driven, units=model.units))
+    units = {name: model.units[name] for name in model.inputs}
+    flown = fid.simulate(model, fid.Record.from_arrays(time_s, inputs=driven, units=units))
     outputs = {
         name: flown[name] + 0.01 * np.std(flown[name]) * random.standard_normal(len(time_s))
         for name in model.outputs

@@ -130,6 +130,8 @@ def _encoding(path: Path) -> str:
         while block := stream.read(LONGEST_LINE):
             if b"\0" in block:
                 return "utf-8"
+            if block.isascii() and not decoder.getstate()[0]:
+                continue  # nothing to decode, and no character begun before
             try:
                 decoder.decode(block)
             except UnicodeDecodeError:
