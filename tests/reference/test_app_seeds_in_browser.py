@@ -158,8 +158,28 @@ def test_seed_000_linear_models_of_the_rig(desk: Desk, tmp_path: Path) -> None:
     page.locator("pre .changed", has_text="armax").wait_for()
     assert _study(desk, page)["model"][0]["structure"] == "armax"
     _reported(page, tmp_path)
+    _controlled(desk, page, tmp_path)
     assert not window.complaints
     page.close()
+
+
+def _controlled(desk: Desk, page: Any, folder: Path) -> None:
+    """A PID around each loop: keys of the study, numbers and code to take along."""
+    _opened(page, "Gains")
+    page.get_by_role("button", name="gains.toml").wait_for(timeout=RUN_MS)
+    page.get_by_label("Form").select_option("pi")
+    page.locator("pre .changed", has_text='controller = "pi"').wait_for()
+    page.get_by_text("The files follow").wait_for()
+    page.get_by_role("button", name="gains.toml").wait_for(timeout=RUN_MS)
+    assert _study(desk, page)["tune"] == {"controller": "pi"}
+    assert not _findings(page)
+    for name in ("gains.toml", "gains_y1.c"):
+        with page.expect_download() as told:
+            page.get_by_role("button", name=name).press("Enter")
+        told.value.save_as(folder / name)
+    numbers = tomllib.loads((folder / "gains.toml").read_text(encoding="utf-8"))["controller"]
+    assert [each["output"] for each in numbers] == ["y1", "y2"]
+    assert "double" in (folder / "gains_y1.c").read_text(encoding="utf-8")
 
 
 @pytest.mark.nightly
