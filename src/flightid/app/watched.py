@@ -24,7 +24,7 @@ ENDED = "ended on request"
 
 
 @dataclass(frozen=True)
-class Progress:
+class WorkProgress:
     """How far work is.
 
     Attributes
@@ -39,7 +39,7 @@ class Progress:
     share: float | None
 
 
-class WorkEnded(BaseException):
+class Cancellation(BaseException):
     """Work was asked to end: nothing that handles errors of the work holds it up."""
 
 
@@ -59,16 +59,16 @@ def watched(place: Path, call: Callable[..., Any], *inputs: object) -> tuple[Any
     try:
         with shown_by(teller.opened):
             return answered(call, *inputs)
-    except WorkEnded:
+    except Cancellation:
         return None, ENDED, time.perf_counter() - begun
 
 
-def progress_at(place: Path) -> Progress | None:
+def progress_at(place: Path) -> WorkProgress | None:
     """What stands in a file of progress; None where there is nothing that can be read."""
     try:
         found = json.loads(place.read_bytes()[:MOST_BYTES])
         share = found["share"]
-        return Progress(str(found["label"]), None if share is None else float(share))
+        return WorkProgress(str(found["label"]), None if share is None else float(share))
     except (OSError, ValueError, TypeError, LookupError):
         return None
 
@@ -113,7 +113,7 @@ class _Teller:
             return
         self._last = now
         if _request(self._place).exists():
-            raise WorkEnded
+            raise Cancellation
         newest = self._open[-1]
         with suppress(OSError):
             # Read by who bears half a file: nothing is lost with it.
