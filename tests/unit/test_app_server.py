@@ -302,6 +302,12 @@ def test_gains_comparisons_and_plans_refuse_what_is_not_there(
     browser.workspace.keep_result(flown.log, f"gains-{version}", known)
     told = browser.ask(f"/api/gains/{flown.log}", "POST", {})[1]
     assert (told["gains"], told["jobs"]) == (known, [])
+    job = {"id": f"gains-{flown.log}", "kind": "gains", "log": flown.log, "state": "interrupted"}
+    assert not [
+        each for each in browser.ask("/api/jobs", "POST", job)[1] if each["kind"] == "gains"
+    ]
+    none = {**job, "log": "0" * 16, "id": f"gains-{'0' * 16}"}
+    assert browser.ask("/api/jobs", "POST", none)[0] == 404
     firm = study + '\n[tune]\npreset = "firm"\n'
     assert gain_work.gains_version(flown.study, firm) != version
     here: dict[str, Any] = {"log": flown.log, "span_s": None, "promised": False}

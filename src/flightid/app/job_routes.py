@@ -8,6 +8,7 @@ from fastapi import FastAPI, HTTPException
 
 from flightid.app.backstage import Backstage, known_log
 from flightid.app.fleet_routes import sound_fleet
+from flightid.app.gain_answers import kept_gains
 from flightid.app.schemas import Job
 
 
@@ -21,12 +22,16 @@ def add_job_routes(app: FastAPI, backstage: Backstage) -> None:
 
     @app.post("/api/jobs")
     async def again(job: Job) -> list[Job]:
-        path = backstage.studies.path(job.log) if job.kind == "run" else None
+        of_study = job.kind in ("run", "gains")
+        path, version = backstage.studies.path(job.log) if of_study else None, ""
         if job.kind == "fleet":
             path = (await asyncio.to_thread(sound_fleet, workspace, job.log)).path
-        if job.kind == "run" and path is None:
+        if of_study and path is None:
             raise HTTPException(404, "There is no study to run.")
-        workers.ensure(job.kind, job.log, path or known_log(workspace, job.log), again=True)
+        if job.kind == "gains":
+            _, version, _ = await asyncio.to_thread(kept_gains, backstage, job.log)
+        path = path or known_log(workspace, job.log)
+        workers.ensure(job.kind, job.log, path, again=True, of=version)
         return workers.all()
 
     @app.delete("/api/jobs/{name}")
