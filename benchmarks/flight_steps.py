@@ -37,7 +37,7 @@ from tests.strangers.ordinary_steps import BETAFLIGHT, HELICOPTER, PLANE, PX4, Q
 
 from flightid.errors import FlightidError
 from flightid.review.deconvolution import LoopSamples, closed_loop
-from flightid.review.step_features import step_features
+from flightid.review.step_features import window_features
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.quantiles import tails
 
@@ -121,8 +121,8 @@ def _row(way: str, axis: Axis, made: list[Flown], ticks: Array, known: Array) ->
 
 
 def _read(curves: list[Curve]) -> tuple[Array, Array]:
-    """Rise times (s) and overshoots (%) by the same rule for every way, and for the truth."""
-    read = [step_features(np.array([c.value, c.value]), c.time_s) for c in curves]
+    """Rise times (s) and overshoots (%), of the level at the window's end, by one rule for all."""
+    read = [window_features(np.array([c.value, c.value]), c.time_s) for c in curves]
     told = [(each[2].value, each[3].value) for each in read]
     rises, overshoots = np.array(told, dtype=float).T
     return rises, overshoots

@@ -11,6 +11,10 @@ import pytest
 import flightid as fid
 from flightid.cli.log_parts import log_records
 from flightid.cli.program import run
+from flightid.conventions import Light
+from flightid.findings import Finding
+from flightid.inspection.flight_phases import FlightPhases
+from flightid.inspection.inspection import Inspection
 from flightid.study.proposal import propose_study
 from flightid.vehicles import PilotDoublet, SidActivation, fly, write_ardupilot_log
 
@@ -44,7 +48,9 @@ def test_a_parameter_goes_and_the_path_is_told(
     assert [step["name"] for step in plain["path"] if step["accepted"]] == ["Lp"]
 
 
-def test_structures_stand_side_by_side(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_structures_stand_side_by_side(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The vehicle only integrates: its damping is worth less than the parameter that it costs."""
     words = ["compare-structures", str(recorded(tmp_path)), "--axis", "roll", "--json"]
     words += ["--method", "output_error", "--model", "rate_first_order"]
@@ -53,6 +59,15 @@ def test_structures_stand_side_by_side(tmp_path: Path, capsys: pytest.CaptureFix
     assert made["best"] == "rate_integrator"
     assert 0.0 < made["rows"]["rate_first_order"]["criterion"] < 2.0
     assert made["rows"]["rate_integrator"]["light"] == "green"
+    # Of a log its inspection counts, as in identify, which called the same fit by another light.
+    phases = FlightPhases(((0.0, 9.0),), True, None, "")
+    doubt = Finding("slow", Light.AMBER, "logged slowly")
+    seen = Inspection("a", "px4", "", "copter", 9.0, (), phases, (), (), (), (), (doubt,))
+    verb = "flightid.cli.compare_structures.inspections_of"
+    monkeypatch.setattr(verb, lambda _files: [seen])
+    assert run([*words, "--model", "rate_integrator"]) == 0
+    made = json.loads(capsys.readouterr().out)
+    assert made["rows"]["rate_integrator"]["light"] == "amber"
     assert run(words) == 2
     assert "two structures or more" in capsys.readouterr().err
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from flightid.cli.equations import equations, fits_of
+from flightid.cli.log_parts import inspections_of, with_inspections
 from flightid.cli.option_fields import OptionsCommand
 from flightid.cli.output import all_option, json_option
 from flightid.cli.pages import show
@@ -59,4 +60,6 @@ def command(
         raise click.UsageError("name two structures or more by --model")
     with progress(None, "Fitting"):
         fits, _ = fits_of(models, axis, method, files, options)
+        seen = inspections_of(files)
+        fits = {name: with_inspections(fit, seen) for name, fit in fits.items()}
     show(compare_structures(fits), "Structures", as_json=as_json)

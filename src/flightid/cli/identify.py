@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,6 +13,7 @@ from flightid.cli.black_boxes import KINDS, black_boxes, structure_of
 from flightid.cli.equations import equations, fits_of
 from flightid.cli.figures import FIGURE
 from flightid.cli.lists import ListOption
+from flightid.cli.log_parts import inspections_of, with_inspections
 from flightid.cli.option_fields import OptionsCommand
 from flightid.cli.output import all_option, emit, json_option, leave_by_verdict, level_option, note
 from flightid.cli.pages import html_option, model_file_option, write_page
@@ -20,6 +22,7 @@ from flightid.cli.sources import AXES, known_models
 
 if TYPE_CHECKING:
     from flightid.identification import Fit, Reduction
+    from flightid.inspection import Inspection
     from flightid.options import Options
 
 
@@ -80,7 +83,6 @@ def command(
     verdict is red.
     """
     import flightid
-    from flightid.logs import is_log
     from flightid.progress import progress
     from flightid.uncertainty.quantiles import showing
 
@@ -100,8 +102,7 @@ def command(
             (fit,) = fits.values()
         advance()
         result = flightid.reduce(fit, data) if reduced else fit
-        for log in filter(is_log, files):
-            result = _with_inspection(result, log)
+        result = _with_inspection(result, inspections_of(files))
         advance()
     note(repr(result))
     if isinstance(result, flightid.Reduction) and not as_json:
@@ -116,21 +117,14 @@ def command(
     leave_by_verdict((*result.findings, *found.evidence.findings))
 
 
-def _with_inspection(result: Fit | Reduction, file: Path) -> Fit | Reduction:
-    """The fit, or every fit of a reduction, with the verdict on the log among its evidence."""
+def _with_inspection(result: Fit | Reduction, inspections: Sequence[Inspection]) -> Fit | Reduction:
+    """The fit, or every fit of a reduction, with the verdicts on its logs among its evidence."""
     import flightid
-    from flightid.evidence import inspection_check, sweep_check
-
-    inspection = flightid.inspect_log(file)
-
-    def examined(fit: Fit) -> Fit:
-        channels = (*fit.model.inputs, *fit.model.outputs)
-        checks = [inspection_check(inspection, channels), *sweep_check(inspection, channels)]
-        return replace(fit, evidence=fit.evidence.with_checks(checks))
 
     if not isinstance(result, flightid.Reduction):
-        return examined(result)
+        return with_inspections(result, inspections)
     path = tuple(
-        step if step.fit is None else replace(step, fit=examined(step.fit)) for step in result.path
+        step if step.fit is None else replace(step, fit=with_inspections(step.fit, inspections))
+        for step in result.path
     )
-    return replace(result, start=examined(result.start), path=path)
+    return replace(result, start=with_inspections(result.start, inspections), path=path)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from flightid.cli.output import note
 
 if TYPE_CHECKING:
+    from flightid.identification import Fit
+    from flightid.inspection import Inspection
     from flightid.logs import Log
     from flightid.record import Record
     from flightid.study.proposal.parts import AxisParts, LogPart
@@ -65,6 +68,25 @@ def with_instrument(
     if len(found) != 1 or not all(map(is_log, files)):
         return given
     return {**given, "estimator": "instrument", "excitations": found}
+
+
+def inspections_of(files: Iterable[Path]) -> list[Inspection]:
+    """Inspections of the logs among some files."""
+    from flightid import inspect_log
+    from flightid.logs import is_log
+
+    return [inspect_log(file) for file in files if is_log(file)]
+
+
+def with_inspections(fit: Fit, inspections: Iterable[Inspection]) -> Fit:
+    """A fit with the verdicts on the logs that its data come from among its evidence."""
+    from flightid.evidence import inspection_check, sweep_check
+
+    channels = (*fit.model.inputs, *fit.model.outputs)
+    for each in inspections:
+        checks = [inspection_check(each, channels), *sweep_check(each, channels)]
+        fit = replace(fit, evidence=fit.evidence.with_checks(checks))
+    return fit
 
 
 def _parts(log: Log, inputs: Sequence[str]) -> list[AxisParts]:
