@@ -88,8 +88,10 @@ class AxisBand:
     @property
     def is_usable(self) -> bool:
         """Whether what is coherent is wide enough for a model."""
-        wide = self.coherent_rad_s or self.band_rad_s
-        return self.band_rad_s is not None and wide[1] / wide[0] >= BAND_LEAST.value
+        if self.band_rad_s is None:
+            return False
+        low, high = self.coherent_rad_s or self.band_rad_s
+        return high / low >= BAND_LEAST.value
 
     @property
     def told_rad_s(self) -> tuple[float, float] | None:
