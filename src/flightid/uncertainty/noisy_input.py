@@ -32,7 +32,7 @@ PREFERRED = 6.63
 """Fall of χ² from no noise, of one number, that chance takes 1 of 100 times."""
 SHOWN = 3.0
 """Errors of a direction's power by which it stands above the noise."""
-BEYOND = 1.6
+BEYOND = 3.0
 """Times the power of the weakest direction, which is less than the noise by chance."""
 FIRST = 1e-2
 TRIED, REFINED = 14, 5
