@@ -172,7 +172,9 @@ def _judged(
     pairs = [run.scored(model.outputs[0]) for run in runs]
     measured, predicted = (np.concatenate([pair[side] for pair in pairs]) for side in (0, 1))
     rms = float(rms_error(measured, predicted))
-    errors = tuple(np.subtract(*pair).astype(np.float32) for pair in pairs)
+    # A run that all but diverged has errors that single precision does not hold, and is like none.
+    held = float(np.max(np.abs(measured - predicted))) < float(np.finfo(np.float32).max)
+    errors = tuple(np.subtract(*pair).astype(np.float32) for pair in pairs) if held else ()
     percent = float(fit_percent(measured, predicted))
     return OrderTrial(structure, model, measures, rms, percent, note, errors=errors)
 
