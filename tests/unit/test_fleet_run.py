@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime
 import errno
+import hashlib
 import importlib.util
 import os
 import shutil
@@ -35,6 +36,7 @@ from flightid.fleet.engine.order import (
 )
 from flightid.fleet.engine.sandbox import DEAD, MEMORY, TIME, Sandbox
 from flightid.fleet.identity import FleetTables, read_tables
+from flightid.fleet.missing import missing_logs
 from flightid.fleet.opening import current_store, open_catalogue
 from flightid.fleet.run_one import NAMING, LogTask, run_one
 from flightid.fleet.settings import read_fleet
@@ -434,6 +436,50 @@ def test_a_renamed_log_counts_under_its_new_name_and_a_deleted_one_is_told(
     ]
 
 
+def test_swapped_logs_follow_their_bytes_and_touched_ones_are_as_before(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Both names of a swap were there, so nothing followed; a touched log was renamed for ever."""
+    pytest.importorskip("duckdb")
+    fleet, logs = tmp_path / "fleet.toml", tmp_path / "logs"
+    rules = "[vehicles]\nby = 'name'\npattern = '^(V[0-9]+)'\ntype = 'quad'\n"
+    fleet.write_text("[fleet]\ntitle = 't'\nlogs = ['logs']\n" + rules)
+    logs.mkdir()
+    one, other, copied = (logs / f"V0{n}-20260105.bin" for n in (1, 2, 3))
+    for n, path in enumerate((one, other, copied)):
+        path.write_bytes(b"no log %d" % n)
+    monkeypatch.setattr("flightid.fleet.run.find_spec", lambda _: None)
+    assert run_fleet(fleet, workers=1).outcomes == {"refused": 3}
+    before = hashlib.sha256(one.read_bytes()).hexdigest()
+    for path, to in ((one, logs / "t"), (other, one), (logs / "t", other)):
+        path.rename(to)
+    # The original of a copy is touched: its record is not the copy's.
+    shutil.copy(copied, logs / "V00-20260105.bin")
+    os.utime(copied, (1.0, 1.0))
+    said = fleet_status(fleet)
+    assert said.shares is not None
+    assert {(each.vehicle_before, each.vehicle_now) for each in said.shares.renamed} == {
+        ("V01", "V02"), ("V02", "V01"),
+    }  # fmt: skip
+    assert [PurePosixPath(each).name for each in said.shares.copies] == ["V00-20260105.bin"]
+    # No process is begun for bytes that have a record, and no bar.
+    monkeypatch.setattr("flightid.fleet.run._Run._taken", never)
+    monkeypatch.setattr("flightid.fleet.run.progress", never)
+    done = run_fleet(fleet, workers=1)
+    assert (done.found, done.kept, done.outcomes) == (4, 4, {})
+    assert done.findings[0].message.startswith("2 logs have another vehicle now")
+    with open_catalogue(fleet) as catalogue:
+        rows = catalogue.query("SELECT log, vehicle FROM logs ORDER BY 2").fetchall()
+    assert [vehicle for _, vehicle in rows] == ["V01", "V02", "V03"]
+    assert rows[1][0] == before
+    for found in (fleet_status(fleet).findings, run_fleet(fleet, workers=1).findings):
+        assert "renamed-logs" not in [each.code for each in found]
+    settings = read_fleet(fleet)
+    tables = read_tables(settings)
+    left = missing_logs(current_store(settings), find_logs([str(logs)]), tables, retry=False)
+    assert [each.name for each in left.addresses] == ["V00-20260105.bin"], "the copy alone"
+
+
 def test_tables_of_vehicles_and_flights_reach_every_log(fleet: Path, tmp_path: Path) -> None:
     """A worker has no tables beside it: their lines come with each log."""
     (log, *_) = sorted((fleet.parent / "logs").glob("V00-*.bin"))
@@ -461,6 +507,8 @@ def test_a_run_in_which_all_fails_says_so(fleet: Path, monkeypatch: pytest.Monke
 
     monkeypatch.setattr("flightid.fleet.run.find_spec", lambda name: None)
     monkeypatch.setattr("flightid.fleet.run.run_plain", dead)
+    # Copies of what is known are no logs that are taken: one that is none of them.
+    (fleet.parent / "logs" / "V03-2026-02-05.bin").write_bytes(b"another")
     done = run_fleet(fleet)
     assert [each.code for each in done.findings if each.light == "red"] == ["all-failed"]
 

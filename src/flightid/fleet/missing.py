@@ -59,12 +59,15 @@ class MissingLogs:
         By log: records whose file is not at the places of the fleet file.
     fitted : dict of str to str
         By log: vehicle of those with a model; empty where it names none.
+    held : dict of str to LogEntry
+        By log: records that are kept, wherever their file lies.
     """
 
     addresses: list[LogAddress]
     earlier: dict[str, set[str]]
     gone: dict[str, LogEntry]
     fitted: dict[str, str]
+    held: dict[str, LogEntry]
 
 
 def missing_logs(
@@ -78,12 +81,13 @@ def missing_logs(
     """
     there = {each.address: each for each in addresses}
     done, again, earlier = set[str](), set[str](), dict[str, set[str]]()
-    gone, fitted = dict[str, LogEntry](), dict[str, str]()
+    gone, fitted, held = dict[str, LogEntry](), dict[str, str](), dict[str, LogEntry]()
     for entry in catalogue_entries(store):
         is_failed = retry and entry.outcome == FAILED
         if entry.reason == BROKEN or entry.is_outdated(tables) or is_failed:
             again.add(entry.log)
             continue
+        held[entry.log] = entry
         if entry.outcome == FITTED:
             fitted[entry.log] = entry.vehicle
         if entry.address not in there:
@@ -96,7 +100,9 @@ def missing_logs(
         again |= earlier.pop(address, set())
     forget(store, again)
     left = [each for each in addresses if each.address not in done]
-    return MissingLogs(left, earlier, gone, {k: v for k, v in fitted.items() if k not in again})
+    fitted = {k: v for k, v in fitted.items() if k not in again}
+    held = {k: v for k, v in held.items() if k not in again}
+    return MissingLogs(left, earlier, gone, fitted, held)
 
 
 def stands_for(entry: LogEntry, address: LogAddress) -> bool:

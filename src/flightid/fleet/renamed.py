@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import datetime
-import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import PurePosixPath
 
 from flightid.conventions import Light
-from flightid.errors import FlightidError
-from flightid.extras import extra_module
 from flightid.findings import Finding, counted
 from flightid.fleet.addresses import LogAddress
 from flightid.fleet.catalogue.compaction import read_records
@@ -62,6 +59,11 @@ class RenamedLog:
         return self.vehicle_now != self.vehicle_before
 
     @property
+    def differs(self) -> bool:
+        """Whether its name or its vehicle does; of a log that was only touched neither."""
+        return self.before != self.now or self.other_vehicle
+
+    @property
     def words(self) -> str:
         """Both names, and both vehicles where they differ."""
         first, second = (PurePosixPath(each) for each in (self.before, self.now))
@@ -96,24 +98,11 @@ def _instant(text: str) -> datetime.datetime | None:
     return datetime.datetime.fromisoformat(text) if text else None
 
 
-def still_there(address: str) -> bool:
-    """Whether anything lies at the address of a record; where nobody can look it counts as there.
-
-    Another fleet file may share the catalogue, and its logs are no concern of this one.
-    """
-    if "://" not in address:
-        return os.path.lexists(address)
-    try:
-        fs, path = extra_module("fsspec", "the address of a log").core.url_to_fs(address)
-        return bool(fs.exists(path))
-    except (FlightidError, OSError, ValueError, ImportError):
-        return True
-
-
-def follow(store: Store, moved: Mapping[str, tuple[LogAddress, LogIdentity]]) -> None:
+def follow(store: Store, moved: Mapping[str, tuple[LogAddress, LogIdentity | None]]) -> None:
     """Give records the place, vehicle, type and date that their logs have now.
 
-    The new record is written before the old one goes: a part that holds it counts until then.
+    Without an identity only size and time of change are new: the file was touched. The new record
+    is written before the old one goes: a part that holds it counts until then.
     """
     parts, _ = read_parts(store)
     held = list(read_records(store, parts, moved.keys())) if parts and moved else []
@@ -124,11 +113,17 @@ def follow(store: Store, moved: Mapping[str, tuple[LogAddress, LogIdentity]]) ->
     out_of_parts(store, compacted)
 
 
-def _followed(record: LogRecord, address: LogAddress, identity: LogIdentity) -> LogRecord:
+def _followed(record: LogRecord, address: LogAddress, identity: LogIdentity | None) -> LogRecord:
+    lies = {"address": address.address, "bytes": address.n_bytes, "stamp": address.stamp}
+    if identity is None:
+        return LogRecord(record.log, record.rows | {"logs": [{**record.rows["logs"][0], **lies}]})
     at = None if identity.flown_at is None else identity.flown_at.isoformat()
     common = {"vehicle": identity.vehicle, "type": identity.type, "flown_at": at}
-    own = {"address": address.address, "bytes": address.n_bytes, "stamp": address.stamp}
-    own |= {"id": identity.own, "told": identity.told, "flown_at_from": identity.flown_at_from}
+    own = lies | {
+        "id": identity.own,
+        "told": identity.told,
+        "flown_at_from": identity.flown_at_from,
+    }
     rows = {name: [{**row, **common} for row in held] for name, held in record.rows.items()}
     (log,) = rows["logs"]
     rows["logs"] = [{**log, **own}]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import replace
 from importlib.util import find_spec
+from itertools import chain
 from multiprocessing import current_process
 from pathlib import Path
 from time import sleep
@@ -33,18 +34,17 @@ from flightid.fleet.engine.order import (
 )
 from flightid.fleet.engine.plain import run_plain
 from flightid.fleet.engine.sandbox import TIME
+from flightid.fleet.following import following
 from flightid.fleet.identity import FleetTables, identify_log, read_tables
 from flightid.fleet.missing import LogEntry, MissingLogs, forget, missing_logs
 from flightid.fleet.opening import current_store
 from flightid.fleet.pattern_clock import require_quick
+from flightid.fleet.recorded import recorded_logs
 from flightid.fleet.refusal import ACTIONS, PATTERN
 from flightid.fleet.renamed import (
-    RenamedLog,
     follow,
     gone_light,
-    renamed_identity,
     renamed_light,
-    still_there,
 )
 from flightid.fleet.run_one import FULL, NAMING, made_record
 from flightid.fleet.run_result import FleetInterrupt, FleetRun
@@ -134,12 +134,11 @@ def _run(
     replaced, taken = set[str](), TakenContents()
     run = _Run(settings, tables, store, order, workers, scheduler)
     before = len(addresses) - len(missing.addresses)
+    seen, fresh = _seen(missing, tables)
     try:
-        with progress(len(missing.addresses), settings.path.stem) as advance:
-            for outcome in run.outcomes(orders(missing.addresses, tables)):
-                taken.add(outcome)
-                replaced |= missing.earlier.get(outcome.order.address.address, set())
-                advance()
+        for outcome in chain(seen, _shown(run.outcomes(fresh), len(fresh), settings.path.stem)):
+            taken.add(outcome)
+            replaced |= missing.earlier.get(outcome.order.address.address, set())
     except KeyboardInterrupt as stop:
         raise FleetInterrupt(before + taken.names, len(addresses)) from stop
     replaced -= taken.outcomes.keys()
@@ -163,6 +162,28 @@ def _run(
     )  # fmt: skip
 
 
+def _seen(missing: MissingLogs, tables: FleetTables) -> tuple[list[LogOutcome], list[LogOrder]]:
+    """Files whose bytes the catalogue has under another name or time of change, and the others.
+
+    No process is begun for the first, and they are no progress.
+    """
+    logs = recorded_logs(missing.addresses, missing.held)
+    every = orders(missing.addresses, tables)
+    seen = [each for each in every if each.address.address in logs]
+    fresh = [each for each in every if each.address.address not in logs]
+    return [LogOutcome(each, KNOWN, logs[each.address.address]) for each in seen], fresh
+
+
+def _shown(outcomes: Iterable[LogOutcome], number: int, name: str) -> Iterator[LogOutcome]:
+    """The same with their progress; with none there is no bar."""
+    if not number:
+        return
+    with progress(number, name) as advance:
+        for outcome in outcomes:
+            yield outcome
+            advance()
+
+
 def _replaced(aside: Sequence[str], replaced: Set[str]) -> Iterator[Finding]:
     if aside:
         text = (
@@ -170,7 +191,10 @@ def _replaced(aside: Sequence[str], replaced: Set[str]) -> Iterator[Finding]:
         )
         yield Finding("damaged-parts", Light.AMBER, text)
     if replaced:
-        text = f"{len(replaced)} earlier records count no more: their logs have other bytes now"
+        whose = "its log has" if len(replaced) == 1 else "their logs have"
+        verb = "counts" if len(replaced) == 1 else "count"
+        said = counted(len(replaced), "earlier record")
+        text = f"{said} {verb} no more: {whose} other bytes now"
         yield Finding("replaced-records", Light.GREEN, text)
 
 
@@ -349,26 +373,14 @@ class _Run:
 
         What was followed is gone no more, and its vehicle is the new one.
         """
-        rules, tables, moved, again = self.settings.vehicles, self.tables, {}, set[LogAddress]()
-        renamed = list[RenamedLog]()
-        for log, address in taken.known.items():
-            entry = missing.gone.get(log)
-            if entry is None or still_there(entry.address):
-                continue
-            renamed.append(RenamedLog.of(entry, address, rules, tables))
-            found = renamed_identity(entry, address, rules, tables)
-            if found is None:
-                again.add(address)
-            else:
-                moved[log] = (address, found)
-            del missing.gone[log]
-            if log in missing.fitted:
-                missing.fitted[log] = renamed[-1].vehicle_now or ""
-        follow(self.store, moved)
-        forget(self.store, {log for log, address in taken.known.items() if address in again})
-        for outcome in self.outcomes(orders(sorted(again, key=lambda e: e.address), tables)):
+        tables = self.tables
+        plan = following(missing, taken.known, self.settings.vehicles, tables)
+        follow(self.store, plan.moved)
+        forget(self.store, set(plan.again))
+        late = sorted(plan.again.values(), key=lambda each: each.address)
+        for outcome in self.outcomes(orders(late, tables)):
             taken.add(outcome)
-        return tuple(renamed_light(renamed, followed=True))
+        return tuple(renamed_light(plan.renamed, followed=True))
 
     def tidy(self, at_least: int) -> None:
         """Compact where the libraries for it are installed; loose files count all the same."""

@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from functools import lru_cache
 from typing import Any
 
 from flightid.errors import OptionError
-from flightid.files import sha256_of_file
 from flightid.findings import Finding
 from flightid.fleet.addresses import LogAddress, find_logs
 from flightid.fleet.catalogue.loose import BROKEN
@@ -17,6 +15,7 @@ from flightid.fleet.catalogue.store import Store
 from flightid.fleet.identity import FleetTables, read_tables
 from flightid.fleet.missing import LogEntry, catalogue_entries, stands_for
 from flightid.fleet.reasons import WIDTH
+from flightid.fleet.recorded import recorded_logs
 from flightid.fleet.renamed import RenamedLog, outdated_light
 from flightid.fleet.settings import FleetSettings, VehicleRules
 from flightid.fleet.taken import copies_named
@@ -75,26 +74,30 @@ class FleetShares:
             return None
         there = {each.address: each for each in addresses}
         own = {e.address: e for e in entries.values() if _is_there(e, there)}
-        sizes = {entry.bytes for entry in entries.values()}
         copies, waiting = dict[str, str](), list[str]()
         of = {entry.log: entry.address for entry in own.values()}
         outdated = [e for e in own.values() if e.reason != BROKEN and e.is_outdated(tables)]
         renamed = [RenamedLog.of(e, there[e.address], rules, tables) for e in outdated]
         renamed = [each for each in renamed if each.other_vehicle]
-        for each in addresses:
-            if each.address in own:
-                continue
-            log = _digest(each) if str(each.n_bytes) in sizes else ""
+        left = [each for each in addresses if each.address not in own]
+        seen = recorded_logs(left, entries)
+        # A file that was touched alone keeps its record before a copy of it is asked.
+        for each in sorted(
+            left, key=lambda e: _lay_at(entries, seen.get(e.address, "")) != e.address
+        ):
+            log = seen.get(each.address, "")
             if log in of:
                 copies[each.address] = of[log]
-            elif log in entries:  # It was moved: its record stands for it under the new name.
+            elif log in entries:  # Its record stands for it, under the new name where it has one.
                 own[each.address], of[log] = entries[log], each.address
-                renamed.append(RenamedLog.of(entries[log], each, rules, tables))
+                named = RenamedLog.of(entries[log], each, rules, tables)
+                renamed += [named] if named.differs else []
             else:
                 waiting.append(each.address)
         counts = Counter(entry.outcome for entry in own.values())
         gone = tuple(sorted(e.address for log, e in entries.items() if log not in of))
-        return cls(dict(counts), copies, tuple(waiting), gone, tuple(renamed))
+        kept = dict(sorted(copies.items()))
+        return cls(dict(counts), kept, tuple(waiting), gone, tuple(renamed))
 
 
 def fleet_shares(settings: FleetSettings, store: Store) -> tuple[FleetShares | None, int]:
@@ -104,27 +107,15 @@ def fleet_shares(settings: FleetSettings, store: Store) -> tuple[FleetShares | N
     return FleetShares.of(store, found, settings.vehicles, tables), len(found)
 
 
+def _lay_at(entries: Mapping[str, LogEntry], log: str) -> str:
+    """Address of the record of a log; empty without one."""
+    return entries[log].address if log in entries else ""
+
+
 def _is_there(entry: LogEntry, there: Mapping[str, LogAddress]) -> bool:
     """Whether the file of a record lies where it lay; a broken record keeps no more than that."""
     found = there.get(entry.address)
     return found is not None and (entry.reason == BROKEN or stands_for(entry, found))
-
-
-def _digest(address: LogAddress) -> str:
-    """Digest of a file of this machine; empty where it cannot be read, or is read from afar."""
-    if address.local is None or address.problem:
-        return ""
-    try:
-        return _digest_of(address.address, address.n_bytes, address.stamp)
-    except OSError:
-        return ""
-
-
-@lru_cache(maxsize=1 << 16)
-def _digest_of(path: str, n_bytes: int, stamp: str) -> str:
-    """Taken once as long as size and time of change stay."""
-    del n_bytes, stamp
-    return sha256_of_file(path)
 
 
 def copy_lines(shares: FleetShares | None) -> list[str]:

@@ -24,15 +24,15 @@ class TakenContents:
     ----------
     outcomes : dict of str to str
         By log.
-    known : dict of str to LogAddress
-        Logs that the catalogue had, and where they lie; of copies the first.
+    known : dict of str to list of LogAddress
+        Logs that the catalogue had, and where they lie, copies too.
     fitted : dict of str to str
         Vehicle of each log that gave a model now; empty where it names none.
     """
 
     def __init__(self) -> None:
         self.outcomes: dict[str, str] = {}
-        self.known: dict[str, LogAddress] = {}
+        self.known: dict[str, list[LogAddress]] = {}
         self.fitted: dict[str, str] = {}
         self._told: dict[str, Mapping[str, str]] = {}
         self._first: dict[str, str] = {}
@@ -44,7 +44,7 @@ class TakenContents:
         if self._first.setdefault(log, address) != address:
             self._copied[address] = log
         if outcome.outcome == KNOWN:
-            self.known.setdefault(log, outcome.order.address)
+            self.known.setdefault(log, []).append(outcome.order.address)
         elif outcome.outcome == FITTED:
             self.fitted[log] = outcome.vehicle
         if self.outcomes.get(log, KNOWN) == KNOWN:
