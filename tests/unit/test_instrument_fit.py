@@ -30,7 +30,7 @@ def _truth() -> dict[str, float]:
 def test_the_excitation_takes_the_bias_of_feedback_away(biased: fid.Fit) -> None:
     found = instrument_fit(biased)
     assert found is not None
-    assert "output error, which feedback of noise biases (loop closed: past noise" in found.reason
+    assert "output error, which feedback of noise biases (" in found.reason
     for name, value in _truth().items():
         ours, theirs = found.fit.parameters[name], biased.parameters[name].value
         assert abs(ours.value - value) < 3.0 * ours.stderr, name
