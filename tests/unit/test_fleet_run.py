@@ -38,6 +38,7 @@ from flightid.fleet.engine.sandbox import DEAD, MEMORY, TIME, Sandbox
 from flightid.fleet.identity import FleetTables, read_tables
 from flightid.fleet.missing import missing_logs
 from flightid.fleet.opening import current_store, open_catalogue
+from flightid.fleet.page import fleet_words
 from flightid.fleet.run_one import NAMING, LogTask, run_one
 from flightid.fleet.settings import read_fleet
 from flightid.fleet.shares import copy_lines
@@ -462,6 +463,7 @@ def test_swapped_logs_follow_their_bytes_and_touched_ones_are_as_before(
         ("V01", "V02"), ("V02", "V01"),
     }  # fmt: skip
     assert [PurePosixPath(each).name for each in said.shares.copies] == ["V00-20260105.bin"]
+    assert fleet_words(ask_fleet(fleet)).startswith("3 logs and 1 copy of them, 0 with a model")
     # No process is begun for bytes that have a record, and no bar.
     monkeypatch.setattr("flightid.fleet.run._Run._taken", never)
     monkeypatch.setattr("flightid.fleet.run.progress", never)

@@ -61,6 +61,7 @@ def run(
     takes what is missing. The exit code is 1 where no log was found, every one that was taken
     failed, or none of the catalogue has a model.
     """
+    from flightid.findings import counted
     from flightid.fleet import run_fleet
     from flightid.fleet.reasons import reason_lines
 
@@ -77,7 +78,9 @@ def run(
     if as_json:
         emit_values(done.to_dict())
     else:
-        click.echo(f"{done.found} logs, {done.kept} of them in the catalogue before")
+        nothing = ": nothing new" if done.kept == done.found > 0 else ""
+        found = counted(done.found, "log")
+        click.echo(f"{found}, {done.kept} of them in the catalogue before{nothing}")
         for outcome, number in sorted(done.outcomes.items()):
             click.echo(f"{number} {outcome}")
         if done.copies:

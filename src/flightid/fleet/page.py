@@ -20,6 +20,7 @@ from flightid.fleet.reasons import grouped_reasons, reasons_table
 from flightid.fleet.statistics.answers import RED, FleetAnswers, Row, TypeAnswers, fitted_share
 from flightid.fleet.statistics.drift import FleetDrift
 from flightid.fleet.statistics.multiple_testing import chance_cell
+from flightid.fleet.taken import copies_named
 from flightid.fleet.unnamed import unnamed_light, unnamed_logs
 from flightid.fleet.vehicle_lights import vehicle_light
 from flightid.report.content import Block, Document, Lights, Paragraph, Section, TableBlock
@@ -90,7 +91,9 @@ def fleet_words(answers: FleetAnswers) -> str:
     fitted, every = fitted_share(answers.logs)
     vehicles = len(fleet_vehicles(answers))
     whose = counted(vehicles, "vehicle") if vehicles else "vehicles that nothing names"
-    return f"{counted(every, 'log')}, {fitted} with a model, of {whose}"
+    n = len(answers.copies)
+    copies = f" and {n} cop{'y' if n == 1 else 'ies'} of them" if n else ""
+    return f"{counted(every, 'log')}{copies}, {fitted} with a model, of {whose}"
 
 
 def fleet_vehicles(answers: FleetAnswers) -> dict[str, Finding]:
@@ -177,7 +180,10 @@ def _type_blocks(each: TypeAnswers) -> Iterator[Block]:
         yield TableBlock(each.population.summary(labels=each.labels))
         yield TableBlock(each.population.spread_table(labels=each.labels))
         if each.odd_flights:
-            told = ", ".join(f"{n} of {each.labels.get(k, k)}" for k, n in each.odd_flights.items())
+            told = "; ".join(
+                f"{len(logs)} of {each.labels.get(k, k)} ({_few(logs)})"
+                for k, logs in each.odd_flights.items()
+            )
             yield Paragraph(
                 f"Flights far off those beside them are left out of these tables: {told}."
             )
@@ -197,6 +203,12 @@ def _type_blocks(each: TypeAnswers) -> Iterator[Block]:
             yield Paragraph(f"No vehicle was held beside its type: {each.outliers.reason}.")
     if each.drift is not None:
         yield from _drift_blocks(each.drift, each.labels)
+
+
+def _few(logs: Sequence[str]) -> str:
+    """The first few names of logs, and how many there are more."""
+    left = len(logs) - SHOWN
+    return ", ".join(logs[:SHOWN]) + (f" and {left} more" if left > 0 else "")
 
 
 def _drift_blocks(drift: FleetDrift, labels: Mapping[str, str]) -> Iterator[Block]:
@@ -285,6 +297,8 @@ def _refused(answers: FleetAnswers) -> Iterator[Block]:
     every = "Every log gave a model; red ones count nowhere." if answers.red else EVERY
     yield TableBlock(table) if table.rows else Paragraph(every)
     yield from map(Paragraph, red_words(answers))
+    if answers.copies:
+        yield Paragraph(f"Copies, each the log of which it is one: {copies_named(answers.copies)}.")
 
 
 def red_words(answers: FleetAnswers) -> list[str]:

@@ -116,7 +116,7 @@ def follow(store: Store, moved: Mapping[str, tuple[LogAddress, LogIdentity | Non
 def _followed(record: LogRecord, address: LogAddress, identity: LogIdentity | None) -> LogRecord:
     lies = {"address": address.address, "bytes": address.n_bytes, "stamp": address.stamp}
     if identity is None:
-        return LogRecord(record.log, record.rows | {"logs": [{**record.rows["logs"][0], **lies}]})
+        return LogRecord(record.log, {**record.rows, "logs": [{**record.rows["logs"][0], **lies}]})
     at = None if identity.flown_at is None else identity.flown_at.isoformat()
     common = {"vehicle": identity.vehicle, "type": identity.type, "flown_at": at}
     own = lies | {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -76,19 +77,23 @@ def ask_fleet(place: str | Path) -> FleetAnswers:
         parameters=questions.parameters,
         population=questions.population,
     )
-    outdated = () if settings is None else _outdated(settings, place)
-    return replace(answers, damaged=damaged, outdated=outdated)
+    outdated, copies = ((), {}) if settings is None else _as_files_are(settings, place)
+    return replace(answers, damaged=damaged, outdated=outdated, copies=copies)
 
 
-def _outdated(settings: FleetSettings, place: str | Path) -> tuple[Finding, ...]:
-    """What of the catalogue is not as the files are; nothing where these are out of reach."""
+def _as_files_are(
+    settings: FleetSettings, place: str | Path
+) -> tuple[tuple[Finding, ...], Mapping[str, str]]:
+    """What of the catalogue is not as the files are, and copies; none of files out of reach."""
     store = opened_store(catalogue_place(place))
     earlier = earlier_light(settings, store)
     try:
         shares, _ = fleet_shares(settings, store)
     except (FlightidError, OSError):
-        return earlier
-    return (*earlier, *(() if shares is None else shares.findings))
+        return earlier, {}
+    if shares is None:
+        return earlier, {}
+    return (*earlier, *shares.findings), shares.copies
 
 
 def asked_of(place: str | Path) -> dict[str, Any]:

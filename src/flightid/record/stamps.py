@@ -185,7 +185,8 @@ def _in_order(
             found=f"{np.count_nonzero(backward)} repeated or backward stamps, the first at "
             f"index {first} ({stamps[first]:.6f} s)",
             needed="increasing stamps",
-            action="choose the stamp policy 'drop' or 'sort'",
+            action="copy the record again, for it may be damaged; of a sound one "
+            "to_uniform takes stamps='drop' or 'sort'",
         )
     n_disordered = 0
     if policy is StampPolicy.SORT:

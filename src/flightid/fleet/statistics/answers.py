@@ -48,8 +48,8 @@ class TypeAnswers:
         Parameters in words, where their models have them: ``"Lp"`` to ``"roll damping"``.
     red : mapping of str to int
         By vehicle: its flights of which this model is red, which count nowhere.
-    odd_flights : mapping of str to int
-        By parameter: flights left out of the population (`without_odd_flights`).
+    odd_flights : mapping of str to tuple of str
+        By parameter: logs left out of the population (`without_odd_flights`), by file name.
     """
 
     type_name: str
@@ -61,7 +61,7 @@ class TypeAnswers:
     reasons: tuple[str, ...] = ()
     labels: Mapping[str, str] = field(default_factory=dict)
     red: Mapping[str, int] = field(default_factory=dict)
-    odd_flights: Mapping[str, int] = field(default_factory=dict)
+    odd_flights: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +81,8 @@ class FleetAnswers:
         Parts of the catalogue that cannot be read: their logs are in no answer.
     outdated : tuple of Finding
         What of the catalogue is not as the fleet file and its logs are by now.
+    copies : mapping of str to str
+        Files with the bytes of another, whose log they are, and that one.
     """
 
     types: tuple[TypeAnswers, ...]
@@ -89,6 +91,7 @@ class FleetAnswers:
     red: Mapping[str, Sequence[str]] = field(default_factory=dict)
     damaged: int = 0
     outdated: tuple[Finding, ...] = ()
+    copies: Mapping[str, str] = field(default_factory=dict)
 
 
 def answer_questions(
@@ -124,12 +127,15 @@ def answer_questions(
     told = [each for each in rows["parameters"] if _counts(each, parameters)]
     groups = sorted({(each["type"], each["model"]) for each in told})
     answers, undated = [], 0
+    names = {e["log"]: str(e["address"]).rpartition("/")[2] for e in rows["logs"]}
     for type_name, model in groups:
         mine = [e for e in told if (e["type"], e["model"]) == (type_name, model)]
         data = _estimates(mine, [e for e in rows["covariances"] if e["model"] == model])
         dated = np.array([_instant(head) is not None for head in _heads(mine).values()])
         undated += int(np.count_nonzero(~dated))
-        one = _answered(type_name, model, data, population=population, outliers=outliers)
+        one = _answered(type_name, model, data, events, population=population, outliers=outliers)
+        named = {k: tuple(names.get(log, log) for log in v) for k, v in one.odd_flights.items()}
+        one = replace(one, odd_flights=named)
         if drift and dated.any():
             flights = data.chosen(dated)
             explained = _covariates(flights, rows, covariates)
@@ -224,12 +230,18 @@ def _set_covariance(matrix: Any, row: Row, columns: Mapping[str, int]) -> None: 
 
 
 def _answered(
-    type_name: str, model: str, data: FlightEstimates, *, population: bool, outliers: bool
+    type_name: str,
+    model: str,
+    data: FlightEstimates,
+    events: Sequence[FleetEvent],
+    *,
+    population: bool,
+    outliers: bool,
 ) -> TypeAnswers:
     if not (population or outliers):
         return TypeAnswers(type_name, model, data, None, None, None)
     shared, rare = _shared(data)
-    usual, odd = without_odd_flights(shared)
+    usual, odd = without_odd_flights(shared, events)
     try:
         found = estimate_population(usual, type_name)
         apart = find_outliers(found) if outliers else None

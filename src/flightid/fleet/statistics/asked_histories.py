@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.fleet.statistics.covariates import CovariateDesign, CovariateSlopes, own_slopes
-from flightid.fleet.statistics.days import covariance_by_day
+from flightid.fleet.statistics.days import SharedByDay, covariance_by_day
 from flightid.fleet.statistics.events import (
     FleetEvent,
     beside_steps,
     event_effects,
     event_steps,
 )
+from flightid.fleet.statistics.few_days import beside_spread
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
 from flightid.fleet.statistics.largest_step import (
     FEWEST,
@@ -53,7 +54,7 @@ def asked_history(
     design: CovariateDesign,
     fitted: CovariateSlopes,
     errors: Array,
-    by_day: Array,
+    by_day: SharedByDay,
     events: Sequence[FleetEvent],
     moved: Array,
 ) -> AskedHistory | None:
@@ -68,9 +69,10 @@ def asked_history(
     vehicle : str
     design : CovariateDesign
     fitted : CovariateSlopes
-    errors, by_day, moved : ndarray, shape (n,)
-        Of every flight: variance, what flights of its day share of it, and what all vehicles share,
-        which events of all keep.
+    errors, moved : ndarray, shape (n,)
+        Of every flight: variance, and what all vehicles share, which events of all keep.
+    by_day : SharedByDay
+        What flights of a day share of their variances.
     events : sequence of FleetEvent
     """
     rows = np.flatnonzero((data.member_of == data.members.index(vehicle)) & data.known[:, i])
@@ -79,7 +81,7 @@ def asked_history(
     rows = rows[np.argsort(data.time_s[rows], kind="stable")]
     name, unit, time_s = data.names[i], data.units[i], data.time_s[rows]
     values, variances = data.values[rows, i], errors[rows]
-    covariance, tested = covariance_by_day(variances, time_s, by_day[rows]), values
+    covariance, tested = covariance_by_day(variances, time_s, by_day.variances[rows]), values
     if design.names:
         slope, error = fitted.without[vehicle]
         x = design.columns[rows]
@@ -98,7 +100,8 @@ def asked_history(
     )
     known = event_steps(happened, time_s)
     tested, covariance = beside_steps(tested, covariance, known)
-    asked = AskedHistory(bare, tested, covariance, known, by_day[rows])
+    together = by_day.variances[rows]
+    asked = AskedHistory(bare, tested, covariance, known, together, by_day.freedom)
     few = not len(step_places(len(rows), known))
     return asked if few else _tested(asked)
 
@@ -168,6 +171,7 @@ def _tested(asked: AskedHistory) -> AskedHistory:
     # A step is looked for with three flights behind it; where one is, it may be of the last two.
     history, values, covariance = asked.history, asked.values, asked.covariance
     scan = scan_steps(values, covariance, asked.known, newest=NEWEST)
+    scan = replace(scan, freedom=asked.freedom)
     old = scan.up_to(len(values) - SHORTEST - 1)
     first, last = scan.place_ends()
     base = scan.level
@@ -178,7 +182,9 @@ def _tested(asked: AskedHistory) -> AskedHistory:
     tested = replace(
         history,
         step_chance=old.chance,
-        walk_chance=wandering_chance(values, covariance, history.time_s),
+        walk_chance=beside_spread(
+            wandering_chance(values, covariance, history.time_s), asked.freedom
+        ),
         change_percent=change,
         changed_s=(float(history.time_s[first]), float(history.time_s[last + 1])),
     )

@@ -270,8 +270,8 @@ def find_drift(
         usual = errors[name].variances(_variances(data, i))
         level = without_events(explained, i, usual, events)
         by_day = shared_by_day(level, i, usual)
-        usual = usual + by_day
-        errors[name] = errors[name].beside_days(by_day, _variances(data, i))
+        usual = usual + by_day.variances
+        errors[name] = errors[name].beside_days(by_day.variances, _variances(data, i))
         _, off = variances_with_odd_ones(level, i, usual)
         own = own_scales(level, i, usual, off)
         scales += own

@@ -29,8 +29,7 @@ def judged_histories(asked: Sequence[AskedHistory]) -> tuple[ParameterHistory, .
         for each, share, beside in zip(histories, shares, apart, strict=True)
     )
     return tuple(
-        _named(each, *(of.values, of.covariance, of.known)) if each.is_alarm else each
-        for each, of in zip(judged, asked, strict=True)
+        _named(each, of) if each.is_alarm else each for each, of in zip(judged, asked, strict=True)
     )
 
 
@@ -40,17 +39,17 @@ def _shares(chances: Sequence[float | None]) -> list[float | None]:
     return [None if chance is None else float(next(shares)) for chance in chances]
 
 
-def _named(
-    history: ParameterHistory, values: Array, covariance: Array, known: Array
-) -> ParameterHistory:
+def _named(history: ParameterHistory, of: AskedHistory) -> ParameterHistory:
     """An alarm as a step or drift, as far as its flights tell, with the size of that."""
+    values, covariance = of.values, of.covariance
     kind = change_kind(values, covariance, history.time_s)
     named = replace(history, kind=kind)
     change = history.change_percent
     if kind == STEP or change.value is None or history.time_s[0] >= history.time_s[-SHORTEST]:
         return named
     drift = scan_drifts(values, covariance, history.time_s)
-    scan = drift if kind == DRIFT else scan_changes(values, covariance, history.time_s, known)
+    scan = drift if kind == DRIFT else scan_changes(values, covariance, history.time_s, of.known)
+    scan = replace(scan, freedom=of.freedom)
     percent = 100.0 * scan.size / abs(scan.level)
     size = Estimate(history.name, percent, "%", ends=StepEnds(scan))
     if kind != DRIFT:

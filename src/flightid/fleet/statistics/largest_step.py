@@ -12,9 +12,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
-from scipy.special import ndtr
+from scipy.special import ndtr, ndtri, stdtrit
 
 from flightid.errors import DataError, ShapeError
+from flightid.fleet.statistics.few_days import as_normal
 from flightid.frozen import dataclass
 from flightid.uncertainty.quantiles import LEVEL, tails
 
@@ -53,6 +54,8 @@ class StepScan:
         Covariance of each step with the level before it.
     places : ndarray of int, shape (m,)
         Last flight before each step, from 0.
+    freedom : float
+        Of the variances; infinite where they are known.
 
     Example
     -------
@@ -68,6 +71,7 @@ class StepScan:
     before_variances: Array
     with_before: Array
     places: NDArray[np.intp]
+    freedom: float = np.inf
 
     def up_to(self, place: int) -> StepScan:
         """The same of places up to one."""
@@ -80,6 +84,7 @@ class StepScan:
             self.before_variances[:m],
             self.with_before[:m],
             self.places[:m],
+            self.freedom,
         )
 
     @property
@@ -114,12 +119,13 @@ class StepScan:
     @cached_property
     def chance(self) -> float:
         """Chance of a largest step as large were there none."""
-        return largest_step_chance(self.statistic, self.correlations)
+        largest = as_normal(np.sqrt(self.statistic), self.freedom)
+        return largest_step_chance(float(largest**2), self.correlations)
 
     @cached_property
     def _shares(self) -> Array:
         """Posterior of the place under a step of unknown size, shape (m,)."""
-        log = 0.5 * self.deviations**2 + 0.5 * np.log(self.variances)
+        log = 0.5 * as_normal(self.deviations, self.freedom) ** 2 + 0.5 * np.log(self.variances)
         shares = np.exp(log - log.max())
         return np.asarray(shares / shares.sum())
 
@@ -128,7 +134,7 @@ class StepScan:
 
         Of a flat prior on size and place: normal at each place, mixed by how likely each is.
         """
-        return _mixture_ends(self._shares, self.sizes, np.sqrt(self.variances), level)
+        return self._ends(self.sizes, np.sqrt(self.variances), level)
 
     def percent_ends(self, level: float = LEVEL) -> tuple[float, float]:
         """The same in percent of the level before, whose error counts (delta method)."""
@@ -137,8 +143,13 @@ class StepScan:
         variance = variance + share**2 * self.before_variances
         size = np.abs(self.before)
         sign = np.sign(self.before)
-        ends = _mixture_ends(self._shares, share * sign, np.sqrt(variance) / size, level)
+        ends = self._ends(share * sign, np.sqrt(variance) / size, level)
         return 100.0 * ends[0], 100.0 * ends[1]
+
+    def _ends(self, centres: Array, deviations: Array, level: float) -> tuple[float, float]:
+        low, _ = tails(level)
+        wide = stdtrit(self.freedom, low) / ndtri(low) if np.isfinite(self.freedom) else 1.0
+        return _mixture_ends(self._shares, centres, wide * deviations, level)
 
     def place_ends(self, level: float = LEVEL) -> tuple[int, int]:
         """Last flight before the step at the earliest and at the latest."""

@@ -109,6 +109,8 @@ class AskedHistory:
         Flights behind each event.
     by_day : ndarray, shape (n,)
         Variances that flights of one day share, a part of those of the history.
+    freedom : float
+        Of these variances, where days told them; infinite else.
     """
 
     history: ParameterHistory
@@ -116,6 +118,7 @@ class AskedHistory:
     covariance: Array
     known: Array
     by_day: Array
+    freedom: float = np.inf
 
     @property
     def own_variances(self) -> Array:
