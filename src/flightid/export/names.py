@@ -98,7 +98,8 @@ def comment(text: str) -> str:
     -------
     >>> comment("roll */ int x;")
     'roll  / int x;'
-    >>> comment("damping in lbf*s/ft")
-    'damping in lbf s/ft'
+    >>> comment("damping in lbf*s/ft"), comment("output in %"), comment("in rad/s²")
+    ('damping in lbf s/ft', 'output in %', 'in rad/s^2')
     """
-    return re.sub(r"[^A-Za-z0-9 .,;:=()+_'/^-]+", "", text.replace("*", " "))[:200]
+    plain = text.translate({ord("*"): " ", ord("²"): "^2", ord("°"): "deg", ord("·"): " "})
+    return re.sub(r"[^A-Za-z0-9 .,;:=()+_'/^%-]+", "", plain)[:200]
