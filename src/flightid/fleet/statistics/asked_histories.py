@@ -33,6 +33,7 @@ from flightid.fleet.statistics.persistence import (
     changed_vehicles,
     day_series,
     explained,
+    is_shared,
     persistence,
     persisting,
 )
@@ -112,7 +113,8 @@ def beside_persistence(
     """Histories of one parameter, by errors that go on where days do.
 
     Days go on where they do beside all changes that independent days would show; or where they
-    explain these changes better than as many vehicles that happened to change.
+    explain these changes better than as many vehicles that happened to change. In a large fleet
+    they go on in vehicles without a change as well, or nowhere.
 
     Parameters
     ----------
@@ -136,6 +138,11 @@ def beside_persistence(
     elif rivals[0].fitness < found.apart + MARGIN:
         return None, list(asked)
     best = max(rivals, key=lambda each: each.fitness)
+    if not is_shared(series, changed, best):
+        own = persistence([each for each in series if each.vehicle not in changed], frozenset())
+        if own is None or not own.is_told:
+            return None, list(asked)
+        best = own
     return best, [_persisting(each, best) for each in asked]
 
 

@@ -28,6 +28,8 @@ KEPT = 9.0
 """Log likelihood that a change must explain: of a step and a movement, sizes and places chosen."""
 ALIKE = 1e-6
 """Share of a shape that others leave, below which it is one of them."""
+VOICES = 20
+"""Vehicles without a change from which on they say by themselves whether days go on."""
 CAUTION = 2.0
 """The same, by which what counts may be less likely than the best: the longest memory of these."""
 
@@ -163,6 +165,22 @@ def explained(series: Sequence[DaySeries], most: Set[str], found: Persistence) -
         if without - beside > 2.0 * KEPT * found.factor:
             kept.append(each.vehicle)
     return frozenset(kept)
+
+
+def is_shared(series: Sequence[DaySeries], changed: Set[str], found: Persistence) -> bool:
+    """Whether vehicles that did not change, where they are many, may go on like that.
+
+    Small steps in a large part of a fleet look like days that go on; but those who share in no
+    step would then go on as well.
+    """
+    others = [(each.values, each.level) for each in series if each.vehicle not in changed]
+    if len(others) < VOICES:
+        return True
+    groups = _grouped(others)
+    with_it, without = (
+        _likelihood(groups, *each)[0] for each in ((found.share, found.correlation), (0.0, 0.0))
+    )
+    return with_it >= without
 
 
 def _left(values: Array, design: Array) -> float:
