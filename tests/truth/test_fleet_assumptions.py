@@ -265,8 +265,8 @@ def test_flights_that_go_on_as_their_neighbours_did_are_no_change() -> None:
     # Half of them changed at one date: that is no memory.
     assert _alarmed(_drift(6, 10, 24, change=0.2, changed=5, last=9)) == set(range(5))
     # Small steps of many: those who share in none would go on as well; unasked, none was found.
-    many = _alarmed(_drift(1, 60, 24, change=0.05, changed=24, last=12))
-    assert len(many & set(range(24))) >= 8
+    many = _alarmed(_drift(4, 60, 24, change=0.05, changed=24, last=12))
+    assert len(many & set(range(24))) >= 15
     assert len(many - set(range(24))) <= 1
 
 
