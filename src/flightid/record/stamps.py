@@ -185,8 +185,8 @@ def _in_order(
             found=f"{np.count_nonzero(backward)} repeated or backward stamps, the first at "
             f"index {first} ({stamps[first]:.6f} s)",
             needed="increasing stamps",
-            action="copy the record again, for it may be damaged; of a sound one "
-            "to_uniform takes stamps='drop' or 'sort'",
+            action="copy the record again, for it may be damaged; of a sound one choose the "
+            "stamp policy 'drop' or 'sort' of to_uniform",
         )
     n_disordered = 0
     if policy is StampPolicy.SORT:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtri, stdtr
+from scipy.special import stdtr
+
+from flightid.uncertainty.quantiles import normal_quantiles
 
 Array = NDArray[np.float64]
 LEAST = 1e-300
@@ -23,13 +25,13 @@ def as_normal(deviations: Array, freedom: float) -> Array:
 
     Example
     -------
-    >>> as_normal(np.array([-2.2281388519649385, 0.0]), 10.0).round(3).tolist()
-    [1.96, 0.0]
+    >>> as_normal(np.array([-3.0, 1.0]), 10.0).round(3).tolist()
+    [2.474, 0.952]
     """
     sizes = np.abs(deviations)
     if np.isinf(freedom):
         return np.asarray(sizes)
-    return np.asarray(-ndtri(np.maximum(stdtr(freedom, -sizes), LEAST)))
+    return np.asarray(-normal_quantiles(np.maximum(stdtr(freedom, -sizes), LEAST)))
 
 
 def beside_spread(chance: float, freedom: float) -> float:
@@ -44,4 +46,4 @@ def beside_spread(chance: float, freedom: float) -> float:
     """
     if np.isinf(freedom):
         return chance
-    return float(2.0 * stdtr(freedom, float(ndtri(0.5 * chance))))
+    return float(2.0 * stdtr(freedom, float(normal_quantiles(0.5 * chance))))

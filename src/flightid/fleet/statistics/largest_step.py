@@ -12,12 +12,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
-from scipy.special import ndtr, ndtri, stdtrit
+from scipy.special import ndtr
 
 from flightid.errors import DataError, ShapeError
 from flightid.fleet.statistics.few_days import as_normal
 from flightid.frozen import dataclass
-from flightid.uncertainty.quantiles import LEVEL, tails
+from flightid.uncertainty.quantiles import LEVEL, half_width, tails
 
 Array = NDArray[np.float64]
 SHORTEST = 3
@@ -147,8 +147,7 @@ class StepScan:
         return 100.0 * ends[0], 100.0 * ends[1]
 
     def _ends(self, centres: Array, deviations: Array, level: float) -> tuple[float, float]:
-        low, _ = tails(level)
-        wide = stdtrit(self.freedom, low) / ndtri(low) if np.isfinite(self.freedom) else 1.0
+        wide = half_width(level, self.freedom) / half_width(level)
         return _mixture_ends(self._shares, centres, wide * deviations, level)
 
     def place_ends(self, level: float = LEVEL) -> tuple[int, int]:
