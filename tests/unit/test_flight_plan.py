@@ -20,7 +20,9 @@ from flightid.planning.axis_guess import guess_axis
 from flightid.planning.flight_findings import flight_findings
 from flightid.planning.flown_sweeps import FlownSweeps
 from flightid.planning.loop_check import MISSED
+from flightid.planning.procedures import procedure_of
 from flightid.planning.result import AxisSweep
+from flightid.planning.settings import settings_of
 from flightid.planning.still_rate import still_rate
 from flightid.report.flight_card import card_html
 from flightid.vehicles import (
@@ -264,6 +266,10 @@ def test_masks_are_whole_and_bits_are_never_summed(plan: fid.SweepPlan) -> None:
         "set bits 0 (a), 18 (b) of LOG_BITMASK, and leave its other bits as they are"
     )
     assert "add " not in fid.plan_flight(vehicle="quadplane").logging
+    # What the firmware of a log does not have is not written for it.
+    known = {"MC_ROLL_P": 6.5}
+    px4 = (settings_of(procedure_of("quad", "px4"), "roll", None, each) for each in (known, {}))
+    assert [[each.name for each in found] for found in px4] == [[], ["SDLOG_PROFILE"]]
 
 
 def test_no_go_leaves_no_settings(plan: fid.SweepPlan, tmp_path: Path) -> None:

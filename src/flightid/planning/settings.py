@@ -144,6 +144,8 @@ def _system_identification(
 def _logging(procedure: Procedure, current: Mapping[str, float]) -> dict[str, tuple[float, str]]:
     """Bits that log fast enough; none where the present ones are not known (ArduPilot)."""
     if procedure.name.startswith("px4"):
+        if current and "SDLOG_PROFILE" not in current:
+            return {}  # firmware that has no such parameter
         present = int(current.get("SDLOG_PROFILE", 1))
         return {"SDLOG_PROFILE": (present | SDLOG_PROFILE, "system identification, high rate")}
     if procedure.name == "inav":
