@@ -22,6 +22,7 @@ def _found(average: float, noise: NoiseCost | None) -> Finding:
 
 def test_a_cost_that_noise_explains_is_green_and_one_that_it_does_not_is_not() -> None:
     assert _found(140.0, NoiseCost(120.0, 20.0)).light is Light.GREEN
+    assert "120 on average, and as much in 16 %" in _found(140.0, NoiseCost(120.0, 20.0)).message
     assert _found(140.0, NoiseCost(20.0, 5.0)).light is Light.RED
     assert _found(42.0, NoiseCost(5.0, 2.0)).light is Light.AMBER
     assert "random errors explain 5" in _found(42.0, NoiseCost(5.0, 2.0)).message

@@ -140,8 +140,9 @@ def _averaged(noise: Mapping[str, NoiseCost]) -> NoiseCost | None:
 
 def _judge_average(average: float, noise: NoiseCost | None, *, withheld: bool) -> Finding:
     if noise is not None and noise.explains(average):
-        what = f"average cost {average:.3g}, as much as random errors alone give"
-        return Finding("cost", Light.GREEN, f"{what} ({noise.mean:.3g})")
+        what = f"average cost {average:.3g}; random errors alone give {noise.mean:.3g} on average"
+        what += f", and as much in {100.0 * noise.chance(average):.2g} % of flights"
+        return Finding("cost", Light.GREEN, what)
     if average > AVERAGE_COST_GUIDE:
         return Finding(
             "cost",
