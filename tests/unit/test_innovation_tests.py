@@ -107,8 +107,10 @@ def test_pulse_responses_are_fitted_until_they_end_or_have_no_bars() -> None:
     outlasting = partial(flights.fly_impulse, decay=0.98, noise=flights.WHITE)
     assert outlasting(0, samples=3000).light == "green"
     short = outlasting(0, samples=600)
-    assert short.light == "amber"
-    assert all(reading.interval95 is None for reading in short.readings)
+    ringing = flights.fly_impulse(7000, decay=0.997, noise=flights.WHITE)
+    for trial in (short, ringing):
+        assert trial.light == "amber"
+        assert all(reading.interval95 is None for reading in trial.readings)
 
 
 def test_a_state_that_is_not_there_takes_the_intervals_away() -> None:

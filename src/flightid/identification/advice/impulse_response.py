@@ -37,6 +37,8 @@ LAST = 4
 """One over the share of the lags, at their end, that has to be zero."""
 SMOOTH = 2
 """Powers of the lag, from zero, that a slow tail is tested for."""
+SHORTEST_PERIODOGRAM = 8
+"""Fewer lags hold no period that mean and slope would miss."""
 OUTLASTS = (
     "the response outlasts {} lags, the most that the records allow, which bends all of them: no "
     "intervals; give longer records, or fit a model with poles (output error)"
@@ -302,20 +304,29 @@ def _lagged(data: SampledChannels, n: int) -> LinearRegression:
 
 
 def _ends(values: Array, covariance: Array, count: int) -> bool:
-    """Whether chance explains the last quarter of the lags, each by itself and as a slow tail.
+    """Whether chance explains the last quarter of the lags: each, as a slow tail, as a mode.
 
-    All lags together have no power against a tail that is small everywhere and of one sign; its
-    mean and slope have, so they are tested beside it (contrasts; Scheffé, *The Analysis of
-    Variance*, section 3.5), each test at half the level.
+    All lags together have no power against a tail that is small everywhere, of one sign or ringing;
+    contrasts have (Scheffé, *The Analysis of Variance*, section 3.5): mean and slope, and cosine
+    and sine of the frequency that is strongest in the quarter before, where faster modes have died.
+    Each test has its part of the level.
     """
     last = max(values.size // LAST, 1)
     tail, spread = values[-last:], covariance[-last:, -last:]
     smooth = np.vander(np.linspace(-1.0, 1.0, last), min(SMOOTH, last))
-    chances = (
-        _chance(tail, spread),
-        _chance(smooth.T @ tail, smooth.T @ spread @ smooth),
-    )
-    return min(chances) >= (1.0 - LEVEL) / (len(chances) * count)
+    contrasts = [np.eye(last), smooth]
+    if last >= SHORTEST_PERIODOGRAM:
+        angles = _strongest(values[-2 * last : -last]) * np.arange(last)
+        contrasts.append(np.column_stack([np.cos(angles), np.sin(angles)]))
+    level = (1.0 - LEVEL) / (len(contrasts) * count)
+    return all(_chance(each.T @ tail, each.T @ spread @ each) >= level for each in contrasts)
+
+
+def _strongest(values: Array) -> float:
+    """Frequency of the largest ordinate of the periodogram but the mean's, in rad a sample."""
+    padded = 4 * values.size
+    power = np.abs(np.fft.rfft(values - values.mean(), padded)) ** 2
+    return 2.0 * np.pi * int(np.argmax(power)) / padded
 
 
 def _chance(values: Array, covariance: Array) -> float:
