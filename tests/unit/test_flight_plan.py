@@ -13,6 +13,7 @@ from flightid.cli.program import run
 from flightid.control.autopilots import axis_loop_of, read_parameters
 from flightid.conventions import Light
 from flightid.errors import OptionError, UnknownNameError
+from flightid.evidence.part_checks import agreement_check
 from flightid.findings import Finding
 from flightid.inspection.advice import set_bits
 from flightid.inspection.flight_phases import FlightPhases, flight_phases
@@ -25,6 +26,7 @@ from flightid.planning.result import AxisSweep
 from flightid.planning.settings import settings_of
 from flightid.planning.still_rate import still_rate
 from flightid.report.flight_card import card_html
+from flightid.uncertainty.agreement import Agreement
 from flightid.vehicles import (
     Autopilot,
     PilotDoublet,
@@ -312,14 +314,20 @@ def test_what_a_log_carries_already_is_not_swept_again(
     assert made.carried == ("roll",)
     assert [each.axis for each in made.sweeps] == ["pitch", "yaw"]
     (done,) = (each for each in made.findings if each.code == "identified-already")
-    assert "a model of roll already: no further sweep" in done.message
+    assert done.message == "this log can carry a model of roll already"
+    # What `run` asks of a model of one record, a plan asks in the same words.
+    (once,) = (each for each in made.findings if each.code == "flown-once")
+    asked = agreement_check(Agreement(1, None, None, np.ones(1))).finding
+    assert (once.light, once.message) == (asked.light, f"roll: {asked.message}")
+    assert once.action == f"{asked.action}: flightid plan swept.bin --axes roll"
     assert done.action == "next is flightid tune swept.bin"
     again = {each.code for each in fid.plan_flight(opened, axes=("roll",)).findings}
     assert "swept-already" in again
     assert "identified-already" not in again
-    every = FlownSweeps(("roll", "roll", "yaw"), ("roll", "pitch", "yaw"))
+    axes = ("roll", "pitch", "yaw")
+    every = FlownSweeps(("roll", "roll", "yaw"), axes, (*axes, *axes))
     said = [each.message for each in every.findings(opened, ("yaw",))]
-    assert said[0].startswith("this log can carry a model of roll and pitch already:")
+    assert said[0] == "this log can carry a model of roll and pitch already"
     assert "already: yaw;" in said[1]
     monkeypatch.setattr("flightid.planning.plan.flown_sweeps", lambda *_: every)
     none = fid.plan_flight(opened)

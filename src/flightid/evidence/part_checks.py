@@ -13,6 +13,7 @@ from flightid.uncertainty.agreement import FEWEST_RECORDS, Agreement
 from flightid.uncertainty.foretold import MATERIAL_PERCENT
 
 ONE = "One record does not tell how far flights differ: what is known is of that flight alone"
+ONCE = "flown once: nothing shows whether a second flight would agree"
 AGAIN = "repeat the manoeuvre in a second record or segment"
 ALL_AGAIN = "repeat what moves all inputs, and hand in each repetition as one record or segment"
 HALVES_ACTION = (
@@ -49,14 +50,19 @@ def agreement_check(found: Agreement, values: NDArray[np.float64] | None = None)
     'One record does not tell how far flights differ: what is known is of that flight alone'
     """
     apart = None if values is None else found.apart_percent(values)
-    return replace(_compared(found, apart), limit="" if found.n_records > 1 else ONE)
+    return replace(_compared(found, apart), limit=ONE if needs_another(found.n_records) else "")
+
+
+def needs_another(n_records: int) -> bool:
+    """Whether a second record is wanted, whoever asks: one alone cannot show what chance does."""
+    return n_records < 2
 
 
 def _compared(found: Agreement, apart: float | None) -> Check:
     if not found.tested:
         # Longer alone does not help: a longer sweep passes each frequency once all the same.
-        what, action = "flown once: nothing shows whether a second flight would agree", AGAIN
-        if found.n_records > 1:
+        what, action = ONCE, AGAIN
+        if not needs_another(found.n_records):
             what = "records are not compared: not each holds all inputs and frequencies by itself"
             action = ALL_AGAIN
         return Check(AGREEMENT, Light.UNKNOWN, what, action)

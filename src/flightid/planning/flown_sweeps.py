@@ -7,6 +7,7 @@ from collections.abc import Collection, Iterator
 from weakref import WeakKeyDictionary
 
 from flightid.conventions import Light
+from flightid.evidence.part_checks import AGAIN, ONCE, needs_another
 from flightid.findings import Finding
 from flightid.frozen import dataclass
 from flightid.inspection import inspect_log
@@ -26,10 +27,13 @@ class FlownSweeps:
         Axis of each run that the autopilot injected.
     carried : tuple of str
         Axes of which the log can carry a model as it is; none where anything about it is red.
+    moved : tuple of str
+        Axis of each manoeuvre that a model may be tried from, injected or not.
     """
 
     injected: tuple[str, ...] = ()
     carried: tuple[str, ...] = ()
+    moved: tuple[str, ...] = ()
 
     def findings(self, log: Log, planned: Collection[str]) -> Iterator[Finding]:
         """What needs no flight, and what is swept again although it was swept."""
@@ -38,8 +42,14 @@ class FlownSweeps:
         if done:
             yield Finding(
                 "identified-already", Light.GREEN,
-                f"this log can carry a model of {_listed(done)} already: no further sweep",
+                f"this log can carry a model of {_listed(done)} already",
                 f"next is flightid tune {name}",
+            )  # fmt: skip
+        once = [axis for axis in done if needs_another(self.moved.count(axis))]
+        if once:
+            yield Finding(
+                "flown-once", Light.UNKNOWN, f"{_listed(once)}: {ONCE}",
+                f"{AGAIN}: flightid plan {name} --axes {','.join(once)}",
             )  # fmt: skip
         again = Counter(axis for axis in self.injected if axis in planned)
         if again:
@@ -72,7 +82,9 @@ def flown_sweeps(log: Log, phases: FlightPhases) -> FlownSweeps:
         if any(each.kind in SEARCHED for each in found):
             inspection = inspect_log(log)
             carried = () if inspection.verdict is Light.RED else carried_axes(inspection)
-        _KNOWN[log] = FlownSweeps(tuple(e.axis for e in found if e.is_injected), carried)
+        injected = tuple(each.axis for each in found if each.is_injected)
+        moved = tuple(each.axis for each in found if each.kind in SEARCHED)
+        _KNOWN[log] = FlownSweeps(injected, carried, moved)
     return _KNOWN[log]
 
 
