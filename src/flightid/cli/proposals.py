@@ -115,8 +115,15 @@ def show_study(result: Study, *, whole: bool, as_json: bool) -> None:
         show_answer(result)
 
 
-def show_answer(result: Study) -> None:
-    """Print one screen of a study, its verdict and the next step last."""
-    from flightid.report.text import to_text
+def show_answer(result: Study, written: Sequence[Path] = ()) -> None:
+    """Print one screen of a study, its verdict and the next step last.
 
-    click.echo(to_text(result.short), nl=False)
+    `written` are files of its gains, the first to fly first, which need no command any more.
+    """
+    from flightid.report.text import to_text
+    from flightid.study.answer import short_document
+    from flightid.uncertainty.quantiles import showing
+
+    with showing(result.settings.level):
+        short = short_document(result, result.document, [str(path) for path in written])
+    click.echo(to_text(short), nl=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Any
@@ -156,22 +157,27 @@ def command(
         _show(tuning, level)
     if study is not None:
         note(f"Wrote {study.output / 'report.html'}")
+    written: Sequence[Path] = ()
     if target is not None:
-        _write(tuning, target, overwrite, accept_red=bool(options.get("accept_red")))
+        accepted = bool(options.get("accept_red"))
+        written = _write(tuning, target, overwrite, accept_red=accepted)
     if study is not None and not as_json:
-        show_answer(study)
+        show_answer(study, written)
     leave_by_verdict(tuning.findings)
 
 
-def _write(tuning: Tuning, target: Path, overwrite: bool, *, accept_red: bool) -> None:
-    """Write what may be flown, and name what stays as it flew."""
+def _write(tuning: Tuning, target: Path, overwrite: bool, *, accept_red: bool) -> Sequence[Path]:
+    """Write what may be flown, the first to fly first, and name what stays as it flew."""
     from flightid.export.gains import write_gains
 
+    written: Sequence[Path] = ()
     if tuning.sound or accept_red:
-        for path in write_gains(tuning, target, overwrite=overwrite, accept_red=accept_red):
-            note(f"Wrote {path}")
+        written = write_gains(tuning, target, overwrite=overwrite, accept_red=accept_red)
+    for path in written:
+        note(f"Wrote {path}")
     for axis, why in ({} if accept_red else tuning.left_out).items():
         note(f"Not written, stays as flown: {axis}: {why}")
+    return written
 
 
 def _holds_models(files: tuple[Path, ...]) -> bool:

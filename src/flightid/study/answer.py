@@ -49,7 +49,9 @@ class StudyAnswer:
     tables: tuple[Table, ...] = ()
 
 
-def answer_of(study: StudyResults, *, source: str | None = None) -> StudyAnswer:
+def answer_of(
+    study: StudyResults, *, source: str | None = None, written: Sequence[str] = ()
+) -> StudyAnswer:
     """Say in a sentence each what the models are worth, and the gains.
 
     Parameters
@@ -57,6 +59,8 @@ def answer_of(study: StudyResults, *, source: str | None = None) -> StudyAnswer:
     study : StudyResults
     source : str, optional
         Study file as the reader has to write it; default: its name, which holds in any folder.
+    written : sequence of str
+        Files of the gains, the first to fly first, where they have been written.
     """
     if source is None:
         source = next((name for name in study.files if name.endswith(".toml")), "STUDY")
@@ -65,7 +69,7 @@ def answer_of(study: StudyResults, *, source: str | None = None) -> StudyAnswer:
     if tuning is None:
         fault = tuning_fault(study.faults)
         return StudyAnswer((*findings, *([] if fault is None else [fault])))
-    findings.append(_gains(tuning, source))
+    findings.append(_gains(tuning, source, written))
     if study.gain_flight is not None:
         findings.append(_flown(study.gain_flight))
     made = tuning.sound or tuple(design for design in tuning.designs if design.exists)
@@ -103,7 +107,9 @@ def models_in_short(items: Sequence[ModelResults]) -> Lights:
     return Lights(tuple(lines), repeats=True)
 
 
-def short_document(study: StudyResults, document: Document) -> Document:
+def short_document(
+    study: StudyResults, document: Document, written: Sequence[str] = ()
+) -> Document:
     """A report of one screen: models, gains and, last, the answer with what is next.
 
     Parameters
@@ -111,8 +117,11 @@ def short_document(study: StudyResults, document: Document) -> Document:
     study : StudyResults
     document : Document
         The whole report, whose verdicts count.
+    written : sequence of str
+        See `answer_of`.
     """
-    answer = answer_of(study, source=None if study.source is None else quote(str(study.source)))
+    source = None if study.source is None else quote(str(study.source))
+    answer = answer_of(study, source=source, written=written)
     models = models_in_short(study.identified)
     others = other_faults(study.faults)
     faults = (Lights(others),) if others else ()
@@ -213,7 +222,7 @@ def _loop_of(items: Sequence[ModelResults]) -> str:
     return f"{fit.model.outputs[0]}/{fit.model.inputs[0]}"
 
 
-def _gains(tuning: Tuning, source: str) -> Finding:
+def _gains(tuning: Tuning, source: str, written: Sequence[str]) -> Finding:
     """Whether there are gains, and what they promise or what is in the way."""
     designs, findings = tuning.sound, tuning.findings
     left = "; ".join(f"{axis}: {why}" for axis, why in tuning.left_out.items())
@@ -234,7 +243,11 @@ def _gains(tuning: Tuning, source: str) -> Finding:
     if plain:
         coded = all(design.plain and design.plain.sampled for design in designs)
         files = "controller.toml and controller.c" if coded else "controller.toml"
-        way = f"they lie beside the report as {files}: close the loop with them, and log"
+        where = f"stand in {written[0]}" if written else f"lie beside the report as {files}"
+        way = f"they {where}: close the loop with them, and log"
+    elif written:
+        step = f", step 1 of {steps}" if steps > 1 else ""
+        way = f"fly {written[0]}{step}, log, and compare the flight with what is promised here"
     else:
         file = f"gains{parameter_suffix(designs[0].flown.autopilot)}"
         way = f"flightid tune {source} --write {file} writes them; " + (

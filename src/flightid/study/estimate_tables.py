@@ -208,7 +208,10 @@ def short_modes_table(items: Iterable[ModelResults]) -> Table:
     made = Table("Modes", columns, tuple(rows)).without_empty_columns()
     told = any(column.name == "±" for column in made.columns)
     note = (f"±: half of the {interval_words(shown())} interval.",) if told else ()
-    gaps = [f"No interval of {'; '.join(names)}: {reason}." for reason, names in untold.items()]
+    gaps = [
+        f"No interval of {'; '.join(dict.fromkeys(names))}: {reason}."
+        for reason, names in untold.items()
+    ]
     return replace(made, notes=(*note, *gaps))
 
 
