@@ -249,6 +249,15 @@ def test_a_loop_that_ends_far_from_what_is_asked_is_amber(
     found = judge_flight(replace(review, loops=(replace(loop, readings=readings),)))
     step = next(f for f in found if f.code == "step-roll-rate")
     assert f"ends at {level:.3g} (" in step.message
+    # What still comes at the end of the window, as an integrator brings it, is no steady error.
+    slow = level * (1.0 - 0.1 * np.exp(-loop.time_s / loop.time_s[-1]))
+    rising = replace(loop, readings=readings, step=slow, draws=np.tile(slow, (9, 1)))
+    later = next(f for f in judge_flight(replace(review, loops=(rising,))) if f.code == step.code)
+    assert f"reaches {level:.3g} (" in later.message
+    assert "still rises there: settling is not seen" in later.message
+    short = later.light is Light.AMBER
+    assert short is (said == "beyond")
+    assert ("it stays" in later.message) is short
     assert step.light is (Light.AMBER if said else Light.GREEN)
     assert (f"it stays {said} what is asked" in step.message) is bool(said)
     assert bool(step.action) is bool(said)

@@ -40,19 +40,36 @@ def test_a_small_overshoot_is_not_lifted_by_its_errors() -> None:
 
 
 @pytest.mark.parametrize(
-    ("slow_s", "scatter", "told"),
-    [(1.0, 0.001, False), (1.0, 0.3, True), (0.01, 0.001, True)],
-    ids=["slow", "slow or not", "settled"],
+    ("slow_s", "late", "scatter", "told", "settles"),
+    [
+        (1.0, 0.4, 0.001, False, False),
+        (1.0, 0.4, 0.3, True, True),
+        (0.01, 0.4, 0.001, True, True),
+        (1.0, 0.1, 0.001, True, False),
+    ],
+    ids=["slow", "slow or not", "settled", "creeps"],
 )
 def test_a_step_that_has_not_settled_has_no_level(
-    slow_s: float, scatter: float, told: bool
+    slow_s: float, late: float, scatter: float, told: bool, settles: bool
 ) -> None:
-    """A demo's yaw rate rose at the end of its window: it "ended at 0.536 (0.533 to 0.538)"."""
+    """A demo's yaw rate rose at the end of its window: it "ended at 0.536 (0.533 to 0.538)".
+
+    Its roll rate crept there, as a slow integrator has it: it settled "in 164 (164 to 164) ms".
+    """
     random = np.random.default_rng(3)
-    late = 0.4 * (1.0 - np.exp(-TIME_S / slow_s))
+    late_curve = late * (1.0 - np.exp(-TIME_S / slow_s))
     slopes = np.concatenate([[0.0], scatter * random.standard_normal(120)])[:, None]
-    found = step_features(0.6 * _curve() + late + slopes * TIME_S, TIME_S)
+    found = step_features(0.6 * _curve() + late_curve + slopes * TIME_S, TIME_S)
     assert all((each.value is not None) is told for each in found[:1])
+    settling, overshoot = found[4], found[3]
+    assert (settling.value is not None) is settles
+    if settles:
+        assert (settling.half_width95 or 0.0) > 0.0
+    elif told:
+        assert (
+            settling.reason == "still rises where this window of 0.49 s ends: settling is not seen"
+        )
+        assert overshoot.value is None
     if not told:
         assert {each.reason for each in found} == {"not settled in this window of 0.49 s"}
 

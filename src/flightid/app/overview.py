@@ -35,7 +35,7 @@ from flightid.uncertainty.estimate import Estimate, Reading
 AXES = ("roll", "pitch", "yaw")
 MOST_EVENTS = 500
 READINGS = ("level", "rise time", "overshoot", "settling time", "-3 dB bandwidth")
-CALLED = {"level": "ends at"}
+CALLED = {"level": "reaches"}
 """What people say of a reading."""
 PLACES = {
     "airborne": "air",

@@ -15,7 +15,7 @@ from flightid.cli.figures import QuotientRange
 from flightid.cli.hints import PARAMETERS
 from flightid.cli.lists import ListOption, ListsCommand
 from flightid.cli.model_commands import feedback_option
-from flightid.cli.next_comparison import unasked
+from flightid.cli.next_comparison import models_made_of, unasked
 from flightid.cli.output import all_option, json_option, level_option
 from flightid.cli.pages import html_option, show
 from flightid.cli.sources import AXES, known_models, load_source
@@ -23,6 +23,7 @@ from flightid.cli.sources import AXES, known_models, load_source
 if TYPE_CHECKING:
     from flightid.dynamics.conditions.result import ConditionComparison
     from flightid.findings import Finding
+    from flightid.logs import Log
     from flightid.models import Model
     from flightid.result import Result
     from flightid.review import FlightComparison, FlightReview, MarginComparison
@@ -199,18 +200,44 @@ def _reviewed(name: str) -> FlightReview:
 
 
 def _flights(before: str, after: str) -> FlightComparison:
-    from flightid import compare_flights
+    from flightid import compare_flights, compare_with_promise, read_log
     from flightid.progress import progress
 
     with progress(None, "reviewing both flights"):
-        return compare_flights(_reviewed(before), _reviewed(after))
+        reviews = _reviewed(before), _reviewed(after)
+    if PART.fullmatch(after):
+        return compare_flights(*reviews)
+    log = read_log(after)
+    folders = [*dict.fromkeys([Path(PART.sub(r"\1", before)).resolve().parent, Path.cwd()])]
+    results = models_made_of(Path(PART.sub(r"\1", before)), folders)
+    promise = None
+    if results is not None:
+        with progress(None, "working out what was promised"):
+            promise = compare_with_promise(_models(str(results)), log, review=reviews[1])
+    made = compare_flights(*reviews, promise=promise)
+    return _with_step(made, log, [*folders, log.path.resolve().parent], promise)
+
+
+def _with_step(
+    made: FlightComparison, log: Log, folders: Sequence[Path], promise: FlightComparison | None
+) -> FlightComparison:
+    """With what to do after the step of gains that a log flew, if it is one of those beside it."""
+    from flightid.review.comparison import unheld
+    from flightid.review.next_step import flown_step
+
+    step = flown_step([each for each in folders if each.is_dir()], log.parameters)
+    if step is None:
+        return made
+    name = log.path.name
+    found = step.unjudged(name) if promise is None else step.finding(kept=promise.kept, log=name)
+    untold = () if promise is None or promise is made else unheld(promise)
+    return replace(made, findings=(*made.findings, *untold, found))
 
 
 def _promise(models: Sequence[str], after: str) -> FlightComparison:
     """What models promised of a flight, and which step of the gains comes next."""
     from flightid import compare_with_promise, read_log
     from flightid.progress import progress
-    from flightid.review.next_step import flown_step
 
     if PART.fullmatch(after):
         raise click.UsageError("a promise is compared with a whole log")
@@ -218,10 +245,7 @@ def _promise(models: Sequence[str], after: str) -> FlightComparison:
     with progress(None, "working out what was promised"):
         made = compare_with_promise([each for name in models for each in _models(name)], log)
     places = [Path(name).resolve().parent for name in (*models, after)]
-    step = flown_step([each for each in places if each.is_dir()], log.parameters)
-    if step is None:
-        return made
-    return replace(made, findings=(*made.findings, step.finding(kept=made.kept)))
+    return _with_step(made, log, places, made)
 
 
 def _models(name: str) -> list[Model]:

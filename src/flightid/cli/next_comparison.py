@@ -1,8 +1,8 @@
-"""What ``flightid compare`` leaves unasked of two models, with the commands that ask it."""
+"""What ``flightid compare`` leaves unasked of two models, and which models stand behind a log."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from flightid.conventions import Light
@@ -67,13 +67,38 @@ def _records(results: Path) -> str:
     return RECORDS
 
 
-def _used(results: Path) -> Iterator[str]:
-    """Names of the files that a study read."""
+def _used(results: Path) -> dict[str, str]:
+    """Names of the files that a study read, with their hashes."""
     from flightid.reading import bounded_bytes, parse_json
 
     if not results.is_file():
-        return
+        return {}
     content = parse_json(bounded_bytes(results, MAXIMUM_RESULTS), "results", results.name)
     files = content.get("files") if isinstance(content, dict) else None
-    if isinstance(files, dict):
-        yield from files
+    return {str(k): str(v) for k, v in files.items()} if isinstance(files, dict) else {}
+
+
+def models_made_of(log: Path, folders: Iterable[Path]) -> Path | None:
+    """The newest results in these folders whose study read this very log and left models.
+
+    Parameters
+    ----------
+    log : Path
+    folders : iterable of Path
+        Where ``*-output`` folders may lie.
+
+    Returns
+    -------
+    Path or None
+    """
+    from flightid.files import sha256_of_file
+    from flightid.models.saved_files import models_of
+
+    found = {each for folder in folders for each in folder.glob(f"*-output/{RESULTS}")}
+    if not found or not log.is_file():
+        return None
+    wanted = sha256_of_file(log)
+    for results in sorted(found, key=lambda path: path.stat().st_mtime, reverse=True):
+        if wanted in _used(results).values() and models_of(results.parent):
+            return results.parent
+    return None

@@ -15,13 +15,18 @@ from flightid.review.result import FlightReview
 Flown = FlightReview | Log | str | Path
 
 
-def compare_flights(before: Flown, after: Flown) -> FlightComparison:
+def compare_flights(
+    before: Flown, after: Flown, *, promise: FlightComparison | None = None
+) -> FlightComparison:
     """Say what changed between two flights, or parts of one: steps, bandwidths, tracking, gains.
 
     Parameters
     ----------
     before, after : FlightReview, Log or path-like
         Reviews may be of parts: ``review_flight(log, span_s=(20.0, 80.0))``.
+    promise : FlightComparison, optional
+        `compare_with_promise` of the second: what got worse as models promised of its gains is no
+        reason to go back.
 
     Raises
     ------
@@ -54,10 +59,13 @@ def compare_flights(before: Flown, after: Flown) -> FlightComparison:
         filters=filters_between(first, second),
         unlike=unlike_between(first, second),
         promised=False,
+        promise=promise,
     )
 
 
-def compare_with_promise(sources: Iterable[object], after: Log | str | Path) -> FlightComparison:
+def compare_with_promise(
+    sources: Iterable[object], after: Log | str | Path, *, review: FlightReview | None = None
+) -> FlightComparison:
     """Say whether a flight keeps what identified models promise of the gains that it flew.
 
     Parameters
@@ -66,6 +74,8 @@ def compare_with_promise(sources: Iterable[object], after: Log | str | Path) -> 
         Identified from an earlier flight of this vehicle.
     after : Log or path-like
         The flight with new gains.
+    review : FlightReview, optional
+        Of that flight, where it has been reviewed.
 
     Raises
     ------
@@ -84,7 +94,8 @@ def compare_with_promise(sources: Iterable[object], after: Log | str | Path) -> 
     log = after if isinstance(after, Log) else read_log(after)
     names = "the models", log.path.name
     promise = promised_loops(sources, log)
-    return compare_loops(promise, review_flight(log).loops, names, promised=True)
+    loops = (review or review_flight(log)).loops
+    return compare_loops(promise, loops, names, promised=True)
 
 
 def _review(flown: Flown) -> FlightReview:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Container, Iterable, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from types import MappingProxyType
 
 from flightid.conventions import Light
 from flightid.dynamics.conditions.ratios import chance_of, difference_of, holm
 from flightid.findings import Finding
 from flightid.frozen import dataclass
-from flightid.review.tables import cell
+from flightid.review.tables import by_reason, cell, untold_notes
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Reading
 from flightid.uncertainty.quantiles import interval_words, shown
@@ -36,6 +37,25 @@ MATERIAL_SHARE, MATERIAL_OVERSHOOT = 0.1, 5.0
 model's simplification alone moves numbers by a few percent, which its covariance does not hold."""
 TOLERANCE = f"{100 * MATERIAL_SHARE:g} % of a number, {MATERIAL_OVERSHOOT:g} points of overshoot"
 IN_MILLISECONDS = 1e3
+NO_INTERVAL = "the difference has no interval"
+
+
+@dataclass(frozen=True)
+class ExpectedLoop:
+    """What models said of one loop under new gains, beside what was flown.
+
+    Attributes
+    ----------
+    kept : bool
+    words : mapping of str to str
+        Of each number: ``"rise time 0.28 → 0.29 s"``, promised and flown.
+    """
+
+    kept: bool
+    words: Mapping[str, str]
+
+
+UNPROMISED: Mapping[str, ExpectedLoop] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -138,6 +158,7 @@ def change_table(
         *(Column("difference"), Column("changed")),
     )
     rows: list[tuple[Cell, ...]] = []
+    changes = tuple(changes)
     for each in changes:
         factor, unit = each.shown_unit
         told = (cell(number, factor) for number in (each.before, each.after, each.difference))
@@ -145,9 +166,19 @@ def change_table(
         rows.append((each.loop, each.name, unit, *told, said))
     brackets = (
         f"In brackets: {interval_words(chosen)} intervals. Changed: beyond chance, one false "
-        "“yes” in 20 such tables; –: not told, or not judged."
+        "“yes” in 20 such tables."
     )
-    return Table(title, columns, tuple(rows), (brackets, *notes))
+    return Table(title, columns, tuple(rows), (brackets, *_untold(names, changes), *notes))
+
+
+def _untold(names: tuple[str, str], changes: Iterable[LoopChange]) -> Iterator[str]:
+    """Why cells are dashes: a number that one side does not tell, a difference without a chance."""
+    for place, name in enumerate(names):
+        sides = ((c.loop, (c.before, c.after)[place]) for c in changes)
+        yield from (said.replace("–:", f"– of {name}:", 1) for said in untold_notes(sides))
+    unsure = (c for c in changes if c.difference.value is not None and c.chance is None)
+    reasons = ((c.loop, c.name, c.difference.reason or NO_INTERVAL) for c in unsure)
+    yield from (f"Not judged (–): {said}." for said in by_reason(reasons))
 
 
 def verdicts(
@@ -156,10 +187,12 @@ def verdicts(
     *,
     promised: bool = False,
     bent: Container[str] = (),
+    promises: Mapping[str, ExpectedLoop] = UNPROMISED,
 ) -> Iterator[Finding]:
     """One verdict for each loop that changed, or that none did.
 
-    Loops that are `bent` were moved farther than their controller is proportional to.
+    Loops that are `bent` were moved farther than their controller is proportional to; `promises`
+    are of the second of two flights.
     """
     by_loop: dict[str, list[LoopChange]] = {}
     for each in changes:
@@ -173,7 +206,8 @@ def verdicts(
                 "look at the steps before you fly more",
             )  # fmt: skip
         else:
-            yield _changed(f"{loop}, before → after: {said}", found, bent=loop in bent)
+            said = f"{loop}, before → after: {said}"
+            yield _changed(said, found, promises.get(loop), bent=loop in bent)
     if not any(each.chance is not None for each in changes):
         yield Finding(
             "loops-not-judged", Light.UNKNOWN,
@@ -192,12 +226,20 @@ def verdicts(
         yield Finding(code, Light.GREEN, f"{said}: {told}")
 
 
-def _changed(said: str, found: list[LoopChange], *, bent: bool) -> Finding:
+def _changed(
+    said: str, found: list[LoopChange], promise: ExpectedLoop | None, *, bent: bool
+) -> Finding:
     """Amber where something got worse; not judged by little, by tracking alone, or of large moves.
 
     A bent loop answers large moves less than in proportion: its step goes by how far it was moved.
+    What models promised of the new gains is held against the promise, not against the older gains.
     """
+    if bent:
+        action = "compare flights whose sticks moved as far: the angle controller answers large "
+        return Finding("loop-changed", Light.UNKNOWN, said, action + "moves more slowly than small")
     worse = [each.name for each in found if each.is_worse]
+    if promise is not None and worse and worse != [TRACKING]:
+        return _beside(said, [name for name in worse if name in promise.words], promise)
     if not worse:
         little = [each.name for each in found if each.is_slightly_worse]
         if not little:
@@ -207,8 +249,17 @@ def _changed(said: str, found: list[LoopChange], *, bent: bool) -> Finding:
     if worse == [TRACKING]:
         action = "compare flights whose sticks moved alike: quicker sticks are tracked worse"
         return Finding("loop-changed", Light.UNKNOWN, said, action)
-    if bent:
-        action = "compare flights whose sticks moved as far: the angle controller answers large "
-        return Finding("loop-changed", Light.UNKNOWN, said, action + "moves more slowly than small")
     action = f"worse: {', '.join(worse)}; look at the loops and at what was set otherwise, and go "
     return Finding("loop-changed", Light.AMBER, said, action + "back unless you wanted it")
+
+
+def _beside(said: str, worse: Sequence[str], promise: ExpectedLoop) -> Finding:
+    """What got worse beside what was promised of it."""
+    told = "; ".join(promise.words[name] for name in worse)
+    told = f" (promised → flown: {told})" if told else ""
+    if promise.kept:
+        said += f": as the models promised of these gains{told}"
+        return Finding("loop-as-promised", Light.GREEN, said)
+    action = "look at the steps before you fly more, and go back unless you know why"
+    said += f": not as the models promised of these gains{told}"
+    return Finding("loop-changed", Light.AMBER, said, action)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flightid.conventions import Light
 from flightid.errors import DataError
@@ -17,6 +18,7 @@ from flightid.result import Result
 from flightid.review.changes import (
     BY_FREQUENCY,
     TRACKING,
+    ExpectedLoop,
     LoopChange,
     change_of,
     change_table,
@@ -24,12 +26,18 @@ from flightid.review.changes import (
     verdicts,
 )
 from flightid.review.loop_response import LoopResponse
-from flightid.review.step_features import step_features
+from flightid.review.step_features import creep, reached_features
+from flightid.review.told_band import QUICK, is_too_quick
 from flightid.table import Column, Table
 from flightid.uncertainty.estimate import Reading
 
+Array = NDArray[np.float64]
 SHOWN = ("delay to half", "rise time", "overshoot", "level")
 STEPS = "Steps of both are read over the time that both show"
+REACHED = "level, rise and overshoot are of what is reached in it"
+NO_MODEL = "none of them is of its rate"
+NOT_ALONE = "its set-point acts by more than the angle controller"
+ON_A_SLOPE = "it ends where the step only creeps, where a model's few percent move it far"
 NONE: Mapping[str, tuple[Any, Any]] = MappingProxyType({})
 
 
@@ -118,27 +126,31 @@ class FlightComparison(Result, schema="flightid.flight_comparison/1"):
         if cut:
             alone = "" if self.promised else "; flightid flight reads each over its own"
             yield f"{STEPS} ({'; '.join(cut)}){alone}."
-        if left := self._left_out():
-            yield f"Not compared: {left}."
+        if moving := [a.name for a, b in pairs if _unsettled(a, b, min(ends[a.name]))]:
+            yield f"Not settled in that time: {', '.join(moving)}; {REACHED}."
+        yield from self._left_out()
         if any(each.name == TRACKING for each in self.changes):
             yield (
                 "Tracking error: rms of the error over that of the set-point; it depends on how "
                 "fast the sticks moved too."
             )
 
-    def _left_out(self) -> str:
+    def _left_out(self) -> Iterator[str]:
         """Loops that one of both alone tells, and why."""
         compared = {each.loop for each in self.changes}
-        sides = dict(zip(("promised", "flown") if self.promised else self.names,
-                         (self.before, self.after), strict=True))  # fmt: skip
-        found: dict[str, list[str]] = {}
-        for side, loops in sides.items():
+        names = dict.fromkeys(each.name for each in (*self.before, *self.after))
+        for place, loops in enumerate((self.before, self.after)):
             told = {loop.name: loop for loop in loops}
-            for name in dict.fromkeys(each.name for each in (*self.before, *self.after)):
-                if name not in compared and (name not in told or not told[name].is_told):
-                    why = told[name].reason if name in told else "nothing of it"
-                    found.setdefault(name, []).append(f"{side}: {why}")
-        return "; ".join(f"{name} ({', '.join(why)})" for name, why in found.items())
+            missing = [n for n in names if n not in compared and n not in told]
+            if self.promised and place == 0:
+                for name in missing:
+                    why = NOT_ALONE if f"{name.split()[0]} rate" in told else NO_MODEL
+                    yield f"The models promise nothing of {name}: {why}."
+            elif missing:
+                yield f"{self.names[place]} logs no set-point of {', '.join(missing)}."
+            for name in names:
+                if name in told and name not in compared and not told[name].is_told:
+                    yield f"{self.names[place]} does not tell {name}: {told[name].reason}."
 
     def gains_table(self) -> Table:
         """Parameters that differ."""
@@ -181,8 +193,12 @@ def compare_loops(
     filters: Mapping[str, tuple[str, str]] = NONE,
     unlike: Mapping[str, tuple[str, str]] = NONE,
     promised: bool,
+    promise: FlightComparison | None = None,
 ) -> FlightComparison:
-    """Put the loops of two flights, or of a promise and a flight, side by side."""
+    """Put the loops of two flights, or of a promise and a flight, side by side.
+
+    Where a `promise` of the second flight is known, what got worse is held against that.
+    """
     bent = {loop.name: loop for loop in (*before, *after) if loop.is_bent and loop.is_told}
     later = {loop.name: loop for loop in after if not (promised and loop.is_bent)}
     changes = tuple(
@@ -191,6 +207,8 @@ def compare_loops(
         if loop.name in later and loop.is_told and later[loop.name].is_told
         for reading, answer in _pairs(loop, later[loop.name])
     )
+    if promised:
+        changes = tuple(_on_a_slope(each, before, later) for each in changes)
     if not changes:
         untold = "; ".join(
             f"{loop.name}: {loop.reason}" for loop in (*before, *after) if loop.reason
@@ -202,7 +220,8 @@ def compare_loops(
             action="see flightid flight LOG of each for what to fly",
         )
     kept = significant_of(changes)
-    judged = list(verdicts(changes, kept, promised=promised, bent=bent))
+    promises = expected(promise)
+    judged = list(verdicts(changes, kept, promised=promised, bent=bent, promises=promises))
     if "vehicle" in unlike or "frame" in unlike:
         # Of two vehicles no difference praises what was set, and no likeness either.
         judged = [replace(e, light=Light.UNKNOWN) if e.light is Light.GREEN else e for e in judged]
@@ -226,14 +245,56 @@ def _pairs(before: LoopResponse, after: LoopResponse) -> Iterator[tuple[Reading,
             yield reading, answer
 
 
+def _on_a_slope(
+    change: LoopChange, before: Iterable[LoopResponse], later: Mapping[str, LoopResponse]
+) -> LoopChange:
+    """Not judged, where it is a time at which steps only creep: what is small moves it far."""
+    mine = next(loop for loop in before if loop.name == change.loop)
+    end_s = min(mine.time_s[-1], later[mine.name].time_s[-1])
+    if change.name != "rise time" or not _unsettled(mine, later[mine.name], end_s):
+        return change
+    apart = replace(change.difference, stderr=None, ends=None, reason=ON_A_SLOPE)
+    return replace(change, difference=apart, chance=None)
+
+
 def _readings(loop: LoopResponse, end_s: float) -> dict[str, Reading]:
-    kept = loop.time_s <= end_s
-    steps = np.vstack([loop.step, loop.draws])[:, kept]
-    found = {r.name: r for r in step_features(steps, loop.time_s[kept]) if r.name in SHOWN}
+    """Of what a step reaches in that time, whether it has settled there or not."""
+    found = {r.name: r for r in reached_features(*_until(loop, end_s)) if r.name in SHOWN}
     found |= {r.name: r for r in loop.readings if r.name == BY_FREQUENCY}
+    found |= {r.name: r for r in loop.readings if r.name == QUICK[0] and is_too_quick(r)}
     if loop.tracking is not None and loop.moved:
         found[TRACKING] = loop.tracking.scaled(100.0 / loop.moved, name=TRACKING, unit="%")
     return found
+
+
+def _until(loop: LoopResponse, end_s: float) -> tuple[Array, Array]:
+    kept = loop.time_s <= end_s
+    return np.vstack([loop.step, loop.draws])[:, kept], loop.time_s[kept]
+
+
+def _unsettled(one: LoopResponse, other: LoopResponse, end_s: float) -> bool:
+    return any(creep(_until(each, end_s)[0]) for each in (one, other))
+
+
+def expected(promise: FlightComparison | None) -> dict[str, ExpectedLoop]:
+    """What models promised of each loop of a flight that it is held against."""
+    found: dict[str, list[LoopChange]] = {}
+    for each in () if promise is None else promise.changes:
+        if each.chance is not None:
+            found.setdefault(each.loop, []).append(each)
+    missed = () if promise is None else promise.significant
+    return {
+        loop: ExpectedLoop(
+            not any(each.key in missed and each.is_material for each in changes),
+            {each.name: each.words for each in changes},
+        )
+        for loop, changes in found.items()
+    }
+
+
+def unheld(promise: FlightComparison) -> tuple[Finding, ...]:
+    """What a promise was not held against, with what to fly for it."""
+    return tuple(each for each in promise.findings if each.light is Light.UNKNOWN)
 
 
 def _beyond(loop: LoopResponse) -> Finding:

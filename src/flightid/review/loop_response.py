@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from flightid.errors import UnknownNameError
 from flightid.frozen import dataclass
 from flightid.result import Result
+from flightid.review.step_features import creep
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Reading
 from flightid.uncertainty.quantiles import LEVEL, interval_words, shown, tails
@@ -87,6 +88,11 @@ class LoopResponse(
     def is_told(self) -> bool:
         """Whether the flight tells a step."""
         return self.step.size > 0
+
+    @property
+    def creeps(self) -> str:
+        """``"still rises"`` or ``"still falls"`` of a step that does where it ends; else empty."""
+        return creep(np.vstack([self.step, self.draws])) if self.is_told else ""
 
     def __getitem__(self, name: str) -> Reading:
         """Reading by its name, for example ``"rise time"``.

@@ -33,9 +33,9 @@ class FlownStep:
     following: Path | None
     back: Path | None
 
-    def finding(self, *, kept: bool | None) -> Finding:
+    def finding(self, *, kept: bool | None, log: str = "this log") -> Finding:
         """What to do after this step, by whether the flight kept its promise; None: in part."""
-        said = f"this log flew {self.flown.name}"
+        said = f"{log} flew {self.flown.name}"
         if kept is None:
             return Finding(
                 "step-not-judged", Light.UNKNOWN, f"{said}; not all that it promised was judged",
@@ -48,6 +48,12 @@ class FlownStep:
             return Finding("last-step", Light.GREEN, f"{said}, the last step: you have arrived")
         action = f"fly {self.following} next, log, and compare again"
         return Finding("next-step", Light.GREEN, said, action)
+
+    def unjudged(self, log: str) -> Finding:
+        """That two flights do not say whether a step kept its promise, and what does."""
+        said = f"{log} flew {self.flown.name}; what models promised of it is not held against it"
+        action = f"flightid compare STUDY-output {log}, of the study that made these gains"
+        return Finding("step-not-judged", Light.UNKNOWN, said, action)
 
 
 def flown_step(folders: Iterable[Path], parameters: Mapping[str, float]) -> FlownStep | None:

@@ -18,6 +18,10 @@ SETTLED = 0.1
 STRIDE = 0.15
 """Share of the window whose mean, the last, is held against the mean of the one before it. Moves
 between them add up over one more window: a step that would leave its settled band has no level."""
+CREEP = 0.01
+"""Share of the level that a step still gains or loses over one more window before it is said to
+(ours): integrators bring the last of a rate over seconds, and below that nobody minds."""
+RISES, FALLS = "still rises", "still falls"
 TOLD = 0.95
 """Least share of the draws in which a crossing exists: else it is not told."""
 HIGHEST = 0.3
@@ -28,21 +32,61 @@ def step_features(steps: Array, time_s: Array) -> tuple[Reading, ...]:
     """Level, delay, rise, overshoot and settling of step responses, row 0 the estimate.
 
     No numbers where the step still moves at the end of its window: they all stand on its level.
+    Where it creeps there they are of what it reaches in this window, and no settling is seen.
+    """
+    if still_moves(steps):
+        why = f"not settled in {_window(time_s)}"
+        read = window_features(steps, time_s)
+        return tuple(Estimate(each.name, None, each.unit, reason=why) for each in read)
+    return reached_features(steps, time_s)
+
+
+def reached_features(steps: Array, time_s: Array) -> tuple[Reading, ...]:
+    """The same of what steps reach in their window, settled or not; then no settling is told.
+
+    Nor is an overshoot of one that is highest where it ends, and rises there.
     """
     read = window_features(steps, time_s)
-    if not still_moves(steps):
+    if not (way := creep(steps)):
         return read
-    why = f"not settled in this window of {time_s[-1]:.3g} s"
-    return tuple(Estimate(each.name, None, each.unit, reason=why) for each in read)
+    why = f"{way} where {_window(time_s)} ends: "
+    untold = {"settling time": f"{why}settling is not seen"}
+    if way == RISES and time_s[np.argmax(steps[0])] >= (1.0 - END) * time_s[-1]:
+        untold["overshoot"] = f"{why}none is seen"
+    return tuple(
+        Estimate(each.name, None, each.unit, reason=untold[each.name])
+        if each.name in untold
+        else each
+        for each in read
+    )
+
+
+def _window(time_s: Array) -> str:
+    return f"this window of {time_s[-1]:.3g} s"
 
 
 def still_moves(steps: Array) -> bool:
     """Whether steps drift at their end by more than counts, and than their draws allow for none."""
+    return abs(_drift(steps)) > SETTLED
+
+
+def creep(steps: Array) -> str:
+    """``"still rises"`` or ``"still falls"`` of steps that do at their end; else empty."""
+    drift = _drift(steps)
+    if abs(drift) <= CREEP:
+        return ""
+    return RISES if drift > 0.0 else FALLS
+
+
+def _drift(steps: Array) -> float:
+    """What the estimate would move over one more window, of its level; 0 where draws allow none."""
     count = max(1, round(STRIDE * steps.shape[1]))
     last = steps[:, -count:].mean(axis=1)
     drift = last - steps[:, -2 * count : -count].mean(axis=1)
     low, high = np.quantile(drift[1:], tails(LEVEL))
-    return bool(abs(drift[0]) > SETTLED * STRIDE * abs(last[0]) and (low > 0.0 or high < 0.0))
+    if low <= 0.0 <= high or last[0] == 0.0:
+        return 0.0
+    return float(drift[0] / (STRIDE * abs(last[0])))
 
 
 def window_features(steps: Array, time_s: Array) -> tuple[Reading, ...]:
@@ -120,10 +164,16 @@ def _crossings(curves: Array, at: Array, value: float) -> Array:
 
 
 def _settling(shares: Array, time_s: Array) -> Array:
-    """Last instant outside of the settled band; NaN where that is the last of the window."""
+    """When each curve enters its settled band for good, by straight lines; NaN if never."""
     outside = np.abs(shares - 1.0) > SETTLED
     last = shares.shape[1] - 1 - np.argmax(outside[:, ::-1], axis=1)
-    found = time_s[np.minimum(last + 1, time_s.size - 1)]
+    rows = np.arange(len(shares))
+    after = np.minimum(last + 1, time_s.size - 1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        # The edge on the side that it comes from.
+        edge = 1.0 + SETTLED * np.sign(shares[rows, last] - 1.0)
+        way = (edge - shares[rows, last]) / (shares[rows, after] - shares[rows, last])
+    found = time_s[last] + np.clip(way, 0.0, 1.0) * (time_s[after] - time_s[last])
     found = np.where(outside.any(axis=1), found, time_s[0])
     return np.where(last >= shares.shape[1] - 2, np.nan, found)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 from flightid.review.identity import Battery, FlightIdentity, ModeSpan
 from flightid.review.loop_response import LoopResponse
@@ -14,6 +14,9 @@ from flightid.uncertainty.estimate import Estimate, Reading
 from flightid.uncertainty.quantiles import interval_words, shown
 
 Rows = tuple[tuple[Cell, ...], ...]
+READ = 5
+"""Readings of a step, of which those by frequency come behind."""
+MOST_DIGITS = 6
 
 
 def battery(found: Battery | None) -> Iterable[tuple[Cell, ...]]:
@@ -38,8 +41,9 @@ def steps(loops: Iterable[LoopResponse]) -> Table:
         Column("rises in", "ms"),
         Column("overshoots by", "%"),
         Column("settles in", "ms"),
-        Column("ends at"),
+        Column("reaches"),
     )
+    told = [loop for loop in loops if loop.is_told]
     rows = tuple(
         (
             loop.name,
@@ -47,17 +51,61 @@ def steps(loops: Iterable[LoopResponse]) -> Table:
             cell(loop["rise time"], 1e3),
             cell(loop["overshoot"]),
             cell(loop["settling time"], 1e3),
-            cell(loop["level"]),
+            _level(loop),
         )
-        for loop in loops
-        if loop.is_told
+        for loop in told
     )
     notes = (
-        f"In brackets: {interval_words(shown())} intervals. –: not told by this flight.",
+        f"In brackets: {interval_words(shown())} intervals.",
         "Of a set-point that jumps by 1; rise from 10 to 90 %, overshoot and settling (10 %) are "
-        "those of the level that it ends at.",
+        "those of the level that it reaches in the time that is read.",
+        *untold_notes((loop.name, each) for loop in told for each in loop.readings[:READ]),
     )
     return Table("Steps, from ordinary flying", columns, rows, notes)
+
+
+def _level(loop: LoopResponse) -> str | None:
+    """The level, and where it is not the last."""
+    level, creeps = cell(loop["level"]), loop.creeps
+    return f"{level}, {creeps}" if level and creeps else level
+
+
+def untold_notes(missing: Iterable[tuple[str, Reading]]) -> Iterator[str]:
+    """Why numbers are dashes, each reason once.
+
+    Parameters
+    ----------
+    missing : iterable of tuple of str and Estimate
+        Where a number stands, and the number; those that are told go.
+
+    Example
+    -------
+    >>> late = Estimate[float | None]("rise time", None, "s", reason="too slow")
+    >>> list(untold_notes([("roll rate", late), ("yaw rate", late)]))
+    ['–: roll rate, yaw rate (rise time): too slow.']
+    """
+    untold = ((at, each.name, each.reason) for at, each in missing if each.value is None)
+    return (f"–: {said}." for said in by_reason(untold))
+
+
+def by_reason(missing: Iterable[tuple[str, str, str]]) -> Iterator[str]:
+    """Places, names and reasons in words, each reason once.
+
+    Example
+    -------
+    >>> list(by_reason([("roll", "rise time", "too slow"), ("yaw", "rise time", "too slow")]))
+    ['roll, yaw (rise time): too slow']
+    """
+    reasons: dict[str, dict[str, list[str]]] = {}
+    for place, name, reason in missing:
+        if reason:
+            reasons.setdefault(reason, {}).setdefault(place, []).append(name)
+    for reason, places in reasons.items():
+        alike: dict[str, list[str]] = {}
+        for place, names in places.items():
+            alike.setdefault(", ".join(names), []).append(place)
+        said = "; ".join(f"{', '.join(where)} ({names})" for names, where in alike.items())
+        yield f"{said}: {reason}"
 
 
 def frequencies(loops: Iterable[LoopResponse]) -> Table:
@@ -73,7 +121,8 @@ def frequencies(loops: Iterable[LoopResponse]) -> Table:
         Column("at", "Hz", 3),
     )
     rows = []
-    for loop in (loop for loop in loops if loop.used_s):
+    used = [loop for loop in loops if loop.used_s]
+    for loop in used:
         read = {reading.name.split(" at ")[-1]: reading for reading in loop.readings}
         delay = next((r for r in loop.readings if r.name.startswith("phase delay")), None)
         wanted = (read.get(name) for name in ("-3 dB", "-90 deg", "-180 deg"))
@@ -89,7 +138,9 @@ def frequencies(loops: Iterable[LoopResponse]) -> Table:
         )
     note = "Phase delay at 2 Hz of rate loops, at 0.5 Hz of attitude loops."
     title = "Closed loops by frequency, and tracking"
-    return Table(title, columns, tuple(rows), (note, "–: not told by this flight."))
+    why = untold_notes((loop.name, each) for loop in used for each in loop.all_readings[READ:])
+    untold = (f"–: {loop.name}: no step, see below." for loop in used if not loop.is_told)
+    return Table(title, columns, tuple(rows), (note, *why, *untold))
 
 
 def motors(used: Iterable[MotorUse]) -> Table:
@@ -149,15 +200,24 @@ def gains(identity: FlightIdentity) -> Table:
 
 
 def cell(reading: Reading | Estimate | None, factor: float = 1.0) -> str | None:
-    """A value with its interval, to three digits; None where it is not told."""
+    """A value with its interval, to as many digits as tell its ends apart; None: not told.
+
+    Example
+    -------
+    >>> cell(Estimate("delay", 0.16372, "s", 1e-5), 1e3)
+    '163.72 (163.7 to 163.74)'
+    """
     if reading is None or reading.value is None:
         return None
-    value = f"{factor * reading.value:.3g}"
     ends = reading.interval(shown())
     if ends is None:
-        return value
+        return f"{factor * reading.value:.3g}"
     low, high = sorted((factor * ends[0], factor * ends[1]))
-    return f"{value} ({low:.3g} to {high:.3g})"
+    for digits in range(3, MOST_DIGITS + 1):
+        value, *around = (f"{each:.{digits}g}" for each in (factor * reading.value, low, high))
+        if around[0] != around[1]:
+            return f"{value} ({around[0]} to {around[1]})"
+    return f"{factor * reading.value:.3g}"
 
 
 def _in_degrees(tracking: Reading | None) -> str | None:

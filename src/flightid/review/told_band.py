@@ -15,6 +15,7 @@ Array = NDArray[np.float64]
 WINDOW_S = 1.0
 """Of the spectra, in units of `pace_s`."""
 RISE = "rise time"
+ASKED = "quicker sticks"
 QUICK = (RISE, "bandwidth at -3 dB", "frequency at -90 deg", "frequency at -180 deg")
 
 
@@ -60,9 +61,14 @@ def told_by(readings: Sequence[Reading], seen_hz: float) -> tuple[Reading, ...]:
         return tuple(readings)
     why = (
         f"the set-point moves this loop up to {seen_hz:.2g} Hz, a rise within {ends[1]:.2g} s asks "
-        f"for {RISE_BAND.value / ends[1]:.2g} Hz: quicker sticks"
+        f"for {RISE_BAND.value / ends[1]:.2g} Hz: {ASKED}"
     )
     return tuple(
         Estimate(each.name, None, each.unit, reason=why) if each.name in QUICK else each
         for each in readings
     )
+
+
+def is_too_quick(reading: Reading) -> bool:
+    """Whether `told_by` took the number: the set-point was too slow for it."""
+    return reading.value is None and reading.reason.endswith(ASKED)

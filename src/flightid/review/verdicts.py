@@ -12,6 +12,7 @@ from flightid.review.loop_response import LoopResponse
 from flightid.review.loops import what_to_fly
 from flightid.review.motors import MotorUse
 from flightid.review.result import FlightReview
+from flightid.review.step_features import FALLS, RISES
 from flightid.review.tables import cell
 from flightid.review.thresholds import LEVEL_OFF, OVERSHOOT, SATURATED, UNBALANCED
 from flightid.review.vibration import Vibration
@@ -86,11 +87,7 @@ def _loops(review: FlightReview) -> Iterator[Finding]:
         if loop["level"].value is None:
             yield _unsettled(loop)
             continue
-        half, over = cell(loop["delay to half"], 1e3), cell(loop["overshoot"])
-        said = (
-            f"{loop.name}: ends at {cell(loop['level'])} of what is asked, half way there after "
-            f"{half} ms, overshoots by {over} %"
-        )
+        said = _step_words(loop)
         if loop.is_bent:
             said += f" (of large moves: {loop.beyond})"
         judged = _level(review, loop, *_overshoot(review, loop, said))
@@ -114,12 +111,27 @@ def _loops(review: FlightReview) -> Iterator[Finding]:
         )
 
 
+def _step_words(loop: LoopResponse) -> str:
+    """What a step does, and whether that is all of it."""
+    half, over = cell(loop["delay to half"], 1e3), cell(loop["overshoot"])
+    level, creeps = f"{cell(loop['level'])} of what is asked", loop.creeps
+    said = f"{loop.name}: half way after {half} ms, "
+    if not creeps:
+        return f"{said}ends at {level}, overshoots by {over} %"
+    beyond = f" after an overshoot of {over} %" if over else ""
+    return (
+        f"{said}reaches {level} in {loop.time_s[-1]:.2g} s{beyond} and {creeps} there: settling is "
+        "not seen"
+    )
+
+
 def _unsettled(loop: LoopResponse) -> Finding:
     """No advice: how far a step gets that still moves is not known."""
     return Finding(
         f"step-{loop.axis}-{loop.loop}",
         Light.UNKNOWN,
-        f"{loop.name}: {loop['level'].reason}: level, rise, overshoot and settling are not told",
+        f"{loop.name}: {loop['level'].reason}, where it has come to {loop.step[-1]:.2g} of what is "
+        "asked: level, rise, overshoot and settling are not told",
     )
 
 
@@ -143,6 +155,8 @@ def _gains(review: FlightReview, sure: str) -> str:
 def _overshoot(review: FlightReview, loop: LoopResponse, said: str) -> tuple[Light, str, str]:
     """Light, message and action: amber where it may be beyond the limit, unknown where all may."""
     over, limit = loop["overshoot"], OVERSHOOT.value
+    if over.value is None and loop.creeps == RISES:
+        return Light.GREEN, said, ""
     low, high = over.interval95 or (over.value or 0.0, over.value or 0.0)
     if over.value is None or (low < limit and high - low > limit):
         return Light.UNKNOWN, f"{said}: too uncertain to judge", what_to_fly(loop)
@@ -154,8 +168,8 @@ def _overshoot(review: FlightReview, loop: LoopResponse, said: str) -> tuple[Lig
 
 
 SHORT = {
-    "rate": "look for motors at a limit, wind, and what the set-point is scaled by; replies slower "
-    "than the window of this step count as missing too",
+    "rate": "look for motors at a limit, wind, and what the set-point is scaled by; what comes "
+    "later than this step is read counts as missing too",
     "attitude": "look at the rate loop first, if it falls short too; then for a trim or wind that "
     "holds the angle off",
 }
@@ -168,16 +182,23 @@ LONG = {
 def _level(
     review: FlightReview, loop: LoopResponse, light: Light, said: str, action: str
 ) -> tuple[Light, str, str]:
-    """The same, amber where the step ends far from one and its interval leaves one out."""
+    """The same, amber where the step ends far from one and its interval leaves one out.
+
+    What still comes, as an integrator brings it, is no steady error, and asks for no gain.
+    """
     level, off = loop["level"], LEVEL_OFF.value
     value = 1.0 if level.value is None else level.value
     ends = level.interval95 or (value, value)
-    if value < 1.0 - off and ends[1] < 1.0:
+    short, beyond = value < 1.0 - off and ends[1] < 1.0, value > 1.0 + off and ends[0] > 1.0
+    if loop.creeps == (RISES if short else FALLS):
+        unsure = light is Light.GREEN and (short or beyond)
+        return (Light.UNKNOWN if unsure else light), said, action
+    if short:
         what, do = "short of what is asked: sticks do not give the motion they stand for", SHORT
         if loop.loop == "rate":
             sure = "raise I of this loop" if ends[1] < 1.0 - off else ""
             action = action or _gains(review, sure)
-    elif value > 1.0 + off and ends[0] > 1.0:
+    elif beyond:
         what, do = "beyond what is asked: sticks give more motion than they stand for", LONG
     else:
         return light, said, action
