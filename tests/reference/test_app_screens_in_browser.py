@@ -151,6 +151,7 @@ def test_from_a_dropped_log_to_gains_and_the_flight_with_them(desk: Desk, tmp_pa
         "Enter"
     )
     page.get_by_role("status").filter(has_text="Tuning again: cancelled.").wait_for()
+    page.get_by_text("still those of balanced; firm has none yet").wait_for()
     page.get_by_role("button", name="balanced", exact=True).press("Enter")
     page.get_by_role("status").filter(has_text="cancelled").wait_for(state="detached")
     page.get_by_role("button", name="Download step 1").wait_for()

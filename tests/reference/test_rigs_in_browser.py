@@ -7,6 +7,7 @@ import zipfile
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 import flightid as fid
 from tests.reference.test_app_in_browser import Desk, _findings, desk, zoomed_by_keys
@@ -91,5 +92,36 @@ def test_from_dropped_tables_to_a_report(desk: Desk, tmp_path: Path) -> None:
     assert report.evaluate("origin") == "null"  # it cannot reach the page
     report.close()
     assert not said
+    assert not window.complaints
+    page.close()
+
+
+@pytest.mark.nightly
+def test_gains_of_a_rig_by_hand(desk: Desk, tmp_path: Path) -> None:
+    """Limits that the records propose, a slider, its numbers in the study, and back again."""
+    window = desk.open()
+    page = window.page
+    page.set_default_timeout(120_000)
+    page.set_input_files("input[type=file]", rig_tables(tmp_path)[:1])
+    page.select_option("select[aria-label='Role of drive']", "input")
+    page.select_option("select[aria-label='Role of swing']", "output")
+    page.click("text=Write the study")
+    page.locator("#content .box").wait_for()
+    page.click("nav >> text=Gains")
+    page.get_by_role("button", name="Take these as limits").click()
+    page.locator("pre .changed", has_text="output_low = -1").wait_for()
+    slider = page.locator("#slider-Kp")
+    slider.wait_for()
+    assert page.locator("label[for=slider-Kp]").inner_text() == "Kp V/rad"
+    assert page.locator("[role=application][aria-label^='What the controller puts out']").count()
+    assert "meets no limit" in page.locator(".reach").inner_text()
+    slider.press("End")
+    page.get_by_text("Nothing to download").wait_for()
+    by_hand = desk.study["tune"]["by_hand"]
+    assert by_hand.keys() == {"Kp", "Ki", "Kd"}
+    page.get_by_role("button", name="As found").click()
+    page.get_by_role("button", name="gains.toml").wait_for()
+    assert "by_hand" not in desk.study["tune"]
+    assert _findings(page) == []
     assert not window.complaints
     page.close()

@@ -14,6 +14,7 @@ pytest.importorskip("fastapi", reason="the extra app is not installed")
 from flightid import run_study
 from flightid.app import gain_work
 from flightid.app.study_edits import KeyEdit, edited
+from flightid.errors import OptionError
 from flightid.export.gains import write_gains
 
 STUDY = """
@@ -86,6 +87,23 @@ def test_a_rig_has_the_controller_that_the_command_gives_it(study: Path, tmp_pat
     worst = ran["y"].worst_case("loop", "phase margin")
     (row,) = [each for each in axis["margins"] if each["name"] == "phase margin"]
     assert (row["nominal"], row["worst"]) == (worst.nominal, worst.worst)
+    # Gains by hand are a key of the study as well; the records tell what its input went through.
+    by_hand = {"Kp": 1.0, "Ki": 2.0, "Kd": 0.0}
+    asked = edited(STUDY, [KeyEdit(("tune", "by_hand"), by_hand)])
+    (held,) = gain_work.gains_of(study, asked).axes
+    tune = {"controller": "pi_d", "by_hand": by_hand}
+    again = run_study(study, output=tmp_path / "out", tune=tune).tuning
+    assert again is not None
+    assert [each["message"] for each in held.model_dump()["findings"]] == [
+        each.message for each in again["y"].findings
+    ]
+    assert {each.name: each.value for each in held.sliders} == by_hand
+    assert [each.found for each in held.sliders] == [*ran["y"].gains.values()]
+    assert told["ranges"]["u"] == [-1.0, 1.0]
+    (said,) = [each for each in axis["findings"] if each["code"] == "limits-untold"]
+    assert "in the records u went from -1 to 1" in said["message"]
+    with pytest.raises(OptionError, match="a loop that is not closed"):
+        gain_work.gains_of(study, edited(STUDY, [KeyEdit(("tune", "by_hand"), {"z/Kp": 1.0})]))
     # Each choice of the form is a key of the study; another loop of the same file.
     clicks = [
         KeyEdit(("tune", "controller"), "pi"),

@@ -56,6 +56,25 @@ def test_a_slider_shows_the_numbers_of_the_tuning(fit: fid.Fit, found: fid.PidDe
     assert phase - 180.0 == pytest.approx(margin, abs=0.3)
 
 
+def test_one_plant_short_is_one_light_on_the_slider_in_the_tuning_and_in_the_files(
+    fit: fid.Fit, found: fid.PidDesign
+) -> None:
+    # The largest P that one plant of 21 does not stand: amber, for so few were drawn, and written.
+    low, high = found.gains["ATC_RAT_RLL_P"], 0.5
+    for _ in range(14):
+        middle = (low * high) ** 0.5
+        short = (~move_gains(found, {"ATC_RAT_RLL_P": middle}, responses=False).met).sum()
+        low, high = (middle, high) if short < 1 else (low, middle)
+    bold = {**found.gains, "ATC_RAT_RLL_P": float(f"{1.0005 * high:.6g}")}
+    moved = move_gains(found, bold, responses=False)
+    held = fid.tune_pid(fit, gains=FLOWN, requirements=NEED, draws=20, by_hand=bold)
+    assert ((~moved.met).sum(), bool(moved.short)) == (1, True)
+    assert moved.finding == held.findings[0]
+    assert (held.exists, moved.finding.light) == (True, Light.AMBER)
+    assert "20 of 21 fresh plants" in moved.finding.message
+    assert move_gains(found, {}, responses=False).finding == found.findings[0]
+
+
 def test_gains_by_hand_that_break_a_requirement_are_red_and_not_written(
     fit: fid.Fit, tmp_path_factory: pytest.TempPathFactory
 ) -> None:

@@ -18,6 +18,7 @@ import flightid as fid
 from flightid.cli.program import run
 from flightid.control.autopilots.pid_loop import PidLoop
 from flightid.control.tuning.order_statistics import least_share
+from flightid.control.tuning.requirements import TuningRequirements
 from flightid.control.tuning.standing_error import judge_standing, standing_errors
 from flightid.conventions import Light
 from flightid.errors import DataError, ExportError, OptionError
@@ -102,6 +103,62 @@ def test_the_code_does_what_the_recursion_does(tmp_path: Path) -> None:
     assert_close(code.pid_step(state, number(0.5), number(0.2)), 0.8, atol=1e-12, why="bumpless")
     with pytest.raises(ExportError, match="no recursion"):
         fid.export(_tuned(), tmp_path / "other.c")
+
+
+def test_presets_and_gains_by_hand_of_a_rig() -> None:
+    """Peaks and areas by SciPy's own response of the loop, with the delay as it is."""
+    omega = np.geomspace(0.01, 500.0, 20_001)
+    s, peaks, left = 1j * omega, [], []
+    for preset in ("gentle", "balanced", "firm"):
+        need = TuningRequirements(preset=preset)
+        options = fid.ControllerOptions(controller="pi")
+        common = {"controller": options, "nominal": True, "band_rad_s": (0.1, 300.0)}
+        design = fid.tune_controller(LAG, requirements=need, **common)
+        plant = scipy.signal.freqresp(([10.0], [1.0, 5.0]), omega)[1] * np.exp(-0.02 * s)
+        apart = 1.0 + plant * (design.gains["Kp"] + design.gains["Ki"] / s)
+        peaks.append(float(1.0 / np.abs(apart).min()))
+        left.append(float(np.trapezoid(np.abs(plant / apart / s) ** 2, omega) / np.pi))
+    most = [1.6, 2.0, 2.5]
+    assert all(peak <= limit + 0.01 for peak, limit in zip(peaks, most, strict=True))
+    assert peaks == sorted(peaks)
+    assert left[0] > 1.3 * left[1] > 1.3**2 * left[2]
+    # The same gains by hand promise the same; the P alone is a controller of its own.
+    held = fid.tune_controller(LAG, requirements=need, by_hand=design.gains, **common)
+    assert [each.to_dict() for each in held.worst_cases] == [
+        each.to_dict() for each in design.worst_cases
+    ]
+    assert fid.tune_controller(LAG, by_hand={"Kp": 1.0}, **common).gains == {"Kp": 1.0, "Ki": 0.0}
+    for wrong in ({"Kd": 1.0}, {"Kp": -1.0}, {"Kp": 0.0}):
+        with pytest.raises(OptionError, match="holds no gains of its controller"):
+            fid.tune_controller(LAG, by_hand=wrong, **common)
+
+
+@pytest.mark.parametrize(
+    ("units", "told"),
+    [
+        (("deg", "%"), ["%/deg", "%/(deg s)", "% s/deg"]),
+        (("rad/s", "1"), ["1/(rad/s)", "1/(rad/s s)", "s/(rad/s)"]),
+        (("1", "V"), ["V", "V/s", "V s"]),
+        ((), ["", "1/s", "s"]),
+    ],
+)
+def test_units_of_gains_are_output_over_measurement(
+    units: tuple[str, ...], told: list[str]
+) -> None:
+    assert [_loop(units=units).unit_told(role) for role in "pid"] == told
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_what_a_controller_puts_out_at_a_step_is_told_in_its_own_sense(sign: float) -> None:
+    plant = replace(LAG, b=sign * np.asarray(LAG.b))
+    design = _tuned(plant, controller="pi")
+    out, answer = design.response("controller output"), design.response("step")
+    # P acts at once; at rest the plant's gain of 2 is made up for.
+    assert_close(out.estimate[0], sign * design.gains["Kp"], rtol=0.02, why="P of the step")
+    assert_close(out.estimate[-1], sign * 0.5, rtol=2e-3, why="1 over the gain")
+    assert_close(answer.estimate[-1], 1.0, rtol=2e-3, why="integral action")
+    left = design.response("disturbance").estimate
+    assert sign * left[np.argmax(np.abs(left))] > 0.01
 
 
 def test_margins_are_those_of_the_continuous_loop() -> None:

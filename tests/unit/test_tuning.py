@@ -453,6 +453,9 @@ def test_a_preset_moves_what_is_left_as_usual() -> None:
     assert TuningRequirements(preset="balanced") == TuningRequirements()
     factors = [TuningRequirements(preset=p).integral_factor for p in ("gentle", "balanced", "firm")]
     assert factors == sorted(factors)
+    # Another preset takes the whole place of the one before, and nothing that was asked for.
+    firm = gentle.changed(preset="firm")
+    assert (firm.phase_margin_deg, firm.gain_margin_db, firm.noise_growth) == (45.0, 7.0, 3.0)
     with pytest.raises(OptionError, match="preset is not known"):
         TuningRequirements(preset="brave")
 

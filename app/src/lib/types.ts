@@ -412,6 +412,9 @@ export interface GainsPart {
   refusal: string;
   files: GainFile[];
   loops: string[];
+  ranges: Record<string, [number, number]>;
+  preset: string;
+  form: string;
 }
 
 /** One axis with other gains, judged at once as a slider moves. */
@@ -504,6 +507,7 @@ export interface MarginRow {
   worst: number | null;
   flown: number | null;
   flown_worst: number | null;
+  untold: string;
 }
 
 /** A model of a study, or why there is none; both empty where it has no equations. */
@@ -786,6 +790,8 @@ export interface RigController {
   forms: ControllerForm[];
   remarks: string[];
   sampled: boolean;
+  measured: string;
+  moved: string;
 }
 
 /** What was found in the samples of a channel, and where. */

@@ -35,6 +35,8 @@ class MarginRow(Message):
     worst: float | None
     flown: float | None
     flown_worst: float | None
+    untold: str
+    """Why nothing is promised of it; empty where something is."""
 
 
 class TimeCurve(Message):
@@ -81,6 +83,9 @@ class RigController(Message):
     remarks: list[str]
     sampled: bool
     """Whether it has a rate, so that there is code of it."""
+    measured: str
+    """Unit of set-point and measurement, and of the output; empty where nobody knows it."""
+    moved: str
 
 
 class AxisGains(Message):
@@ -128,6 +133,11 @@ class GainsPart(Message):
     """Of ``flightid tune --write``: steps with their ways back; of a rig numbers and code."""
     loops: list[str]
     """Of a rig: every loop that its models have, as output/input."""
+    ranges: dict[str, tuple[float, float]]
+    """Of a rig: what each input went through in the records that were fitted."""
+    preset: str
+    """Of the study that these gains are of, as is the form of a rig's controller."""
+    form: str
 
 
 class GainsScreen(Message):

@@ -31,15 +31,18 @@ from flightid.app.study_edits import KeyEdit, edited
 from flightid.app.study_reach import draft_inside, named_places
 from flightid.app.work import KEPT
 from flightid.control.autopilots.parameter_files import parameter_suffix
+from flightid.control.tuning.controller_options import ControllerOptions
+from flightid.control.tuning.findings import GAINS
 from flightid.control.tuning.moved_gains import MovedGains, move_gains
 from flightid.control.tuning.pid_design import PidDesign
+from flightid.control.tuning.requirements import TuningRequirements
 from flightid.control.tuning.result import Tuning
-from flightid.conventions import Light
 from flightid.errors import DataError, FlightidError, StudyError, UnknownNameError
 from flightid.export.gains import write_gains
 from flightid.files import write_atomically
 from flightid.findings import Finding, worst
 from flightid.study.gain_preview import LoopChoice, preview_loops, preview_tuning
+from flightid.units import DIMENSIONLESS
 from flightid.version import VERSION
 
 MOST_POINTS = 240
@@ -90,7 +93,7 @@ def gains_of(study: Path, text: str) -> GainsPart:
         said = "choose the loops to close: models here have several inputs or outputs"
         return GainsPart(
             axes=[], refused=[], findings=[], n_steps=0, left_out={}, refusal=said, files=[],
-            loops=list(loops.offered),
+            loops=list(loops.offered), ranges=dict(loops.ranges), **_asked(text),
         )  # fmt: skip
     tuning = _tuned(study, text)
     by_hand = _hand_gains(text)
@@ -116,7 +119,17 @@ def gains_of(study: Path, text: str) -> GainsPart:
         refusal=refusal,
         files=[] if refusal else _files(tuning),
         loops=[] if loops is None else list(loops.offered),
+        ranges={} if loops is None else dict(loops.ranges),
+        **_asked(text),
     )
+
+
+def _asked(text: str) -> dict[str, str]:
+    """Preset and form that a study asks for."""
+    table = tomllib.loads(text).get("tune", {})
+    usual = {"preset": TuningRequirements().preset, "form": ControllerOptions().controller}
+    return {"preset": str(table.get("preset", usual["preset"])),
+            "form": str(table.get("controller", usual["form"]))}  # fmt: skip
 
 
 def _loops_of(study: Path, text: str) -> LoopChoice | None:
@@ -214,10 +227,8 @@ def _axis(
     found: Mapping[str, float],
     by_hand: Mapping[str, float],
 ) -> AxisGains:
-    hand = any(name in by_hand for name in design.gains)
-    light: Light = worst(design.findings)
-    if moved.short:
-        light = Light.RED
+    hand = any(name in by_hand or f"{design.axis}/{name}" in by_hand for name in design.gains)
+    findings = tuple(moved.finding if each.code in GAINS else each for each in design.findings)
     count, total = int(moved.met.sum()), len(moved.met)
     sentence = f"{count} of {total} plants that the data allow meet every requirement"
     if moved.short:
@@ -225,7 +236,7 @@ def _axis(
     return AxisGains(
         axis=design.axis,
         by_hand=hand,
-        light=light_of(light),
+        light=light_of(worst(findings)),
         sentence=sentence,
         sliders=[
             GainSlider(
@@ -252,7 +263,7 @@ def _axis(
             for each in design.stages
         ],
         filters=[f"{each.name} {each.old:g} to {each.value:g}" for each in design.filters],
-        findings=[shown_finding(each) for each in design.findings],
+        findings=[shown_finding(each) for each in findings],
         controller=_controller(design),
     )
 
@@ -263,7 +274,11 @@ def _controller(design: PidDesign) -> RigController | None:
         return None
     table = loop.form_table()
     forms = [ControllerForm(name=str(a), law=str(b), gains=str(c)) for a, b, c in table.rows]
-    return RigController(forms=forms, remarks=list(table.notes), sampled=loop.sampled)
+    measured, moved = ("" if each == DIMENSIONLESS else each for each in loop.units or ("", ""))
+    return RigController(
+        forms=forms, remarks=list(table.notes), sampled=loop.sampled, measured=measured,
+        moved=moved,
+    )  # fmt: skip
 
 
 def _margins(moved: MovedGains) -> list[MarginRow]:
@@ -284,6 +299,9 @@ def _margins(moved: MovedGains) -> list[MarginRow]:
                 worst=each.worst,
                 flown=each.flown,
                 flown_worst=each.flown_worst,
+                untold=""
+                if each.nominal is None or each.worst is not None
+                else each.estimate.reason,
             )
         )
     return rows

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import MutableMapping
+from collections.abc import Mapping, MutableMapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
@@ -12,6 +12,7 @@ from flightid.control.tuning.result import Tuning
 from flightid.frozen import dataclass
 from flightid.models import Model
 from flightid.models.model import model_of
+from flightid.study.actuator_range import input_ranges
 from flightid.study.pipeline import identify_models
 from flightid.study.previewed import PreviewedStudy
 from flightid.study.stage_runner import StageRunner
@@ -68,10 +69,13 @@ class LoopChoice:
     ----------
     offered, chosen : tuple of str
         All of them; those that a tuning closes, none where it must be told.
+    ranges : mapping of str to tuple of float
+        What each input went through in the records: a proposal for the limits of an actuator.
     """
 
     offered: tuple[str, ...]
     chosen: tuple[str, ...]
+    ranges: Mapping[str, tuple[float, float]]
 
 
 def preview_loops(
@@ -102,7 +106,8 @@ def preview_loops(
         offered = [f"{y}/{u}" for each in models for y in each.outputs for u in each.inputs]
         single = [each for model in models for each in only_loop(model)]
         chosen = asked.loops if asked is not None and asked.loops else tuple(single)
-        return LoopChoice(tuple(dict.fromkeys(offered)), chosen)
+        ranges = input_ranges(each.value for each in staged)
+        return LoopChoice(tuple(dict.fromkeys(offered)), chosen, ranges)
 
 
 def preview_fits(path: str | Path, *, cache: MutableMapping[str, Any] | None = None) -> list[Any]:

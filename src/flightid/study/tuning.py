@@ -17,12 +17,13 @@ from flightid.control.tuning.tune import tune
 from flightid.control.tuning.tune_controller import tune_controller
 from flightid.control.tuning.tune_pid import CHANNELS
 from flightid.control.tuning.tuned_filters import TunedFilters
-from flightid.errors import DataError, FlightidError, ModelError, StudyError
+from flightid.errors import DataError, FlightidError, ModelError, OptionError, StudyError
 from flightid.frozen import dataclass
 from flightid.models import Model, load_model
 from flightid.models.model import model_of
 from flightid.options import options_of
 from flightid.review.suggested_filters import suggested_filters
+from flightid.study.actuator_range import input_ranges, untold_limits
 from flightid.study.reading import TableReader, read_each
 from flightid.validation import Comparison, Verification
 
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
 
 KINDS = (TuningRequirements, TuneOptions, ControllerOptions)
 """Dataclasses whose options are the keys of [tune], and options of ``flightid tune``."""
-AUTOPILOT_ONLY = ("gyro", "angle_loop", "signs", "other_loops", "filters", "by_hand")
+AUTOPILOT_ONLY = ("gyro", "angle_loop", "signs", "other_loops", "filters")
 """Options that a PID of its own does not know."""
 
 
@@ -74,7 +75,7 @@ class TuneSettings:
         if told[2]:
             own = replace(own or ControllerOptions(), **told[2])
         return TuneSettings(
-            replace(self.requirements, **told[0]), replace(self.options, **told[1]), own
+            self.requirements.changed(**told[0]), replace(self.options, **told[1]), own
         )
 
 
@@ -172,8 +173,9 @@ def tune_models(
         The study reads records, which hold no gains.
     """
     if settings.controller is not None:
-        known = [(one.fit, tuple(one.verifications.values())) for one in identified if one.fit]
-        return _controllers(known, settings.controller, settings)
+        items = [one for one in identified if one.fit]
+        known = [(one.fit, tuple(one.verifications.values())) for one in items]
+        return _controllers(known, settings.controller, settings, input_ranges(items))
     fits: dict[str, object] = {}
     checks = {}
     for item in identified:
@@ -245,6 +247,7 @@ def _controllers(
     known: Sequence[tuple[Any, tuple[Verification | Comparison, ...]]],
     controller: ControllerOptions,
     settings: TuneSettings,
+    ranges: Mapping[str, tuple[float, float]] | None = None,
 ) -> Tuning | None:
     """A PID of its own around each loop that is asked for, of the first model that has it."""
     if not known:
@@ -267,13 +270,17 @@ def _controllers(
             ):
                 continue
             asked = {k: v for k, v in vars(settings.options).items() if k not in AUTOPILOT_ONLY}
+            asked["by_hand"] = _own_gains(asked["by_hand"] or {}, output)
             try:
-                designs[name] = tune_controller(
+                made = tune_controller(
                     model, inputs=input, outputs=output, controller=controller,
                     requirements=settings.requirements, verification=checks, **asked,
                 )  # fmt: skip
+                told = untold_limits(controller, input, channels, ranges or {})
+                designs[name] = replace(made, findings=(*made.findings, *told))
             except (DataError, ModelError) as error:
                 errors[name] = error
+    _require_loops(settings.options.by_hand or {}, [*designs, *errors])
     missing = [name for name in controller.loops if name not in {*designs, *errors}]
     if errors and not designs:
         raise next(iter(errors.values()))
@@ -286,6 +293,30 @@ def _controllers(
         )
     refused = tuple(RefusedAxis.by(name, error) for name, error in errors.items())
     return Tuning(tuple(designs.values()), (), refused)
+
+
+def _own_gains(by_hand: Mapping[str, float], output: str) -> dict[str, float]:
+    """Those of one loop: named by the gain alone, or by output/gain where several are closed."""
+    parted = {name.rpartition("/"): value for name, value in by_hand.items()}
+    return {gain: v for (loop, _, gain), v in parted.items() if loop in ("", output)}
+
+
+def _require_loops(by_hand: Mapping[str, float], closed: Sequence[str]) -> None:
+    """Refuse gains by hand of a loop that is not closed.
+
+    Raises
+    ------
+    OptionError
+        Names them.
+    """
+    outputs = [_loop_channels(name)[0] for name in closed]
+    lost = [name for name in by_hand if name.rpartition("/")[0] not in ("", *outputs)]
+    if closed and lost:
+        raise OptionError(
+            "by_hand names gains of a loop that is not closed",
+            found=", ".join(lost),
+            needed=f"Kp, Ki, Kd, or with the output before them: {outputs[0]}/Kp",
+        )
 
 
 def _first_loop(known: Sequence[tuple[Any, object]]) -> str:

@@ -92,6 +92,23 @@ class PidLoop(AxisLoop):
         """Zero: there is no loop around this one."""
         return 0.0
 
+    def unit_told(self, role: str) -> str:
+        """Unit of a gain by its role: output over measurement, where both are known.
+
+        Example
+        -------
+        >>> PidLoop("y", {}, {}, 50.0, 50.0, units=("deg", "%")).unit_told("i")
+        '%/(deg s)'
+        """
+        if not {*self.units} - {DIMENSIONLESS}:
+            return {"p": "", "i": "1/s", "d": "s"}[role]
+        measured, moved = self.units
+        over = {"p": measured, "i": f"{measured} s", "d": measured}[role]
+        above = moved if role != "d" else "s" if moved == DIMENSIONLESS else f"{moved} s"
+        if measured == DIMENSIONLESS:
+            return above if role != "i" else f"{moved}/s"
+        return f"{above}/({over})" if set(over) & set(" /*") else f"{above}/{over}"
+
     def form(self, name: str) -> dict[str, float] | None:
         """Gains in one of the usual forms, the same transfer function in each.
 

@@ -19,6 +19,7 @@ from flightid.control.tuning.gain_steps import Stage, TunedGain
 from flightid.control.tuning.limits import ANGLE
 from flightid.control.tuning.loop_problem import LoopAssessment, LoopProblem, Plants
 from flightid.control.tuning.margins_beyond import margins_beyond
+from flightid.control.tuning.order_statistics import MOST
 from flightid.control.tuning.requirements import TuningRequirements
 from flightid.control.tuning.sampled_plants import (
     AxisLoops,
@@ -223,7 +224,9 @@ def tune_axis(
     return _result(setting, paths, found, loop, fresh, old)
 
 
-def held_by_hand(problem: LoopProblem, gains: Array) -> GainSearchResult:
+def held_by_hand(
+    problem: LoopProblem, gains: Array, judged: LoopAssessment | None = None
+) -> GainSearchResult:
     """Gains that nobody searched, with the requirements that fresh plants do not meet.
 
     Parameters
@@ -231,12 +234,22 @@ def held_by_hand(problem: LoopProblem, gains: Array) -> GainSearchResult:
     problem : LoopProblem
         Its plants are those to promise for.
     gains : ndarray, shape (n_gains,)
+    judged : LoopAssessment, optional
+        The gains judged by the problem, where that is known.
+
+    Returns
+    -------
+    GainSearchResult
+        Gains exist that hold for the estimate and for nine of ten plants: what the search promises
+        of its own on fresh plants is no more.
     """
-    judged = problem.judge(gains[None])
+    judged = problem.judge(gains[None]) if judged is None else judged
     least = dict(zip(judged.names, judged.slack[:, 0].min(axis=-1).tolist(), strict=True))
     short = tuple(name for name, slack in least.items() if slack < 0.0)
     nearest = () if short else (min(least, key=lambda name: least[name]),)
-    return GainSearchResult(gains, not short, short or nearest, least, by_hand=True)
+    met = judged.slack[:, 0].min(axis=0) >= 0.0
+    exists = bool(met[0]) and float(met.mean()) >= MOST
+    return GainSearchResult(gains, exists, short or nearest, least, by_hand=True)
 
 
 def _result(

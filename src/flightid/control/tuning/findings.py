@@ -11,16 +11,17 @@ from flightid.control.autopilots import AxisLoop
 from flightid.control.gyro import Gyro
 from flightid.control.margins.findings import COHERENCE
 from flightid.control.tuning.axis_tuning import AxisResult
-from flightid.control.tuning.gain_search import INTEGRAL
+from flightid.control.tuning.gain_search import INTEGRAL, GainSearchResult
 from flightid.control.tuning.gain_steps import Stage, TunedGain
-from flightid.control.tuning.order_statistics import least_share
+from flightid.control.tuning.order_statistics import ENOUGH, least_share
 from flightid.conventions import Light
 from flightid.findings import Finding
 
 Array = NDArray[np.float64]
-ENOUGH = 0.95
 NEAR = 2.0**0.5
 """Half an octave to either side."""
+GAINS = ("gains", "no-gains")
+"""Codes of `verdict`."""
 ADVICE = {
     "stability": "no gains in the ranges hold every plant: identify better, or widen the ranges",
     "identified band": "sweep to higher frequencies, or lower band_factor knowingly",
@@ -31,14 +32,22 @@ ADVICE = {
 }
 
 
-def verdict(result: AxisResult, drawn: int) -> Finding:
-    """Whether gains were found, and for how many of the plants drawn; 0: for none of them."""
-    names = ", ".join(result.found.binding)
-    if not result.found.exists:
-        short = [
-            f"{name} {slack:+.0%}" for name, slack in result.found.slack.items() if slack < 0.0
-        ]
-        if result.found.by_hand:
+def verdict(found: GainSearchResult, met: NDArray[np.bool_], drawn: int) -> Finding:
+    """Whether there are gains, and for how many plants: the one light of gains, wherever it shows.
+
+    Parameters
+    ----------
+    found : GainSearchResult
+        Of a search, or held by hand.
+    met : ndarray of bool, shape (n_plants,)
+        Which fresh plants meet every requirement.
+    drawn : int
+        How many were drawn, those that were left out among them; 0: none.
+    """
+    names = ", ".join(found.binding)
+    if not found.exists:
+        short = [f"{name} {slack:+.0%}" for name, slack in found.slack.items() if slack < 0.0]
+        if found.by_hand:
             return Finding(
                 "no-gains",
                 Light.RED,
@@ -51,15 +60,15 @@ def verdict(result: AxisResult, drawn: int) -> Finding:
             Light.RED,
             f"no gains were found that meet all requirements for every plant, on a grid over their "
             f"ranges nor by search from it; nearest: {', '.join(short)}",
-            advice(result.found.binding),
+            advice(found.binding),
         )
-    if not drawn and result.found.by_hand:
+    if not drawn and found.by_hand:
         return Finding(
             "gains", Light.AMBER, f"gains set by hand, for the model alone; nearest: {names}"
         )
     if not drawn:
         return Finding("gains", Light.AMBER, f"gains found for the model alone; binding: {names}")
-    good, share = int(result.met.sum()), least_share(int(result.met.sum()), drawn)
+    good, share = int(met.sum()), least_share(int(met.sum()), drawn)
     return Finding(
         "gains",
         Light.GREEN if share >= ENOUGH else Light.AMBER,

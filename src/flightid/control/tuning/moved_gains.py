@@ -9,10 +9,14 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.control.tuning.axis_tuning import held_by_hand
 from flightid.control.tuning.controller_paths import ControllerPaths
+from flightid.control.tuning.findings import GAINS, verdict
+from flightid.control.tuning.gain_search import GainSearchResult
 from flightid.control.tuning.pid_design import PidDesign
 from flightid.control.tuning.responses import ResponseBand, response_bands
 from flightid.control.tuning.worst_cases import WorstCase, worst_cases
+from flightid.findings import Finding
 from flightid.frozen import dataclass
 
 Array = NDArray[np.float64]
@@ -27,6 +31,8 @@ class MovedGains:
     ----------
     values : mapping of str to float
         Every gain that moves, as the autopilot keeps it.
+    finding : Finding
+        Whether they are gains: what a tuning says of them, by hand or searched.
     worst_cases : tuple of WorstCase
         Beside those of the flown gains; the numbers of `tune(…, by_hand=values)`.
     met : ndarray of bool, shape (n_plants,)
@@ -41,6 +47,7 @@ class MovedGains:
     """
 
     values: Mapping[str, float]
+    finding: Finding
     worst_cases: tuple[WorstCase, ...]
     met: NDArray[np.bool_]
     short: tuple[str, ...]
@@ -106,8 +113,10 @@ def move_gains(
     if design.flown.has_flown and not design.filters:
         old = paths.gains_of(design.flown)[None]
         curves["flown"] = problem.loops(old, chosen).whole[0, 0]
+    made_of = {name: loop.gains[name] for name in paths.names}
     return MovedGains(
-        {name: loop.gains[name] for name in paths.names},
+        made_of,
+        _verdict(design, made_of, held_by_hand(problem, gains, judged), met),
         beside,
         met,
         short,
@@ -115,6 +124,17 @@ def move_gains(
         problem.plants.omega_rad_s,
         curves,
     )
+
+
+def _verdict(
+    design: PidDesign, values: Mapping[str, float], held: GainSearchResult, met: NDArray[np.bool_]
+) -> Finding:
+    """Of the design where its gains are these, else of gains by hand."""
+    if values == design.gains:
+        return next(each for each in design.findings if each.code in GAINS)
+    known = bool(design.provenance.get("draws"))
+    left = cast(int, design.provenance.get("left_out", 0))
+    return verdict(held, met, len(met) + left if known else 0)
 
 
 def _bands(design: PidDesign, loop: object) -> tuple[ResponseBand, ...]:

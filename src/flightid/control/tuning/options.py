@@ -58,7 +58,8 @@ class TuneOptions(Options):
     by_hand: Mapping[str, float] | None = option(
         None,
         doc="Gains by the autopilot's names in place of those of the search: their axes are judged "
-        "as they stand, gains that are not named as flown.",
+        "as they stand, gains that are not named as flown. Of a PID of its own Kp, Ki, Kd, with "
+        "several loops output/Kp; what is not named is zero.",
     )
     accept_red: bool = option(
         False,

@@ -9,6 +9,10 @@ import scipy
 from flightid.errors import OptionError
 
 CONFIDENCE = 0.95
+ENOUGH = 0.95
+"""Share of the plants that the data allow for which gains must hold."""
+MOST = 0.9
+"""Share of the plants drawn below which gains by hand are none."""
 
 
 def content_of_worst(count: int, confidence: float = CONFIDENCE) -> float:

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import tomllib
-from dataclasses import asdict, fields
+from collections.abc import Mapping
+from dataclasses import asdict, fields, replace
 from functools import cache
 from importlib.resources import files
+from typing import Any, cast
 
 from flightid.frozen import dataclass
 from flightid.options import Options, option
 
 PRESETS = ("gentle", "balanced", "firm")
+OWN = "own_controller"
+"""Of a preset: what else it means where no autopilot is tuned."""
 OBJECTIVES = ("disturbance", "crossover", "disturbance_bandwidth")
 
 
@@ -51,7 +55,8 @@ class TuningRequirements(Options):
         Largest ratio of I to P, over that of the autopilot's defaults or over nothing where the
         flown gains have a larger one; without it I grows until a margin stops it.
     preset : {"gentle", "balanced", "firm"}
-        Values of `presets.toml` for all of these that are left as usual.
+        Values of `presets.toml` for all of these that are left as usual; firm is less margin around
+        a rig, more noise and a larger I on an autopilot.
     objective : {"disturbance", "crossover", "disturbance_bandwidth"}
         What is made as good as the limits allow: the rate that a step of disturbance at the
         output leaves (root of its square integrated over time), the rate loop's crossover, or the
@@ -114,10 +119,35 @@ class TuningRequirements(Options):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        usual = {field.name: field.default for field in fields(self)}
-        for name, value in _presets()[self.preset].items():
-            if getattr(self, name) == usual[name]:
+        self._fill(_presets()[self.preset])
+
+    def _fill(self, values: Mapping[str, object]) -> None:
+        usual = _usual()
+        for name, value in values.items():
+            if name != OWN and getattr(self, name) == usual[name]:
                 object.__setattr__(self, name, value)
+
+    def changed(self, **requirements: Any) -> TuningRequirements:
+        """With some replaced, by name; another preset takes the place of all of the one before.
+
+        Example
+        -------
+        >>> gentle = TuningRequirements(preset="gentle", sensitivity_peak=1.8)
+        >>> firm = gentle.changed(preset="firm")
+        >>> firm.phase_margin_deg, firm.sensitivity_peak
+        (45.0, 1.8)
+        """
+        if "preset" not in requirements:
+            return replace(self, **requirements)
+        usual, before = _usual(), _presets()[self.preset]
+        back = {n: usual[n] for n, v in before.items() if n != OWN and getattr(self, n) == v}
+        return replace(self, **{**back, **requirements})
+
+    def of_own_controller(self) -> TuningRequirements:
+        """For a controller that is no autopilot's: no growth of noise, its own meaning of firm."""
+        made = replace(self, noise_growth=None)
+        made._fill(cast(Mapping[str, object], _presets()[self.preset].get(OWN, {})))
+        return made
 
     @property
     def has_target(self) -> bool:
@@ -137,7 +167,12 @@ class TuningRequirements(Options):
 
 
 @cache
-def _presets() -> dict[str, dict[str, float]]:
+def _usual() -> dict[str, object]:
+    return {each.name: each.default for each in fields(TuningRequirements)}
+
+
+@cache
+def _presets() -> dict[str, dict[str, object]]:
     """Requirements by preset and name, as data."""
     text = files("flightid.control.tuning").joinpath("presets.toml").read_text(encoding="utf-8")
     return tomllib.loads(text)

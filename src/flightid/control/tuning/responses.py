@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.control.autopilots import AxisLoop
+from flightid.control.autopilots.pid_loop import PidLoop
 from flightid.control.gyro import Gyro
 from flightid.control.tuning.controller_paths import (
     ControllerPaths,
@@ -24,9 +25,12 @@ from flightid.control.tuning.sampled_plants import (
     plants_of_axis,
 )
 from flightid.frozen import dataclass
+from flightid.units import DIMENSIONLESS
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+CONTROL = "controller output"
+"""What a controller of its own puts out at a step of the set-point."""
 SHOWN_S = {
     "rate step": 1.0,
     "angle step": 2.0,
@@ -34,8 +38,9 @@ SHOWN_S = {
     "disturbance to angle": 4.0,
     "step": 2.0,
     "disturbance": 4.0,
+    CONTROL: 2.0,
 }
-PLAIN = {"rate step": "step", "disturbance to rate": "disturbance"}
+PLAIN = {"rate step": "step", "disturbance to rate": "disturbance", CONTROL: CONTROL}
 """The same of a loop that holds no rate."""
 UNITS = {
     "rate step": "rad/s",
@@ -44,6 +49,7 @@ UNITS = {
     "disturbance to angle": "rad",
     "step": "",
     "disturbance": "",
+    CONTROL: "",
 }
 SETTLED_SHARE = 1e-3
 FIRST_S, LONGEST = 8.0, 1 << 16
@@ -219,6 +225,11 @@ def _pulses(closed: ClosedPlants, loops: list[AxisLoop], count: int) -> dict[str
         "rate step": forward * axis.rate / (1.0 + rate),
         "disturbance to rate": axis.rate / (1.0 + whole),
     }
+    if isinstance(loop := loops[place], PidLoop):
+        # The plants are in the controller's sense; what it puts out and what disturbs that are not.
+        sense = -1.0 if loop.direct else 1.0
+        made[CONTROL] = sense * forward / (1.0 + rate)
+        made["disturbance to rate"] *= sense
     if paths.with_angle:
         made["angle step"] = outer * axis.angle / (1.0 + whole)
         made["disturbance to angle"] = axis.angle / (1.0 + whole)
@@ -246,7 +257,7 @@ def response_bands(
     return tuple(
         ResponseBand(
             name,
-            UNITS[name],
+            _unit(name, new[closed.place]),
             time_s,
             values[0],
             values.min(axis=0),
@@ -255,3 +266,11 @@ def response_bands(
         )
         for name, (time_s, values) in sorted(made.items(), reverse=True)
     )
+
+
+def _unit(name: str, loop: AxisLoop) -> str:
+    """Of a response; of a controller of its own that of what it measures or moves."""
+    if not isinstance(loop, PidLoop) or not loop.units:
+        return UNITS[name]
+    measured, moved = ("" if each == DIMENSIONLESS else each for each in loop.units)
+    return moved if name == CONTROL else measured

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import cast
 
@@ -60,6 +60,7 @@ def tune_controller(
     draws: int = DRAWS,
     seed: int = 0,
     nominal: bool = False,
+    by_hand: Mapping[str, float] | None = None,
     accept_red: bool = False,
 ) -> PidDesign:
     """Gains of a PID controller that keep their margins for every plant that the data allow.
@@ -76,7 +77,11 @@ def tune_controller(
     controller : ControllerOptions, optional
         Structure, rate, filter, limits.
     requirements : TuningRequirements, optional
-        Those of the rate loop are of this loop; growth of noise and steps have no meaning here.
+        Those of the rate loop are of this loop; growth of noise and steps have no meaning here,
+        and firm asks for 4.5 dB and 30 deg.
+    by_hand : mapping of str to float, optional
+        Gains by name (Kp, Ki, Kd) that are judged as they stand in place of a search; those that
+        are not named are zero.
     band_rad_s, verification, draws, seed, nominal, accept_red : optional
         As for `flightid.tune_pid`.
 
@@ -119,7 +124,7 @@ def tune_controller(
     channels = _channels(fit, inputs, outputs)
     rate_hz = asked.loop_rate_hz or _own_rate(fit)
     sampled = rate_hz is not None
-    need = replace(requirements or TuningRequirements(), noise_growth=None)
+    need = (requirements or TuningRequirements()).of_own_controller()
     common = {"draws": draws, "fresh": draws, "seed": seed, "band_rad_s": band_rad_s,
               "verification": verification, "nominal": nominal, "accept_red": accept_red,
               "needs_band": need.band_factor is not None}  # fmt: skip
@@ -128,6 +133,7 @@ def tune_controller(
     direct, evidence = _of_one_sign(evidence, *channels)
     turn = _turn(evidence, *channels, rate_hz, need)
     loop = _loop(asked, channels[0], rate_hz or FINE * turn, sampled, direct)
+    loop = replace(loop, units=_units(fit, *channels))
     start = _scaled(loop, turn, _gain(evidence.estimate, *channels, np.array([turn]))[0])
     # Of a continuous loop the hold's half step is taken off again.
     evidence = replace(evidence, hold_in_model=not sampled)
@@ -136,13 +142,12 @@ def tune_controller(
         evidence, [start], [channels[0]], [channels[1]], need, "filtered", False,
         [-1 if direct else 1], noise_density(asked.measurement_noise, step),
     )  # fmt: skip
+    setting = replace(setting, by_hand=_gains_given(by_hand or {}, start))
     with progress(axis_steps(setting, start), f"tuning {start.axis}") as advance:
         result = tune_axis(setting, [start], [start], 0, advance)
     tuned = result.loop
     assert isinstance(tuned, PidLoop)
-    made, excess = _weighted(
-        asked, setting, replace(_finished(tuned), units=_units(fit, *channels))
-    )
+    made, excess = _weighted(asked, setting, _finished(tuned))
     design = design_of(setting, replace(result, loop=made), [start], 0, [start], [], seed)
     if design.exists:
         held = judge_standing(made, evidence.estimate, evidence.fresh, *channels)
@@ -297,15 +302,37 @@ def _scaled(loop: PidLoop, turn: float, gain: complex) -> PidLoop:
     scale, size = VEHICLE_RAD_S / turn, 1.0 / abs(gain)
     low, high = (share * size for share in WIDEST_P)
     ranges = {
-        "p": GainRange(low, high, "", 0.0, 0.0),
-        "i": GainRange(1e-3 * low / scale, HIGHEST_I * high / scale, "1/s", 0.0, 0.0),
-        "d": GainRange(0.0, HIGHEST_D * high * scale, "s", 0.0, 0.0),
+        "p": GainRange(low, high, loop.unit_told("p"), 0.0, 0.0),
+        "i": GainRange(1e-3 * low / scale, HIGHEST_I * high / scale, loop.unit_told("i"), 0.0, 0.0),
+        "d": GainRange(0.0, HIGHEST_D * high * scale, loop.unit_told("d"), 0.0, 0.0),
     }
     named = {loop.names[role]: each for role, each in ranges.items() if role in loop.names}
     values = dict(loop.values)
     if values["filter_s"] < 0.0:
         values["filter_s"] = float(f"{FILTER_SHARE / turn:.3g}")
     return replace(loop, values=values, ranges_by_name=named, time_scale=scale)
+
+
+def _gains_given(by_hand: Mapping[str, float], loop: PidLoop) -> dict[str, float]:
+    """Gains by hand of a loop, those that are not named as zero.
+
+    Raises
+    ------
+    OptionError
+        A name that is no gain, a value below zero, or no gain at all.
+    """
+    if not by_hand:
+        return {}
+    known = [loop.names[role] for role in "pid" if role in loop.names]
+    bad = {n: v for n, v in by_hand.items() if n not in known or not 0.0 <= v < np.inf}
+    if bad or not any(by_hand.values()):
+        raise OptionError(
+            f"by_hand of {loop.axis} holds no gains of its controller",
+            found=", ".join(f"{name} = {value:g}" for name, value in (bad or by_hand).items()),
+            needed=f"{', '.join(known)} of at least 0, one above",
+            action="the sign belongs to the controller, which knows which way the output answers",
+        )
+    return dict.fromkeys(known, 0.0) | dict(by_hand)
 
 
 def _finished(loop: PidLoop) -> PidLoop:

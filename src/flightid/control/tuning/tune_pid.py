@@ -306,7 +306,7 @@ def design_of(
         count,
         result.problem,
         (
-            verdict(result, drawn if known else 0),
+            verdict(result.found, result.met, drawn if known else 0),
             *remarks(result, flown, changes, stages, couplings, setting.gyro),
             *low_coherence(result, setting.coherence_of(place)),
             *beyond_findings(result.beyond, setting.evidence.band_rad_s),
@@ -321,6 +321,7 @@ def design_of(
             "band_rad_s": setting.evidence.band_rad_s,
             "rate": setting.gyro,
             "hold_in_model": setting.evidence.hold_in_model,
+            "left_out": setting.evidence.left_out,
         },
         closed=ClosedPlants(shown.take(list(range(min(MOVED, len(shown))))), place, setting.gyro),
         loops=tuple(new),

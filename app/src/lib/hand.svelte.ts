@@ -1,0 +1,71 @@
+import { live } from "./live.svelte";
+import type { AxisGains, GainsAnswer, GainsQuestion } from "./types";
+
+/** How long an answer may take before the page says that plants are worked out once more. */
+const LATE_MS = 900;
+/** Rest of a hand after which time responses follow the margins. */
+const REST_MS = 80;
+
+/** A hand on the gains of an axis: margins follow it, time responses follow the margins when it rests. */
+export class Hand {
+  moved = $state.raw<AxisGains | null>(null);
+  values = $state.raw<Record<string, number>>({});
+  refused = $state("");
+  late = $state(false);
+  #rest = 0;
+  #slow = 0;
+  /** Counts what takes the place of moved gains: answers to what was asked before come too late. */
+  #turn = 0;
+
+  /** `still` is the axis as its study has it. */
+  constructor(readonly log: string, readonly still: () => AxisGains | null) {}
+
+  /** What is shown of the axis. */
+  get shown() {
+    const still = this.still();
+    return this.moved && this.moved.axis === still?.axis ? this.moved : still;
+  }
+
+  /** Every gain of the axis, those that were moved among them. */
+  get now(): Record<string, number> {
+    return { ...Object.fromEntries((this.still()?.sliders ?? []).map((each) => [each.name, each.value])), ...this.values };
+  }
+
+  /** Gains that were found anew take the place of what a hand has moved. */
+  forget() {
+    this.stop();
+    clearTimeout(this.#slow);
+    this.#turn += 1;
+    this.late = false;
+    this.moved = null;
+    this.values = {};
+    this.refused = "";
+  }
+
+  stop() {
+    clearTimeout(this.#rest);
+  }
+
+  move = (gain: string, value: number) => {
+    if (!this.still()) return;
+    this.values = { ...this.values, [gain]: value };
+    this.stop();
+    this.#judge({ ...this.now, [gain]: value }, false);
+  };
+
+  #judge(values: Record<string, number>, responses: boolean) {
+    const [still, turn] = [this.still()!, this.#turn];
+    clearTimeout(this.#slow);
+    this.#slow = setTimeout(() => (this.late = true), LATE_MS) as unknown as number;
+    live.ask<GainsQuestion, GainsAnswer>("gains", { log: this.log, edits: [], axis: still.axis, values, responses }, (answer) => {
+      if (turn !== this.#turn) return;
+      clearTimeout(this.#slow);
+      this.late = false;
+      this.refused = answer.error ?? "";
+      if (!answer.moved) return;
+      const earlier = this.moved?.axis === answer.moved.axis ? this.moved : still;
+      this.moved = responses ? answer.moved : { ...answer.moved, curves: earlier?.curves ?? [] };
+      if (!responses) this.#rest = setTimeout(() => this.still()?.axis === answer.moved!.axis && this.#judge(values, true), REST_MS) as unknown as number;
+    });
+  }
+}
