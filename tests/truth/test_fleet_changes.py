@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
+
 import numpy as np
 import pytest
 
 from flightid.fleet.statistics.change_kind import DRIFT, STEP, change_kind
 from flightid.fleet.statistics.drift import FleetDrift, find_drift
-from flightid.fleet.statistics.events import FleetEvent, beside_steps, event_steps
+from flightid.fleet.statistics.events import (
+    FleetEvent,
+    beside_steps,
+    event_effect,
+    event_steps,
+)
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
 from flightid.fleet.statistics.largest_step import (
     largest_step_chance,
@@ -16,8 +26,11 @@ from flightid.fleet.statistics.largest_step import (
 )
 from flightid.fleet.statistics.local_level import follow_level
 from flightid.fleet.statistics.multiple_testing import corrected
+from flightid.fleet.statistics.parameter_history import ParameterHistory
 from flightid.fleet.statistics.repeats import repeat_scatter
 from flightid.fleet.statistics.wandering import squares_chance, wandering_chance
+from flightid.fleet.vehicle_lights import event_words
+from flightid.uncertainty.quantiles import showing
 
 DAY_S = 86400.0
 
@@ -212,6 +225,16 @@ def test_a_change_of_many_beside_a_new_firmware_is_not_laid_on_the_others() -> N
     assert share >= 0.9
 
 
+def test_changes_of_many_do_not_bend_the_slope_of_a_firmware() -> None:
+    """Eight of 20 step three days behind it: its 8 % were told as 10.6 (8.8 to 12.3), 4 found."""
+    found = find_drift(*_fleet(13, 20, change=0.1, changed=8, explained=True))
+    assert {int(each.vehicle) for each in found.alarms} == set(range(8))
+    assert not found.persistent
+    firmware = found.slopes["gain"][1].interval95
+    assert firmware is not None
+    assert firmware[0] < 0.08 < firmware[1] < 0.088
+
+
 def test_a_changed_vehicle_is_found_and_a_battery_is_none() -> None:
     data, covariates = _fleet(14, 12, change=0.2, changed=1, explained=True)
     found = find_drift(data, covariates)
@@ -277,6 +300,33 @@ def test_chances_beside_an_event_are_even(n: int, at: int) -> None:
         found.append(scan_steps(*beside_steps(values, covariance, known), known).chance)
     for share in (0.2, 0.5):
         assert np.mean(np.array(found) < share) == pytest.approx(share, abs=0.12)
+
+
+@pytest.mark.parametrize("freedom", [np.inf, 5.0])
+def test_an_event_is_a_change_where_its_interval_holds_none(freedom: float) -> None:
+    """In percent of a level known to 5 %: to first order some were a change and held zero."""
+    rng, days, told = np.random.default_rng(8), np.arange(8.0), 0
+    for level in np.repeat([-1.0, 1.0], 150):
+        values = level + 0.1 * rng.normal(size=8) + np.where(days >= 4, 0.16, 0.0)
+        found = event_effect(
+            FleetEvent("motor", 3.5), "gain", "1", values, 0.01 * np.eye(8), days, freedom
+        )
+        assert found.chance is not None
+        told += found.chance < 0.05
+        for size in (found.change, found.percent):
+            assert size.is_significant == (found.chance < 0.05)
+        if 0.001 < found.chance < 0.05:
+            one = found
+    assert told > 50
+    # Words follow the interval that is shown, at another level too.
+    history = cast("ParameterHistory", SimpleNamespace(name="gain"))
+    with showing(0.999):
+        assert "gain may have changed by" in event_words(history, one, {})
+    assert "gain changed by" in event_words(history, one, {})
+    unlike = replace(one, percent=replace(one.percent, value=None, ends=None))
+    assert re.search(
+        r"gain changed by \+\S+ \(\+\S+ to \+\S+\) at", event_words(history, unlike, {})
+    )
 
 
 def test_understated_errors_show_in_repeats_and_raise_no_alarm() -> None:

@@ -60,6 +60,8 @@ def change_words(history: ParameterHistory, labels: Mapping[str, str]) -> str:
     )
     name, size = labels.get(history.name, history.name), _size_words(history.change_percent)
     beyond = ", beside what its events explain" if history.events else ""
+    if _holds_zero(history.change_percent):
+        return f"{name} changed{how}{beyond}; by how much is not told:{size.removeprefix(' by')}"
     return f"{name} changed{size}{how}{beyond}"
 
 
@@ -74,11 +76,20 @@ def going_on_words(history: ParameterHistory, labels: Mapping[str, str]) -> str:
 
 def event_words(history: ParameterHistory, effect: EventEffect, labels: Mapping[str, str]) -> str:
     """What an event changed, by how much: of what was told, no reason to look at it."""
-    name = labels.get(history.name, history.name)
-    return f"{name} changed{_size_words(effect.percent)} at the event “{effect.event.what}”"
+    name, size = labels.get(history.name, history.name), effect.percent
+    size = effect.change if size.value is None else size
+    did = "may have changed" if _holds_zero(size) else "changed"
+    return f"{name} {did}{_size_words(size)} at the event “{effect.event.what}”"
+
+
+def _holds_zero(change: Reading) -> bool:
+    """Whether the interval that is shown holds no change at all."""
+    ends = change.interval(shown())
+    return ends is not None and ends[0] <= 0.0 <= ends[1]
 
 
 def _size_words(change: Reading) -> str:
     ends = change.interval(shown())
-    size = "" if change.value is None else f" by {change.value:+.2g} %"
-    return size + ("" if ends is None else f" ({ends[0]:+.2g} to {ends[1]:+.2g} %)")
+    unit = "" if change.unit == "1" else f" {change.unit}"
+    size = "" if change.value is None else f" by {change.value:+.2g}{unit}"
+    return size + ("" if ends is None else f" ({ends[0]:+.2g} to {ends[1]:+.2g}{unit})")

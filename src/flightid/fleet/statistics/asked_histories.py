@@ -8,11 +8,15 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.fleet.statistics.covariates import CovariateDesign, CovariateSlopes, own_slopes
+from flightid.fleet.statistics.covariates import (
+    CovariateDesign,
+    CovariateSlopes,
+    fit_covariates,
+    own_slopes,
+)
 from flightid.fleet.statistics.days import SharedByDay, covariance_by_day
 from flightid.fleet.statistics.events import (
     FleetEvent,
-    beside_steps,
     event_effects,
     event_steps,
 )
@@ -26,11 +30,13 @@ from flightid.fleet.statistics.largest_step import (
     step_places,
 )
 from flightid.fleet.statistics.local_level import follow_level
+from flightid.fleet.statistics.neighbours import histories_in_time
 from flightid.fleet.statistics.parameter_history import AskedHistory, ParameterHistory, StepEnds
 from flightid.fleet.statistics.persistence import (
     DaySeries,
     Persistence,
     changed_vehicles,
+    changes,
     day_series,
     explained,
     is_shared,
@@ -48,18 +54,20 @@ ROUNDS = 4
 TOO_FEW = f"fewer than {FEWEST} flights"
 
 
-def asked_history(
+def asked_histories(
     data: FlightEstimates,
     i: int,
-    vehicle: str,
     design: CovariateDesign,
-    fitted: CovariateSlopes,
     errors: Array,
     by_day: SharedByDay,
     events: Sequence[FleetEvent],
     moved: Array,
-) -> AskedHistory | None:
-    """One parameter of one vehicle with its tests by independent days; None where it tells none.
+) -> tuple[CovariateSlopes, list[AskedHistory]]:
+    """One parameter of all vehicles with its tests by independent days, and the slopes taken out.
+
+    A change of many vehicles bends the slope of what came at about the same time, such as a new
+    firmware: slopes are fitted beside the changes that are found, and these are sought anew, until
+    the same vehicles change.
 
     Parameters
     ----------
@@ -67,22 +75,54 @@ def asked_history(
         What all vehicles share taken out.
     i : int
         Place of the parameter.
-    vehicle : str
     design : CovariateDesign
-    fitted : CovariateSlopes
     errors, moved : ndarray, shape (n,)
         Of every flight: variance, and what all vehicles share, which events of all keep.
     by_day : SharedByDay
         What flights of a day share of their variances.
     events : sequence of FleetEvent
     """
-    rows = np.flatnonzero((data.member_of == data.members.index(vehicle)) & data.known[:, i])
-    if not len(rows):
-        return None
-    rows = rows[np.argsort(data.time_s[rows], kind="stable")]
-    name, unit, time_s = data.names[i], data.units[i], data.time_s[rows]
+    changed: frozenset[str] = frozenset()
+    histories = list(histories_in_time(data, i))
+    happened = [
+        [each for each in events if each.concerns(data.vehicles[rows[0]])] for rows in histories
+    ]
+    known = {
+        data.vehicles[rows[0]]: event_steps(own, data.time_s[rows])
+        for rows, own in zip(histories, happened, strict=True)
+    }
+    beside = known
+    for _ in range(ROUNDS):
+        fitted = fit_covariates(data, i, design, errors, beside)
+        asked = [
+            _asked_history(data, i, rows, design, fitted, errors, by_day, own, moved)
+            for rows, own in zip(histories, happened, strict=True)
+        ]
+        now = changed_vehicles(asked) if design.names else changed
+        if now == changed:
+            break
+        changed = now
+        shapes = {e.history.vehicle: changes(e) for e in asked if e.history.vehicle in now}
+        beside = {v: np.column_stack([x, *shapes.get(v, ())]) for v, x in known.items()}
+    return fitted, asked
+
+
+def _asked_history(
+    data: FlightEstimates,
+    i: int,
+    rows: NDArray[np.intp],
+    design: CovariateDesign,
+    fitted: CovariateSlopes,
+    errors: Array,
+    by_day: SharedByDay,
+    events: Sequence[FleetEvent],
+    moved: Array,
+) -> AskedHistory:
+    """One parameter of one vehicle with its tests; its own flights and events alone."""
+    name, unit, vehicle = data.names[i], data.units[i], data.vehicles[rows[0]]
+    time_s, together = data.time_s[rows], by_day.variances[rows]
     values, variances = data.values[rows, i], errors[rows]
-    covariance, tested = covariance_by_day(variances, time_s, by_day.variances[rows]), values
+    covariance, tested = covariance_by_day(variances, time_s, together), values
     if design.names:
         slope, error = fitted.without[vehicle]
         x = design.columns[rows]
@@ -92,19 +132,14 @@ def asked_history(
         own = own_slopes(values, variances, apart, slope, error)
         tested, values = values - apart @ slope, values - apart @ own
     track = follow_level(values, variances, time_s)
-    happened = [event for event in events if event.concerns(vehicle)]
     bare = ParameterHistory(
         *(vehicle, name, unit, time_s, values, variances, track, None, None),
         Estimate(name, None, "%", reason=TOO_FEW),
         None,
-        events=event_effects(happened, name, unit, tested, covariance, time_s, moved[rows]),
     )
-    known = event_steps(happened, time_s)
-    tested, covariance = beside_steps(tested, covariance, known)
-    together = by_day.variances[rows]
-    asked = AskedHistory(bare, tested, covariance, known, together, by_day.freedom)
-    few = not len(step_places(len(rows), known))
-    return asked if few else _tested(asked)
+    return _tested(
+        AskedHistory(bare, tested, covariance, tuple(events), moved[rows], together, by_day.freedom)
+    )
 
 
 def beside_persistence(
@@ -167,16 +202,23 @@ def _known(found: Persistence | None) -> Persistence:
 
 def _persisting(asked: AskedHistory, found: Persistence) -> AskedHistory:
     """The same judged by errors that go on from day to day."""
-    if asked.history.chance is None:
-        return asked
-    wider = replace(asked, covariance=persisting(asked, found))
-    history = replace(asked.history, apart_chance=asked.history.chance)
-    return _tested(replace(wider, history=history))
+    wider = replace(asked, errors=persisting(asked, found))
+    return _tested(
+        replace(wider, history=replace(asked.history, apart_chance=asked.history.chance))
+    )
 
 
 def _tested(asked: AskedHistory) -> AskedHistory:
+    history = asked.history
+    effects = event_effects(
+        *(asked.events, history.name, history.unit, asked.measured, asked.errors),
+        *(history.time_s, asked.shared, asked.freedom),
+    )
+    history = replace(history, events=effects)
+    if not len(step_places(len(asked.values), asked.known)):
+        return replace(asked, history=history)
     # A step is looked for with three flights behind it; where one is, it may be of the last two.
-    history, values, covariance = asked.history, asked.values, asked.covariance
+    values, covariance = asked.values, asked.covariance
     scan = scan_steps(values, covariance, asked.known, newest=NEWEST)
     scan = replace(scan, freedom=asked.freedom)
     old = scan.up_to(len(values) - SHORTEST - 1)

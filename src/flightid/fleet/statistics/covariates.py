@@ -16,6 +16,7 @@ from scipy.optimize import nnls
 
 from flightid.errors import ShapeError
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
+from flightid.fleet.statistics.neighbours import histories_in_time
 from flightid.frozen import dataclass
 from flightid.uncertainty.estimate import Estimate, Reading
 
@@ -25,6 +26,8 @@ UNTOLD = 1e-6
 """Prior information of a slope, beside that of one flight: one that no other vehicle tells is left
 to the vehicle's own flights."""
 TOLD = 1e-8
+RANK = 1e-9
+"""Of the largest singular value of a design, below which there is none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +129,11 @@ class CovariateSlopes:
 
 
 def fit_covariates(
-    data: FlightEstimates, place: int, design: CovariateDesign, variances: Array
+    data: FlightEstimates,
+    place: int,
+    design: CovariateDesign,
+    variances: Array,
+    beside: Mapping[str, Array] | None = None,
 ) -> CovariateSlopes:
     """Slopes of one parameter on the covariates, within vehicles.
 
@@ -138,6 +145,9 @@ def fit_covariates(
     design : CovariateDesign
     variances : ndarray, shape (n,)
         Of the parameter's errors.
+    beside : mapping of str to ndarray, optional
+        By vehicle, shape (its flights in order of time, m): shapes that its flights hold at any
+        size, such as steps. Left in, a change of many behind a new firmware bends its slope.
 
     Raises
     ------
@@ -156,15 +166,14 @@ def fit_covariates(
         none = dict.fromkeys(data.members, (np.zeros(c), np.eye(c)))
         return CovariateSlopes((), np.zeros(c), none)
     information, score = np.zeros((k, c, c)), np.zeros((k, c))
-    for vehicle in range(k):
-        rows = there & (data.member_of == vehicle)
-        if not rows.any():
-            continue
-        weights = 1.0 / variances[rows]
-        x = design.columns[rows] - np.average(design.columns[rows], axis=0, weights=weights)
-        y = data.values[rows, place] - np.average(data.values[rows, place], weights=weights)
-        information[vehicle] = (x.T * weights) @ x
-        score[vehicle] = (x.T * weights) @ y
+    for rows in histories_in_time(data, place):
+        vehicle, weights = data.member_of[rows[0]], 1.0 / np.sqrt(variances[rows])
+        own, held = np.ones((len(rows), 1)), (beside or {}).get(data.vehicles[rows[0]])
+        own = own if held is None else np.column_stack([own, held])
+        both = np.column_stack([design.columns[rows], data.values[rows, place]])
+        left = _left(own * weights[:, None], both * weights[:, None])
+        information[vehicle] = left[:, :c].T @ left[:, :c]
+        score[vehicle] = left[:, :c].T @ left[:, c]
     prior = UNTOLD * float(np.median(1.0 / variances[there])) * np.eye(c)
     total, sums = information.sum(axis=0) + prior, score.sum(axis=0)
     slopes = np.asarray(np.linalg.solve(total, sums))
@@ -185,6 +194,13 @@ def fit_covariates(
         for i, name in enumerate(design.names)
     )
     return CovariateSlopes(effects, slopes, without)
+
+
+def _left(design: Array, columns: Array) -> Array:
+    """What a design, of any rank, leaves of columns."""
+    axes, sizes, _ = np.linalg.svd(design, full_matrices=False)
+    axes = axes[:, sizes > RANK * sizes[0]]
+    return np.asarray(columns - axes @ (axes.T @ columns))
 
 
 def _spread(information: Array, left: Array) -> Array:

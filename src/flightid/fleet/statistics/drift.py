@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.fleet.statistics.asked_histories import asked_history, beside_persistence
+from flightid.fleet.statistics.asked_histories import asked_histories, beside_persistence
 from flightid.fleet.statistics.covariates import (
     Covariate,
     design_covariates,
@@ -278,14 +278,9 @@ def find_drift(
         usual = usual * variance_factors(own, data.vehicles)
         variances, off = variances_with_odd_ones(level, i, usual)
         odd[name] = int(off.sum())
-        fitted = fit_covariates(data, i, design, variances)
-        slopes[name] = fitted.effects
         moved = every.values[:, i] - data.values[:, i]
-        asked = [
-            asked_history(data, i, vehicle, design, fitted, variances, by_day, events, moved)
-            for vehicle in data.members
-        ]
-        mine = [each for each in asked if each is not None]
+        fitted, mine = asked_histories(data, i, design, variances, by_day, events, moved)
+        slopes[name] = fitted.effects
         goes_on, mine = beside_persistence(mine)
         if goes_on is not None:
             persistent[name] = goes_on

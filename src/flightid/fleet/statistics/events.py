@@ -12,11 +12,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.fleet.statistics.few_days import beside_spread
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
 from flightid.fleet.statistics.neighbours import histories_in_time
 from flightid.frozen import dataclass
-from flightid.uncertainty.estimate import Estimate, Reading
-from flightid.uncertainty.quantiles import two_sided_chance
+from flightid.uncertainty.estimate import Estimate, Interval, Reading
+from flightid.uncertainty.quantiles import half_width, two_sided_chance
 
 Array = NDArray[np.float64]
 OPEN = 1e6
@@ -73,8 +74,56 @@ class EventEffect:
     chance: float | None
 
 
+@dataclass(frozen=True, eq=False)
+class PercentEnds:
+    """Ends of a step in percent of the level before it; they hold zero where those of the step do.
+
+    None where the level may be zero.
+
+    Attributes
+    ----------
+    level, step : float
+    errors : ndarray, shape (2, 2)
+        Covariance of both.
+    freedom : float
+
+    Reference
+    ---------
+    Fieller, "Some problems in interval estimation", *J. Royal Statistical Society B* 16 (1954).
+
+    Example
+    -------
+    >>> low, high = PercentEnds(10.0, 2.1, np.array([[1.0, -1.0], [-1.0, 1.1]]), np.inf)(0.95)
+    >>> round(low, 1), round(high, 1)
+    (0.4, 51.3)
+    """
+
+    level: float
+    step: float
+    errors: Array
+    freedom: float
+
+    def __call__(self, level: float) -> Interval | None:
+        """Lower and upper end at a level."""
+        wide = half_width(level, self.freedom) ** 2
+        a = self.level**2 - wide * self.errors[0, 0]
+        if a <= 0.0:
+            return None
+        b = self.level * self.step - wide * self.errors[0, 1]
+        c = self.step**2 - wide * self.errors[1, 1]
+        root = np.sqrt(max(b**2 - a * c, 0.0))
+        low, high = sorted(100.0 * np.sign(self.level) * np.array([b - root, b + root]) / a)
+        return float(low), float(high)
+
+
 def event_effect(
-    event: FleetEvent, name: str, unit: str, values: Array, covariance: Array, time_s: Array
+    event: FleetEvent,
+    name: str,
+    unit: str,
+    values: Array,
+    covariance: Array,
+    time_s: Array,
+    freedom: float = np.inf,
 ) -> EventEffect:
     """Estimate the step of a series at a known time, by generalised least squares.
 
@@ -86,6 +135,8 @@ def event_effect(
     values : ndarray, shape (n,)
     covariance : ndarray, shape (n, n)
     time_s : ndarray, shape (n,)
+    freedom : float
+        Of the variances; infinite where they are known.
 
     Returns
     -------
@@ -93,14 +144,14 @@ def event_effect(
 
     Assumes
     -------
-    The level before stays, and so does the one behind. Percent to first order (delta method).
+    The level before stays, and so does the one behind.
 
     Example
     -------
     >>> motor = FleetEvent("motor replaced", 1.5)
     >>> event_effect(motor, "gain", "1", np.array([2.0, 2.0, 3.0, 3.0]), 0.01 * np.eye(4),
     ...              np.arange(4.0)).percent
-    Estimate(gain = 50 (37.51 to 62.49) %)
+    Estimate(gain = 50 (38.18 to 63.27) %)
     """
     behind = time_s >= event.time_s
     if behind.all() or not behind.any():
@@ -113,11 +164,12 @@ def event_effect(
     stderr = float(np.sqrt(errors[1, 1]))
     percent: Reading = Estimate(name, None, "%", reason="the level before may be zero")
     if abs(level) > 3.0 * np.sqrt(errors[0, 0]):
-        slope = np.array([-step / level, 1.0]) / abs(level)
-        spread = float(np.sqrt(slope @ errors @ slope))
-        percent = Estimate(name, float(100.0 * step / abs(level)), "%", 100.0 * spread)
-    change = Estimate(name, float(step), unit, stderr)
-    return EventEffect(event, change, percent, two_sided_chance(step / stderr))
+        ends = PercentEnds(level, step, errors, freedom)
+        percent = Estimate(name, float(100.0 * step / abs(level)), "%", ends=ends)
+    told = None if np.isinf(freedom) else freedom
+    change = Estimate(name, float(step), unit, stderr, freedom=told)
+    chance = beside_spread(two_sided_chance(step / stderr), freedom)
+    return EventEffect(event, change, percent, chance)
 
 
 def event_effects(
@@ -128,6 +180,7 @@ def event_effects(
     covariance: Array,
     time_s: Array,
     shared: Array,
+    freedom: float = np.inf,
 ) -> tuple[EventEffect, ...]:
     """The step at each event as `event_effect` has it, those of the others left open.
 
@@ -139,7 +192,7 @@ def event_effects(
         others = known[:, np.any(known != (time_s >= event.time_s)[:, None], axis=0)]
         around = opened(covariance, others)
         own = values if event.vehicles else values + shared
-        found.append(event_effect(event, name, unit, own, around, time_s))
+        found.append(event_effect(event, name, unit, own, around, time_s, freedom))
     return tuple(found)
 
 

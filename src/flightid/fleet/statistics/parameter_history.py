@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.fleet.statistics.events import EventEffect
+from flightid.fleet.statistics.events import (
+    EventEffect,
+    FleetEvent,
+    beside_steps,
+    event_steps,
+)
 from flightid.fleet.statistics.largest_step import StepScan
 from flightid.fleet.statistics.local_level import LocalLevel
 from flightid.fleet.statistics.multiple_testing import FALSE_SHARE
@@ -101,12 +108,14 @@ class AskedHistory:
     Attributes
     ----------
     history : ParameterHistory
-    values : ndarray, shape (n,)
-        Slopes are those of other vehicles, and what events explain is out.
-    covariance : ndarray, shape (n, n)
-        Of their errors; sizes of the steps of events are left open.
-    known : ndarray, shape (n, e)
-        Flights behind each event.
+    measured : ndarray, shape (n,)
+        Slopes are those of other vehicles; steps of events are in.
+    errors : ndarray, shape (n, n)
+        Covariance of `measured`.
+    events : tuple of FleetEvent
+        That concern the vehicle.
+    shared : ndarray, shape (n,)
+        What all vehicles share, which `measured` lacks.
     by_day : ndarray, shape (n,)
         Variances that flights of one day share, a part of those of the history.
     freedom : float
@@ -114,11 +123,31 @@ class AskedHistory:
     """
 
     history: ParameterHistory
-    values: Array
-    covariance: Array
-    known: Array
+    measured: Array
+    errors: Array
+    events: tuple[FleetEvent, ...]
+    shared: Array
     by_day: Array
     freedom: float = np.inf
+
+    @cached_property
+    def known(self) -> Array:
+        """Flights behind each event, shape (n, e)."""
+        return event_steps(self.events, self.history.time_s)
+
+    @cached_property
+    def _beside(self) -> tuple[Array, Array]:
+        return beside_steps(self.measured, self.errors, self.known)
+
+    @property
+    def values(self) -> Array:
+        """What events explain is out, shape (n,)."""
+        return self._beside[0]
+
+    @property
+    def covariance(self) -> Array:
+        """Of their errors, shape (n, n); sizes of the steps of events are left open."""
+        return self._beside[1]
 
     @property
     def own_variances(self) -> Array:

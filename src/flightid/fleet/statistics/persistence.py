@@ -206,7 +206,7 @@ def _days(asked: AskedHistory, has_changed: bool) -> DaySeries | None:
     scale = np.sqrt(day_variances(asked)[np.unique(day, return_index=True)[1]])
     weights = weights / scale[:, None]
     level = np.column_stack([np.ones(len(day)), asked.known])
-    change = np.column_stack([level, *_changes(asked)]) if has_changed else level
+    change = np.column_stack([level, *changes(asked)]) if has_changed else level
     both = (_apart(weights @ each) for each in (level, change))
     return DaySeries(asked.history.vehicle, weights @ asked.values, *both)
 
@@ -217,7 +217,7 @@ def _apart(design: Array) -> Array:
     return np.asarray(design[:, own > ALIKE * own.max()])
 
 
-def _changes(asked: AskedHistory) -> list[Array]:
+def changes(asked: AskedHistory) -> list[Array]:
     """The step and the steady movement that explain most of a history."""
     n, time_s = len(asked.values), asked.history.time_s
     place = scan_steps(asked.values, asked.covariance, asked.known).place
@@ -283,4 +283,4 @@ def persisting(asked: AskedHistory, found: Persistence) -> Array:
     beyond = beyond * np.outer(sizes, sizes)
     together = np.where((lag == 0) & ~np.eye(len(day), dtype=bool), asked.by_day, 0.0)
     base = np.diag(asked.history.variances) + together
-    return np.asarray(asked.covariance + (found.factor - 1.0) * base + found.factor * beyond)
+    return np.asarray(asked.errors + (found.factor - 1.0) * base + found.factor * beyond)
