@@ -14,6 +14,7 @@ from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.fleet import refusal as room
 from flightid.fleet.identity import read_tables
+from flightid.fleet.reasons import STOPPED as MARK
 from flightid.fleet.reasons import grouped_reasons, reason_lines
 from flightid.fleet.refusal import refusal
 from flightid.fleet.run_one import _verdict
@@ -111,6 +112,10 @@ def test_reasons_are_counted_with_an_example_and_what_to_do() -> None:
     # Advice that names its own log is that of others: a row a log stood for each of 30.
     own = [{**each, "action": f"flightid plan {each['address'][5:]}"} for each in rows[:3]]
     assert [(e.logs, e.action) for e in grouped_reasons(own)] == [(3, "flightid plan 0.bin")]
+    # Where studies stop alike one of them says it: a fleet of spoilt logs said it of each reason.
+    stops = [f"Cut. {MARK}segment 2 of 3.5 s", f"No sweep. {MARK}segment 4 of 1 s"]
+    cut = [{**row, "reason": f"r{n}", "message": each} for n, each in enumerate(stops)]
+    assert [each.message for each in grouped_reasons(cut)] == [stops[0], "No sweep."]
     lines = reason_lines(found)
     assert lines[:2] == [
         "  3 refused: not a log (such as 0.bin: an empty file)",

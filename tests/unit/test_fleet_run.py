@@ -18,7 +18,9 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 import pytest
+from click.testing import CliRunner
 
+from flightid.cli.fleet import command
 from flightid.errors import DataError, StudyError
 from flightid.fleet import ask_fleet, fleet_status, run_fleet
 from flightid.fleet.addresses import LogAddress, find_logs
@@ -474,6 +476,8 @@ def test_swapped_logs_follow_their_bytes_and_touched_ones_are_as_before(
         rows = catalogue.query("SELECT log, vehicle FROM logs ORDER BY 2").fetchall()
     assert [vehicle for _, vehicle in rows] == ["V01", "V02", "V03"]
     assert rows[1][0] == before
+    said = CliRunner().invoke(command, ["run", str(fleet)]).output
+    assert said.startswith("4 logs, all in the catalogue before: nothing new\n")
     for found in (fleet_status(fleet).findings, run_fleet(fleet, workers=1).findings):
         assert "renamed-logs" not in [each.code for each in found]
     settings = read_fleet(fleet)

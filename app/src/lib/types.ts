@@ -191,9 +191,7 @@ export interface FleetRows {
 
 /** What the last run of a fleet from the page did. */
 export interface FleetRunPart {
-  found: number;
-  kept: number;
-  outcomes: Record<string, number>;
+  lines: string[];
   said: string[];
 }
 

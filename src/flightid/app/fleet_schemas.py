@@ -124,9 +124,7 @@ class FleetPart(Message):
 class FleetRunPart(Message):
     """What the last run of a fleet from the page did."""
 
-    found: int
-    kept: int
-    outcomes: dict[str, int]
+    lines: list[str]
     said: list[str]
 
 

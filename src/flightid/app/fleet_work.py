@@ -55,10 +55,7 @@ _held: list[tuple[str, FleetAnswers | None]] = [NOTHING_HELD]
 def make_fleet(path: Path, result: Path) -> None:
     """Run a fleet file as `flightid fleet run` does, and write what became of it."""
     done = run_fleet(path)
-    part = FleetRunPart(
-        found=done.found, kept=done.kept, outcomes=dict(done.outcomes),
-        said=[str(each) for each in done.findings],
-    )  # fmt: skip
+    part = FleetRunPart(lines=[*done.lines], said=[str(each) for each in done.findings])
     write_atomically(result, part.model_dump_json())
 
 

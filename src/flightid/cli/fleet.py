@@ -61,7 +61,6 @@ def run(
     takes what is missing. The exit code is 1 where no log was found, every one that was taken
     failed, or none of the catalogue has a model.
     """
-    from flightid.findings import counted
     from flightid.fleet import run_fleet
     from flightid.fleet.reasons import reason_lines
 
@@ -78,14 +77,7 @@ def run(
     if as_json:
         emit_values(done.to_dict())
     else:
-        nothing = ": nothing new" if done.kept == done.found > 0 else ""
-        found = counted(done.found, "log")
-        click.echo(f"{found}, {done.kept} of them in the catalogue before{nothing}")
-        for outcome, number in sorted(done.outcomes.items()):
-            click.echo(f"{number} {outcome}")
-        if done.copies:
-            click.echo(f"{len(done.copies)} with the bytes of another")
-        for line in reason_lines(done.reasons):
+        for line in (*done.lines, *reason_lines(done.reasons)):
             click.echo(line)
         place = done.catalogue
         note(f"Wrote {place if '://' in place else os.path.normpath(place)}")

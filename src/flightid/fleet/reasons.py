@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, replace
 from typing import Any
@@ -12,6 +13,9 @@ from flightid.table import Cell, Column, Table
 from flightid.wrapping import wrapped
 
 WIDTH = 100
+STOPPED = "The study stopped at this: "
+"""After what an inspection found, before where the study ended."""
+NUMBERS = re.compile(r"[0-9.]+")
 IN_WORDS = {
     "record": "damaged record",
     "time": "out of time",
@@ -89,7 +93,18 @@ def grouped_reasons(rows: Iterable[Mapping[str, Any]]) -> tuple[RefusalReason, .
             continue
         words = (str(row.get(name) or "") for name in ("message", "action", "address"))
         found[key] = RefusalReason(outcome, reason, 1, *words)
-    return tuple(sorted(found.values(), key=lambda each: -each.logs))
+    return _stops_once(sorted(found.values(), key=lambda each: -each.logs))
+
+
+def _stops_once(reasons: Iterable[RefusalReason]) -> tuple[RefusalReason, ...]:
+    """The same; where studies stopped alike, but for numbers, the commonest reason says it."""
+    said, found = set[str](), list[RefusalReason]()
+    for each in reasons:
+        why, mark, where = each.message.partition(STOPPED)
+        alike = NUMBERS.sub("0", where)
+        found.append(replace(each, message=why.rstrip()) if mark and alike in said else each)
+        said.add(alike)
+    return tuple(found)
 
 
 def _advice(row: Mapping[str, Any]) -> str:

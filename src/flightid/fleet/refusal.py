@@ -20,6 +20,7 @@ from flightid.errors import (
 )
 from flightid.findings import FIRST, Finding, urgency
 from flightid.fleet.catalogue.schema import FAILED, REFUSED
+from flightid.fleet.reasons import STOPPED
 from flightid.inspection import Inspection, inspect_log
 from flightid.logs import Log
 from flightid.study.proposal import Proposal
@@ -103,7 +104,7 @@ def refusal(error: Exception, log: Log | None) -> dict[str, Any]:
         seen = _inspected(log)
         worst = decisive(seen)
         if worst is not None:
-            code, words = worst.code, f"{worst.message}. The study stopped at this: {words}"
+            code, words = worst.code, f"{worst.message}. {STOPPED}{words}"
             actions = _against_it(worst, seen) or actions
     return {
         "outcome": REFUSED if known else FAILED,

@@ -47,6 +47,27 @@ class FleetRun(Result, schema="flightid.fleet_run/1"):
     reasons: tuple[RefusalReason, ...] = ()
     copies: Mapping[str, str] = field(default_factory=dict)
 
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """What was found, and what became of it: numbers add up to those found.
+
+        Example
+        -------
+        >>> FleetRun("catalogue", 3, 1, {"fitted": 2}).lines
+        ('3 logs, 1 of them in the catalogue before', '2 fitted')
+        >>> FleetRun("catalogue", 3, 3, {}).lines
+        ('3 logs, all in the catalogue before: nothing new',)
+        """
+        is_new = self.kept < self.found or not self.found
+        before = f"{self.kept} of them" if is_new else "all"
+        nothing = "" if is_new else ": nothing new"
+        copies = len(self.copies)
+        return (
+            f"{counted(self.found, 'log')}, {before} in the catalogue before{nothing}",
+            *(f"{number} {outcome}" for outcome, number in sorted(self.outcomes.items())),
+            *([f"{copies} with the bytes of another"] if copies else []),
+        )
+
     def summary(self) -> Table:
         """Table of the numbers."""
         rows: list[tuple[str, int]] = [("logs found", self.found), ("kept", self.kept)]
