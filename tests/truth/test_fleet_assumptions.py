@@ -9,6 +9,7 @@ import pytest
 
 from flightid.fleet.drift_lights import errors_lights, persistent_lights
 from flightid.fleet.statistics.change_kind import DRIFT
+from flightid.fleet.statistics.days import shared_by_day
 from flightid.fleet.statistics.drift import FleetDrift, find_drift
 from flightid.fleet.statistics.events import FleetEvent
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
@@ -192,12 +193,35 @@ def test_few_steps_are_missed_for_a_vehicles_own_scatter() -> None:
     assert sum(len(_alarmed(each) - set(range(5))) for each in found) <= 4
 
 
+@pytest.mark.parametrize(("step", "low", "high"), [(0.0, 0.85, 1.05), (2.0, 1.3, 1.6)])
+def test_what_days_differ_by_is_told_beside_changes_too(
+    step: float, low: float, high: float
+) -> None:
+    """Six vehicles of six days; by the median step 1.04, and 1.82 where all change, of 9.9 free."""
+    flight, found = np.arange(24), []
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        days = 0.4 * np.repeat(rng.normal(size=(6, 6)), 4, axis=1)
+        values = 10.0 + days + 0.3 * rng.normal(size=(6, 24)) + step * (flight >= 12)
+        times = np.tile(DAY_S * (3.0 * (flight // 4) + 0.1 * (flight % 4)), 6)
+        ids, errors = np.repeat([*"abcdef"], 24).tolist(), np.full(144, 0.09)
+        data = FlightEstimates.of(
+            ["L"], ids, values.reshape(-1, 1), errors.reshape(-1, 1, 1), time_s=times
+        )
+        found.append(shared_by_day(data, 0, errors))
+    assert low < np.mean([each.variances[0] for each in found]) / 0.16 < high
+    assert max(each.freedom for each in found) == pytest.approx(19.2, abs=0.1)
+
+
 @pytest.mark.slow
 def test_few_days_that_differ_are_no_change() -> None:
     """Days' spread was taken as known though 15 or 12 steps from day to day tell it: 15 alarms."""
     for vehicles, a_day in ((3, 4), (4, 6)):
         found = [_drift(seed, vehicles, 24, a_day=a_day, days=0.08) for seed in range(60)]
         assert sum(bool(each.alarms) for each in found) <= 3
+    # Four a day, so six days: 35 are found by the median step from day to day, now 50.
+    options = {"a_day": 4, "days": 0.04, "change": 0.15, "changed": 1, "last": 12}
+    assert sum(0 in _alarmed(_drift(seed, 6, 24, **options)) for seed in range(80)) >= 44
 
 
 def test_one_wild_flight_leaves_the_type_as_it_is() -> None:

@@ -269,7 +269,7 @@ def find_drift(
         errors[name] = error_scale(explained, i, repeated)
         usual = errors[name].variances(_variances(data, i))
         level = without_events(explained, i, usual, events)
-        by_day = shared_by_day(level, i, usual)
+        by_day = shared_by_day(level, i, usual, events)
         usual = usual + by_day.variances
         errors[name] = errors[name].beside_days(by_day.variances, _variances(data, i))
         _, off = variances_with_odd_ones(level, i, usual)

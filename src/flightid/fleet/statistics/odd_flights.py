@@ -49,7 +49,7 @@ def without_odd_flights(
         stated = np.where(data.known[:, i], data.covariances[:, i, i], 1.0)
         usual = error_scale(data, i, None).variances(stated)
         level = without_events(data, i, usual, events) if events else data
-        usual = usual + shared_by_day(level, i, usual).variances
+        usual = usual + shared_by_day(level, i, usual, events).variances
         _, off = variances_with_odd_ones(level, i, usual)
         off &= _few_of_vehicle(data, i, off)
         if off.any():
