@@ -3,7 +3,8 @@
 Each row: logs in the catalogue when it happened, how the run ended, what was there afterwards, and
 what the next run still had to take. Lost are logs that were in the catalogue when it happened and
 are not there afterwards; failed, those that stand in it as failures at the end.
-FLIGHTID_FLEET_LOGS says how many logs a run has (default 40, refused at once; every fourth real).
+FLIGHTID_FLEET_LOGS says how many logs a run has (default 40, refused at once; every fourth real),
+FLIGHTID_FLEET_FAULTS a word of the faults that are tried (default: all).
 """
 
 from __future__ import annotations
@@ -15,7 +16,9 @@ import signal
 import subprocess
 import sys
 import tempfile
+import threading
 from collections.abc import Callable
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from time import monotonic, sleep
 
@@ -30,6 +33,7 @@ PATIENCE_S = 300.0
 def run() -> Table:
     """One row a fault."""
     count, draws = int(os.environ.get("FLIGHTID_FLEET_LOGS", "40")), random.Random(1)
+    wanted = os.environ.get("FLIGHTID_FLEET_FAULTS", "")
     faults: dict[str, Callable[[Path, int, random.Random], tuple[object, ...]]] = {
         "log process": _killed("process"),
         "worker": _killed("worker"),
@@ -41,6 +45,8 @@ def run() -> Table:
     }
     rows = []
     for name, fault in faults.items():
+        if wanted not in name:
+            continue
         with tempfile.TemporaryDirectory() as folder:
             try:
                 rows.append((name, *fault(Path(folder), count, draws)))
@@ -195,16 +201,39 @@ def _full_disk(folder: Path, count: int, draws: random.Random) -> tuple[object, 
         subprocess.run(["umount", str(disk)], check=False)
 
 
+class _Silent(BaseHTTPRequestHandler):
+    """A store that says how long a log is and then hands over none of it."""
+
+    def do_HEAD(self) -> None:
+        """Answer at once."""
+        self.send_response(200)
+        self.send_header("Content-Length", "1000000")
+        self.end_headers()
+
+    def do_GET(self) -> None:
+        """Hang for longer than any run."""
+        self.do_HEAD()
+        sleep(2.0 * PATIENCE_S)
+
+    def log_message(self, *_: object) -> None:
+        """Nothing is printed."""
+
+
 def _misbehaved(folder: Path, count: int, draws: random.Random) -> tuple[object, ...]:
-    """A pattern that never ends on one name, and a log too long for its process's memory."""
+    """A log whose store hangs, and one too long for its process's memory."""
     del draws
+    server = ThreadingHTTPServer(("127.0.0.1", 0), _Silent)
+    server.daemon_threads = True
+    threading.Thread(target=server.serve_forever, daemon=True).start()
     path = _fleet(folder, count - 2, "time_s = 20\nmemory_mib = 900")
-    text = path.read_text().replace('pattern = "^(V[0-9]+)-"', 'pattern = "^(V[0-9]+)-|^(a+)+$"')
-    path.write_text(text)
-    (folder / "logs" / f"{'a' * 60}.bin").write_bytes(b"hangs")
+    hangs = f"http://127.0.0.1:{server.server_address[1]}/V01-20260102-hangs.bin"
+    path.write_text(path.read_text().replace('logs = ["logs"]', f'logs = ["logs", "{hangs}"]'))
     with (folder / "logs" / "V01-20260101-long.bin").open("wb") as file:
         shutil.copyfileobj((folder / "logs" / "V00-2026-01-05.bin").open("rb"), file)
         file.truncate(1 << 30)
-    running = _begun(path, "--workers", "2")
-    then = _until(path, running, count)
-    return _finished(path, running, then, count)
+    try:
+        running = _begun(path, "--workers", "2")
+        then = _until(path, running, count)
+        return _finished(path, running, then, count)
+    finally:
+        server.shutdown()
