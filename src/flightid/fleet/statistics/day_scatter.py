@@ -41,7 +41,7 @@ class DayMeans:
     @property
     def free(self) -> int:
         """Days less events."""
-        return self.means.shape[1] - self.design.shape[2] + 1
+        return int(self.means.shape[1] - self.design.shape[2] + 1)
 
     def left(self, added: float) -> float:
         """Squares about level, events and the largest step, each day with a variance more."""
