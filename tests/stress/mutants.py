@@ -15,6 +15,7 @@ import ast
 import json
 import os
 import random
+import resource
 import shutil
 import subprocess
 import sys
@@ -22,6 +23,7 @@ import tempfile
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
@@ -38,7 +40,13 @@ OPERATORS = (
     *("ReplaceComparisonOperator_Eq_NotEq", "ReplaceComparisonOperator_NotEq_Eq"),
     *("ReplaceUnaryOperator_USub_UAdd", "ReplaceBreakWithContinue", "ZeroIterationForLoop"),
 )
-MOST_TESTS, LONGEST_S = 60, 300.0
+MOST_TESTS, LONGEST_S = 60, 300
+WAITING = 10
+"""Wall time a processor's second may take: a busy machine is not a loop without end."""
+PASSED = 0
+ENDS = {PASSED: "survived", 1: "killed", 2: "killed"}
+"""By pytest's code: 1, a test failed; 2, the tree cannot be imported."""
+UNNOTICED = ("survived", "not reached", "not run")
 Reached = Mapping[str, Mapping[int, Sequence[str]]]
 
 
@@ -67,16 +75,18 @@ def copied(folder: Path) -> Path:
     return folder
 
 
-def tested(tree: Path, words: Sequence[str], longest_s: float | None) -> int | None:
-    """How pytest ends in that tree; None where it does not in time."""
+def tested(tree: Path, words: Sequence[str], longest_s: int | None) -> int | None:
+    """How pytest ends in that tree; below zero or None where its processor's time is not enough."""
     first = (str(tree), str(tree / "src"), *filter(None, [os.environ.get("PYTHONPATH")]))
     given = os.environ | {"PYTHONPATH": os.pathsep.join(first)}
+    limit = partial(resource.setrlimit, resource.RLIMIT_CPU, (longest_s, longest_s))
     for threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "RAYON_NUM_THREADS"):
         given[threads] = "1"
     try:
         return subprocess.run(
             [sys.executable, "-m", "pytest", "-q", "--no-header", *words],
-            cwd=tree, env=given, timeout=longest_s, check=False,
+            cwd=tree, env=given, timeout=longest_s and WAITING * longest_s, check=False,
+            preexec_fn=limit if longest_s else None,
             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         ).returncode  # fmt: skip
     except subprocess.TimeoutExpired:
@@ -93,7 +103,8 @@ def reached(tree: Path, data: Path, packages: Sequence[str], tests: Sequence[str
         settings.write_text(f"[run]\nrelative_files = true\nsource =\n    {sources}\n")
         words = ["--cov", f"--cov-config={settings}", "--cov-context=test", "--cov-report=", "-n2"]
         left_out = [f"--ignore-glob=*{each}*" for each in SLOW]
-        tested(tree, [*words, *left_out, *tests], None)
+        if tested(tree, [*words, *left_out, *tests], None) != PASSED:
+            raise SystemExit("tests fail before anything is changed: they would notice everything")
         shutil.copy(tree / ".coverage", data)
     known = CoverageData(str(data))
     known.read()
@@ -134,7 +145,7 @@ def _annotations(module: ast.Module) -> Iterator[tuple[tuple[int, int], tuple[in
 
 
 def end_of(tree: Path, mutant: Mutant, names: Reached) -> str:
-    """Killed, survived, or not reached by any test."""
+    """Killed, endless, survived, not reached by any test, or such that those are not found."""
     from cosmic_ray.mutating import mutate_code
     from cosmic_ray.plugins import get_operator
 
@@ -152,7 +163,8 @@ def end_of(tree: Path, mutant: Mutant, names: Reached) -> str:
         return "no change"
     try:
         place.write_text(changed, encoding="utf-8")
-        return "survived" if tested(tree, ["-x", *tests], LONGEST_S) == 0 else "killed"
+        code = tested(tree, ["-x", *tests], LONGEST_S)
+        return ENDS.get(code, "endless" if code is None or code < 0 else "not run")
     finally:
         place.write_text(text, encoding="utf-8")
 
@@ -179,11 +191,12 @@ def main() -> None:
                 with asked.keep.open("a") as file:
                     found = {"name": mutant.name, "end": ends[mutant.name], **asdict(mutant)}
                     file.write(json.dumps(found) + "\n")
-            if ends[mutant.name] in ("survived", "not reached"):
+            if ends[mutant.name] in UNNOTICED:
                 print(f"{k + 1}/{asked.sample} {ends[mutant.name]}: {mutant.name}", flush=True)
     counted = Counter(ends[each.name] for each in drawn)
     tried = counted.total() - counted["no change"]
-    print(f"{dict(counted)}; unnoticed {100 * (1 - counted['killed'] / tried):.1f} % of {tried}")
+    missed = sum(counted[each] for each in UNNOTICED)
+    print(f"{dict(counted)}; unnoticed {100 * missed / tried:.1f} % of {tried}")
 
 
 if __name__ == "__main__":
