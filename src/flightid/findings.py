@@ -15,6 +15,13 @@ FIRST = ("scale-contradicted", "tipped-over")
 """Codes of what comes before all advice on a log: another flight would meet it again."""
 
 
+FALL = "tipped-over"
+CAUSES = (
+    "saturated", "motor-at", "motors-unbalanced", "yaw-trimmed", "vibration", "accelerometer-clips",
+)  # fmt: skip
+"""Beginnings of codes that may tell why a vehicle fell: they come right after the fall."""
+
+
 class Statement(Protocol):
     """Whatever states a fact under a code."""
 
@@ -89,8 +96,15 @@ def worst(findings: list[Finding] | tuple[Finding, ...]) -> Light:
     return next((light for light in GRAVITY if light in lights), Light.GREEN)
 
 
-def urgency(finding: Finding) -> tuple[int, int]:
-    """What findings are sorted by where a reader does the first first: a fall, then the worst.
+def urgency(finding: Finding, fallen: bool = False) -> tuple[int, int]:
+    """What findings of one flight are sorted by where a reader does the first first.
+
+    Parameters
+    ----------
+    finding : Finding
+    fallen : bool
+        Whether the vehicle fell: what may have made it fall then comes before advice on logging and
+        on further flights, which would fall as well.
 
     Example
     -------
@@ -98,8 +112,25 @@ def urgency(finding: Finding) -> tuple[int, int]:
     >>> [each.code for each in sorted([short, fell], key=urgency)]
     ['tipped-over', 'too-short']
     """
-    first = FIRST.index(finding.code) if finding.code in FIRST else len(FIRST)
-    return first, GRAVITY.index(finding.light)
+    if finding.code in FIRST:
+        return FIRST.index(finding.code), GRAVITY.index(finding.light)
+    caused = fallen and finding.light is not Light.GREEN and finding.code.startswith(CAUSES)
+    return len(FIRST) + (not caused), GRAVITY.index(finding.light)
+
+
+def in_order(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    """Findings of one flight, what is to be done first first: the one place that orders them.
+
+    Example
+    -------
+    >>> codes = ("rate-too-low", "saturated", "tipped-over")
+    >>> told = [Finding(code, Light.AMBER, "") for code in codes]
+    >>> [each.code for each in in_order(told)]
+    ['tipped-over', 'saturated', 'rate-too-low']
+    """
+    known = tuple(findings)
+    fallen = any(each.code == FALL for each in known)
+    return tuple(sorted(known, key=lambda each: urgency(each, fallen)))
 
 
 def unsaid(findings: Iterable[Said], others: Iterable[Said]) -> list[Said]:

@@ -182,6 +182,15 @@ def test_from_a_dropped_log_to_a_dragged_band(desk: Desk, tmp_path: Path) -> Non
     page.fill("#field", "imu gyrx")
     page.press("#field", "Enter")
     page.wait_for_selector("section[aria-label='Plot of IMU.GyrX'] canvas")
+    # A formula of fields, and the plots that stand as a file by name.
+    page.fill("#field", "IMU.GyrX - IMU.GyrY")
+    page.press("#field", "Enter")
+    page.wait_for_selector("section[aria-label='Plot of =IMU.GyrX - IMU.GyrY'] canvas")
+    page.click("text=Keep as …")
+    page.get_by_label("Name of the layout").fill("gyros")
+    page.get_by_label("Name of the layout").press("Enter")
+    page.get_by_text("plots/gyros.toml").wait_for()
+    assert "=IMU.GyrX - IMU.GyrY" in (desk.folder / "plots" / "gyros.toml").read_text("utf-8")
     # By keyboard what a drag does by mouse, and the values at the cursor.
     chart = page.locator("[role=application][aria-label^='IMU.GyrX over time']")
     zoomed_by_keys(chart, page.locator(".plots").get_by_role("button", name="Whole flight"))

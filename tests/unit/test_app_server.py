@@ -297,7 +297,8 @@ def test_gains_comparisons_and_plans_refuse_what_is_not_there(
     # Gains that were found before are there at once: those of this text and of these files.
     study = flown.study.read_text()
     version = gain_work.gains_version(flown.study, study)
-    known = {"axes": [], "refused": [], "findings": [], "n_steps": 0, "left_out": {},
+    known = {"axes": [], "ranges": {}, "preset": "balanced", "form": "pi_d",
+             "refused": [], "findings": [], "n_steps": 0, "left_out": {},
              "refusal": "none", "files": [], "loops": []}  # fmt: skip
     browser.workspace.keep_result(flown.log, f"gains-{version}", known)
     told = browser.ask(f"/api/gains/{flown.log}", "POST", {})[1]

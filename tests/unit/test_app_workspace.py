@@ -14,6 +14,8 @@ pytest.importorskip("fastapi", reason="the extra app is not installed")
 from tools.build_page import is_built, require_in
 from tools.page_types import TARGET, page_types
 
+from flightid.app.plot_layouts import keep_layout, plot_layouts, remove_layout
+from flightid.app.plot_schemas import PlotLayout
 from flightid.app.study_edits import KeyEdit, edited, etag_of, write_study
 from flightid.app.workspace import Workspace
 from flightid.errors import OptionError, StudyError
@@ -169,3 +171,20 @@ def test_a_wheel_without_the_page_fails(tmp_path: Path) -> None:
     assert is_built(page, sources)  # an sdist: the page, and no sources of it
     (sources / "package.json").write_text("{}")
     assert not is_built(page, sources)
+
+
+def test_layouts_of_plots_are_files_that_lead_nowhere_else(tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path)
+    panes = [["RATE.R", "RATE.RDes"], ['=RCOU.C1 - RCOU.C2 + "µ"']]
+    made = PlotLayout(name="motors", panes=panes)
+    keep_layout(workspace, made)
+    assert plot_layouts(workspace) == [made]
+    for name, text in (("b", "[[pane]]"), ("c", "no TOML"), ("d", "[[pane]]\nseries = [1]")):
+        (tmp_path / "plots" / f"{name}.toml").write_text(text)
+    (tmp_path / "plots" / "e.toml").symlink_to("/etc/passwd")
+    assert plot_layouts(workspace) == [made]
+    for name in ("../a", "", "a/b", ".hidden"):
+        with pytest.raises(ValueError, match="pattern"):
+            PlotLayout(name=name, panes=panes)
+    assert (remove_layout(workspace, "motors"), remove_layout(workspace, "motors")) == (True, False)
+    assert plot_layouts(workspace) == []

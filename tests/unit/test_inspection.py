@@ -126,14 +126,16 @@ def test_a_fall_ends_the_flight(inspected: Callable[[SweepFlight], Inspection]) 
 def test_a_fall_is_the_first_thing_that_is_said_and_done(
     inspected: Callable[[SweepFlight], Inspection], tmp_path: Path
 ) -> None:
-    flight = SweepFlight(tips_over=True, sweep_s=20.0, rate_hz=10.0)
+    flight = SweepFlight(tips_over=True, sweep_s=20.0, rate_hz=10.0, motor_us=1950.0)
     found = inspected(flight)
     assert carried_sentence(found).startswith("The vehicle falls over at ")
     # Red stands behind it: another flight would meet what made it fall again.
-    assert [each.light for each in found.findings[:2]] == [Light.AMBER, Light.RED]
-    assert found.findings[0].code == "tipped-over"
+    lights = [each.light for each in found.findings[:3]]
+    assert lights == [Light.AMBER, Light.AMBER, Light.RED]
+    assert [each.code for each in found.findings[:2]] == ["tipped-over", "saturated"]
     review = fid.review_flight(flight.write(tmp_path))
-    assert review.findings[-1].code == "tipped-over", "where eyes are on a terminal"
+    told = [each.code for each in review.findings[:-4:-1]]
+    assert told[:2] == ["tipped-over", "motor-at-upper"], "last, where eyes are on a terminal"
 
 
 def test_without_a_sweep_no_axis_carries_a_model_and_the_verdict_is_red(

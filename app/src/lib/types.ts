@@ -11,6 +11,7 @@ export interface AxisCard {
   model: string | null;
   band_rad_s: [number, number] | null;
   coherence: number | null;
+  first: boolean;
 }
 
 /** Gains of an axis and what they promise. */
@@ -367,6 +368,12 @@ export interface FlySwitch {
   failures: Record<string, "frozen" | "zero" | "biased">;
 }
 
+/** A formula of fields that can be plotted. */
+export interface FormulaUnit {
+  series: string;
+  unit: string;
+}
+
 /** A parameter file. */
 export interface GainFile {
   name: string;
@@ -436,7 +443,7 @@ export interface GainsScreen {
 /** Long work: its state, and where it can be asked for again. */
 export interface Job {
   id: string;
-  kind: "overview" | "review" | "run" | "fleet" | "gains";
+  kind: "overview" | "review" | "run" | "fleet" | "gains" | "proposal";
   log: string;
   state: "waiting" | "done" | "failed" | "cancelled" | "interrupted";
   reason: string;
@@ -630,6 +637,12 @@ export interface PlanWishes {
   control: number | null;
   rate_rad_s: number | null;
   attitude_rad: number | null;
+}
+
+/** Plots that stand on the screen Flight: panes, each with fields or formulas of fields. */
+export interface PlotLayout {
+  name: string;
+  panes: string[][];
 }
 
 /** One output on one record: extremes by column of what was measured and predicted. */
@@ -864,6 +877,7 @@ export interface RigScreen {
   outputs: string[];
   untold: string;
   time: string;
+  time_unit: string;
   left_out: string[];
   jobs: Job[];
 }
@@ -903,6 +917,7 @@ export interface ShownFinding {
   action: string;
   spans_s: [number, number][];
   first: boolean;
+  rank: number;
 }
 
 /** A model with equations: what it says of itself. */

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from concurrent.futures import Future, InvalidStateError
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 from pebble import ProcessPool
@@ -27,12 +28,14 @@ class Crew:
 
     Parameters
     ----------
+    shared : Path
+        Folder through which they share what took long.
     size : int
         How many.
     """
 
-    def __init__(self, size: int = 1) -> None:
-        self._size = size
+    def __init__(self, shared: Path, size: int = 1) -> None:
+        self._shared, self._size = shared, size
         self._lock = threading.Lock()
         self._begun: dict[Future[Any], ProcessPool] = {}
         self._ended = threading.Event()
@@ -89,4 +92,6 @@ class Crew:
     def _made(self) -> ProcessPool:
         # A process of its own state: a fork of one with threads may hold a lock for good.
         context = multiprocessing.get_context("spawn")
-        return ProcessPool(max_workers=self._size, context=context, initializer=work.limit_memory)
+        return ProcessPool(
+            self._size, context=context, initializer=work.begin, initargs=(self._shared,)
+        )

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import hashlib
 import math
-import re
 from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
@@ -18,11 +17,12 @@ from flightid.app.backstage import Backstage, LogName, known_log, made
 from flightid.app.jobs import Workers
 from flightid.app.kept_parts import kept_fields
 from flightid.app.own_folders import is_link
+from flightid.app.plot_schemas import FormulaUnit
 from flightid.app.pyramid import Pyramid, view
 from flightid.app.schemas import FieldGroup
 from flightid.app.workspace import Workspace
+from flightid.logs.field_formula import FIELD, LONGEST
 
-SERIES = re.compile(r"([^.\[\]]{1,200})(?:\[(\d{1,4})\])?\.(.{1,200})")
 MOST_SERIES, MOST_COLUMNS = 12, 8000
 
 
@@ -38,6 +38,15 @@ def add_field_routes(app: FastAPI, backstage: Backstage) -> None:
             await made(workers.live(work.make_fields, path, target))
             found = kept_fields(workspace, log)
         return found or []
+
+    @app.get("/api/logs/{log}/formula")
+    async def formula(
+        log: LogName, text: Annotated[str, Query(min_length=1, max_length=LONGEST)]
+    ) -> FormulaUnit:
+        """Whether a formula of fields can be plotted, and in what unit."""
+        path = known_log(workspace, log)
+        _, unit = await _formula(workspace, workers, log, path, text.strip())
+        return FormulaUnit(series=f"={text.strip()}", unit=unit)
 
     @app.get("/api/logs/{log}/view", response_class=Response)
     async def seen(
@@ -56,20 +65,36 @@ def add_field_routes(app: FastAPI, backstage: Backstage) -> None:
         return Response(head.tobytes() + table.tobytes(), media_type="application/octet-stream")
 
 
+async def _formula(
+    workspace: Workspace, workers: Workers, log: str, path: Path, formula: str
+) -> tuple[Path, str]:
+    """Levels of a formula, made anew, and its unit."""
+    target = _target(workspace, log, f"={formula}")
+    return target, await made(workers.live(work.make_formula, path, formula, target))
+
+
+def _target(workspace: Workspace, log: str, series: str) -> Path:
+    name = hashlib.sha256(series.encode()).hexdigest()[:24]
+    return workspace.result_path(log, f"{name}.npy").with_suffix(".npy")
+
+
 async def _pyramid(
     workspace: Workspace, workers: Workers, log: str, path: Path, series: str
 ) -> Pyramid:
     """Levels of a field, made where they are not there yet."""
-    match = SERIES.fullmatch(series)
-    if match is None:
+    match = FIELD.fullmatch(series)
+    if match is None and not series.startswith("="):
         raise HTTPException(422, "A series is named MESSAGE.FIELD or MESSAGE[instance].FIELD.")
-    message, number, field = match.groups()
-    name = hashlib.sha256(series.encode()).hexdigest()[:24]
-    target = workspace.result_path(log, f"{name}.npy").with_suffix(".npy")
+    target = _target(workspace, log, series)
     with suppress(OSError, ValueError, IndexError, EOFError):
         if not is_link(target):
             return await asyncio.to_thread(Pyramid.read, target)
     # Not there, or broken; the new one takes its place.
+    if series.startswith("="):
+        await _formula(workspace, workers, log, path, series[1:])
+        return await asyncio.to_thread(Pyramid.read, target)
+    assert match is not None
+    message, number, field = match.groups()
     instance = None if number is None else int(number)
     await made(workers.live(work.make_pyramid, path, message, instance, field, target))
     return await asyncio.to_thread(Pyramid.read, target)

@@ -24,6 +24,8 @@ def add_job_routes(app: FastAPI, backstage: Backstage) -> None:
     async def again(job: Job) -> list[Job]:
         of_study = job.kind in ("run", "gains")
         path, version = backstage.studies.path(job.log) if of_study else None, ""
+        if job.kind == "proposal":
+            raise HTTPException(422, "Ask for the study of these records again.")
         if job.kind == "fleet":
             path = (await asyncio.to_thread(sound_fleet, workspace, job.log)).path
         if of_study and path is None:

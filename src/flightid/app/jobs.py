@@ -11,6 +11,7 @@ from __future__ import annotations
 import asyncio
 import json
 import os
+import shutil
 import time
 from collections.abc import Callable
 from concurrent.futures import CancelledError, Future
@@ -26,6 +27,7 @@ from flightid.app.crew import Crew
 from flightid.app.kept_parts import kept_part
 from flightid.app.own_folders import clear_left, made_name, own_folder, read_plain
 from flightid.app.schemas import Job
+from flightid.app.stage_cache import shared_folder
 from flightid.app.workspace import Workspace
 from flightid.errors import FlightidError
 from flightid.files import write_atomically
@@ -95,9 +97,10 @@ class Workers:
         self._look: asyncio.Task[None] | None = None
         self._listeners: list[Listener] = []
         self._loop: asyncio.AbstractEventLoop | None = None
-        self._live, self._tuning, self._compared, self._planned = (Crew() for _ in range(4))
-        self._asked, self._fleets = Crew(), Crew()
-        self._long = Crew(max(1, (os.cpu_count() or 2) - 1))
+        self._shared = shared_folder()
+        crews = [Crew(self._shared) for _ in range(6)]
+        self._live, self._tuning, self._compared, self._planned, self._asked, self._fleets = crews
+        self._long = Crew(self._shared, max(1, (os.cpu_count() or 2) - 1))
         self._folder = own_folder(workspace.folder, ".flightid", "jobs")
         self._progress = own_folder(workspace.folder, ".flightid", "progress")
         clear_left(self._progress)
@@ -123,6 +126,7 @@ class Workers:
             crew.join()
         for place in {*self._places.values(), *self._ending}:
             watched.forget(place)
+        shutil.rmtree(self._shared, ignore_errors=True)
 
     def listen(self, listener: Listener) -> Callable[[], None]:
         """Hear of every change of a job; returns what ends it."""
@@ -217,6 +221,29 @@ class Workers:
     async def planned(self, call: Callable[..., Any], *inputs: object) -> tuple[Any, str, float]:
         """The same for plans."""
         return await _awaited(self._planned, LONGEST_S, call, *inputs)
+
+    async def proposed(
+        self, log: str, call: Callable[..., Any], *inputs: object
+    ) -> tuple[Any, str, float]:
+        """The same for the study of records, told as a job that can be ended; nothing is kept."""
+        name = f"proposal-{log}"
+        self._end(name)
+        job = Job(id=name, kind="proposal", log=log, state="waiting", begun_s=time.time())
+        place = self._progress / made_name("now")
+        future = self._planned.schedule(watched.watched, place, call, *inputs, timeout_s=LONGEST_S)
+        self._jobs[name], self._futures[name], self._places[name] = job, future, place
+        self._tell(job)
+        try:
+            made: tuple[Any, str, float] = await asyncio.wrap_future(future)
+        except (TimeoutError, ProcessExpired, BrokenProcessPool) as error:
+            made = None, f"the work ended early: {type(error).__name__}", 0.0
+        except asyncio.CancelledError:
+            if not future.cancelled():
+                raise
+            made = None, watched.ENDED, 0.0
+        if self._futures.get(name) is future:
+            self._change(name, "done", "")
+        return made
 
     async def asked(self, call: Callable[..., Any], *inputs: object) -> tuple[Any, str, float]:
         """The same for catalogues of fleets, whose answers that process holds."""

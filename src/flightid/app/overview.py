@@ -20,7 +20,7 @@ from flightid.app.schemas import (
     StripEvent,
     StripLine,
 )
-from flightid.findings import FIRST, Finding
+from flightid.findings import FALL, FIRST, GRAVITY, Finding, in_order, urgency
 from flightid.inspection import Inspection
 from flightid.inspection.carried import carried_sentence
 from flightid.inspection.usable_band import hertz_words
@@ -108,7 +108,7 @@ def review_of(review: FlightReview) -> ReviewPart:
     return ReviewPart(
         light=light_of(review.verdict),
         steps=[step_curve(each) for each in told],
-        verdicts=_verdicts(review.findings, ()),
+        verdicts=_verdicts(in_order(review.findings), ()),
         untold=untold,
     )
 
@@ -157,11 +157,14 @@ def _card(
         headline="No model from this log",
         detail=said or "its command or its rate is not logged",
         action=action,
+        first=before is not None,
     )
 
 
 def _verdicts(findings: Iterable[Finding], blocks: Iterable[TimelineBlock]) -> list[ShownFinding]:
+    findings = tuple(findings)
     listed, given = list(blocks), set[str]()
+    fallen = any(each.code == FALL for each in findings)
     made = []
     for finding in findings:
         action = "" if finding.action in given else finding.action
@@ -174,9 +177,16 @@ def _verdicts(findings: Iterable[Finding], blocks: Iterable[TimelineBlock]) -> l
                 action=action,
                 spans_s=[(b.start_s, b.stop_s) for b in listed if _shows(b, finding.code)][:50],
                 first=finding.code in FIRST,
+                rank=_rank(finding, fallen),
             )
         )
     return made
+
+
+def _rank(finding: Finding, fallen: bool) -> int:
+    """Place among the verdicts of a flight, whoever tells them: the lower, the earlier."""
+    group, gravity = urgency(finding, fallen)
+    return group * len(GRAVITY) + gravity
 
 
 def _shows(block: TimelineBlock, code: str) -> bool:

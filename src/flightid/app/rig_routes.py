@@ -87,7 +87,7 @@ def add_rig_routes(app: FastAPI, backstage: Backstage) -> None:
         roles = asked.model_dump(include={"inputs", "outputs", "excitations", "model", "actuators"})
         reading = _options(asked) | ({"units": asked.units} if asked.units else {})
         # Structures are tried for as long as that takes, where it holds up no hand that drags.
-        call = workers.planned(rig_work.propose, paths, target.parent, roles, reading)
+        call = workers.proposed(rig, rig_work.propose, paths, target.parent, roles, reading)
         proposed = ProposedStudy(**await made(call))
         if proposed.text and studies.path(rig) is None:
             await asyncio.to_thread(write_study, target, proposed.text)

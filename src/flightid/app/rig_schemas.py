@@ -92,6 +92,8 @@ class RigScreen(Message):
     untold: str
     time: str
     """Column that was read as the time; empty where none was."""
+    time_unit: str
+    """What its stamps were read as; empty: s."""
     left_out: list[str]
     """Files that were taken out of the set; they stay where they are."""
     jobs: list[Job]

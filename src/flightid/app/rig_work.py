@@ -58,13 +58,14 @@ def make_rig(paths: Sequence[Path], reading: Mapping[str, Any]) -> dict[str, Any
         "inputs": list(inputs),
         "outputs": list(outputs),
         "untold": untold,
-        "time": _time_of(records),
+        "time": _told_of(records, "time"),
+        "time_unit": _told_of(records, "time_unit"),
     }
 
 
-def _time_of(records: Sequence[Record]) -> str:
-    """Column of the time, as the reader of tables took it."""
-    told = (step.options.get("time") for each in records for step in each.history)
+def _told_of(records: Sequence[Record], what: str) -> str:
+    """Column of the time, or its unit, as the reader of tables took it."""
+    told = (step.options.get(what) for each in records for step in each.history)
     return next((each for each in told if isinstance(each, str)), "")
 
 

@@ -28,6 +28,8 @@ class ShownFinding(Message):
     spans_s: list[tuple[float, float]]
     first: bool = False
     """Whether it comes before all other advice, whatever its light: a fall."""
+    rank: int = 0
+    """Of verdicts of a flight: the lower, the earlier, whoever tells them (`findings.urgency`)."""
 
 
 class AxisCard(Message):
@@ -42,6 +44,8 @@ class AxisCard(Message):
     model: str | None = None
     band_rad_s: tuple[float, float] | None = None
     coherence: float | None = None
+    first: bool = False
+    """Whether its action comes before everything else that the card says: the vehicle fell."""
 
 
 class StepCurve(Message):
@@ -116,7 +120,7 @@ class Job(Message):
     """Long work: its state, and where it can be asked for again."""
 
     id: str
-    kind: Literal["overview", "review", "run", "fleet", "gains"]
+    kind: Literal["overview", "review", "run", "fleet", "gains", "proposal"]
     log: str
     state: Literal["waiting", "done", "failed", "cancelled", "interrupted"]
     reason: str = ""

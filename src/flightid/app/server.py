@@ -22,6 +22,7 @@ from flightid.app.live import add_socket
 from flightid.app.log_routes import add_log_routes
 from flightid.app.model_routes import add_model_routes
 from flightid.app.page_routes import add_page_routes
+from flightid.app.plot_routes import add_plot_routes
 from flightid.app.removed_routes import add_removed_routes
 from flightid.app.rig_routes import add_rig_routes
 from flightid.app.run_routes import add_run_routes
@@ -35,6 +36,7 @@ ROUTES: tuple[Callable[[FastAPI, Backstage], None], ...] = (
     add_log_routes,
     add_removed_routes,
     add_field_routes,
+    add_plot_routes,
     add_job_routes,
     add_study_routes,
     add_gain_routes,

@@ -8,7 +8,6 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -16,11 +15,13 @@ from typing import Any
 from flightid.app.overview import light_of, overview_of, review_of
 from flightid.app.pyramid import Pyramid
 from flightid.app.schemas import FieldGroup, ResponseCurve, ResponsePart, ShownFinding
+from flightid.app.stage_cache import StageCache
 from flightid.app.study_edits import KeyEdit, edited
 from flightid.app.study_reach import draft_inside
 from flightid.errors import FlightidError
 from flightid.files import write_atomically
 from flightid.logs import Log, read_log
+from flightid.logs.field_formula import field_formula
 from flightid.reading import memory_budget
 from flightid.responses import FrequencyResponse
 from flightid.responses.response_band import ResponseIntervals, response_bands
@@ -31,33 +32,17 @@ from flightid.study.proposal import propose_study
 from flightid.study.settings import read_settings
 from flightid.study.stage_runner import StageRunner
 
-HELD = 48
-"""Results of stages that a worker keeps, the oldest forgotten first."""
 BESIDE_BYTES = 2 << 30
 """What a worker may take beside a file of the largest size."""
-
-
-class StageCache(OrderedDict[str, Any]):
-    """Results of stages, as many as `HELD`: those that were taken last."""
-
-    def __getitem__(self, key: str) -> Any:  # noqa: ANN401 - whatever a stage gives
-        """A result, the youngest from now on."""
-        self.move_to_end(key)
-        return super().__getitem__(key)
-
-    def __setitem__(self, key: str, value: object) -> None:
-        """Keep a result, and forget the oldest."""
-        super().__setitem__(key, value)
-        while len(self) > HELD:
-            self.popitem(last=False)
 
 
 KEPT = StageCache()
 """Of this process; the next request on the same log finds it open."""
 
 
-def limit_memory() -> None:
-    """Bound what this process may allocate, where the system can."""
+def begin(shared: Path) -> None:
+    """Begin a worker: bound what it may allocate, where the system can, and share slow stages."""
+    KEPT.share(shared)
     try:
         import resource  # noqa: PLC0415 - not on every system
     except ImportError:
@@ -123,6 +108,13 @@ def make_pyramid(path: Path, message: str, instance: int | None, field: str, res
     """Write a field of a log with its levels."""
     table = _log(path, KEPT).table(message, instance)
     Pyramid.of(table.time_s, table[field]).write(result)
+
+
+def make_formula(path: Path, formula: str, result: Path) -> str:
+    """Write a formula of fields of a log with its levels; returns its unit."""
+    made = field_formula(_log(path, KEPT), formula)
+    Pyramid.of(made.time_s, made.values).write(result)
+    return made.unit
 
 
 def make_responses(

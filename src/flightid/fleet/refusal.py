@@ -18,7 +18,7 @@ from flightid.errors import (
     SingularError,
     UnknownNameError,
 )
-from flightid.findings import FIRST, Finding, urgency
+from flightid.findings import FIRST, Finding, in_order
 from flightid.fleet.catalogue.schema import FAILED, REFUSED
 from flightid.fleet.reasons import STOPPED
 from flightid.inspection import Inspection, inspect_log
@@ -136,7 +136,7 @@ def _inspected(log: Log) -> tuple[Finding, ...]:
 def against(inspection: Inspection | None) -> tuple[Finding, ...]:
     """Findings that are not green, a fall first, for it comes before all that follows from it."""
     seen = () if inspection is None else inspection.findings
-    return tuple(sorted((f for f in seen if f.light is not Light.GREEN), key=urgency))
+    return in_order(f for f in seen if f.light is not Light.GREEN)
 
 
 def decisive(seen: Sequence[Finding]) -> Finding | None:
@@ -151,7 +151,7 @@ def unidentified(made: Proposal) -> LogRefusalError:
     bad = [*against(made.inspection)]
     bad += [each for each in made.findings if each.light is not Light.GREEN]
     # A fall comes first, then the worst; of several the inspection's, which looks at the logging.
-    worst = min(bad, key=urgency, default=None)
+    worst = next(iter(in_order(bad)), None)
     refused = LogRefusalError(
         "no model can be identified from this log",
         found=None if worst is None else worst.message,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from flightid.conventions import Light
-from flightid.findings import Finding, counted, urgency
+from flightid.findings import Finding, counted, in_order
 from flightid.inspection import advice
 from flightid.inspection.carried import carried_axes
 from flightid.inspection.gap_findings import gap_findings
@@ -37,7 +37,7 @@ def judge(log: Log, found: Inspection) -> tuple[Finding, ...]:
         findings += [*_length(found), *_bands(log, found), *_loop(log, found)]
     findings += [*_logging(log, found), *_excitation(log, found, scales)]
     findings += _quality(log, found)
-    return tuple(sorted([*findings, *_without_model(log, found, findings)], key=urgency))
+    return in_order([*findings, *_without_model(log, found, findings)])
 
 
 def _without_model(log: Log, found: Inspection, told: list[Finding]) -> list[Finding]:

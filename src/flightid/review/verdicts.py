@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from flightid.conventions import Light
-from flightid.findings import Finding, urgency
+from flightid.findings import Finding, in_order
 from flightid.inspection.advice import LOGGING
 from flightid.review.filter_findings import filter_findings
 from flightid.review.loop_response import LoopResponse
@@ -29,7 +29,7 @@ SHAKEN = "balance propellers, damp the autopilot's mount, look for loose parts"
 
 def judge_flight(review: FlightReview) -> tuple[Finding, ...]:
     """All verdicts, the worst and then a fall last, where eyes are on a terminal."""
-    return tuple(sorted(_all(review), key=urgency, reverse=True))
+    return in_order(_all(review))[::-1]
 
 
 def _all(review: FlightReview) -> Iterator[Finding]:

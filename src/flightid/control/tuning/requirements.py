@@ -127,7 +127,7 @@ class TuningRequirements(Options):
             if name != OWN and getattr(self, name) == usual[name]:
                 object.__setattr__(self, name, value)
 
-    def changed(self, **requirements: Any) -> TuningRequirements:
+    def changed(self, **requirements: Any) -> TuningRequirements:  # noqa: ANN401
         """With some replaced, by name; another preset takes the place of all of the one before.
 
         Example

@@ -9,7 +9,7 @@ from pathlib import Path
 from flightid.conventions import Light
 from flightid.errors import StudyError
 from flightid.files import write_atomically
-from flightid.findings import FIRST, Finding, urgency
+from flightid.findings import FIRST, Finding, in_order
 from flightid.frozen import dataclass
 from flightid.inspection import Inspection
 from flightid.inspection.carried import carried_sentence
@@ -70,7 +70,7 @@ class Proposal:
         if self.inspection is not None:
             said += ["", self.inspection.in_short()]
             noted = self.inspection.findings
-            first = [f.action for f in sorted(noted, key=urgency) if f.code in FIRST]
+            first = [f.action for f in in_order(noted) if f.code in FIRST]
             found = [*actions, *(each.action for each in noted if each.action)]
             planned = [each for each in found if "flightid plan" in each]
             actions = [*first, *self._next(planned=bool(planned)), *planned, *found]
