@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import flightid as fid
 from flightid.errors import DataError, FitError, ModelError, OptionError, UnitError
@@ -111,6 +112,36 @@ def test_parameters_that_the_data_cannot_tell_apart_are_named() -> None:
         fitted(both.with_fixed(unused=1.0), responses())
     fit = fitted(both.with_fixed(unused=1.0, eff=1.0), responses())
     assert_close(fit.parameters["La"].value, REAL["La"], rtol=1e-8, why="noise-free")
+
+
+def test_a_parameter_of_pairs_left_out_stays_where_it_was() -> None:
+    steps, step_s, rng = 6000, 0.02, np.random.default_rng(4)
+    a, d = (lfilter([0.2], [1.0, -0.8], rng.standard_normal(steps)) for _ in range(2))
+    truth = {"Lp": -2.0, "La": 6.0, "Nr": -0.7, "Na": 1.0, "Nd": -3.0}
+    p, r = (
+        lfilter([0.0, (np.exp(pole * step_s) - 1.0) / pole], [1.0, -np.exp(pole * step_s)], moved)
+        for pole, moved in ((-2.0, 6.0 * a), (-0.7, a - 3.0 * d))
+    )
+    p, r = (y + 0.02 * y.std() * rng.standard_normal(steps) for y in (p, r))
+    record = fid.Record.from_arrays(
+        step_s * np.arange(steps), inputs={"a": a, "d": d}, outputs={"p": p, "r": r}
+    ).declare(hold="zero")
+    model = fid.StateSpaceModel(
+        states={"p": "1", "r": "1"},
+        input_units={"a": "1", "d": "1"},
+        measurements={name: fid.Output(name, "1") for name in ("p", "r")},
+        equations={"p'": "Lp*p + La*a", "r'": "Nr*r + Na*a + Nd*d"},
+        parameters=fid.Parameters(
+            [fid.Parameter(name, 0.8 * truth[name], "1/s") for name in truth]
+        ),
+    )
+    data = fid.estimate_response(record, band_rad_s=(0.5, 30.0), n_omega=30)
+    fit = fid.identify(model.with_responses("p/a", "r/a"), data)
+    left = fit.parameters["Nd"]
+    assert (left.value, left.status, left.stderr) == (0.8 * truth["Nd"], "not seen", None)
+    assert fit.model.parameters["Nd"].free
+    assert "not-seen" in {finding.code for finding in fit.findings}
+    assert_close(fit.parameters["La"].value, truth["La"], rtol=0.1, why="seen beside it")
 
 
 def test_contradictory_bounds_are_refused() -> None:

@@ -244,8 +244,12 @@ def test_a_model_that_its_data_do_not_allow_leaves_the_others(
     said = " ".join(to_text(study.short).split())
     assert "2 of 3 models to use" in said, "what serves comes first"
     assert "not to be used, for what is said of it below: " in said
+    alone = STUDY[: STUDY.index("[[record]]")] + BRIEF
     with pytest.raises(FlightidError):
-        run(folder, STUDY[: STUDY.index("[[record]]")] + BRIEF, cache)
+        run(folder, alone, cache)
+    again = BRIEF[BRIEF.index("[[model]]") :].replace('"Brief"', '"Briefer"')
+    with pytest.raises(FlightidError, match="no model of the study .*: found Brief: .*; Briefer: "):
+        run(folder, alone + again, cache)
 
 
 def test_chirps_of_a_log_have_the_names_of_their_segments() -> None:

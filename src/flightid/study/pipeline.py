@@ -71,7 +71,7 @@ def identify_models(
     """Carry every model through its stages.
 
     All fits come first: models may be rivals of each other in the verification. A model whose data
-    allow no fit is named, and the others stand; where none is left its error is the study's.
+    allow no fit is named, and the others stand; where none is left the study's error names each.
 
     Parameters
     ----------
@@ -91,17 +91,17 @@ def identify_models(
         What was found, with the hash of the fit and of all that was examined of it.
     """
     parts: list[Part] = []
-    errors: list[FlightidError] = []
+    errors: dict[str, FlightidError] = {}
     for asked in tasks:
         task = start_from(asked, parts)
         try:
             parts.append(_identified(task, records, reducing, runner))
         except (DataError, FitError) as error:
-            errors.append(error)
+            errors[task.settings.name] = error
             parts.append(_refused(task, error))
         advance(2)
     if errors and len(errors) == len(parts):
-        raise errors[0]
+        raise _of_all(errors)
     fitted = {part.task.settings.name: part.fitted for part in parts}
     found = []
     for part in parts:
@@ -112,6 +112,19 @@ def identify_models(
         found.append(StageResult(_examined(item, seen), key))
         advance()
     return tuple(found)
+
+
+def _of_all(errors: Mapping[str, FlightidError]) -> FlightidError:
+    """The only error, or one of that kind that says why each model of the study has no fit."""
+    first, *others = errors.values()
+    if not others:
+        return first
+    steps = dict.fromkeys(f"{name}: {each.action}" for name, each in errors.items() if each.action)
+    return type(first)(
+        "no model of the study could be identified",
+        found="; ".join(f"{name}: {each.reason}" for name, each in errors.items()),
+        action="; ".join(steps) or None,
+    )
 
 
 def _refused(task: Task, error: FlightidError) -> Part:

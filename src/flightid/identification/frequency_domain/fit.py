@@ -51,6 +51,7 @@ from flightid.identification.frequency_domain.selection import (
     select_points,
 )
 from flightid.identification.frequency_domain.setup_checks import check_setup
+from flightid.identification.frequency_domain.unseen import with_starts
 from flightid.identification.frequency_domain.without_bias import far_from_best, take_out
 from flightid.identification.multistart import DenseEnd, cluster, local_minima, require_free
 from flightid.identification.rival_fits import judged
@@ -73,7 +74,7 @@ def fit_responses(
     model, nudged = opened(model, selected)
     setup = [*nudged, *check_start(model, selected)]
     try:
-        return _fit_selected(model, data, selected, setup, options)
+        return with_starts(_fit_selected(model, data, selected, setup, options), model)
     except FitError as error:
         if not setup:
             raise
