@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
+import pytest
 
 import flightid as fid
+from flightid.identification.frequency_domain.model_residuals import ModelResiduals
+from flightid.responses.windows.transform import FoldedBasis
 
 
 def test_a_model_whose_input_the_response_lacks_is_not_corrected() -> None:
@@ -36,3 +41,32 @@ def test_a_model_whose_input_the_response_lacks_is_not_corrected() -> None:
     said = "no samples of its input dr; needed every input of the model; the response holds da"
     assert any(said in each.message for each in fit.findings)
     assert all(each.interval95 is None for each in fit.parameters.values())
+
+
+def test_a_fit_makes_each_basis_and_follows_each_model_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    model = fid.load_model("rate_first_order")
+    made = fid.excitation.sweep(
+        band_rad_s=(1.0, 20.0), amplitude=0.1, duration_s=40.0, sample_rate_hz=50.0, name="tau_phi"
+    )
+    sticks = fid.Record.from_excitation(made)
+    flown = fid.simulate(model, sticks, units={"p": "rad/s"}, noise=fid.Noise(sensor={"p": 0.05}))
+    response = fid.estimate_response(flown, band_rad_s=(1.5, 15.0), n_omega=30)
+    bases: list[tuple[object, ...]] = []
+    followed: list[tuple[ModelResiduals, list[float | None]]] = []
+    make, follow = FoldedBasis.of, ModelResiduals._follow
+
+    def counted(plan, omega, detrend="none"):
+        bases.append((plan, omega.tobytes(), detrend))
+        return make(plan, omega, detrend)
+
+    def followed_once(self, model):
+        followed.append((self, [p.value for p in model.parameters.values()]))
+        return follow(self, model)
+
+    monkeypatch.setattr(FoldedBasis, "of", counted)
+    monkeypatch.setattr(ModelResiduals, "_follow", followed_once)
+    fid.identify(model, response)
+    assert len(bases) == len(set(bases)) > 1
+    assert not any(one[0] is other[0] and one[1] == other[1] for one, other in pairwise(followed))

@@ -33,6 +33,7 @@ from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.record import Record
 from flightid.record.hold import Loop
 from flightid.responses import FrequencyResponse
+from flightid.responses.windows.kept_bases import bases_kept
 from flightid.uncertainty.feedback_result import declared_loop
 
 JointData = tuple[FrequencyResponse, Record | Sequence[Record]]
@@ -207,16 +208,17 @@ def identify(
             return with_way_said(fit, closed)
     held = hold_for(chosen.options, flat(data), options)
     given = options if held is None else {**options, "hold": held.hold}
-    fit = chosen.run(model, data, given)
-    # Where data chose among structures the fit knows which.
-    fit = replace(fit, structure=fit.structure or model, method=chosen.name)
-    told = options if loop is None else {**options, "loop": loop}
-    channels = (*fit.model.inputs, *fit.model.outputs)
-    known = data_provenance(flat(data), channels)
-    fit = replace(fit, provenance={**fit.provenance, **known, "told": told})
-    fit = with_damage_judged(fit, flat(data))
-    if held is not None:
-        fit = with_hold_said(*with_hold_tested(fit, chosen, data, given, held, loop))
+    with bases_kept():
+        fit = chosen.run(model, data, given)
+        # Where data chose among structures the fit knows which.
+        fit = replace(fit, structure=fit.structure or model, method=chosen.name)
+        told = options if loop is None else {**options, "loop": loop}
+        channels = (*fit.model.inputs, *fit.model.outputs)
+        known = data_provenance(flat(data), channels)
+        fit = replace(fit, provenance={**fit.provenance, **known, "told": told})
+        fit = with_damage_judged(fit, flat(data))
+        if held is not None:
+            fit = with_hold_said(*with_hold_tested(fit, chosen, data, given, held, loop))
     if not in_doubt(fit.findings):
         fit = with_residuals_judged(fit)
     fit = with_loop_judged(fit, loop)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import fields
 from functools import cached_property
 
 import numpy as np
@@ -160,6 +161,19 @@ class _FollowedRun:
         return np.asarray(self.rest[kept] / self.fitter.scale[:, None] ** 2)
 
 
+_Followed = tuple[list[_FollowedRun], dict[int, tuple[list[_SystemRun], Array, _InitialConditions]]]
+"""Runs beside records, and what they have in common by the length of records."""
+
+
+def _are_same(one: GreyBoxModel, other: GreyBoxModel) -> bool:
+    """Whether two models are copies of one structure with the same values."""
+    if type(one) is not type(other):
+        return False
+    held = (f.name for f in fields(one) if f.name not in ("parameters", "estimated"))
+    values = [[p.value for p in each.parameters.values()] for each in (one, other)]
+    return values[0] == values[1] and all(getattr(one, n) is getattr(other, n) for n in held)
+
+
 @dataclass(frozen=True)
 class ModelResiduals:
     """Measured less modelled outputs of all records, for model after model.
@@ -237,9 +251,17 @@ class ModelResiduals:
         fitted = {each.output for each in model.responses}
         return np.array([row for row, name in enumerate(self.outputs) if name in fitted])
 
-    def _followed(
-        self, model: GreyBoxModel
-    ) -> tuple[list[_FollowedRun], dict[int, tuple[list[_SystemRun], Array, _InitialConditions]]]:
+    def _followed(self, model: GreyBoxModel) -> _Followed:
+        """The records beside a model: a search asks for what is left, its slopes and errors."""
+        if not (self._last and _are_same(self._last[0][0], model)):
+            self._last[:] = [(model, self._follow(model))]
+        return self._last[0][1]
+
+    @cached_property
+    def _last(self) -> list[tuple[GreyBoxModel, _Followed]]:
+        return []
+
+    def _follow(self, model: GreyBoxModel) -> _Followed:
         kept = self._kept(model)
         known: dict[int, tuple[list[_SystemRun], Array, _InitialConditions]] = {}
         found = []

@@ -84,6 +84,12 @@ class FoldedBasis:
         """All frequencies."""
         return sum(len(each.cosine) for each in self.slow) + len(self.cosine)
 
+    @property
+    def n_bytes(self) -> int:
+        """Memory of its numbers."""
+        parts: list[FoldedBasis | PanelBasis] = [self, *self.slow]
+        return sum(each.cosine.nbytes + each.sine.nbytes for each in parts)
+
     @classmethod
     def of(cls, plan: WindowPlan, omega: Real, detrend: str = "none") -> FoldedBasis:
         """Basis for `omega` in rad per sample, increasing."""

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.frozen import dataclass
+from flightid.responses.windows.kept_bases import basis_of
 from flightid.responses.windows.transform import FoldedBasis, WindowPlan, transform
 
 Complex = NDArray[np.complex128]
@@ -50,7 +51,7 @@ class WindowWeights:
     def bases(self, frequencies: Places) -> list[FoldedBasis]:
         """Tapered sinusoids of each window length."""
         omega = self.omega[frequencies]
-        return [FoldedBasis.of(share.plan, omega, self.detrend) for share in self.shares]
+        return [basis_of(share.plan, omega, self.detrend) for share in self.shares]
 
     def weights_at(self, inputs: Places, frequencies: Places) -> list[list[Complex]]:
         """Weight of each window's output transform, by record and window length.
