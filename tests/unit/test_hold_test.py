@@ -8,7 +8,12 @@ import numpy as np
 import pytest
 
 import flightid as fid
-from flightid.identification.hold_likelihood import HeldOutputs, held_outputs
+from flightid.identification.hold_likelihood import (
+    HeldOutputs,
+    _products,
+    _weighed,
+    held_outputs,
+)
 from flightid.identification.hold_test import judged
 from flightid.identification.rival_holds import OtherHold
 from flightid.models import load_model
@@ -353,3 +358,13 @@ def test_a_closed_loop_does_not_speak_against_a_hold_that_is_true() -> None:
     assert "hold-contradicted" in said["open"]
     line = next(line for line in fits["closed"].evidence.lines if "the data cannot tell" in line)
     assert "Inputs are steps between samples as the records say" in line
+
+
+def test_products_of_a_step_are_those_of_its_columns() -> None:
+    random = np.random.default_rng(0)
+    left, slopes = random.standard_normal((2, 700)), random.standard_normal((2, 700, 5))
+    weights = np.array([0.5, 3.0])
+    rows = np.concatenate(list(_weighed(left, slopes, weights, 3)))
+    assert_close(
+        _products(left, slopes, weights, 3), rows.T @ rows, rtol=1e-12, why="rounding of two ways"
+    )

@@ -214,7 +214,7 @@ def _require_near(left: Sequence[Array], slopes: Sequence[Array], largest: Array
         A run that explodes, or leaves far more than there was.
     """
     sound = all(
-        np.all(np.abs(rest) <= largest[:, None]) and np.all(np.isfinite(slope))
+        np.all(np.abs(rest) <= largest[:, None]) and np.isfinite(np.sum(slope))
         for rest, slope in zip(left, slopes, strict=True)
     )
     if not sound:
@@ -232,7 +232,9 @@ def _steps(
     weights = 1.0 / np.where(sizes > 0.0, sizes, 1.0)
     # Triangles hold all that least squares ask, of as many rows as there are numbers.
     triangles = [
-        triangle_of_parts(partial(_weighed, rest, slope, weights, n_free))
+        triangle_of_parts(
+            partial(_weighed, rest, slope, weights, n_free), _products(rest, slope, weights, n_free)
+        )
         for rest, slope in zip(left, slopes, strict=True)
     ]
     n_own = [each.shape[1] - n_free - 1 for each in triangles]
@@ -244,6 +246,20 @@ def _steps(
         rest = each[:m, -1] - each[:m, m:-1] @ shared
         found.append(np.concatenate([shared, np.linalg.lstsq(each[:m, :m], rest)[0]]))
     return found
+
+
+def _products(left: Array, slopes: Array, weights: Array, n_free: int) -> Array:
+    """Products of the columns that `_weighed` gives, without a copy of long slopes."""
+    count = slopes.shape[2]
+    found = np.zeros((count + 1, count + 1))
+    with np.errstate(over="ignore", invalid="ignore"):
+        for rest, slope, weight in zip(left, slopes, weights, strict=True):
+            found[:count, :count] += weight**2 * (slope.T @ slope)
+            found[:count, count] += weight**2 * (slope.T @ rest)
+            found[count, count] += weight**2 * (rest @ rest)
+    found[count, :count] = found[:count, count]
+    places = [*range(n_free, count), *range(n_free), count]
+    return np.asarray(found[np.ix_(places, places)])
 
 
 def _weighed(left: Array, slopes: Array, weights: Array, n_free: int) -> Iterator[Array]:

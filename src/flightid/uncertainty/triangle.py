@@ -47,10 +47,13 @@ def triangle_of_rows(columns: Array) -> Array:
     return _by_blocks(columns) if found is None else found
 
 
-def _of_products(parts: Callable[[], Iterable[Array]]) -> Array | None:
+def _of_products(
+    parts: Callable[[], Iterable[Array]], products: Array | None = None
+) -> Array | None:
     """The triangle of all rows by products of columns; None where these lost too many digits."""
     with np.errstate(over="ignore", invalid="ignore"):
-        products = np.sum([part.T @ part for part in parts()], axis=0)
+        if products is None:
+            products = np.sum([part.T @ part for part in parts()], axis=0)
         length = np.sqrt(np.diag(products))
     empty = length == 0.0
     if not np.all(empty | ((length > SIZES[0]) & (length < SIZES[1]))):
@@ -83,20 +86,22 @@ def _by_blocks(columns: Array) -> Array:
     return _by_blocks(np.concatenate([*parts, columns[len(blocks) * rows :]]))
 
 
-def triangle_of_parts(parts: Callable[[], Iterable[Array]]) -> Array:
+def triangle_of_parts(parts: Callable[[], Iterable[Array]], products: Array | None = None) -> Array:
     """The same of rows that come part by part, so that long columns need not stand anywhere.
 
     Parameters
     ----------
     parts : callable
         Gives them, each shape (n, k), and once more where their products lost too many digits.
+    products : ndarray, shape (k, k), optional
+        Of all columns with all, where they are known.
 
     Example
     -------
     >>> triangle_of_parts(lambda: [np.array([[3.0]]), np.array([[4.0]])])
     array([[5.]])
     """
-    found = _of_products(parts)
+    found = _of_products(parts, products)
     if found is None:
         found = _by_blocks(np.concatenate([_by_blocks(part) for part in parts()]))
     return found
