@@ -30,7 +30,7 @@ for seed in range(3):
     flight = fid.simulate(model, record, units={"alpha": "rad", "q": "rad/s", "nz": "1"})
     noisy = {n: flight[n] + 0.005 * random.standard_normal(200) for n in ("alpha", "q", "nz")}
     flown.append(flight.replace(noisy))
-fit = fid.identify(model, flown, starts=2, seed=4)
+fit = fid.identify(model, flown, starts=5, seed=4)
 for parameter in fit.parameters.values():
     print(parameter.name, parameter.value.hex(), (parameter.stderr or 0.0).hex())
 """

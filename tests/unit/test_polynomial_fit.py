@@ -8,6 +8,7 @@ from scipy.signal import lfilter
 
 import flightid as fid
 from flightid.errors import DataError, FitError, OptionError, UnitError
+from flightid.identification.prediction_error import search
 from flightid.identification.prediction_error.starts import polynomial_starts
 from flightid.models.sampled.channels import gather_channels
 from tests.closeness import assert_close
@@ -245,6 +246,23 @@ def test_starts_are_systematic_first_then_random_and_reproducible():
     fit = fid.identify(asked, flown(ARMAX, 18, noise=0.5))
     assert sum(m.count for m in fit.minima) <= 6
     assert fit.minima[0].objective == min(m.objective for m in fit.minima)
+
+
+def test_a_start_that_comes_near_a_known_end_ends_there() -> None:
+    asked = P.armax("u", "y", na=2, nb=2, nc=2, starts=6, seed=5)
+    data = gather_channels([flown(ARMAX, 18, noise=0.5)], "y", ("u",), "mean")
+    starts = polynomial_starts(asked, data)
+    alone = [search._outcomes(asked, data, start[None], [], 0)[0] for start in starts]
+    ends = search._outcomes(asked, data, starts, [], 0)
+    assert all(not isinstance(end, str) for end in (*alone, *ends))
+    theta, cost, triangle = ends[0][0], ends[0][1], ends[0][2].reshape(len(starts[0]), -1).T
+    error = np.sqrt(cost / data.output.size)
+    shared = [k for k in range(1, 6) if np.array_equal(ends[k][0], theta)]
+    assert len(shared) >= 3
+    for k in shared:
+        away = triangle @ (alone[k][0] - theta)
+        assert_close(away / error, 0.0, atol=1e-3, why="both ends are the same minimum")
+        assert ends[k][3] < alone[k][3]
 
 
 def test_few_iterations_are_reported():

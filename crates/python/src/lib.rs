@@ -51,6 +51,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     vehicles::quadrotor::register(module)?;
     models::equation_records::register(module)?;
     models::expression::register(module)?;
+    fits::lagged_forms::register(module)?;
     fits::least_squares::register(module)?;
     models::narx_models::register(module)?;
     models::polynomial_models::register(module)?;

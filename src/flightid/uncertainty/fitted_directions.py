@@ -12,11 +12,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid import _native
 from flightid.frozen import dataclass
 
 Array = NDArray[np.float64]
-AT_ONCE = 2048
-"""Rows that are turned together: they and their past stay in the cache."""
 TURN, TERMS = 0.5, 12
 """Largest phase (rad) over half of a span of samples, and terms of its series: 5e-13 is left."""
 
@@ -128,15 +127,7 @@ def lags_of_form(columns: Array, form: Array, n_lags: int) -> Array:
     >>> lags_of_form(np.array([[1.0], [2.0], [3.0]]), np.eye(1), 2)
     array([14.,  8.])
     """
-    n, m = columns.shape
-    flat = np.ascontiguousarray(columns).ravel()
-    found = np.zeros(n_lags)
-    for begin in range(0, n, AT_ONCE):
-        turned = (columns[begin : begin + AT_ONCE] @ form).ravel()
-        for lag in range(min(n_lags, n - begin)):
-            later = flat[(begin + lag) * m : (begin + lag) * m + turned.size]
-            found[lag] += turned[: later.size] @ later
-    return found
+    return _native.lags_of_form(columns, form, n_lags)
 
 
 def slow_transforms(columns: Array, length: int, n_bins: int) -> NDArray[np.complex128]:

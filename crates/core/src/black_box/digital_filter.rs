@@ -19,6 +19,18 @@ pub fn divide(polynomial: &[f64], x: &mut [f64]) {
     divide_together(polynomial, [x]);
 }
 
+/// Any number of signals by the same polynomial, four at a time.
+pub fn divide_all(polynomial: &[f64], mut signals: Vec<&mut Vec<f64>>) {
+    for group in signals.chunks_mut(4) {
+        match group {
+            [x, y, z, w] => divide_together(polynomial, [x, y, z, w]),
+            [x, y, z] => divide_together(polynomial, [x, y, z]),
+            [x, y] => divide_together(polynomial, [x, y]),
+            others => others.iter_mut().for_each(|x| divide(polynomial, x)),
+        }
+    }
+}
+
 /// Several signals by the same polynomial, in one pass: a recursion waits for its own last value, so
 /// others run in its shadow.
 pub fn divide_together<const M: usize>(polynomial: &[f64], x: [&mut [f64]; M]) {

@@ -10,6 +10,7 @@ pub mod orthogonal_least_squares;
 pub mod polynomial_fit;
 pub mod polynomial_normal;
 pub mod polynomial_orders;
+pub mod polynomial_past;
 pub mod polynomial_predictor;
 pub mod radial_basis;
 pub(crate) mod remainder;

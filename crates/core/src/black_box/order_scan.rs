@@ -11,7 +11,7 @@ use crate::black_box::polynomial_fit::{Before, PredictionError};
 use crate::black_box::polynomial_orders::Orders;
 use crate::black_box::polynomial_predictor::{Polynomials, Samples};
 use crate::error::CoreError;
-use crate::fits::least_squares::{Options, Problem};
+use crate::fits::least_squares::{Options, Problem, Progress};
 use crate::fits::levenberg_marquardt::minimise;
 use crate::numerics::householder::{back_substitute, triangularise};
 
@@ -233,7 +233,7 @@ fn refine(
         step_tolerance: 1e-7,
         cost_tolerance: FINEST / problem.n_residuals().max(1) as f64,
     };
-    let proceed = &mut |_: &_| !stop();
+    let proceed = &mut |_: &Progress<'_>| !stop();
     let found = minimise(&mut problem, &theta, &low, &high, &options, proceed).ok()?;
     Some(Scanned {
         squares: found.cost,

@@ -7,16 +7,16 @@
 //! Reference: Ljung, *System Identification*, 2nd ed., chapter 10; elimination of linear unknowns:
 //! Golub & Pereyra (1973), SIAM J. Numer. Anal. 10, in the form of Kaufman (1975), BIT 15.
 
-use crate::black_box::digital_filter::divide;
 use crate::black_box::polynomial_normal::{add_products, factorise, remove_square};
 use crate::black_box::polynomial_orders::Orders;
-use crate::black_box::polynomial_predictor::{Derivatives, Past, Polynomials, Run, Samples, run};
+use crate::black_box::polynomial_past::Past;
+use crate::black_box::polynomial_predictor::{Derivatives, Polynomials, Run, Samples, run};
 use crate::error::CoreError;
 use crate::fits::least_squares::{Minimum, Options, Problem, Progress};
 use crate::fits::levenberg_marquardt::minimise;
+use crate::fits::settled_starts::{Settled, in_waves};
 use crate::numerics::householder::{back_substitute, norm, triangularise};
 use crate::numerics::polynomial_roots::reflected;
-use rayon::prelude::*;
 
 const BLOCK: usize = 512;
 
@@ -111,15 +111,8 @@ impl<'a> PredictionError<'a> {
                 if self.levels {
                     past.add_level(&p, n, self.skip);
                 }
-                if !past.directions.is_empty() {
-                    let values = past.best(&made.error);
-                    made = run(&self.orders, &p, record, &values);
-                } else if past.level.is_some() {
-                    made.level = past.best(&made.error).last().copied().unwrap_or(0.0);
-                    let mut response = vec![made.level; n];
-                    divide(&p.c, &mut response);
-                    made.error.iter_mut().zip(&response).for_each(|(x, r)| *x += r);
-                }
+                let values = past.best(&made.error);
+                made.add_past(&self.orders, &p, &past, &values);
                 pasts.push(past);
             }
             runs.push(made);
@@ -243,7 +236,7 @@ impl Problem for PredictionError<'_> {
     }
 }
 
-/// Fit from each start, in parallel; what `stop` answers ends all of them.
+/// Fit from each start, in waves (`settled_starts`); what `stop` answers ends all of them.
 pub fn fit_from(
     problem: &PredictionError<'_>,
     starts: &[Vec<f64>],
@@ -252,11 +245,27 @@ pub fn fit_from(
 ) -> Vec<Result<Minimum, CoreError>> {
     let n = problem.n_parameters();
     let (low, high) = (vec![f64::NEG_INFINITY; n], vec![f64::INFINITY; n]);
-    let proceed = |_: &Progress| !stop();
-    let search = |start: &Vec<f64>| {
-        minimise(&mut problem.clone(), start, &low, &high, options, &mut proceed.clone())
+    let search = |start: &Vec<f64>, known: &[Result<Minimum, CoreError>]| {
+        let ends: Vec<(&Minimum, Settled)> = known.iter().flatten().filter_map(settled).collect();
+        let mut at = None;
+        let mut proceed = |now: &Progress<'_>| {
+            at =
+                ends.iter().find(|(_, end)| end.holds(now.x)).map(|(end, _)| (now.iteration, *end));
+            at.is_none() && !stop()
+        };
+        let found = minimise(&mut problem.clone(), start, &low, &high, options, &mut proceed);
+        match at {
+            Some((iterations, end)) => Ok(Minimum { iterations, ..end.clone() }),
+            None => found,
+        }
     };
-    starts.par_iter().map(search).collect()
+    in_waves(starts, search)
+}
+
+/// A minimum with the ellipsoid about it in which other starts count as there.
+fn settled(end: &Minimum) -> Option<(&Minimum, Settled)> {
+    let variance = end.cost / end.residuals.len() as f64;
+    Settled::of(&end.x, &end.triangle, variance, end.termination).map(|about| (end, about))
 }
 
 /// A linear regression: ARX, or one stage of a start.

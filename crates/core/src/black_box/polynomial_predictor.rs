@@ -1,16 +1,14 @@
-//! The one-step predictor of A y = Σ (Bᵢ/Fᵢ) uᵢ + (C/D) e: its errors, their derivatives as shifts of
-//! a few filtered signals, and what the unknown past adds. (Python side: models/polynomial/model.py)
+//! The one-step predictor of A y = Σ (Bᵢ/Fᵢ) uᵢ + (C/D) e: its errors, and their derivatives as shifts
+//! of a few filtered signals. (Python side: models/polynomial/model.py)
 //!
 //! With wᵢ = (Bᵢ/Fᵢ) uᵢ and s = A y − Σ wᵢ the prediction error is e = (D/C) s. One F may stand under
 //! all inputs: w = (Σ Bᵢ uᵢ)/F.
 //!
 //! Reference: Ljung, *System Identification*, 2nd ed., sections 4.2 and 10.3, eqs. 10.50 to 10.53.
 
-use crate::black_box::digital_filter::{add_product, divide, divide_together};
+use crate::black_box::digital_filter::{add_product, divide, divide_all};
 use crate::black_box::polynomial_orders::Orders;
 use crate::error::CoreError;
-use crate::numerics::gram_schmidt::dot;
-use crate::numerics::householder::norm;
 
 /// The polynomials in q⁻¹; all but B start with one.
 #[derive(Debug, Clone)]
@@ -187,18 +185,10 @@ impl Derivatives {
             made.push(with_d(response), 1, orders.f[j], 1.0);
             last.push(Some(j));
         }
-        // Each recursion waits for its own last sample: three side by side fill the wait.
-        for group in made.signals.chunks_mut(3) {
-            match group {
-                [x, y, z] => divide_together(&p.c, [x, y, z]),
-                [x, y] => divide_together(&p.c, [x, y]),
-                others => others.iter_mut().for_each(|x| divide(&p.c, x)),
-            }
-        }
-        for (signal, denominator) in made.signals.iter_mut().zip(last) {
-            if let Some(j) = denominator {
-                divide(&p.f[j], signal);
-            }
+        divide_all(&p.c, made.signals.iter_mut().collect());
+        for (j, denominator) in p.f.iter().enumerate() {
+            let over = made.signals.iter_mut().zip(&last).filter(|&(_, &of)| of == Some(j));
+            divide_all(denominator, over.map(|(signal, _)| signal).collect());
         }
         made
     }
@@ -224,142 +214,4 @@ impl Derivatives {
             }
         }
     }
-}
-
-/// Orthonormal directions in which the unknown past, and an unknown level, move the errors of a
-/// record.
-#[derive(Debug, Clone)]
-pub struct Past {
-    /// Directions of the past, each as long as it lasts.
-    pub directions: Vec<Vec<f64>>,
-    /// Direction of the level, as long as the record.
-    pub level: Option<Vec<f64>>,
-    /// Which unknown each direction came from, and its coordinates on the directions before it.
-    factors: Vec<(usize, Vec<f64>)>,
-    n_unknowns: usize,
-}
-
-/// Below this share of its largest value an impulse response is over.
-const FORGOTTEN: f64 = 1e-14;
-/// Below this share of its length a direction counts as a combination of those before it.
-const DEPENDENT: f64 = 1e-9;
-
-impl Past {
-    /// Directions for a record of `n` samples whose first `skip` errors do not count.
-    pub fn new(orders: &Orders, p: &Polynomials, n: usize, skip: usize) -> Self {
-        let (through_f, of_noise) = orders.memory();
-        let mut made = Self::empty();
-        made.n_unknowns = through_f.iter().sum::<usize>() + of_noise;
-        let mut unknown = 0;
-        for (j, &count) in through_f.iter().enumerate().filter(|&(_, &count)| count > 0) {
-            let mut response = impulse(&p.d, n);
-            divide_together(&p.c, [&mut response]);
-            divide(&p.f[j], &mut response);
-            made.add(&response, -1.0, count, &mut unknown, skip);
-        }
-        if of_noise > 0 {
-            let mut response = impulse(&[1.0], n);
-            divide(&p.c, &mut response);
-            made.add(&response, 1.0, of_noise, &mut unknown, skip);
-        }
-        made
-    }
-
-    /// Nothing unknown.
-    pub fn empty() -> Self {
-        Self { directions: Vec::new(), level: None, factors: Vec::new(), n_unknowns: 0 }
-    }
-
-    /// Add a constant before 1/C: an unknown level of the output, whatever A and D make of it.
-    pub fn add_level(&mut self, p: &Polynomials, n: usize, skip: usize) {
-        let mut response = vec![1.0; n];
-        divide(&p.c, &mut response);
-        response[..skip.min(n)].fill(0.0);
-        let place = self.n_unknowns;
-        self.n_unknowns += 1;
-        let before = self.directions.len();
-        self.orthogonalise(response, place);
-        if self.directions.len() > before {
-            self.level = self.directions.pop();
-        }
-    }
-
-    fn add(&mut self, response: &[f64], sign: f64, count: usize, unknown: &mut usize, skip: usize) {
-        let largest = response.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
-        let lasting = response.iter().rposition(|x| x.abs() > FORGOTTEN * largest).unwrap_or(0);
-        for shift in 0..count {
-            let length = (lasting + 1 + shift).min(response.len());
-            let mut column = vec![0.0; length];
-            for t in shift.max(skip)..length {
-                column[t] = sign * response[t - shift];
-            }
-            self.orthogonalise(column, *unknown);
-            *unknown += 1;
-        }
-    }
-
-    fn orthogonalise(&mut self, mut column: Vec<f64>, unknown: usize) {
-        let before = norm(&column);
-        let mut coordinates = vec![0.0; self.directions.len() + 1];
-        // Once leaves rounding errors along nearly parallel directions; twice is enough.
-        for _ in 0..2 {
-            for (direction, coordinate) in self.directions.iter().zip(&mut coordinates) {
-                let shared = direction.len().min(column.len());
-                let part = dot(&direction[..shared], &column[..shared]);
-                *coordinate += part;
-                column.resize(column.len().max(direction.len()), 0.0);
-                column.iter_mut().zip(direction).for_each(|(x, d)| *x -= part * d);
-            }
-        }
-        let after = norm(&column);
-        if after > DEPENDENT * before {
-            coordinates[self.directions.len()] = after;
-            column.iter_mut().for_each(|x| *x /= after);
-            self.directions.push(column);
-            self.factors.push((unknown, coordinates));
-        }
-    }
-
-    /// Length of the longest direction of the past.
-    pub fn lasting(&self) -> usize {
-        self.directions.iter().map(Vec::len).max().unwrap_or(0)
-    }
-
-    /// Values of the unknowns that make these errors smallest, the level's last.
-    pub fn best(&self, error: &[f64]) -> Vec<f64> {
-        let mut wanted: Vec<f64> =
-            self.directions.iter().chain(&self.level).map(|d| -dot(d, &error[..d.len()])).collect();
-        let mut values = vec![0.0; self.n_unknowns];
-        for k in (0..wanted.len()).rev() {
-            let (unknown, coordinates) = &self.factors[k];
-            let value = wanted[k] / coordinates[k];
-            values[*unknown] = value;
-            wanted[..k].iter_mut().zip(coordinates).for_each(|(w, c)| *w -= value * c);
-        }
-        values
-    }
-
-    /// Take out of a signal what the past can explain.
-    pub fn remove_from(&self, signal: &mut [f64]) {
-        for direction in &self.directions {
-            let part = dot(direction, &signal[..direction.len()]);
-            signal.iter_mut().zip(direction).for_each(|(x, d)| *x -= part * d);
-        }
-    }
-
-    /// Coordinates of the derivatives on the direction of the level.
-    pub fn level_shares(&self, made: &Derivatives) -> Vec<f64> {
-        let Some(level) = &self.level else { return Vec::new() };
-        let share = |column: &Column| {
-            let shift = column.shift.min(level.len());
-            column.sign * dot(&level[shift..], &made.signals[column.signal][..level.len() - shift])
-        };
-        made.columns.iter().map(share).collect()
-    }
-}
-
-fn impulse(polynomial: &[f64], n: usize) -> Vec<f64> {
-    let mut signal = vec![0.0; n];
-    signal.iter_mut().zip(polynomial).for_each(|(x, p)| *x = *p);
-    signal
 }

@@ -161,9 +161,11 @@ pub struct Minimum {
 
 /// State that the callback sees after each step.
 #[derive(Debug, Clone, Copy)]
-pub struct Progress {
+pub struct Progress<'a> {
     /// Steps tried.
     pub iteration: usize,
     /// Sum of squares now.
     pub cost: f64,
+    /// Variables now.
+    pub x: &'a [f64],
 }

@@ -86,7 +86,8 @@ pub fn search<O: Objective>(
             break Termination::Iterations;
         }
         let outcome = search.step(objective, options)?;
-        if !proceed(&Progress { iteration: search.iterations, cost: search.cost }) {
+        let Search { iterations: iteration, cost, ref x, .. } = search;
+        if !proceed(&Progress { iteration, cost, x }) {
             break Termination::Interrupted;
         }
         if let Some(reason) = outcome {

@@ -5,3 +5,4 @@ pub mod joint_objective;
 pub mod least_squares;
 pub mod levenberg_marquardt;
 pub mod normal_triangle;
+pub mod settled_starts;

@@ -9,7 +9,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use crate::error::CoreError;
-use crate::fits::least_squares::{Minimum, Options, Problem};
+use crate::fits::least_squares::{Minimum, Options, Problem, Progress};
 use crate::fits::levenberg_marquardt::minimise;
 use crate::frequency_domain::response_model::ResponseModel;
 
@@ -246,7 +246,7 @@ pub fn minimise_from<P: Problem + Clone + Sync>(
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Vec<Result<Minimum, CoreError>> {
     let one = |start: &Vec<f64>| {
-        let proceed = &mut |_: &_| !stop();
+        let proceed = &mut |_: &Progress<'_>| !stop();
         minimise(&mut problem.clone(), start, lower, upper, options, proceed)
     };
     match starts {

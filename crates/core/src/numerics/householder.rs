@@ -1,13 +1,22 @@
 //! Orthogonal triangularisation of small dense least-squares problems, in place, columns contiguous.
 
+use crate::numerics::widest::widest;
+
 /// Reduce the first `n` columns of a column-major (`m` × `n + extra`) matrix to upper triangular form
 /// by Householder reflections, applied to the extra columns too.
 ///
 /// Reference: Golub & Van Loan, *Matrix Computations*, 4th ed., algorithms 5.1.1 and 5.2.1.
 pub fn triangularise(a: &mut [f64], m: usize, n: usize) {
-    if m == 0 {
-        return;
+    if m > 0 {
+        widest(
+            #[inline(always)]
+            || reflect_all(a, m, n),
+        );
     }
+}
+
+#[inline(always)]
+fn reflect_all(a: &mut [f64], m: usize, n: usize) {
     for k in 0..n.min(m.saturating_sub(1)) {
         let (head, rest) = a.split_at_mut((k + 1) * m);
         let column = &mut head[k * m + k..];
@@ -46,6 +55,7 @@ pub fn back_substitute(r: &[f64], m: usize, n: usize, b: &[f64], x: &mut [f64]) 
 }
 
 /// Inner product; eight running sums, so that the additions need not wait for one another.
+#[inline(always)]
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 8];
     let (left, right) = (a.chunks_exact(8), b.chunks_exact(8));

@@ -6,6 +6,7 @@ pub(crate) mod decay;
 pub mod dual;
 pub(crate) mod gram_schmidt;
 pub mod householder;
+pub mod lagged_forms;
 pub mod levinson;
 pub mod matrix_exponential;
 pub mod polynomial_roots;

@@ -15,8 +15,9 @@ use rayon::prelude::*;
 use crate::error::CoreError;
 use crate::fits::dense_problem::Dense;
 use crate::fits::joint_objective::Joint;
-use crate::fits::least_squares::{Objective, Options, Point, Problem, Termination};
-use crate::fits::levenberg_marquardt::search;
+use crate::fits::least_squares::{Objective, Options, Point, Problem, Progress, Termination};
+use crate::fits::levenberg_marquardt::{Found, search};
+use crate::fits::settled_starts::{Settled, in_waves};
 use crate::output_error::model_on_records::Trajectories;
 use crate::output_error::normal_equations::{Elimination, triangle};
 use crate::output_error::output_error_weights::{Moments, Noise, Weights};
@@ -262,9 +263,9 @@ impl<T: Trajectories> Objective for OutputError<'_, T> {
     }
 }
 
-/// Fit from several starts, in parallel, until `stop` says true; the answers keep the order of the
-/// starts. One start runs on the calling thread. Residuals of variance one of other data on the same
-/// parameters, where there are any `beside`, add their sum of squares.
+/// Fit from several starts, in waves (`settled_starts`), until `stop` says true; the answers keep
+/// the order of the starts. Residuals of variance one of other data on the same parameters, where
+/// there are any `beside`, add their sum of squares.
 #[allow(clippy::too_many_arguments)]
 pub fn fit_from<T: Trajectories, P: Problem + Clone + Sync>(
     trajectories: &T,
@@ -276,26 +277,45 @@ pub fn fit_from<T: Trajectories, P: Problem + Clone + Sync>(
     options: &Options,
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Vec<Result<Estimate, CoreError>> {
-    let one = |start: &Vec<f64>| {
+    let one = |start: &Vec<f64>, known: &[Result<Ending, CoreError>]| {
+        let mut at = None;
+        let proceed = &mut |now: &Progress<'_>| {
+            let near = |end: &&Ending| end.1.as_ref().is_some_and(|about| about.holds(now.x));
+            at = known.iter().flatten().find(near).map(|end| (now.iteration, &end.0));
+            at.is_none() && !stop()
+        };
         let mut fit = OutputError::new(trajectories, data, noise)?;
-        let proceed = &mut |_: &_| !stop();
         let Some(beside) = beside else {
             let found = search(&mut fit, start, bounds.0, bounds.1, options, proceed)?;
-            return fit.estimate(found.x, found.iterations, found.termination);
+            return reached(at).map_or_else(|| ending(fit, found), Ok);
         };
         let mut beside = beside.clone();
         let mut other = Dense::new(&mut beside);
         let mut joint = Joint::new(&mut other, &mut fit)?;
         let found = search(&mut joint, start, bounds.0, bounds.1, options, proceed)?;
+        if let Some(there) = reached(at) {
+            return Ok(there);
+        }
         let share = 0.5 * other.cost(&found.x)?;
-        let mut ending = fit.estimate(found.x, found.iterations, found.termination)?;
-        ending.objective += share;
-        Ok(ending)
+        let mut made = ending(fit, found)?;
+        made.0.objective += share;
+        Ok(made)
     };
-    match starts {
-        [only] => vec![one(only)],
-        _ => starts.par_iter().map(one).collect(),
-    }
+    in_waves(starts, one).into_iter().map(|end| end.map(|(estimate, _)| estimate)).collect()
+}
+
+/// Where a fit ended, with the ellipsoid about it in which other starts count as there.
+type Ending = (Estimate, Option<Settled>);
+
+/// The end of another start that a search came near, in its own steps.
+fn reached(at: Option<(usize, &Estimate)>) -> Option<Ending> {
+    at.map(|(iterations, end)| (Estimate { iterations, ..end.clone() }, None))
+}
+
+/// What a search found; its residuals are whitened, so that their variance is one.
+fn ending<T: Trajectories>(fit: OutputError<'_, T>, found: Found) -> Result<Ending, CoreError> {
+    let about = Settled::of(&found.x, &found.triangle, 1.0, found.termination);
+    Ok((fit.estimate(found.x, found.iterations, found.termination)?, about))
 }
 
 fn require_finite(moments: &Moments) -> Result<(), CoreError> {
