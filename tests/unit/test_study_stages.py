@@ -248,7 +248,8 @@ def test_a_model_that_its_data_do_not_allow_leaves_the_others(
     with pytest.raises(FlightidError):
         run(folder, alone, cache)
     again = BRIEF[BRIEF.index("[[model]]") :].replace('"Brief"', '"Briefer"')
-    with pytest.raises(FlightidError, match="no model of the study .*: found Brief: .*; Briefer: "):
+    said = r"no model of the study .*: found Brief: .*; Briefer: "
+    with pytest.raises(FlightidError, match=said):
         run(folder, alone + again, cache)
 
 
