@@ -9,13 +9,16 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from scipy.signal import butter, lfilter, welch
 
 import flightid as fid
 from flightid.cli.flight import command
 from flightid.cli.program import program
 from flightid.control.autopilots import NotchTracking
+from flightid.errors import DataError, OptionError
 from flightid.logs.dataflash.layout import MessageLayout
 from flightid.logs.dataflash.writer import DataflashWriter
+from flightid.review.edited_filters import filter_bench
 from flightid.review.filter_findings import _advice
 from flightid.review.gyro_noise import GyroNoise, floor_beneath
 from flightid.review.notch_proposal import _series
@@ -137,6 +140,46 @@ def test_a_quiet_gyro_may_have_faster_filters_and_says_what_they_save(tmp_path: 
     assert review.filters.table().rows[0][:2] == ("all", "INS_GYRO_FILTER")
 
 
+def test_edited_filters_pass_what_filtering_the_gyro_again_passes(tmp_path: Path) -> None:
+    """Against SciPy: its Butterworth filter on the samples that were logged, and Welch's method."""
+    path = tmp_path / "shaken.bin"
+    _write(path, tone=0.6, white=0.01, esc=False)
+    log = fid.read_log(path)
+    bench = filter_bench(log)
+    (roll, *_) = bench.edited({"INS_GYRO_FILTER": 25.0})
+    again = lfilter(*butter(2, 25.0, fs=1000.0), log.table("GYR")["GyrX"])[2000:]
+    hz, power = welch(again, 1000.0, nperseg=2048)
+    seen = (roll.frequency_hz > 8.0) & (roll.frequency_hz < 80.0)
+    there = np.interp(roll.frequency_hz[seen], hz, power)
+    share = 10.0 * np.log10(roll.edited[seen] / there)
+    assert abs(np.median(share)) < 0.3
+    # Phase, noise and notches are those that the review found for the same parameters.
+    assert bench.choice is not None
+    for made, told in zip(bench.edited(bench.choice.values), bench.choice.axes, strict=True):
+        assert_close(made.phase_edited_deg, told.phase_new_deg, atol=1e-9, why="one controller")
+        assert_close(made.noise_edited, told.noise_new, rtol=1e-9, why="one spectrum")
+    fixed = {"INS_HNTCH_ENABLE": 1.0, "INS_HNTCH_MODE": 0.0, "INS_HNTCH_FREQ": 150.0,
+             "INS_HNTCH_BW": 40.0, "INS_HNTCH_HMNCS": 1.0}  # fmt: skip
+    (cut, *_) = bench.edited(fixed)
+    at = int(np.argmin(np.abs(cut.frequency_hz - 150.0)))
+    assert cut.edited[at] < 1e-3 * cut.flown[at]
+    assert cut.phase_edited_deg < cut.phase_flown_deg
+    changes = bench.changes(fixed | {"INS_GYRO_FILTER": 40.0})
+    assert {each.name: each.value for each in changes} == {
+        name: value for name, value in fixed.items() if value != bench.values[name]
+    }
+    assert all((each.old is None) == (each.name not in PARAMETERS) for each in changes)
+    # The page shows these numbers, and a file with its way back.
+    filter_work = pytest.importorskip("flightid.app.filter_work", exc_type=ImportError)
+    shown = filter_work.try_filters(path, {"INS_GYRO_FILTER": 25.0})
+    assert shown["axes"][0]["noise_edited_percent"] == pytest.approx(100.0 * roll.noise_edited)
+    assert "INS_GYRO_FILTER,25" in shown["files"][0]["text"].replace(" ", "")
+    assert "INS_GYRO_FILTER,40" in shown["files"][1]["text"].replace(" ", "")
+    assert (shown["raw"], filter_work.try_filters(path, {})["files"]) == (True, [])
+    with pytest.raises(OptionError, match="no filter of this vehicle"):
+        bench.edited({"ATC_RAT_RLL_P": 0.2})
+
+
 def test_filters_that_cannot_be_told_say_why_and_nothing_is_written(tmp_path: Path) -> None:
     writer = DataflashWriter()
     writer.message(10_000_000, "ArduCopter V4.6.0 (test)")
@@ -145,6 +188,8 @@ def test_filters_that_cannot_be_told_say_why_and_nothing_is_written(tmp_path: Pa
     writer.write(tmp_path / "bare.bin")
     review = fid.review_flight(tmp_path / "bare.bin")
     assert "no ATC_RAT_RLL_P" in review.filters.reason
+    with pytest.raises(DataError, match="no filters can be tried"):
+        filter_bench(fid.read_log(tmp_path / "bare.bin"))
     made = CliRunner().invoke(
         command, [str(tmp_path / "bare.bin"), "--write", str(tmp_path / "none.param")]
     )

@@ -1,4 +1,4 @@
-import type { RemovedItem, CompareRequest, ComparisonPart, Edit, FieldGroup, FlightScreen, FormulaUnit, GainsScreen, Job, Listing, LogItem, ModelAnswer, OwnModelAnswer, OwnModel, PlanPart, PlanRequest, PlotLayout, ProposedStudy, RigItem, RigScreen, RunScreen, ShownModel, StudyText, UseEdits } from "./types";
+import type { RemovedItem, CompareRequest, ComparisonPart, Edit, FieldGroup, FilterScreen, FlightScreen, FormulaUnit, GainsScreen, Job, Listing, LogItem, ModelAnswer, OwnModelAnswer, OwnModel, PlanPart, PlanRequest, PlotLayout, ProposedStudy, RigItem, RigScreen, RunScreen, ShownModel, StudyText, UseEdits } from "./types";
 
 /** A refusal of the server, in its own words. */
 export class Refusal extends Error {
@@ -113,6 +113,7 @@ export async function rigView(id: string, file: string, manoeuvre: string, serie
 }
 
 /** Series over a span: time, then a row each; NaN breaks a line, infinity says "no sample here". */
+export const filters = (log: string, values: Record<string, number>) => json<FilterScreen>(`/api/filters/${log}`, sent("POST", { values }));
 export const layouts = () => json<PlotLayout[]>("/api/layouts");
 export const keepLayout = (layout: PlotLayout) => json<PlotLayout[]>("/api/layouts", sent("POST", layout));
 export const removeLayout = (name: string) => json<PlotLayout[]>(`/api/layouts/${encodeURIComponent(name)}`, { method: "DELETE" });

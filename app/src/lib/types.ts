@@ -108,6 +108,45 @@ export interface FieldGroup {
   fields: Record<string, string>;
 }
 
+/** What the filters make of the noise of one axis; spectra in dB of 1 (rad/s)² per Hz. */
+export interface FilterAxis {
+  axis: string;
+  ahead: (number | null)[];
+  flown: (number | null)[];
+  edited: (number | null)[];
+  phase_flown_deg: number;
+  phase_edited_deg: number;
+  noise_flown_percent: number;
+  noise_edited_percent: number;
+  stages: string[];
+}
+
+/** Filters to try, by the autopilot's names; the others stay as flown. */
+export interface FilterRequest {
+  values: Record<string, number>;
+}
+
+/** Filters of a vehicle on the noise of its flight. */
+export interface FilterScreen {
+  values: FilterValue[];
+  suggested: Record<string, number>;
+  at_hz: number;
+  measured: boolean;
+  raw: boolean;
+  frequency_hz: number[];
+  axes: FilterAxis[];
+  files: GainFile[];
+  python: string;
+}
+
+/** A parameter of a filter: as flown, and as it is tried. */
+export interface FilterValue {
+  name: string;
+  flown: number;
+  known: boolean;
+  value: number;
+}
+
 /** The fleet file that was written, and what was chosen. */
 export interface FleetDraft {
   fleet: FleetItem;

@@ -1,4 +1,4 @@
-"""What the page and the server tell each other of plots: formulas of fields, layouts."""
+"""What page and server tell each other of plots: formulas, layouts, filters tried on noise."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import Annotated
 
 from pydantic import Field
 
+from flightid.app.gain_schemas import GainFile
 from flightid.app.schemas import Message
 
 LAYOUT_NAME = "^[A-Za-z0-9_][A-Za-z0-9_ -]{0,59}$"
@@ -27,3 +28,49 @@ class PlotLayout(Message):
 
     name: Annotated[str, Field(pattern=LAYOUT_NAME)]
     panes: Annotated[list[PaneSeries], Field(min_length=1, max_length=40)]
+
+
+class FilterValue(Message):
+    """A parameter of a filter: as flown, and as it is tried."""
+
+    name: str
+    flown: float
+    known: bool
+    """Whether the log tells it; else it is what firmware takes."""
+    value: float
+
+
+class FilterAxis(Message):
+    """What the filters make of the noise of one axis; spectra in dB of 1 (rad/s)² per Hz."""
+
+    axis: str
+    ahead: list[float | None]
+    flown: list[float | None]
+    edited: list[float | None]
+    phase_flown_deg: float
+    phase_edited_deg: float
+    noise_flown_percent: float
+    noise_edited_percent: float
+    stages: list[str]
+
+
+class FilterScreen(Message):
+    """Filters of a vehicle on the noise of its flight."""
+
+    values: list[FilterValue]
+    suggested: dict[str, float]
+    at_hz: float
+    measured: bool
+    raw: bool
+    """Whether the noise was logged ahead of the filters."""
+    frequency_hz: list[float]
+    axes: list[FilterAxis]
+    files: list[GainFile]
+    """To set what is tried, and the way back; none where nothing differs."""
+    python: str
+
+
+class FilterRequest(Message):
+    """Filters to try, by the autopilot's names; the others stay as flown."""
+
+    values: dict[str, float] = Field(default_factory=dict, max_length=64)
