@@ -18,6 +18,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 SOURCES = ROOT / "app"
 PAGE = ROOT / "src" / "flightid" / "app" / "page"
+GUNZIP = ROOT / "src" / "flightid" / "report" / "templates" / "gunzip.js"
+NOTICE = "/* Made by tools/build_page.py of fflate, MIT, Copyright 2026 Arjun Barrett. */"
 STAMP = "sources.sha256"
 NEEDED = ("index.html", "page.js", STAMP)
 
@@ -56,7 +58,11 @@ def build() -> None:
     if not taken.is_file() or taken.read_text(encoding="utf-8") != wanted:
         _run(npm, "ci", "--ignore-scripts", "--no-audit", "--no-fund", "--loglevel=error")
         taken.write_text(wanted, encoding="utf-8")
-    _run(node, "node_modules/vite/bin/vite.js", "build", "--logLevel", "warn")
+    vite = (node, "node_modules/vite/bin/vite.js", "build", "--logLevel", "warn")
+    _run(*vite)
+    # Kept in git, for reports are written without a page: the same bytes for the same lock.
+    _run(*vite, "--config", "vite.report.config.ts")
+    GUNZIP.write_text(f"{NOTICE}\n{GUNZIP.read_text(encoding='utf-8')}", encoding="utf-8")
     (PAGE / STAMP).write_text(f"{source_hash()}\n", encoding="utf-8")
     if not is_built():
         sys.exit(f"The page was not built whole: {PAGE} lacks one of {', '.join(NEEDED)}")

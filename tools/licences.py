@@ -24,7 +24,8 @@ Made by `python tools/licences.py --write`. The crates are inside the wheel, who
 Reports draw with plotly.js 4.1.1 (MIT, Copyright 2012-2026, Plotly, Inc.), which the wheel holds.
 The page of `flightid app` is made of Svelte 5.57.3 (MIT, Copyright 2016-2025, Svelte
 Contributors), uPlot 1.6.32 (MIT, Copyright 2022, Leon Sorokin) and three.js 0.187.0 (MIT, Copyright
-2010-2026, three.js authors), which the wheel holds too.
+2010-2026, three.js authors); reports unpack themselves by fflate 0.8.3 (MIT, Copyright 2026, Arjun
+Barrett). The wheel holds these too.
 """
 
 

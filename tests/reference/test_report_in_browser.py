@@ -125,7 +125,14 @@ def test_paper_shows_all_plots_and_columns_at_its_own_width(tmp_path: Path) -> N
         page.goto(file.as_uri())
         plots, early, buttons = page.evaluate("window.early")
         apology = page.locator("#plain").is_visible()
+        # The last line stands close below what is above it, or it takes a page of its own.
+        page.emulate_media(media="print")
+        left_empty = page.evaluate(
+            """document.querySelector("footer").getBoundingClientRect().top
+               - document.querySelector("main > section").getBoundingClientRect().bottom"""
+        )
         browser.close()
+    assert left_empty < 24, "the footer alone on a page of paper"
     assert early >= plots == 8, "each plot has layers of its own"
     assert (buttons, apology) == (0, False)
     assert drawn < 8, "what is folded or below the screen is not drawn before"

@@ -67,7 +67,7 @@ def to_html(document: Document, *, packed: bool = True) -> str:
     sections = [numbers.section(section) for section in tree["sections"]]
     has_plots = any(isinstance(block, Figure) for block in document.walk())
     library = plotting_library() if has_plots else ""
-    script = "\n".join(map(_resource, (["inflate.js"] if has_plots else []) + ["page.js"]))
+    script = "\n".join(map(_resource, (["gunzip.js"] if has_plots else []) + ["page.js"]))
     hashes = [_script_hash(text) for text in ([script, library] if has_plots else [script])]
     return (
         environment()
