@@ -15,6 +15,7 @@ from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.inspection.flight_phases import FlightPhases
 from flightid.inspection.inspection import Inspection
+from flightid.logs.dataflash.writer import DataflashWriter
 from flightid.study.proposal import propose_study
 from flightid.vehicles import PilotDoublet, SidActivation, fly, write_ardupilot_log
 
@@ -46,6 +47,33 @@ def test_a_parameter_goes_and_the_path_is_told(
     plain = json.loads(capsys.readouterr().out)
     assert plain["schema"] == "flightid.reduction/1"
     assert [step["name"] for step in plain["path"] if step["accepted"]] == ["Lp"]
+
+
+def test_columns_stand_for_the_channels_of_equations(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """`run` and `tune` took them; `identify --inputs` was "no option of a response"."""
+    flown = fid.read_records(recorded(tmp_path))[0]
+    table = np.column_stack([flown.time_s, flown["tau_phi"], flown["p"]])
+    path = tmp_path / "rig.csv"
+    np.savetxt(path, table, delimiter=",", header="t [s],u [1],y [rad/s]", comments="")
+    words = ["identify", str(path), "--model", "rate_first_order", "--axis", "roll", "--json"]
+    words += ["--method", "output_error", "--inputs"]
+    assert run([*words, "u", "--outputs", "y"]) == 0
+    own = json.loads(capsys.readouterr().out)
+    whole = ["identify", str(tmp_path / "flight.nc"), *words[2:-1]]
+    assert run(whole) == 0
+    named = json.loads(capsys.readouterr().out)
+    found, told = (each["parameters"]["Ltphi"]["value"] for each in (own, named))
+    assert found == pytest.approx(told, rel=1e-6)
+    assert run([*words, "u,y", "--outputs", "y"]) == 2
+    assert "the inputs of these equations are tau_phi" in capsys.readouterr().err
+    log = tmp_path / "flight.bin"
+    writer = DataflashWriter()
+    writer.parameter("SCHED_LOOP_RATE", 400.0)
+    writer.write(log)
+    assert run(["identify", str(log), *words[2:], "u", "--outputs", "y"]) == 2
+    assert "is a log, whose channels have names of their own" in capsys.readouterr().err
 
 
 def test_structures_stand_side_by_side(

@@ -78,6 +78,7 @@ def fits_of(
     from flightid.responses.options import AUTOMATIC
 
     way, loop = method or USUAL, options.pop("loop", None)
+    columns = {role: options.pop(role, None) or () for role in ("inputs", "outputs")}
     # Records keep what was injected: what a free run in a loop leaves is tested against that.
     beside_inputs = (
         () if way in methods() and _on_responses(way) else options.pop("excitations", ())
@@ -87,6 +88,9 @@ def fits_of(
     _require_same_channels(models)
     (first, *_) = models.values()
     channels: dict[str, Any] = {"inputs": first.inputs, "outputs": first.outputs}
+    named: dict[str, Any] = {
+        role: _columns_of(role, channels[role], columns[role]) for role in channels
+    }
     if (way == JOINT) != bool(beside):
         raise click.UsageError(
             f"--method {JOINT} and --records belong together: the response comes from FILES, "
@@ -94,12 +98,12 @@ def fits_of(
         )
     injected = beside_inputs or of_response.get("excitations")
     read = read_files(
-        files, *of_files, **channels, units=first.units, excitations=injected, take="flown"
+        files, *of_files, **named, units=first.units, excitations=injected, take="flown"
     )
     more: list[Record] = []
     if way == JOINT:
         span = {} if beside_span_s is None else {"span_s": beside_span_s}
-        more = read_files(beside, of_files[0], span, **channels, units=first.units)
+        more = read_files(beside, of_files[0], span, **named, units=first.units)
 
     def fitted(data: Any) -> tuple[dict[str, Fit], Any]:  # noqa: ANN401 — records, or a response
         whole = [data, *more] if more else data
@@ -124,6 +128,23 @@ def fits_of(
         lambda longer: fitted(longer.estimate(estimate, of_response)),
         banded="band_rad_s" in of_response,
     )
+
+
+def _columns_of(
+    role: str, channels: Sequence[str], columns: Sequence[str]
+) -> Sequence[str] | dict[str, str]:
+    """Channels of equations, with the columns that stand for them where those were named."""
+    from flightid.study.proposal.columns import columns_by_channel
+
+    if not columns:
+        return channels
+    other = columns_by_channel(channels, columns)
+    if other is None:
+        raise click.UsageError(
+            f"the {role} of these equations are {', '.join(channels)}: --{role} names a column for "
+            f"each, in their order; found {', '.join(columns)}"
+        )
+    return {name: other.get(name, name) for name in channels} if other else channels
 
 
 def _require_same_channels(models: Mapping[str, Model]) -> None:

@@ -49,8 +49,8 @@ def read_files(
     of_tables: Mapping[str, Any],
     of_logs: Mapping[str, Any],
     *,
-    inputs: Sequence[str] | None = None,
-    outputs: Sequence[str] | None = None,
+    inputs: Sequence[str] | Mapping[str, str] | None = None,
+    outputs: Sequence[str] | Mapping[str, str] | None = None,
     excitations: Sequence[str] | None = None,
     units: Mapping[str, str] | None = None,
     take: Take | None = None,
@@ -66,7 +66,8 @@ def read_files(
     of_tables, of_logs : mapping of str to object
         What was given of `reading`.
     inputs, outputs, excitations : sequence of str, optional
-        Channels by role; without them all of a log, and those with a role of a table.
+        Channels by role; without them all of a log, and those with a role of a table. A mapping
+        gives columns of tables other names.
     units : mapping of str to str, optional
         Unit of the model by channel.
     take : {"flown", "unseen"}, optional
@@ -85,19 +86,34 @@ def read_files(
         if is_log(file) and not (_names_columns(of_tables, inputs, outputs) and is_table_too(file)):
             _refuse(of_tables, f"tables, and {file.name} is a log")
             named = [*(inputs or ()), *(outputs or ()), *(excitations or ())]
+            _refuse_renaming(file, inputs, outputs)
             asked = None if of_logs or not inputs else take
-            found += _from_log(file, of_logs, list(dict.fromkeys(named)), inputs or (), asked)
+            found += _from_log(file, of_logs, list(dict.fromkeys(named)), list(inputs or ()), asked)
             continue
         _refuse({"sid_run": None} if "sid_run" in of_logs else {}, "logs")
         found += _from_table(file, of_tables, of_logs, inputs, outputs, excitations)
     return [_in_units(record, units or {}) for record in found]
 
 
+def _refuse_renaming(file: Path, *roles: Sequence[str] | Mapping[str, str] | None) -> None:
+    """Refuse columns of other names for a log, whose channels have names of their own."""
+    given = [name for role in roles if isinstance(role, dict) for name in role.items()]
+    other = [f"{column} for {name}" for name, column in given if column != name]
+    if other:
+        raise click.UsageError(
+            f"{file.name} is a log, whose channels have names of their own: found "
+            f"{', '.join(other)}; leave --inputs and --outputs out"
+        )
+
+
 def _names_columns(
-    of_tables: Mapping[str, Any], inputs: Sequence[str] | None, outputs: Sequence[str] | None
+    of_tables: Mapping[str, Any],
+    inputs: Sequence[str] | Mapping[str, str] | None,
+    outputs: Sequence[str] | Mapping[str, str] | None,
 ) -> bool:
     """Whether columns of a table are meant: topics of a bag, fields of a decoded blackbox."""
-    named = (*(inputs or ()), *(outputs or ()))
+    roles = (role.values() if isinstance(role, dict) else role or () for role in (inputs, outputs))
+    named = [name for role in roles for name in role]
     return bool(of_tables) or any(name.startswith("/") or "[" in name for name in named)
 
 
@@ -125,8 +141,8 @@ def _from_table(
     file: Path,
     of_tables: Mapping[str, Any],
     of_logs: Mapping[str, Any],
-    inputs: Sequence[str] | None,
-    outputs: Sequence[str] | None,
+    inputs: Sequence[str] | Mapping[str, str] | None,
+    outputs: Sequence[str] | Mapping[str, str] | None,
     excitations: Sequence[str] | None,
 ) -> list[Record]:
     from flightid import read_records

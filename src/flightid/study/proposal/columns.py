@@ -55,16 +55,21 @@ def columns_of_model(model: str, columns: Columns) -> dict[str, str]:
         The model cannot be loaded.
     """
     found = load_model(model)
-    pairs: dict[str, str] = {}
-    for channels, named in (
-        (found.inputs, columns.inputs),
-        (found.outputs, columns.outputs),
-    ):
-        free = [name for name in named if name not in channels]
-        waiting = [name for name in channels if name not in named]
-        if len(free) == len(waiting):
-            pairs |= dict(zip(waiting, free, strict=True))
-    return pairs
+    taken = columns_by_channel(found.inputs, columns.inputs)
+    return {**(taken or {}), **(columns_by_channel(found.outputs, columns.outputs) or {})}
+
+
+def columns_by_channel(channels: Sequence[str], columns: Sequence[str]) -> dict[str, str] | None:
+    """Columns of another name by the channels of equations, in their order; None: not as many.
+
+    Example
+    -------
+    >>> columns_by_channel(("tau_phi",), ("u",)), columns_by_channel(("p",), ("p", "q"))
+    ({'tau_phi': 'u'}, None)
+    """
+    free = [name for name in columns if name not in channels]
+    waiting = [name for name in channels if name not in columns]
+    return dict(zip(waiting, free, strict=True)) if len(free) == len(waiting) else None
 
 
 def units_of_channels(model: str, units: Mapping[str, str]) -> dict[str, str]:
