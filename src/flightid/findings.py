@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Protocol, TypeVar
 
 from flightid.conventions import Light
@@ -151,6 +151,34 @@ def unsaid(findings: Iterable[Said], others: Iterable[Said]) -> list[Said]:
         if each.code not in codes
         and not any(one.message.startswith(each.message.partition(" for ")[0]) for one in known)
     ]  # fmt: skip
+
+
+def said_once(findings: Iterable[Finding]) -> list[Finding]:
+    """Findings of one list for a reader: what is said of several names in one line, actions once.
+
+    Names stand before a colon, as ``"roll: …"``; an action that several share stays with the first.
+
+    Example
+    -------
+    >>> two = [Finding("a", Light.AMBER, f"{axis}: short", "fly") for axis in ("roll", "yaw")]
+    >>> for each in said_once([*two, Finding("b", Light.AMBER, "calm", "fly")]):
+    ...     print(each)
+    [amber] roll, yaw: short — fly
+    [amber] calm
+    """
+    groups: dict[tuple[Light, str, str], list[tuple[str, Finding]]] = {}
+    for each in findings:
+        name, colon, said = each.message.partition(": ")
+        key = (each.light, said if colon else each.message, each.action)
+        groups.setdefault(key, []).append((name if colon else "", each))
+    made, given = [], set[str]()
+    for (_, said, action), members in groups.items():
+        names = ", ".join(dict.fromkeys(name for name, _ in members if name))
+        first = members[0][1]
+        message = f"{names}: {said}" if len(members) > 1 and names else first.message
+        made.append(replace(first, message=message, action="" if action in given else action))
+        given.add(action)
+    return made
 
 
 def counted(number: int, noun: str) -> str:

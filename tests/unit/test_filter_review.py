@@ -136,7 +136,11 @@ def test_a_quiet_gyro_may_have_faster_filters_and_says_what_they_save(tmp_path: 
     assert review.filters.choice is not None
     assert review.filters.choice.values["INS_GYRO_FILTER"] == 80.0
     (found,) = (f for f in review.findings if f.code == "filters-slow")
-    assert "roll: saves" in found.message
+    # Of each axis the table says it; the verdict repeated the table to the letter.
+    (note, *_) = review.filters.choice_table().notes
+    assert note.startswith("roll: saves")
+    assert f"saves up to {note.split()[2]} deg" in found.message
+    assert note not in found.message
     assert review.filters.table().rows[0][:2] == ("all", "INS_GYRO_FILTER")
 
 

@@ -14,8 +14,16 @@ from flightid.control.autopilots import axis_loop
 from flightid.conventions import Light, Role
 from flightid.errors import FlightidError
 from flightid.findings import Finding
+from flightid.report.content import Document
 from flightid.report.text import to_text
-from flightid.study.answer import _gains, _margin_table, _models, _small_angles
+from flightid.study.answer import (
+    _gains,
+    _margin_table,
+    _models,
+    _small_angles,
+    short_document,
+)
+from flightid.study.faults import CODE, FAILED, TUNING
 from flightid.study.identified import LEFT_OUT, ModelResults
 from flightid.study.settings import Segment
 from flightid.study.stage_runner import digest
@@ -243,7 +251,7 @@ def test_a_model_that_its_data_do_not_allow_leaves_the_others(
     assert any(finding.code == "model-refused" for finding in study.findings)
     said = " ".join(to_text(study.short).split())
     assert "2 of 3 models to use" in said, "what serves comes first"
-    assert "not to be used, for what is said of it below: " in said
+    assert "not to be used, for what is said of it: " in said
     alone = STUDY[: STUDY.index("[[record]]")] + BRIEF
     with pytest.raises(FlightidError):
         run(folder, alone, cache)
@@ -309,7 +317,7 @@ def test_what_was_left_out_is_no_model_to_use() -> None:
     )
     said = _models(study, "study.toml").message  # type: ignore[arg-type]
     assert said.startswith("1 of 2 models to use: it predicts 93 %"), said
-    assert said.endswith("none of p/da, as said below")
+    assert said.endswith("none of p/da, for the reason that is named")
 
 
 def test_margins_below_what_is_asked_and_columns_left_out_are_told() -> None:
@@ -328,6 +336,10 @@ def test_margins_below_what_is_asked_and_columns_left_out_are_told() -> None:
     said = _gains(tuning, "study.toml").message  # type: ignore[arg-type]
     assert "at least 44°" in said
     assert said.endswith("(98.4 % of them or more keep 45° and all else asked)")
+    way = _gains(tuning, "study.toml").action  # type: ignore[arg-type]
+    assert way.startswith("flightid tune study.toml --write gains.params writes them")
+    done = _gains(tuning, "study.toml", ["g-1.params"]).action  # type: ignore[arg-type]
+    assert done == "fly g-1.params, log, and compare the flight with what is promised here"
     notes = _margin_table((roll,)).notes  # type: ignore[arg-type]
     assert notes[1].startswith("gain margin: not promised")
     flown = axis_loop("arducopter", "roll", loop_rate_hz=400.0)
@@ -385,3 +397,25 @@ def test_a_narrow_response_is_no_reason_to_leave_out_the_only_input() -> None:
     assert select_coherent(seen, 0.6, 0.3, False).names == ()
     assert select_coherent(seen, 0.6, 0.3, False, on_samples=True).names == ("angle/drive",)
     assert select_coherent(seen, 0.6, 0.1, False, on_samples=True).names == ("angle/drive",)
+
+
+def test_the_answer_says_nothing_twice() -> None:
+    """A rig's answer gave one action four times, and the verdict on its model twice."""
+    do = "declare loop = open"
+    verdict = Finding("evidence", Light.RED, "whether a loop is closed cannot be told", do)
+    fit = SimpleNamespace(
+        evidence=SimpleNamespace(verdict=verdict), average_cost=1.0, covariance=None, details=None
+    )
+    item = SimpleNamespace(
+        name="p", fit=fit, findings=(), on_unseen={}, settings=SimpleNamespace(structure=None)
+    )
+    why = f"{TUNING}{FAILED}the fit of p is red: found {verdict.message}; needed a model"
+    study = SimpleNamespace(
+        identified=[item], faults=(Finding(CODE, Light.RED, why, do),), files=("study.toml",),
+        tuning=None, inspection=None, gain_flight=None, source=None,
+    )  # fmt: skip
+    document = Document("Models", "", ())
+    said = " ".join(to_text(short_document(study, document)).split())  # type: ignore[arg-type]
+    assert said.count(do) == 1
+    assert said.count(verdict.message) == 1
+    assert "no gains: the fit of p is red; needed a model" in said

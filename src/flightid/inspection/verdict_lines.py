@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from flightid.findings import Finding
+from flightid.findings import Finding, said_once
 from flightid.wrapping import wrapped
 
 WIDTH = 100
 
 
 def verdict_lines(findings: Iterable[Finding]) -> str:
-    """Light and message of each finding; an action that several share stands with the first."""
-    given: set[str] = set()
+    """Light and message of each finding, each once; an action of several stands with the first."""
     lines = []
-    for finding in findings:
+    for finding in said_once(findings):
         lines += wrapped(f"{finding.light.words}: {finding.message}", WIDTH, later="    ")
-        if finding.action and finding.action not in given:
-            given.add(finding.action)
+        if finding.action:
             lines += wrapped(f"do: {finding.action}", WIDTH, first="    ", later="        ")
     return "\n".join(lines)

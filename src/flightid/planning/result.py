@@ -16,7 +16,7 @@ from flightid.conventions import Light
 from flightid.errors import OptionError
 from flightid.excitation import Plan
 from flightid.files import write_atomically
-from flightid.findings import Finding, worst
+from flightid.findings import Finding, said_once, worst
 from flightid.frozen import dataclass
 from flightid.planning.axis_guess import AxisGuess
 from flightid.planning.flight_time import FlightTime
@@ -206,7 +206,7 @@ class SweepPlan(Result, schema="flightid.sweep_plan/1"):
         if self.sweeps:
             yield f"{self.flight_time.words[0].upper()}{self.flight_time.words[1:]}."
             yield f"Log: {self.logging}."
-        yield from map(str, self.findings)
+        yield from map(str, said_once(self.findings))
 
     def settings(self, axis: str) -> Table:
         """What the file of an axis sets, beside what flew.

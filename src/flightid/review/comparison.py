@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from flightid.conventions import Light
 from flightid.errors import DataError
-from flightid.findings import Finding
+from flightid.findings import Finding, said_once
 from flightid.frozen import dataclass
 from flightid.result import Result
 from flightid.review.changes import (
@@ -110,7 +110,7 @@ class FlightComparison(Result, schema="flightid.flight_comparison/1"):
             Of the intervals.
         """
         names = ("promised", "flown") if self.promised else self.names
-        notes = (*self._windows(), *map(str, self.findings))
+        notes = (*self._windows(), *map(str, said_once(self.findings)))
         title = f"{self.names[0]} and {self.names[1]}"
         if self.unlike:
             title = f"{title}, of different {', '.join(self.unlike)}"

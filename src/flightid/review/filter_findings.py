@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 from flightid.control.autopilots.parameter_files import parameter_suffix
@@ -31,7 +32,7 @@ def filter_findings(filters: FilterReview, log: str, kind: str) -> Iterator[Find
     ]
     choice = filters.choice
     told = "" if choice is None else ", ".join(f"{c.name} {c.value:g}" for c in choice.changes)
-    words = "; ".join(filters.words())
+    words = _phase(choice)
     file = f"filters{parameter_suffix(kind)}" if choice is not None else ""
     way = f"flightid flight {log} --write {file} writes them with the way back"
     for use in noisy:
@@ -54,6 +55,16 @@ def filter_findings(filters: FilterReview, log: str, kind: str) -> Iterator[Find
             f"the filters may be faster: {told} ({words})",
             way,
         )
+
+
+def _phase(choice: FilterChoice | None) -> str:
+    """The most that filters save of phase, or cost; of each axis their table says it."""
+    if choice is None or not choice.axes:
+        return ""
+    most = max(choice.axes, key=lambda each: abs(each.phase_gained_deg))
+    word = "saves" if most.phase_gained_deg >= 0.0 else "costs"
+    hertz = most.crossover_rad_s / math.tau
+    return f"{word} up to {abs(most.phase_gained_deg):.2g} deg at {hertz:.3g} Hz"
 
 
 def _advice(told: str, words: str, choice: FilterChoice | None, way: str) -> str:

@@ -144,6 +144,8 @@ class FilterReview:
         full = {use.axis: use.full for use in self.axes}
         for each in self.choice.axes:
             scale, gained = 100.0 / full[each.axis], each.phase_gained_deg
+            if each.noise_flown == each.noise_new and gained == 0.0:
+                continue
             word = "saves" if gained >= 0.0 else "costs"
             yield (
                 f"{each.axis}: {word} {abs(gained):.2g} deg at "

@@ -14,7 +14,7 @@ from flightid.control.autopilots.parameter_files import parameter_suffix
 from flightid.control.autopilots.pid_loop import PidLoop
 from flightid.control.tuning.limits import ANGLE
 from flightid.conventions import Light
-from flightid.findings import Finding, counted, worst
+from flightid.findings import Finding, counted, said_once, worst
 from flightid.frozen import dataclass
 from flightid.report.content import Document, Lights, Section, TableBlock
 from flightid.study.elsewhere import red_elsewhere
@@ -68,13 +68,23 @@ def answer_of(
     tuning = study.tuning
     if tuning is None:
         fault = tuning_fault(study.faults)
-        return StudyAnswer((*findings, *([] if fault is None else [fault])))
+        told = [] if fault is None else [_without_verdicts(fault, study.identified)]
+        return StudyAnswer(tuple(said_once([*findings, *told])))
     findings.append(_gains(tuning, source, written))
     if study.gain_flight is not None:
         findings.append(_flown(study.gain_flight))
     made = tuning.sound or tuple(design for design in tuning.designs if design.exists)
     tables = (_gain_table(made, tuning.filters), _margin_table(made)) if made else ()
     return StudyAnswer(tuple(findings), tables)
+
+
+def _without_verdicts(fault: Finding, items: Iterable[ModelResults]) -> Finding:
+    """Why there are no gains, without the verdict on a model, which its own line tells."""
+    said = fault.message
+    for item in items:
+        if item.fit is not None:
+            said = said.replace(f": found {item.fit.evidence.verdict.message}", "")
+    return replace(fault, message=said)
 
 
 def in_short(item: ModelResults) -> Finding:
@@ -122,7 +132,7 @@ def short_document(
     """
     source = None if study.source is None else quote(str(study.source))
     answer = answer_of(study, source=source, written=written)
-    models = models_in_short(study.identified)
+    models = _without_actions(models_in_short(study.identified), answer.findings)
     others = other_faults(study.faults)
     faults = (Lights(others),) if others else ()
     tables = tuple(map(TableBlock, answer.tables))
@@ -138,6 +148,13 @@ def short_document(
         ),
     )
     return Document(document.title, document.subtitle, sections)
+
+
+def _without_actions(lights: Lights, others: Iterable[Finding]) -> Lights:
+    """Lights whose actions the answer does not give as well: it stands where eyes are."""
+    given = {each.action for each in others}
+    kept = (replace(e, action="") if e.action in given else e for e in lights.findings)
+    return replace(lights, findings=tuple(kept))
 
 
 def _models(study: StudyResults, source: str) -> Finding:
@@ -162,9 +179,9 @@ def _models(study: StudyResults, source: str) -> Finding:
     if any(each.light is Light.AMBER for each in lights):
         said += "; each says what is to be doubted" if good else ""
     if none:
-        said += f"{'; ' if said else ''}none of {', '.join(none)}, as said below"
+        said += f"{'; ' if said else ''}none of {', '.join(none)}, for the reason that is named"
     if bad:
-        why = f"not to be used, for what is said of {'it' if len(bad) == 1 else 'each'} below"
+        why = f"not to be used, for what is said of {'it' if len(bad) == 1 else 'each'}"
         said += f"{'; ' if said else ''}{why}: {', '.join(item.name for _, item in bad)}"
     action = _next(study, source, good) if good else bad[0][0].action
     return Finding("answer", light, said, action)
@@ -222,7 +239,7 @@ def _loop_of(items: Sequence[ModelResults]) -> str:
     return f"{fit.model.outputs[0]}/{fit.model.inputs[0]}"
 
 
-def _gains(tuning: Tuning, source: str, written: Sequence[str]) -> Finding:
+def _gains(tuning: Tuning, source: str, written: Sequence[str] = ()) -> Finding:
     """Whether there are gains, and what they promise or what is in the way."""
     designs, findings = tuning.sound, tuning.findings
     left = "; ".join(f"{axis}: {why}" for axis, why in tuning.left_out.items())
