@@ -10,7 +10,7 @@ import numpy as np
 
 from flightid.errors import FlightidError
 from flightid.review.deconvolution import LoopDraws, LoopSamples, closed_loop
-from flightid.review.step_features import frequency_features, step_features
+from flightid.review.step_features import frequency_features, reached_features, step_features
 from flightid.review.told_band import told_by, told_hz
 from flightid.uncertainty.quantiles import tails
 from tests.strangers.counting import Case, Reading, Trial
@@ -48,7 +48,8 @@ def truths(axis: Axis, every: int) -> tuple[dict[str, float | None], tuple[float
     exact = np.interp(time_s, np.arange(ticks.size) / axis.loop_hz, ticks)
     pulses = np.diff(np.concatenate([[0.0], ticks]))
     loop = LoopDraws(np.array([pulses, pulses]), np.ones((2, 1)), 1.0 / axis.loop_hz)
-    read = (*step_features(np.array([exact, exact]), time_s), *frequency_features(loop, SLOWEST_HZ))
+    read = reached_features(np.array([exact, exact]), time_s)
+    read += frequency_features(loop, SLOWEST_HZ)
     return {r.name: r.value for r in read}, tuple(exact)
 
 

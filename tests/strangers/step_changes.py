@@ -9,7 +9,7 @@ from functools import partial
 from flightid.dynamics.conditions.ratios import difference_of
 from flightid.errors import FlightidError
 from flightid.review.deconvolution import closed_loop
-from flightid.review.step_features import frequency_features, step_features
+from flightid.review.step_features import frequency_features, reached_features
 from flightid.uncertainty.estimate import Reading as Told
 from tests.strangers.counting import Case, Reading, Trial
 from tests.strangers.ordinary_flights import Axis
@@ -51,7 +51,7 @@ def _read(seed: int, axis: Axis, *, acro: bool) -> dict[str, Told]:
     loop = closed_loop(fly_samples(seed, axis, acro=acro, every=EVERY))
     time_s = instants(axis, EVERY)
     steps = loop.step(time_s.size)
-    told = (*step_features(steps, time_s), *frequency_features(loop, SLOWEST_HZ))
+    told = (*reached_features(steps, time_s), *frequency_features(loop, SLOWEST_HZ))
     return {each.name: each for each in told}
 
 

@@ -19,6 +19,7 @@ from flightid.planning.loop_check import LoopCheck, check_loop
 from flightid.planning.still_rate import still_rate
 from flightid.record import Record
 from flightid.responses import estimate_response
+from flightid.review.typical_axes import TYPICAL
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -52,14 +53,6 @@ PHASE_MARGIN_RAD = {
     "yaw": math.radians(85.0),
 }
 """At which the gains that fly cross over: yaw is tuned softly."""
-TYPICAL = {
-    "multirotor": FlownAxis(1.0, 0.5, 0.012, motor_lag_s=0.05),
-    "small multirotor": FlownAxis(1.0, 0.5, 0.008, motor_lag_s=0.025),
-    "helicopter": FlownAxis(1.0, 0.1, 0.02, motor_lag_s=0.05),
-    "aeroplane": FlownAxis(1.0, 0.15, 0.03, motor_lag_s=0.05),
-}
-"""Time constant, delay and motor lag of middle-sized vehicles, s; the gain follows from the gains
-that fly."""
 
 
 @dataclass(frozen=True)
@@ -257,7 +250,11 @@ def _typical(loop: AxisLoop, kind: str) -> FlownAxis:
     Feed-forward is the inverse of a steady gain; without it, P is what a multirotor's rate loop
     crosses over with.
     """
-    base = replace(TYPICAL[kind], loop=loop, attitude_feedback_per_s=loop.angle_gain_1_s)
+    usual = TYPICAL[kind]
+    base = FlownAxis(
+        1.0, usual.time_constant_s, usual.delay_s, motor_lag_s=usual.motor_lag_s,
+        loop=loop, attitude_feedback_per_s=loop.angle_gain_1_s,
+    )  # fmt: skip
     omega = np.geomspace(0.5, 100.0, 400)
     terms, names = loop.forward_basis(omega[:1], with_hold=False)
     forward = loop.names.get("ff", "")

@@ -22,7 +22,7 @@ class Procedure:
     loops : str
         Whose controllers stay on, as `axis_loop` names them; empty: not known here.
     kind : str
-        Typical vehicle, of `axis_guess.TYPICAL`.
+        Typical vehicle, of `review.typical_axes.TYPICAL`.
     how : {"mode", "stick", "autotune", "chirp"}
         The autopilot's own sweep, the pilot's stick, the autopilot's tuning, Betaflight's chirp.
     enters : {"mixer", "rate", "angle"}

@@ -13,6 +13,7 @@ from flightid.inspection.signals import find
 from flightid.inspection.stamps import log_span
 from flightid.logs import Log, read_log
 from flightid.review.filters import filter_review
+from flightid.review.flown_range import flown_ranges
 from flightid.review.gyro_noise import gyro_noise
 from flightid.review.identity import flight_identity
 from flightid.review.loops import loop_responses, without
@@ -87,5 +88,6 @@ def review_flight(
         filters=filter_review(opened, phases.airborne, noise, loops),
         throttle=find(opened, "thrust"),
         swept=bool(injected_spans(opened)),
+        ranges=flown_ranges(opened, loops),
     )
     return replace(found, findings=judge_flight(found))

@@ -13,6 +13,7 @@ from flightid.inspection.verdict_lines import verdict_lines
 from flightid.result import Result
 from flightid.review import tables
 from flightid.review.filters import FilterReview
+from flightid.review.flown_range import FlownRange, range_table
 from flightid.review.gyro_noise import GyroNoise
 from flightid.review.identity import FlightIdentity
 from flightid.review.loop_response import LoopResponse
@@ -61,6 +62,8 @@ class FlightReview(
         Thrust that was asked for, share of the most; None where it is not logged.
     swept : bool
         Whether the autopilot flew sweeps, whose models weigh gains as no step does.
+    ranges : tuple of FlownRange
+        What the flown gains promise over all typical vehicles that would fly so.
 
     Example
     -------
@@ -87,6 +90,7 @@ class FlightReview(
     findings: tuple[Finding, ...] = ()
     throttle: Signal | None = None
     swept: bool = False
+    ranges: tuple[FlownRange, ...] = ()
 
     @property
     def verdict(self) -> Light:
@@ -134,6 +138,7 @@ class FlightReview(
             self.flight(),
             tables.steps(self.loops),
             tables.frequencies(self.loops),
+            range_table(self.ranges),
             tables.motors(self.motors),
             tables.vibrations(self.vibrations),
             self.noise.summary(),

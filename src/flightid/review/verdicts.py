@@ -35,6 +35,7 @@ def judge_flight(review: FlightReview) -> tuple[Finding, ...]:
 def _all(review: FlightReview) -> Iterator[Finding]:
     yield from _flown(review)
     yield from _loops(review)
+    yield from filter(None, (each.finding(review.name) for each in review.ranges))
     yield from _motors(review)
     for vibration in review.vibrations:
         yield from _vibration(vibration)
