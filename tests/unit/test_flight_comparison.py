@@ -278,8 +278,11 @@ def test_parts_of_one_log_are_compared(
     parts = [f"{log}@{start_s:.0f}:{start_s + 29:.0f}", f"{log}@{start_s + 30:.0f}:"]
     assert run(["compare", *parts]) == 0
     assert "no change beyond chance" in capsys.readouterr().out
-    with pytest.raises(DataError, match="there is no loop that both tell"):
+    with pytest.raises(DataError, match="there is no loop that both tell") as none:
         fid.compare_flights(log, fid.review_flight(log, span_s=(0.0, 1.0)))
+    assert str(none.value).count("nothing was flown") == 1
+    assert run(["compare", f"{log}@0:1", str(log)]) == 2
+    assert "lies outside of the log: 10.0 to" in capsys.readouterr().err
 
 
 @pytest.fixture(scope="module")

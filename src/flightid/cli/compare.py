@@ -196,6 +196,12 @@ def _reviewed(name: str) -> FlightReview:
         return review_flight(name)
     span_s = float(part[2] or 0.0), float(part[3] or "inf")
     review = review_flight(part[1], span_s=span_s)
+    ends_s = review.start_s, review.start_s + review.duration_s
+    if span_s[0] >= ends_s[1] or span_s[1] <= ends_s[0]:
+        raise click.UsageError(
+            f"{name} lies outside of the log: {ends_s[0]:.1f} to {ends_s[1]:.1f} s of "
+            "the autopilot's clock"
+        )
     return replace(review, name=f"{review.name}@{part[2]}:{part[3]}")
 
 

@@ -165,12 +165,12 @@ def _measured(axis: str, pieces: list[Record], base: FlownAxis, loop: AxisLoop) 
     """
     command, rate, angle = CHANNELS[axis]
     if not pieces:
-        raise DataError("no span in the air holds command and rate", found=f"{command}, {rate}")
+        raise DataError(f"no {SHORTEST_S:g} s in the air hold command and rate both")
     limited = np.mean(np.abs(np.concatenate([piece[command] for piece in pieces])) >= FULL)
     if loop.output_unit == "1" and limited > MOST_AT_LIMIT:
         raise DataError("the command was at its limit", found=f"{100 * limited:.0f} % of the time")
     if angle not in pieces[0]:
-        raise DataError("no set-point of attitude is logged", found=f"no {angle}")
+        raise DataError("no set-point of attitude is logged")
     rate_hz = min(record.sample_rate_hz for record in pieces)
     highest = min(HIGHEST_RAD_S, 2.0 * np.pi * rate_hz / SAMPLES_IN_CYCLE)
     if highest < 4.0 * LOWEST_RAD_S:

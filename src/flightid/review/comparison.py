@@ -210,9 +210,8 @@ def compare_loops(
     if promised:
         changes = tuple(_on_a_slope(each, before, later) for each in changes)
     if not changes:
-        untold = "; ".join(
-            f"{loop.name}: {loop.reason}" for loop in (*before, *after) if loop.reason
-        )
+        sides = zip(names, (before, after), strict=True)
+        untold = "; ".join(filter(None, (_untold(name, loops) for name, loops in sides)))
         raise DataError(
             "there is no loop that both tell",
             found=untold or "no loop in common",
@@ -230,6 +229,18 @@ def compare_loops(
     return FlightComparison(
         names, promised, changes, before, after, gains, filters, unlike, kept, findings
     )
+
+
+def _untold(name: str, loops: Iterable[LoopResponse]) -> str:
+    """Why a side tells no loops, each reason once; empty where it tells all."""
+    reasons: dict[str, list[str]] = {}
+    for loop in loops:
+        if loop.reason:
+            reasons.setdefault(loop.reason, []).append(loop.name)
+    if len(reasons) == 1:
+        return f"{name}: {next(iter(reasons))}"
+    told = "; ".join(f"{', '.join(names)}: {reason}" for reason, names in reasons.items())
+    return f"{name}: {told}" if told else ""
 
 
 def _pairs(before: LoopResponse, after: LoopResponse) -> Iterator[tuple[Reading, Reading]]:
