@@ -34,6 +34,16 @@ def test_by_keyboard_from_take_off_to_a_rated_record(desk: Desk) -> None:
     page.get_by_role("button", name="Reset").press("Enter")
     page.get_by_role("group", name="Reset").get_by_role("button", name="Go on").press("Enter")
     page.locator(".view:focus").wait_for()
+    # Escape takes the question back as well; without one it pauses, and the keys are the page's.
+    page.get_by_role("button", name="Reset").press("Enter")
+    page.keyboard.press("Escape")
+    page.get_by_role("group", name="Reset").wait_for(state="detached")
+    page.locator(".view:focus").wait_for()
+    page.keyboard.press("Escape")
+    page.get_by_text("paused", exact=True).wait_for()
+    page.locator("button:focus", has_text="Pause").press("Enter")
+    page.get_by_text("flying", exact=True).wait_for()
+    page.locator(".view:focus").wait_for()
     assert len(list((desk.folder / "flights").iterdir())) == 1
     page.keyboard.down("ArrowRight")
     page.get_by_role("img", name="roll 25 %").wait_for()
