@@ -29,7 +29,8 @@ SHAKEN = "balance propellers, damp the autopilot's mount, look for loose parts"
 
 def judge_flight(review: FlightReview) -> tuple[Finding, ...]:
     """All verdicts, the worst and then a fall last, where eyes are on a terminal."""
-    return in_order(_all(review))[::-1]
+    # Of equals the first stays ahead of the others: it leads to them.
+    return in_order(tuple(_all(review))[::-1])[::-1]
 
 
 def _all(review: FlightReview) -> Iterator[Finding]:
