@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tracemalloc
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,10 @@ from benchmarks.output_error import N, two_rates, two_rates_record
 from numpy.typing import NDArray
 
 import flightid as fid
+from flightid.identification.output_error import distinct
+from flightid.identification.output_error.distinct import run_with_slopes
+from flightid.identification.records.options import RecordOptions
+from flightid.identification.records.setup import prepare_records
 from flightid.uncertainty import residual_noise
 from flightid.uncertainty.fitted_directions import (
     FittedDirections,
@@ -107,3 +112,21 @@ def test_a_record_is_fitted_in_less_than_five_times_its_sensitivities() -> None:
     finally:
         tracemalloc.stop()
     assert peak < 5.0 * 8 * 2 * 8 * N  # bytes, outputs, parameters; 8 times with whole copies
+
+
+def test_beginnings_of_long_records_tell_numbers_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+    lengths: list[int] = []
+
+    def counted(model, prepared, *rest):
+        lengths.append(prepared.arrays[0][1].shape[1])
+        return run_with_slopes(model, prepared, *rest)
+
+    monkeypatch.setattr(distinct, "run_with_slopes", counted)
+    prepared = prepare_records(two_rates(), two_rates_record(3), RecordOptions())
+    distinct.require_distinct(prepared.model, prepared, None)
+    assert lengths == [distinct.BEGINNING]
+    # Inputs that stand still at first tell nothing there: the whole record is asked.
+    still = [(np.where(np.arange(u.shape[1]) < 3000, 0.0, u), y, step)
+             for u, y, step in prepared.arrays]  # fmt: skip
+    distinct.require_distinct(prepared.model, replace(prepared, arrays=still), None)
+    assert lengths[1:] == [distinct.BEGINNING, N]

@@ -111,10 +111,13 @@ class FitResponse:
         plain, found = np.asarray(sum(squares)), []
         for output, noise in enumerate(self.models):
             heard = [
-                np.column_stack([*block.of_output(output), block.residual[output]])
+                [x for x in (*block.of_output(output), block.residual[output][:, None]) if x.size]
                 for block in self.blocks
             ]
-            met = [u.products(x) for u, x in zip(lagged, heard, strict=True)]
+            met = [
+                np.concatenate([u.products(x) for x in parts])
+                for u, parts in zip(lagged, heard, strict=True)
+            ]
             scale = np.diag(plain)
             if noise.is_white:
                 raw, covariance = score = self._of_output(output, met, squares)
@@ -122,7 +125,10 @@ class FitResponse:
                 columns = [u.columns for u in lagged]
                 raw, covariance = self._of_output(output, met, squares, columns)
                 sharp = [noise.unshaped(u) for u in columns]
-                met = [x.T @ u for x, u in zip(heard, sharp, strict=True)]
+                met = [
+                    np.concatenate([x.T @ u for x in parts])
+                    for parts, u in zip(heard, sharp, strict=True)
+                ]
                 own = [u.T @ u for u in sharp]
                 score = self._of_output(output, met, own, sharp)
                 scale = np.diag(np.asarray(sum(own)))

@@ -15,6 +15,8 @@ AT_ONCE = 256
 LEAST_DIAGONAL = 1e-3
 """Smallest diagonal of the triangle, of columns of unit length, at which the squared condition of
 products of columns leaves ten good digits."""
+LEAST_REFINED = 1e-5
+"""The same where a second triangle, of what the first leaves of columns, brings the digits back."""
 SIZES = 1e-100, 1e100
 """Lengths of columns whose products neither vanish nor overflow."""
 
@@ -22,7 +24,8 @@ SIZES = 1e-100, 1e100
 def triangle_of_rows(columns: Array) -> Array:
     """R of columns = QR; the signs of its rows are as they come.
 
-    By products of columns, which cost a tenth, where these keep enough digits; else block by block.
+    By products of columns, which cost a tenth, where these keep enough digits, once or in two
+    rounds; else block by block.
 
     Parameters
     ----------
@@ -36,7 +39,8 @@ def triangle_of_rows(columns: Array) -> Array:
     ---------
     Demmel, Grigori, Hoemmen & Langou (2012), Communication-optimal parallel and sequential QR and
     LU factorizations, *SIAM J. Scientific Computing* 34(1), section 3; of products: Golub & Van
-    Loan, *Matrix Computations*, 4th ed., §5.3.2.
+    Loan, *Matrix Computations*, 4th ed., §5.3.2; two rounds: Yamamoto, Nakatsukasa, Yanagisawa &
+    Fukaya (2015), Roundoff error analysis of the CholeskyQR2 algorithm, *ETNA* 44.
 
     Example
     -------
@@ -68,9 +72,23 @@ def _of_products(
         lower = np.linalg.cholesky(scaled)
     except np.linalg.LinAlgError:
         return None
-    if not np.min(np.diag(lower), initial=1.0) >= LEAST_DIAGONAL:
+    least = np.min(np.diag(lower), initial=1.0)
+    if not least >= LEAST_REFINED:
         return None
-    return np.asarray(lower.T * length)
+    found = np.asarray(lower.T * length)
+    return found if least >= LEAST_DIAGONAL else _refined(found, parts)
+
+
+def _refined(first: Array, parts: Callable[[], Iterable[Array]]) -> Array | None:
+    """A triangle times that of the columns by its inverse, which are all but orthonormal."""
+    if np.any(np.diag(first) == 0.0):
+        return None
+    inverse = np.triu(np.linalg.inv(first))
+    turned = (part @ inverse for part in parts())
+    products = np.sum([part.T @ part for part in turned], axis=0)
+    if not np.max(np.abs(products - np.eye(len(products)))) < 0.1:
+        return None
+    return np.asarray(np.linalg.cholesky(products).T @ first)
 
 
 def _by_blocks(columns: Array) -> Array:
