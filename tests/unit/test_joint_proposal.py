@@ -52,7 +52,7 @@ def test_it_is_taken_where_no_output_runs_worse_and_all_run_better(
         name: ProposedModel(f"{name} from u", ['tried = "oe 1."'], error=error, tried="oe 1.")
         for name, error in (("p", 1.0), ("q", 2.0))
     }
-    monkeypatch.setattr(structures_of, "_polynomial", lambda _, output, __: alone[output])
+    monkeypatch.setattr(structures_of, "_alone", lambda _, output, __: alone[output])
     record = SimpleNamespace(duration_s=100.0, sample_rate_hz=10.0)
     group = SimpleNamespace(inputs=("u",), parts=(SimpleNamespace(record=record),))
     segments = SimpleNamespace(together=(), fitted="rig, fitted", unseen=("rig, unseen",))

@@ -16,6 +16,7 @@ from flightid.control.tuning.limits import ANGLE
 from flightid.conventions import Light
 from flightid.findings import Finding, counted, said_once, worst
 from flightid.frozen import dataclass
+from flightid.models import NarxModel
 from flightid.report.content import Document, Lights, Section, TableBlock
 from flightid.study.elsewhere import red_elsewhere
 from flightid.study.estimate_tables import short_modes_table, structure_words
@@ -217,6 +218,8 @@ def _next(study: StudyResults, source: str, good: Sequence[ModelResults]) -> str
         return ""
     if study.inspection is not None:
         return f"for gains: flightid tune {source}"
+    if all(item.fit is not None and isinstance(item.fit.model, NarxModel) for item in good):
+        return "gains of a PID need a linear model: record small steps about one operating point"
     if all(item.fit is None or item.fit.covariance is None for item in good):
         return "gains of a PID need a model whose errors are known: mend first what is named above"
     models = [item.fit.model for item in good if item.fit is not None]

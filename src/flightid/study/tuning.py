@@ -17,9 +17,11 @@ from flightid.control.tuning.tune import tune
 from flightid.control.tuning.tune_controller import tune_controller
 from flightid.control.tuning.tune_pid import CHANNELS
 from flightid.control.tuning.tuned_filters import TunedFilters
+from flightid.conventions import Light
 from flightid.errors import DataError, FlightidError, ModelError, OptionError, StudyError
+from flightid.findings import Finding
 from flightid.frozen import dataclass
-from flightid.models import Model, load_model
+from flightid.models import Model, NarxModel, load_model
 from flightid.models.model import model_of
 from flightid.options import options_of
 from flightid.review.suggested_filters import suggested_filters
@@ -258,7 +260,10 @@ def _controllers(
         )
     designs: dict[str, PidDesign] = {}
     errors: dict[str, FlightidError] = {}
-    for model, checks in known:
+    models = [model_of(model) for model, _ in known]
+    nonlinear = {each.output for each in models if isinstance(each, NarxModel)}
+    # Of a nonlinear model there are no gains; the linear one beside it may have some.
+    for model, checks in sorted(known, key=lambda each: isinstance(model_of(each[0]), NarxModel)):
         channels = cast(Model, model_of(model))
         for name in controller.loops or only_loop(channels):
             output, input = _loop_channels(name)
@@ -277,6 +282,7 @@ def _controllers(
                     requirements=settings.requirements, verification=checks, **asked,
                 )  # fmt: skip
                 told = untold_limits(controller, input, channels, ranges or {})
+                told = (*told, *([_beside_nonlinear(output)] if output in nonlinear else []))
                 designs[name] = replace(made, findings=(*made.findings, *told))
             except (DataError, ModelError) as error:
                 errors[name] = error
@@ -293,6 +299,16 @@ def _controllers(
         )
     refused = tuple(RefusedAxis.by(name, error) for name, error in errors.items())
     return Tuning(tuple(designs.values()), (), refused)
+
+
+def _beside_nonlinear(output: str) -> Finding:
+    """What gains of a linear model hold for where a nonlinear one runs better."""
+    said = (
+        f"a NARX model of {output} runs better than the linear one that gains rest on: margins "
+        "hold at the levels of its record, and the plant has others elsewhere"
+    )
+    action = "try the gains at the largest and least levels, or tune by steps about each"
+    return Finding("nonlinear-beside", Light.AMBER, said, action)
 
 
 def _own_gains(by_hand: Mapping[str, float], output: str) -> dict[str, float]:

@@ -24,7 +24,7 @@ from flightid.identification.simpler_structure import simpler_fit
 from flightid.identification.uncertain_of import evidence_behind, uncertain_of
 from flightid.inspection.thresholds import BAND_LEAST
 from flightid.inspection.usable_band import NARROW
-from flightid.models import InnovationsModel, PolynomialModel
+from flightid.models import InnovationsModel, NarxModel, PolynomialModel
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.models.model import linear_system, model_of
 from flightid.uncertainty.uncertain import Uncertain
@@ -132,9 +132,10 @@ def gather(
     Raises
     ------
     DataError
-        No covariance, no identified band, a fit or a verification that is red, too much that the
-        model does not explain.
+        No linear model, no covariance, no identified band, a fit or a verification that is red,
+        too much that the model does not explain.
     """
+    _require_linear(source)
     source, choice = (source, ()) if nominal else _with_errors(source)
     uncertain: Uncertain[Any] = uncertain_of(source)
     errors = errors_of(source)
@@ -169,6 +170,19 @@ def gather(
         },
         errors,
     )
+
+
+def _require_linear(source: object) -> None:
+    """Margins of a linearisation hold where it was taken, and nobody knows its errors there."""
+    model = model_of(source)
+    if isinstance(model, NarxModel):
+        raise DataError(
+            "a nonlinear model has other margins at every level, so no gains are made from it",
+            found=f"a NARX model of {model.output}, whose weights have no standard errors",
+            needed="a linear model of one operating point",
+            action="record steps about that point, so small that a linear model's residuals pass, "
+            "and tune by that record",
+        )
 
 
 def _with_errors(source: object) -> tuple[object, tuple[Finding, ...]]:

@@ -156,10 +156,35 @@ def _fitted_trial(structure: Structure, data: SampledChannels, scan: ScanRecords
         model, (measures, white), settled = search_polynomial(structure, data)
         trial = replace(_judged(structure, model, measures, scan), whitened=white)
         return trial if settled else replace(trial, settled=False, note="not converged")
+    return _identified_trial(structure, scan)
+
+
+def _identified_trial(structure: Structure, scan: ScanRecords) -> OrderTrial:
     fit = identify(structure, list(scan.fitted))
     straight = any(finding.code == LINEAR for finding in fit.findings)
     note = "linear: no nonlinear model beats it" if straight else ""
     return _ended(replace(_judged(structure, fit.model, None, scan, note), fit=fit), fit)
+
+
+def fitted_trials(
+    structures: Sequence[Structure], scan: ScanRecords, what: str
+) -> list[OrderTrial]:
+    """Structures of any kind but polynomials with their fits, judged as those of a scan are.
+
+    Parameters
+    ----------
+    structures : sequence
+    scan : ScanRecords
+    what : str
+        What is tried, for the line of progress.
+    """
+    trials: list[OrderTrial] = []
+    for structure in track(structures, what):
+        try:
+            trials.append(_identified_trial(structure, scan))
+        except (DataError, FitError, OptionError) as error:
+            trials.append(OrderTrial(structure, None, None, None, None, str(error)))
+    return trials
 
 
 def _judged(
