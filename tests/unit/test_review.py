@@ -257,6 +257,7 @@ def test_a_loop_that_ends_far_from_what_is_asked_is_amber(
     assert "still rises there: settling is not seen" in later.message
     short = later.light is Light.AMBER
     assert short is (said == "beyond")
+    assert (later.light is Light.UNKNOWN) is (said == "short of")
     assert ("it stays" in later.message) is short
     assert step.light is (Light.AMBER if said else Light.GREEN)
     assert (f"it stays {said} what is asked" in step.message) is bool(said)

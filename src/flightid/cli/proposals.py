@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, MutableMapping, Sequence
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -125,5 +126,6 @@ def show_answer(result: Study, written: Sequence[Path] = ()) -> None:
     from flightid.uncertainty.quantiles import showing
 
     with showing(result.settings.level):
-        short = short_document(result, result.document, [str(path) for path in written])
+        names, place = [str(path) for path in written], quote(str(result.output))
+        short = short_document(result, result.document, names, place)
     click.echo(to_text(short), nl=False)

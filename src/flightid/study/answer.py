@@ -51,7 +51,11 @@ class StudyAnswer:
 
 
 def answer_of(
-    study: StudyResults, *, source: str | None = None, written: Sequence[str] = ()
+    study: StudyResults,
+    *,
+    source: str | None = None,
+    written: Sequence[str] = (),
+    results: str = "",
 ) -> StudyAnswer:
     """Say in a sentence each what the models are worth, and the gains.
 
@@ -62,6 +66,8 @@ def answer_of(
         Study file as the reader has to write it; default: its name, which holds in any folder.
     written : sequence of str
         Files of the gains, the first to fly first, where they have been written.
+    results : str
+        Folder of the results as the reader has to write it.
     """
     if source is None:
         source = next((name for name in study.files if name.endswith(".toml")), "STUDY")
@@ -71,7 +77,7 @@ def answer_of(
         fault = tuning_fault(study.faults)
         told = [] if fault is None else [_without_verdicts(fault, study.identified)]
         return StudyAnswer(tuple(said_once([*findings, *told])))
-    findings.append(_gains(tuning, source, written))
+    findings.append(_gains(tuning, source, written, results))
     if study.gain_flight is not None:
         findings.append(_flown(study.gain_flight))
     made = tuning.sound or tuple(design for design in tuning.designs if design.exists)
@@ -119,7 +125,7 @@ def models_in_short(items: Sequence[ModelResults]) -> Lights:
 
 
 def short_document(
-    study: StudyResults, document: Document, written: Sequence[str] = ()
+    study: StudyResults, document: Document, written: Sequence[str] = (), results: str = ""
 ) -> Document:
     """A report of one screen: models, gains and, last, the answer with what is next.
 
@@ -128,11 +134,11 @@ def short_document(
     study : StudyResults
     document : Document
         The whole report, whose verdicts count.
-    written : sequence of str
+    written, results
         See `answer_of`.
     """
     source = None if study.source is None else quote(str(study.source))
-    answer = answer_of(study, source=source, written=written)
+    answer = answer_of(study, source=source, written=written, results=results)
     models = _without_actions(models_in_short(study.identified), answer.findings)
     others = other_faults(study.faults)
     faults = (Lights(others),) if others else ()
@@ -242,7 +248,7 @@ def _loop_of(items: Sequence[ModelResults]) -> str:
     return f"{fit.model.outputs[0]}/{fit.model.inputs[0]}"
 
 
-def _gains(tuning: Tuning, source: str, written: Sequence[str] = ()) -> Finding:
+def _gains(tuning: Tuning, source: str, written: Sequence[str] = (), results: str = "") -> Finding:
     """Whether there are gains, and what they promise or what is in the way."""
     designs, findings = tuning.sound, tuning.findings
     left = "; ".join(f"{axis}: {why}" for axis, why in tuning.left_out.items())
@@ -267,7 +273,7 @@ def _gains(tuning: Tuning, source: str, written: Sequence[str] = ()) -> Finding:
         way = f"they {where}: close the loop with them, and log"
     elif written:
         step = f", step 1 of {steps}" if steps > 1 else ""
-        way = f"fly {written[0]}{step}, log, and compare the flight with what is promised here"
+        way = f"fly {written[0]}{step}, log, then flightid compare {results} LOG: kept or not"
     else:
         file = f"gains{parameter_suffix(designs[0].flown.autopilot)}"
         way = f"flightid tune {source} --write {file} writes them; " + (
