@@ -290,6 +290,8 @@ def test_flights_that_go_on_as_their_neighbours_did_are_no_change() -> None:
     said = going_on_words(alone.going_on[0], {})
     assert "% (" in said
     assert "or its flights go on as their neighbours did" in said
+    # Taken as in proportion to a flight's own errors, what went on left a red vehicle in both.
+    assert not any(_alarmed(_drift(k, 10, 24, days=0.05, memory=0.9)) for k in (1, 8))
     # An event is no change of what goes on: in 60 fleets one of three was told in 49, now in 8.
     motors = [FleetEvent("motor", 36.0 * DAY_S - 1.0, (f"{i:03}",)) for i in range(5)]
     told = [_drift(k, 10, 24, days=0.05, memory=0.9, events=motors).by_event for k in range(4)]
@@ -310,5 +312,7 @@ def test_few_fleets_whose_days_go_on_alarm_and_independent_ones_keep_their_power
     alarmed = [_alarmed(each) for each in fleets]
     assert sum(map(bool, alarmed)) <= 5
     assert sum(map(len, alarmed)) <= 8
+    longer = [_drift(seed, 10, 24, days=0.05, memory=0.9) for seed in range(24)]
+    assert sum(bool(each.alarms) for each in longer) <= 2  # of what goes on in proportion 7
     found = [_drift(seed, 10, 24, change=0.1, changed=2, last=8) for seed in range(24)]
     assert sum(len(_alarmed(each) & {0, 1}) for each in found) >= 44

@@ -185,13 +185,12 @@ def _settled(
     series: Sequence[DaySeries], most: frozenset[str], changed: frozenset[str]
 ) -> Persistence:
     """Days that go on beside just those changes, of `most`, that explain more than they cost."""
-    found = _known(persistence(series, changed))
     for _ in range(ROUNDS):
-        now = explained(series, most, found)
+        now = explained(series, most, _known(persistence(series, changed, caution=0.0)))
         if now == changed:
             break
-        changed, found = now, _known(persistence(series, now))
-    return found
+        changed = now
+    return _known(persistence(series, changed))
 
 
 def _known(found: Persistence | None) -> Persistence:

@@ -116,9 +116,9 @@ def _covariance(variances: Array, time_s: Array, memory: Persistence | None) -> 
         return np.diag(variances)
     day = days_of(time_s)
     lag = np.abs(np.subtract.outer(day, day))
-    beyond = np.where(lag > 0, memory.share * memory.correlation**lag, np.eye(len(day)))
-    sizes = np.sqrt(memory.factor * variances)
-    return np.asarray(beyond * np.outer(sizes, sizes))
+    apart = (lag > 0) | np.eye(len(day), dtype=bool)
+    going_on = np.where(apart, memory.share * memory.typical * memory.correlation**lag, 0.0)
+    return np.asarray(memory.factor * ((1.0 - memory.share) * np.diag(variances) + going_on))
 
 
 def judged_newest(asked: Sequence[NewestFlight]) -> tuple[NewestFlight, ...]:

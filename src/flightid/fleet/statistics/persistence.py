@@ -24,7 +24,7 @@ SHARES = (0.1, 0.2, 0.3, 0.45, 0.6, 0.75, 0.9, 0.98)
 LIKELIER = 3.0
 """Twice the logarithm of the ratio of likelihoods from which days go on: of independent ones one
 fleet in twenty has as much."""
-KEPT = 9.0
+KEPT = 11.5
 """Log likelihood that a change must explain: of a step and a movement, sizes and places chosen."""
 ALIKE = 1e-6
 """Share of a shape that others leave, below which it is one of them."""
@@ -48,6 +48,9 @@ class Persistence:
         Of the variances that errors and days were taken to have; 1 at least.
     likelier : float
         Twice the logarithm of how much likelier that is than independent days.
+    typical : float
+        Variance of a day's mean, the median of all, in the square of the unit: what goes on has
+        the same size whatever a flight's own error.
     fitness, apart : float
         Log likelihood of the days, and were they independent, less what changes that are kept out
         cost (`KEPT` a vehicle).
@@ -57,6 +60,7 @@ class Persistence:
     correlation: float
     factor: float
     likelier: float
+    typical: float
     fitness: float
     apart: float
 
@@ -82,12 +86,14 @@ class Persistence:
 
 @dataclass(frozen=True, eq=False)
 class DaySeries:
-    """Days of one vehicle, in the standard errors of their means.
+    """Days of one vehicle.
 
     Attributes
     ----------
     vehicle : str
     values : ndarray, shape (d,)
+    variances : ndarray, shape (d,)
+        Of these, were days independent.
     level : ndarray, shape (d, e)
         What may have any size: a level, and the steps of events.
     change : ndarray, shape (d, m)
@@ -96,16 +102,19 @@ class DaySeries:
 
     vehicle: str
     values: Array
+    variances: Array
     level: Array
     change: Array
 
 
-def persistence(series: Sequence[DaySeries], changed: Set[str]) -> Persistence | None:
+def persistence(
+    series: Sequence[DaySeries], changed: Set[str], *, caution: float = CAUTION
+) -> Persistence | None:
     """Hold days that go on beside independent ones, by the likelihood over all vehicles.
 
-    Days' means in their standard errors have the covariance f ((1 − c) δ + c ρ^|lag|), in the
-    order of days; f is common, and eliminated. A level of each vehicle, the steps of its events and
-    what changed may have any size.
+    Days' means have the covariance f ((1 − c) v δ + c v̄ ρ^|lag|) with the variance v of each, the
+    median v̄ of all and lags in days that were flown; f is common, and eliminated. A level of each
+    vehicle, the steps of its events and what changed may have any size.
 
     Parameters
     ----------
@@ -113,6 +122,8 @@ def persistence(series: Sequence[DaySeries], changed: Set[str]) -> Persistence |
         Of one parameter.
     changed : set of str
         Vehicles whose change is kept out.
+    caution : float
+        Twice the logarithm of how much less likely than the best what is told may be.
 
     Returns
     -------
@@ -131,7 +142,10 @@ def persistence(series: Sequence[DaySeries], changed: Set[str]) -> Persistence |
     """
     if not series:
         return None
-    groups = _grouped([(e.values, e.change if e.vehicle in changed else e.level) for e in series])
+    typical = typical_variance(series)
+    groups = _grouped(
+        [_scaled(e, e.change if e.vehicle in changed else e.level, typical) for e in series]
+    )
     none = _likelihood(groups, 0.0, 0.0)
     grid = [(0.0, 0.0, *none)]
     grid += [(c, r, *_likelihood(groups, c, r)) for c, r in product(SHARES, CORRELATIONS)]
@@ -139,9 +153,9 @@ def persistence(series: Sequence[DaySeries], changed: Set[str]) -> Persistence |
     kept = sum(each.vehicle in changed for each in series)
     likelier, apart = 2.0 * (best - none[0]), none[2] - KEPT * kept
     found = [
-        Persistence(c, r, max(1.0, factor), likelier, whole - KEPT * kept, apart)
+        Persistence(c, r, max(1.0, factor), likelier, typical, whole - KEPT * kept, apart)
         for c, r, value, factor, whole in grid
-        if 2.0 * (best - value) <= CAUTION
+        if 2.0 * (best - value) <= caution
     ]
     return max(found, key=lambda each: each.long_run)
 
@@ -158,10 +172,9 @@ def explained(series: Sequence[DaySeries], most: Set[str], found: Persistence) -
     """Vehicles, of `most`, whose change explains more than it costs beside days that go on."""
     kept = []
     for each in (one for one in series if one.vehicle in most):
-        inverse, _ = _whitening(len(each.values), found.share, found.correlation)
-        without, beside = (
-            _left(inverse @ each.values, inverse @ x) for x in (each.level, each.change)
-        )
+        values, variances, _ = _scaled(each, each.level, found.typical)
+        inverse, _ = _whitening(variances, found.share, found.correlation)
+        without, beside = (_left(inverse @ values, inverse @ x) for x in (each.level, each.change))
         if without - beside > 2.0 * KEPT * found.factor:
             kept.append(each.vehicle)
     return frozenset(kept)
@@ -173,7 +186,9 @@ def is_shared(series: Sequence[DaySeries], changed: Set[str], found: Persistence
     Small steps in a large part of a fleet look like days that go on; but those who share in no
     step would then go on as well.
     """
-    others = [(each.values, each.level) for each in series if each.vehicle not in changed]
+    others = [
+        _scaled(each, each.level, found.typical) for each in series if each.vehicle not in changed
+    ]
     if len(others) < VOICES:
         return True
     groups = _grouped(others)
@@ -203,12 +218,21 @@ def _days(asked: AskedHistory, has_changed: bool) -> DaySeries | None:
         return None
     own, of_day = asked.own_variances, np.bincount(day, 1.0 / asked.own_variances)
     weights = (day == np.arange(day.max() + 1)[:, None]) / own / of_day[:, None]
-    scale = np.sqrt(day_variances(asked)[np.unique(day, return_index=True)[1]])
-    weights = weights / scale[:, None]
+    variances = day_variances(asked)[np.unique(day, return_index=True)[1]]
     level = np.column_stack([np.ones(len(day)), asked.known])
     change = np.column_stack([level, *changes(asked)]) if has_changed else level
     both = (_apart(weights @ each) for each in (level, change))
-    return DaySeries(asked.history.vehicle, weights @ asked.values, *both)
+    return DaySeries(asked.history.vehicle, weights @ asked.values, variances, *both)
+
+
+def typical_variance(series: Sequence[DaySeries]) -> float:
+    """Median variance of a day's mean, over all vehicles."""
+    return float(np.median(np.concatenate([each.variances for each in series])))
+
+
+def _scaled(series: DaySeries, design: Array, typical: float) -> tuple[Array, Array, Array]:
+    """Values and variances in a typical one, and the design."""
+    return series.values / np.sqrt(typical), series.variances / typical, design
 
 
 def _apart(design: Array) -> Array:
@@ -234,53 +258,62 @@ def day_variances(asked: AskedHistory) -> Array:
     return np.asarray(1.0 / np.bincount(day, 1.0 / asked.own_variances)[day] + asked.by_day)
 
 
-def _grouped(series: Sequence[tuple[Array, Array]]) -> list[tuple[Array, Array]]:
+Group = tuple[Array, Array, Array]
+
+
+def _grouped(series: Sequence[tuple[Array, Array, Array]]) -> list[Group]:
     """Series of equal shape in one array, with a last axis of one column for the values."""
-    groups: dict[tuple[int, ...], list[tuple[Array, Array]]] = {}
-    for values, design in series:
-        groups.setdefault(design.shape, []).append((values, design))
-    return [
-        (np.stack([values for values, _ in held])[:, :, None], np.stack([x for _, x in held]))
-        for held in groups.values()
-    ]
+    groups: dict[tuple[int, ...], list[tuple[Array, Array, Array]]] = {}
+    for each in series:
+        groups.setdefault(each[2].shape, []).append(each)
+    stacked = [[np.stack(each) for each in zip(*held, strict=True)] for held in groups.values()]
+    return [(values[:, :, None], variances, design) for values, variances, design in stacked]
 
 
-def _whitening(n: int, share: float, correlation: float) -> tuple[Array, float]:
-    """What makes days independent, and half the logarithm of their covariance's determinant."""
+def _whitening(variances: Array, share: float, correlation: float) -> tuple[Array, float]:
+    """What makes days independent, and half the logarithm of their covariances' determinants.
+
+    Variances are of one vehicle, shape (d,), or of several, shape (m, d).
+    """
+    n = variances.shape[-1]
     lag = np.abs(np.subtract.outer(np.arange(n), np.arange(n)))
-    root = np.linalg.cholesky(share * correlation**lag + (1.0 - share) * np.eye(n))
-    return np.linalg.inv(root), float(np.sum(np.log(np.diag(root))))
+    own = (1.0 - share) * variances[..., None] * np.eye(n)
+    root = np.linalg.cholesky(share * correlation**lag + own)
+    log_root = float(np.sum(np.log(np.diagonal(root, axis1=-2, axis2=-1))))
+    return np.linalg.inv(root), log_root
 
 
 def _likelihood(
-    groups: Sequence[tuple[Array, Array]], share: float, correlation: float
+    groups: Sequence[Group], share: float, correlation: float
 ) -> tuple[float, float, float]:
     """Restricted log likelihood over all vehicles, their common factor, and the plain likelihood.
 
     The last, with means as estimated, compares designs.
     """
     total, squares, freedom, whole, count = 0.0, 0.0, 0, 0.0, 0
-    for values, design in groups:
+    for values, variances, design in groups:
         many, n, p = design.shape
-        inverse, log_root = _whitening(n, share, correlation)
+        inverse, log_root = _whitening(variances, share, correlation)
         q, r = np.linalg.qr(inverse @ design)
         white = inverse @ values
         squares += float(np.sum(white**2) - np.sum((np.swapaxes(q, 1, 2) @ white) ** 2))
         sizes = np.abs(np.diagonal(r, axis1=1, axis2=2))
-        total -= many * log_root + float(np.sum(np.log(sizes)))
-        freedom, count, whole = freedom + many * (n - p), count + many * n, whole - many * log_root
+        total -= log_root + float(np.sum(np.log(sizes)))
+        freedom, count, whole = freedom + many * (n - p), count + many * n, whole - log_root
     factor = squares / freedom
     whole -= 0.5 * count * float(np.log(squares / count))
     return total - 0.5 * freedom * float(np.log(factor)), factor, whole
 
 
 def persisting(asked: AskedHistory, found: Persistence) -> Array:
-    """Covariance of the flights of a vehicle whose days go on, shape (n, n)."""
+    """Covariance of the flights of a vehicle whose days go on, shape (n, n).
+
+    Days' means have that of `persistence`; flights of a day scatter about theirs as before.
+    """
     day = days_of(asked.history.time_s)
-    lag = np.abs(np.subtract.outer(day, day))
-    sizes = np.sqrt(day_variances(asked))
-    beyond = np.where(lag > 0, found.share * found.correlation**lag, 0.0)
-    beyond = beyond * np.outer(sizes, sizes)
-    together = np.where((lag == 0) & ~np.eye(len(day), dtype=bool), asked.by_day, 0.0)
-    base = np.diag(asked.history.variances) + together
-    return np.asarray(asked.errors + (found.factor - 1.0) * base + found.factor * beyond)
+    same = (day[:, None] == day).astype(np.float64)
+    own, of_day = np.diag(asked.own_variances), day_variances(asked)
+    before = own + same * asked.by_day
+    going_on = found.typical * found.correlation ** np.abs(np.subtract.outer(day, day))
+    means = found.factor * ((1.0 - found.share) * same * of_day + found.share * going_on)
+    return np.asarray(asked.errors - before + own + means - same * (of_day - asked.by_day))
