@@ -53,6 +53,10 @@ def test_the_page_says_of_a_fleet_what_its_report_says(tmp_path: Path) -> None:
     assert ("new motor", "v02") in {(each[0], each[1]) for each in events.rows}
     drift = answers.types[0].drift
     assert drift is not None
+    # Verdict, lights and slopes of the report were nowhere on the page.
+    assert part.verdict == fid.fleet.fleet_report(path).counted
+    assert "repeats" in {each.code for each in kind.findings}
+    assert "What covariates explain" in {each.title for each in kind.tables}
     # Its three refused logs are nowhere, and so are those of its flights.
     assert (
         "records of logs that are gone from the places of the fleet file" in part.refused.notes[-1]

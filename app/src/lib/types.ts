@@ -209,6 +209,7 @@ export interface FleetListing {
 export interface FleetPart {
   title: string;
   words: string;
+  verdict: string;
   level: number;
   vehicles: FleetVehicle[];
   types: FleetType[];
@@ -269,6 +270,8 @@ export interface FleetType {
   reasons: string[];
   labels: Record<string, string>;
   tables: FleetSheet[];
+  notes: string[];
+  findings: ShownFinding[];
 }
 
 /** A vehicle with its light. */

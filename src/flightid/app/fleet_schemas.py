@@ -106,6 +106,8 @@ class FleetType(Message):
     reasons: list[str]
     labels: dict[str, str]
     tables: list[FleetSheet]
+    notes: list[str]
+    findings: list[ShownFinding]
 
 
 class FleetPart(Message):
@@ -113,6 +115,7 @@ class FleetPart(Message):
 
     title: str
     words: str
+    verdict: str
     level: float
     vehicles: list[FleetVehicle]
     types: list[FleetType]

@@ -27,14 +27,19 @@ from flightid.files import write_atomically
 from flightid.findings import Finding
 from flightid.fleet import ask_fleet, propose_fleet, read_fleet, run_fleet
 from flightid.fleet import open as open_fleet
+from flightid.fleet.drift_lights import estimate_lights, shared_lights
 from flightid.fleet.engine.address_space import bounded_memory
 from flightid.fleet.opening import names_fleet_file
 from flightid.fleet.page import (
+    copies_words,
     events_table,
     fleet_vehicles,
     fleet_words,
+    lights_counted,
+    odd_words,
     red_words,
     refused_table,
+    slopes_table,
 )
 from flightid.fleet.statistics.answers import FleetAnswers, TypeAnswers
 from flightid.fleet.statistics.parameter_history import ParameterHistory
@@ -74,6 +79,7 @@ def answer_fleet(place: Path) -> dict[str, Any]:
         return FleetPart(
             title=_title(place),
             words=fleet_words(answers),
+            verdict=lights_counted(answers),
             level=shown(),
             vehicles=[
                 _vehicle(name, found, answers) for name, found in fleet_vehicles(answers).items()
@@ -167,26 +173,30 @@ def _finding(found: Finding) -> ShownFinding:
 
 
 def _type(each: TypeAnswers) -> FleetType:
-    tables, reasons = list[Table](), list(each.reasons)
+    tables, reasons, found = list[Table](), list(each.reasons), tuple[Finding, ...]()
     if each.population is not None:
         tables.append(each.population.summary(labels=each.labels))
         tables.append(each.population.spread_table(labels=each.labels))
     if each.outliers is not None:
         tables.append(each.outliers.summary(each.labels))
     if each.drift is not None:
+        found = (*estimate_lights(each.drift, each.labels), *shared_lights(each.drift, each.labels))
+        tables.append(slopes_table(each.drift, each.labels))
         tables.append(each.drift.summary(labels=each.labels))
         tables.append(events_table(each.drift, each.labels))
         reasons += [each.drift.reason] if each.drift.reason else []
     return FleetType(
         name=each.type_name, model=each.model, reasons=reasons,
         labels=dict(each.labels), tables=[_table(table) for table in tables],
+        notes=list(filter(None, [odd_words(each)])), findings=[_finding(one) for one in found],
     )  # fmt: skip
 
 
 def _refused(answers: FleetAnswers) -> Table:
     table = refused_table(answers.logs)
     outdated = (f"{each.message}: {each.action}" for each in answers.outdated)
-    return replace(table, notes=(*table.notes, *red_words(answers), *outdated))
+    copies = filter(None, [copies_words(answers)])
+    return replace(table, notes=(*table.notes, *red_words(answers), *copies, *outdated))
 
 
 def _table(table: Table) -> FleetSheet:

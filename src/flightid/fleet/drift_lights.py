@@ -14,6 +14,15 @@ from flightid.uncertainty.quantiles import shown
 TWICE = "fly some vehicles twice a day: that tells errors from flights that differ"
 
 
+def estimate_lights(drift: FleetDrift, labels: Mapping[str, str]) -> tuple[Finding, ...]:
+    """All verdicts on errors of the estimates."""
+    return (
+        *errors_lights(drift, labels),
+        *scale_lights(drift, labels),
+        *persistent_lights(drift, labels),
+    )
+
+
 def errors_lights(drift: FleetDrift, labels: Mapping[str, str]) -> tuple[Finding, ...]:
     """Whether errors of each parameter hold, and what they were taken for."""
     return tuple(

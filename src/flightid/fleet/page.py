@@ -10,8 +10,7 @@ from flightid.findings import Finding, counted
 from flightid.fleet.catalogue.schema import FITTED
 from flightid.fleet.drift_lights import (
     errors_lights,
-    persistent_lights,
-    scale_lights,
+    estimate_lights,
     shared_lights,
 )
 from flightid.fleet.normality import MORE
@@ -53,7 +52,7 @@ def fleet_document(answers: FleetAnswers, title: str = "Fleet") -> Document:
         *(Section(_type_title(each), tuple(_type_blocks(each))) for each in answers.types),
         Section("Logs that could not be used", tuple(_refused(answers))),
     ]
-    footer, lights = f"Made by flightid {VERSION}.", _lights_counted(answers)
+    footer, lights = f"Made by flightid {VERSION}.", lights_counted(answers)
     return Document(title, fleet_words(answers), tuple(sections), footer, lights)
 
 
@@ -65,7 +64,7 @@ def damaged_light(parts: int) -> Finding | None:
     return Finding("damaged-parts", Light.RED, said, "flightid fleet run takes them again")
 
 
-def _lights_counted(answers: FleetAnswers) -> str:
+def lights_counted(answers: FleetAnswers) -> str:
     """Vehicles by light, in words; other verdicts of the page are on estimates, not on vehicles."""
     found = Counter(each.light for each in fleet_vehicles(answers).values())
     said = ", ".join(f"{found[light]} {light.words}" for light in ORDER if found[light])
@@ -179,14 +178,8 @@ def _type_blocks(each: TypeAnswers) -> Iterator[Block]:
     if each.population is not None:
         yield TableBlock(each.population.summary(labels=each.labels))
         yield TableBlock(each.population.spread_table(labels=each.labels))
-        if each.odd_flights:
-            told = "; ".join(
-                f"{len(logs)} of {each.labels.get(k, k)} ({_few(logs)})"
-                for k, logs in each.odd_flights.items()
-            )
-            yield Paragraph(
-                f"Flights far off those beside them are left out of these tables: {told}."
-            )
+        if odd := odd_words(each):
+            yield Paragraph(odd)
         caption = f"Every vehicle's own estimate with its interval of {interval_words(shown())}"
         ends = (e.next_vehicle.interval(shown()) for e in each.population.parameters.values())
         shaded = ", and, shaded, where the next vehicle lies" if any(ends) else ""
@@ -205,6 +198,16 @@ def _type_blocks(each: TypeAnswers) -> Iterator[Block]:
         yield from _drift_blocks(each.drift, each.labels)
 
 
+def odd_words(each: TypeAnswers) -> str:
+    """Flights that the tables of a type lack; empty where there are none."""
+    told = "; ".join(
+        f"{len(logs)} of {each.labels.get(k, k)} ({_few(logs)})"
+        for k, logs in each.odd_flights.items()
+    )
+    said = "Flights far off those beside them are left out of these tables"
+    return f"{said}: {told}." if told else ""
+
+
 def _few(logs: Sequence[str]) -> str:
     """The first few names of logs, and how many there are more."""
     left = len(logs) - SHOWN
@@ -212,15 +215,10 @@ def _few(logs: Sequence[str]) -> str:
 
 
 def _drift_blocks(drift: FleetDrift, labels: Mapping[str, str]) -> Iterator[Block]:
-    errors = (
-        *errors_lights(drift, labels),
-        *scale_lights(drift, labels),
-        *persistent_lights(drift, labels),
-    )
-    yield Lights(errors, "Errors of the estimates")
+    yield Lights(estimate_lights(drift, labels), "Errors of the estimates")
     if drift.shared or drift.alike:
         yield Lights(shared_lights(drift, labels), "What all vehicles did together")
-    slopes = _slopes(drift, labels)
+    slopes = slopes_table(drift, labels)
     if slopes.rows:
         yield TableBlock(slopes)
     if drift.reason:
@@ -243,7 +241,8 @@ def _unchanged(changes: Table) -> str:
     return " ".join(("Nothing changed:", changes.notes[0], *changes.notes[1:]))
 
 
-def _slopes(drift: FleetDrift, labels: Mapping[str, str]) -> Table:
+def slopes_table(drift: FleetDrift, labels: Mapping[str, str]) -> Table:
+    """What covariates do to each parameter; no rows without any."""
     rows: list[tuple[Cell, ...]] = []
     units = {each.name: each.unit for each in drift.histories if each.unit != "1"}
     for name, effects in drift.slopes.items():
@@ -297,8 +296,15 @@ def _refused(answers: FleetAnswers) -> Iterator[Block]:
     every = "Every log gave a model; red ones count nowhere." if answers.red else EVERY
     yield TableBlock(table) if table.rows else Paragraph(every)
     yield from map(Paragraph, red_words(answers))
-    if answers.copies:
-        yield Paragraph(f"Copies, each the log of which it is one: {copies_named(answers.copies)}.")
+    if copies := copies_words(answers):
+        yield Paragraph(copies)
+
+
+def copies_words(answers: FleetAnswers) -> str:
+    """Copies with what they are of; empty where there are none."""
+    if not answers.copies:
+        return ""
+    return f"Copies, each the log of which it is one: {copies_named(answers.copies)}."
 
 
 def red_words(answers: FleetAnswers) -> list[str]:
