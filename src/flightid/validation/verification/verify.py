@@ -32,6 +32,7 @@ from flightid.responses import FrequencyResponse
 from flightid.validation.verification.baseline import baseline_findings
 from flightid.validation.verification.comparison import Comparison, compared
 from flightid.validation.verification.contradiction import contradictions
+from flightid.validation.verification.foretold_error import unless_gusts
 from flightid.validation.verification.held_otherwise import hold_findings
 from flightid.validation.verification.judgement import THEIL, THEIL_GUIDE, judge
 from flightid.validation.verification.muad import mismatch
@@ -111,7 +112,8 @@ def verify(
     within a record. Start and biases are solved for on the first third of a record: over the whole
     of it they would imitate slow modes. Modes that grow a hundredfold over a record are run
     backward from its end, which is exact for records of any length; that explains rather than
-    predicts, and the light comes from pieces of the record.
+    predicts, and the light comes from pieces of the record. An error that inputs do not foretell
+    is that of gusts and noise, and never red.
 
     Parameters
     ----------
@@ -209,7 +211,7 @@ def verify(
         judged = judge(tuple(made), chosen, request, seen, own)
         gusts = gust_errors(each, model, [record.duration_s for record in flown])
         verdicts = weighed(judged.findings, THEIL, judged.rms_error, gusts, GUSTS)
-        judged = replace(judged, findings=verdicts)
+        judged = replace(judged, findings=unless_gusts(verdicts, (THEIL,), made))
         beside = (
             *baseline_findings(each, made, request),
             *contradictions(each, way, made, request),

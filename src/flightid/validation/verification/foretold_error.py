@@ -1,0 +1,170 @@
+"""Whether inputs foretell the error of a free run: what gusts make of it, no input tells.
+
+A free run holds the whole answer to gusts, which grows with slow modes: it is large where the model
+is right. A wrong model errs by a function of the inputs. Both are told apart as in a prediction
+error with a model of its noise: what the error's own past of all outputs does not foretell is asked
+of the past inputs. That holds in a closed loop too, where inputs answer gusts, for they answer past
+ones alone. Both pasts are asked on coarser and coarser grids, for noisy sensors hide a gust's past
+from few samples of a fine one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from flightid.conventions import Light
+from flightid.findings import Finding
+from flightid.identification.prediction.request import FREE_RUN
+from flightid.identification.prediction.result import Prediction
+
+Array = NDArray[np.float64]
+LONGEST_PAST, SHORTEST_PAST = 6, 3
+"""Past samples of every channel on the finest grid, and fewest on the coarsest."""
+SAMPLES_A_NUMBER = 5
+"""Samples of a grid for each number that is estimated on it."""
+LEVEL = 0.003
+"""Chance below which inputs foretell an error. Pasts are finite, so of right models in gusts that
+noisy sensors measure about three times as many are called wrong."""
+CALM = "verify on a record in calmer air, or with larger inputs: this one cannot tell"
+NO_NOISE = 1e-8
+"""Share of an error that its past leaves below which no noise made it, and so no gust."""
+RESOLVED = 1e-10
+"""Share of an input's past that something else leaves of it below which it tells nothing more."""
+
+
+def foretold_chance(errors: Sequence[Array], inputs: Sequence[Array]) -> float | None:
+    """Chance that past inputs add as much to what the error's own past foretells.
+
+    Parameters
+    ----------
+    errors, inputs : sequence of ndarray, each shape (n_channels, n_samples)
+        One array for each record.
+
+    Returns
+    -------
+    float or None
+        Over all outputs and grids (Bonferroni); None where records are too short to tell.
+
+    Reference
+    ---------
+    Granger, *Econometrica* 37 (1969); Ljung, *System Identification*, 2nd ed., section 13.4.
+
+    Example
+    -------
+    >>> rng = np.random.default_rng(0)
+    >>> u, e = rng.standard_normal((2, 1, 600))
+    >>> gust = scipy.signal.lfilter([1.0], [1.0, -0.98], e)
+    >>> foretold_chance([gust], [u]) > LEVEL
+    True
+    >>> foretold_chance([gust + scipy.signal.lfilter([0.0, 0.3], [1.0, -0.9], u)], [u]) < LEVEL
+    True
+    """
+    changing = np.any([np.ptp(rows, axis=1) > 0.0 for rows in errors], axis=0)
+    moved = np.any([np.ptp(rows, axis=1) > 0.0 for rows in inputs], axis=0)
+    pairs = [(e[changing], u[moved]) for e, u in zip(errors, inputs, strict=True)]
+    channels = int(np.sum(changing) + np.sum(moved))
+    if not np.any(moved) or not np.any(changing):
+        return None
+    whole = sum(e.shape[1] for e, _ in pairs)
+    chances = []
+    step = 1
+    while (past := _past(whole // step, channels)) >= SHORTEST_PAST:
+        found = _chance([(_coarser(e, step), _coarser(u, step)) for e, u in pairs], past)
+        if found is not None:
+            chances.append(found)
+        step *= 2
+    return min(1.0, len(chances) * min(chances)) if chances else None
+
+
+def unless_gusts(
+    findings: Sequence[Finding], codes: Sequence[str], made: Sequence[Prediction]
+) -> tuple[Finding, ...]:
+    """Verdicts on free runs, none red for an error that no input foretells.
+
+    Parameters
+    ----------
+    findings : sequence of Finding
+    codes : sequence of str
+        Of the findings that weigh the error.
+    made : sequence of Prediction
+    """
+    red = any(each.code in codes and each.light is Light.RED for each in findings)
+    whole = all(each.horizon == FREE_RUN and each.diverged_at is None for each in made)
+    if not red or not whole:
+        return tuple(findings)
+    errors = [np.array([each.residual(name) for name in each.outputs]) for each in made]
+    inputs = [each.predicted.matrix(each.predicted.inputs) for each in made]
+    chance = foretold_chance(errors, inputs)
+    if chance is None or chance < LEVEL:
+        return tuple(findings)
+    said = (
+        f"; inputs foretell no more of the error than chance does (p = {chance:.2g}): it is "
+        "as much as gusts alone make, and contradicts the model in nothing"
+    )
+    return tuple(
+        replace(each, light=Light.AMBER, message=each.message + said, action=CALM)
+        if each.code in codes and each.light is Light.RED
+        else each
+        for each in findings
+    )
+
+
+def _past(samples: int, channels: int) -> int:
+    return min(LONGEST_PAST, samples // (SAMPLES_A_NUMBER * channels))
+
+
+def _coarser(rows: Array, step: int) -> Array:
+    """Means of neighbouring samples."""
+    kept = rows.shape[1] // step * step
+    return np.asarray(rows[:, :kept].reshape(len(rows), -1, step).mean(axis=2))
+
+
+def _chance(pairs: Sequence[tuple[Array, Array]], past: int) -> float | None:
+    """Fisher's F of the inputs' past beside that of the errors, over all errors; None: too short.
+
+    Each record has a constant of its own. Errors without noise are no gusts': chance 0.
+    """
+    kept = [pair for pair in pairs if pair[0].shape[1] > past]
+    if not kept:
+        return None
+    aims, own, asked = (
+        np.concatenate(rows, axis=1)
+        for rows in zip(*(_rows(e, u, past) for e, u in kept), strict=True)
+    )
+    place = np.repeat(np.arange(len(kept)), [e.shape[1] - past for e, _ in kept])
+    own = np.concatenate([own, np.equal.outer(np.arange(len(kept)), place)])
+    basis = _basis(own, own)
+    left, fresh = (rows - (rows @ basis) @ basis.T for rows in (aims, asked))
+    further = _basis(fresh, asked)
+    free = aims.shape[1] - basis.shape[1] - further.shape[1]
+    if not further.shape[1] or free < further.shape[1]:
+        return None
+    if np.any(np.sum(left**2, axis=1) < NO_NOISE * np.sum(aims**2, axis=1)):
+        return 0.0
+    gain = np.sum((left @ further) ** 2, axis=1)
+    rest = np.maximum(np.sum(left**2, axis=1) - gain, np.finfo(float).tiny)
+    f = gain / further.shape[1] / (rest / free)
+    return float(min(1.0, len(aims) * np.min(scipy.special.fdtrc(further.shape[1], free, f))))
+
+
+def _rows(errors: Array, inputs: Array, past: int) -> tuple[Array, Array, Array]:
+    """Errors from the first that has a past on, their pasts, and those of the inputs."""
+    return errors[:, past:], _lagged(errors, past), _lagged(inputs, past)
+
+
+def _lagged(rows: Array, past: int) -> Array:
+    n = rows.shape[1]
+    return np.concatenate([rows[:, past - lag : n - lag] for lag in range(1, past + 1)])
+
+
+def _basis(rows: Array, whole: Array) -> Array:
+    """Orthonormal columns of rows, each counted by its size in a whole, (n_samples, n_kept)."""
+    size = np.sqrt(np.sum(whole**2, axis=1, keepdims=True))
+    scaled = rows / np.where(size > 0.0, size, 1.0)
+    directions, spread, _ = np.linalg.svd(scaled.T, full_matrices=False)
+    return np.asarray(directions[:, spread > np.sqrt(RESOLVED)])
