@@ -6,6 +6,8 @@ phase. They are tightest between 1 and 4 rad/s, where pilots close their loops.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -17,6 +19,7 @@ from flightid.models import model_of
 from flightid.responses import FrequencyResponse
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
+from flightid.validation.verification.as_estimated import without_leakage
 
 # Numerator and denominator in falling powers of s, and the delay of the phase bounds, s.
 _GAIN_UPPER = ((3.16, 31.61, 22.79), (1.0, 27.14, 1.84), 0.0)
@@ -25,6 +28,7 @@ _PHASE_UPPER = ((68.89, 1100.12, -275.22), (1.0, 39.94, 9.99), -0.0059)
 _PHASE_LOWER = ((475.32, 184100.0, 29460.0), (1.0, 11.66, 0.039), 0.0072)
 _Bound = tuple[tuple[float, ...], tuple[float, ...], float]
 
+LESS_LEAKAGE = ", the estimate's leakage taken out"
 INSIDE_PERCENT = (60.0, 90.0)
 """Share of the band inside the envelopes: less is red, more is green."""
 
@@ -108,6 +112,9 @@ class Mismatch(Result, schema="flightid.mismatch/1"):
         Where the coherence carries a judgement.
     findings : tuple of Finding
         One for each pair.
+    is_corrected : bool
+        Whether the measured response is that without the leakage that its estimator makes of the
+        model; else as it stands, leakage included.
 
     Example
     -------
@@ -128,6 +135,7 @@ class Mismatch(Result, schema="flightid.mismatch/1"):
     phase_deg: NDArray[np.float64]
     judged: NDArray[np.bool_]
     findings: tuple[Finding, ...] = ()
+    is_corrected: bool = False
 
     @property
     def inside(self) -> NDArray[np.bool_]:
@@ -181,6 +189,9 @@ def mismatch(
 ) -> Mismatch:
     """Compare a model's frequency response with a measured one inside the envelopes.
 
+    Where the records behind the measurement are at hand, what its windows make of the model on the
+    measured inputs is taken out, as in a fit: leakage is no fault of a model.
+
     Assumes: the envelopes come from piloted aircraft in up-and-away flight; for a small vehicle
     they say what a human pilot would notice, not what a controller needs.
 
@@ -227,12 +238,12 @@ def mismatch(
         if y in outputs and u in inputs and (chosen is None or f"{y}/{u}" in chosen)
     ]
     computed = _model_response(inner, responses.omega_rad_s)
+    pairs = [(y, u) for y, u in pairs if np.any(computed[outputs.index(y), inputs.index(u)])]
+    corrected = without_leakage(inner, responses, [f"{y}/{u}" for y, u in pairs])
     kept, ratios, judged = [], [], []
     for y, u in pairs:
         own = computed[outputs.index(y), inputs.index(u)]
-        if not np.any(own):
-            continue
-        measured = responses.pair(y, u)
+        measured = (corrected or responses).pair(y, u)
         if np.any(measured.response == 0):
             raise DataError(f"the measured response {y}/{u} is zero at a frequency")
         kept.append(f"{y}/{u}")
@@ -251,15 +262,9 @@ def mismatch(
         _decibel(ratio),
         np.degrees(np.angle(ratio)),
         np.array(judged),
+        is_corrected=corrected is not None,
     )
-    return Mismatch(
-        draft.names,
-        draft.envelopes,
-        draft.gain_db,
-        draft.phase_deg,
-        draft.judged,
-        _findings(draft),
-    )
+    return replace(draft, findings=_findings(draft))
 
 
 def _model_response(model: object, omega: NDArray[np.float64]) -> NDArray[np.complex128]:
@@ -301,6 +306,7 @@ def _findings(draft: Mismatch) -> tuple[Finding, ...]:
         else:
             light = Light.GREEN if share >= good else Light.AMBER if share >= poor else Light.RED
             text = f"{name}: {share:.0f} % of the band lies inside the mismatch envelopes"
+            text += LESS_LEAKAGE if draft.is_corrected else ""
         action = "" if light is Light.GREEN else "look where the ratio leaves the envelopes"
         found.append(Finding("mismatch-envelopes", light, text, action))
     return tuple(found)
