@@ -12,6 +12,8 @@ import pytest
 import flightid as fid
 from flightid.control.margins.resonance_slack import TAKEN
 from flightid.conventions import Light
+from flightid.evidence.evidence import Check, Evidence
+from flightid.uncertainty.shown_bands import shown_words
 from flightid.uncertainty.uncertain import Uncertain
 from tests.strangers import hover
 from tests.strangers.gains import NAMES
@@ -119,3 +121,34 @@ def _lagged(delay: float, n: np.ndarray) -> fid.LinearSystem:
     return fid.LinearSystem(
         [[0.0, n[1]], [0.0, -n[1]]], [[0.0], [n[0]]], [[1.0, 0.0]], [[0.0]], ("e",), ("y",), [delay]
     )
+
+
+@pytest.mark.parametrize(("read", "top"), [(("q", "u"), 30.0), (("u",), 2.0), (("theta",), 2.0)])
+def test_a_loop_is_known_where_the_responses_that_it_closes_are(
+    read: tuple[str, ...], top: float
+) -> None:
+    """Speed is seen up to 2 rad/s, pitch rate to 30: a loop of both is not one of speed alone."""
+    craft = fid.LinearSystem(
+        [[-0.1, 0.0, -9.8], [0.02, -2.0, 0.0], [0.0, 1.0, 0.0]], [[0.0], [6.0], [0.0]],
+        np.eye(3), np.zeros((3, 1)), ("lon",), ("u", "q", "theta"), [0.05],
+    )  # fmt: skip
+    seen = {"u/lon": (0.4, 2.0), "q/lon": (0.9, 30.0)}
+    check = Check(
+        "excitation band", Light.GREEN, "narrowest", band_rad_s=(0.4, 2.0), by_response_rad_s=seen
+    )
+    evidence = Evidence.from_dict(Evidence((check,)).to_dict())
+    source = replace(
+        Uncertain.exact(craft),
+        valid_rad_s=evidence.band_rad_s,
+        by_response_rad_s=evidence.by_response_rad_s,
+    )
+    gains = {"q": 1.0, "u": -0.002, "theta": 2.0}
+    closed = fid.close_loop(source, {"lon": {name: gains[name] for name in read}})
+    loop = closed.margins()["lon"]
+    said = [each for each in loop.findings if each.code == "margin-beyond-band"]
+    assert all(f"above the {top:g} rad/s" in each.message for each in said)
+    assert said or read == ("u",)
+    alone = fid.margins(source, "lon", "q")
+    assert not [each for each in alone.findings if "2 rad/s" in each.message]
+    words = shown_words(evidence.by_response_rad_s, evidence.band_rad_s)
+    assert words == "its responses hold from 0.4 to 30 rad/s together, u/lon up to 2 rad/s"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
+from dataclasses import field, replace
 from typing import Any
 
 from flightid.conventions import Light
@@ -74,6 +74,8 @@ class Check:
         Frequencies that it is about, rad/s.
     limit : str
         What these data cannot tell, however green: said beside the light.
+    by_response_rad_s : mapping of str to (float, float)
+        By response, rad/s, where it is about several.
 
     Example
     -------
@@ -87,6 +89,7 @@ class Check:
     action: str = ""
     band_rad_s: tuple[float, float] | None = None
     limit: str = ""
+    by_response_rad_s: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if self.name not in NAMES:
@@ -109,6 +112,9 @@ class Check:
             "action": self.action,
             "band_rad_s": None if self.band_rad_s is None else list(self.band_rad_s),
             "limit": self.limit,
+            "by_response_rad_s": {
+                name: list(band) for name, band in self.by_response_rad_s.items()
+            },
         }
 
     @classmethod
@@ -122,6 +128,10 @@ class Check:
             values.get("action", ""),
             None if band is None else (float(band[0]), float(band[1])),
             values.get("limit", ""),
+            {
+                name: (float(a), float(b))
+                for name, (a, b) in values.get("by_response_rad_s", {}).items()
+            },
         )
 
 
@@ -171,6 +181,12 @@ class Evidence(Result, schema="flightid.evidence/1"):
         """Frequencies that the inputs excited with coherence, rad/s: where a model is known."""
         check = self.check(BAND)
         return None if check is None else check.band_rad_s
+
+    @property
+    def by_response_rad_s(self) -> Mapping[str, tuple[float, float]]:
+        """The same by response, ``"output/input"`` or the output of all inputs, rad/s."""
+        check = self.check(BAND)
+        return {} if check is None else check.by_response_rad_s
 
     @property
     def findings(self) -> tuple[Finding, ...]:

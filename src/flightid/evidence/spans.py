@@ -107,11 +107,16 @@ def judge_span(spans: Sequence[Span], *, predicted: bool = False) -> Check:
     """
     narrow = min(spans, key=lambda span: span.ratio)
     band = narrow.band_rad_s
+    bands = {span.name: span.band_rad_s for span in spans if span.band_rad_s is not None}
     if narrow.ratio >= (BAND_LEAST if predicted else BAND_GOOD).value:
-        return Check(BAND, Light.GREEN, f"narrowest band: {narrow}", band_rad_s=band)
+        return Check(
+            BAND, Light.GREEN, f"narrowest band: {narrow}", band_rad_s=band, by_response_rad_s=bands
+        )
     if narrow.ratio >= BAND_LEAST.value:
-        return Check(BAND, Light.AMBER, f"{narrow}: less than a decade", MORE, band)
-    return Check(BAND, Light.AMBER, f"{narrow}: {NARROW}", MORE, band)
+        return Check(
+            BAND, Light.AMBER, f"{narrow}: less than a decade", MORE, band, by_response_rad_s=bands
+        )
+    return Check(BAND, Light.AMBER, f"{narrow}: {NARROW}", MORE, band, by_response_rad_s=bands)
 
 
 def judge_coherence(spans: Sequence[Span]) -> Check:

@@ -15,6 +15,7 @@ from flightid.findings import Finding
 from flightid.identification.fit import Fit, uncertain_model
 from flightid.models import Model, PolynomialModel
 from flightid.responses import FrequencyResponse
+from flightid.uncertainty.shown_bands import shown_words
 from flightid.uncertainty.uncertain import Uncertain
 
 Array = NDArray[np.float64]
@@ -70,7 +71,12 @@ def uncertain_of(
     found, examined = _of_numbers(source, output, input), evidence_behind(source)
     if examined is None:
         return found
-    return replace(found, findings=source_findings(source), valid_rad_s=examined.band_rad_s)
+    return replace(
+        found,
+        findings=source_findings(source),
+        valid_rad_s=examined.band_rad_s,
+        by_response_rad_s=examined.by_response_rad_s,
+    )
 
 
 def source_findings(source: object) -> tuple[Finding, ...]:
@@ -102,7 +108,7 @@ def _rests_on(examined: Evidence) -> Finding:
     verdict, band = examined.verdict, examined.band_rad_s
     where = "nothing tells in which band it holds"
     if band is not None:
-        where = f"it holds from {band[0]:.3g} to {band[1]:.3g} rad/s"
+        where = shown_words(examined.by_response_rad_s, band)
     text = f"rests on a fit that is {verdict.light}: {verdict.message}; {where}"
     return Finding("source-evidence", verdict.light, text, verdict.action)
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import field, replace
 from functools import cached_property, lru_cache
 from typing import Generic, TypeVar
 
@@ -15,6 +15,7 @@ from flightid.findings import Finding
 from flightid.frozen import dataclass
 from flightid.uncertainty.estimate import Estimate, Reading
 from flightid.uncertainty.quantiles import LEVEL, half_width
+from flightid.uncertainty.shown_bands import Band, covered_band, responses_about
 
 T = TypeVar("T")
 Made = TypeVar("Made")
@@ -64,6 +65,8 @@ class Uncertain(Generic[T]):
         Frequencies in which it is known, rad/s.
     allowed : callable, optional
         Whether numbers are some that their estimator could have given; others are not drawn.
+    by_response_rad_s : mapping of str to (float, float)
+        Of single responses, rad/s, where several were fitted; see `about`.
 
     Example
     -------
@@ -81,6 +84,7 @@ class Uncertain(Generic[T]):
     findings: tuple[Finding, ...] = ()
     valid_rad_s: tuple[float, float] | None = None
     allowed: Callable[[Array], bool] | None = None
+    by_response_rad_s: Mapping[str, Band] = field(default_factory=dict)
 
     @classmethod
     def exact(cls, thing: T, reason: str = "") -> Uncertain[T]:
@@ -332,7 +336,16 @@ class Uncertain(Generic[T]):
             self.findings,
             self.valid_rad_s,
             self.allowed,
+            self.by_response_rad_s,
         )
+
+    def about(self, responses: Iterable[str]) -> Uncertain[T]:
+        """The same as it is known for what is made of some responses, ``"output/input"``.
+
+        Their bands together are the band; of responses that were not fitted nothing changes.
+        """
+        found = responses_about(self.by_response_rad_s, responses)
+        return replace(self, valid_rad_s=covered_band(found.values())) if found else self
 
     def kept(self) -> Uncertain[T]:
         """The same, with what it has made kept: a closed loop whose margins are read at each input.

@@ -123,7 +123,22 @@ class ClosedLoop(
     def _broken(self, actuator: str) -> Uncertain[Interconnection]:
         """The loop broken at an actuator over the uncertainty: cut once, for every vehicle."""
         cut = self.broken_at(actuator)
-        return self.uncertain.then(lambda loops: with_part(cut, PLANT, loops.blocks[PLANT].part))
+        broken = self.uncertain.then(lambda loops: with_part(cut, PLANT, loops.blocks[PLANT].part))
+        return broken.about(self._closed_by(actuator))
+
+    def _closed_by(self, actuator: str) -> list[str]:
+        """Responses that the loop at an actuator closes, ``"output/input"``: what it feeds back."""
+        plant, *others = self.loops.blocks
+        wanted, size = {actuator, f"{actuator}_controller"}, 0
+        while len(wanted) > size:
+            size = len(wanted)
+            wanted |= {
+                name
+                for block in others
+                if wanted.intersection(block.outputs)
+                for name in block.inputs
+            }
+        return [f"{name}/{actuator}" for name in plant.outputs if name in wanted]
 
     def _total(self, actuator: str) -> str:
         if actuator not in self.actuators:

@@ -201,6 +201,7 @@ def _modelled(
             found=controller.shape,
             needed="a function of s, a gain, or a model",
         )
+    uncertain = uncertain.about([f"{outputs[row]}/{inputs[column]}"])
     roots = roots_of(model).joined(roots_of(controller))
     omega = loop_grid(lambda at: of(model, at), roots, band_rad_s)
     count = roots.n_unstable if unstable_poles is None else unstable_poles
