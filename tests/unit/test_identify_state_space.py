@@ -56,8 +56,8 @@ def test_setup_is_checked_pair_by_pair(pair: str, factor: complex, code: str) ->
 
 def test_a_fit_that_fails_says_what_looked_wrong_before_it() -> None:
     model = lateral().with_fixed(**HELD).with_responses("p/a", "r/a", "r/d")
-    with pytest.raises(FitError, match=r"r/d: the data lie .* check the sign of the channels"):
-        fitted(model, responses({"r/d": -1.0}))
+    with pytest.raises(FitError, match=r"p/a: the data lie .* check the sign of the channels"):
+        fitted(model, responses({"p/a": -1.0}))
 
 
 def in_series() -> fid.StateSpaceModel:

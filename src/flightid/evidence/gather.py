@@ -58,6 +58,8 @@ STRAIGHT = frozenset({"", "regression", "instruments", "kernel", "subspace"})
 INSENSITIVE, CRAMER_RAO, CORRELATED = "insensitive", "cramer-rao", "correlated"
 OF_PARAMETERS = (INSENSITIVE, CRAMER_RAO, CORRELATED)
 """Codes of guides to parameters: they speak of model and band, and know nothing of the noise."""
+MINIMUM_DOUBTED = "minimum-doubted"
+"""Of a search whose minimum leaves so much that a lower one may lie elsewhere."""
 ON_A_WORD = "hold-told"
 """A hold that estimates rest on and that the data neither bear out nor contradict."""
 WINDOWS_SHORT = "windows-short"
@@ -75,6 +77,7 @@ BELONGS = {
     "not-converged": SETTLED,
     "not-refined": SETTLED,
     "several-minima": SETTLED,
+    MINIMUM_DOUBTED: SETTLED,
     "local-minima": SETTLED,
     "stability-enforced": SETTLED,
     "root-at-circle": SETTLED,

@@ -10,7 +10,14 @@ import scipy
 from numpy.typing import NDArray
 
 from flightid.conventions import Light
-from flightid.evidence.gather import CONVERGED, CORRELATED, CRAMER_RAO, INSENSITIVE, MORE_STEPS
+from flightid.evidence.gather import (
+    CONVERGED,
+    CORRELATED,
+    CRAMER_RAO,
+    INSENSITIVE,
+    MINIMUM_DOUBTED,
+    MORE_STEPS,
+)
 from flightid.findings import Finding
 from flightid.frozen import dataclass
 from flightid.identification.multistart import End
@@ -42,6 +49,9 @@ CERTAIN = 1e-6
 """Chance of such a cost by noise below which the structure is at fault."""
 CHANCE = 0.01
 """Share of flights of a model that is right whose noise costs more than noise explains."""
+
+STARTS_FIRST = "try more starts first (starts = 16), or start values from equation error"
+"""What to do about a cost of responses: it costs least, and a wrong minimum looks like the rest."""
 
 _NEAR_COST = 1.1
 DETERMINED = 0.2
@@ -93,8 +103,15 @@ def judge_cost(
         explained = name in known and known[name].explains(cost)
         if len(costs) > 1 and cost > SINGLE_COST_GUIDE and not explained:
             light = Light.RED if cost > SINGLE_COST_LIMIT else Light.AMBER
-            action = "narrow its band to where it is coherent, or leave it out"
+            action = (
+                f"{STARTS_FIRST}; then narrow its band to where it is coherent, or leave it out"
+            )
             found.append(Finding("cost-response", light, f"{name}: cost {cost:.0f}", action))
+    if any(each.light is Light.RED for each in found):
+        worst = max(costs, key=lambda name: costs[name])
+        what = f"the search ended at a minimum of average cost {average:.0f}"
+        what += f", {worst} {costs[worst]:.0f}: it need not be the lowest"
+        found.append(Finding(MINIMUM_DOUBTED, Light.AMBER, what, STARTS_FIRST))
     return found
 
 
@@ -148,8 +165,9 @@ def _judge_average(average: float, noise: NoiseCost | None, *, withheld: bool) -
             "cost",
             Light.RED,
             f"average cost {average:.0f} is above the guide of 100",
-            "do not use its numbers, whose intervals assume that the structure holds: add "
-            "missing dynamics, narrow the band, or look for a wrong sign or unit",
+            "do not use its numbers, whose intervals assume that the structure holds: "
+            f"{STARTS_FIRST}; then add missing dynamics, narrow the band, or look for a wrong sign "
+            "or unit",
         )
     seen = noise is not None and average > MISFIT_RATIO * noise.mean + MISFIT_GUIDE
     if noise is not None and (seen or withheld):

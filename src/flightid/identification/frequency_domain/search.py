@@ -91,6 +91,18 @@ class _Descent:
         around = self._ends(np.ascontiguousarray(early), maximum_iterations)
         return [end for end in around if end.cost < best * (1.0 - LOWER)]
 
+    def by_errors(self, begin: Array, best: float, maximum_iterations: int) -> list[DenseEnd]:
+        """Ends below the best cost that begin where the least relative complex errors lie.
+
+        Decibels and degrees of a response hold it back where it has to pass zero: the sign of an
+        effect that starts wrong, or a zero on the wrong side of the axis, stays. The complex error
+        passes it straight, so that signs come right; the cost itself then goes on from there.
+        """
+        leading = replace(self, white=[*map(_relative, range(len(self.selected)), self.selected)])
+        led = [end.x for end in leading._ends(begin, maximum_iterations)]
+        ends = self._ends(np.ascontiguousarray(led), maximum_iterations)
+        return [end for end in ends if end.cost < best * (1.0 - LOWER)]
+
     def _costs(self, starts: Array) -> Array:
         """Weighted dB and degrees at each start; infinite where it has no response."""
         measured = np.concatenate([each.response for each in self.selected])
@@ -113,12 +125,18 @@ class _Descent:
     def _grids(self) -> list[Array]:
         return [each.omega_rad_s for each in self.selected]
 
-    def _ends(self, begin: Array, steps: int) -> list[DenseEnd]:
-        return [end for end in self.follow(begin, steps) if not isinstance(end, str)]
+    def _ends(self, begin: Array, steps: int, light: float = 1.0) -> list[DenseEnd]:
+        return [end for end in self.follow(begin, steps, light) if not isinstance(end, str)]
 
     def _thinned(self, stride: int) -> _Descent:
         """The same cost by the points that are so far apart."""
         return replace(self, selected=[_thinned(each, stride) for each in self.selected])
+
+
+def _relative(place: int, response: SelectedResponse) -> tuple[int, int, Array]:
+    """Weights of a response's complex errors, as decibels of small ones weigh."""
+    weight = DECIBEL * np.sqrt(response.weight_db) / np.abs(response.response)
+    return place, 1, np.ascontiguousarray(np.diag(np.tile(weight, 2)))
 
 
 def _thinned(response: SelectedResponse, stride: int) -> SelectedResponse:
@@ -148,8 +166,8 @@ def minimise(
 
     Where the best end of the weighted dB and degrees is still poor, each start is followed again
     with the phase in the lead for a few steps: poles and delays find their places before gains can
-    settle around wrong ones. Before that a few starts around the given values are tried, and kept
-    where one ends lower.
+    settle around wrong ones. Before that a few starts around the given values are tried, and of
+    several responses what complex errors lead to, and kept where one ends lower.
 
     Parameters
     ----------
@@ -181,10 +199,14 @@ def minimise(
         if lower:
             lowest = min(lower, key=lambda end: end.cost)
             outcomes, best = [*outcomes, lowest], lowest.cost
-    if cost == "likelihood" or best <= EXCELLENT_COST * len(selected):
+    if cost == "likelihood" or best <= LEAVES * len(selected):
         return collect(outcomes)
-    leading = descent.follow(drawn, LEADING_ITERATIONS, LIGHT)
-    led = [end.x for end in leading if not isinstance(end, str)]
-    if led:
-        outcomes = [*outcomes, *descent.follow(np.ascontiguousarray(led), maximum_iterations)]
+    if best > EXCELLENT_COST * len(selected):
+        led = [end.x for end in descent._ends(drawn, LEADING_ITERATIONS, LIGHT)]
+        outcomes = [*outcomes, *descent.follow(np.array(led), maximum_iterations)]
+    if len(selected) > 1:
+        ends = [end for end in outcomes if not isinstance(end, str)]
+        best = min((end.cost for end in ends), default=np.inf)
+        begin = np.vstack([drawn, *(end.x for end in ends if end.cost == best)])
+        outcomes = [*outcomes, *descent.by_errors(begin, best, maximum_iterations)]
     return collect(outcomes)
