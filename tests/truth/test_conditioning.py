@@ -240,6 +240,22 @@ def test_accelerometer_on_an_analytic_rotation_reads_nothing_at_the_cg() -> None
     assert found.history[-1].options["y_m"] == -0.2
 
 
+def test_sensors_move_in_the_units_that_a_record_has() -> None:
+    record, _ = _spinning(np.array([0.4, -0.2, 0.1]))
+    feet = record.to_units(p="deg/s", ax="ft/s^2", ay="g", az="ft/s^2")
+    moved = c.accelerations_at_cg(feet, (0.1, 0.2, 0.3))
+    assert [moved.unit(name) for name in ("p", "ax", "ay")] == ["deg/s", "ft/s^2", "g"]
+    metres = moved.to_units(ax="m/s^2", ay="m/s^2", az="m/s^2").matrix(("ax", "ay", "az"))
+    known = c.accelerations_at_cg(record, (0.1, 0.2, 0.3)).matrix(("ax", "ay", "az"))
+    assert_close(metres, known, atol=1e-12, why="the same motion in other units")
+    samples = {name: record[name] for name in record.channels}
+    wrong = Record.from_arrays(
+        TIME_S, outputs=samples, units={k: UNITS[k] for k in samples} | {"ax": "deg"}
+    )
+    with pytest.raises(UnitError, match=r"'ax'.* has another unit"):
+        c.accelerations_at_cg(wrong, (0.1, 0.2, 0.3))
+
+
 def test_velocity_and_air_data_on_a_lever_arm() -> None:
     arm = np.array([1.5, 0.3, -0.4])
     record, omega = _spinning(arm)

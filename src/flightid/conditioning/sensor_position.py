@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.conditioning.smoothing import local_derivative
 from flightid.errors import DataError, OptionError
 from flightid.record import Record, Step
-from flightid.units import require_match
+from flightid.record.unit_changes import unit_changes
+from flightid.units import convert, require_match
 
 Triad = tuple[str, str, str]
 RATES: Triad = ("p", "q", "r")
@@ -32,7 +35,8 @@ def accelerations_at_cg(
     Parameters
     ----------
     record : Record
-        Data; rates in rad/s, accelerations (specific forces) in m/s².
+        Data; rates as rad/s, accelerations (specific forces) as m/s², or in units that convert
+        to them.
     position_m : (float, float, float)
         Position of the sensor relative to the centre of gravity, m; forward, right, down.
     accelerations, rates : (str, str, str)
@@ -43,7 +47,7 @@ def accelerations_at_cg(
     Raises
     ------
     UnitError
-        A channel in another unit.
+        A channel in a unit of another dimension.
     UnknownNameError
         There is no such channel.
     OptionError
@@ -63,18 +67,18 @@ def accelerations_at_cg(
     0.0
     """
     arm = _arm(position_m)
-    _require_units(record, {"rad/s": rates, "m/s^2": accelerations})
-    omega = record.matrix(rates)
+    known = _in_units(record, {"rad/s": rates, "m/s^2": accelerations})
+    omega = known.matrix(rates)
     change = np.array(
         [local_derivative(rate, record.sample_time_s, half_width=half_width) for rate in omega]
     )
     lever = arm[:, None]
     moved = (
-        record.matrix(accelerations)
+        known.matrix(accelerations)
         - np.cross(change, lever, axis=0)
         - np.cross(omega, np.cross(omega, lever, axis=0), axis=0)
     )
-    return _replaced(record, accelerations, moved, "accelerations_at_cg", arm)
+    return _replaced(record, known, accelerations, moved, "accelerations_at_cg", arm)
 
 
 def velocities_at_cg(
@@ -89,7 +93,7 @@ def velocities_at_cg(
     Parameters
     ----------
     record : Record
-        Data; rates in rad/s, velocities in m/s.
+        Data; rates as rad/s, velocities as m/s, or in units that convert to them.
     position_m : (float, float, float)
         Position of the sensor relative to the centre of gravity, m; forward, right, down.
     velocities, rates : (str, str, str)
@@ -98,7 +102,7 @@ def velocities_at_cg(
     Raises
     ------
     UnitError
-        A channel in another unit.
+        A channel in a unit of another dimension.
     UnknownNameError
         There is no such channel.
     OptionError
@@ -118,9 +122,9 @@ def velocities_at_cg(
     [0.0, 0.0]
     """
     arm = _arm(position_m)
-    _require_units(record, {"rad/s": rates, "m/s": velocities})
-    moved = record.matrix(velocities) - np.cross(record.matrix(rates), arm[:, None], axis=0)
-    return _replaced(record, velocities, moved, "velocities_at_cg", arm)
+    known = _in_units(record, {"rad/s": rates, "m/s": velocities})
+    moved = known.matrix(velocities) - np.cross(known.matrix(rates), arm[:, None], axis=0)
+    return _replaced(record, known, velocities, moved, "velocities_at_cg", arm)
 
 
 def air_data_at_cg(
@@ -141,7 +145,7 @@ def air_data_at_cg(
     Parameters
     ----------
     record : Record
-        Data; rates in rad/s, airspeed in m/s, angles in rad.
+        Data; rates as rad/s, airspeed as m/s, angles as rad, or in units that convert to them.
     position_m : (float, float, float)
         Position of the vanes relative to the centre of gravity, m; forward, right, down.
     air_data, rates : (str, str, str)
@@ -150,7 +154,7 @@ def air_data_at_cg(
     Raises
     ------
     UnitError
-        A channel in another unit.
+        A channel in a unit of another dimension.
     UnknownNameError
         There is no such channel.
     DataError
@@ -174,8 +178,9 @@ def air_data_at_cg(
     """
     arm = _arm(position_m)
     speed_name, alpha_name, beta_name = air_data
-    _require_units(record, {"rad/s": rates, "m/s": (speed_name,), "rad": (alpha_name, beta_name)})
-    speed, alpha, beta = record.matrix(air_data)
+    angles = (alpha_name, beta_name)
+    known = _in_units(record, {"rad/s": rates, "m/s": (speed_name,), "rad": angles})
+    speed, alpha, beta = known.matrix(air_data)
     if np.any(speed <= 0):
         raise DataError(
             f"airspeed {speed_name!r} is not positive everywhere",
@@ -186,10 +191,10 @@ def air_data_at_cg(
     at_boom = speed * np.array(
         [np.cos(alpha) * np.cos(beta), np.sin(beta), np.sin(alpha) * np.cos(beta)]
     )
-    u, v, w = at_boom - np.cross(record.matrix(rates), arm[:, None], axis=0)
+    u, v, w = at_boom - np.cross(known.matrix(rates), arm[:, None], axis=0)
     moved_speed = np.sqrt(u**2 + v**2 + w**2)
     moved = np.array([moved_speed, np.arctan2(w, u), np.arcsin(v / moved_speed)])
-    return _replaced(record, air_data, moved, "air_data_at_cg", arm)
+    return _replaced(record, known, air_data, moved, "air_data_at_cg", arm)
 
 
 def _arm(position_m: tuple[float, float, float]) -> NDArray[np.float64]:
@@ -201,15 +206,36 @@ def _arm(position_m: tuple[float, float, float]) -> NDArray[np.float64]:
     return arm
 
 
-def _require_units(record: Record, needed: dict[str, tuple[str, ...]]) -> None:
-    for unit, names in needed.items():
-        for name in names:
+def _in_units(record: Record, needed: Mapping[str, Sequence[str]]) -> Record:
+    """The record with channels in the units that the equations need, converted where they differ.
+
+    Raises
+    ------
+    UnitError
+    """
+    units = {name: unit for unit, names in needed.items() for name in names}
+    changes = unit_changes(record, units)
+    for name, unit in units.items():
+        if name not in changes:
             require_match(name, record.unit(name), unit, record=str(record.name))
+    return record.to_units(**changes) if changes else record
 
 
 def _replaced(
-    record: Record, names: Triad, values: NDArray[np.float64], verb: str, arm: NDArray[np.float64]
+    record: Record,
+    known: Record,
+    names: Triad,
+    values: NDArray[np.float64],
+    verb: str,
+    arm: NDArray[np.float64],
 ) -> Record:
+    """The record with channels moved, in its own units; values are in those of `known`."""
     x, y, z = arm.tolist()
     step = Step(f"conditioning.{verb}", {"channels": " ".join(names), "x_m": x, "y_m": y, "z_m": z})
-    return record.replace(dict(zip(names, values, strict=True)), step=step)
+    moved = {
+        name: row
+        if known.unit(name) == record.unit(name)
+        else convert(row, known.unit(name), record.unit(name))
+        for name, row in zip(names, values, strict=True)
+    }
+    return record.replace(moved, step=step)

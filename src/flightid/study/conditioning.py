@@ -22,6 +22,7 @@ from flightid.conditioning import (
 )
 from flightid.conditioning.consistency_result import KinematicConsistency
 from flightid.conditioning.detrend import Trend
+from flightid.conditioning.kinematics import UNITS as KINEMATIC_UNITS
 from flightid.conditioning.options import FilterOptions, OutlierOptions
 from flightid.conditioning.sensor_position import RATES
 from flightid.conventions import AxisConversion
@@ -29,6 +30,7 @@ from flightid.errors import StudyError
 from flightid.frozen import dataclass
 from flightid.options import Options, option, options_class
 from flightid.record import Record
+from flightid.record.unit_changes import unit_changes
 from flightid.simulation import actuator_positions
 from flightid.study.reading import TableReader, read_each
 from flightid.study.record_files import RecordFile
@@ -212,10 +214,12 @@ def _apply(record: Record, step: Conditioning, checks: list[KinematicConsistency
     if step.consistency is not None:
         # Other channels of the record, in units of their own, are not looked at.
         looked = record.select([*RATES, *step.consistency.channels])
+        looked = looked.to_units(**unit_changes(looked, KINEMATIC_UNITS))
         found = check_consistency(looked, estimate=step.consistency.estimate)
         checks.append(found)
         if step.consistency.apply:
-            corrected = {name: found.corrected[name] for name in looked.channels}
+            own = found.corrected.to_units(**{n: record.unit(n) for n in looked.channels})
+            corrected = {name: own[name] for name in looked.channels}
             # Delays that are taken out cost samples at the ends.
             first, last = found.corrected.time_s[[0, -1]]
             record = record.segment(first, last + 0.5 * record.sample_time_s)

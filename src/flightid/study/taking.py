@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import field, replace
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ from flightid.logs import Log, read_log
 from flightid.logs.dataflash.sid_runs import SidRun
 from flightid.logs.to_record import EXCITATION
 from flightid.record import Channel, Record, Step
+from flightid.record.unit_changes import unit_changes
 from flightid.study.conditioning import Conditioning, condition, outliers_first
 from flightid.study.flight import FlightPlan
 from flightid.study.record_files import declared, load_records, made_by
@@ -93,6 +94,7 @@ def take(
             if file.name in needed
         }
         made = _conditioned(files, settings, runner, checks)
+        made = _in_units_of(tasks, made, runner)
         return StudyRecords(made, tuple(paths), checks=checks)
     flown, truth = _obtain_log(settings, given, folder, runner)
     opened = runner.stage("log", read_log, flown)
@@ -118,6 +120,7 @@ def take(
     }
     inspection = runner.stage("inspection", inspect_log, opened) if inspects else None
     made = _conditioned(cut, settings, runner, checks)
+    made = _in_units_of(tasks, made, runner)
     return StudyRecords(made, (flown,), inspection, truth, opened, checks)
 
 
@@ -147,6 +150,33 @@ def _prepare(
     records: list[Record], steps: tuple[Conditioning, ...]
 ) -> list[tuple[Record, tuple[KinematicConsistency, ...]]]:
     return [condition(record, steps, str(record.name)) for record in records]
+
+
+def _in_units_of(
+    tasks: Sequence[Task],
+    records: Mapping[str, StageResult[list[Record]]],
+    runner: StageRunner,
+) -> dict[str, StageResult[list[Record]]]:
+    """Records in the units of the models that take them, as `identify` converts its own.
+
+    A channel that two models want in different units stays as it is.
+    """
+    made = dict(records)
+    for name, record in records.items():
+        wanted: dict[str, set[str]] = {}
+        for task in tasks:
+            if task.model is not None and name in task.settings.segments:
+                for channel in (*task.inputs, *task.outputs):
+                    if channel in task.model.units:
+                        wanted.setdefault(channel, set()).add(task.model.units[channel])
+        units = {channel: min(each) for channel, each in wanted.items() if len(each) == 1}
+        if any(unit_changes(each, units) for each in record.value):
+            made[name] = runner.stage(f"units: {name}", _converted, record, units)
+    return made
+
+
+def _converted(records: list[Record], units: Mapping[str, str]) -> list[Record]:
+    return [each.to_units(**unit_changes(each, units)) for each in records]
 
 
 def _obtain_log(
