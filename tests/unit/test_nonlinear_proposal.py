@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -144,6 +145,7 @@ def test_a_linear_model_that_is_not_red_stands_beside(monkeypatch: pytest.Monkey
         assert [each.name for each in found] == names
         assert 'structure = "narx"' in found[0].lines
         assert not any(line.startswith("band_rad_s") for line in found[0].lines)
+        assert re.search(r"oe [0-9.]+\. NARX taken", found[0].tried), "a unit of 1 is not said"
 
 
 @pytest.mark.slow

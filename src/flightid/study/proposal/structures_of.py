@@ -21,6 +21,7 @@ from flightid.study.proposal.order_scans import Band, ProposedScans
 from flightid.study.proposal.stretches import FITTED, Group, Segments, rounded
 from flightid.study.structure_settings import NARX, SUBSPACE
 from flightid.study.structures import RUNS_ALIKE, ranked, runs_as_well
+from flightid.units import DIMENSIONLESS
 from flightid.validation import OrderScan
 from flightid.validation.order_scan.result import OrderTrial, rank_of
 
@@ -135,7 +136,8 @@ def _alone(name: str, output: str, asked: GroupScans) -> ProposedModel:
     best = _linear(asked.scans, output, driving)
     curved = best.nonlinear(asked.scans)
     said = ", ".join(f"{kind} {error:.3g}" for kind, error in best.errors.items())
-    said = f"Error of free runs on what was not fitted, by kind: {said} {unit}".rstrip()
+    said = f"Error of free runs on what was not fitted, by kind: {said}"
+    said += f" {unit}" if unit and unit != DIMENSIONLESS else ""
     told = () if curved is None else (curved.said,)
     tried = ". ".join((said, *told))
     # Named where one structure alone is left, too: records are read with what all models ask.
