@@ -11,7 +11,12 @@ from flightid.record.hold import common_loop
 from flightid.record.repeats import found_period
 from flightid.record.several import as_records
 from flightid.uncertainty.feedback import MAXIMUM_SAMPLES, find_feedback
-from flightid.uncertainty.feedback_result import FeedbackTest, declared_loop, unless_spread
+from flightid.uncertainty.feedback_result import (
+    FeedbackTest,
+    declared_loop,
+    unless_blind,
+    unless_spread,
+)
 
 KEPT = 4
 """Sets of records whose examination is kept: a scan fits the same ones many times."""
@@ -90,4 +95,4 @@ def feedback_test(
         driven,
         repeats=all(found_period(rows) is not None for rows in moved),
     )
-    return unless_spread(test, [each.history for each in listed], (*driven, *seen))
+    return unless_spread(unless_blind(test), [each.history for each in listed], (*driven, *seen))

@@ -16,7 +16,12 @@ from flightid.responses.response import FrequencyResponse
 from flightid.responses.windows.samples import Samples
 from flightid.uncertainty.fed_noise import fed_noise_spectrum
 from flightid.uncertainty.feedback import MAXIMUM_SAMPLES, find_feedback
-from flightid.uncertainty.feedback_result import FeedbackTest, declared_loop, unless_spread
+from flightid.uncertainty.feedback_result import (
+    FeedbackTest,
+    declared_loop,
+    unless_blind,
+    unless_spread,
+)
 
 SAMPLES_A_CYCLE = 8.0
 """Samples kept in a cycle of the highest frequency of interest."""
@@ -53,7 +58,7 @@ def feedback_of(
     key = ("feedback", *records[1:], samples.inputs, samples.outputs, begun, step, most)
     test = records[0].once(key, lambda: _tested(samples, step, most))
     names = (*samples.inputs, *samples.outputs)
-    return unless_spread(test, [each.history for each in records], names)
+    return unless_spread(unless_blind(test), [each.history for each in records], names)
 
 
 def _tested(samples: Samples, step: int, most: int) -> FeedbackTest:

@@ -13,7 +13,8 @@ A controller that answers within the sample hides its noise: the model of the ou
 their cause. So what is new in an input is also held against the outputs of its own sample. Where
 they go together, a vehicle that answers at once and a controller that does look the same, and the
 loop is not known. Nor is it where noise in the measurement of an input would make outputs foretell
-it as they do (`noisy_input.py`).
+it as they do (`noisy_input.py`). Where no loop is seen, what could have been is told
+(`feedback_power.py`).
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from flightid.uncertainty.feedback_power import unseen_feedback
 from flightid.uncertainty.feedback_result import LAGS, LEVEL, FeedbackTest
 from flightid.uncertainty.lagged_products import (
     RIDGE,
@@ -111,7 +113,9 @@ def find_feedback(
     free = sum(_room(u, order) for u, _ in pairs) - n_in * order - LAGS * n_out
     if order < 1 or free < FEWEST_FREE:
         return FeedbackTest("unknown", "too short")
-    news = _news([np.concatenate(pair) for pair in pairs], order, n_in + n_out)
+    both = [np.concatenate(pair) for pair in pairs]
+    weights = _past_weights(both, order, n_in + n_out)
+    news = left_by_past(both, weights)
     noise = _noise(pairs, news, n_in)
     power = sum(np.sum(y**2, axis=1) for _, y in pairs)
     noisy = sum(np.sum(e**2, axis=1) for e in noise) > SMALLEST_NOISE * power
@@ -120,8 +124,10 @@ def find_feedback(
         heard = [e[noisy] for e in noise]
         shares = _moving(_shares(pairs, heard, order), pairs, heard, order, PAST)
         past_noise = _worst(shares, names, "test")
+        echo = weights[:, n_in:, n_in:].transpose(0, 2, 1)[:, noisy][:, :, noisy]
         if past_noise.p_value is not None and past_noise.p_value < LEVEL:
             return _unless_noisy(shares, [(u, y[noisy]) for u, y in pairs], order, names)
+        past_noise = _with_power(past_noise, pairs, heard, echo, names)
     if unthinned:
         pairs = [(u, y) for u, y in zip(whole, unthinned[1], strict=True) if u.shape[1] > order]
         news = _news([np.concatenate(pair) for pair in pairs], order, n_in + n_out)
@@ -138,6 +144,24 @@ def _worst(found: Sequence[tuple[float, float]], names: Sequence[str], source: s
     place = int(np.argmin([p for _, p in found]))
     share, p_value = found[place]
     return FeedbackTest("open", source, min(1.0, len(names) * p_value), names[place], share)
+
+
+def _with_power(
+    test: FeedbackTest,
+    pairs: Sequence[Pair],
+    noise: Sequence[Array],
+    echo: Array,
+    names: Sequence[str],
+) -> FeedbackTest:
+    """A test that saw no loop, with the largest one that it would have missed."""
+    inputs, order = [u for u, _ in pairs], len(echo)
+    own = _past_weights(inputs, order, len(names))
+    fresh = left_by_past(inputs, own)
+    unseen = unseen_feedback(noise, echo, inputs, own, fresh)
+    if unseen is None:
+        return test
+    named = names[unseen.input]
+    return replace(test, input=named, unseen_share=unseen.share, unseen_bias=unseen.bias)
 
 
 def _unless_noisy(
@@ -198,11 +222,16 @@ def _room(inputs: Array, order: int) -> int:
 
 def _news(records: Sequence[Array], order: int, size: int) -> list[Array]:
     """What the pasts of all channels leave of the first of them, (size, n − order)."""
+    return left_by_past(records, _past_weights(records, order, size))
+
+
+def _past_weights(records: Sequence[Array], order: int, size: int) -> Array:
+    """What the pasts of all channels make of the first of them, (order, n_channels, size)."""
     products = lagged_products(records, order, order)
     channels = products.shape[1]
     known, targets = np.arange(channels, channels * (order + 1)), np.arange(size)
     weights = weights_of(products.reshape(2 * (channels * (order + 1),)), known, targets)
-    return left_by_past(records, weights.reshape(order, channels, size))
+    return weights.reshape(order, channels, size)
 
 
 def _noise(pairs: Sequence[Pair], news: Sequence[Array], n_in: int) -> list[Array]:

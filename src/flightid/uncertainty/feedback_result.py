@@ -17,6 +17,8 @@ LEVEL = 0.01
 """Share of open loops that are called closed."""
 LAGS = 12
 """Past samples of noise that may move an input."""
+BEARABLE = 1.0
+"""Standard errors by which a loop that no test sees may bend an estimate."""
 NEARLY = 0.999
 """Share of what is new in an input from which outputs leave nothing else that moves it."""
 
@@ -32,9 +34,9 @@ class FeedbackTest:
         How it is known: the test of past noise; the user's word; inputs that repeat exactly, or
         outputs without noise, which feed nothing back; an estimate by way of an excitation or of a
         model of the noise, which a closed loop does not bias. Or why it is not ("same sample", "too
-        short", "filtered", "noisy input"): input and output go together within a sample; records
-        too short to tell; samples made of later ones, which look like feedback, or noise of an
-        input's sensor, which does too.
+        short", "filtered", "noisy input", "blind"): input and output go together within a sample;
+        records too short to tell; samples made of later ones, which look like feedback, or noise of
+        an input's sensor, which does too; a loop that bends estimates would not have been seen.
     p_value : float or None
         Chance of so large a share with the loop open, over all inputs; None without a test.
     input : str or None
@@ -46,6 +48,10 @@ class FeedbackTest:
         Past samples of noise that were asked.
     input_noise : float or None
         With source "noisy input": rms of the noise that would explain it, over that of the input.
+    unseen_share, unseen_bias : float or None
+        Where no loop is seen: the smallest feedback of one output to `input` that would have been,
+        in 95 of 100 tests, as a share of the input's variance (above 1: more than all of it), and
+        the bias that it leaves, in standard errors; where that is largest.
 
     Example
     -------
@@ -60,6 +66,8 @@ class FeedbackTest:
     share: float | None = None
     lags: int = LAGS
     input_noise: float | None = None
+    unseen_share: float | None = None
+    unseen_bias: float | None = None
 
     @property
     def is_closed(self) -> bool:
@@ -103,6 +111,11 @@ class FeedbackTest:
                 f"{_percent(self.share)} % of what is new in input {self.input}, as a loop would, "
                 f"or {_percent(self.input_noise)} % of noise (rms) in what measured that input"
             ),
+            "blind": (
+                f"whether a loop is closed cannot be told: none is seen, but one that makes "
+                f"{self._unseen} would not be, and may bend estimates by {self._bias} standard "
+                "errors"
+            ),
             "too short": "whether a loop is closed cannot be told: the records are too short",
         }
         if self.source in words:
@@ -111,7 +124,23 @@ class FeedbackTest:
         if self.loop == "closed":
             share = f"{_percent(self.share)} % of what is new in input {self.input}"
             return f"loop closed: {seen} {share} {chance}"
-        return f"no loop seen: {seen} no more of the inputs than chance may {chance}"
+        power = ""
+        if self.unseen_bias is not None:
+            power = (
+                f"; one that makes {self._unseen} would be, and a smaller one bends estimates by "
+                f"less than {self._bias} standard errors"
+            )
+        return f"no loop seen: {seen} no more of the inputs than chance may {chance}{power}"
+
+    @property
+    def _bias(self) -> str:
+        bias = self.unseen_bias or 0.0
+        return "ten or more" if bias >= 10.0 else f"{max(bias, 0.01):.2g}"
+
+    @property
+    def _unseen(self) -> str:
+        share = self.unseen_share or 0.0
+        return f"{'all' if share >= 1.0 else f'{100.0 * share:.2g} %'} of input {self.input}"
 
     def to_dict(self) -> dict[str, object]:
         """Plain values."""
@@ -123,6 +152,8 @@ class FeedbackTest:
             "share": self.share,
             "lags": self.lags,
             "input_noise": self.input_noise,
+            "unseen_share": self.unseen_share,
+            "unseen_bias": self.unseen_bias,
         }
 
 
@@ -137,6 +168,18 @@ def unless_spread(
     """A test of channels, "filtered" where some were without phase, which looks like feedback."""
     found = test.source == "test" and test.is_closed and spread_channels(histories, names)
     return replace(test, loop="unknown", source="filtered") if found else test
+
+
+def unless_blind(test: FeedbackTest) -> FeedbackTest:
+    """A test that saw no loop, "blind" where one that it misses bends estimates by their errors.
+
+    Example
+    -------
+    >>> unless_blind(FeedbackTest("open", "test", 0.4, "u", 0.01, unseen_bias=8.0)).source
+    'blind'
+    """
+    blind = test.loop == "open" and test.source == "test" and (test.unseen_bias or 0.0) > BEARABLE
+    return replace(test, loop="unknown", source="blind") if blind else test
 
 
 def declared_loop(loop: str) -> FeedbackTest:

@@ -259,7 +259,7 @@ def _delays(output: str, acts: Mapping[str, InputDelay], sample_time_s: float) -
 
 
 def _feedback(test: FeedbackTest) -> list[Finding]:
-    if test.source in ("same sample", "noisy input"):
+    if test.source in ("same sample", "noisy input", "blind"):
         action = "declare loop='open' where no controller moved the input; else fit a noise model"
         return [Finding("feedback-unknown", Light.UNKNOWN, str(test), action)]
     if not test.is_closed:

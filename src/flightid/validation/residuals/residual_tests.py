@@ -202,7 +202,7 @@ def _loop(
     if held and found.source == "test":
         measured = feedback_test(records, inputs=data.inputs, outputs=data.residuals)
         if found.is_closed:
-            overruled = measured.loop == "open" or measured.source == "noisy input"
+            overruled = measured.loop == "open" or measured.source in ("noisy input", "blind")
         else:
             overruled = not measured.is_known
         found = measured if overruled else found
