@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import flightid as fid
+from flightid.validation import mismatch
 
 SLOW = """
 kind = "state-space"
@@ -59,6 +60,19 @@ def test_wrong_models_leave_the_envelopes(flown) -> None:  # type: ignore[no-unt
         seen = fid.verify(model.with_values(wrong), _record(model), responses=response).mismatch
         assert seen is not None
         assert seen.findings[0].light.value != "green"
+
+
+def test_transfer_functions_are_judged_alike() -> None:
+    model = fid.load_model("rate_first_order", axis="roll")
+    time_s = np.arange(2000) * 0.02
+    swept = {model.inputs[0]: np.sin(0.3 * time_s + 3.0 * time_s**2 / 40.0)}
+    moved = fid.Record.from_arrays(time_s, inputs=swept).declare(hold="zero")
+    response = fid.estimate_response(
+        fid.simulate(model, moved, hold="zero"), band_rad_s=(1.0, 6.0), window_s=6.0
+    )
+    seen = mismatch(model, response)
+    assert seen.is_corrected
+    assert seen.inside_percent == (100.0,)
 
 
 def _record(model: fid.StateSpaceModel) -> fid.Record:

@@ -34,7 +34,11 @@ def without_leakage(
     if not isinstance(model, StateSpaceModel | TransferFunctionModel) or responses.linear is None:
         return None
     hold = responses.input_shape.hold or "band_limited"
+    if isinstance(model, StateSpaceModel):
+        model = model.with_responses(*names)
+    elif set(model.response_names) != set(names):
+        return None
     try:
-        return Correction(responses, hold).apply(model.with_responses(*names))
+        return Correction(responses, hold).apply(model)
     except OUTSIDE:
         return None
