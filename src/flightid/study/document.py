@@ -37,7 +37,7 @@ from flightid.study.estimate_tables import model_table
 from flightid.study.faults import other_faults, section_of, whole_section
 from flightid.study.model_section import model_section
 from flightid.study.results import StudyResults
-from flightid.study.truth import recovered
+from flightid.study.truth import inside, recovered
 from flightid.study.tuning import AUTOPILOT_ONLY
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.quantiles import interval_words, shown
@@ -155,7 +155,7 @@ def parameter_table(study: StudyResults) -> Table:
         row: list[Cell] = [item.settings.name, parameter.name, parameter.value, parameter.unit]
         row += [low, high]
         if beside:
-            row += [true_value, _inside(parameter, true_value)]
+            row += [true_value, inside(parameter, true_value, _dropped(item))]
         rows.append((*row, _meaning(item, parameter.name)))
     columns.append(Column("meaning"))
     notes = () if study.truth is None else ("Truth: what the simulated vehicle obeys at hover.",)
@@ -167,6 +167,11 @@ def _meaning(item: ModelResults, name: str) -> str:
     known = getattr(None if item.fit is None else item.fit.model, "parameters", {})
     found = known.get(name) if isinstance(known, Mapping) else None
     return getattr(found, "note", "") or ""
+
+
+def _dropped(item: ModelResults) -> Mapping[str, float]:
+    """What a reduction has fixed, and at which value."""
+    return {} if item.reduction is None else item.reduction.dropped
 
 
 def _beside(study: StudyResults) -> str:
@@ -191,13 +196,6 @@ def _parameters(study: StudyResults) -> Iterator[tuple[ModelResults, Estimate, f
             yield item, parameter, truth.get(name)
 
 
-def _inside(parameter: Estimate, true_value: float | None) -> bool | None:
-    ends = parameter.interval(shown())
-    if ends is None or true_value is None:
-        return None
-    return ends[0] <= true_value <= ends[1]
-
-
 def _result(study: StudyResults, *, sections: tuple[Section, ...] = ()) -> Iterator[Block]:
     answer = answer_of(study)
     red = red_elsewhere(answer.findings, sections)
@@ -214,12 +212,12 @@ def _result(study: StudyResults, *, sections: tuple[Section, ...] = ()) -> Itera
         yield Lights(others)
     yield models_in_short(study.identified)
     # A tied parameter follows another: it would count the same miss twice.
-    inside = [
-        _inside(parameter, true)
-        for _, parameter, true in _parameters(study)
+    held = [
+        inside(parameter, true, _dropped(item))
+        for item, parameter, true in _parameters(study)
         if parameter.status != "tied"
     ]
-    judged = np.array([value for value in inside if value is not None], dtype=bool)
+    judged = np.array([value for value in held if value is not None], dtype=bool)
     if judged.size:
         yield Lights((recovered(judged),))
     if len(study.identified) > 1 or not study.has_equations:

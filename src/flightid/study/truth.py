@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.frozen import dataclass
+from flightid.uncertainty.estimate import Estimate
+from flightid.uncertainty.quantiles import shown
 from flightid.vehicles import Flight, RateTruth
 from flightid.vehicles.truth import AXES, RATES
 
@@ -85,6 +87,38 @@ class Truth:
     def to_dict(self) -> dict[str, object]:
         """Plain values by rate channel."""
         return {rate: truth.to_dict() for rate, truth in self.rates.items()}
+
+
+def inside(
+    parameter: Estimate, true_value: float | None, dropped: Mapping[str, float]
+) -> bool | None:
+    """Whether an interval holds the truth; of what a reduction dropped, whether it is that.
+
+    Parameters
+    ----------
+    parameter : Estimate
+    true_value : float or None
+    dropped : mapping of str to float
+        Values at which a reduction has fixed parameters.
+
+    Returns
+    -------
+    bool or None
+        None where nothing is claimed, or no truth is known.
+
+    Example
+    -------
+    >>> inside(Estimate("Lu", 0.0, "1/s"), 0.004, {"Lu": 0.0})
+    False
+    >>> inside(Estimate("Lu", 0.0, "1/s"), 0.004, {}) is None
+    True
+    """
+    if true_value is None:
+        return None
+    if parameter.name in dropped:
+        return bool(dropped[parameter.name] == true_value)
+    ends = parameter.interval(shown())
+    return None if ends is None else ends[0] <= true_value <= ends[1]
 
 
 def recovered(inside: NDArray[np.bool_]) -> Finding:

@@ -10,6 +10,7 @@ from flightid.errors import DataError, FitError, ModelError, OptionError
 from flightid.frozen import dataclass
 from flightid.identification.fit import Fit
 from flightid.identification.identify import identify
+from flightid.identification.reduction.growth import FittedPole, changed_growth, poles_of
 from flightid.identification.reduction.result import Reduction, ReductionStep
 from flightid.identification.reduction.rules import (
     Candidate,
@@ -47,8 +48,9 @@ def reduce(
     The parameter with the largest insensitivity above its guide is dropped first; where there is
     none, the one with the largest Cramér–Rao bound above its guide; then one of each pair that is
     too correlated. The rest is fitted again from where it stood. A step whose average cost rises
-    markedly, by itself or with the steps before it, is undone. A rise is not marked where the
-    random error of the parameter explains it: a parameter that is truly zero costs that much.
+    markedly, by itself or with the steps before it, is undone; so is one that takes away a motion
+    that grows for certain, or brings one about, and the next is tried. A rise is not marked where
+    the random error of the parameter explains it: one that is truly zero costs that much.
 
     Parameters
     ----------
@@ -235,20 +237,26 @@ class _ReductionPath:
     def follow(self, limits: ReductionLimits, after_rise: str, advance: Any) -> str:  # noqa: ANN401
         """Drop what the guides say; why it ended."""
         stay, start = set(self.keep), self.fit.average_cost
+        # Beside the first fit: what grows may go faint in one step and be gone in the next.
+        poles = poles_of(self.fit)
         while (candidate := choose(self.fit, limits, stay)) is not None:
-            step = self._attempt(candidate, limits, start)
+            step = self._attempt(candidate, limits, start, poles)
             advance()
             if step.accepted:
                 self._accept(step)
                 continue
             self.path.append(step)
             stay.add(step.name)
-            if step.cost_after is not None and after_rise == "stop":
+            if step.cost_after is not None and after_rise == "stop" and not step.changes_growth:
                 return f"dropping {step.name} raises the cost markedly"
         return "no other parameter that may go breaks a guide"
 
     def _attempt(
-        self, candidate: Candidate, limits: ReductionLimits, start: float
+        self,
+        candidate: Candidate,
+        limits: ReductionLimits,
+        start: float,
+        poles: Sequence[FittedPole],
     ) -> ReductionStep:
         name = candidate.name
         model, value, note = _without(self.fit.model, name, self.at)
@@ -262,10 +270,15 @@ class _ReductionPath:
         step = ReductionStep(name, value, candidate.reason, *costs, True, found, note, explained)
         so_far = [each.explained for each in self.path if each.accepted]
         excess = limits.excess(start, *costs, explained, so_far)
-        if not excess:
+        word = (
+            f"the average cost would rise to {found.average_cost:.4g}, {excess}" if excess else ""
+        )
+        grown = "" if excess else changed_growth(poles, poles_of(found))
+        if not (word or grown):
             return step
-        word = f"the average cost would rise to {found.average_cost:.4g}, {excess}"
-        return replace(step, accepted=False, note=word, explained=0.0)
+        return replace(
+            step, accepted=False, note=word or grown, explained=0.0, changes_growth=bool(grown)
+        )
 
     def _refit(self, model: GreyBoxModel) -> Fit:
         found: Fit = identify(model, self.data, **self.options)

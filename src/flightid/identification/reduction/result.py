@@ -10,6 +10,7 @@ from flightid.errors import OptionError
 from flightid.findings import Finding
 from flightid.frozen import dataclass
 from flightid.identification.fit import Fit
+from flightid.identification.reduction.growth import growth_findings, poles_of
 from flightid.identification.reduction.rules import ReductionLimits, choose
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
@@ -37,6 +38,8 @@ class ReductionStep:
         Why it had to stay, or why it was not fixed at zero.
     explained : float
         Rise of the average cost that the random error of the parameter explains.
+    changes_growth : bool
+        Whether it had to stay for what grows, not for the cost.
 
     Example
     -------
@@ -53,6 +56,7 @@ class ReductionStep:
     fit: Fit | None = None
     note: str = ""
     explained: float = 0.0
+    changes_growth: bool = False
 
     @property
     def rise_percent(self) -> float | None:
@@ -151,6 +155,8 @@ class Reduction(Result, schema="flightid.reduction/1", untold={"data": "response
     def path_findings(self) -> tuple[Finding, ...]:
         """Verdict on the path alone."""
         found = [self._verdict()]
+        if self.dropped:
+            found += growth_findings(poles_of(self.start), poles_of(self.fit))
         found += [
             Finding("reduction-held", Light.AMBER, f"{each.name}: {each.note}")
             for each in self.path
