@@ -81,3 +81,28 @@ def test_an_aeroplane_turns_by_its_short_period() -> None:
     found = fid.handling_qualities(fid.load_model("fixed_wing_longitudinal"))
     pitch = found.bandwidths["pitch"]
     assert_close(pitch.phase_bandwidth_rad_s, 4.411, rtol=5e-4, why="above the phugoid")
+
+
+@pytest.mark.parametrize("low", [0.05, 0.2, 0.5])
+def test_a_model_shows_its_sign_by_what_lies_below_the_band(low: float) -> None:
+    """A hovering helicopter by NumPy: its unstable pair ends where a band from 0.5 rad/s begins."""
+    g, lag = 32.174, 0.1
+    craft = fid.LinearSystem(
+        [
+            [-0.02, 0.0, 0.0, 0.0, -g, 0.0, -g, 0.0],
+            [0.0, -0.05, 0.0, 0.0, 0.0, g, 0.0, g],
+            [0.004, 0.003, 0.0, 0.0, 0.0, 0.0, 7.0, 0.0],
+            [0.004, -0.03, 0.0, 0.0, 0.0, 0.0, 0.0, 32.0],
+            [0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+            [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0],
+            [0.0, 0.0, -1.0, 0.0, 0.0, 0.0, -1.0 / lag, -0.2 / lag],
+            [0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.15 / lag, -1.0 / lag],
+        ],
+        np.array([[0.0] * 6 + [0.025 / lag, 0.004 / lag]]).T,
+        np.eye(8)[[4]], [[0.0]], ("lon",), ("theta",), [0.035],
+    )  # fmt: skip
+    found = attitude_bandwidth(craft, "lon", "theta", band_rad_s=(low, 60.0))
+    assert_close(found.bandwidth.value, 0.59, rtol=0.01, why="above the pair, whatever the band")
+    assert not [each for each in found.findings if each.code == "sign-doubtful"]
+    with pytest.raises(DataError, match=r"has passed −135° where it begins\.$"):
+        attitude_bandwidth(craft, "lon", "theta", band_rad_s=(1.0, 60.0))

@@ -37,7 +37,9 @@ SMALLEST_DELAY_S = 0.002
 COHERENT = 0.6
 NOISY = 0.03
 """Random error at a crossing beyond which intervals of a reading cover less than they say."""
-LATE = "begin the band lower: the phase has passed −135° where it begins; or turn the sign"
+LATE = "begin the band lower: the phase has passed −135° where it begins"
+SIGN_SURE_DEG = 45.0
+"""Lead over the phase of the gain up to which the sign of a control is not in doubt."""
 NO_FALL = "widen the band; take the attitude, or say that it is a rate, with its sign"
 NO_LEAD = "above its unstable pair the phase never passes −135°: close an inner loop first"
 AMBIGUOUS = 3.0
@@ -149,9 +151,11 @@ def attitude_bandwidth(
 
 
 def _next(curve: GainPhaseCurve) -> str:
-    if curve.branch.above and not curve.branch.reversed:
+    if curve.branch.above > curve.omega[0] and not curve.branch.reversed:
         return NO_LEAD
-    return LATE if curve.degrees[0] <= PHASE_MARGIN_DEG - 180.0 else NO_FALL
+    if curve.degrees[0] > PHASE_MARGIN_DEG - 180.0:
+        return NO_FALL
+    return LATE if abs(curve.branch.lead) <= SIGN_SURE_DEG else f"{LATE}; or turn the sign"
 
 
 def _pair(output: str, control: str, band: tuple[float, float], output_is: str, sign: int) -> Pair:

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.dynamics.handling_qualities.branch import Branch, branch_of
+from flightid.dynamics.handling_qualities.branch import POINTS, Branch, branch_of
 from flightid.errors import DataError, UnknownNameError
 from flightid.frozen import dataclass
 from flightid.models import LinearSystem, TransferFunctionModel
@@ -19,6 +19,8 @@ from flightid.responses import FrequencyResponse
 from flightid.responses.unbiased import WITHOUT_BIAS
 from flightid.scalar_search import root_between
 
+LOOKED_BELOW = 30.0
+"""By which ratio below the band a model is looked at for the branch of its phase."""
 GRID_POINTS = 2000
 SLOPE_POINTS = 200
 DEGREES_PER_RADIAN = 57.3
@@ -107,7 +109,7 @@ class GainPhaseCurve:
         DataError
             Fewer than two points in the band, or a zero among them.
         """
-        exact = None
+        exact, first = None, 0
         if isinstance(thing, FrequencyResponse):
             measured = thing.pair(pair.output, pair.input)
             inside = (measured.omega_rad_s >= pair.low) & (measured.omega_rad_s <= pair.high)
@@ -116,11 +118,16 @@ class GainPhaseCurve:
         else:
             respond, high = _evaluator(thing, pair)
             omega = np.geomspace(pair.low, min(pair.high, high), points)
+            # A model is known below the band too, where slow modes turn what tells its sign.
+            below = np.geomspace(pair.low / LOOKED_BELOW, pair.low, POINTS, endpoint=False)
+            omega, first = np.concatenate([below, omega]), len(below)
             values = respond(omega)
 
             def exact(at: float) -> complex:
                 return complex(respond(np.array([at]))[0])
 
+        if first and not (np.all(values[:first]) and np.all(np.isfinite(values[:first]))):
+            omega, values, first = omega[first:], values[first:], 0
         if len(omega) < 2 or np.any(values == 0.0):
             raise DataError(
                 f"{pair.output}/{pair.input} has no points in the band",
@@ -130,7 +137,7 @@ class GainPhaseCurve:
         decibels = 20.0 * np.log10(np.abs(values))
         degrees = np.degrees(np.unwrap(np.angle(values)))
         branch = branch_of(omega, decibels, degrees)
-        degrees += branch.turn
+        omega, decibels, degrees = omega[first:], decibels[first:], degrees[first:] + branch.turn
         if smoother is not None:
             decibels, degrees = smoother @ decibels, smoother @ degrees
         return cls(omega, decibels, degrees, exact, branch)
