@@ -179,10 +179,9 @@ def test_sampled_models_are_turned_to_continuous_time() -> None:
     delays = [m.named.character for m in fid.modes(late) if m.root == 0.0]
     assert delays == ["delay of one sample"] * len(delays)
     assert len(delays) == 3
-    rows = fid.modes(late).table().rows
-    assert [(row[0], row[-1]) for row in rows[1:]] == [
-        ("3 poles at the origin", "delays of one sample each")
-    ]
+    table = fid.modes(late).table()
+    assert [row[0] for row in table.rows[1:]] == ["3 poles at the origin"]
+    assert "3 poles at the origin: delays of one sample each." in table.notes
     assert [row[0] for row in modes_cells(fid.modes(late))] == [
         fid.modes(late).modes[0].named.character,
         "3 delays of one sample each",
@@ -286,3 +285,12 @@ def test_findings_tell_of_growth_and_of_doubt() -> None:
     spiral = fid.modes(fid.identify(truth, data)).mode("spiral")
     assert spiral.time_to_half.reason == UNSIGNED
     assert spiral.time_to_half.interval95 is None
+
+
+def test_a_table_of_modes_is_readable_and_says_what_each_is() -> None:
+    table = fid.modes(fid.load_model("fixed_wing_longitudinal")).table()
+    words = "phugoid, lightly damped oscillation: pitch attitude 49 %, forward speed 48 %."
+    assert words in table.notes
+    lines = table.to_text().splitlines()
+    assert max(map(len, lines)) <= 160
+    assert len(lines) < 20

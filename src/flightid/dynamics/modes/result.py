@@ -18,6 +18,7 @@ from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Reading
 from flightid.uncertainty.quantiles import interval_words, shown
 
+ORIGIN = "poles at the origin"
 LEAST_SHOWN = 0.01
 """Participation below which the table of participations leaves a state out."""
 
@@ -277,8 +278,6 @@ class Modes(Result, schema="flightid.modes/1"):
             Column("mode"),
             Column("real", "rad/s"),
             Column("±", "rad/s", 2),
-            Column("imaginary", "rad/s"),
-            Column("±", "rad/s", 2),
             Column("ω_n", "rad/s"),
             Column("±", "rad/s", 2),
             Column("f_n", "Hz", 4),
@@ -289,7 +288,6 @@ class Modes(Result, schema="flightid.modes/1"):
             Column("to half", "s"),
             Column("to double", "s"),
             Column(interval_words(level), "s"),
-            Column("character and participation"),
         )
         moving, delays = delays_apart(self.modes)
         rows = [_row(mode, level) for mode in moving] + _delay_rows(delays, level)
@@ -297,7 +295,12 @@ class Modes(Result, schema="flightid.modes/1"):
         return table.without_empty_columns()
 
     def _notes(self, level: float) -> tuple[str, ...]:
-        notes = ["One line for a complex pair."]
+        # What a mode is would be a column of ten lines beside so many numbers.
+        moving, delays = delays_apart(self.modes)
+        notes = [f"{mode.description}." for mode in (*moving, *delays[:1])]
+        if len(delays) > 1:
+            notes[-1] = f"{len(delays)} {ORIGIN}: {EACH_ONE_SAMPLE}."
+        notes.append("One line for a complex pair.")
         if self.reason:
             notes.append(f"No intervals: {self.reason}.")
         else:
@@ -365,8 +368,7 @@ def _delay_rows(found: list[Mode], level: float) -> list[tuple[Cell, ...]]:
     """Poles at the origin, which have no numbers of their own, in one row."""
     rows = [_row(mode, level) for mode in found[:1]]
     if len(found) > 1:
-        name = f"{len(found)} poles at the origin"
-        return [(name, *row[1:-1], EACH_ONE_SAMPLE) for row in rows]
+        return [(f"{len(found)} {ORIGIN}", *row[1:]) for row in rows]
     return rows
 
 
@@ -386,13 +388,10 @@ def _row(mode: Mode, level: float) -> tuple[Cell, ...]:
     omega = mode.natural_frequency.value
     for each, there in (
         (mode.real, True),
-        (mode.imaginary, pair),
         (mode.natural_frequency, pair),
         (mode.damping_ratio, pair),
     ):
         numbers += [each.value, each.half(level)] if there else [None, None]
     numbers.insert(-2, omega / math.tau if pair and omega is not None else None)
     times = (mode.period, mode.time_constant, mode.time_to_half, mode.time_to_double)
-    parts = f": {mode.named.parts}" if mode.named.parts else ""
-    words = f"{mode.named.character}{parts}"
-    return (mode.name, *numbers, *(each.value for each in times), interval, words)
+    return (mode.name, *numbers, *(each.value for each in times), interval)
