@@ -67,6 +67,7 @@ OF_COMMANDS = {
     "no_browser": "print the address of the page and open nothing",
     "output": "folder that is written",
     "pair": "output and input of a saved response",
+    "rename": "columns that stand for channels of other names",
     "overwrite": "whether a file may be replaced",
     "quiet": "no progress",
     "records": "records beside the data",

@@ -92,7 +92,7 @@ def read_files(
             continue
         _refuse({"sid_run": None} if "sid_run" in of_logs else {}, "logs")
         found += _from_table(file, of_tables, of_logs, inputs, outputs, excitations)
-    return [_in_units(record, units or {}) for record in found]
+    return [in_units(record, units or {}) for record in found]
 
 
 def _refuse_renaming(file: Path, *roles: Sequence[str] | Mapping[str, str] | None) -> None:
@@ -164,7 +164,8 @@ def _from_table(
     return records if span is None else [record.segment(*span) for record in records]
 
 
-def _in_units(record: Record, units: Mapping[str, str]) -> Record:
+def in_units(record: Record, units: Mapping[str, str]) -> Record:
+    """The record with channels in the units that are wanted, where they convert; each is told."""
     from flightid.record.unit_changes import unit_changes
 
     wanted = unit_changes(record, units)

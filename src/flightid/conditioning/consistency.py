@@ -191,7 +191,7 @@ def _sources(record: Record, channels: Mapping[str, str]) -> dict[str, str]:
             "the consistency check needs all three rates",
             found="no " + ", ".join(missing),
             needed="p, q and r",
-            action="name the channels",
+            action="name the columns that they are: --rename, or channels of check_consistency",
         )
     if not all(name in source for name in FORCES):
         source = {k: v for k, v in source.items() if k not in (*FORCES, *VELOCITIES)}

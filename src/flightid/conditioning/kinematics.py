@@ -17,7 +17,10 @@ from numpy.typing import NDArray
 from flightid._native import reconstruct_kinematics
 from flightid.conventions import STANDARD_GRAVITY_M_S2
 from flightid.frozen import dataclass
+from flightid.record import Record
+from flightid.record.formats.name_units import unit_at_end
 from flightid.uncertainty.input_noise import InputNoise, white_deviation
+from flightid.units import is_convertible
 
 Array = NDArray[np.float64]
 
@@ -33,6 +36,28 @@ UNITS = {
 INPUTS = (*RATES, *FORCES)
 OUTPUTS = tuple(name for name in UNITS if name not in INPUTS)
 VELOCITIES = ("u", "v", "w", "vn", "ve", "vd", "V", "alpha", "beta")
+
+
+def columns_of(record: Record) -> dict[str, str]:
+    """Channels of a record by canonical name: of that name, else with their unit at its end.
+
+    Example
+    -------
+    >>> of_rates = {"p": [0.0, 0.1], "q_radps": [0.0, 0.1], "r_of_tail": [0.0, 0.1]}
+    >>> columns_of(Record.from_arrays([0, 1], outputs=of_rates, units={"q_radps": "rad/s"}))
+    {'p': 'p', 'q': 'q_radps'}
+    """
+    found: dict[str, str] = {}
+    for name, unit in UNITS.items():
+        named = [name] if name in record else []
+        named += [
+            label
+            for label in record.channels
+            if label.partition("_")[0] == name and unit_at_end(label) is not None
+            if is_convertible(record.unit(label), unit)
+        ]
+        found |= {name: named[0]} if named else {}
+    return found
 
 
 @dataclass(frozen=True)
