@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -15,7 +16,9 @@ import flightid as fid
 from flightid.cli.flight import command
 from flightid.cli.program import program
 from flightid.control.autopilots import NotchTracking
+from flightid.conventions import Light
 from flightid.errors import DataError, OptionError
+from flightid.findings import FALL, Finding
 from flightid.logs.dataflash.layout import MessageLayout
 from flightid.logs.dataflash.writer import DataflashWriter
 from flightid.review.edited_filters import filter_bench
@@ -89,6 +92,13 @@ def test_a_notch_by_throttle_is_proposed_where_motors_shake_the_gyro(
     assert fid.read_parameters(file) == pytest.approx(choice.values)
     back = fid.read_parameters(tmp_path / "filters.rollback.param")
     assert back["INS_HNTCH_ENABLE"] == 0.0
+    fell = Finding(FALL, Light.AMBER, "the vehicle falls over", "look for the cause first")
+    fallen = replace(review, findings=(*review.findings, fell))
+    monkeypatch.setattr(fid, "review_flight", lambda *_, **__: fallen, raising=False)
+    unwritten = tmp_path / "after_the_fall.param"
+    made = CliRunner().invoke(command, [str(path), "--write", str(unwritten)])
+    assert "the vehicle falls over; look for the cause first" in " ".join(made.output.split())
+    assert not unwritten.exists()
 
 
 @pytest.mark.parametrize(

@@ -59,7 +59,12 @@ def command(
 def _write(review: FlightReview, target: Path, overwrite: bool) -> None:
     """Write the filters that would serve better; say why there are none."""
     from flightid.control.autopilots import write_parameters
+    from flightid.findings import FALL
 
+    fallen = [each for each in review.findings if each.code == FALL]
+    if fallen:
+        note(f"Not written: {target}: {fallen[0].message}; {fallen[0].action}")
+        return
     choice = review.filters.choice
     if choice is None or not choice.changes:
         why = "as good as flown" if choice else review.filters.reason or review.noise.reason

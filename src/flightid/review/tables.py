@@ -136,7 +136,10 @@ def frequencies(loops: Iterable[LoopResponse]) -> Table:
                 loop.rate_hz,
             )
         )
-    note = "Phase delay at 2 Hz of rate loops, at 0.5 Hz of attitude loops."
+    note = (
+        "Phase delay at 2 Hz of rate loops, at 0.5 Hz of attitude loops; -3 dB below the gain at "
+        "half of that frequency, which is not what was asked where a loop follows with less."
+    )
     title = "Closed loops by frequency, and tracking"
     why = untold_notes((loop.name, each) for loop in used for each in loop.all_readings[READ:])
     untold = (f"–: {loop.name}: no step, see below." for loop in used if not loop.is_told)
