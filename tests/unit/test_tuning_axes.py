@@ -316,6 +316,12 @@ def test_pictures_and_report_show_every_loop(tuning: fid.Tuning) -> None:
     words = [trace for trace in alone.data if trace.name == "not promised"]
     assert {row for trace in words for row in trace.y} <= {f"roll, {loop}" for loop in dark}
     assert "flown" not in steps_caption([bare])
+    none = tuple(dataclasses.replace(each, worst=None) for each in design.worst_cases)
+    unread = promised_margins([dataclasses.replace(design, worst_cases=none)])
+    said = {note.text for note in unread.layout.annotations}
+    has = any(x.name == "gain margin" and x.estimate.value is not None for x in none)
+    words = "no gain margin is promised (of the estimate: "
+    assert any(text.startswith(words) for text in said) == has
     drawn = gain_map(design)
     line = next(trace for trace in drawn.data if trace.name == "all requirements met")
     assert np.nanmax(line.z) > 0.0

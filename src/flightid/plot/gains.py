@@ -111,7 +111,8 @@ def promised_margins(designs: Sequence[PidDesign]) -> go.PlotFigure:
         ]
         labels = [_label(*each) for each in cases]
         if not cases:
-            _say_without_limit(made, name, column, rows)
+            unread = [each for _, each in found[name] if each.estimate.value is not None]
+            _say_without_limit(made, name, column, rows, unread)
             continue
         bars = go.Bar(
             x=[each.worst for _, each in cases], y=labels, orientation="h", width=0.6,
@@ -170,16 +171,23 @@ def _say_what_is_not_promised(made: go.PlotFigure, column: int, rows: Sequence[s
         made.add_trace(words, 1, column)
 
 
-def _say_without_limit(made: go.PlotFigure, name: str, column: int, rows: Sequence[str]) -> None:
-    """A panel whose loops all lack a crossing says so; an axis without a trace has no place."""
+def _say_without_limit(
+    made: go.PlotFigure, name: str, column: int, rows: Sequence[str], unread: Sequence[WorstCase]
+) -> None:
+    """A panel without a bar says why; an axis without a trace has no place.
+
+    `unread` are loops whose estimate has this margin, which is not promised for every vehicle.
+    """
+    told = ", ".join(f"{each.estimate.value:.3g} {each.estimate.unit}" for each in unread)
+    said = f"no vehicle's loop has a finite {name}"
+    if unread:
+        said = f"no {name} is promised (of the estimate: {told})"
     unseen = go.Scatter(
         x=[0.0] * len(rows), y=list(rows), mode="markers", showlegend=False, hoverinfo="skip",
         name=name, marker={"opacity": 0.0},
     )  # fmt: skip
     made.add_trace(unseen, 1, column)
-    made.add_annotation(
-        1, column, text=f"no vehicle's loop has a finite {name}", x=0.5, y=0.5, showarrow=False
-    )
+    made.add_annotation(1, column, text=said, x=0.5, y=0.5, showarrow=False)
     ends = {f"{axis}ref": f"{axis}{column if column > 1 else ''} domain" for axis in "xy"}
     made.layout["annotations"][-1].merge(ends)
     made.update_xaxes(
