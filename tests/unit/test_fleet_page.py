@@ -81,6 +81,22 @@ def test_logs_with_a_model_of_no_vehicle_are_counted() -> None:
     assert "4 logs with a model count nowhere" in found[0].message
 
 
+def test_a_parameter_that_never_scatters_and_an_event_of_nobody_are_told() -> None:
+    rows = fleet_rows(3, 4, 24)
+    for row in rows["parameters"]:
+        if row["name"] == "Ltphi":
+            row["value"] = 150.0
+    early = FleetEvent("painted", (START - datetime.timedelta(days=9)).timestamp(), ("v02",))
+    nobody = FleetEvent("new arms", MOTOR.time_s, ("v2",))
+    document = fleet_document(answer_questions(rows, events=[early, nobody]))
+    told = [each.message for each in document.findings]
+    assert sum(each.startswith("v0") for each in told) == 4
+    assert not any("beside what its events explain" in each for each in told)
+    (unknown,) = [each for each in document.findings if each.code == "event-of-nobody"]
+    assert unknown.light is Light.AMBER
+    assert "“new arms” is of v2, of which no flight with a model is known" in unknown.message
+
+
 def test_few_vehicles_that_all_moved_alike_are_amber() -> None:
     """Season in a fleet of three made 120 of 120 vehicles red."""
     rows = fleet_rows(3, 3)

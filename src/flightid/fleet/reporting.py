@@ -78,7 +78,7 @@ def ask_fleet(place: str | Path) -> FleetAnswers:
         population=questions.population,
     )
     outdated, copies = ((), {}) if settings is None else _as_files_are(settings, place)
-    return replace(answers, damaged=damaged, outdated=outdated, copies=copies)
+    return replace(answers, damaged=damaged, outdated=(*answers.outdated, *outdated), copies=copies)
 
 
 def _as_files_are(

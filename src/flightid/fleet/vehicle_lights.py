@@ -59,7 +59,8 @@ def change_words(history: ParameterHistory, labels: Mapping[str, str]) -> str:
         history.kind, ""
     )
     name, size = labels.get(history.name, history.name), _size_words(history.change_percent)
-    beyond = ", beside what its events explain" if history.events else ""
+    explained = any(each.change.value is not None for each in history.events)
+    beyond = ", beside what its events explain" if explained else ""
     if _holds_zero(history.change_percent):
         return f"{name} changed{how}{beyond}; by how much is not told:{size.removeprefix(' by')}"
     return f"{name} changed{size}{how}{beyond}"

@@ -22,6 +22,7 @@ from flightid.fleet.statistics.odd_flights import without_odd_flights
 from flightid.fleet.statistics.outliers import FleetOutliers, find_outliers
 from flightid.fleet.statistics.population import Population, estimate_population
 from flightid.fleet.statistics.spread_search import FEWEST
+from flightid.fleet.unnamed import events_of_nobody
 from flightid.frozen import dataclass
 from flightid.uncertainty.quantiles import LEVEL, half_width
 
@@ -145,7 +146,10 @@ def answer_questions(
         labels = told_apart({each["name"]: each.get("meaning") for each in mine})
         red = _red_flights(rows["parameters"], type_name, model)
         answers.append(replace(one, labels=labels, red=red))
-    return FleetAnswers(tuple(answers), tuple(rows["logs"]), undated, _red_models(rows))
+    nobody = tuple(events_of_nobody(events, {str(each["vehicle"]) for each in told}))
+    return FleetAnswers(
+        tuple(answers), tuple(rows["logs"]), undated, _red_models(rows), outdated=nobody
+    )
 
 
 def _red_models(rows: Rows) -> dict[str, list[str]]:

@@ -128,8 +128,9 @@ def persistence(
     Returns
     -------
     Persistence or None
-        None where no vehicle has ten days. Of all that are nearly as likely as the best the one
-        with the longest memory: what is wrongly called a change costs more than one missed.
+        None where no vehicle has ten days, or none scatters at all. Of all that are nearly as
+        likely as the best the one with the longest memory: what is wrongly called a change costs
+        more than one missed.
 
     Assumes
     -------
@@ -146,7 +147,10 @@ def persistence(
     groups = _grouped(
         [_scaled(e, e.change if e.vehicle in changed else e.level, typical) for e in series]
     )
-    none = _likelihood(groups, 0.0, 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        none = _likelihood(groups, 0.0, 0.0)
+    if not np.isfinite(none[0]):
+        return None
     grid = [(0.0, 0.0, *none)]
     grid += [(c, r, *_likelihood(groups, c, r)) for c, r in product(SHARES, CORRELATIONS)]
     best = max(each[2] for each in grid)
