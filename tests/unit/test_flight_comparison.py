@@ -16,7 +16,14 @@ from flightid.conventions import Light
 from flightid.dynamics.conditions.ratios import difference_of
 from flightid.errors import DataError
 from flightid.plot.flight import compared_steps
-from flightid.review.changes import BY_FREQUENCY, TRACKING, change_of, verdicts
+from flightid.review.changes import (
+    BY_FREQUENCY,
+    TRACKING,
+    ExpectedLoop,
+    _beside,
+    change_of,
+    verdicts,
+)
 from flightid.review.comparison import compare_loops
 from flightid.review.loop_response import LoopResponse
 from flightid.review.next_step import FlownStep, flown_step
@@ -148,6 +155,11 @@ def test_a_loop_that_became_too_slow_to_settle_is_named_and_held_against_its_pro
     assert off.light is Light.AMBER
     assert "not as the models promised" in off.message
     assert "promised → flown: level" in off.message
+    # What was kept is no reason for what was missed.
+    told = {"level": "level 0.855 → 0.852", "delay to half": "delay to half 63.6 → 80.6 ms"}
+    late = _beside("roll rate", ["level"], ExpectedLoop(told, ("delay to half",)))
+    assert late.message.endswith("(promised → flown: delay to half 63.6 → 80.6 ms)")
+    assert late.light is Light.AMBER
     # Large moves are judged neither way: better is no more told than worse.
     bent = replace(quick, loop="attitude", is_bent=True)
     better = compare_loops((replace(slow, loop="attitude"),), (bent,), ("a", "b"), promised=False)

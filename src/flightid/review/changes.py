@@ -46,13 +46,14 @@ class ExpectedLoop:
 
     Attributes
     ----------
-    kept : bool
     words : mapping of str to str
         Of each number: ``"rise time 0.28 → 0.29 s"``, promised and flown.
+    missed : tuple of str
+        Numbers that were flown otherwise, beyond chance and by what a pilot feels.
     """
 
-    kept: bool
     words: Mapping[str, str]
+    missed: tuple[str, ...] = ()
 
 
 UNPROMISED: Mapping[str, ExpectedLoop] = MappingProxyType({})
@@ -238,7 +239,7 @@ def _changed(
         action = "compare flights whose sticks moved as far: the angle controller answers large "
         return Finding("loop-changed", Light.UNKNOWN, said, action + "moves more slowly than small")
     worse = [each.name for each in found if each.is_worse]
-    if promise is not None and worse and worse != [TRACKING]:
+    if promise is not None and (promise.missed or (worse and worse != [TRACKING])):
         return _beside(said, [name for name in worse if name in promise.words], promise)
     if not worse:
         little = [each.name for each in found if each.is_slightly_worse]
@@ -254,10 +255,10 @@ def _changed(
 
 
 def _beside(said: str, worse: Sequence[str], promise: ExpectedLoop) -> Finding:
-    """What got worse beside what was promised of it."""
-    told = "; ".join(promise.words[name] for name in worse)
+    """What got worse beside what was promised of it; where a promise was missed, that one."""
+    told = "; ".join(promise.words[name] for name in promise.missed or worse)
     told = f" (promised → flown: {told})" if told else ""
-    if promise.kept:
+    if not promise.missed:
         said += f": as the models promised of these gains{told}"
         return Finding("loop-as-promised", Light.GREEN, said)
     action = "look at the steps before you fly more, and go back unless you know why"

@@ -296,8 +296,8 @@ def expected(promise: FlightComparison | None) -> dict[str, ExpectedLoop]:
     missed = () if promise is None else promise.significant
     return {
         loop: ExpectedLoop(
-            not any(each.key in missed and each.is_material for each in changes),
             {each.name: each.words for each in changes},
+            tuple(each.name for each in changes if each.key in missed and each.is_material),
         )
         for loop, changes in found.items()
     }
