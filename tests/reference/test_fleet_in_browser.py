@@ -42,7 +42,7 @@ def test_from_a_fleet_to_a_vehicle_to_its_log(desk: Desk) -> None:
     assert page.evaluate("document.documentElement.scrollWidth") == PHONE["width"]
     page.set_viewport_size({"width": 1280, "height": 800})
     page.get_by_role("button", name="Run: take what is missing").press("Enter")
-    page.get_by_text("Last run from here: 0 logs found").wait_for()
+    page.get_by_text("Last run from here: 0 logs, 0 of them in the catalogue before").wait_for()
     page.get_by_label("Flights of v02").get_by_role("link").press("Enter")
     page.wait_for_url("**/#/flight/*")
     assert not said

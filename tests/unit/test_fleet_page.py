@@ -110,6 +110,16 @@ def test_few_vehicles_that_all_moved_alike_are_amber() -> None:
     (told,) = [each for each in document.findings if each.code == "moved-alike"]
     assert "all 3 vehicles moved alike: of the type (season, firmware) or of each" in told.message
     assert "where flights go on alike on all vehicles beside" in " ".join(to_text(document).split())
+    # One that went far further than the others moved by itself too.
+    for row in rows["parameters"]:
+        if row["vehicle"] == "v01" and row["name"] == "Ltphi" and row["flown_at"][:10] >= late:
+            row["value"] *= 0.4
+    lights = {
+        each.message[:3]: each.light
+        for each in fleet_document(answer_questions(rows, covariates=["battery"])).findings
+        if each.code == "vehicle"
+    }
+    assert lights == {"v00": Light.AMBER, "v01": Light.RED, "v02": Light.AMBER}
 
 
 def test_vehicles_too_few_to_be_judged_are_grey_and_not_green() -> None:

@@ -20,9 +20,9 @@ three, of which the third is a witness."""
 ALIKE = 0.7
 """Correlation of a vehicle's level with that of the others that changed, from which half of its
 squares are theirs: two steps of one sign at the 8th and the 14th of 20 flights have 0.53."""
-STAYED, SURE = 0.5, 2.58
-"""Share of the others' movement below which a vehicle stayed, and by how many standard errors: at
-99 %."""
+STAYED, FURTHER, SURE = 0.5, 2.0, 2.58
+"""Share of the others' movement below which a vehicle stayed, and above which it went further than
+they; and by how many standard errors: at 99 %."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,8 @@ class MovedAlike:
     ----------
     name : str
     vehicles : tuple of str
-        Those that changed alike.
+        Those that changed alike; not one that surely went more than twice as far as the others,
+        whose change is its own.
     judged : int
         Vehicles whose history of it was judged.
     """
@@ -73,7 +74,9 @@ def moved_alike(histories: Sequence[ParameterHistory]) -> tuple[MovedAlike, ...]
         many = len(alike) >= max(FEWEST_ALIKE, NEARLY_ALL * len(judged))
         others = [each for each in judged if each not in alike]
         if len(judged) < FEWEST_VEHICLES and many and not any(_stayed(e, alike) for e in others):
-            found.append(MovedAlike(name, tuple(each.vehicle for each in alike), len(judged)))
+            own = [e for e in alike if _went_further(e, [o for o in alike if o is not e])]
+            told = tuple(each.vehicle for each in alike if each not in own)
+            found.append(MovedAlike(name, told, len(judged)))
     return tuple(found)
 
 
@@ -88,15 +91,25 @@ def _alike(changed: Sequence[ParameterHistory]) -> list[ParameterHistory]:
 
 def _stayed(one: ParameterHistory, moved: Sequence[ParameterHistory]) -> bool:
     """Whether a vehicle surely did not go half as far as others did, by its flights and errors."""
+    share, error = _share(one, moved)
+    return share + SURE * error < STAYED
+
+
+def _went_further(one: ParameterHistory, others: Sequence[ParameterHistory]) -> bool:
+    share, error = _share(one, others)
+    return share - SURE * error > FURTHER
+
+
+def _share(one: ParameterHistory, moved: Sequence[ParameterHistory]) -> tuple[float, float]:
+    """Of the mean movement of others that a vehicle's flights show, and its standard error."""
     beside = np.mean([np.interp(one.time_s, e.time_s, _course(e)) for e in moved], axis=0)
     scale = max(abs(float(one.track.level.mean())), float(np.finfo(np.float64).tiny))
     weights = scale**2 / one.variances
     beside, values = (v - np.average(v, weights=weights) for v in (beside, one.values / scale))
     information = float(np.sum(weights * beside**2))
     if information <= 0.0:
-        return False
-    share = float(np.sum(weights * beside * values)) / information
-    return bool(share + SURE / np.sqrt(information) < STAYED)
+        return 1.0, np.inf
+    return float(np.sum(weights * beside * values)) / information, 1.0 / np.sqrt(information)
 
 
 def _correlation(one: ParameterHistory, others: Sequence[ParameterHistory]) -> float:
