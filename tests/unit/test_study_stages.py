@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import flightid as fid
+from flightid.app.gain_work import _small_moves
 from flightid.control.autopilots import axis_loop
 from flightid.conventions import Light, Role
 from flightid.errors import FlightidError
@@ -20,8 +21,8 @@ from flightid.study.answer import (
     _gains,
     _margin_table,
     _models,
-    _small_angles,
     short_document,
+    small_angles,
 )
 from flightid.study.faults import CODE, FAILED, TUNING
 from flightid.study.identified import LEFT_OUT, ModelResults
@@ -344,10 +345,12 @@ def test_margins_below_what_is_asked_and_columns_left_out_are_told() -> None:
     assert notes[1].startswith("gain margin: not promised")
     flown = axis_loop("arducopter", "roll", loop_rate_hz=400.0)
     angle = SimpleNamespace(axis="roll", flown=flown, loop=flown.with_gains(ATC_ANG_RLL_P=9.0))
-    (small,) = _small_angles([angle])  # type: ignore[list-item]
+    (small,) = small_angles([angle])  # type: ignore[list-item]
     assert "errors up to 6.8 deg in roll (27 as flown)" in small
+    (shown,) = _small_moves(angle)  # type: ignore[arg-type]
+    assert shown.message == small, "the page says what the command says"
     free = flown.with_gains(ATC_ACCEL_R_MAX=0.0)
-    assert not [*_small_angles([SimpleNamespace(axis="roll", flown=free, loop=free)])]  # type: ignore[list-item]
+    assert not [*small_angles([SimpleNamespace(axis="roll", flown=free, loop=free)])]  # type: ignore[list-item]
 
 
 def test_no_model_is_none_to_use() -> None:

@@ -37,10 +37,12 @@ from flightid.control.tuning.moved_gains import MovedGains, move_gains
 from flightid.control.tuning.pid_design import PidDesign
 from flightid.control.tuning.requirements import TuningRequirements
 from flightid.control.tuning.result import Tuning
+from flightid.conventions import Light
 from flightid.errors import DataError, FlightidError, StudyError, UnknownNameError
 from flightid.export.gains import write_gains
 from flightid.files import write_atomically
 from flightid.findings import Finding, worst
+from flightid.study.answer import small_angles
 from flightid.study.gain_preview import LoopChoice, preview_loops, preview_tuning
 from flightid.units import DIMENSIONLESS
 from flightid.version import VERSION
@@ -263,9 +265,14 @@ def _axis(
             for each in design.stages
         ],
         filters=[f"{each.name} {each.old:g} to {each.value:g}" for each in design.filters],
-        findings=[shown_finding(each) for each in findings],
+        findings=[shown_finding(each) for each in (*findings, *_small_moves(design))],
         controller=_controller(design),
     )
+
+
+def _small_moves(design: PidDesign) -> list[Finding]:
+    """Up to which error its angle steps hold, as the command says below its gains."""
+    return [Finding("small-angles", Light.GREEN, each, "") for each in small_angles([design])]
 
 
 def _controller(design: PidDesign) -> RigController | None:

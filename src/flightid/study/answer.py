@@ -323,11 +323,11 @@ def _gain_table(designs: tuple[PidDesign, ...], filters: TunedFilters | None) ->
         for design in designs
         for change in design.changes
     ]  # fmt: skip
-    notes = (*(() if filters is None else filters.words), *_small_angles(designs))
+    notes = (*(() if filters is None else filters.words), *small_angles(designs))
     return Table("Gains to fly", columns, tuple(rows), notes).without_empty_columns()
 
 
-def _small_angles(designs: Iterable[PidDesign]) -> Iterator[str]:
+def small_angles(designs: Iterable[PidDesign]) -> Iterator[str]:
     """Up to which error angle controllers do what is promised, where parameters end it."""
     said: list[str] = []
     bounds: dict[str, None] = {}
