@@ -17,12 +17,12 @@ from flightid.fleet.parameter_words import told_apart
 from flightid.fleet.statistics.covariates import Covariate
 from flightid.fleet.statistics.drift import FleetDrift, find_drift
 from flightid.fleet.statistics.events import FleetEvent
+from flightid.fleet.statistics.events_of_nobody import events_of_nobody
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
 from flightid.fleet.statistics.odd_flights import without_odd_flights
 from flightid.fleet.statistics.outliers import FleetOutliers, find_outliers
 from flightid.fleet.statistics.population import Population, estimate_population
 from flightid.fleet.statistics.spread_search import FEWEST
-from flightid.fleet.unnamed import events_of_nobody
 from flightid.frozen import dataclass
 from flightid.uncertainty.quantiles import LEVEL, half_width
 
