@@ -152,6 +152,8 @@ def test_models_stand_where_there_are_no_gains(
     assert len(found) == 1
     assert "lower nf and nb by 1" in said.out
     assert "could not be made" not in said.out
+    (headline,) = [line for line in said.out.splitlines() if line.startswith("Answer: ")]
+    assert headline.startswith("Answer: red ("), "as the exit code says"
     assert "report.html" in said.err
     assert (tmp_path / "rig-output" / "report.html").is_file()
 

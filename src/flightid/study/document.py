@@ -199,7 +199,12 @@ def _parameters(study: StudyResults) -> Iterator[tuple[ModelResults, Estimate, f
 def _result(study: StudyResults, *, sections: tuple[Section, ...] = ()) -> Iterator[Block]:
     answer = answer_of(study)
     red = red_elsewhere(answer.findings, sections)
-    yield Lights((*answer.findings, *red), repeats=True)
+    # Gains that could not be made stand nowhere else: they count.
+    own = tuple(each for each in answer.findings if study.tuning is None and each.code == "gains")
+    told = (*(each for each in answer.findings if each not in own), *red)
+    yield Lights(told, repeats=True)
+    if own:
+        yield Lights(own)
     # The promise stands in a picture: its table opens on demand.
     pictures, promises = _pictures(study), answer.tables[1:]
     yield from islice(pictures, 1)

@@ -81,7 +81,7 @@ class FleetAnswers:
     damaged : int
         Parts of the catalogue that cannot be read: their logs are in no answer.
     outdated : tuple of Finding
-        What of the catalogue is not as the fleet file and its logs are by now.
+        What of the catalogue and the fleet file is not as the logs are: events of nobody too.
     copies : mapping of str to str
         Files with the bytes of another, whose log they are, and that one.
     """
