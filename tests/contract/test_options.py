@@ -80,6 +80,7 @@ OF_COMMANDS = {
     "port": "where the page is served on this machine",
     "scenario": "flight to simulate",
     "seed": "seed of random numbers",
+    "stick_deg": "largest move of a simulated pilot",
     "tune": "gains at the end",
     "unpacked": "a page without compression",
     "validation": "records that a fit has not seen",

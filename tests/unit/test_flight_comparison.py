@@ -26,7 +26,7 @@ from flightid.review.changes import (
 )
 from flightid.review.comparison import compare_loops
 from flightid.review.loop_response import LoopResponse
-from flightid.review.next_step import FlownStep, flown_step
+from flightid.review.next_step import FlownStep, flown_step, left_to_fly
 from flightid.review.promised import promised_loops
 from flightid.review.step_features import step_features
 from flightid.uncertainty.estimate import Estimate
@@ -191,8 +191,18 @@ def test_large_moves_of_an_angle_are_not_held_against_small_ones(tmp_path: Path)
     assert promise.findings[-1].code == "beyond-angle-law"
     assert "moves of the roll stick by 8.6 deg at once" in promise.findings[-1].action
     assert promise.kept is None
-    back = FlownStep(log, log, log).finding(kept=promise.kept)
-    assert (back.light, "load" in back.action) == (Light.UNKNOWN, False)
+    # "Fly these gains again as asked for above" had said neither what nor what then.
+    again = {"kept": promise.kept, "again": "flightid compare out LOG"}
+    told = FlownStep(log, None, log).finding(**again, to_fly=left_to_fly(promise))
+    assert told.light is Light.UNKNOWN
+    assert told.message.endswith("not judged: roll attitude")
+    assert told.action.startswith(
+        f"load {log} and fly a minute of quick moves of the roll stick by"
+    )
+    assert told.action.endswith("or less; then flightid compare out LOG")
+    both = {name: f"fly a minute of the {name} stick" for name in ("roll", "pitch")}
+    pair = FlownStep(log, None, log).finding(kept=True, to_fly=both).action
+    assert "fly a minute of the roll and pitch stick; then" in pair
     flights = compare_loops(quick[:1], (large,), ("a", "b"), promised=False)
     assert [each.light for each in flights.findings] == [Light.UNKNOWN]
     assert "whose sticks moved as far" in flights.findings[0].action
@@ -345,7 +355,10 @@ def test_the_step_that_flew_names_the_next_and_the_way_back(
     step = flown_step([log.parent], fid.read_log(log).parameters)
     assert step is not None
     assert step.flown.name == "gains-1.param"
-    assert "gains-1.rollback.param" in step.finding(kept=False).action
+    back = step.finding(kept=False, log="f.BIN").action
+    assert "gains-1.rollback.param; what the models missed" in back
+    assert back.endswith("flightid plan f.BIN")
+    assert step.finding(kept=False, log="f.BIN", swept=True).action.endswith("flightid tune f.BIN")
     assert replace(step, following=None).finding(kept=True).code == "last-step"
     assert flown_step([log.parent], {"ATC_RAT_RLL_P": 0.5}) is None
 

@@ -321,14 +321,20 @@ def test_what_a_log_carries_already_is_not_swept_again(
     assert (once.light, once.message) == (asked.light, f"roll: {asked.message}")
     assert once.action == f"{asked.action}: flightid plan swept.bin --axes roll"
     assert done.action == "next is flightid tune swept.bin"
-    again = {each.code for each in fid.plan_flight(opened, axes=("roll",)).findings}
-    assert "swept-already" in again
+    again = {each.code: each for each in fid.plan_flight(opened, axes=("roll",)).findings}
+    assert again["swept-again"].message.startswith("roll: swept already, and the log can carry")
     assert "identified-already" not in again
+    # The plan had sent its reader to `tune` and `inspect`, which had sent him to the plan.
+    assert not any("flightid" in each.action for each in again.values())
     axes = ("roll", "pitch", "yaw")
     every = FlownSweeps(("roll", "roll", "yaw"), axes, (*axes, *axes))
     said = [each.message for each in every.findings(opened, ("yaw",))]
     assert said[0] == "this log can carry a model of roll and pitch already"
-    assert "already: yaw;" in said[1]
+    assert said[1].startswith("yaw: swept already, and the log can carry a model")
+    missed = FlownSweeps(("roll", "yaw"), (), ("roll",), {"roll": "too little coherence"})
+    (why,) = missed.findings(opened, ("roll",))
+    assert (why.code, why.light) == ("swept-already", Light.AMBER)
+    assert why.message.endswith("no model rests on that: too little coherence")
     monkeypatch.setattr("flightid.planning.plan.flown_sweeps", lambda *_: every)
     none = fid.plan_flight(opened)
     assert (none.verdict, none.is_go, none.sweeps) == ("not needed", True, ())

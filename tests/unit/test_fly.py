@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -21,7 +22,7 @@ from flightid.vehicles import (
     fly_scenario,
     rate_truth,
 )
-from flightid.vehicles.scenario import advised_runs, published_runs
+from flightid.vehicles.scenario import advised_runs, published_runs, stick_moves
 from tests.closeness import assert_close
 
 TURN = [PilotDoublet("roll", 0.1, 3.0)]
@@ -89,6 +90,11 @@ def test_scenarios_are_the_published_table_and_ours(monkeypatch: pytest.MonkeyPa
     assert changed.vehicle.mass_kg == 1.0
     assert changed.autopilot.rate[2] == RateGains(p=0.1)
     assert changed.to_dict()["schema"] == "flightid.flight/1"
+    moves = stick_moves(0.1, seed=2)
+    jumps = [2.0 * abs(each.amplitude) for each in moves if each.axis != "yaw"]
+    assert 0.05 <= min(jumps) < 0.06 < 0.09 < max(jumps) <= 0.1
+    assert {each.axis for each in moves} == {"roll", "pitch", "yaw"}
+    assert all(a.end_s < b.start_s for a, b in pairwise(moves))
 
 
 def test_refusals() -> None:
@@ -137,6 +143,10 @@ def test_unknown_names_are_refused() -> None:
         rate_truth("roll").effective_delay_s("best")  # type: ignore[arg-type]
     with pytest.raises(errors.OptionError, match="scenario is not known"):
         fly_scenario("wild")
+    with pytest.raises(errors.OptionError, match="flown without sticks"):
+        fly_scenario("advised", stick_rad=0.1)
+    with pytest.raises(errors.OptionError, match="size of stick moves"):
+        fly_scenario("sticks", stick_rad=0.0)
     with pytest.raises(errors.OptionError, match="setting is not known"):
         fly_scenario(weather={})
     with pytest.raises(errors.OptionError, match="has no such field"):

@@ -14,17 +14,13 @@ from flightid.app.gain_work import _small_moves
 from flightid.control.autopilots import axis_loop
 from flightid.conventions import Light, Role
 from flightid.errors import FlightidError
+from flightid.evidence.evidence import Check, Evidence
 from flightid.findings import Finding
 from flightid.report.content import Document
 from flightid.report.text import to_text
-from flightid.study.answer import (
-    _gains,
-    _margin_table,
-    _models,
-    short_document,
-    small_angles,
-)
+from flightid.study.answer import _models, models_in_short, short_document
 from flightid.study.faults import CODE, FAILED, TUNING
+from flightid.study.gain_answer import gains_finding, margin_table, small_angles
 from flightid.study.identified import LEFT_OUT, ModelResults
 from flightid.study.settings import Segment
 from flightid.study.stage_runner import digest
@@ -331,17 +327,33 @@ def test_margins_below_what_is_asked_and_columns_left_out_are_told() -> None:
     beyond = Finding("margin-beyond-band", Light.GREEN, "read above the band")
     roll = SimpleNamespace(
         axis="roll", loop=None, worst_cases=worst, requirements=asked, findings=(beyond,),
-        share_met=0.984, stages=(None,), flown=SimpleNamespace(autopilot="px4"),
+        share_met=0.984, stages=(SimpleNamespace(gains={}),),
+        flown=SimpleNamespace(autopilot="px4", gains={}),
     )  # fmt: skip
-    tuning = SimpleNamespace(sound=[roll], findings=(), left_out={})
-    said = _gains(tuning, "study.toml").message  # type: ignore[arg-type]
+    tuning = SimpleNamespace(sound=[roll], findings=(), left_out={}, designs=())
+    said = gains_finding(tuning, "study.toml").message  # type: ignore[arg-type]
     assert "at least 44°" in said
     assert said.endswith("(98.4 % of them or more keep 45° and all else asked)")
-    way = _gains(tuning, "study.toml").action  # type: ignore[arg-type]
+    way = gains_finding(tuning, "study.toml").action  # type: ignore[arg-type]
     assert way.startswith("flightid tune study.toml --write gains.params writes them")
-    done = _gains(tuning, "study.toml", ["g-1.params"], "out").action  # type: ignore[arg-type]
-    assert done == "fly g-1.params, log, then flightid compare out LOG: kept or not"
-    notes = _margin_table((roll,)).notes  # type: ignore[arg-type]
+    done = gains_finding(tuning, "study.toml", ["g-1.params"], "out").action  # type: ignore[arg-type]
+    moves = "a minute of quick moves of each stick"
+    assert done == f"fly g-1.params: {moves}; log, then flightid compare out LOG: kept or not"
+    # An amber line of gains had no reason, and "look again" no command.
+    copter = axis_loop("arducopter", "roll", loop_rate_hz=400.0)
+    step = SimpleNamespace(
+        **{**vars(roll), "stages": [SimpleNamespace(gains={"ATC_ANG_RLL_P": 9.0})] * 2},
+    )
+    step.flown = copter
+    doubts = (Finding("a", Light.AMBER, "the band ends early"), Finding("b", Light.AMBER, "windy"))
+    step.findings = doubts
+    two = SimpleNamespace(sound=[step], findings=doubts, left_out={}, designs=(step,))
+    told = gains_finding(two, "study.toml", results="out")  # type: ignore[arg-type]
+    assert told.light is Light.AMBER
+    assert told.message.endswith("; but roll the band ends early (1 other reason: report)")
+    fly = f"fly gains-1.param, step 1 of 2: {moves}, roll and pitch by no more than 6.8 deg at once"
+    assert f"{fly}; log, then flightid compare out LOG" in told.action
+    notes = margin_table((roll,)).notes  # type: ignore[arg-type]
     assert notes[1].startswith("gain margin: not promised")
     flown = axis_loop("arducopter", "roll", loop_rate_hz=400.0)
     angle = SimpleNamespace(axis="roll", flown=flown, loop=flown.with_gains(ATC_ANG_RLL_P=9.0))
@@ -351,6 +363,27 @@ def test_margins_below_what_is_asked_and_columns_left_out_are_told() -> None:
     assert shown.message == small, "the page says what the command says"
     free = flown.with_gains(ATC_ACCEL_R_MAX=0.0)
     assert not [*small_angles([SimpleNamespace(axis="roll", flown=free, loop=free)])]  # type: ignore[list-item]
+
+
+def test_lights_of_models_are_of_what_their_lines_say() -> None:
+    """The reason of three ambers stood apart, and left three amber lines that say nothing amber."""
+
+    def model(name: str, predicted: Light) -> SimpleNamespace:
+        checks = (
+            Check("prediction", predicted, f"predicts {name}"),
+            Check("agreement of parts", Light.UNKNOWN, "flown once", "repeat it"),
+        )
+        evidence = Evidence(checks, ("agreement of parts",))
+        fit = SimpleNamespace(average_cost=1.0, evidence=evidence)
+        return SimpleNamespace(name=name, fit=fit, settings=SimpleNamespace(structure=None))
+
+    items = [model("p", Light.GREEN), model("q", Light.GREEN)]
+    lines = models_in_short(items).findings  # type: ignore[arg-type]
+    assert [each.light for each in lines] == [Light.GREEN, Light.GREEN, Light.AMBER]
+    assert lines[-1].message == "p, q: flown once"
+    assert lines[-1].action == "repeat it"
+    (alone,) = models_in_short(items[:1]).findings  # type: ignore[arg-type]
+    assert (alone.light, "flown once" in alone.message) == (Light.AMBER, True)
 
 
 def test_no_model_is_none_to_use() -> None:

@@ -42,7 +42,7 @@ from flightid.errors import DataError, FlightidError, StudyError, UnknownNameErr
 from flightid.export.gains import write_gains
 from flightid.files import write_atomically
 from flightid.findings import Finding, worst
-from flightid.study.answer import small_angles
+from flightid.study.gain_answer import small_angles
 from flightid.study.gain_preview import LoopChoice, preview_loops, preview_tuning
 from flightid.units import DIMENSIONLESS
 from flightid.version import VERSION

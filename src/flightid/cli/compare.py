@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING
 
 import click
@@ -221,23 +222,50 @@ def _flights(before: str, after: str) -> FlightComparison:
         with progress(None, "working out what was promised"):
             promise = compare_with_promise(_models(str(results)), log, review=reviews[1])
     made = compare_flights(*reviews, promise=promise)
-    return _with_step(made, log, [*folders, log.path.resolve().parent], promise)
+    places = [*folders, log.path.resolve().parent]
+    return _with_step(made, log, places, promise, [] if results is None else [str(_near(results))])
+
+
+def _near(path: Path) -> Path:
+    """A path as it is typed here: without the folder that the command runs in."""
+    here = Path.cwd()
+    return path.relative_to(here) if path.is_relative_to(here) else path
 
 
 def _with_step(
-    made: FlightComparison, log: Log, folders: Sequence[Path], promise: FlightComparison | None
+    made: FlightComparison,
+    log: Log,
+    folders: Sequence[Path],
+    promise: FlightComparison | None,
+    models: Sequence[str] = (),
 ) -> FlightComparison:
-    """With what to do after the step of gains that a log flew, if it is one of those beside it."""
-    from flightid.review.comparison import unheld
-    from flightid.review.next_step import flown_step
+    """With what to do after the step of gains that a log flew, if it is one of those beside it.
 
-    step = flown_step([each for each in folders if each.is_dir()], log.parameters)
+    `models` promised, as they were named.
+    """
+    from flightid.review.comparison import unheld
+    from flightid.review.next_step import flown_step, left_to_fly
+
+    step = flown_step([_near(each) for each in folders if each.is_dir()], log.parameters)
     if step is None:
         return made
     name = log.path.name
-    found = step.unjudged(name) if promise is None else step.finding(kept=promise.kept, log=name)
-    untold = () if promise is None or promise is made else unheld(promise)
-    return replace(made, findings=(*made.findings, *untold, found))
+    if promise is None:
+        return replace(made, findings=(*made.findings, step.unjudged(name)))
+    to_fly = left_to_fly(promise)
+    found = step.finding(
+        kept=promise.kept,
+        to_fly=to_fly,
+        log=name,
+        again=f"flightid compare {' '.join(map(quote, models))} LOG",
+        swept=bool(log.sid_runs),
+    )
+    untold = () if promise is made else unheld(promise)
+    said = [*made.findings, *untold]
+    if to_fly and promise.kept is not False:
+        # The last line says what to fly for all of them.
+        said = [replace(e, action="") if e in unheld(promise) else e for e in said]
+    return replace(made, findings=(*said, found))
 
 
 def _promise(models: Sequence[str], after: str) -> FlightComparison:
@@ -251,7 +279,7 @@ def _promise(models: Sequence[str], after: str) -> FlightComparison:
     with progress(None, "working out what was promised"):
         made = compare_with_promise([each for name in models for each in _models(name)], log)
     places = [Path(name).resolve().parent for name in (*models, after)]
-    return _with_step(made, log, places, made)
+    return _with_step(made, log, places, made, models)
 
 
 def _models(name: str) -> list[Model]:

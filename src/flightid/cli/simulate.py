@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from flightid.cli.figures import QuotientRange
 from flightid.cli.option_fields import OptionsCommand, flags_of, parted
 from flightid.cli.output import WRITTEN, emit, json_option, note
 from flightid.cli.records import FILES, read_files, reading, write_out
@@ -33,10 +34,17 @@ def command() -> None:
 )
 @click.option(
     "--scenario",
-    type=click.Choice(["advised", "published"]),
+    type=click.Choice(["advised", "published", "sticks"]),
     default="advised",
     show_default=True,
-    help="Sweep settings: flightid's, or those of the published rig study.",
+    help="Sweep settings, flightid's or those of the published rig study; or sticks alone, as an "
+    "ordinary flight has them.",
+)
+@click.option(
+    "--stick-deg",
+    type=QuotientRange(min=0.0, min_open=True),
+    help="Of the scenario sticks: most that roll or pitch is asked to move at once, deg; default: "
+    "11.5.",
 )
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of noise.")
 @click.option(
@@ -45,11 +53,21 @@ def command() -> None:
     help="Gains to fly: a file of `flightid tune --write`.",
 )
 @json_option
-def quadrotor(target: Path, scenario: str, seed: int, gains: Path | None, as_json: bool) -> None:
-    """Sweep a 450 mm quadrotor on a gyroscopic rig; print the truth an identification should find.
+def quadrotor(
+    target: Path,
+    scenario: str,
+    stick_deg: float | None,
+    seed: int,
+    gains: Path | None,
+    as_json: bool,
+) -> None:
+    """Fly a 450 mm quadrotor on a gyroscopic rig; print the truth an identification should find.
 
-    The log is ArduCopter's: mixer sweeps of roll, pitch and yaw, then doublets for verification.
+    The log is ArduCopter's: mixer sweeps of roll, pitch and yaw, then doublets for verification;
+    or a minute of quick moves of each stick, which tell what gains do and carry no model.
     """
+    from math import radians
+
     from flightid.control.autopilots import read_parameters
     from flightid.progress import progress
     from flightid.vehicles import Autopilot
@@ -59,7 +77,8 @@ def quadrotor(target: Path, scenario: str, seed: int, gains: Path | None, as_jso
     flown = {} if gains is None else read_parameters(gains)
     autopilot = vars(Autopilot().with_parameters(flown))
     with progress(2, "Flying") as advance:
-        flight = fly_scenario(scenario, seed=seed, autopilot=autopilot)
+        largest = None if stick_deg is None else radians(stick_deg)
+        flight = fly_scenario(scenario, seed=seed, stick_rad=largest, autopilot=autopilot)
         advance()
         write_ardupilot_log(flight, target)
         advance()

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import field
 from weakref import WeakKeyDictionary
 
 from flightid.conventions import Light
 from flightid.evidence.part_checks import AGAIN, ONCE, needs_another
 from flightid.findings import Finding
 from flightid.frozen import dataclass
-from flightid.inspection import inspect_log
-from flightid.inspection.carried import SEARCHED, carried_axes
+from flightid.inspection import Inspection, inspect_log
+from flightid.inspection.carried import SEARCHED, carried_axes, why_no_model
 from flightid.inspection.excitation_found import excitations
 from flightid.inspection.flight_phases import FlightPhases
+from flightid.inspection.usable_band import AxisBand
 from flightid.logs import Log
+
+UNTOLD = "the log does not tell why"
 
 
 @dataclass(frozen=True)
@@ -29,11 +33,14 @@ class FlownSweeps:
         Axes of which the log can carry a model as it is; none where anything about it is red.
     moved : tuple of str
         Axis of each manoeuvre that a model may be tried from, injected or not.
+    unfit : mapping of str to str
+        Why the log carries no model of an axis, by axis.
     """
 
     injected: tuple[str, ...] = ()
     carried: tuple[str, ...] = ()
     moved: tuple[str, ...] = ()
+    unfit: Mapping[str, str] = field(default_factory=dict)
 
     def findings(self, log: Log, planned: Collection[str]) -> Iterator[Finding]:
         """What needs no flight, and what is swept again although it was swept."""
@@ -52,15 +59,22 @@ class FlownSweeps:
                 f"{AGAIN}: flightid plan {name} --axes {','.join(once)}",
             )  # fmt: skip
         again = Counter(axis for axis in self.injected if axis in planned)
-        if again:
-            named = ", ".join(f"{axis} ({n})" if n > 1 else axis for axis, n in again.items())
-            next_step = f"next is flightid tune {name}"
-            if not set(again) <= set(self.carried):
-                next_step = f"flightid inspect {name} says why no model rests on them"
+        second = [axis for axis in again if axis in self.carried]
+        if second:
+            yield Finding(
+                "swept-again", Light.GREEN,
+                f"{_listed(second)}: swept already, and the log can carry a model: further runs "
+                "show whether flights agree",
+            )  # fmt: skip
+        by_reason: dict[str, list[str]] = {}
+        for axis in again:
+            if axis not in self.carried:
+                by_reason.setdefault(self.unfit.get(axis, UNTOLD), []).append(axis)
+        for reason, axes in by_reason.items():
             yield Finding(
                 "swept-already", Light.AMBER,
-                f"this log holds injected sweeps already: {named}; a plan is of ordinary flying",
-                next_step,
+                f"{_listed(axes)}: swept already, and no model rests on that: {reason}",
+                "see that it does not happen again before you fly this plan",
             )  # fmt: skip
 
 
@@ -79,13 +93,21 @@ def flown_sweeps(log: Log, phases: FlightPhases) -> FlownSweeps:
     if log not in _KNOWN:
         found = excitations(log, phases.airborne)
         carried: tuple[str, ...] = ()
+        unfit: dict[str, str] = {}
         if any(each.kind in SEARCHED for each in found):
             inspection = inspect_log(log)
             carried = () if inspection.verdict is Light.RED else carried_axes(inspection)
+            unfit = {band.axis: _why(inspection, band) for band in inspection.bands}
         injected = tuple(each.axis for each in found if each.is_injected)
         moved = tuple(each.axis for each in found if each.kind in SEARCHED)
-        _KNOWN[log] = FlownSweeps(injected, carried, moved)
+        _KNOWN[log] = FlownSweeps(injected, carried, moved, unfit)
     return _KNOWN[log]
+
+
+def _why(inspection: Inspection, band: AxisBand) -> str:
+    """Why an axis carries no model: its band, else what is red of the whole log."""
+    red = (each.message for each in inspection.findings if each.light is Light.RED)
+    return why_no_model(inspection, band) or next(red, UNTOLD)
 
 
 def _listed(axes: list[str]) -> str:

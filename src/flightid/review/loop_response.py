@@ -53,6 +53,8 @@ class LoopResponse(
         they did not.
     is_bent : bool
         Whether the step holds such moves: it is slower than that of small ones.
+    proportional_rad : float or None
+        Error up to which the angle controller is proportional, where parameters end it.
 
     Example
     -------
@@ -78,6 +80,7 @@ class LoopResponse(
     action: str = ""
     beyond: str = ""
     is_bent: bool = False
+    proportional_rad: float | None = None
 
     @property
     def name(self) -> str:

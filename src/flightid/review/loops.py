@@ -19,7 +19,7 @@ from flightid.logs import Log
 from flightid.record import Record
 from flightid.review.deconvolution import TOO_FEW, LoopDraws, LoopSamples, closed_loop
 from flightid.review.loop_response import LoopResponse
-from flightid.review.proportional import Excess, excess_of
+from flightid.review.proportional import Excess, bounded_law, excess_of
 from flightid.review.step_features import (
     frequency_features,
     step_features,
@@ -50,6 +50,8 @@ WINDOW_S = {"rate": 0.5, "attitude": 1.5}
 SLOWEST_HZ = {"rate": 2.0, "attitude": 0.5}
 PACE = {"rate": 1.0, "attitude": 2.5}
 STRETCHES = 10
+QUICK_DEG = 10.0, 20.0
+"""Stick moves that tell the loop of an attitude."""
 HARDLY = 0.1
 """Of what counts as quick sticks: a set-point that moves less was not meant to move."""
 TRACKING = "tracking error, rms"
@@ -115,7 +117,11 @@ def _loop(log: Log, spans: tuple[Span, ...], axis: str, loop: str) -> LoopRespon
     if unfit:
         return replace(blank, reason=unfit, action=logging(log))
     begun = replace(blank, tracking=tracking_error(pieces, "rad/s" if loop == "rate" else "rad"))
-    excess = excess_of(log, axis, pieces) if loop == "attitude" else None
+    law = bounded_law(log, axis) if loop == "attitude" else None
+    if law is None:
+        return _read(log, begun, pieces)
+    begun = replace(begun, proportional_rad=law.proportional_to_rad)
+    excess = excess_of(law, axis, pieces)
     if excess is None:
         return _read(log, begun, pieces)
     small = _pieces(pair, without(spans, list(excess.spans)))
@@ -335,11 +341,20 @@ def _is_told(level: Reading) -> bool:
 
 def what_to_fly(begun: LoopResponse) -> str:
     """What to fly so that this loop shows a step."""
-    size = "30 to 60 deg/s" if begun.loop == "rate" else "10 to 20 deg"
-    stick = {"roll": "roll stick", "pitch": "pitch stick", "yaw": "yaw stick"}[begun.axis]
-    now = begun.moved or 0.0
-    unit = "deg/s" if begun.loop == "rate" else "deg"
+    size, unit = _size_to_fly(begun)
+    now = math.degrees(begun.moved or 0.0)
     return (
-        f"fly a minute with quick moves of the {stick}, {size} to both sides, two a second at most "
-        f"(the set-point's standard deviation was {math.degrees(now):.2g} {unit})"
+        f"fly a minute with quick moves of the {begun.axis} stick, {size}, two a second at most "
+        f"(the set-point's standard deviation was {now:.2g} {unit})"
     )
+
+
+def _size_to_fly(begun: LoopResponse) -> tuple[str, str]:
+    """Size of stick moves, no larger than the angle controller is proportional to, and its unit."""
+    if begun.loop == "rate":
+        return "30 to 60 deg/s to both sides", "deg/s"
+    least, most = QUICK_DEG
+    limit = math.inf if begun.proportional_rad is None else math.degrees(begun.proportional_rad)
+    if limit < least:
+        return f"to both sides by {limit:.2g} deg at once, or less", "deg"
+    return f"{least:g} to {min(most, limit):.2g} deg to both sides", "deg"

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 from flightid.control.autopilots.parameter_files import ROLLBACK, WRITERS, read_parameters
 from flightid.conventions import Light
@@ -13,8 +15,13 @@ from flightid.errors import FileFormatError
 from flightid.findings import Finding
 from flightid.frozen import dataclass
 
+if TYPE_CHECKING:
+    from flightid.review.comparison import FlightComparison
+
+STICK = "{} stick"
 SAME = 1e-4
 """Relative difference of gains that went through single precision and a ground station."""
+NOTHING: Mapping[str, str] = MappingProxyType({})
 SUFFIXES = tuple(suffix for suffix, _ in WRITERS.values())
 
 
@@ -33,27 +40,79 @@ class FlownStep:
     following: Path | None
     back: Path | None
 
-    def finding(self, *, kept: bool | None, log: str = "this log") -> Finding:
-        """What to do after this step, by whether the flight kept its promise; None: in part."""
+    def finding(
+        self,
+        *,
+        kept: bool | None,
+        to_fly: Mapping[str, str] = NOTHING,
+        log: str = "LOG",
+        again: str = "compare again",
+        swept: bool = False,
+    ) -> Finding:
+        """What to do after this step, and with what command it goes on.
+
+        Parameters
+        ----------
+        kept : bool or None
+            Whether the flight kept its promise; None: in part.
+        to_fly : mapping of str to str
+            Loops that it left unjudged, with what to fly for each; see `left_to_fly`.
+        log : str
+        again : str
+            Command that compares the promise with the next log.
+        swept : bool
+            Whether the log holds sweeps, of which models can be made anew.
+        """
         said = f"{log} flew {self.flown.name}"
-        if kept is None:
-            return Finding(
-                "step-not-judged", Light.UNKNOWN, f"{said}; not all that it promised was judged",
-                "fly these gains again as asked for above before the next step",
-            )  # fmt: skip
-        if not kept:
+        if kept is False:
             back = "the gains before it" if self.back is None else str(self.back)
-            return Finding("step-back", Light.AMBER, f"{said}, and not as promised", f"load {back}")
+            anew = f"flightid {'tune' if swept else 'plan'} {log}"
+            why = "its sweeps tell" if swept else "further sweeps will tell"
+            action = f"load {back}; what the models missed {why}: {anew}"
+            return Finding("step-back", Light.AMBER, f"{said}, and not as promised", action)
+        if to_fly:
+            said += f"; what was judged is as promised, not judged: {', '.join(to_fly)}"
+            flights = "; ".join(_joined(to_fly))
+            action = f"load {self.flown} and {flights}; then {again}"
+            return Finding("step-not-judged", Light.UNKNOWN, said, action)
+        if kept is None:
+            said += "; nothing of what models promised of it could be judged"
+            action = f"{again}, with models whose errors are known"
+            return Finding("step-not-judged", Light.UNKNOWN, said, action)
         if self.following is None:
             return Finding("last-step", Light.GREEN, f"{said}, the last step: you have arrived")
-        action = f"fly {self.following} next, log, and compare again"
-        return Finding("next-step", Light.GREEN, said, action)
+        action = f"fly {self.following} next, log, then {again}"
+        return Finding("next-step", Light.GREEN, f"{said}, as promised", action)
 
     def unjudged(self, log: str) -> Finding:
         """That two flights do not say whether a step kept its promise, and what does."""
         said = f"{log} flew {self.flown.name}; what models promised of it is not held against it"
         action = f"flightid compare STUDY-output {log}, of the study that made these gains"
         return Finding("step-not-judged", Light.UNKNOWN, said, action)
+
+
+def left_to_fly(promise: FlightComparison) -> dict[str, str]:
+    """Loops that a flight leaves unjudged of what models promised, with what to fly for each.
+
+    Parameters
+    ----------
+    promise : FlightComparison
+        Of `flightid.compare_with_promise`.
+    """
+    judged = {each.loop for each in promise.changes if each.chance is not None}
+    flown = {loop.name: loop.action for loop in promise.after}
+    promised = [loop.name for loop in promise.before if loop.name not in judged]
+    return {name: flown[name] for name in promised if flown.get(name)}
+
+
+def _joined(to_fly: Mapping[str, str]) -> Iterator[str]:
+    """What to fly, in one sentence of all axes for which it is alike."""
+    sticks: dict[str, list[str]] = {}
+    for name, action in to_fly.items():
+        axis = name.split()[0]
+        sticks.setdefault(action.replace(f"{axis} stick", STICK), []).append(axis)
+    for action, axes in sticks.items():
+        yield action.replace(STICK, f"{' and '.join(dict.fromkeys(axes))} stick")
 
 
 def flown_step(folders: Iterable[Path], parameters: Mapping[str, float]) -> FlownStep | None:

@@ -49,16 +49,40 @@ class Excess:
     def action(self) -> str:
         """What to fly so that the controller is proportional."""
         limit = math.degrees(self.law.proportional_to_rad)
-        return f"fly moves of the {self.axis} stick by {limit:.2g} deg at once, or less"
+        return (
+            f"fly a minute of quick moves of the {self.axis} stick by {limit:.2g} deg at once, or "
+            "less"
+        )
 
 
-def excess_of(log: Log, axis: str, pieces: Sequence[Record]) -> Excess | None:
-    """Where the attitude was farther from its set-point than the controller is proportional to.
+def bounded_law(log: Log, axis: str) -> AngleLaw | None:
+    """The angle controller of a log, where it stops to be proportional at some error.
 
     Parameters
     ----------
     log : Log
         Whose parameters count.
+    axis : str
+
+    Returns
+    -------
+    AngleLaw or None
+        None where it is proportional to all errors, or nothing tells it.
+    """
+    try:
+        law = angle_law(autopilot_of(log), log.parameters, axis)
+    except DataError:
+        return None
+    return law if law is not None and math.isfinite(law.proportional_to_rad) else None
+
+
+def excess_of(law: AngleLaw, axis: str, pieces: Sequence[Record]) -> Excess | None:
+    """Where the attitude was farther from its set-point than the controller is proportional to.
+
+    Parameters
+    ----------
+    law : AngleLaw
+        See `bounded_law`.
     axis : str
     pieces : sequence of Record
         With channels ``"set_point"`` and ``"measured"``, rad.
@@ -66,14 +90,8 @@ def excess_of(log: Log, axis: str, pieces: Sequence[Record]) -> Excess | None:
     Returns
     -------
     Excess or None
-        None where errors stayed small, or nothing tells the controller.
+        None where errors stayed small.
     """
-    try:
-        law = angle_law(autopilot_of(log), log.parameters, axis)
-    except DataError:
-        return None
-    if law is None or not math.isfinite(law.proportional_to_rad):
-        return None
     spans: list[Span] = []
     most_rad = 0.0
     for piece in pieces:

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from shlex import quote
 from statistics import median
 from typing import TYPE_CHECKING
 
-from flightid.control.autopilots.angle_law import angle_law
-from flightid.control.autopilots.parameter_files import parameter_suffix
-from flightid.control.autopilots.pid_loop import PidLoop
-from flightid.control.tuning.limits import ANGLE
 from flightid.conventions import Light
+from flightid.evidence.evidence import GUIDELINES, PREDICTION
 from flightid.findings import Finding, counted, said_once, worst
 from flightid.frozen import dataclass
 from flightid.models import NarxModel
@@ -21,17 +17,12 @@ from flightid.report.content import Document, Lights, Section, TableBlock
 from flightid.study.elsewhere import red_elsewhere
 from flightid.study.estimate_tables import short_modes_table, structure_words
 from flightid.study.faults import CODE, other_faults, tuning_fault
-from flightid.table import Cell, Column, Table
+from flightid.study.gain_answer import flown_again, gain_table, gains_finding, margin_table
+from flightid.table import Table
 
 if TYPE_CHECKING:
-    from flightid.control.tuning.pid_design import PidDesign
-    from flightid.control.tuning.result import Tuning
-    from flightid.control.tuning.tuned_filters import TunedFilters
     from flightid.study.identified import ModelResults
     from flightid.study.results import StudyResults
-    from flightid.vehicles import GainFlight
-
-MARGINS = {"phase margin": "deg", "gain margin": "dB"}
 
 
 @dataclass(frozen=True)
@@ -77,11 +68,11 @@ def answer_of(
         fault = tuning_fault(study.faults)
         told = [] if fault is None else [_without_verdicts(fault, study.identified)]
         return StudyAnswer(tuple(said_once([*findings, *told])))
-    findings.append(_gains(tuning, source, written, results))
+    findings.append(gains_finding(tuning, source, written, results))
     if study.gain_flight is not None:
-        findings.append(_flown(study.gain_flight))
+        findings.append(flown_again(study.gain_flight))
     made = tuning.sound or tuple(design for design in tuning.designs if design.exists)
-    tables = (_gain_table(made, tuning.filters), _margin_table(made)) if made else ()
+    tables = (gain_table(made, tuning.filters), margin_table(made)) if made else ()
     return StudyAnswer(tuple(findings), tables)
 
 
@@ -107,7 +98,10 @@ def in_short(item: ModelResults) -> Finding:
 
 
 def models_in_short(items: Sequence[ModelResults]) -> Lights:
-    """One line about each model; a last reason that several share, and its action, is said once."""
+    """One line about each model; a last reason that several share, and its action, is said once.
+
+    What is left of a line then has the light of what it says, not of the reason that went.
+    """
     lines = [in_short(item) for item in items]
     groups: dict[tuple[str, str, str], list[int]] = {}
     for place, line in enumerate(lines):
@@ -118,10 +112,18 @@ def models_in_short(items: Sequence[ModelResults]) -> Lights:
         if len(places) > 1:
             for place in places:
                 said = lines[place].message.removesuffix(f"; {reason}")
-                lines[place] = replace(lines[place], message=said, action="")
+                left = _said_light(items[place])
+                lines[place] = replace(lines[place], message=said, action="", light=left)
             names = ", ".join(items[place].name for place in places)
             lines.append(Finding("model", Light(light), f"{names}: {reason}", action))
     return Lights(tuple(lines), repeats=True)
+
+
+def _said_light(item: ModelResults) -> Light:
+    """The light of what a line says of a fit beside its reason: cost and prediction."""
+    checks = () if item.fit is None else map(item.fit.evidence.check, (PREDICTION, GUIDELINES))
+    told = tuple(check.finding for check in checks if check is not None)
+    return worst(told) if told else Light.UNKNOWN
 
 
 def short_document(
@@ -184,7 +186,7 @@ def _models(study: StudyResults, source: str) -> Finding:
     said = f"{several if bad or none else counted(len(good), 'model')} to use" if good else ""
     said += _promise(good)
     if any(each.light is Light.AMBER for each in lights):
-        said += "; each says what is to be doubted" if good else ""
+        said += "; what is to be doubted is said of each" if good else ""
     if none:
         said += f"{'; ' if said else ''}none of {', '.join(none)}, for the reason that is named"
     if bad:
@@ -246,134 +248,3 @@ def _loop_of(items: Sequence[ModelResults]) -> str:
     if widths:
         return max(widths, key=widths.__getitem__)
     return f"{fit.model.outputs[0]}/{fit.model.inputs[0]}"
-
-
-def _gains(tuning: Tuning, source: str, written: Sequence[str] = (), results: str = "") -> Finding:
-    """Whether there are gains, and what they promise or what is in the way."""
-    designs, findings = tuning.sound, tuning.findings
-    left = "; ".join(f"{axis}: {why}" for axis, why in tuning.left_out.items())
-    red = next((each for each in findings if each.light is Light.RED), None)
-    if not designs:
-        action = red.action if red else "relax what cannot be met, or identify better"
-        return Finding("gains", Light.RED, f"no gains to fly: {left}", action)
-    least = [
-        each.worst
-        for design in designs
-        for each in design.worst_cases
-        if each.name == "phase margin" and each.worst is not None
-    ]
-    promise = f" keep at least {min(least):.0f}° of phase margin" if least else " keep their limits"
-    steps = max(len(design.stages) for design in designs)
-    axes = ", ".join(design.axis for design in designs)
-    plain = any(isinstance(design.loop, PidLoop) for design in designs)
-    if plain:
-        coded = all(design.plain and design.plain.sampled for design in designs)
-        files = "controller.toml and controller.c" if coded else "controller.toml"
-        where = f"stand in {written[0]}" if written else f"lie beside the report as {files}"
-        way = f"they {where}: close the loop with them, and log"
-    elif written:
-        step = f", step 1 of {steps}" if steps > 1 else ""
-        way = f"fly {written[0]}{step}, log, then flightid compare {results} LOG: kept or not"
-    else:
-        file = f"gains{parameter_suffix(designs[0].flown.autopilot)}"
-        way = f"flightid tune {source} --write {file} writes them; " + (
-            f"fly step 1 of {steps}, log, and look again" if steps > 1 else "fly them, and log"
-        )
-    what = "rig" if plain else "vehicle"
-    message = f"gains of {axes}{promise} at the worst {what} that the data allow"
-    asked = designs[0].requirements.phase_margin_deg
-    if least and min(least) < asked:
-        share = min(design.share_met for design in designs)
-        message += f" ({100.0 * share:.1f} % of them or more keep {asked:g}° and all else asked)"
-    if left:
-        message += f"; none to fly, they stay as flown: {left}"
-    return Finding("gains", worst(findings) if findings else Light.GREEN, message, way)
-
-
-def _flown(flight: GainFlight) -> Finding:
-    """Whether the simulated vehicle keeps what the gains promise."""
-    first = next((each for each in flight.findings if each.light is Light.RED), None)
-    said = f"{flight.meeting} of {len(flight.judged)} pairs of 95 % intervals meet"
-    least = [
-        each.measured.value
-        for each in flight.margins
-        if each.name == "phase margin" and each.measured.value is not None
-    ]
-    said += f", least phase margin {min(least):.0f}°" if least else ""
-    told = f"flown again in the simulated vehicle: {first.message if first else said}"
-    return Finding("flown-again", worst(flight.findings), told, first.action if first else "")
-
-
-def _gain_table(designs: tuple[PidDesign, ...], filters: TunedFilters | None) -> Table:
-    columns = (
-        Column("axis"), Column("parameter"), Column("flown"), Column("new"),
-        Column("ratio", digits=3), Column("first step"),
-    )  # fmt: skip
-    named = {each.name: each for design in designs for each in design.filters}
-    rows: list[tuple[Cell, ...]] = [
-        ("filter", each.name, each.old, each.value, each.value / each.old if each.old else None,
-         each.value)
-        for each in named.values()
-    ]  # fmt: skip
-    rows += [
-        (
-            design.axis, change.name, change.flown, change.new, change.ratio,
-            design.stages[0].gains.get(change.name) if len(design.stages) > 1 else None,
-        )
-        for design in designs
-        for change in design.changes
-    ]  # fmt: skip
-    notes = (*(() if filters is None else filters.words), *small_angles(designs))
-    return Table("Gains to fly", columns, tuple(rows), notes).without_empty_columns()
-
-
-def small_angles(designs: Iterable[PidDesign]) -> Iterator[str]:
-    """Up to which error angle controllers do what is promised, where parameters end it."""
-    said: list[str] = []
-    bounds: dict[str, None] = {}
-    for design in designs:
-        flown, new = (
-            angle_law(each.autopilot, each.gains, design.axis)
-            for each in (design.flown, design.loop)
-        )
-        if flown is None or new is None or not math.isfinite(new.proportional_to_rad):
-            continue
-        before, after = (math.degrees(each.proportional_to_rad) for each in (flown, new))
-        said.append(f"{after:.2g} deg in {design.axis} ({before:.2g} as flown)")
-        bounds[new.bound] = None
-    if said:
-        yield (
-            f"Angle steps are promised for errors up to {', '.join(said)}: larger ones are "
-            f"answered more slowly ({', '.join(bounds)})."
-        )
-
-
-def _margin_table(designs: tuple[PidDesign, ...]) -> Table:
-    columns = [Column("axis"), Column("loop")]
-    for name, unit in MARGINS.items():
-        columns += [Column(name, unit, 3), Column(f"{name} as flown", unit, 3)]
-    rows: list[tuple[Cell, ...]] = []
-    for design in designs:
-        for loop in dict.fromkeys(each.loop for each in design.worst_cases):
-            cells: list[Cell] = []
-            for name in MARGINS:
-                found = [e for e in design.worst_cases if (e.loop, e.name) == (loop, name)]
-                cells += [found[0].worst, found[0].flown_worst] if found else [None, None]
-            if any(cell is not None for cell in cells):
-                rows.append((design.axis, loop, *cells))
-    asked = designs[0].requirements
-    angled = any(each.loop == ANGLE for design in designs for each in design.worst_cases)
-    angle = f" ({asked.angle_phase_margin_deg:g} deg of the angle loop)" if angled else ""
-    note = f"Required: {asked.phase_margin_deg:g} deg{angle} and {asked.gain_margin_db:g} dB."
-    notes = [note]
-    if any(f.code == "margin-beyond-band" for each in designs for f in each.findings):
-        shown = [[row[2 + 2 * place] for row in rows] for place in range(len(MARGINS))]
-        gone = [name for name, cells in zip(MARGINS, shown, strict=True) if {*cells} == {None}]
-        dashed = any(None in cells and {*cells} != {None} for cells in shown)
-        what = " and ".join(["–"] * (dashed or not gone) + gone)
-        notes.append(
-            f"{what}: not promised, for what lies above the band to which the model was shown."
-        )
-    what = "rig" if any(isinstance(each.loop, PidLoop) for each in designs) else "vehicle"
-    title = f"Margins of the worst {what} that the data allow"
-    return Table(title, tuple(columns), tuple(rows), tuple(notes)).without_empty_columns()

@@ -1,18 +1,27 @@
-"""Flights worth simulating: the published rig study, and the same rig flown as we advise."""
+"""Flights worth simulating: the published rig study, the rig as we advise, and sticks alone."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import fields, replace
 from typing import Any, TypeVar
+
+import numpy as np
 
 from flightid.errors import OptionError
 from flightid.vehicles.autopilot import Autopilot, PilotDoublet, RateGains, SidActivation
 from flightid.vehicles.flight import Flight, fly
 from flightid.vehicles.quadrotor import QuadrotorParameters, Sensors, Turbulence
+from flightid.vehicles.truth import AXES
 
 Group = TypeVar("Group", QuadrotorParameters, Autopilot, Sensors, Turbulence)
-SCENARIOS = ("advised", "published")
+SCENARIOS = ("advised", "published", "sticks")
+STICK_RAD, STICK_YAW_RAD_S = 0.2, 0.8
+"""Largest move of a stick at once: angle of roll and pitch, rate of yaw."""
+MINUTE_S, FIRST_MOVE_S, BETWEEN_AXES_S = 60.0, 5.0, 5.0
+WIDTHS_S, PAUSES_S = (0.25, 0.8), (0.3, 0.8)
+"""Of half a move to and fro, and of the rest behind it: about one move a second."""
 GROUPS = ("vehicle", "autopilot", "sensors", "turbulence")
 
 
@@ -78,17 +87,56 @@ def verification_doublets(start_s: float) -> tuple[PilotDoublet, ...]:
     )
 
 
-def fly_scenario(
-    scenario: str = "advised", *, seed: int = 0, **changes: Mapping[str, Any]
-) -> Flight:
-    """Fly the rig: sweeps of the three axes, then doublets for verification.
+def stick_moves(largest_rad: float = STICK_RAD, *, seed: int = 0) -> tuple[PilotDoublet, ...]:
+    """A minute of quick moves of each stick, to and fro by chance: what an ordinary flight holds.
 
     Parameters
     ----------
-    scenario : {"advised", "published"}
-        Sweep settings: ours, or those of the published rig study.
+    largest_rad : float
+        Most that roll or pitch is asked to move at once, rad.
+    seed : int
+        Of sizes and times.
+
+    Example
+    -------
+    >>> moves = stick_moves(0.1)
+    >>> max(2.0 * abs(move.amplitude) for move in moves if move.axis == "roll") <= 0.1
+    True
+    """
+    drawn = np.random.default_rng(seed)
+    moves: list[PilotDoublet] = []
+    time_s = FIRST_MOVE_S
+    for axis in AXES:
+        # Halfway a doublet jumps by twice its amplitude.
+        largest = STICK_YAW_RAD_S if axis == "yaw" else 0.5 * largest_rad
+        end_s = time_s + MINUTE_S
+        while time_s < end_s:
+            size = float(largest * drawn.uniform(0.5, 1.0) * drawn.choice((-1.0, 1.0)))
+            move = PilotDoublet(axis, time_s, size, float(drawn.uniform(*WIDTHS_S)))
+            moves.append(move)
+            time_s = move.end_s + float(drawn.uniform(*PAUSES_S))
+        time_s += BETWEEN_AXES_S
+    return tuple(moves)
+
+
+def fly_scenario(
+    scenario: str = "advised",
+    *,
+    seed: int = 0,
+    stick_rad: float | None = None,
+    **changes: Mapping[str, Any],
+) -> Flight:
+    """Fly the rig: sweeps of the three axes and doublets for verification, or sticks alone.
+
+    Parameters
+    ----------
+    scenario : {"advised", "published", "sticks"}
+        Sweep settings, ours or those of the published rig study; or an ordinary flight: a minute of
+        quick moves of each stick.
     seed : int
         Seed of all noise.
+    stick_rad : float, optional
+        Of sticks: most that roll or pitch is asked to move at once; default: 0.2 rad.
     **changes : mapping
         Groups ``vehicle``, ``autopilot``, ``sensors``, ``turbulence``, each with the fields that
         differ from the default.
@@ -112,16 +160,34 @@ def fly_scenario(
     for group in changes:
         if group not in GROUPS:
             raise OptionError("setting is not known", found=group, needed=f"one of {GROUPS}")
-    runs = advised_runs() if scenario == "advised" else published_runs()
+    runs, doublets = _flown(scenario, stick_rad, seed)
     return fly(
         runs=runs,
-        doublets=verification_doublets(runs[-1].end_s + 5.0),
+        doublets=doublets,
         vehicle=_changed(QuadrotorParameters(), changes.get("vehicle", {})),
         autopilot=_changed(Autopilot(), changes.get("autopilot", {})),
         sensors=_changed(Sensors(), changes.get("sensors", {})),
         turbulence=_changed(Turbulence(), changes.get("turbulence", {})),
         seed=seed,
     )
+
+
+def _flown(
+    scenario: str, stick_rad: float | None, seed: int
+) -> tuple[tuple[SidActivation, ...], tuple[PilotDoublet, ...]]:
+    """Sweeps and stick moves of a scenario."""
+    if scenario == "sticks":
+        largest = STICK_RAD if stick_rad is None else stick_rad
+        if not (math.isfinite(largest) and largest > 0.0):
+            raise OptionError("the size of stick moves", found=largest, needed="above 0 rad")
+        return (), stick_moves(largest, seed=seed)
+    if stick_rad is not None:
+        raise OptionError(
+            "sweeps are flown without sticks", found=f"stick_rad={stick_rad:g}",
+            needed="the scenario sticks",
+        )  # fmt: skip
+    runs = advised_runs() if scenario == "advised" else published_runs()
+    return runs, verification_doublets(runs[-1].end_s + 5.0)
 
 
 def _changed(group: Group, values: Mapping[str, Any]) -> Group:

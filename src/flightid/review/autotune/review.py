@@ -69,7 +69,7 @@ def review_autotune(log: Log | str | Path) -> AutotuneReview:
             "the log holds no autotune",
             found=f"{opened.path.name}, {opened.kind}",
             needed="ATUN messages (ArduCopter) or autotune_attitude_control_status (PX4)",
-            action="flightid flight says what an ordinary flight tells",
+            action=f"flightid flight {opened.path.name} says what an ordinary flight tells",
         )
     opinions = []
     with progress(max(len(run.spans), 1), "second opinion") as advance:
@@ -100,10 +100,10 @@ def _before(log: Log, run: AutotuneRun) -> dict[str, dict[str, float]]:
 def _judged(review: AutotuneReview) -> Iterator[Finding]:
     yield from review.run.findings
     for opinion in review.opinions:
-        yield from _of_opinion(opinion)
+        yield from _of_opinion(opinion, review.name)
 
 
-def _of_opinion(opinion: SecondOpinion) -> Iterator[Finding]:
+def _of_opinion(opinion: SecondOpinion, log: str) -> Iterator[Finding]:
     if opinion.tuned is None:
         yield Finding(
             f"no-second-opinion-{opinion.axis}",
@@ -119,9 +119,10 @@ def _of_opinion(opinion: SecondOpinion) -> Iterator[Finding]:
     flown = "" if opinion.flown is None else f"; before: {_words(opinion.flown)[1]}"
     action = {
         Light.GREEN: "",
-        Light.AMBER: "look at the step in flight (flightid flight), and sweep the axis for margins "
-        "that are surer (flightid design)",
-        Light.RED: "do not fly these gains; sweep the axis and tune it (flightid design, tune)",
+        Light.AMBER: f"look at the step in flight (flightid flight {log}); margins that are surer "
+        f"take a sweep: flightid plan {log} --axes {opinion.axis}",
+        Light.RED: f"do not fly these gains; sweep the axis, then tune it: flightid plan {log} "
+        f"--axes {opinion.axis}",
     }[light]
     yield Finding(
         f"autotune-margins-{opinion.axis}",
