@@ -120,7 +120,7 @@ def write_rig(path: Path, seed: int = 7) -> None:
 
 def _has_gains(said: str) -> bool:
     """Gains, and the phase margin that they keep."""
-    return "phase margin" in said and ("Gains to fly" in said or "PID" in said)
+    return "phase margin" in said and ("Gains to fly" in said or "Gains of the controller" in said)
 
 
 if __name__ == "__main__":

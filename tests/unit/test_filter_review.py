@@ -25,6 +25,7 @@ from flightid.review.edited_filters import filter_bench
 from flightid.review.filter_findings import _advice
 from flightid.review.gyro_noise import GyroNoise, floor_beneath
 from flightid.review.notch_proposal import _series
+from flightid.review.verdicts import judge_flight
 from tests.closeness import assert_close
 
 PARAMETERS = {
@@ -85,6 +86,11 @@ def test_a_notch_by_throttle_is_proposed_where_motors_shake_the_gyro(
     assert abs(choice.values["INS_HNTCH_FREQ"] - 100.0) < 8.0
     assert choice.values["INS_HNTCH_HMNCS"] == 3.0
     assert any(f.code == "output-noise-roll" for f in review.findings)
+    # Of a fall the same filters were advised with a command that refuses to write them.
+    fell = judge_flight(replace(review, phases=replace(review.phases, tipped_s=20.0)))
+    (noisy,) = (each for each in fell if each.code == "output-noise-roll")
+    assert noisy.action.startswith("find the cause of the fall first")
+    assert not any("--write" in each.action for each in fell)
     monkeypatch.setattr(fid, "review_flight", lambda *_, **__: review, raising=False)
     made = CliRunner().invoke(command, [str(path), "--write", str(file)])
     assert made.exit_code == 0, made.output
@@ -232,5 +238,5 @@ def test_the_command_tunes_with_suggested_filters_and_writes_them(tmp_path: Path
 
 def test_filters_that_change_nothing_are_not_advised() -> None:
     nothing: Any = SimpleNamespace(within_limit=True, axes=())
-    assert _advice("", "", nothing, "").startswith("balance propellers")
-    assert _advice("", "", None, "").startswith("balance propellers")
+    assert _advice("", "", nothing, "", "").startswith("balance propellers")
+    assert _advice("", "", None, "", "").startswith("balance propellers")

@@ -71,7 +71,9 @@ def test_result_is_plain_values_text_and_tables(good: Inspection) -> None:
     head = "s of the autopilot's clock, as all times here"
     span = f"from {good.start_s:.1f} to {good.start_s + good.duration_s:.1f} {head}"
     assert span in " ".join(text.split())
-    assert "can support identification" in text
+    assert (
+        "This log can carry a model of roll, pitch and yaw.\nNext: flightid tune sweeps.bin" in text
+    )
     assert "injected sweep on roll" in " ".join(text.split())
     assert max(map(len, text.split("\n\n")[0].splitlines())) <= 100
     assert [table.title for table in good.tables()][1:3] == [
@@ -144,7 +146,10 @@ def test_without_a_sweep_no_axis_carries_a_model_and_the_verdict_is_red(
     found = inspected(SweepFlight(injected=False))
     assert carried_axes(found) == ()
     assert codes(found, Light.RED) == {"no-model"}
-    assert "can support identification" not in found.to_text()
+    assert "Next: " not in found.to_text()
+    (red,) = (each for each in found.findings if each.code == "no-model")
+    assert red.message == "no axis carries a model: none was swept"
+    assert not any("usable from" in each.message for each in found.findings)
     why = "roll, pitch, yaw: nothing was injected, and no sweep was flown"
     assert carried_sentence(found) == f"This log can carry no model: {why}."
 
@@ -221,6 +226,6 @@ def test_command_line_prints_text_or_json_and_leaves_with_the_verdict(tmp_path: 
     path = SweepFlight(airborne=False, sweep_s=5.0, motor_us=1000.0).write(tmp_path)
     text = CliRunner().invoke(command, [str(path)])
     assert text.exit_code == 1
-    assert "cannot support identification" in text.output
+    assert "it can carry no model" in " ".join(text.output.split())
     document = CliRunner().invoke(command, [str(path), "--json"])
     assert json.loads(document.output)["verdict"] == "red"

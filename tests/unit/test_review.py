@@ -257,11 +257,14 @@ def test_a_loop_that_ends_far_from_what_is_asked_is_amber(
     assert "still rises there: settling is not seen" in later.message
     short = later.light is Light.AMBER
     assert short is (said == "beyond")
-    assert (later.light is Light.UNKNOWN) is (said == "short of")
+    # An end of 0.54 (-0.05 to 1.13) had been green.
+    untold = error == 0.3
+    assert (later.light is Light.UNKNOWN) is (said == "short of" or untold)
     assert ("it stays" in later.message) is short
-    assert step.light is (Light.AMBER if said else Light.GREEN)
+    fine = Light.UNKNOWN if untold else Light.GREEN
+    assert step.light is (Light.AMBER if said else fine)
     assert (f"it stays {said} what is asked" in step.message) is bool(said)
-    assert bool(step.action) is bool(said)
+    assert bool(step.action) is (bool(said) or untold)
     assert gains in step.action
     _with_sweeps(review, readings, gains)
 

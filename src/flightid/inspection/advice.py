@@ -103,7 +103,8 @@ def excitation(log: Log) -> str:
         return f"{piloted}; {sized}"
     if log.vehicle == "copter":
         return f"fly system identification mode with {SID_MIXER}; {sized}"
-    return f"fly sweeps or 3-2-1-1 steps about each axis; {repeats}"
+    swept = "fly sweeps or 3-2-1-1 steps about each axis"
+    return f"{swept}; {sized if log.vehicle == 'plane' else repeats}"
 
 
 def record_length(lowest_hz: float = LOWEST_OF_INTEREST.value) -> str:

@@ -157,7 +157,12 @@ class Inspection(Result, schema="flightid.inspection/1"):
         head = f"{self.name}: {self.firmware or self.kind}, {self.logged_words}"
         opening = (*wrapped(head, WIDTH), *wrapped(carried_sentence(self), WIDTH))
         said = "\n".join(opening)
-        return f"{said}\nThis log {self._words()}.\n{verdict_lines(self.findings)}"
+        return "\n".join([said, *self._next(), verdict_lines(self.findings)])
+
+    def _next(self) -> Iterator[str]:
+        """The command that goes on from a log that carries a model."""
+        if self.verdict in (Light.GREEN, Light.AMBER) and carried_axes(self):
+            yield f"Next: flightid tune {self.name} (models, then gains), or run (models alone)."
 
     def _used_rates(self) -> Table:
         """Rates of what a model would be made of; the others are counted."""
@@ -178,8 +183,9 @@ class Inspection(Result, schema="flightid.inspection/1"):
             f"{self.name}: {self.firmware or self.kind}, {self.logged_words}, "
             f"airborne {self.phases.airborne_words}"
         )
-        tables = (self._axes(), self._excitations(), self._saturations(), self._skews())
-        return "\n\n".join([head, *(each.to_text() for each in tables if each.rows)])
+        tables = (self._axes(), self._excitations(), self._saturations())
+        said = "\n".join(wrapped(head, WIDTH))
+        return "\n\n".join([said, *(each.to_text() for each in tables if each.rows)])
 
     def _advised(self) -> Iterator[tuple[Finding, str]]:
         """Findings with what to do; an advice that several share is given once."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from flightid.conventions import Light
 from flightid.findings import Finding, counted, in_order
 from flightid.inspection import advice
-from flightid.inspection.carried import carried_axes
+from flightid.inspection.carried import carried_axes, is_swept
 from flightid.inspection.gap_findings import gap_findings
 from flightid.inspection.saturation import Saturation
 from flightid.inspection.signals import map_of
@@ -46,7 +46,9 @@ def _without_model(log: Log, found: Inspection, told: list[Finding]) -> list[Fin
         return []
     if carried_axes(found):
         return []
-    what = "no axis carries a model: none has a sweep or injection in a band wide enough"
+    swept = any(is_swept(found, band.axis) for band in found.bands)
+    why = "none has a sweep in a band wide enough" if swept else "none was swept"
+    what = f"no axis carries a model: {why}"
     return [Finding("no-model", Light.RED, what, advice.excitation(log))]
 
 
@@ -200,7 +202,9 @@ def _excitation(log: Log, found: Inspection, scales: list[Finding]) -> list[Find
 
 
 def _bands(log: Log, found: Inspection) -> list[Finding]:
-    findings = [_band(log, band) for band in found.bands if band.rate_hz > 0]
+    findings = [
+        _band(log, band, is_swept(found, band.axis)) for band in found.bands if band.rate_hz > 0
+    ]
     if not any(finding.code.startswith("band") for finding in findings):
         measured = [b for b in found.bands if b.largest_coherence is not None]
         largest = ", ".join(f"{b.axis} {b.largest_coherence:.2f}" for b in measured)
@@ -217,7 +221,7 @@ def _bands(log: Log, found: Inspection) -> list[Finding]:
     return findings
 
 
-def _band(log: Log, band: AxisBand) -> Finding:
+def _band(log: Log, band: AxisBand, swept: bool) -> Finding:
     coherent = band.coherent_rad_s or band.band_rad_s
     if coherent is None:
         return Finding(
@@ -228,7 +232,8 @@ def _band(log: Log, band: AxisBand) -> Finding:
         )
     width = coherent[1] / coherent[0]
     shown = band.told_rad_s or coherent
-    word = "usable" if band.is_usable else "coherent"
+    # Of plain flying a band is coherent, and carries nothing.
+    word = "usable" if band.is_usable and swept else "coherent"
     text = (
         f"{band.axis}: {word} from {hertz_words(shown)} ({shown[0]:.3g} to {shown[1]:.3g} rad/s), "
         f"mean coherence {band.coherence:.2f}"
@@ -242,9 +247,10 @@ def _band(log: Log, band: AxisBand) -> Finding:
             f"{text}: {NARROW}",
             advice.excitation(log),
         )
-    light = Light.GREEN if width >= BAND_GOOD.value else Light.AMBER
-    action = "" if light is Light.GREEN else advice.excitation(log)
-    return Finding(f"band-{band.axis}", light, text, action)
+    if width >= BAND_GOOD.value:
+        return Finding(f"band-{band.axis}", Light.GREEN, text)
+    narrow = f"{text}; less than a decade, which tells gain, lag and delay apart"
+    return Finding(f"band-{band.axis}", Light.AMBER, narrow, advice.excitation(log))
 
 
 def _loop(log: Log, found: Inspection) -> list[Finding]:

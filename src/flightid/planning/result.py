@@ -205,7 +205,7 @@ class SweepPlan(Result, schema="flightid.sweep_plan/1"):
     def _notes(self) -> Iterator[str]:
         if self.sweeps:
             yield f"{self.flight_time.words[0].upper()}{self.flight_time.words[1:]}."
-            yield f"Log: {self.logging}."
+            yield f"Log: {self.logging.removeprefix('log ')}."
         yield from map(str, said_once(self.findings))
 
     def settings(self, axis: str) -> Table:

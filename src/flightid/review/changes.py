@@ -220,6 +220,7 @@ def verdicts(
         count = len({c.loop for c in judged})
         said = f"{len(judged)} numbers of {count} loop{'' if count == 1 else 's'}"
         told = "flown as promised" if promised else "no change beyond chance"
+        told += f" ({len(changes) - len(judged)} more not judged)" if changes[len(judged) :] else ""
         small = sum(each.key in significant for each in judged)
         if small:
             told += f" but for {small} that changed by less than what counts ({TOLERANCE})"

@@ -12,11 +12,16 @@ from flightid.findings import Finding
 from flightid.review.filters import FilterReview
 from flightid.review.thresholds import OUTPUT_NOISE, PHASE_TO_WIN
 
+AFTER_THE_FALL = "find the cause of the fall first; filters by the noise of the next flight"
 
-def filter_findings(filters: FilterReview, log: str, kind: str) -> Iterator[Finding]:
+
+def filter_findings(
+    filters: FilterReview, log: str, kind: str, *, fallen: bool
+) -> Iterator[Finding]:
     """Noise in the outputs, notches beside the peaks, and what better filters would do.
 
-    `log` is the name of its file, `kind` who wrote it, as `Log.kind` has it.
+    `log` is the name of its file, `kind` who wrote it, as `Log.kind` has it; of a flight that ended
+    in a fall, `fallen`, none are proposed.
     """
     for text in filters.missed:
         yield Finding(
@@ -43,9 +48,9 @@ def filter_findings(filters: FilterReview, log: str, kind: str) -> Iterator[Find
             Light.AMBER,
             f"noise of the gyroscope moves the {use.axis} output by {share:.2g} % of full command, "
             f"rms; {100.0 * limit:g} % is fine",
-            _advice(told, words, choice, way),
+            AFTER_THE_FALL if fallen else _advice(told, words, choice, way, log),
         )
-    if noisy or choice is None or not choice.changes:
+    if noisy or fallen or choice is None or not choice.changes:
         return
     most = max(each.phase_gained_deg for each in choice.axes)
     if most >= PHASE_TO_WIN.value:
@@ -67,10 +72,10 @@ def _phase(choice: FilterChoice | None) -> str:
     return f"{word} up to {abs(most.phase_gained_deg):.2g} deg at {hertz:.3g} Hz"
 
 
-def _advice(told: str, words: str, choice: FilterChoice | None, way: str) -> str:
+def _advice(told: str, words: str, choice: FilterChoice | None, way: str, log: str) -> str:
     if choice is None or not told:
         return "balance propellers and damp the mount: no cut-off within its range does better"
     rest = "" if choice.within_limit else "; it is not enough: balance propellers, damp the mount"
     if min(each.phase_gained_deg for each in choice.axes) < -PHASE_TO_WIN.value:
-        rest += "; sweep with them and tune the gains (flightid plan), or lower D instead"
+        rest += f"; sweep with them and tune the gains (flightid plan {log}), or lower D instead"
     return f"set {told} ({words}){rest}; {way}"

@@ -45,7 +45,8 @@ def _all(review: FlightReview) -> Iterator[Finding]:
             "vibration-unknown", Light.UNKNOWN, "the log holds no measure of vibration in the air"
         )
     yield from _noise(review)
-    yield from filter_findings(review.filters, review.name, review.kind)
+    fallen = review.phases.tipped_s is not None
+    yield from filter_findings(review.filters, review.name, review.kind, fallen=fallen)
 
 
 def _noise(review: FlightReview) -> Iterator[Finding]:
@@ -202,6 +203,8 @@ def _level(
             action = action or _gains(review, sure)
     elif beyond:
         what, do = "beyond what is asked: sticks give more motion than they stand for", LONG
+    elif light is Light.GREEN and (level.half_width95 or 0.0) > off:
+        return Light.UNKNOWN, f"{said}: where it ends is too uncertain to judge", what_to_fly(loop)
     else:
         return light, said, action
     acts = "; ".join(filter(None, (do[loop.loop], action)))

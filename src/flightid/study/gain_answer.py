@@ -137,7 +137,9 @@ def gain_table(designs: tuple[PidDesign, ...], filters: TunedFilters | None) -> 
         for change in design.changes
     ]  # fmt: skip
     notes = (*(() if filters is None else filters.words), *small_angles(designs))
-    return Table("Gains to fly", columns, tuple(rows), notes).without_empty_columns()
+    plain = any(isinstance(each.loop, PidLoop) for each in designs)
+    title = "Gains of the controller" if plain else "Gains to fly"
+    return Table(title, columns, tuple(rows), notes).without_empty_columns()
 
 
 def small_angles(designs: Iterable[PidDesign]) -> Iterator[str]:

@@ -89,6 +89,7 @@ def write_ardupilot_log(flight: Flight, path: str | Path) -> Path:
 
 def _start(writer: DataflashWriter, flight: Flight) -> None:
     parameters = flight.autopilot.parameters() | {
+        "SID_AXIS": 0.0,
         "LOG_BITMASK": float(BASE_LOG_BITMASK | ATTITUDE_BITS[flight.log_every]),
         "MOT_THST_HOVER": flight.vehicle.hover_throttle,
     }
