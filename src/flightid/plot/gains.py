@@ -178,10 +178,11 @@ def _say_without_limit(
 
     `unread` are loops whose estimate has this margin, which is not promised for every vehicle.
     """
-    told = ", ".join(f"{each.estimate.value:.3g} {each.estimate.unit}" for each in unread)
     said = f"no vehicle's loop has a finite {name}"
-    if unread:
-        said = f"no {name} is promised (of the estimate: {told})"
+    if values := [each.estimate.value for each in unread if each.estimate.value is not None]:
+        ends = dict.fromkeys(f"{value:.3g}" for value in (min(values), max(values)))
+        unit = unread[0].estimate.unit
+        said = f"no {name} is promised<br>({' to '.join(ends)} {unit} of the estimate alone)"
     unseen = go.Scatter(
         x=[0.0] * len(rows), y=list(rows), mode="markers", showlegend=False, hoverinfo="skip",
         name=name, marker={"opacity": 0.0},

@@ -14,6 +14,8 @@ from flightid.record.time_columns import near_times, told_time, with_time
 from flightid.record.time_question import slow_stamps
 from flightid.table import Cell, Column, Table
 
+NO_TIME = "--sample-time-s SECONDS"
+
 
 def table_contents(path: str | Path) -> Table:
     r"""Columns of a file with unit, samples, rate, range, and the stamps of a bag's topics.
@@ -50,7 +52,9 @@ def table_contents(path: str | Path) -> Table:
     notes += _by_name(table)
     if len(moving) < len(rows):
         notes.append(f"Not listed: {len(rows) - len(moving)} columns that never move.")
-    notes.append(f"Next: flightid run {path.name} --inputs COLUMN --outputs COLUMN")
+    timed = "" if not any(note.startswith("No time") for note in notes) else f" {NO_TIME}"
+    named = "--inputs COLUMN --outputs COLUMN where their names do not tell them"
+    notes.append(f"Next: flightid tune {path.name}{timed} (model, modes, PID), {named}")
     columns = (
         *(Column("column"), Column("unit"), Column("samples"), Column("rate", "Hz")),
         *(Column("least"), Column("most")),
@@ -73,7 +77,7 @@ def _time(table: ColumnTable) -> list[str]:
         return [str(error)]
     if table.clock is None and name not in table.lengths:
         near = near_times(table) or "no column is named as one"
-        return [f"No time: {near}; say --time COLUMN or --sample-time-s SECONDS."]
+        return [f"No time: {near}; say --time COLUMN or {NO_TIME}."]
     told = told_time(timed, name)
     said = [f"{table.path.name}: {told}."] if told else []
     question = _question(timed, name)

@@ -149,6 +149,6 @@ def feedback_findings(test: FeedbackTest) -> tuple[Finding, ...]:
             f"{seen}, and the direct estimate tends to minus the inverse of the controller where "
             "output noise dominates",
             "use estimator='instrument' with the injected excitation, estimator='prewhitened' "
-            "where it was not logged, or fly with the loop open",
+            "where it was not logged, or measure with the loop open",
         ),
     )

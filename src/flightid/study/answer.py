@@ -58,7 +58,7 @@ def answer_of(
     written : sequence of str
         Files of the gains, the first to fly first, where they have been written.
     results : str
-        Folder of the results as the reader has to write it.
+        Folder of the results as the reader has to write it; default: its name.
     """
     if source is None:
         source = next((name for name in study.files if name.endswith(".toml")), "STUDY")
@@ -68,7 +68,7 @@ def answer_of(
         fault = tuning_fault(study.faults)
         told = [] if fault is None else [_without_verdicts(fault, study.identified)]
         return StudyAnswer(tuple(said_once([*findings, *told])))
-    findings.append(gains_finding(tuning, source, written, results))
+    findings.append(gains_finding(tuning, source, written, results or study.output.name))
     if study.gain_flight is not None:
         findings.append(flown_again(study.gain_flight))
     made = tuning.sound or tuple(design for design in tuning.designs if design.exists)

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from flightid.control.tuning.tuned_filters import TunedFilters
     from flightid.vehicles import GainFlight
 
-STUDY_OUTPUT = "STUDY-output"
-"""Stands for the folder of results where nobody names it."""
 WIDE_DEG = 20.0
 """Angles that quick sticks do not exceed at once."""
 MARGINS = {"phase margin": "deg", "gain margin": "dB"}
@@ -59,7 +57,7 @@ def gains_finding(
         way = "" if written else f"flightid tune {source} --write gains{suffix} writes them; "
         way += (
             f"fly {first}{step}: {_moves(designs)}; log, then "
-            f"flightid compare {results or STUDY_OUTPUT} LOG: kept or not"
+            f"flightid compare {results} LOG: kept or not"
         )
     what = "rig" if plain else "vehicle"
     light = worst(findings) if findings else Light.GREEN
@@ -78,7 +76,11 @@ def gains_finding(
 def _moves(designs: Iterable[PidDesign]) -> str:
     """What to fly of the first step, so that what is promised of it can be judged."""
     laws = [
-        angle_law(each.flown.autopilot, {**each.flown.gains, **each.stages[0].gains}, each.axis)
+        angle_law(
+            each.flown.autopilot,
+            {**each.flown.gains, **(each.stages[0].gains if each.stages else {})},
+            each.axis,
+        )
         for each in designs
         if each.axis != "yaw"
     ]

@@ -83,7 +83,7 @@ def judge_feedback(
             f"the closed loop brings output noise to the inputs, which moves {named}; "
             "so there are no intervals",
             "use estimator='instrument' with the injected signal, estimator='prewhitened' where it "
-            "was not logged, or fly with the loop open",
+            "was not logged, or measure with the loop open",
         )
     ]
 
