@@ -47,6 +47,9 @@ LAGS = 20
 """Of the filters that take colour out."""
 STEPS = 2
 """Of Gauss and Newton: what a delay moves by half a sample bends by less than the second tells."""
+SHORT = 1000.0
+"""Squared changes of outputs, over what is left of them, up to which slopes stay: some 30 bars. At
+10 bars the second step then ends within 0.04 of one of where full steps do."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,21 +184,25 @@ def _under(
     values = np.array([prepared.model.parameters[name].value or 0.0 for name in free])
     sizes = np.std(np.concatenate([each[1] for each in prepared.arrays], axis=1), axis=1)
     largest = FAR * sizes
+    slopes: list[Array] = []
     for round_ in range(STEPS):
         if round_:
             model = prepared.model.with_values(dict(zip(free, map(float, values), strict=True)))
             prepared = replace(prepared, model=model)
         runs = [
-            run_with_slopes(prepared.model, prepared, runs_of, place, own)
+            run_with_slopes(prepared.model, prepared, runs_of, place, own, sloped=not slopes)
             for place, own in enumerate(prepared.own)
         ]
         left = [each[1] - run[0] for each, run in zip(prepared.arrays, runs, strict=True)]
-        _require_near(left, [slopes for _, slopes in runs], largest)
+        _require_near(left, [slope for _, slope in runs], largest)
         left = [_whitened(each, filters) for each in left]
-        slopes = [_whitened(each, filters) for _, each in runs]
+        slopes = slopes or [_whitened(slope, filters) for _, slope in runs]
         steps = _steps(left, slopes, sizes, len(free))
-        left = [rest - slope @ step for rest, slope, step in zip(left, slopes, steps, strict=True)]
+        changes = [slope @ step for slope, step in zip(slopes, steps, strict=True)]
+        left = [rest - change for rest, change in zip(left, changes, strict=True)]
         sizes = np.sqrt(np.mean(np.concatenate(left, axis=1) ** 2, axis=1))
+        if _squares(changes, sizes) > SHORT:
+            slopes = []
         values = values + steps[0][: len(free)]
         own = [
             numbers.filled(_free_values(numbers) + step[len(free) :])
@@ -203,6 +210,12 @@ def _under(
         ]
         prepared = replace(prepared, own=own)
     return HeldOutputs(values, left)
+
+
+def _squares(changes: Sequence[Array], sizes: Array) -> float:
+    """Sum of squares of changes of outputs, each over what is left of it."""
+    total = np.sum([np.sum(each**2, axis=1) for each in changes], axis=0)
+    return float(np.sum(total / np.where(sizes > 0.0, sizes, 1.0) ** 2))
 
 
 def _require_near(left: Sequence[Array], slopes: Sequence[Array], largest: Array) -> None:

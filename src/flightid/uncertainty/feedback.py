@@ -21,11 +21,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from flightid.frozen import dataclass
 from flightid.uncertainty.feedback_power import unseen_feedback
 from flightid.uncertainty.feedback_result import LAGS, LEVEL, FeedbackTest
 from flightid.uncertainty.lagged_products import (
@@ -113,10 +115,8 @@ def find_feedback(
     free = sum(_room(u, order) for u, _ in pairs) - n_in * order - LAGS * n_out
     if order < 1 or free < FEWEST_FREE:
         return FeedbackTest("unknown", "too short")
-    both = [np.concatenate(pair) for pair in pairs]
-    weights = _past_weights(both, order, n_in + n_out)
-    news = left_by_past(both, weights)
-    noise = _noise(pairs, news, n_in)
+    pasts = _Pasts([np.concatenate(pair) for pair in pairs], order, n_in)
+    noise = _noise(pairs, pasts.news, n_in)
     power = sum(np.sum(y**2, axis=1) for _, y in pairs)
     noisy = sum(np.sum(e**2, axis=1) for e in noise) > SMALLEST_NOISE * power
     past_noise = FeedbackTest("open", "no noise")
@@ -124,19 +124,66 @@ def find_feedback(
         heard = [e[noisy] for e in noise]
         shares = _moving(_shares(pairs, heard, order), pairs, heard, order, PAST)
         past_noise = _worst(shares, names, "test")
-        echo = weights[:, n_in:, n_in:].transpose(0, 2, 1)[:, noisy][:, :, noisy]
+        echo = pasts.weights[:, n_in:, n_in:].transpose(0, 2, 1)[:, noisy][:, :, noisy]
         if past_noise.p_value is not None and past_noise.p_value < LEVEL:
             return _unless_noisy(shares, [(u, y[noisy]) for u, y in pairs], order, names)
-        past_noise = _with_power(past_noise, pairs, heard, echo, names)
+        past_noise = _with_power(past_noise, pasts, heard, echo, names)
     if unthinned:
         pairs = [(u, y) for u, y in zip(whole, unthinned[1], strict=True) if u.shape[1] > order]
-        news = _news([np.concatenate(pair) for pair in pairs], order, n_in + n_out)
-    outputs_news = [new[n_in:] for new in news]
-    shares = _moving(_shares_at_once(pairs, news, order), pairs, outputs_news, order, range(1))
+        pasts = _Pasts([np.concatenate(pair) for pair in pairs], order, n_in)
+    outputs_news = [new[n_in:] for new in pasts.news]
+    shares = _moving(_shares_at_once(pasts), pairs, outputs_news, order, range(1))
     at_once = _worst(shares, names, "same sample")
     if at_once.p_value is not None and at_once.p_value < LEVEL:
         return replace(at_once, loop="unknown")
     return past_noise
+
+
+@dataclass(frozen=True, eq=False)
+class _Pasts:
+    """Channels of some records, inputs first, and what their pasts make of them: worked out once.
+
+    Attributes
+    ----------
+    records : sequence of ndarray, each shape (n_channels, n_samples)
+    order : int
+        Past samples.
+    n_in : int
+        Inputs among the channels.
+    """
+
+    records: Sequence[Array]
+    order: int
+    n_in: int
+
+    @cached_property
+    def _products(self) -> Array:
+        return lagged_products(self.records, self.order, self.order)
+
+    @cached_property
+    def weights(self) -> Array:
+        """What the pasts of all channels make of each, (order, n_channels, n_channels)."""
+        return _past_weights(self._products)
+
+    @cached_property
+    def news(self) -> list[Array]:
+        """What these leave, (n_channels, n − order)."""
+        return left_by_past(self.records, self.weights)
+
+    @cached_property
+    def own(self) -> Array:
+        """What the pasts of inputs make of inputs, (order, n_in, n_in)."""
+        return _past_weights(self._products[:, : self.n_in, :, : self.n_in])
+
+    @cached_property
+    def inputs(self) -> list[Array]:
+        """The inputs of each record."""
+        return [rows[: self.n_in] for rows in self.records]
+
+    @cached_property
+    def fresh(self) -> list[Array]:
+        """What the pasts of inputs leave of them, (n_in, n − order)."""
+        return left_by_past(self.inputs, self.own)
 
 
 def _worst(found: Sequence[tuple[float, float]], names: Sequence[str], source: str) -> FeedbackTest:
@@ -147,17 +194,10 @@ def _worst(found: Sequence[tuple[float, float]], names: Sequence[str], source: s
 
 
 def _with_power(
-    test: FeedbackTest,
-    pairs: Sequence[Pair],
-    noise: Sequence[Array],
-    echo: Array,
-    names: Sequence[str],
+    test: FeedbackTest, pasts: _Pasts, noise: Sequence[Array], echo: Array, names: Sequence[str]
 ) -> FeedbackTest:
     """A test that saw no loop, with the largest one that it would have missed."""
-    inputs, order = [u for u, _ in pairs], len(echo)
-    own = _past_weights(inputs, order, len(names))
-    fresh = left_by_past(inputs, own)
-    unseen = unseen_feedback(noise, echo, inputs, own, fresh)
+    unseen = unseen_feedback(noise, echo, pasts.inputs, pasts.own, pasts.fresh)
     if unseen is None:
         return test
     named = names[unseen.input]
@@ -220,18 +260,12 @@ def _room(inputs: Array, order: int) -> int:
     return int(inputs.shape[1]) - order - LAGS
 
 
-def _news(records: Sequence[Array], order: int, size: int) -> list[Array]:
-    """What the pasts of all channels leave of the first of them, (size, n − order)."""
-    return left_by_past(records, _past_weights(records, order, size))
-
-
-def _past_weights(records: Sequence[Array], order: int, size: int) -> Array:
-    """What the pasts of all channels make of the first of them, (order, n_channels, size)."""
-    products = lagged_products(records, order, order)
-    channels = products.shape[1]
-    known, targets = np.arange(channels, channels * (order + 1)), np.arange(size)
-    weights = weights_of(products.reshape(2 * (channels * (order + 1),)), known, targets)
-    return weights.reshape(order, channels, size)
+def _past_weights(products: Array) -> Array:
+    """What the pasts of all channels make of each, by their lagged products."""
+    lags, channels = products.shape[:2]
+    known, targets = np.arange(channels, channels * lags), np.arange(channels)
+    weights = weights_of(products.reshape(2 * (channels * lags,)), known, targets)
+    return weights.reshape(lags - 1, channels, channels)
 
 
 def _noise(pairs: Sequence[Pair], news: Sequence[Array], n_in: int) -> list[Array]:
@@ -277,21 +311,18 @@ def _shares(pairs: Sequence[Pair], noise: Sequence[Array], order: int) -> list[t
     return list(zip(shares.tolist(), chances.tolist(), strict=True))
 
 
-def _shares_at_once(
-    pairs: Sequence[Pair], news: Sequence[Array], order: int
-) -> list[tuple[float, float]]:
+def _shares_at_once(pasts: _Pasts) -> list[tuple[float, float]]:
     """By input: share of what its past leaves that outputs up to its sample explain, and F's p.
 
     The probability is that of the outputs of the same sample alone.
     """
-    n_in, n_out = len(pairs[0][0]), len(pairs[0][1])
-    power = [np.sum(np.concatenate(pair)[:, order:] ** 2, axis=1) for pair in pairs]
+    n_in, order, news = pasts.n_in, pasts.order, pasts.news
+    power = [np.sum(rows[:, order:] ** 2, axis=1) for rows in pasts.records]
     floor = SMALLEST_NOISE * np.sum(power, axis=0)
-    own = _news([u for u, _ in pairs], order, n_in)
-    fresh = np.sum([np.sum(new**2, axis=1) for new in own], axis=0)
+    fresh = np.sum([np.sum(new**2, axis=1) for new in pasts.fresh], axis=0)
     products = np.sum([new @ new.T for new in news], axis=0)
     seen = n_in + np.flatnonzero(np.diagonal(products)[n_in:] > floor[n_in:])
-    free = sum(new.shape[1] for new in news) - order * (n_in + n_out) - seen.size
+    free = sum(new.shape[1] for new in news) - order * len(products) - seen.size
     if free < FEWEST_FREE or not seen.size:
         return [(0.0, 1.0)] * n_in
     way = weights_of(products, seen, np.arange(n_in)).T

@@ -105,35 +105,53 @@ def unseen_feedback(
     # Errors of an estimate are of all the noise, the bias of what may be fed back alone.
     carried = power / (power + np.diagonal(covariance))
     least = _noncentrality(LAGS * n_out, n, LEVEL / len(new)) / n
+    moving = np.flatnonzero(new > 0.0)
+    seen = {place: _whitened_power(own[:, place, place], fed) for place in moving}
     found = []
     for output in np.flatnonzero(power > np.finfo(float).tiny):
         h = fed[:, output]
         spectrum = np.sum(np.abs(np.fft.rfft(h, 2 * ECHO, axis=0)) ** 2, axis=1)
         alike = np.fft.irfft(spectrum, 2 * ECHO)
         independent = n / float(np.sum((alike / np.max(alike)) ** 2))
-        for place in np.flatnonzero(new > 0.0):
-            left = np.zeros(LAGS + 1)
-            left[: len(own) + 1] = np.append(1.0, -own[:, place, place])[: LAGS + 1]
-            whitened = np.tril(scipy.linalg.toeplitz(left)) @ h[: LAGS + 1]
-            seen = float(np.sum(whitened**2)) / float(power[output])
-            share = least * float(new[place] / whole[place]) / max(seen, SMALLEST)
+        for place in moving:
+            part = max(float(seen[place][output]) / float(power[output]), SMALLEST)
+            share = least * float(new[place] / whole[place]) / part
             times = share * float(carried[output]) * independent / LAGS
             found.append(Unseen(int(place), share, float(np.sqrt(times))))
     return max(found, key=lambda each: each.bias, default=None)
 
 
+def _whitened_power(past: Array, fed: Array) -> Array:
+    """Power that the first lags of answers have once an input's own past is out of them, by output.
+
+    Parameters
+    ----------
+    past : ndarray, shape (order,)
+        Weights of an input's own past.
+    fed : ndarray, shape (n_lags, n_out, n_noise)
+    """
+    left = np.zeros(LAGS + 1)
+    left[: len(past) + 1] = np.append(1.0, -past)[: LAGS + 1]
+    kept = fed[: LAGS + 1]
+    whitened = np.tril(scipy.linalg.toeplitz(left)) @ kept.reshape(len(kept), -1)
+    return np.asarray(np.sum(whitened.reshape(kept.shape) ** 2, axis=(0, 2)))
+
+
 def _answers(echo: Array, covariance: Array) -> Array:
     """Outputs after independent unit noise, the sample of the noise apart: (lag, output, noise)."""
     value, vector = np.linalg.eigh(covariance)
-    answers = np.zeros((ECHO, *covariance.shape))
-    answers[0] = vector * np.sqrt(np.maximum(value, 0.0))
-    largest = GROWN * float(np.max(np.abs(answers[0])))
+    order, n_out, _ = echo.shape
+    weights = echo.transpose(1, 0, 2).reshape(n_out, -1)
+    # From the last to the first: what is past lies side by side, latest first.
+    back = np.zeros((ECHO, n_out, n_out))
+    back[-1] = vector * np.sqrt(np.maximum(value, 0.0))
+    largest = GROWN * float(np.max(np.abs(back[-1])))
     for now in range(1, ECHO):
-        past = min(now, len(echo))
-        answer = np.einsum("koj,kje->oe", echo[:past], answers[now - past : now][::-1])
-        answers[now] = np.clip(answer, -largest, largest)
-    answers[0] = 0.0
-    return answers
+        past = n_out * min(now, order)
+        answer = weights[:, :past] @ back[ECHO - now :].reshape(-1, n_out)[:past]
+        np.clip(answer, -largest, largest, out=back[ECHO - 1 - now])
+    back[-1] = 0.0
+    return back[::-1]
 
 
 @lru_cache(maxsize=16)

@@ -36,15 +36,20 @@ def run_with_slopes(
     runs_of: EquationRuns | None,
     place: int,
     own: OwnNumbers,
+    *,
+    sloped: bool = True,
 ) -> tuple[Array, Array]:
-    """Outputs with bias, and their derivatives by θ, initial states, shifts and biases."""
+    """Outputs with bias, and their derivatives by θ, initial states, shifts and biases.
+
+    Without slopes these have no columns.
+    """
     asked = (
         fitted.parameters.independent_values(),
         fitted.parameters.free_indices,
         prepared.arrays[place],
         own.native,
         prepared.hold,
-        True,
+        sloped,
     )
     outputs, slopes = (
         fitted.native.run_record(*asked)
@@ -52,7 +57,7 @@ def run_with_slopes(
         else runs_of.native.run_record(place, *asked)
     )
     shifted = outputs + own.bias[:, None]
-    if not own.free_bias:
+    if not (sloped and own.free_bias):
         return shifted, slopes
     n_outputs, n_samples = outputs.shape
     biases = np.zeros((n_outputs, n_samples, len(own.free_bias)))
