@@ -121,6 +121,11 @@ def test_one_record_says_that_it_cannot_know() -> None:
     found = agreement_check(Agreement(1, 0.5, None, np.ones(1)))
     assert found.light is Light.GREEN
     assert "One record does not tell how far flights differ" in found.limit
+    # What to do stood nowhere, and the reason twice, where nothing could be compared.
+    once = Evidence((agreement_check(Agreement(1, None, None, np.ones(1))),), ())
+    assert once.lines[1].startswith("[not judged] flown once")
+    assert once.lines[1].endswith(" — repeat the manoeuvre in a second record or segment")
+    assert once.limits == ()
     evidence = Evidence((found,), ())
     assert evidence.lines == ("Light: green.", f"{found.limit}.")
     assert evidence.verdict.message.endswith(f"; {found.limit[0].lower()}{found.limit[1:]}")

@@ -223,6 +223,11 @@ def test_columns_are_told_by_name_then_unit_or_refused() -> None:
         columns_of([bare], ("a", "b"), ())
     with pytest.raises(UnknownNameError, match="no such column"):
         columns_of([bare], ("c",), ())
+    # DaISy's exchanger: the answer is told, and one column is left.
+    daisy = Record.from_arrays(stamps, others=dict.fromkeys(("q_flow", "th_out"), stamps))
+    found = columns_of([daisy], (), ())
+    assert (found.inputs, found.outputs) == (("q_flow",), ("th_out",))
+    assert found.said[0].startswith("Inputs q_flow (as what is left), outputs th_out (by their")
 
 
 def test_data_without_a_model_give_no_study(tmp_path: Path) -> None:

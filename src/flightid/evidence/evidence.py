@@ -8,7 +8,7 @@ from typing import Any
 
 from flightid.conventions import Light
 from flightid.errors import DataError, OptionError
-from flightid.findings import Finding
+from flightid.findings import Finding, said_once
 from flightid.frozen import dataclass
 from flightid.result import Result
 from flightid.surface import spoken
@@ -220,10 +220,9 @@ class Evidence(Result, schema="flightid.evidence/1"):
 
     @property
     def lines(self) -> tuple[str, ...]:
-        """The light, every reason for which it is not green, and limits, one a line."""
-        reasons = [f for f in self.findings if f.light is not Light.GREEN]
-        said = [f"[{f.light.words}] {f.message}" for f in reasons]
-        return (f"Light: {self.light}.", *said, *(f"{limit}." for limit in self.limits))
+        """The light, each reason for which it is not green with what to do, and limits."""
+        reasons = said_once(f for f in self.findings if f.light is not Light.GREEN)
+        return (f"Light: {self.light}.", *map(str, reasons), *(f"{each}." for each in self.limits))
 
     @property
     def limits(self) -> tuple[str, ...]:

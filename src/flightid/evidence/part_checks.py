@@ -50,7 +50,9 @@ def agreement_check(found: Agreement, values: NDArray[np.float64] | None = None)
     'One record does not tell how far flights differ: what is known is of that flight alone'
     """
     apart = None if values is None else found.apart_percent(values)
-    return replace(_compared(found, apart), limit=ONE if needs_another(found.n_records) else "")
+    # Where nothing was compared, the reason says as much.
+    alone = found.tested and needs_another(found.n_records)
+    return replace(_compared(found, apart), limit=ONE if alone else "")
 
 
 def needs_another(n_records: int) -> bool:

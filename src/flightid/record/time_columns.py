@@ -219,7 +219,9 @@ def row_stamps(
             f"{table.path.name} has no time column {time_column!r}",
             found="columns " + ", ".join(table.lengths),
             needed=needed,
-            action=near_times(table) or table.advice or "no sample time is invented: state it",
+            action=near_times(table)
+            or table.advice
+            or "say it, for none is invented: sample_time_s=…",
         )
     if not (np.isfinite(sample_time_s) and sample_time_s > 0):
         raise OptionError("sample time is not positive", found=sample_time_s, needed="above 0 s")

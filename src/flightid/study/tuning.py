@@ -336,7 +336,9 @@ def _require_loops(by_hand: Mapping[str, float], closed: Sequence[str]) -> None:
 
 
 def _first_loop(known: Sequence[tuple[Any, object]]) -> str:
-    model = cast(Model, model_of(known[0][0]))
+    """A loop worth closing: of a model whose errors are known, where there is one."""
+    told = (each for each, _ in known if getattr(each, "covariance", None) is not None)
+    model = cast(Model, model_of(next(told, known[0][0])))
     return f"{model.outputs[0]}/{model.inputs[0]}"
 
 

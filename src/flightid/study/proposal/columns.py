@@ -13,12 +13,12 @@ from flightid.models import load_model
 from flightid.record import Record
 
 DRIVES = re.compile(
-    r"u\d*|inputs?\d*|in\d*|.*(command|cmd|voltage|volt|current|throttle|pwm|duty|stick|torque|force"
+    r"u\d*|inputs?\d*|in\d*|.*_in|d_(lat|lon|ped|col)|.*(command|cmd|voltage|volt|current|throttle|pwm|duty|stick|torque|force"
     r"|aileron|elevator|rudder|collective|tau_).*",
     re.IGNORECASE,
 )
 ANSWERS = re.compile(
-    r"y\d*|outputs?\d*|out\d*|[pqr]|phi|theta|psi|.*(angle|rate|speed|velocity|position|height"
+    r"y\d*|outputs?\d*|out\d*|.*_out|[pqr]|phi|theta|psi|.*(angle|rate|speed|velocity|position|height"
     r"|altitude|pitch|roll|yaw|temperature|accel).*",
     re.IGNORECASE,
 )
@@ -114,6 +114,8 @@ def columns_of(
     shared = [name for name in shared if name not in injected]
     drives, how_in = _told(first, shared, Role.INPUT, inputs, outputs)
     answers, how_out = _told(first, shared, Role.OUTPUT, outputs, drives)
+    if answers and not drives:
+        drives, how_in = _told(first, shared, Role.INPUT, inputs, answers)
     for role, found in (("inputs", drives), ("outputs", answers)):
         if not found:
             columns = ", ".join(f"{name} [{first.unit(name) or '?'}]" for name in shared)
