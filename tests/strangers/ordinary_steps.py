@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache, partial
 
 import numpy as np
+from numpy.typing import NDArray
 
-from flightid.errors import FlightidError
-from flightid.review.deconvolution import LoopDraws, LoopSamples, closed_loop
-from flightid.review.step_features import frequency_features, reached_features, step_features
-from flightid.review.told_band import told_by, told_hz
-from flightid.uncertainty.quantiles import tails
+from flightid.review.deconvolution import LoopDraws, LoopSamples
+from flightid.review.loop_response import LoopResponse
+from flightid.review.loops import SLOWEST_HZ, read_step
+from flightid.review.step_features import frequency_features, window_features
 from tests.strangers.counting import Case, Reading, Trial
 from tests.strangers.ordinary_flights import Axis, ordinary, step
 
-WINDOW_S, SLOWEST_HZ, INSTANTS = 0.5, 2.0, 8
+Array = NDArray[np.float64]
+INSTANTS = 8
 QUADROTOR = Axis()
 PX4 = Axis(form="px4", p=0.15, i=0.2, d=0.003)
 BETAFLIGHT = Axis(
@@ -30,34 +32,37 @@ HELICOPTER = Axis(
 PLANE = Axis(
     effectiveness=45.0, damping=8.0, motor_s=0.05, p=0.12, i=0.2, d=0.0, angle_p=2.5, gust=1.5
 )
+CREEPING = Axis(effectiveness=142.3, damping=3.38, p=0.065, i=0.082, d=0.0038, angle_p=7.35)
+UNDRIVEN = Axis(effectiveness=50.0, p=0.09, i=0.0, d=0.0024)
+"""A demo's tuned rate loop, whose slow integrator brings the last fifth, and one without."""
 READ = (
     "level",
     "delay to half",
     "rise time",
     "overshoot",
+    "gain",
     "bandwidth at -3 dB",
     "frequency at -90",
 )
 
 
 @cache
-def truths(axis: Axis, every: int) -> tuple[dict[str, float | None], tuple[float, ...]]:
-    """What is read off the quiet loop, at the instants of an estimate, and its step there."""
-    ticks = step(axis, 3.0)
-    time_s = instants(axis, every)
+def truths(axis: Axis, every: int, count: int) -> tuple[dict[str, float | None], Array]:
+    """What is read off the quiet loop at so many instants of an estimate, and its step there."""
+    time_s = instants(axis, every, count)
+    ticks = step(axis, 3.0 + time_s[-1])
     exact = np.interp(time_s, np.arange(ticks.size) / axis.loop_hz, ticks)
     pulses = np.diff(np.concatenate([[0.0], ticks]))
     loop = LoopDraws(np.array([pulses, pulses]), np.ones((2, 1)), 1.0 / axis.loop_hz)
-    read = reached_features(np.array([exact, exact]), time_s)
-    read += frequency_features(loop, SLOWEST_HZ)
-    return {r.name: r.value for r in read}, tuple(exact)
+    read = window_features(np.array([exact, exact]), time_s)
+    read += frequency_features(loop, SLOWEST_HZ["rate"])
+    return {r.name: r.value for r in read}, exact
 
 
-def instants(axis: Axis, every: int) -> np.ndarray:
+def instants(axis: Axis, every: int, count: int) -> Array:
     """When a step is told, s after the tick at which the set-point jumps."""
     sample_s = every / axis.loop_hz
-    middles = (np.arange(round(WINDOW_S / sample_s)) + 0.5) * sample_s
-    return np.asarray(middles - 0.5 / axis.loop_hz)
+    return np.asarray((np.arange(count) + 0.5) * sample_s - 0.5 / axis.loop_hz)
 
 
 def fly_samples(
@@ -71,31 +76,41 @@ def fly_samples(
     return LoopSamples(r - r.mean(), y - y.mean(), ahead - ahead.mean(), (r.size,), sample_s)
 
 
+def fly_loop(samples: LoopSamples, axis: Axis) -> LoopResponse:
+    """What `flightid flight` makes of these samples, its window and refusals included."""
+    none = np.zeros(0)
+    moved, rate_hz = float(np.std(samples.set_point)), 1.0 / samples.sample_time_s
+    begun = LoopResponse(
+        "roll", "rate", "", "", rate_hz, samples.duration_s, 1, moved, None, none, none, none
+    )
+    return read_step(begun, samples, 1.0 / axis.loop_hz, "")
+
+
 def fly_step(
     seed: int, *, axis: Axis, acro: bool, duration_s: float = 60.0, every: int = 4
 ) -> Trial:
     """Step at eight instants and every reading of one flight's rate loop."""
     samples = fly_samples(seed, axis, acro=acro, duration_s=duration_s, every=every)
     begun = time.perf_counter()
-    try:
-        loop = closed_loop(samples)
-    except FlightidError as error:
-        return Trial(refusal=str(error), seconds=time.perf_counter() - begun)
-    time_s = instants(axis, every)
-    steps = loop.step(time_s.size)
-    known, exact = truths(axis, every)
-    low, high = np.quantile(steps[1:], tails(0.95), axis=0)
-    readings = [
-        Reading(f"step at {1e3 * time_s[k]:.0f} ms", exact[k], float(steps[0, k]), None, ends)
-        for k in np.linspace(2, time_s.size - 1, INSTANTS).round().astype(int)
-        for ends in [(float(low[k]), float(high[k]))]
-    ]
-    features = (*step_features(steps, time_s), *frequency_features(loop, SLOWEST_HZ))
-    for found in told_by(features, told_hz(samples)):
+    loop = fly_loop(samples, axis)
+    spent = time.perf_counter() - begun
+    if not loop.is_told:
+        return Trial(refusal=loop.reason, seconds=spent)
+    return Trial(tuple(beside_truth(loop, axis, every)), "", spent)
+
+
+def beside_truth(loop: LoopResponse, axis: Axis, every: int) -> Iterator[Reading]:
+    """Numbers of a loop with the simulator's own."""
+    known, exact = truths(axis, every, loop.time_s.size)
+    low, high = loop.band(0.95)
+    for k in np.linspace(2, loop.time_s.size - 1, INSTANTS).round().astype(int):
+        ends = float(low[k]), float(high[k])
+        name = f"step at {1e3 * loop.time_s[k]:.0f} ms"
+        yield Reading(name, float(exact[k]), float(loop.step[k]), None, ends)
+    for found in loop.readings:
         truth = known[found.name]
         if found.name.startswith(READ) and truth is not None and found.value is not None:
-            readings.append(Reading(found.name, truth, found.value, None, found.interval95))
-    return Trial(tuple(readings), "", time.perf_counter() - begun)
+            yield Reading(found.name, truth, found.value, None, found.interval95)
 
 
 CASES = tuple(
@@ -110,5 +125,7 @@ CASES = tuple(
         ("plane, angle mode", PLANE, False, {}),
         ("quadrotor, calm", replace(QUADROTOR, gust=0.5), False, {}),
         ("helicopter, heavy gusts", replace(HELICOPTER, gust=6.0), False, {}),
+        ("quadrotor, slow integrator", CREEPING, False, {}),
+        ("quadrotor, no integrator", UNDRIVEN, False, {}),
     )
 )

@@ -7,10 +7,7 @@ from dataclasses import replace
 from functools import partial
 
 from flightid.dynamics.conditions.ratios import difference_of
-from flightid.errors import FlightidError
-from flightid.review.deconvolution import closed_loop
-from flightid.review.step_features import frequency_features, reached_features
-from flightid.uncertainty.estimate import Reading as Told
+from flightid.review.comparison import pairs
 from tests.strangers.counting import Case, Reading, Trial
 from tests.strangers.ordinary_flights import Axis
 from tests.strangers.ordinary_steps import (
@@ -18,9 +15,8 @@ from tests.strangers.ordinary_steps import (
     PX4,
     QUADROTOR,
     READ,
-    SLOWEST_HZ,
+    fly_loop,
     fly_samples,
-    instants,
     truths,
 )
 
@@ -31,28 +27,23 @@ EVERY, LATER = 4, 5000
 def fly_pair(seed: int, *, before: Axis, after: Axis, acro: bool) -> Trial:
     """Differences of every reading between two flights."""
     begun = time.perf_counter()
-    try:
-        old = _read(seed, before, acro=acro)
-        new = _read(seed + LATER, after, acro=acro)
-    except FlightidError as error:
-        return Trial(refusal=str(error), seconds=time.perf_counter() - begun)
-    truth = [truths(axis, EVERY)[0] for axis in (before, after)]
+    old, new = (
+        fly_loop(fly_samples(at, axis, acro=acro, every=EVERY), axis)
+        for at, axis in ((seed, before), (seed + LATER, after))
+    )
+    spent = time.perf_counter() - begun
+    if not (old.is_told and new.is_told):
+        return Trial(refusal=old.reason or new.reason, seconds=spent)
+    count = min(old.time_s.size, new.time_s.size)
+    truth = [truths(axis, EVERY, count)[0] for axis in (before, after)]
     readings = []
-    for name, first in old.items():
-        ends = truth[0].get(name), truth[1].get(name)
-        found = difference_of(new[name], first)
-        if name.startswith(READ) and None not in ends and found.value is not None:
+    for first, second in pairs(old, new):
+        ends = truth[0].get(first.name), truth[1].get(first.name)
+        found = difference_of(second, first)
+        if first.name.startswith(READ) and None not in ends and found.value is not None:
             exact = (ends[1] or 0.0) - (ends[0] or 0.0)
-            readings.append(Reading(name, exact, found.value, None, found.interval95))
-    return Trial(tuple(readings), "", time.perf_counter() - begun)
-
-
-def _read(seed: int, axis: Axis, *, acro: bool) -> dict[str, Told]:
-    loop = closed_loop(fly_samples(seed, axis, acro=acro, every=EVERY))
-    time_s = instants(axis, EVERY)
-    steps = loop.step(time_s.size)
-    told = (*reached_features(steps, time_s), *frequency_features(loop, SLOWEST_HZ))
-    return {each.name: each for each in told}
+            readings.append(Reading(first.name, exact, found.value, None, found.interval95))
+    return Trial(tuple(readings), "", spent)
 
 
 CASES = tuple(

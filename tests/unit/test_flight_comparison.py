@@ -17,7 +17,6 @@ from flightid.dynamics.conditions.ratios import difference_of
 from flightid.errors import DataError
 from flightid.plot.flight import compared_steps
 from flightid.review.changes import (
-    BY_FREQUENCY,
     TRACKING,
     ExpectedLoop,
     _beside,
@@ -28,7 +27,7 @@ from flightid.review.comparison import compare_loops
 from flightid.review.loop_response import LoopResponse
 from flightid.review.next_step import FlownStep, flown_step, left_to_fly
 from flightid.review.promised import promised_loops
-from flightid.review.step_features import step_features
+from flightid.review.step_features import BANDWIDTH, step_features
 from flightid.uncertainty.estimate import Estimate
 from flightid.uncertainty.uneven import DrawnEnds
 from flightid.vehicles import Autopilot, Turbulence, fly, rate_truth, write_ardupilot_log
@@ -135,9 +134,9 @@ def test_a_loop_that_became_too_slow_to_settle_is_named_and_held_against_its_pro
     made = compare_loops((quick,), (slow,), ("a", "b"), promised=False)
     (found,) = made.findings
     assert found.light is Light.AMBER
-    assert "rise time" in found.message
+    assert "delay to half" in found.message
     notes = " ".join(made.summary().notes)
-    assert "Not settled in that time: roll rate; level, rise and overshoot" in notes
+    assert "Not settled in that time: roll rate; level and delay are of what is" in notes
     dashes = [
         (each.loop, each.name) for each in made.changes
         if None in (each.before.value, each.after.value, each.chance)
@@ -145,7 +144,7 @@ def test_a_loop_that_became_too_slow_to_settle_is_named_and_held_against_its_pro
     assert dashes
     assert all(f"{loop} ({name}" in notes for loop, name in dashes)
     kept = compare_loops((slow,), (_slower(quick, 1.01),), ("models", "b"), promised=True)
-    assert "Not judged (–): roll rate (rise time)" in " ".join(kept.summary().notes)
+    assert "no rise time is told that goes by its end" in " ".join(kept.summary().notes)
     (as_told,) = compare_loops(
         (quick,), (slow,), ("a", "b"), promised=False, promise=kept
     ).findings  # fmt: skip
@@ -261,8 +260,8 @@ def test_what_intervals_show_to_be_worse_is_not_green_and_the_tolerance_is_print
         ("rise time", 1.0, 0.85, True, False),
         ("overshoot", 10.0, 14.0, False, False),
         ("overshoot", 10.0, 17.0, True, True),
-        (BY_FREQUENCY, 10.0, 8.0, True, True),
-        (BY_FREQUENCY, 10.0, 12.0, True, False),
+        (BANDWIDTH, 10.0, 8.0, True, True),
+        (BANDWIDTH, 10.0, 12.0, True, False),
         ("level", 1.0, 1.2, True, True),
         ("level", 1.3, 1.1, True, False),
         ("level", 1.1, 0.7, True, True),

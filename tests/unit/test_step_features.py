@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.signal import butter, lfilter
+from scipy.signal import butter, freqz, lfilter
 
-from flightid.review.deconvolution import LoopSamples
-from flightid.review.step_features import step_features
+from flightid.review.deconvolution import LoopDraws, LoopSamples
+from flightid.review.step_features import frequency_features, step_features
 from flightid.review.told_band import told_by, told_hz
+from flightid.uncertainty.estimate import Reading
 
 TIME_S = 0.01 * np.arange(50)
 DAMPING, OMEGA = 0.83, 30.0
@@ -40,7 +41,7 @@ def test_a_small_overshoot_is_not_lifted_by_its_errors() -> None:
 
 
 @pytest.mark.parametrize(
-    ("slow_s", "late", "scatter", "told", "settles"),
+    ("slow_s", "late", "scatter", "rises", "settles"),
     [
         (1.0, 0.4, 0.001, False, False),
         (1.0, 0.4, 0.3, True, True),
@@ -49,29 +50,65 @@ def test_a_small_overshoot_is_not_lifted_by_its_errors() -> None:
     ],
     ids=["slow", "slow or not", "settled", "creeps"],
 )
-def test_a_step_that_has_not_settled_has_no_level(
-    slow_s: float, late: float, scatter: float, told: bool, settles: bool
+def test_a_step_that_still_moves_tells_what_it_reaches_and_nothing_that_goes_by_its_window(
+    slow_s: float, late: float, scatter: float, rises: bool, settles: bool
 ) -> None:
     """A demo's yaw rate rose at the end of its window: it "ended at 0.536 (0.533 to 0.538)".
 
-    Its roll rate crept there, as a slow integrator has it: it settled "in 164 (164 to 164) ms".
+    Its roll rate crept there, as a slow integrator has it: it settled "in 164 (164 to 164) ms", and
+    rose in 214, 336 or 552 ms by windows of 0.5, 1 and 2 s.
     """
     random = np.random.default_rng(3)
     late_curve = late * (1.0 - np.exp(-TIME_S / slow_s))
     slopes = np.concatenate([[0.0], scatter * random.standard_normal(120)])[:, None]
-    found = step_features(0.6 * _curve() + late_curve + slopes * TIME_S, TIME_S)
-    assert all((each.value is not None) is told for each in found[:1])
-    settling, overshoot = found[4], found[3]
+    clean = 0.6 * _curve() + late_curve
+    found = step_features(clean + slopes * TIME_S, TIME_S)
+    level, half, rise, overshoot, settling = found
+    assert level.value == pytest.approx(clean[40:].mean(), rel=1e-9)
+    assert half.value is not None
+    assert (rise.value is not None) is rises
     assert (settling.value is not None) is settles
+    said = "still rises where this window of 0.49 s ends: "
     if settles:
         assert (settling.half_width95 or 0.0) > 0.0
-    elif told:
-        assert (
-            settling.reason == "still rises where this window of 0.49 s ends: settling is not seen"
-        )
+    else:
+        assert settling.reason == f"{said}settling is not seen"
         assert overshoot.value is None
-    if not told:
-        assert {each.reason for each in found} == {"not settled in this window of 0.49 s"}
+    if not rises:
+        assert rise.reason == f"{said}its last tenths are as long as one looks"
+
+
+def test_bandwidth_is_below_what_is_asked_and_a_loop_that_never_follows_has_none() -> None:
+    """Read below the gain at 1 Hz, a loop that lost gain looked quicker: 2.99 and 7.09 Hz.
+
+    Truth by SciPy: a fast lag of some gain, and a slow one that brings the rest.
+    """
+    step_s = 0.01
+
+    def told(quick: float, slow: float) -> tuple[dict[str, Reading], float]:
+        top, bottom = np.zeros(1), np.ones(1)
+        for gain, lag_s in ((quick, 0.05), (slow, 0.8)):
+            pole = np.exp(-step_s / lag_s)
+            one = np.array([0.0, gain * (1.0 - pole)]), np.array([1.0, -pole])
+            top = np.polyadd(np.convolve(top, one[1])[::-1], np.convolve(one[0], bottom)[::-1])[
+                ::-1
+            ]
+            bottom = np.convolve(bottom, one[1])
+        hertz = np.geomspace(0.2, 30.0, 20_000)
+        gain = np.abs(freqz(top, bottom, hertz, fs=1.0 / step_s)[1])
+        loop = LoopDraws(np.tile(top, (3, 1)), np.tile(bottom, (3, 1)), step_s)
+        read = {each.name: each for each in frequency_features(loop, 2.0)}
+        assert read["gain at 1 Hz"].value == pytest.approx(np.interp(1.0, hertz, gain), rel=1e-6)
+        return read, float(hertz[np.argmax(gain < np.sqrt(0.5))])
+
+    (much, truth), (less, low) = told(0.8, 0.2), told(0.5, 0.5)
+    assert much["bandwidth at -3 dB"].value == pytest.approx(truth, rel=2e-3)
+    assert less["bandwidth at -3 dB"].value == pytest.approx(low, rel=2e-3)
+    assert truth > 4.0 * low
+    (never, _) = told(0.5, 0.1)
+    lost = never["bandwidth at -3 dB"]
+    assert lost.value is None
+    assert lost.reason == "it follows with less than 0.71 of what is asked at 0.2 Hz already"
 
 
 def test_what_is_quicker_than_the_set_point_ever_was_is_not_told() -> None:

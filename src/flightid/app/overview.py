@@ -27,6 +27,7 @@ from flightid.inspection.usable_band import hertz_words
 from flightid.logs import Log
 from flightid.review import FlightReview
 from flightid.review.loop_response import LoopResponse
+from flightid.review.step_features import BANDWIDTH
 from flightid.review.tables import cell
 from flightid.review.timeline import FlightTimeline, TimelineBlock
 from flightid.study.settings import Settings
@@ -34,7 +35,7 @@ from flightid.uncertainty.estimate import Estimate, Reading
 
 AXES = ("roll", "pitch", "yaw")
 MOST_EVENTS = 500
-READINGS = ("level", "rise time", "overshoot", "settling time", "-3 dB bandwidth")
+READINGS = ("level", "rise time", "overshoot", "settling time", BANDWIDTH)
 CALLED = {"level": "reaches"}
 """What people say of a reading."""
 PLACES = {

@@ -10,18 +10,19 @@ from flightid.conventions import Light
 from flightid.dynamics.conditions.ratios import chance_of, difference_of, holm
 from flightid.findings import Finding
 from flightid.frozen import dataclass
+from flightid.review.step_features import BANDWIDTH, GAIN
 from flightid.review.tables import by_reason, cell, untold_notes
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Reading
 from flightid.uncertainty.quantiles import interval_words, shown
 
-BY_FREQUENCY, TRACKING = "bandwidth at -3 dB", "tracking error of set-point"
+TRACKING = "tracking error of set-point"
 FREQUENCIES = ("crossover", "disturbance bandwidth")
 WORSE = {
     "delay to half": 1.0,
     "rise time": 1.0,
     "overshoot": 1.0,
-    BY_FREQUENCY: -1.0,
+    BANDWIDTH: -1.0,
     TRACKING: 1.0,
     "crossover": -1.0,
     "phase margin": -1.0,
@@ -31,7 +32,7 @@ WORSE = {
     "sensitivity peak": 1.0,
     "disturbance bandwidth": -1.0,
 }
-"""Which way a number of a loop gets worse."""
+"""Which way a number of a loop gets worse; level and gain do away from one."""
 MATERIAL_SHARE, MATERIAL_OVERSHOOT = 0.1, 5.0
 """A tenth of what was promised, or five points of overshoot: what no pilot feels is no miss. A
 model's simplification alone moves numbers by a few percent, which its covariance does not hold."""
@@ -120,7 +121,7 @@ class LoopChange:
 
     @property
     def _leans_worse(self) -> bool:
-        if self.name == "level":
+        if self.name == "level" or self.name.startswith(GAIN):
             old, new = (abs((each.value or 0.0) - 1.0) for each in (self.before, self.after))
             return new > old
         return WORSE[self.name] * (self.difference.value or 0.0) > 0.0

@@ -16,7 +16,6 @@ from flightid.findings import Finding, said_once
 from flightid.frozen import dataclass
 from flightid.result import Result
 from flightid.review.changes import (
-    BY_FREQUENCY,
     TRACKING,
     ExpectedLoop,
     LoopChange,
@@ -26,7 +25,7 @@ from flightid.review.changes import (
     verdicts,
 )
 from flightid.review.loop_response import LoopResponse
-from flightid.review.step_features import creep, reached_features
+from flightid.review.step_features import BANDWIDTH, GAIN, creep, step_features
 from flightid.review.told_band import QUICK, is_too_quick
 from flightid.table import Column, Table
 from flightid.uncertainty.estimate import Reading
@@ -34,10 +33,9 @@ from flightid.uncertainty.estimate import Reading
 Array = NDArray[np.float64]
 SHOWN = ("delay to half", "rise time", "overshoot", "level")
 STEPS = "Steps of both are read over the time that both show"
-REACHED = "level, rise and overshoot are of what is reached in it"
+REACHED = "level and delay are of what is reached in it, no rise time is told that goes by its end"
 NO_MODEL = "none of them is of its rate"
 NOT_ALONE = "its set-point acts by more than the angle controller"
-ON_A_SLOPE = "it ends where the step only creeps, where a model's few percent move it far"
 NONE: Mapping[str, tuple[Any, Any]] = MappingProxyType({})
 
 
@@ -205,10 +203,8 @@ def compare_loops(
         change_of(loop.name, reading, answer)
         for loop in before
         if loop.name in later and loop.is_told and later[loop.name].is_told
-        for reading, answer in _pairs(loop, later[loop.name])
+        for reading, answer in pairs(loop, later[loop.name])
     )
-    if promised:
-        changes = tuple(_on_a_slope(each, before, later) for each in changes)
     if not changes:
         sides = zip(names, (before, after), strict=True)
         untold = "; ".join(filter(None, (_untold(name, loops) for name, loops in sides)))
@@ -243,7 +239,7 @@ def _untold(name: str, loops: Iterable[LoopResponse]) -> str:
     return f"{name}: {told}" if told else ""
 
 
-def _pairs(before: LoopResponse, after: LoopResponse) -> Iterator[tuple[Reading, Reading]]:
+def pairs(before: LoopResponse, after: LoopResponse) -> Iterator[tuple[Reading, Reading]]:
     """The same number of both, steps read over the time that both show: where they end counts.
 
     Where one flight does not tell it, the other's stands beside a gap.
@@ -256,22 +252,10 @@ def _pairs(before: LoopResponse, after: LoopResponse) -> Iterator[tuple[Reading,
             yield reading, answer
 
 
-def _on_a_slope(
-    change: LoopChange, before: Iterable[LoopResponse], later: Mapping[str, LoopResponse]
-) -> LoopChange:
-    """Not judged, where it is a time at which steps only creep: what is small moves it far."""
-    mine = next(loop for loop in before if loop.name == change.loop)
-    end_s = min(mine.time_s[-1], later[mine.name].time_s[-1])
-    if change.name != "rise time" or not _unsettled(mine, later[mine.name], end_s):
-        return change
-    apart = replace(change.difference, stderr=None, ends=None, reason=ON_A_SLOPE)
-    return replace(change, difference=apart, chance=None)
-
-
 def _readings(loop: LoopResponse, end_s: float) -> dict[str, Reading]:
     """Of what a step reaches in that time, whether it has settled there or not."""
-    found = {r.name: r for r in reached_features(*_until(loop, end_s)) if r.name in SHOWN}
-    found |= {r.name: r for r in loop.readings if r.name == BY_FREQUENCY}
+    found = {r.name: r for r in step_features(*_until(loop, end_s)) if r.name in SHOWN}
+    found |= {r.name: r for r in loop.readings if r.name.startswith((GAIN, BANDWIDTH))}
     found |= {r.name: r for r in loop.readings if r.name == QUICK[0] and is_too_quick(r)}
     if loop.tracking is not None and loop.moved:
         found[TRACKING] = loop.tracking.scaled(100.0 / loop.moved, name=TRACKING, unit="%")

@@ -87,11 +87,35 @@ class LoopDraws:
 
 @dataclass(frozen=True)
 class _Equation:
-    """One predicted channel: coefficients of its own past, of the other's, of the set-point."""
+    """One predicted channel: coefficients of its own past, of the other's, of the set-point.
+
+    `summed` is that of the sum of errors, set-point less measured, up to the sample before.
+    """
 
     own: Array
     other: Array
+    summed: Array
     driven: Array
+
+    @classmethod
+    def rows(cls, found: Array, own: int, other: int) -> list[_Equation]:
+        """Of coefficients of so many lags of both channels, one sum, and the set-point."""
+        ends = [own, own + other, own + other + 1]
+        return [cls(*np.split(row, ends)) for row in found]
+
+    @property
+    def past(self) -> Array:
+        """One less what its own past makes of it."""
+        return _delayed(-self.own, 1.0)
+
+    @property
+    def through(self) -> Array:
+        """What the other channel makes of it."""
+        return _delayed(self.other)
+
+    def differences(self, polynomial: Array, sign: float = 1.0) -> Array:
+        """A polynomial with the sum beside it, both times what makes differences of sums."""
+        return _sum(np.convolve(polynomial, [1.0, -1.0]), sign * _delayed(self.summed))
 
 
 def closed_loop(samples: LoopSamples, *, pace_s: float = 1.0, seed: int = 0) -> LoopDraws:
@@ -100,7 +124,7 @@ def closed_loop(samples: LoopSamples, *, pace_s: float = 1.0, seed: int = 0) -> 
     Gusts move the measured channel, the attitude loop answers, and the set-point follows: a plain
     quotient is bent by that. A long ARX model predicts the measured channel from its own past, from
     the set-point and from the forerunner, which knows of a gust before the filtered gyro does, and
-    so leaves the noise out.
+    so leaves the noise out. The sum of errors stands for what an integrator remembers.
 
     Parameters
     ----------
@@ -128,16 +152,25 @@ def closed_loop(samples: LoopSamples, *, pace_s: float = 1.0, seed: int = 0) -> 
     own, other, driven = (_lags(memory * pace_s, samples.sample_time_s) for memory in MEMORY_S)
     _require_rows(samples, own + other + driven)
     random = np.random.default_rng(seed)
-    if samples.forerunner is None:
-        found = _predicted(samples.measured, (samples.set_point,), samples, (own, driven), random)
-        rows = [_Equation(row[:own], np.zeros(0), row[own:]) for row in found]
-        return _polynomials(rows, None, samples.sample_time_s)
     w, y, r = samples.forerunner, samples.measured, samples.set_point
-    ahead = _predicted(y, (w, r), samples, (own, other, driven), random)
-    beside = _predicted(w, (y, r), samples, (other, own, driven), random)
-    first = [_Equation(*np.split(row, [own, own + other])) for row in ahead]
-    second = [_Equation(*np.split(row, [other, own + other])) for row in beside]
+    sums = _sums_of_errors(samples)
+    if w is None:
+        found = _predicted(y, (sums, r), samples, (own, 1, driven), random)
+        return _polynomials(_Equation.rows(found, own, 0), None, samples.sample_time_s)
+    ahead = _predicted(y, (w, sums, r), samples, (own, other, 1, driven), random)
+    beside = _predicted(w, (y, sums, r), samples, (other, own, 1, driven), random)
+    first, second = _Equation.rows(ahead, own, other), _Equation.rows(beside, other, own)
     return _polynomials(first, second, samples.sample_time_s)
+
+
+def _sums_of_errors(samples: LoopSamples) -> Array:
+    """Running sum of set-point less measured in each piece, as the controller's integrator has it.
+
+    An integrator takes slow gusts away: what predicts the rest remembers them without end. Lags
+    alone forget, and what they forget made steps of slow integrators end too low.
+    """
+    errors, ends = samples.set_point - samples.measured, np.cumsum(samples.lengths)[:-1]
+    return np.concatenate([np.cumsum(part) for part in np.split(errors, ends)])
 
 
 def _lags(memory_s: float, sample_time_s: float) -> int:
@@ -188,16 +221,18 @@ def _predicted(
 def _polynomials(
     first: Sequence[_Equation], second: Sequence[_Equation] | None, sample_time_s: float
 ) -> LoopDraws:
-    """Closed loops of predictors: what a set-point does to the first channel by way of both."""
+    """Closed loops of predictors: what a set-point does to the first channel by way of both.
+
+    All times what makes differences of sums, which takes the infinite memory of these away.
+    """
     made = []
     for place, one in enumerate(first):
-        a, b, through = _delayed(-one.own, 1.0), _delayed(one.driven), _delayed(one.other)
+        a, b = one.differences(one.past), one.differences(_delayed(one.driven))
         if second is not None:
             two = second[place]
-            c = _delayed(-two.own, 1.0)
-            top = _sum(np.convolve(c, b), np.convolve(through, _delayed(two.driven)))
-            a = _sum(np.convolve(c, a), -np.convolve(through, _delayed(two.other)))
-            b = top
+            driven, back = two.differences(_delayed(two.driven)), two.differences(two.through, -1.0)
+            b = _sum(np.convolve(two.past, b), np.convolve(one.through, driven))
+            a = _sum(np.convolve(two.past, a), -np.convolve(one.through, back))
         made.append((b, a))
     return LoopDraws(np.array([b for b, _ in made]), np.array([a for _, a in made]), sample_time_s)
 

@@ -18,6 +18,7 @@ from flightid.frozen import dataclass
 from flightid.logs import Log
 from flightid.review.loop_response import LoopResponse
 from flightid.review.loops import SLOWEST_HZ
+from flightid.review.step_features import BANDWIDTH, SEVEN_TENTHS
 from flightid.review.typical_axes import TYPICAL, TypicalAxis
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Reading
@@ -35,7 +36,7 @@ LEADS_S = (1e-3, 0.5)
 """Of the yaw of rotors, which push the frame as they speed up; other axes have none."""
 UNTOLD = "the flight tells too few bandwidths and delays of it"
 UNLIKE = "hardly any typical vehicle answers so"
-BY_FREQUENCY = ("phase delay", "bandwidth at -3 dB", "frequency at")
+BY_FREQUENCY = ("phase delay", BANDWIDTH, "frequency at")
 CROSSOVERS_RAD_S = (2.0, 80.0)
 GRID = np.geomspace(1.0, 500.0, 100)
 LOGS = np.log(GRID)
@@ -237,16 +238,14 @@ class _Candidates:
         """Squared misses of what a flight tells, in errors; infinite of loops that are unstable."""
         gain, phase = np.abs(self.closed), np.unwrap(np.angle(self.closed), axis=1)
         phase -= 2.0 * np.pi * np.round(phase[:, :1] / (2.0 * np.pi))
-        slow = math.log(math.tau * 0.5 * SLOWEST_HZ["rate"])
         total = np.where(self.margins()[1] <= 0.0, np.inf, 0.0)
         for each in wanted:
             assert each.value is not None
             if each.name.startswith("phase delay"):
                 omega = math.tau * SLOWEST_HZ["rate"]
                 found = -_at(phase, np.full(len(phase), math.log(omega))) / omega
-            elif each.name == BY_FREQUENCY[1]:
-                rest = _at(gain, np.full(len(gain), slow))
-                found = _falls(gain / rest[:, None], math.sqrt(0.5)) / math.tau
+            elif each.name == BANDWIDTH:
+                found = _falls(gain, SEVEN_TENTHS) / math.tau
             else:
                 found = _falls(phase, math.radians(float(each.name.split()[-2]))) / math.tau
             error = math.hypot(SIMPLE * each.value, (each.half_width95 or 0.0) / half_width())

@@ -164,7 +164,7 @@ def _stepped(
         used_s=samples.duration_s,
         moved=float(np.std(samples.set_point)),
     )
-    return _step(known, samples, tick_s, advised)
+    return read_step(known, samples, tick_s, advised)
 
 
 def loop_rate_hz(log: Log) -> float:
@@ -249,7 +249,10 @@ def tracking_error(pieces: Sequence[Record], unit: str) -> Reading:
     return Estimate(TRACKING, value, unit, ends=ends)
 
 
-def _step(begun: LoopResponse, samples: LoopSamples, tick_s: float, advised: str) -> LoopResponse:
+def read_step(
+    begun: LoopResponse, samples: LoopSamples, tick_s: float, advised: str
+) -> LoopResponse:
+    """The step of samples whose set-point the controller takes at ticks of `tick_s`."""
     pace = PACE[begun.loop]
     try:
         draws = closed_loop(samples, pace_s=pace)

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from typing import cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flightid.control.autopilots.axis_loop import AxisLoop
 from flightid.control.autopilots.from_log import axis_loop_of
@@ -21,7 +22,11 @@ from flightid.review.loop_response import LoopResponse
 from flightid.review.loops import SLOWEST_HZ, WINDOW_S
 from flightid.review.step_features import frequency_features, step_features
 
+Array = NDArray[np.float64]
 DRAWS = 40
+SHOWN_S = 8.0
+"""Of steps from which frequencies are read: slow integrators bring the last of a rate over seconds,
+and what is cut off would be missing at low frequencies."""
 RESPONSES = {"rate": "rate step", "attitude": "angle step"}
 
 
@@ -98,21 +103,22 @@ def _promised(source: object, axes: list[str], loops: list[AxisLoop]) -> list[Lo
     )  # fmt: skip
     made = []
     for place, axis in enumerate(axes):
-        told = responses(plants, loops, place, "filtered")
+        told = responses(plants, loops, place, "filtered", shown_s=SHOWN_S)
         for loop, name in RESPONSES.items():
             if name in told:
                 made.append(_loop(axis, loop, told[name][1], step_s, bool(evidence.draws)))
     return made
 
 
-def _loop(axis: str, loop: str, steps: np.ndarray, step_s: float, known: bool) -> LoopResponse:
+def _loop(axis: str, loop: str, steps: Array, step_s: float, known: bool) -> LoopResponse:
     """Readings of steps at the loop's samples; one plant alone has no intervals."""
-    count = min(steps.shape[1], round(4.0 * WINDOW_S[loop] / step_s))
-    shown = steps[:, :count] if known else np.repeat(steps[:1, :count], 2, axis=0)
-    time_s = np.arange(count) * step_s
+    shown = steps if known else np.repeat(steps[:1], 2, axis=0)
     pulses = np.diff(shown, axis=1, prepend=0.0)
     draws = LoopDraws(pulses, np.ones((len(pulses), 1)), step_s)
-    readings = (*step_features(shown, time_s), *frequency_features(draws, SLOWEST_HZ[loop]))
+    by_frequency = frequency_features(draws, SLOWEST_HZ[loop])
+    shown = shown[:, : round(4.0 * WINDOW_S[loop] / step_s)]
+    time_s = np.arange(shown.shape[1]) * step_s
+    readings = (*step_features(shown, time_s), *by_frequency)
     return LoopResponse(
         axis, loop, "identified model", "gains of the log", 1.0 / step_s, 0.0, 0, None, None,
         time_s, shown[0], shown[1:], readings,

@@ -21,30 +21,27 @@ between them add up over one more window: a step that would leave its settled ba
 CREEP = 0.01
 """Share of the level that a step still gains or loses over one more window before it is said to
 (ours): integrators bring the last of a rate over seconds, and below that nobody minds."""
+RISE = 2
+"""Place of the rise time among the readings of a step."""
+SAME_RISE = 0.1
+"""Of a rise time: what half of the window tells otherwise by more is the window's, not the loop's.
+A tenth is what counts between flights, too."""
 RISES, FALLS = "still rises", "still falls"
 TOLD = 0.95
 """Least share of the draws in which a crossing exists: else it is not told."""
-HIGHEST = 0.3
-"""Of the sampling rate: frequencies above it are not read."""
+HIGHEST, LOWEST = 0.3, 0.1
+"""Of the sampling rate, and of the frequency of the phase delay: nothing is read beyond."""
+BANDWIDTH, GAIN = "bandwidth at -3 dB", "gain at "
+SEVEN_TENTHS = float(np.sqrt(0.5))
+UNTOLD = "not reached in every loop that the data allow"
 
 
 def step_features(steps: Array, time_s: Array) -> tuple[Reading, ...]:
     """Level, delay, rise, overshoot and settling of step responses, row 0 the estimate.
 
-    No numbers where the step still moves at the end of its window: they all stand on its level.
-    Where it creeps there they are of what it reaches in this window, and no settling is seen.
-    """
-    if still_moves(steps):
-        why = f"not settled in {_window(time_s)}"
-        read = window_features(steps, time_s)
-        return tuple(Estimate(each.name, None, each.unit, reason=why) for each in read)
-    return reached_features(steps, time_s)
-
-
-def reached_features(steps: Array, time_s: Array) -> tuple[Reading, ...]:
-    """The same of what steps reach in their window, settled or not; then no settling is told.
-
-    Nor is an overshoot of one that is highest where it ends, and rises there.
+    All are of the level that steps reach in their window: the mean of its last fifth. Of one that
+    still moves there no settling is told, no overshoot if it is highest there, and no rise time
+    that goes by where the window ends.
     """
     read = window_features(steps, time_s)
     if not (way := creep(steps)):
@@ -53,12 +50,24 @@ def reached_features(steps: Array, time_s: Array) -> tuple[Reading, ...]:
     untold = {"settling time": f"{why}settling is not seen"}
     if way == RISES and time_s[np.argmax(steps[0])] >= (1.0 - END) * time_s[-1]:
         untold["overshoot"] = f"{why}none is seen"
+    if _rise_goes_by_window(steps, time_s):
+        untold["rise time"] = f"{why}its last tenths are as long as one looks"
     return tuple(
         Estimate(each.name, None, each.unit, reason=untold[each.name])
         if each.name in untold
         else each
         for each in read
     )
+
+
+def _rise_goes_by_window(steps: Array, time_s: Array) -> bool:
+    """Whether half of the window would tell a rise time that differs by more than counts."""
+    half = time_s <= 0.5 * time_s[-1]
+    (whole, short) = (
+        window_features(steps[:, part], time_s[part])[RISE].value
+        for part in (np.ones(half.size, dtype=np.bool_), half)
+    )
+    return whole is None or short is None or abs(whole - short) > SAME_RISE * whole
 
 
 def _window(time_s: Array) -> str:
@@ -126,26 +135,40 @@ def _overshoots(shares: Array) -> Array:
 
 
 def frequency_features(loop: LoopDraws, slowest_hz: float) -> tuple[Reading, ...]:
-    """Bandwidths by gain and phase, and the phase delay at a low frequency."""
-    highest = HIGHEST / loop.sample_time_s
-    grid = np.geomspace(0.5 * slowest_hz, highest, 240)
+    """Gain and phase delay at a low frequency, and bandwidths by gain and by phase.
+
+    The bandwidth by gain is where the loop first follows with less than 0.71 of what is asked, 3 dB
+    below one: a loop that lost gain has less of it, whatever its shape.
+    """
+    highest, base = HIGHEST / loop.sample_time_s, 0.5 * slowest_hz
+    below = np.geomspace(LOWEST * slowest_hz, base, 80)[:-1]
+    grid = np.concatenate([below, np.geomspace(base, highest, 240)])
     response = loop.response(2.0 * np.pi * grid)
-    gain = np.abs(response) / np.abs(response[:, :1])
-    phase = np.unwrap(np.angle(response), axis=1)
+    at_base = response[:, below.size]
+    phase = np.unwrap(np.angle(response[:, below.size :]), axis=1)
     phase -= 2.0 * np.pi * np.round(phase[:, :1] / (2.0 * np.pi))
     slow = loop.response(np.array([2.0 * np.pi * slowest_hz]))[:, 0]
     late = -np.angle(slow) / (2.0 * np.pi * slowest_hz)
+    above = f"above {highest:.3g} Hz, or not told below it by these data"
+    lost = f"it follows with less than 0.71 of what is asked at {grid[0]:.2g} Hz already"
 
-    def falls(curve: Array, value: float) -> Array:
-        found = _crossings(-curve, grid, -value)
-        return np.where(curve[:, 0] <= value, np.nan, found)
+    def turns(deg: float) -> Array:
+        return _falls(phase, np.radians(deg), grid[below.size :])
 
+    gain = np.abs(response)
+    weak = gain[0, 0] <= SEVEN_TENTHS
     return (
         _reading(f"phase delay at {slowest_hz:g} Hz", late, "s"),
-        _reading("bandwidth at -3 dB", falls(gain, np.sqrt(0.5)), "Hz", highest),
-        _reading("frequency at -90 deg", falls(phase, -np.pi / 2.0), "Hz", highest),
-        _reading("frequency at -180 deg", falls(phase, -np.pi), "Hz", highest),
+        _reading(f"{GAIN}{base:g} Hz", np.abs(at_base), "1"),
+        _reading(BANDWIDTH, _falls(gain, SEVEN_TENTHS, grid), "Hz", lost if weak else above),
+        _reading("frequency at -90 deg", turns(-90.0), "Hz", above),
+        _reading("frequency at -180 deg", turns(-180.0), "Hz", above),
     )
+
+
+def _falls(curves: Array, value: float, at: Array) -> Array:
+    """Where each curve first falls to a value; NaN where it begins below, or never does."""
+    return np.where(curves[:, 0] <= value, np.nan, _crossings(-curves, at, -value))
 
 
 def _crossings(curves: Array, at: Array, value: float) -> Array:
@@ -178,7 +201,7 @@ def _settling(shares: Array, time_s: Array) -> Array:
     return np.where(last >= shares.shape[1] - 2, np.nan, found)
 
 
-def _reading(name: str, values: Array, unit: str, highest: float | None = None) -> Reading:
+def _reading(name: str, values: Array, unit: str, why: str = UNTOLD) -> Reading:
     told = np.isfinite(values)
     if told[0] and np.mean(told) >= TOLD:
         found = Estimate(name, float(values[0]), unit, ends=DrawnEnds(values[1:][told[1:]]))
@@ -186,7 +209,4 @@ def _reading(name: str, values: Array, unit: str, highest: float | None = None) 
         # Draws that scatter about another crossing than the estimate's tell of neither.
         if ends is not None and ends[0] <= values[0] <= ends[1]:
             return found
-    why = "not reached in every loop that the data allow"
-    if highest is not None:
-        why = f"above {highest:.3g} Hz, or not told below it by these data"
     return Estimate(name, None, unit, reason=why)

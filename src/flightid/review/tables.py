@@ -58,7 +58,7 @@ def steps(loops: Iterable[LoopResponse]) -> Table:
     notes = (
         f"In brackets: {interval_words(shown())} intervals.",
         "Of a set-point that jumps by 1; rise from 10 to 90 %, overshoot and settling (10 %) are "
-        "those of the level that it reaches in the time that is read.",
+        "those of the level that it reaches in the time that is read: the mean of its last fifth.",
         *untold_notes((loop.name, each) for loop in told for each in loop.readings[:READ]),
     )
     return Table("Steps, from ordinary flying", columns, rows, notes)
@@ -67,7 +67,7 @@ def steps(loops: Iterable[LoopResponse]) -> Table:
 def _level(loop: LoopResponse) -> str | None:
     """The level, and where it is not the last."""
     level, creeps = cell(loop["level"]), loop.creeps
-    return f"{level}, {creeps}" if level and creeps else level
+    return f"{level} in {loop.time_s[-1]:.2g} s, {creeps}" if level and creeps else level
 
 
 def untold_notes(missing: Iterable[tuple[str, Reading]]) -> Iterator[str]:
@@ -113,6 +113,7 @@ def frequencies(loops: Iterable[LoopResponse]) -> Table:
     columns = (
         Column("loop"),
         Column("phase delay", "ms"),
+        Column("gain"),
         Column("-3 dB", "Hz"),
         Column("-90 deg", "Hz"),
         Column("-180 deg", "Hz"),
@@ -125,11 +126,13 @@ def frequencies(loops: Iterable[LoopResponse]) -> Table:
     for loop in used:
         read = {reading.name.split(" at ")[-1]: reading for reading in loop.readings}
         delay = next((r for r in loop.readings if r.name.startswith("phase delay")), None)
+        gain = next((r for r in loop.readings if r.name.startswith("gain")), None)
         wanted = (read.get(name) for name in ("-3 dB", "-90 deg", "-180 deg"))
         rows.append(
             (
                 loop.name,
                 cell(delay, 1e3),
+                cell(gain),
                 *map(cell, wanted),
                 _in_degrees(loop.tracking),
                 loop.used_s,
@@ -137,8 +140,8 @@ def frequencies(loops: Iterable[LoopResponse]) -> Table:
             )
         )
     note = (
-        "Phase delay at 2 Hz of rate loops, at 0.5 Hz of attitude loops; -3 dB below the gain at "
-        "half of that frequency, which is not what was asked where a loop follows with less."
+        "Phase delay at 2 Hz of rate loops, at 0.5 Hz of attitude loops; gain at half of that. "
+        "-3 dB: where a loop first follows with less than 0.71 of what is asked."
     )
     title = "Closed loops by frequency, and tracking"
     why = untold_notes((loop.name, each) for loop in used for each in loop.all_readings[READ:])

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.review.deconvolution import LoopSamples
+from flightid.review.step_features import BANDWIDTH
 from flightid.review.thresholds import COHERENT, RISE_BAND
 from flightid.uncertainty.estimate import Estimate, Reading
 
@@ -16,7 +17,7 @@ WINDOW_S = 1.0
 """Of the spectra, in units of `pace_s`."""
 RISE = "rise time"
 ASKED = "quicker sticks"
-QUICK = (RISE, "bandwidth at -3 dB", "frequency at -90 deg", "frequency at -180 deg")
+QUICK = (RISE, BANDWIDTH, "frequency at -90 deg", "frequency at -180 deg")
 
 
 def told_hz(samples: LoopSamples, *, pace_s: float = 1.0) -> float:

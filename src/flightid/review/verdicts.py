@@ -87,9 +87,6 @@ def _flown(review: FlightReview) -> Iterator[Finding]:
 def _loops(review: FlightReview) -> Iterator[Finding]:
     told = [loop for loop in review.loops if loop.is_told]
     for loop in told:
-        if loop["level"].value is None:
-            yield _unsettled(loop)
-            continue
         said = _step_words(loop)
         if loop.is_bent:
             said += f" (of large moves: {loop.beyond})"
@@ -125,16 +122,6 @@ def _step_words(loop: LoopResponse) -> str:
     return (
         f"{said}reaches {level} in {loop.time_s[-1]:.2g} s{beyond} and {creeps} there: settling is "
         "not seen"
-    )
-
-
-def _unsettled(loop: LoopResponse) -> Finding:
-    """No advice: how far a step gets that still moves is not known."""
-    return Finding(
-        f"step-{loop.axis}-{loop.loop}",
-        Light.UNKNOWN,
-        f"{loop.name}: {loop['level'].reason}, where it has come to {loop.step[-1]:.2g} of what is "
-        "asked: level, rise, overshoot and settling are not told",
     )
 
 
