@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+import click
 import numpy as np
 import pytest
 
 import flightid as fid
+from flightid.cli.compare import _flights
+from flightid.cli.next_comparison import flown_for
 from flightid.cli.program import run
 from flightid.control.autopilots.parameter_files import GainChange, write_ardupilot_parameters
 from flightid.conventions import Light
 from flightid.dynamics.conditions.ratios import difference_of
 from flightid.errors import DataError
+from flightid.files import sha256_of_file
 from flightid.plot.flight import compared_steps
 from flightid.review.changes import (
     TRACKING,
@@ -24,6 +29,7 @@ from flightid.review.changes import (
     verdicts,
 )
 from flightid.review.comparison import compare_loops
+from flightid.review.flight_state import FlightState
 from flightid.review.loop_response import LoopResponse
 from flightid.review.next_step import FlownStep, flown_step, left_to_fly
 from flightid.review.promised import promised_loops
@@ -231,8 +237,17 @@ def test_gains_filters_and_other_vehicles_are_said(
     found = fid.compare_flights(review, other)
     assert (found.findings[0].code, found.findings[0].light) == ("not-alike", Light.AMBER)
     assert found.summary().title.endswith("of different firmware")
-    framed = replace(other, identity=replace(other.identity, frame="another"))
+    framed = replace(other, identity=replace(other.identity, frame="another FRAME_CLASS"))
     assert Light.GREEN not in [f.light for f in fid.compare_flights(review, framed).findings]
+    named = replace(other, identity=replace(other.identity, frame="QUAD/X"))
+    assert "frame" not in fid.compare_flights(review, named).unlike
+    limit = replace(review.motors[0], at_upper=0.2)
+    bound = replace(review, name="b", motors=(limit, *review.motors[1:]))
+    held = fid.compare_flights(review, bound).findings
+    assert [(f.code, f.light) for f in held] == [
+        ("motor-at-upper", Light.AMBER), ("loops-unchanged", Light.UNKNOWN),
+    ]  # fmt: skip
+    assert held[0].message.startswith("b: ")
     cut = replace(review, name="b", loops=review.loops[1:])
     notes = fid.compare_flights(review, cut).summary().notes
     assert f"b logs no set-point of {review.loops[0].name}." in notes
@@ -360,6 +375,56 @@ def test_the_step_that_flew_names_the_next_and_the_way_back(
     assert step.finding(kept=False, log="f.BIN", swept=True).action.endswith("flightid tune f.BIN")
     assert replace(step, following=None).finding(kept=True).code == "last-step"
     assert flown_step([log.parent], {"ATC_RAT_RLL_P": 0.5}) is None
+
+
+def test_what_lies_beside_two_logs_changes_no_verdict_and_a_promise_that_is_named_does(
+    logs: dict[str, Path], stepped: tuple[Path, fid.TransferFunctionModel]
+) -> None:
+    """`compare f1 f3` went by the study's folder that lay beside: amber and green by turns."""
+    before, after = logs["before"], stepped[0]
+    alone = _flights(str(before), str(after), [])
+    assert "flightid compare STUDY-output" in alone.beside
+    models = before.parent / "before-output" / "models"
+    models.mkdir(parents=True)
+    model = models / "roll.toml"
+    model.write_bytes((after.parent / "roll.toml").read_bytes())
+    used = {"files": {before.name: sha256_of_file(before)}}
+    (models.parent / "results.json").write_text(json.dumps(used))
+    beside = _flights(str(before), str(after), [])
+    assert beside.findings == alone.findings
+    assert "before-output" in beside.beside
+    named = _flights(str(before), str(after), [str(model)])
+    assert "gains-2.param next" in named.findings[-1].action
+    with pytest.raises(click.UsageError, match="with a whole log"):
+        _flights(str(before), f"{after}@1:2", [str(model)])
+
+
+def test_a_study_of_another_vehicle_is_told_and_nothing_is_praised(
+    stepped: tuple[Path, fid.TransferFunctionModel],
+    reviews: dict[str, fid.FlightReview],
+    tmp_path: Path,
+) -> None:
+    """A quadrotor's study beside a log of another vehicle was held against it without a word."""
+    log, model = stepped
+    flown = fid.review_flight(log)
+    (tmp_path / "results.json").write_text(json.dumps({"review": flown.to_dict()}))
+    state = flown_for(tmp_path)
+    assert state == FlightState.of(flown)
+    assert state == flown_for(tmp_path / "models" / "roll.toml")
+    assert flown_for(log) is None
+    kept = fid.compare_with_promise([model], log, review=flown, state=state)
+    assert (kept.findings[0].light, kept.kept) == (Light.GREEN, True)
+    new = replace(state, told={**state.told, "firmware": "V4"})
+    later = fid.compare_with_promise([model], log, review=flown, state=new)
+    assert (later.findings[0].light, later.kept) == (Light.AMBER, True)
+    others = ({"vehicle": "px4 plane"}, Light.RED), ({"autopilot": "Cube 1"}, Light.AMBER)
+    for told, light in others:
+        seen = replace(flown, identity=replace(flown.identity, board="Cube 2"))
+        other = replace(state, told={**state.told, **told})
+        found = fid.compare_with_promise([model], log, review=seen, state=other).findings
+        assert (found[0].code, found[0].light) == ("not-alike", light)
+        assert Light.GREEN not in [each.light for each in found]
+    assert FlightState.of(reviews["before"]).unlike(state)["firmware"]
 
 
 def test_angle_loops_are_promised_where_nothing_else_moves_them(

@@ -16,7 +16,7 @@ from flightid.cli.figures import QuotientRange
 from flightid.cli.hints import PARAMETERS
 from flightid.cli.lists import ListOption, ListsCommand
 from flightid.cli.model_commands import feedback_option
-from flightid.cli.next_comparison import models_made_of, unasked
+from flightid.cli.next_comparison import flown_for, models_made_of, unasked
 from flightid.cli.output import all_option, json_option, level_option
 from flightid.cli.pages import html_option, show
 from flightid.cli.sources import AXES, known_models, load_source
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from flightid.models import Model
     from flightid.result import Result
     from flightid.review import FlightComparison, FlightReview, MarginComparison
+    from flightid.review.flight_state import FlightState
 
 PART = re.compile(r"(.+)@([\d.]*):([\d.]*)")
 """A log and a part of it, s: ``flight.BIN@20:80``."""
@@ -71,13 +72,14 @@ def command(
 
     Two logs, or parts of logs (flight.BIN@20:80, s on the autopilot's clock): steps, bandwidths and
     tracking of the loops, gains and filters that differ, and whether vehicle, firmware or battery
-    do. Models, then a log: what they promise of the gains that it flew beside what it shows; where
-    `flightid tune --write` left its files beside either, the next step to fly or the file that
-    takes this one back. Models alone: parameters and modes with their ratios, the first as base;
-    with --gains or --feedback, and of studies that tuned a PID, margins with intervals of the
-    difference too; one model and two files of --gains: what the gains change. A model is a .toml
-    file, the folder of a study, the JSON of a fit, or a library name. To see which predicts better:
-    `flightid verify MODEL RECORDS --against MODEL`.
+    do; the two logs alone decide. Models, then a log: what they promise of the gains that it flew
+    beside what it shows; where `flightid tune --write` left its files beside either, the next step
+    to fly or the file that takes this one back. Models, then two logs: what got worse is held
+    against what they promise of the second. Models alone: parameters and modes with their ratios,
+    the first as base; with --gains or --feedback, and of studies that tuned a PID, margins with
+    intervals of the difference too; one model and two files of --gains: what the gains change. A
+    model is a .toml file, the folder of a study, the JSON of a fit, or a library name. To see which
+    predicts better: `flightid verify MODEL RECORDS --against MODEL`.
     """
     from flightid.uncertainty.quantiles import showing
 
@@ -99,12 +101,16 @@ def command(
         return
     if gains or feedback:
         raise click.UsageError("--gains and --feedback are closed around models; a log has its own")
-    if (len(flights) > 1 and len(files) != len(flights)) or files[-1] not in flights:
-        raise click.UsageError("name two logs, or models and then the log that flew their gains")
     if len(flights) > 2:
         raise click.UsageError("two logs are compared at a time")
+    models = files[: -len(flights)]
+    if tuple(flights) != files[-len(flights) :]:
+        raise click.UsageError("name two logs, or models and then the log that flew their gains")
     with showing(level):
-        made = _flights(*files) if len(flights) == 2 else _promise(files[:-1], files[-1])
+        if len(flights) == 2:
+            made = _flights(flights[0], flights[1], models)
+        else:
+            made = _promise(models, flights[0])
         if not as_json:
             for table in made.settings_tables():
                 click.echo(f"{table}\n")
@@ -206,24 +212,39 @@ def _reviewed(name: str) -> FlightReview:
     return replace(review, name=f"{review.name}@{part[2]}:{part[3]}")
 
 
-def _flights(before: str, after: str) -> FlightComparison:
+def _flights(before: str, after: str, models: Sequence[str]) -> FlightComparison:
+    """Two flights, judged by themselves; with models named, by what these promise of the second.
+
+    Whatever lies beside the logs changes no verdict: the same two give the same.
+    """
     from flightid import compare_flights, compare_with_promise, read_log
     from flightid.progress import progress
 
+    if models and PART.fullmatch(after):
+        raise click.UsageError("a promise is compared with a whole log")
     with progress(None, "reviewing both flights"):
         reviews = _reviewed(before), _reviewed(after)
-    if PART.fullmatch(after):
-        return compare_flights(*reviews)
+    if not models:
+        return replace(compare_flights(*reviews), beside=_beside(before, after))
     log = read_log(after)
-    folders = [*dict.fromkeys([Path(PART.sub(r"\1", before)).resolve().parent, Path.cwd()])]
-    results = models_made_of(Path(PART.sub(r"\1", before)), folders)
-    promise = None
-    if results is not None:
-        with progress(None, "working out what was promised"):
-            promise = compare_with_promise(_models(str(results)), log, review=reviews[1])
+    with progress(None, "working out what was promised"):
+        promise = compare_with_promise(
+            _all_models(models), log, review=reviews[1], state=_state(models)
+        )
     made = compare_flights(*reviews, promise=promise)
-    places = [*folders, log.path.resolve().parent]
-    return _with_step(made, log, places, promise, [] if results is None else [str(_near(results))])
+    return _with_step(made, log, [before, after], promise, models)
+
+
+def _beside(before: str, after: str) -> str:
+    """That no study was looked at, and the command that holds one's promise against the second."""
+    logs = [Path(PART.sub(r"\1", each)) for each in (before, after)]
+    folders = dict.fromkeys((logs[0].resolve().parent, Path.cwd()))
+    made = models_made_of(logs[0], folders)
+    named = "STUDY-output" if made is None else quote(str(_near(made)))
+    return (
+        "Two logs are judged by themselves, whatever lies beside them; what a study promised of "
+        f"the second: flightid compare {named} {quote(str(logs[0]))} {quote(str(logs[1]))}."
+    )
 
 
 def _near(path: Path) -> Path:
@@ -235,9 +256,9 @@ def _near(path: Path) -> Path:
 def _with_step(
     made: FlightComparison,
     log: Log,
-    folders: Sequence[Path],
-    promise: FlightComparison | None,
-    models: Sequence[str] = (),
+    logs: Sequence[str],
+    promise: FlightComparison,
+    models: Sequence[str],
 ) -> FlightComparison:
     """With what to do after the step of gains that a log flew, if it is one of those beside it.
 
@@ -246,22 +267,20 @@ def _with_step(
     from flightid.review.comparison import unheld
     from flightid.review.next_step import flown_step, left_to_fly
 
-    step = flown_step([_near(each) for each in folders if each.is_dir()], log.parameters)
+    places = [Path(PART.sub(r"\1", name)).resolve().parent for name in (*models, *logs)]
+    step = flown_step([_near(each) for each in places if each.is_dir()], log.parameters)
+    untold = () if promise is made else unheld(promise)
+    said = [*made.findings, *untold]
     if step is None:
-        return made
-    name = log.path.name
-    if promise is None:
-        return replace(made, findings=(*made.findings, step.unjudged(name)))
+        return replace(made, findings=tuple(said))
     to_fly = left_to_fly(promise)
     found = step.finding(
         kept=promise.kept,
         to_fly=to_fly,
-        log=name,
+        log=log.path.name,
         again=f"flightid compare {' '.join(map(quote, models))} LOG",
         swept=bool(log.sid_runs),
     )
-    untold = () if promise is made else unheld(promise)
-    said = [*made.findings, *untold]
     if to_fly and promise.kept is not False:
         # The last line says what to fly for all of them.
         said = [replace(e, action="") if e in unheld(promise) else e for e in said]
@@ -277,9 +296,17 @@ def _promise(models: Sequence[str], after: str) -> FlightComparison:
         raise click.UsageError("a promise is compared with a whole log")
     log = read_log(after)
     with progress(None, "working out what was promised"):
-        made = compare_with_promise([each for name in models for each in _models(name)], log)
-    places = [Path(name).resolve().parent for name in (*models, after)]
-    return _with_step(made, log, places, made, models)
+        made = compare_with_promise(_all_models(models), log, state=_state(models))
+    return _with_step(made, log, [after], made, models)
+
+
+def _state(models: Sequence[str]) -> FlightState | None:
+    """State of the flight that the models were identified from, where their results tell it."""
+    return next(filter(None, (flown_for(Path(name)) for name in models)), None)
+
+
+def _all_models(names: Sequence[str]) -> list[Model]:
+    return [each for name in names for each in _models(name)]
 
 
 def _models(name: str) -> list[Model]:

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from flightid.conventions import Light
 from flightid.findings import Finding
+
+if TYPE_CHECKING:
+    from flightid.review.flight_state import FlightState
 
 RESULTS = "results.json"
 MAXIMUM_RESULTS = 256 << 20
@@ -69,13 +73,33 @@ def _records(results: Path) -> str:
 
 def _used(results: Path) -> dict[str, str]:
     """Names of the files that a study read, with their hashes."""
+    files = _part(results, "files")
+    return {str(k): str(v) for k, v in files.items()}
+
+
+def _part(results: Path, name: str) -> dict[str, object]:
+    """A part of a study's results; empty where they have none."""
     from flightid.reading import bounded_bytes, parse_json
 
     if not results.is_file():
         return {}
     content = parse_json(bounded_bytes(results, MAXIMUM_RESULTS), "results", results.name)
-    files = content.get("files") if isinstance(content, dict) else None
-    return {str(k): str(v) for k, v in files.items()} if isinstance(files, dict) else {}
+    part = content.get(name) if isinstance(content, dict) else None
+    return part if isinstance(part, dict) else {}
+
+
+def flown_for(model: Path) -> FlightState | None:
+    """State of the flight that a study's folder, or a model in it, was identified from.
+
+    None where no results stand with it, or they hold no review of a flight.
+    """
+    from flightid.models.saved_files import MODELS
+    from flightid.review.flight_state import FlightState
+
+    folder = model if model.is_dir() else model.parent
+    folder = folder.parent if folder.name == MODELS else folder
+    review = _part(folder / RESULTS, "review")
+    return FlightState.in_results(review) if review else None
 
 
 def models_made_of(log: Path, folders: Iterable[Path]) -> Path | None:

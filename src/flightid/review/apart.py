@@ -1,13 +1,8 @@
-"""What was set otherwise in two flights: gains, filters, and what else their loops depend on."""
+"""What was set otherwise in two flights: gains and filters."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 from flightid.review.result import FlightReview
-
-MATERIAL_VOLTAGE = 1.2
-"""Ratio of first voltages beyond which the batteries are not alike: a cell empties by a fifth."""
 
 
 def filters_between(before: FlightReview, after: FlightReview) -> dict[str, tuple[str, str]]:
@@ -23,30 +18,6 @@ def filters_between(before: FlightReview, after: FlightReview) -> dict[str, tupl
     )
     pairs = {name: (old.get(name, "off"), new.get(name, "off")) for name in {**old, **new}}
     return {name: pair for name, pair in pairs.items() if pair[0] != pair[1]}
-
-
-def unlike_between(before: FlightReview, after: FlightReview) -> dict[str, tuple[str, str]]:
-    """What differs between two flights, of what both logs tell, that their loops depend on."""
-    old, new = (dict(_state(each)) for each in (before, after))
-    found = {what: (old[what], new[what]) for what in old if new.get(what, old[what]) != old[what]}
-    one, other = before.identity.battery, after.identity.battery
-    if "battery cells" not in found and one is not None and other is not None:
-        low, high = sorted((one.start_v, other.start_v))
-        if high > MATERIAL_VOLTAGE * low:
-            found["battery"] = f"{one.start_v:.3g} V", f"{other.start_v:.3g} V"
-    return found
-
-
-def _state(review: FlightReview) -> Iterator[tuple[str, str]]:
-    battery = review.identity.battery
-    cells = None if battery is None else battery.cells
-    told = {
-        "vehicle": " ".join(filter(None, (review.kind, review.vehicle))),
-        "firmware": review.firmware,
-        "frame": review.identity.frame,
-        "battery cells": f"{cells}" if cells else "",
-    }
-    yield from ((what, value) for what, value in told.items() if value)
 
 
 def gains_between(before: FlightReview, after: FlightReview) -> dict[str, tuple[float, float]]:

@@ -6,11 +6,13 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from flightid.logs import Log, read_log
-from flightid.review.apart import filters_between, gains_between, unlike_between
+from flightid.review.apart import filters_between, gains_between
 from flightid.review.comparison import FlightComparison, compare_loops
 from flightid.review.flight import review_flight
+from flightid.review.flight_state import FlightState
 from flightid.review.promised import promised_loops
 from flightid.review.result import FlightReview
+from flightid.review.verdicts import loops_in_doubt
 
 Flown = FlightReview | Log | str | Path
 
@@ -57,14 +59,19 @@ def compare_flights(
         names,
         gains=gains_between(first, second),
         filters=filters_between(first, second),
-        unlike=unlike_between(first, second),
+        unlike=FlightState.of(first).unlike(FlightState.of(second)),
         promised=False,
         promise=promise,
+        limits=(*loops_in_doubt(first), *loops_in_doubt(second)),
     )
 
 
 def compare_with_promise(
-    sources: Iterable[object], after: Log | str | Path, *, review: FlightReview | None = None
+    sources: Iterable[object],
+    after: Log | str | Path,
+    *,
+    review: FlightReview | None = None,
+    state: FlightState | None = None,
 ) -> FlightComparison:
     """Say whether a flight keeps what identified models promise of the gains that it flew.
 
@@ -76,6 +83,9 @@ def compare_with_promise(
         The flight with new gains.
     review : FlightReview, optional
         Of that flight, where it has been reviewed.
+    state : FlightState, optional
+        Of the flight that the models were identified from: what differs is said, and of another
+        vehicle nothing is praised.
 
     Raises
     ------
@@ -94,8 +104,10 @@ def compare_with_promise(
     log = after if isinstance(after, Log) else read_log(after)
     names = "the models", log.path.name
     promise = promised_loops(sources, log)
-    loops = (review or review_flight(log)).loops
-    return compare_loops(promise, loops, names, promised=True)
+    flown = review or review_flight(log)
+    unlike = {} if state is None else state.unlike(FlightState.of(flown))
+    limits = loops_in_doubt(flown)
+    return compare_loops(promise, flown.loops, names, unlike=unlike, promised=True, limits=limits)
 
 
 def _review(flown: Flown) -> FlightReview:

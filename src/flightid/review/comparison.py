@@ -24,7 +24,9 @@ from flightid.review.changes import (
     significant_of,
     verdicts,
 )
+from flightid.review.flight_state import OTHERS
 from flightid.review.loop_response import LoopResponse
+from flightid.review.motors import LIMITS
 from flightid.review.step_features import BANDWIDTH, GAIN, creep, step_features
 from flightid.review.told_band import QUICK, is_too_quick
 from flightid.table import Column, Table
@@ -32,10 +34,13 @@ from flightid.uncertainty.estimate import Reading
 
 Array = NDArray[np.float64]
 SHOWN = ("delay to half", "rise time", "overshoot", "level")
+NOT_ALIKE = "not-alike"
 STEPS = "Steps of both are read over the time that both show"
 REACHED = "level and delay are of what is reached in it, no rise time is told that goes by its end"
 NO_MODEL = "none of them is of its rate"
 NOT_ALONE = "its set-point acts by more than the angle controller"
+CAUSES = (NOT_ALIKE, *LIMITS)
+"""Findings that excuse a loop, and say nothing of it."""
 NONE: Mapping[str, tuple[Any, Any]] = MappingProxyType({})
 
 
@@ -56,10 +61,12 @@ class FlightComparison(Result, schema="flightid.flight_comparison/1"):
     filters : mapping of str to tuple of str
         Filters whose settings differ: before and after.
     unlike : mapping of str to tuple of str
-        What else differs that loops depend on: vehicle, firmware, frame, battery.
+        What else differs that loops depend on: vehicle, board, firmware, frame, motors, battery.
     significant : tuple of str
         ``"loop, name"`` of what changed beyond chance.
     findings : tuple of Finding
+    beside : str
+        What is to be known of what was not looked at; empty where nothing is.
 
     Example
     -------
@@ -77,11 +84,12 @@ class FlightComparison(Result, schema="flightid.flight_comparison/1"):
     unlike: Mapping[str, tuple[str, str]]
     significant: tuple[str, ...]
     findings: tuple[Finding, ...]
+    beside: str = ""
 
     @property
     def kept(self) -> bool | None:
-        """Whether nothing was found that asks for a look; None where a part was not judged."""
-        lights = {each.light for each in self.findings}
+        """Whether no loop was found that asks for a look; None where a part was not judged."""
+        lights = {each.light for each in self.findings if each.code not in CAUSES}
         if lights & {Light.AMBER, Light.RED}:
             return False
         return None if Light.UNKNOWN in lights else True
@@ -108,7 +116,8 @@ class FlightComparison(Result, schema="flightid.flight_comparison/1"):
             Of the intervals.
         """
         names = ("promised", "flown") if self.promised else self.names
-        notes = (*self._windows(), *map(str, said_once(self.findings)))
+        beside = filter(None, (self.beside,))
+        notes = (*self._windows(), *beside, *map(str, said_once(self.findings)))
         title = f"{self.names[0]} and {self.names[1]}"
         if self.unlike:
             title = f"{title}, of different {', '.join(self.unlike)}"
@@ -192,10 +201,12 @@ def compare_loops(
     unlike: Mapping[str, tuple[str, str]] = NONE,
     promised: bool,
     promise: FlightComparison | None = None,
+    limits: tuple[Finding, ...] = (),
 ) -> FlightComparison:
     """Put the loops of two flights, or of a promise and a flight, side by side.
 
-    Where a `promise` of the second flight is known, what got worse is held against that.
+    Where a `promise` of the second flight is known, what got worse is held against that. Of other
+    vehicles, and of loops that `limits` bent, no difference praises what was set, and no likeness.
     """
     bent = {loop.name: loop for loop in (*before, *after) if loop.is_bent and loop.is_told}
     later = {loop.name: loop for loop in after if not (promised and loop.is_bent)}
@@ -207,7 +218,8 @@ def compare_loops(
     )
     if not changes:
         sides = zip(names, (before, after), strict=True)
-        untold = "; ".join(filter(None, (_untold(name, loops) for name, loops in sides)))
+        reasons = (_untold(name, loops) for name, loops in sides)
+        untold = "; ".join(filter(None, (_apart(unlike), *reasons)))
         raise DataError(
             "there is no loop that both tell",
             found=untold or "no loop in common",
@@ -217,11 +229,11 @@ def compare_loops(
     kept = significant_of(changes)
     promises = expected(promise)
     judged = list(verdicts(changes, kept, promised=promised, bent=bent, promises=promises))
-    if "vehicle" in unlike or "frame" in unlike:
-        # Of two vehicles no difference praises what was set, and no likeness either.
+    if limits or any(each in unlike for each in OTHERS):
         judged = [replace(e, light=Light.UNKNOWN) if e.light is Light.GREEN else e for e in judged]
     unfit = [bent[loop.name] for loop in before if promised and loop.name in bent]
-    findings = (*_unlike(unlike), *judged, *map(_beyond, unfit))
+    said = _unlike(unlike, names, promised=promised)
+    findings = (*said, *limits, *judged, *map(_beyond, unfit))
     return FlightComparison(
         names, promised, changes, before, after, gains, filters, unlike, kept, findings
     )
@@ -298,10 +310,28 @@ def _beyond(loop: LoopResponse) -> Finding:
     return Finding("beyond-angle-law", Light.UNKNOWN, said, f"{loop.action}, and compare again")
 
 
-def _unlike(unlike: Mapping[str, tuple[str, str]]) -> Iterator[Finding]:
-    if unlike:
-        said = "; ".join(f"{what} {old} → {new}" for what, (old, new) in unlike.items())
+def _apart(unlike: Mapping[str, tuple[str, str]]) -> str:
+    return "; ".join(f"{what} {old} → {new}" for what, (old, new) in unlike.items())
+
+
+def _unlike(
+    unlike: Mapping[str, tuple[str, str]], names: tuple[str, str], *, promised: bool
+) -> Iterator[Finding]:
+    if not unlike:
+        return
+    said = _apart(unlike)
+    if not promised:
         yield Finding(
-            "not-alike", Light.AMBER, f"more than gains may differ between the two logs: {said}",
+            NOT_ALIKE, Light.AMBER, f"more than gains may differ between the two logs: {said}",
             "compare flights of one vehicle in one state, or hold these for causes as well",
+        )  # fmt: skip
+    elif "vehicle" in unlike or "frame" in unlike:
+        yield Finding(
+            NOT_ALIKE, Light.RED, f"{names[0]} are of another vehicle than {names[1]}: {said}",
+            f"name the study of this vehicle, or make one: flightid plan {names[1]}",
+        )  # fmt: skip
+    else:
+        yield Finding(
+            NOT_ALIKE, Light.AMBER, f"{names[0]} are of a flight in another state: {said}",
+            "hold these for causes as well where a promise is missed",
         )  # fmt: skip

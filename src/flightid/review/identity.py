@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,11 @@ from flightid.units import DIMENSIONLESS, convert
 GAIN_ROLES = ("p", "i", "d", "ff", "k", "angle_p")
 """What a pilot calls the gains, of all that a controller has."""
 CELLS = ("BAT1_N_CELLS", "BAT_N_CELLS")
+MOTORS = (
+    *("MOT_THST_EXPO", "MOT_SPIN_MIN", "MOT_SPIN_MAX", "MOT_PWM_MIN", "MOT_PWM_MAX"),
+    *("MOT_PWM_TYPE", "THR_MDL_FAC", "PWM_MAIN_MIN", "PWM_MAIN_MAX"),
+)
+"""Parameters of ArduPilot and PX4 that make thrust of commands: loops' gains go with them."""
 LEAST_VOLTAGE = 1.0
 """Below it no battery is measured, V."""
 
@@ -75,6 +81,10 @@ class FlightIdentity:
         Flown value by the autopilot's name, by axis.
     changed_gains : tuple of str
         Those that changed while the log ran; the value above is the last.
+    board : str
+        Board and unique number of the autopilot; empty where the log does not tell them.
+    motors : mapping of str to float
+        Parameters that make commands thrust.
     """
 
     frame: str
@@ -82,6 +92,8 @@ class FlightIdentity:
     battery: Battery | None
     gains: Mapping[str, Mapping[str, float]]
     changed_gains: tuple[str, ...]
+    board: str = ""
+    motors: Mapping[str, float] = field(default_factory=dict)
 
 
 def flight_identity(log: Log, phases: FlightPhases) -> FlightIdentity:
@@ -89,8 +101,10 @@ def flight_identity(log: Log, phases: FlightPhases) -> FlightIdentity:
     gains = _gains(log)
     known = {name for values in gains.values() for name in values}
     changed = {c.name for c in log.parameter_changes if c.name in known and c.old != c.new}
+    motors = {name: log.parameters[name] for name in MOTORS if name in log.parameters}
+    battery = _battery(log, phases.airborne)
     return FlightIdentity(
-        _frame(log), mode_spans(log), _battery(log, phases.airborne), gains, tuple(sorted(changed))
+        _frame(log), mode_spans(log), battery, gains, tuple(sorted(changed)), log.board, motors
     )
 
 

@@ -17,6 +17,8 @@ from flightid.uncertainty.estimate import Estimate
 QUADROTOR = 4
 STRETCHES = 10
 """Stretches of equal length whose scatter makes the intervals."""
+LIMITS = ("motor-at-upper", "motor-at-lower")
+"""Codes of findings that a motor has no room left: loops are not what they were tuned to be."""
 
 
 @dataclass(frozen=True)

@@ -84,12 +84,6 @@ class FlownStep:
         action = f"fly {self.following} next, log, then {again}"
         return Finding("next-step", Light.GREEN, f"{said}, as promised", action)
 
-    def unjudged(self, log: str) -> Finding:
-        """That two flights do not say whether a step kept its promise, and what does."""
-        said = f"{log} flew {self.flown.name}; what models promised of it is not held against it"
-        action = f"flightid compare STUDY-output {log}, of the study that made these gains"
-        return Finding("step-not-judged", Light.UNKNOWN, said, action)
-
 
 def left_to_fly(promise: FlightComparison) -> dict[str, str]:
     """Loops that a flight leaves unjudged of what models promised, with what to fly for each.

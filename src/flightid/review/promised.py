@@ -117,7 +117,7 @@ def _loop(axis: str, loop: str, steps: Array, step_s: float, known: bool) -> Loo
     draws = LoopDraws(pulses, np.ones((len(pulses), 1)), step_s)
     by_frequency = frequency_features(draws, SLOWEST_HZ[loop])
     shown = shown[:, : round(4.0 * WINDOW_S[loop] / step_s)]
-    time_s = np.arange(shown.shape[1]) * step_s
+    time_s = np.arange(shown.shape[1], dtype=np.float64) * step_s
     readings = (*step_features(shown, time_s), *by_frequency)
     return LoopResponse(
         axis, loop, "identified model", "gains of the log", 1.0 / step_s, 0.0, 0, None, None,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 from flightid.conventions import Light
 from flightid.findings import Finding, in_order
@@ -10,7 +11,7 @@ from flightid.inspection.advice import LOGGING
 from flightid.review.filter_findings import filter_findings
 from flightid.review.loop_response import LoopResponse
 from flightid.review.loops import what_to_fly
-from flightid.review.motors import MotorUse
+from flightid.review.motors import LIMITS, MotorUse
 from flightid.review.result import FlightReview
 from flightid.review.step_features import FALLS, RISES
 from flightid.review.tables import cell
@@ -47,6 +48,12 @@ def _all(review: FlightReview) -> Iterator[Finding]:
     yield from _noise(review)
     fallen = review.phases.tipped_s is not None
     yield from filter_findings(review.filters, review.name, review.kind, fallen=fallen)
+
+
+def loops_in_doubt(review: FlightReview) -> tuple[Finding, ...]:
+    """Why loops of a flight are not what they were tuned to be, with the flight's name."""
+    limits = (each for each in _motors(review) if each.code in LIMITS)
+    return tuple(replace(each, message=f"{review.name}: {each.message}") for each in limits)
 
 
 def _noise(review: FlightReview) -> Iterator[Finding]:
