@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import flightid as fid
+from flightid.control.tuning.findings import verdict
+from flightid.control.tuning.gain_search import GainSearchResult
 from flightid.control.tuning.moved_gains import move_gains
 from flightid.conventions import Light
 from flightid.errors import DataError, OptionError
@@ -87,6 +89,19 @@ def test_gains_by_hand_that_break_a_requirement_are_red_and_not_written(
     with pytest.raises(DataError, match="no gains of roll"):
         made.write(folder / "gains.param")
     assert not list(folder.iterdir())
+
+
+@pytest.mark.parametrize("by_hand", [True, False])
+def test_an_unstable_loop_is_called_that_and_its_margins_are_no_shares(by_hand: bool) -> None:
+    slack = {"stability": 2.0, "loop: phase margin": -0.4, "loop: sensitivity peak": -1.8}
+    short = GainSearchResult(np.ones(3), False, ("loop: phase margin",), slack, by_hand)
+    said = verdict(short, np.zeros(3, bool), 3).message
+    assert said.endswith(": loop: phase margin -40%, loop: sensitivity peak")
+    slack = {"stability": -1.0, "loop: phase margin": -2.31}
+    unstable = GainSearchResult(np.ones(3), False, ("stability",), slack, by_hand)
+    said = verdict(unstable, np.zeros(3, bool), 3).message
+    assert said.endswith(": some plant is unstable with them")
+    assert "%" not in said
 
 
 def test_gains_by_hand_that_no_axis_has_are_refused_by_name(fit: fid.Fit) -> None:

@@ -231,15 +231,11 @@ def _axis(
 ) -> AxisGains:
     hand = any(name in by_hand or f"{design.axis}/{name}" in by_hand for name in design.gains)
     findings = tuple(moved.finding if each.code in GAINS else each for each in design.findings)
-    count, total = int(moved.met.sum()), len(moved.met)
-    sentence = f"{count} of {total} plants that the data allow meet every requirement"
-    if moved.short:
-        sentence += f"; not met: {', '.join(moved.short)}"
     return AxisGains(
         axis=design.axis,
         by_hand=hand,
         light=light_of(worst(findings)),
-        sentence=sentence,
+        sentence=_sentence(moved),
         sliders=[
             GainSlider(
                 name=each.name,
@@ -268,6 +264,14 @@ def _axis(
         findings=[shown_finding(each) for each in (*findings, *_small_moves(design))],
         controller=_controller(design),
     )
+
+
+def _sentence(moved: MovedGains) -> str:
+    count, total = int(moved.met.sum()), len(moved.met)
+    if moved.unstable:
+        return f"unstable for {moved.unstable} of {total} plants that the data allow"
+    said = f"{count} of {total} plants that the data allow meet every requirement"
+    return said + (f"; not met: {', '.join(moved.short)}" if moved.short else "")
 
 
 def _small_moves(design: PidDesign) -> list[Finding]:

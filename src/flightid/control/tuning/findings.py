@@ -46,22 +46,7 @@ def verdict(found: GainSearchResult, met: NDArray[np.bool_], drawn: int) -> Find
     """
     names = ", ".join(found.binding)
     if not found.exists:
-        short = [f"{name} {slack:+.0%}" for name, slack in found.slack.items() if slack < 0.0]
-        if found.by_hand:
-            return Finding(
-                "no-gains",
-                Light.RED,
-                f"the gains set by hand do not meet all requirements for every plant: "
-                f"{', '.join(short)}",
-                "go back towards the gains of the search (leave out by_hand)",
-            )
-        return Finding(
-            "no-gains",
-            Light.RED,
-            f"no gains were found that meet all requirements for every plant, on a grid over their "
-            f"ranges nor by search from it; nearest: {', '.join(short)}",
-            advice(found.binding),
-        )
+        return _no_gains(found)
     if not drawn and found.by_hand:
         return Finding(
             "gains", Light.AMBER, f"gains set by hand, for the model alone; nearest: {names}"
@@ -76,6 +61,25 @@ def verdict(found: GainSearchResult, met: NDArray[np.bool_], drawn: int) -> Find
         f"that the data allow (95 % confidence); binding: {names or 'nothing'}",
         "" if share >= ENOUGH else "draw more plants for the search",
     )
+
+
+def _no_gains(found: GainSearchResult) -> Finding:
+    """Why these are no gains: what they miss, in shares of it, or that a loop is unstable."""
+    unstable = found.slack.get("stability", 0.0) < 0.0
+    short = [_short(name, slack) for name, slack in found.slack.items() if slack < 0.0]
+    told = "some plant is unstable with them" if unstable else ", ".join(short)
+    if found.by_hand:
+        said = "the gains set by hand do not meet all requirements for every plant: "
+        action = "go back towards the gains of the search (leave out by_hand)"
+        return Finding("no-gains", Light.RED, said + told, action)
+    said = "no gains were found that meet all requirements for every plant, on a grid over their "
+    said += "ranges nor by search from it; nearest: "
+    return Finding("no-gains", Light.RED, said + told, advice(found.binding))
+
+
+def _short(name: str, slack: float) -> str:
+    """A requirement with the share of it that is missing, where less than all of it is."""
+    return f"{name} {slack:+.0%}" if slack > -1.0 else name
 
 
 def advice(binding: Sequence[str]) -> str:

@@ -39,6 +39,8 @@ class MovedGains:
         Which plants meet every requirement.
     short : tuple of str
         Requirements that some plant does not meet.
+    unstable : int
+        Plants that they do not hold stable.
     responses : tuple of ResponseBand
         Of some of the plants; none where the estimate is unstable.
     omega_rad_s : ndarray, shape (n_f,)
@@ -51,6 +53,7 @@ class MovedGains:
     worst_cases: tuple[WorstCase, ...]
     met: NDArray[np.bool_]
     short: tuple[str, ...]
+    unstable: int
     responses: tuple[ResponseBand, ...]
     omega_rad_s: Array
     loops: Mapping[str, Complex]
@@ -120,6 +123,7 @@ def move_gains(
         beside,
         met,
         short,
+        int((~judged.stable[0]).sum()),
         _bands(design, loop) if responses and bool(judged.stable[0, 0]) else (),
         problem.plants.omega_rad_s,
         curves,
