@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +14,11 @@ from scipy.signal import cont2discrete, lfilter
 from flightid import ControllerOptions
 from flightid.cli.output import Exit
 from flightid.cli.program import run
+from flightid.conditioning import flip_sign
+from flightid.conventions import Role
 from flightid.errors import DataError, StudyError
+from flightid.study.actuator_range import input_ranges
+from flightid.study.record_files import RecordFile, load_records
 from flightid.study.settings import read_settings
 from flightid.study.tuning import TuneSettings, _controllers, tune_models
 from tests.closeness import assert_close
@@ -178,3 +184,28 @@ def test_gains_without_any_model_say_that_there_is_none() -> None:
     asked = ControllerOptions(controller="pi_d")
     with pytest.raises(StudyError, match="no model was made, so no gains"):
         _controllers([], asked, None)  # type: ignore[arg-type]
+
+
+def test_limits_are_proposed_from_measured_samples_of_steps_that_ring(tmp_path: Path) -> None:
+    noise = np.random.default_rng(3)
+    time_s = 0.02 * np.arange(1500) + 4e-4 * noise.standard_normal(1500)
+    u = np.repeat(noise.choice([-2.0, -1.0, 0.5, 2.0], 60), 25)
+    u[1300:] *= 3.0
+    rows = np.column_stack([time_s, u, np.roll(u, 1)])
+    path = tmp_path / "rig.csv"
+    np.savetxt(path, rows, delimiter=",", header="time,u [V],y", comments="")
+    file = RecordFile(
+        name="fit", path=(path.name,), paths=(path,), resample_to_s=0.02, span_s=(1.0, 20.0)
+    )
+    records = load_records(file, {"u": Role.INPUT, "y": Role.OUTPUT})
+    items: Any = [SimpleNamespace(training=records)]
+    # On the new grid they ring beyond what was measured; beyond the span the steps are larger.
+    low, high = input_ranges(items)["u"]
+    assert low < -2.05
+    assert high > 2.05
+    assert input_ranges(items, [file]) == {"u": (-2.0, 2.0)}
+    items[0].training = [each.to_units(u="mV") for each in records]
+    assert input_ranges(items, [file]) == {"u": (-2000.0, 2000.0)}
+    # What was done to an input afterwards is told as it stands.
+    items[0].training = [flip_sign(each, ["u"]) for each in records]
+    assert input_ranges(items, [file]) == input_ranges(items)

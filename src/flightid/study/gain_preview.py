@@ -47,17 +47,18 @@ def preview_tuning(
     """
     with speaking(as_key):
         settings, runner, log, staged = _identified(Path(path), cache)
-        wanted = settings.tune or TuneSettings()
+        wanted, files = settings.tune or TuneSettings(), settings.record_files
         if log is None and wanted.controller is None:
             wanted = replace(wanted, controller=ControllerOptions())  # as `flightid tune` does
         if wanted.controller is None and wanted.options.by_hand and not wanted.has_other_filters:
             alone = replace(wanted, options=replace(wanted.options, by_hand=None))
-            found = runner.stage("tuning", tune_models, staged, log, alone)
+            found = runner.stage("tuning", tune_models, staged, log, alone, files)
             if found.value is not None:
                 inputs = (staged, log, wanted, found)
                 held: Tuning = runner.stage("gains by hand", tune_by_hand, *inputs).value
                 return held
-        tuned: Tuning | None = runner.stage("tuning", tune_models, staged, log, wanted).value
+        made = runner.stage("tuning", tune_models, staged, log, wanted, files)
+        tuned: Tuning | None = made.value
         return tuned
 
 
@@ -97,7 +98,7 @@ def preview_loops(
         A stage refuses its data.
     """
     with speaking(as_key):
-        settings, _, log, staged = _identified(Path(path), cache)
+        settings, runner, log, staged = _identified(Path(path), cache)
         asked = None if settings.tune is None else settings.tune.controller
         if log is not None and asked is None:
             return None
@@ -106,7 +107,8 @@ def preview_loops(
         offered = [f"{y}/{u}" for each in models for y in each.outputs for u in each.inputs]
         single = [each for model in models for each in only_loop(model)]
         chosen = asked.loops if asked is not None and asked.loops else tuple(single)
-        ranges = input_ranges(each.value for each in staged)
+        files = settings.record_files
+        ranges = runner.stage("ranges of inputs", input_ranges, staged, files).value
         return LoopChoice(tuple(dict.fromkeys(offered)), chosen, ranges)
 
 

@@ -137,7 +137,7 @@ def _run(
         faults = Faults()
         tuned = None
         if wanted is not None:
-            inputs = (runner, staged, taken.log, wanted)
+            inputs = (runner, staged, taken.log, wanted, settings.record_files)
             tuned = faults.spare(TUNING, _tuned, None, *inputs)
         tuning = None if tuned is None else tuned.value
         flown = None

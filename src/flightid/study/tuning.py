@@ -27,6 +27,7 @@ from flightid.options import options_of
 from flightid.review.suggested_filters import suggested_filters
 from flightid.study.actuator_range import input_ranges, untold_limits
 from flightid.study.reading import TableReader, read_each
+from flightid.study.record_files import RecordFile
 from flightid.validation import Comparison, Verification
 
 if TYPE_CHECKING:
@@ -153,7 +154,10 @@ def _axes(model: Model) -> list[str]:
 
 
 def tune_models(
-    identified: Iterable[ModelResults], log: Log | None, settings: TuneSettings
+    identified: Iterable[ModelResults],
+    log: Log | None,
+    settings: TuneSettings,
+    files: Sequence[RecordFile] = (),
 ) -> Tuning | None:
     """Tune every axis whose rate a model of the study predicts from its command.
 
@@ -163,6 +167,8 @@ def tune_models(
     log : Log or None
         The flight, which holds the gains that flew.
     settings : TuneSettings
+    files : sequence of RecordFile
+        What the records were read from, where there is no log.
 
     Returns
     -------
@@ -177,7 +183,7 @@ def tune_models(
     if settings.controller is not None:
         items = [one for one in identified if one.fit]
         known = [(one.fit, tuple(one.verifications.values())) for one in items]
-        return _controllers(known, settings.controller, settings, input_ranges(items))
+        return _controllers(known, settings.controller, settings, input_ranges(items, files))
     fits: dict[str, object] = {}
     checks = {}
     for item in identified:
