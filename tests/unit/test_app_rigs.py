@@ -8,11 +8,13 @@ from collections.abc import AsyncIterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from flightid.app.guard import POLICY, REPORT_POLICY, _dressed
+from flightid.app.pyramid import Pyramid
 from flightid.app.removed import RemovedList
-from flightid.app.rig_work import make_rig, require_table
+from flightid.app.rig_work import make_rig, make_rig_pyramid, require_table
 from flightid.app.rigs import Rigs
 from flightid.app.study_edits import KeyEdit, edited
 from flightid.app.work import answered
@@ -128,6 +130,41 @@ def test_a_column_that_stands_still_has_a_row_as_well(tmp_path: Path) -> None:
     moves = {each["name"]: (each["least"], each["most"]) for each in told["columns"]}
     assert moves == {"u1": (0.0, 1.0), "u2": (0.5, 0.5), "y": (0.0, 39.0)}
     assert told["notes"] == []
+
+
+def test_faults_are_told_where_they_are_and_not_from_the_first_to_the_last(tmp_path: Path) -> None:
+    """Two spikes 24 s apart had shaded a quarter of the flight."""
+    time_s = 0.02 * np.arange(2500)
+    noise = np.random.default_rng(1).standard_normal(2500)
+    samples = np.sin(1.3 * time_s) + 0.4 * np.sin(7.0 * time_s) + 0.02 * noise
+    samples[[600, 1800]] += 40.0
+    rows = np.column_stack([time_s, np.sign(np.sin(time_s)), samples])
+    path = tmp_path / "rig.csv"
+    np.savetxt(path, rows, delimiter=",", header="time,u,y", comments="")
+    (manoeuvre,) = make_rig([path], {})["files"][0]["manoeuvres"]
+    (fault,) = manoeuvre["faults"]
+    assert (fault["code"], fault["spans_s"]) == ("spikes", [(12.0, 12.0), (36.0, 36.0)])
+
+
+def test_stamps_that_are_not_uniform_get_a_grid_on_the_page(tmp_path: Path) -> None:
+    noise = np.random.default_rng(2)
+    time_s = 0.02 * np.arange(1500) + 4e-4 * noise.standard_normal(1500)
+    u = np.repeat(noise.choice([-1.0, 1.0], 60), 25)
+    path = tmp_path / "rig.csv"
+    np.savetxt(path, np.column_stack([time_s, u, np.roll(u, 3)]), delimiter=",", comments="",
+               header="time,u,y")  # fmt: skip
+    (told,) = make_rig([path], {})["files"]
+    assert "time stamps are not uniform" in told["error"]
+    assert "resample_to_s=0.02," in told["error"]
+    assert (told["grid_s"], told["manoeuvres"]) == (0.02, [])
+    (told,) = make_rig([path], {"resample_to_s": 0.02})["files"]
+    assert (told["error"], told["grid_s"]) == ("", 0.02)
+    assert told["manoeuvres"][0]["rate_hz"] == pytest.approx(50.0)
+    reading = {"resample_to_s": 0.02}
+    result = tmp_path / "u.npy"
+    make_rig_pyramid(path, "rig", "u", reading, result)
+    stamps = Pyramid.read(result).time_s
+    assert np.ptp(np.diff(stamps)) < 1e-9
 
 
 def test_a_table_of_a_list_is_taken_out() -> None:

@@ -104,13 +104,13 @@ def add_rig_routes(app: FastAPI, backstage: Backstage) -> None:
         columns: Annotated[int, Query(ge=10, le=MOST_COLUMNS)],
         time_column: Annotated[str | None, Query(max_length=300)] = None,
         sample_time_s: Annotated[float | None, Query(gt=0.0)] = None,
+        resample_to_s: Annotated[float | None, Query(gt=0.0)] = None,
     ) -> Response:
         if not (math.isfinite(start_s) and math.isfinite(stop_s) and start_s < stop_s):
             raise HTTPException(422, "A span needs two instants, the first before the last.")
-        path = next((each for each in _known(rigs, rig) if each.name == file), None)
-        if path is None:
-            raise HTTPException(404, "The records hold no such file.")
-        options = _options(RigReading(time_column=time_column, sample_time_s=sample_time_s))
+        path = _file(rigs, rig, file)
+        told: dict[str, Any] = {"time_column": time_column, "sample_time_s": sample_time_s}
+        options = _options(RigReading(**told, resample_to_s=resample_to_s))
         levels = [await _levels(backstage, rig, path, manoeuvre, each, options) for each in series]
         table = await asyncio.to_thread(view, levels, (start_s, stop_s), columns)
         head = np.array(table.shape[::-1], np.float64)
@@ -138,8 +138,14 @@ async def _levels(
 
 
 def _options(reading: RigReading) -> dict[str, Any]:
-    told = {"time_column": reading.time_column, "sample_time_s": reading.sample_time_s}
-    return {key: value for key, value in told.items() if value is not None}
+    return reading.model_dump(include=set(RigReading.model_fields), exclude_none=True)
+
+
+def _file(rigs: Rigs, rig: str, name: str) -> Path:
+    for path in _known(rigs, rig):
+        if path.name == name:
+            return path
+    raise HTTPException(404, "The records hold no such file.")
 
 
 def _known(rigs: Rigs, rig: str) -> list[Path]:

@@ -37,7 +37,7 @@ class RigFault(Message):
     light: Light
     message: str
     action: str
-    span_s: tuple[float, float] | None
+    spans_s: list[tuple[float, float]]
 
 
 class RigManoeuvre(Message):
@@ -59,6 +59,10 @@ class RigFile(Message):
     notes: list[str]
     manoeuvres: list[RigManoeuvre]
     error: str = ""
+    grid_s: float | None = None
+    """Sample time of a grid for stamps that are not uniform; None where they are."""
+    grid_column: str = ""
+    """Column of these stamps."""
 
 
 class RigReading(Message):
@@ -66,6 +70,7 @@ class RigReading(Message):
 
     time_column: str | None = None
     sample_time_s: float | None = Field(None, gt=0.0)
+    resample_to_s: float | None = Field(None, gt=0.0)
 
 
 class RigProposal(RigReading):

@@ -16,9 +16,10 @@ from flightid.app.work import KEPT
 from flightid.conventions import Light
 from flightid.errors import FlightidError, UnknownNameError
 from flightid.record import Record, read_records
-from flightid.record.checks import CHECK, checked_history
+from flightid.record.checks import CHECK, checked_history, places_of
 from flightid.record.contents import table_contents
 from flightid.record.formats.sniff import file_format
+from flightid.record.grid_proposal import GridProposal, propose_grid
 from flightid.record.tables import read_table
 from flightid.study.proposal import propose_study
 from flightid.study.proposal.columns import columns_of
@@ -58,7 +59,7 @@ def make_rig(paths: Sequence[Path], reading: Mapping[str, Any]) -> dict[str, Any
         "inputs": list(inputs),
         "outputs": list(outputs),
         "untold": untold,
-        "time": _told_of(records, "time"),
+        "time": _told_of(records, "time") or next((f.grid_column for f in files), ""),
         "time_unit": _told_of(records, "time_unit"),
     }
 
@@ -122,7 +123,22 @@ def _file(path: Path, reading: Mapping[str, Any]) -> RigFile:
         columns += _unlisted(records, {each.name for each in columns})
     except FlightidError as error:
         said = str(error)
-    return RigFile(name=path.name, columns=columns, notes=notes, manoeuvres=manoeuvres, error=said)
+    grid = _grid(path, reading) if said or "resample_to_s" in reading else None
+    return RigFile(
+        name=path.name, columns=columns, notes=notes, manoeuvres=manoeuvres, error=said,
+        grid_s=None if grid is None else grid.step_s,
+        grid_column="" if grid is None else grid.time_column,
+    )  # fmt: skip
+
+
+def _grid(path: Path, reading: Mapping[str, Any]) -> GridProposal | None:
+    """A new grid, where stamps call for one."""
+    if "sample_time_s" in reading:
+        return None
+    try:
+        return propose_grid(path, time_column=reading.get("time_column"))
+    except FlightidError:
+        return None
 
 
 def _column(row: tuple[Any, ...]) -> RigColumn:
@@ -163,12 +179,11 @@ def _manoeuvre(record: Record) -> RigManoeuvre:
 
 
 def _fault(options: Mapping[str, Any]) -> RigFault:
-    start, stop = options["start_s"], options["stop_s"]
     return RigFault(
         channel=str(options["channel"]),
         code=str(options["code"]),
         light=light_of(Light(str(options["light"]))),
         message=str(options["found"]),
         action=str(options["action"] or ""),
-        span_s=None if start is None or stop is None else (float(start), float(stop)),
+        spans_s=list(places_of(options)),
     )

@@ -6,7 +6,7 @@ that was made from arrays when it is asked for the first time.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from flightid.conventions import Light
 from flightid.findings import Finding
@@ -16,6 +16,7 @@ from flightid.record.commanded_edges import Surroundings
 from flightid.record.history import Step
 from flightid.record.record import Record
 from flightid.record.sample_faults import Array, SampleFault, sample_faults
+from flightid.table import Cell
 from flightid.version import VERSION
 
 CHECK = "Record.check"
@@ -39,11 +40,34 @@ def fault_steps(faults: Iterable[SampleFault]) -> tuple[Step, ...]:
                 "light": str(fault.finding.light),
                 "found": fault.finding.message,
                 "action": fault.finding.action,
+                **({"places_s": _told(fault)} if len(fault.places_s) > 1 else {}),
             },
             VERSION,
         )
         for fault in faults
     )
+
+
+def _told(fault: SampleFault) -> str:
+    return " ".join(f"{first!r}:{last!r}" for first, last in fault.places_s)
+
+
+def places_of(options: Mapping[str, Cell]) -> tuple[tuple[float, float], ...]:
+    """Where the fault of a step is, s: first and last instant of each place; none: nobody knows.
+
+    Example
+    -------
+    >>> places_of({"start_s": 1.0, "stop_s": 9.0, "places_s": "1.0:1.0 8.5:9.0"})
+    ((1.0, 1.0), (8.5, 9.0))
+    >>> places_of({"start_s": 1.0, "stop_s": 9.0}), places_of({"start_s": None, "stop_s": None})
+    (((1.0, 9.0),), ())
+    """
+    start, stop = options["start_s"], options["stop_s"]
+    if start is None or stop is None:
+        return ()
+    pairs = (each.split(":") for each in str(options.get("places_s", "")).split())
+    told = tuple((float(first), float(last)) for first, last in pairs)
+    return told or ((float(start), float(stop)),)
 
 
 def entry_steps(

@@ -36,6 +36,8 @@ REPEATED, ABRUPT = 0.01, 0.25
 """Share of values that come twice in a channel that never rests; last step before it stops, over
 the median one."""
 LIMIT_SHARE, LIMIT_RUN, LIMIT_RUNS, LEVELS = 0.01, 3, 3, 30
+MOST_PLACES = 50
+"""Stretches of one fault that are told apart; nearer ones are joined."""
 TURN = 2.0 * np.pi
 ALONE = Surroundings()
 
@@ -49,12 +51,15 @@ class SampleFault:
     channel : str
     start_s, stop_s : float
     finding : Finding
+    places_s : tuple of tuple of float
+        Where in that stretch it is, first and last instant of each place; none: all of it.
     """
 
     channel: str
     start_s: float
     stop_s: float
     finding: Finding
+    places_s: tuple[tuple[float, float], ...] = ()
 
 
 def sample_faults(
@@ -152,11 +157,24 @@ class _ExaminedChannel:
         """The unit as it follows a number."""
         return "" if self.unit == DIMENSIONLESS else f" {self.unit}"
 
-    def fault(self, at: NDArray[np.intp], finding: tuple[str, Light, str, str]) -> SampleFault:
-        """A finding on the stretch between the first and the last of some samples."""
+    def fault(
+        self,
+        starts: NDArray[np.intp],
+        stops: NDArray[np.intp],
+        finding: tuple[str, Light, str, str],
+    ) -> SampleFault:
+        """A finding on stretches, by the first and the last sample of each."""
         code, light, said, action = finding
-        first, last = float(self.stamps[at[0]]), float(self.stamps[at[-1]])
-        return SampleFault(self.name, first, last, Finding(code, light, said, action))
+        ends = self.stamps[starts], self.stamps[stops]
+        places = tuple(zip(*(each.tolist() for each in _joined(*ends)), strict=True))
+        told = Finding(code, light, said, action)
+        return SampleFault(self.name, places[0][0], places[-1][1], told, places)
+
+
+def _joined(starts: Array, stops: Array) -> tuple[Array, Array]:
+    """Stretches, those that lie nearest to each other as one where they are many."""
+    parted = np.sort(np.argsort(stops[:-1] - starts[1:], kind="stable")[: MOST_PLACES - 1])
+    return starts[np.concatenate([[0], parted + 1])], stops[np.concatenate([parted, [-1]])]
 
 
 def _alone(values: Array) -> tuple[NDArray[np.intp], Array, float]:
@@ -215,7 +233,7 @@ def _spikes(channel: _ExaminedChannel) -> SampleFault | None:
         f"({100 * share:.0f} % of the channel's variance): {_instants(stamps[at])}"
     )
     action = _spike_action(away[at], np.delete(away, at), spread)
-    return channel.fault(at, ("spikes", light, said, action))
+    return channel.fault(at, at, ("spikes", light, said, action))
 
 
 def _instants(stamps: Array) -> str:
@@ -254,7 +272,8 @@ def _wraps(channel: _ExaminedChannel) -> SampleFault | None:
     if not at.size or np.median(np.abs(steps)) > 0.1 * turn:
         return None
     said = f"{name} jumps by a whole turn {counted(at.size, 'time')}: a heading that wraps"
-    return channel.fault(at, ("wrapped", Light.RED, said, "unwrap it before it is fitted"))
+    finding = ("wrapped", Light.RED, said, "unwrap it before it is fitted")
+    return channel.fault(at, at + 1, finding)
 
 
 def _dead(channel: _ExaminedChannel) -> SampleFault | None:
@@ -279,7 +298,6 @@ def _dead(channel: _ExaminedChannel) -> SampleFault | None:
     noisy = turning >= NOISY and np.mean(steps == 0.0) <= 1.0 - 2 * NOISY
     if not (noisy or _stops_in_motion(channel, starts[long], steps)):
         return None
-    first, last = int(starts[long][0]), int(stops[long][-1])
     share = float(np.sum((stops - starts)[long])) / values.size
     longest = int(np.argmax(stops - starts))
     light = Light.RED if share >= RED_SHARE else Light.AMBER
@@ -290,7 +308,7 @@ def _dead(channel: _ExaminedChannel) -> SampleFault | None:
         "there"
     )
     action = "cut the record before and after, or leave the channel out"
-    return channel.fault(np.array([first, last]), ("flat", light, said, action))
+    return channel.fault(starts[long], stops[long], ("flat", light, said, action))
 
 
 def _stops_in_motion(channel: _ExaminedChannel, starts: NDArray[np.intp], elsewhere: Array) -> bool:
@@ -325,8 +343,8 @@ def _held(channel: _ExaminedChannel) -> SampleFault | None:
     action = f"resample the record to every {place} row (resample_to_s)"
     if unknown:
         action = f"a command: nothing; what was measured: {action}"
-    ends = np.array([0, values.size - 1])
-    return channel.fault(ends, ("samples-repeated", Light.AMBER, said, action))
+    ends = np.array([0]), np.array([values.size - 1])
+    return channel.fault(*ends, ("samples-repeated", Light.AMBER, said, action))
 
 
 def _clipped(channel: _ExaminedChannel) -> SampleFault | None:
@@ -352,8 +370,7 @@ def _clipped(channel: _ExaminedChannel) -> SampleFault | None:
             f"samples, {starts.size} times"
         )
         action = "fit records in which it stays inside its range; fly a smaller amplitude"
-        ends = np.array([starts[0], stops[-1] - 1])
-        return channel.fault(ends, ("clipped", light, said, action))
+        return channel.fault(starts, stops - 1, ("clipped", light, said, action))
     return None
 
 

@@ -16,6 +16,9 @@ GAP_FACTOR = 2.5
 UNIFORM_TOLERANCE = 1e-3
 """Largest departure from a uniform grid, in sample times, that counts as rounding of stamps."""
 
+WALK = 0.25
+"""Part of a sample time by which a rounded grid may walk off the stamps over a record."""
+
 
 def mean_spacing_s(stamps: NDArray[np.float64]) -> float:
     """Mean spacing of stamps outside gaps, s; 0 below two."""
@@ -23,6 +26,19 @@ def mean_spacing_s(stamps: NDArray[np.float64]) -> float:
     if not spacing.size:
         return 0.0
     return float(np.mean(spacing[spacing <= GAP_FACTOR * np.median(spacing)]))
+
+
+def rounded_step_s(stamps: NDArray[np.float64]) -> float:
+    """Mean spacing outside gaps in the fewest digits that end within a quarter of a sample, s.
+
+    Example
+    -------
+    >>> rounded_step_s(0.02 * np.arange(500) + 1e-4 * np.sin(np.arange(500)))
+    0.02
+    """
+    step = mean_spacing_s(stamps)
+    rounded = (float(f"{step:.{digits}g}") for digits in range(1, 10))
+    return next((each for each in rounded if abs(each - step) * stamps.size <= WALK * step), step)
 
 
 class StampPolicy(StrEnum):

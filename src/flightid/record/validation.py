@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from flightid.conventions import Role
 from flightid.errors import DataError, OptionError, ShapeError, UnknownNameError
 from flightid.record.channel import Channel
-from flightid.record.stamps import UNIFORM_TOLERANCE
+from flightid.record.stamps import UNIFORM_TOLERANCE, rounded_step_s
 from flightid.units import DIMENSIONLESS
 
 REPEATING = 0.5
@@ -147,11 +147,13 @@ def uniform_sample_time(time_s: NDArray[np.float64]) -> float:
     away -= time_s
     worst = float(max(away.max(), -away.min())) / sample_time_s
     if worst > UNIFORM_TOLERANCE:
+        step = rounded_step_s(time_s)
         raise DataError(
             "time stamps are not uniform",
             found=f"a stamp {100 * worst:.3g} % of a sample time off the grid",
             needed=f"at most {100 * UNIFORM_TOLERANCE:g} %",
-            action="bring the channels to one time base where they are read, resample_to_s=…, or "
-            "by conditioning.to_uniform in Python",
+            action="bring the channels to one time base where they are read, "
+            f"resample_to_s={f'{step:.9g}' if step > 0 else '…'}, or by conditioning.to_uniform "
+            "in Python",
         )
     return sample_time_s
