@@ -59,6 +59,7 @@ from flightid.study.response_settings import ResponseSettings
 from flightid.study.settings import LogChannels, LogFile, Segment, StudyWords
 from flightid.study.structure_settings import StructureSettings
 from flightid.study.uses_settings import ExportSettings, LoopSettings, RotorSettings
+from flightid.study.view_settings import FilterSettings, PlotSettings
 from flightid.validation.residuals.options import ResidualTestOptions
 from flightid.validation.verification.options import VerifyOptions
 from flightid.vehicles import (
@@ -112,6 +113,8 @@ STUDY: dict[str, type[Options]] = {
     "[[export]], beside its format's": ExportSettings,
     "[rotor]": RotorSettings,
     "[[loop]]": LoopSettings,
+    "[filters]": FilterSettings,
+    "[[plot]]": PlotSettings,
 }
 """Tables of a study that are no verb's alone."""
 

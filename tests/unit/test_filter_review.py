@@ -21,7 +21,8 @@ from flightid.errors import DataError, OptionError
 from flightid.findings import FALL, Finding
 from flightid.logs.dataflash.layout import MessageLayout
 from flightid.logs.dataflash.writer import DataflashWriter
-from flightid.review.edited_filters import filter_bench
+from flightid.review.edited_filters import NOTCHES, EditedAxis, filter_bench
+from flightid.review.filter_costs import filter_costs
 from flightid.review.filter_findings import _advice
 from flightid.review.gyro_noise import GyroNoise, floor_beneath
 from flightid.review.notch_proposal import _series
@@ -184,11 +185,13 @@ def test_edited_filters_pass_what_filtering_the_gyro_again_passes(tmp_path: Path
     at = int(np.argmin(np.abs(cut.frequency_hz - 150.0)))
     assert cut.edited[at] < 1e-3 * cut.flown[at]
     assert cut.phase_edited_deg < cut.phase_flown_deg
+    # The file holds all that the notch rests on, what the log does not tell as well; so does the
+    # way back.
     changes = bench.changes(fixed | {"INS_GYRO_FILTER": 40.0})
-    assert {each.name: each.value for each in changes} == {
-        name: value for name, value in fixed.items() if value != bench.values[name]
-    }
+    assert {each.name: each.value for each in changes} == NOTCHES["ardupilot"] | fixed
     assert all((each.old is None) == (each.name not in PARAMETERS) for each in changes)
+    back = bench.way_back(fixed)
+    assert {each.name: each.value for each in back} == NOTCHES["ardupilot"]
     # The page shows these numbers, and a file with its way back.
     filter_work = pytest.importorskip("flightid.app.filter_work", exc_type=ImportError)
     shown = filter_work.try_filters(path, {"INS_GYRO_FILTER": 25.0})
@@ -198,6 +201,38 @@ def test_edited_filters_pass_what_filtering_the_gyro_again_passes(tmp_path: Path
     assert (shown["raw"], filter_work.try_filters(path, {})["files"]) == (True, [])
     with pytest.raises(OptionError, match="no filter of this vehicle"):
         bench.edited({"ATC_RAT_RLL_P": 0.2})
+
+
+@pytest.mark.parametrize(
+    ("cost", "margin", "light", "said"),
+    [
+        (134.0, (62.5, 110.0), Light.RED, "leave 62.5 to 110 deg: the loop would be unstable"),
+        (80.0, (62.5, 110.0), Light.RED, "the loop may be unstable"),
+        (30.0, (62.5, 110.0), Light.AMBER, "32.5 to 80 deg are left, 45 are asked for"),
+        (10.0, (62.5, 110.0), Light.GREEN, "52.5 to 100 deg are left"),
+        (50.0, None, Light.RED, "all of the 45 deg that a loop is designed to keep"),
+        (10.0, None, Light.AMBER, "the flight does not tell what is left"),
+        (2.0, (40.0, 50.0), None, ""),
+    ],
+)
+def test_what_filters_cost_is_said_beside_what_the_loop_has(
+    cost: float, margin: tuple[float, float] | None, light: Light | None, said: str
+) -> None:
+    one = np.ones(1)
+    axis = EditedAxis("roll", one, one, one, one, -30.0, -30.0 - cost, 0.005, 0.004, ())
+    known = {} if margin is None else {"roll": margin}
+    found = list(filter_costs([axis], 3.07, known, measured=True))
+    assert [each.light for each in found] == ([] if light is None else [light])
+    assert all(f"cost {cost:.3g} deg of phase at 3.07 Hz" in each.message for each in found)
+    assert all(each.message.endswith(said) for each in found)
+
+
+def test_filters_that_let_more_noise_through_than_is_fine_are_amber() -> None:
+    one = np.ones(1)
+    axis = EditedAxis("roll", one, one, one, one, -30.0, -25.0, 0.008, 0.021, ())
+    (found,) = filter_costs([axis], 5.0, {}, measured=False)
+    assert (found.light, found.code) == (Light.AMBER, "edited-noise-roll")
+    assert "2.1 % of full command, rms (0.8 as flown)" in found.message
 
 
 def test_filters_that_cannot_be_told_say_why_and_nothing_is_written(tmp_path: Path) -> None:

@@ -135,6 +135,7 @@ export interface FilterScreen {
   raw: boolean;
   frequency_hz: number[];
   axes: FilterAxis[];
+  findings: ShownFinding[];
   files: GainFile[];
   python: string;
 }
@@ -854,7 +855,7 @@ export interface RigFault {
   light: "green" | "amber" | "red" | "unknown";
   message: string;
   action: string;
-  span_s: [number, number] | null;
+  spans_s: [number, number][];
 }
 
 /** A file: its columns, and the manoeuvres in it or why none can be read. */
@@ -864,6 +865,8 @@ export interface RigFile {
   notes: string[];
   manoeuvres: RigManoeuvre[];
   error: string;
+  grid_s: number | null;
+  grid_column: string;
 }
 
 /** A file to take out of a set of records, or to put back. */
@@ -897,6 +900,7 @@ export interface RigManoeuvre {
 export interface RigProposal {
   time_column: string | null;
   sample_time_s: number | null;
+  resample_to_s: number | null;
   inputs: string[];
   outputs: string[];
   excitations: string[];
@@ -909,6 +913,7 @@ export interface RigProposal {
 export interface RigReading {
   time_column: string | null;
   sample_time_s: number | null;
+  resample_to_s: number | null;
 }
 
 /** A set of record files, and the roles that names and units tell. */
@@ -1033,6 +1038,7 @@ export interface StripLine {
 export interface StudyParts {
   models: string;
   gains: string;
+  views: string;
 }
 
 /** A study file, its tag, and what the page reads off it. */

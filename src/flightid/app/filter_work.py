@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.app.gain_schemas import GainFile
+from flightid.app.gain_work import shown_finding
 from flightid.app.plot_schemas import FilterAxis, FilterScreen, FilterValue
 from flightid.app.work import KEPT, kept_log
-from flightid.control.autopilots import GainChange, write_parameters
 from flightid.control.autopilots.parameter_files import parameter_suffix
 from flightid.files import sha256_of_file
 from flightid.review.edited_filters import EditedAxis, FilterBench, filter_bench
+from flightid.review.tried_filters import TriedFilters, tried_filters
 
 MOST_POINTS = 300
 QUIET_DB = -120.0
@@ -29,18 +30,18 @@ def try_filters(path: Path, values: Mapping[str, float]) -> Mapping[str, Any]:
     if key not in KEPT:
         KEPT[key] = filter_bench(kept_log(path))
     bench: FilterBench = KEPT[key]
-    axes = bench.edited(values)
+    tried = tried_filters(bench, values)
+    axes = tried.axes
     frequency = axes[0].frequency_hz
     rows = np.unique(
         np.searchsorted(frequency, np.geomspace(max(frequency[0], 1.0), frequency[-1], MOST_POINTS))
     )
     rows = rows[rows < len(frequency)]
-    changes = bench.changes(values)
     known = bench.values
     return FilterScreen(
         values=[
             FilterValue(
-                name=name, flown=flown, known=name in bench.parameters,
+                name=name, flown=flown, known=bench.knows(name),
                 value=values.get(name, flown),
             )
             for name, flown in known.items()
@@ -51,8 +52,9 @@ def try_filters(path: Path, values: Mapping[str, float]) -> Mapping[str, Any]:
         raw=bench.noise.gyro == "raw",
         frequency_hz=[float(f"{each:.5g}") for each in frequency[rows]],
         axes=[_axis(each, rows) for each in axes],
-        files=_files(bench.kind, changes) if changes else [],
-        python=_python(path, {each.name: each.value for each in changes}),
+        findings=[shown_finding(each) for each in tried.findings],
+        files=_files(tried) if tried.is_flyable else [],
+        python=_python(path, values),
     ).model_dump()  # fmt: skip
 
 
@@ -75,21 +77,17 @@ def _decibels(density: NDArray[np.float64]) -> list[float | None]:
     return [float(f"{each:.5g}") if each >= QUIET_DB else None for each in made]
 
 
-def _files(kind: str, changes: Sequence[GainChange]) -> list[GainFile]:
+def _files(tried: TriedFilters) -> list[GainFile]:
     """The parameter file, and the way back."""
     with tempfile.TemporaryDirectory() as name:
-        target = Path(name) / f"filters{parameter_suffix(kind)}"
-        notes = ["flightid: filters set by hand on the noise of a flight"]
-        made = write_parameters(kind, changes, target, notes=notes)
-        paths = [path for path in (made.path, made.rollback) if path is not None]
+        paths = tried.write(Path(name) / f"filters{parameter_suffix(tried.kind)}")
         return [GainFile(name=each.name, text=each.read_text("utf-8")) for each in paths]
 
 
 def _python(path: Path, values: Mapping[str, float]) -> str:
     return (
         "import flightid as fid\n"
-        "from flightid.review.edited_filters import filter_bench\n\n"
-        f"bench = filter_bench(fid.read_log({path.name!r}))\n"
-        f"for axis in bench.edited({dict(values)!r}):\n"
-        "    print(axis.axis, axis.phase_edited_deg - axis.phase_flown_deg, axis.noise_edited)\n"
+        "from flightid.review.tried_filters import tried_on\n\n"
+        f"tried = tried_on(fid.read_log({path.name!r}), {dict(values)!r})\n"
+        "print(tried.summary())\n"
     )

@@ -27,7 +27,7 @@ from flightid.app.gain_schemas import (
 )
 from flightid.app.overview import light_of
 from flightid.app.schemas import ShownFinding
-from flightid.app.study_edits import KeyEdit, edited
+from flightid.app.study_edits import VIEWS, KeyEdit, edited
 from flightid.app.study_reach import draft_inside, named_places
 from flightid.app.work import KEPT
 from flightid.control.autopilots.parameter_files import parameter_suffix
@@ -76,7 +76,7 @@ def gains_version(study: Path, text: str) -> str:
     with draft_inside(study, text) as draft:
         places = named_places(draft)
     known = [(str(each), *_state(each)) for each in places]
-    said = repr((tomllib.loads(text), known))
+    said = repr((_asked_of_models(text), known))
     return hashlib.sha256(said.encode()).hexdigest()[:16]
 
 
@@ -201,10 +201,15 @@ def _hand_gains(text: str) -> Mapping[str, float]:
 
 def _key(text: str) -> str:
     """What plants rest on: all of the study but the gains by hand."""
-    document = tomllib.loads(text)
+    document = _asked_of_models(text)
     if isinstance(document.get("tune"), dict):
         document["tune"].pop("by_hand", None)
     return "tuning of " + hashlib.sha256(repr(document).encode()).hexdigest()
+
+
+def _asked_of_models(text: str) -> dict[str, Any]:
+    """A study without what is asked of its log alone."""
+    return {key: value for key, value in tomllib.loads(text).items() if key not in VIEWS}
 
 
 def _searched(tuning: Tuning, axis: str) -> Mapping[str, float]:

@@ -7,7 +7,7 @@ from typing import Annotated
 from pydantic import Field
 
 from flightid.app.gain_schemas import GainFile
-from flightid.app.schemas import Message
+from flightid.app.schemas import Message, ShownFinding
 
 LAYOUT_NAME = "^[A-Za-z0-9_][A-Za-z0-9_ -]{0,59}$"
 PaneSeries = Annotated[
@@ -65,6 +65,8 @@ class FilterScreen(Message):
     """Whether the noise was logged ahead of the filters."""
     frequency_hz: list[float]
     axes: list[FilterAxis]
+    findings: list[ShownFinding]
+    """What they cost; a red one leaves no files."""
     files: list[GainFile]
     """To set what is tried, and the way back; none where nothing differs."""
     python: str

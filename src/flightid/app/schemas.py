@@ -205,8 +205,11 @@ class StudyParts(Message):
     """What parts of a study are known by: a change of one leaves what rests on others as it is."""
 
     models: str
-    """All but ``[tune]``, which no model rests on."""
+    """All but the others, which no model rests on."""
     gains: str
+    """``[tune]``."""
+    views: str = ""
+    """``[filters]`` and ``[[plot]]``; empty where there are none."""
 
 
 class StudyText(Message):

@@ -18,6 +18,9 @@ from flightid.frozen import dataclass
 from flightid.reading import DOCUMENT_BYTES
 from flightid.study.settings import read_settings
 
+VIEWS = ("filters", "plot")
+"""Tables of a study on which neither models nor gains rest."""
+
 
 @dataclass(frozen=True)
 class KeyEdit:
@@ -65,7 +68,9 @@ def parts_of(text: str) -> StudyParts:
     except (TOMLKitError, RecursionError) as error:
         raise StudyError("the study file is no TOML", found=str(error)) from error
     gains = document.pop("tune", None)
-    return StudyParts(models=etag_of(repr(document)), gains=etag_of(repr(gains)))
+    views = {key: document.pop(key) for key in VIEWS if key in document}
+    models, tuned, viewed = (etag_of(repr(each)) for each in (document, gains, views))
+    return StudyParts(models=models, gains=tuned, views=viewed if views else "")
 
 
 def edited(text: str, edits: Sequence[KeyEdit]) -> str:

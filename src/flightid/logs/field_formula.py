@@ -95,6 +95,17 @@ def field_formula(log: Log, formula: str) -> FieldFormula:
     return FieldFormula(tuple(fields.values()), time_s, _worked_out(compiled, rows), unit)
 
 
+def require_formula(formula: str) -> None:
+    """Refuse what is no formula of fields, without a log.
+
+    Raises
+    ------
+    OptionError
+        No formula of the grammar, or of no field.
+    """
+    _compiled(formula)
+
+
 def _compiled(formula: str) -> tuple[str, dict[str, str], _native.Tape]:
     """Its words, the field of each, and what works it out."""
     try:

@@ -16,6 +16,7 @@ from flightid.plot.autopilots import controller, replay
 from flightid.plot.compared_loops import compared_loops
 from flightid.plot.consistency import consistency
 from flightid.plot.excitation import excitation_history, plan_spectrum
+from flightid.plot.field_plot import field_history, tried_noise
 from flightid.plot.fit import fit_figure
 from flightid.plot.fitted_record import record_figure
 from flightid.plot.flight import compared_steps, flight_steps, gyro_spectrum, loop_steps
@@ -154,6 +155,7 @@ PICTURES: Mapping[str, Callable[..., Any]] = {
     "AttitudeBandwidth": bandwidth_curves,
     "AxisLoop": controller,
     "ClosedLoop": _closed_loop,
+    "FieldPlot": field_history,
     "FlightComparison": compared_steps,
     "FlightReview": flight_steps,
     "GyroNoise": gyro_spectrum,
@@ -186,6 +188,7 @@ PICTURES: Mapping[str, Callable[..., Any]] = {
     "ResidualSpectra": _residual_spectra,
     "ResidualTests": _residual_tests,
     "SpectrumComparison": spectrum_comparison,
+    "TriedFilters": tried_noise,
     "Tuning": _tuning,
     "Verification": _verification,
 }

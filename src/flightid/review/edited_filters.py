@@ -21,6 +21,7 @@ from flightid.inspection.actuators import find_actuators
 from flightid.inspection.flight_phases import flight_phases
 from flightid.logs import Log
 from flightid.review.filters import filter_review
+from flightid.review.flown_range import flown_ranges
 from flightid.review.gyro_noise import GyroNoise, gyro_noise
 from flightid.review.loops import loop_responses
 
@@ -37,7 +38,10 @@ NOTCHES: dict[str, dict[str, float]] = {
     },
 }  # fmt: skip
 """Parameters of notches that are edited, with what firmware takes where a log has none."""
+NOTCH = ("INS_HNTCH_", "IMU_GYRO_NF0_", "IMU_GYRO_NF1_", "IMU_GYRO_DNF_")
+"""What the names of one notch begin with: its effect rests on all of them."""
 HIGHEST_HZ = 1e4
+UNTOLD = "not in the log: what firmware takes"
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +96,8 @@ class FilterBench:
         Of the log.
     choice : FilterChoice or None
         Filters that would serve better.
+    margins_deg : mapping of str to tuple of float
+        Phase margins that the flown filters and gains keep, by axis; see `filter_costs`.
     """
 
     loops: Mapping[str, AxisLoop]
@@ -102,6 +108,7 @@ class FilterBench:
     tracking: NotchTracking
     kind: str
     choice: FilterChoice | None
+    margins_deg: Mapping[str, tuple[float, float]]
 
     @property
     def values(self) -> dict[str, float]:
@@ -143,13 +150,34 @@ class FilterBench:
         return tuple(self._axis(axis, values) for axis in self.loops)
 
     def changes(self, values: Mapping[str, float]) -> tuple[GainChange, ...]:
-        """Parameters that differ from those that flew, as a file would set them."""
+        """Parameters that a file would set: what differs, and what a notch rests on beside it.
+
+        A log that holds no parameter of a notch leaves it to what firmware takes; a file that sets
+        some of them sets the others to that as well.
+        """
+        known, held = self.values, self.parameters
+        edited = {name: value for name, value in values.items() if value != known.get(name)}
+        notches = tuple(each for each in NOTCH if any(name.startswith(each) for name in edited))
+        assumed = {
+            name: value
+            for name, value in NOTCHES.get(self.kind, {}).items()
+            if name not in held and name not in edited and name.startswith(notches)
+        }
+        set_ = [GainChange(n, value, held.get(n), "filter") for n, value in edited.items()]
+        beside = [GainChange(n, value, None, "not in the log") for n, value in assumed.items()]
+        return (*set_, *beside)
+
+    def way_back(self, values: Mapping[str, float]) -> tuple[GainChange, ...]:
+        """What sets every one of them as it flew; what the log lacks to what firmware takes."""
         known = self.values
         return tuple(
-            GainChange(name, value, self.parameters.get(name), "filter")
-            for name, value in values.items()
-            if value != known.get(name)
+            GainChange(each.name, known[each.name], None, "" if self.knows(each.name) else UNTOLD)
+            for each in self.changes(values)
         )
+
+    def knows(self, name: str) -> bool:
+        """Whether the log tells the value of a parameter that flew."""
+        return name in self.parameters
 
     def _axis(self, axis: str, values: Mapping[str, float]) -> EditedAxis:
         flown = self.loops[axis]
@@ -227,4 +255,9 @@ def filter_bench(log: Log) -> FilterBench:
         notch_tracking(log, spans),
         log.kind,
         review.choice,
+        {
+            each.axis: each.phase_margin_deg
+            for each in flown_ranges(log, loops)
+            if each.phase_margin_deg is not None
+        },
     )

@@ -39,6 +39,7 @@ from flightid.study.model_section import model_section
 from flightid.study.results import StudyResults
 from flightid.study.truth import inside, recovered
 from flightid.study.tuning import AUTOPILOT_ONLY
+from flightid.study.views import view_sections
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.quantiles import interval_words, shown
 from flightid.version import VERSION
@@ -76,6 +77,7 @@ def study_document(study: StudyResults) -> Document:
         *_uses(study),
         section_of("The records" if study.inspection is None else "The log", _source_blocks, study),
         *_review(study),
+        *view_sections(study.tried, study.plots),
         Section("Provenance", provenance(study.files, _options(study))),
     )
     return Document(

@@ -12,9 +12,11 @@ from flightid.dynamics.handling_qualities.handling_qualities import HandlingQual
 from flightid.findings import Finding
 from flightid.frozen import dataclass
 from flightid.inspection import Inspection
+from flightid.logs.field_plot import FieldPlot
 from flightid.record import Record
 from flightid.result import Result
 from flightid.review import FlightReview
+from flightid.review.tried_filters import TriedFilters
 from flightid.study.identified import ModelResults
 from flightid.study.output import SCHEMA
 from flightid.study.settings import Settings
@@ -74,6 +76,10 @@ class StudyResults(
         Study file as this run was given it.
     review : FlightReview or None
         What the log's flight tells besides; None where records come from files.
+    tried : TriedFilters or None
+        Filters that the study tries on the noise of the flight.
+    plots : tuple of FieldPlot
+        Fields of the log that the study shows.
     """
 
     settings: Settings
@@ -93,6 +99,8 @@ class StudyResults(
     from_cache: tuple[str, ...] = ()
     source: Path | None = None
     review: FlightReview | None = None
+    tried: TriedFilters | None = None
+    plots: tuple[FieldPlot, ...] = ()
 
     @property
     def has_equations(self) -> bool:

@@ -35,6 +35,7 @@ from flightid.study.taking import require_log, take
 from flightid.study.task import load_task
 from flightid.study.tuning import TuneSettings, tune_models
 from flightid.study.uses import use_models
+from flightid.study.views import view_log
 from flightid.surface import as_key, speaking
 from flightid.uncertainty.quantiles import checked_level
 from flightid.vehicles import GainFlight
@@ -153,6 +154,7 @@ def _run(
         reviewed = None
         if taken.log is not None:
             reviewed = faults.spare("the flight review", _reviewed, None, runner, taken.log)
+        tried, plots = view_log(settings.views, taken.log, runner, faults, folder)
         study = Study(
             settings,
             final,
@@ -171,6 +173,8 @@ def _run(
             tuple(runner.from_cache),
             source,
             reviewed,
+            tried,
+            plots,
         )
         _write(study, folder)
         advance()

@@ -32,6 +32,7 @@ from flightid.study.response_settings import ResponseSettings
 from flightid.study.shape_options import ShapeOptions
 from flightid.study.tuning import TuneSettings, read_tune
 from flightid.study.uses_settings import UsesSettings, read_uses
+from flightid.study.view_settings import ViewSettings, read_views
 from flightid.uncertainty.quantiles import LEVEL
 from flightid.vehicles import GainFlightOptions
 
@@ -138,6 +139,8 @@ class Settings:
         How tuned gains are flown again in the simulated vehicle; None: not at all.
     qualities : QualitiesSettings or None
         How handling qualities are read off the fits; None: not at all.
+    views : ViewSettings
+        What is asked of the log besides models.
     """
 
     title: str
@@ -162,6 +165,7 @@ class Settings:
     qualities: QualitiesSettings | None = None
     uses: UsesSettings = field(default_factory=UsesSettings)
     fly: GainFlightOptions | None = None
+    views: ViewSettings = field(default_factory=ViewSettings)
 
     @property
     def injected(self) -> tuple[str, ...]:
@@ -213,6 +217,7 @@ def read_settings(path: Path) -> Settings:
     models = collected.each(readers, model, folder)
     named = [str(values.get("name")) for _, values in collected.read(root.rows, [], "model")]
     uses = collected.read(read_uses, UsesSettings(), root, named)
+    views = collected.read(read_views, ViewSettings(), root)
     collected.read(root.finish, None)
     if files and segments:
         collected.errors.append(
@@ -231,7 +236,8 @@ def read_settings(path: Path) -> Settings:
     # What refers to a part that could not be read is no error of its own.
     if not collected.errors:
         kind, known = "record" if files else "segment", [each.name for each in files or segments]
-        collected.read(partial(require_references, kind=kind), None, files or segments, models)
+        if models or views == ViewSettings():
+            collected.read(partial(require_references, kind=kind), None, files or segments, models)
         collected.read(require_conditions, None, models)
         collected.read(require_records, None, conditioning, known)
     collected.finish()
@@ -255,6 +261,7 @@ def read_settings(path: Path) -> Settings:
         qualities,
         uses,
         flown_again,
+        views,
     )
 
 

@@ -1,0 +1,101 @@
+"""Filters to try and fields to plot as keys of a study: the page's numbers, and refusals."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("fastapi", reason="the extra app is not installed")
+
+import flightid as fid
+from flightid.app import filter_work, work
+from flightid.app.pyramid import Pyramid
+from flightid.app.study_edits import KeyEdit, edited, parts_of
+from flightid.errors import FlightidError
+from flightid.study.faults import Faults
+from flightid.study.settings import read_settings
+from flightid.study.stage_runner import StageRunner
+from flightid.study.views import view_log
+from tests.unit.test_filter_review import _write
+
+ASKED = {"INS_GYRO_FILTER": 25.0, "INS_HNTCH_ENABLE": 1.0}
+SERIES = ["GYR.GyrX", "=GYR.GyrX - GYR.GyrY", "NOT.There"]
+BARE = '[study]\ntitle = "Shaken"\n[log]\npath = "shaken.bin"\n'
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """As clicks of the page write it."""
+    folder = tmp_path_factory.mktemp("views")
+    _write(folder / "shaken.bin", tone=0.6, white=0.01, esc=False)
+    clicks = [
+        KeyEdit(("filters",), {"parameters": ASKED}),
+        KeyEdit(("plot",), [{"series": SERIES}]),
+    ]
+    (folder / "study.toml").write_text(edited(BARE, clicks), encoding="utf-8")
+    return folder / "study.toml"
+
+
+def test_keys_of_a_study_give_the_numbers_of_the_page(study: Path, tmp_path: Path) -> None:
+    log = study.parent / "shaken.bin"
+    settings, runner = read_settings(study), StageRunner()
+    opened = runner.stage("log", fid.read_log, log)
+    tried, plots = view_log(settings.views, opened, runner, Faults(), tmp_path)
+    page = filter_work.try_filters(log, ASKED)
+    assert tried is not None
+    for mine, shown in zip(tried.axes, page["axes"], strict=True):
+        numbers = mine.phase_edited_deg, 100.0 * mine.noise_edited
+        assert numbers == (shown["phase_edited_deg"], shown["noise_edited_percent"])
+    assert [f.message for f in tried.findings] == [each["message"] for each in page["findings"]]
+    assert len(page["files"]) == 2
+    for file in page["files"]:
+        assert (tmp_path / file["name"]).read_text("utf-8") == file["text"]
+    # A formula of fields, as the page draws it; what the log lacks is named, and the others stand.
+    (plot,) = plots
+    unit = work.make_formula(log, "GYR.GyrX - GYR.GyrY", tmp_path / "levels.npy")
+    assert [each.name for each in plot.series] == ["GYR.GyrX", "GYR.GyrX - GYR.GyrY"]
+    assert plot.series[1].unit == unit
+    drawn = Pyramid.read(tmp_path / "levels.npy")
+    np.testing.assert_array_equal(plot.series[1].values, drawn.values)
+    assert "NOT" in plot.findings[0].message
+    # Neither models nor gains rest on them.
+    before, after = (parts_of(each) for each in (BARE, study.read_text("utf-8")))
+    assert (before.models, before.gains) == (after.models, after.gains)
+    assert before.views != after.views
+
+
+@pytest.mark.slow
+def test_a_run_reports_filters_and_fields(study: Path) -> None:
+    ran = fid.run_study(study)
+    told = json.loads((ran.output / "results.json").read_text("utf-8"))
+    page = filter_work.try_filters(study.parent / "shaken.bin", ASKED)
+    assert told["plots"][0]["rows"][1]["field"] == "GYR.GyrX - GYR.GyrY"
+    assert told["tried"]["axes"][0]["phase_edited_deg"] == page["axes"][0]["phase_edited_deg"]
+    text = (ran.output / "report.txt").read_text("utf-8")
+    assert "Filters tried" in text
+    assert "GYR.GyrX - GYR.GyrY" in text
+    assert {each["name"] for each in page["files"]} <= {p.name for p in ran.output.iterdir()}
+
+
+@pytest.mark.parametrize(
+    ("said", "refusal"),
+    [
+        ("[[plot]]\nseries = []", "a plot shows nothing"),
+        ('[[plot]]\nseries = ["Roll"]', "names no field of a log"),
+        ('[[plot]]\nseries = ["= ATT.Roll +"]', "no formula of fields"),
+        ("[filters]\nparameters = { A = 'b' }", "parameters"),
+        ("[filters]", "parameters"),
+    ],
+)
+def test_a_study_refuses_views_that_name_nothing(tmp_path: Path, said: str, refusal: str) -> None:
+    study = tmp_path / "study.toml"
+    head = '[study]\ntitle = "A"\n'
+    study.write_text(f'{head}[log]\npath = "a.bin"\n{said}\n', encoding="utf-8")
+    with pytest.raises(FlightidError, match=refusal):
+        read_settings(study)
+    study.write_text(f'{head}[[record]]\nname = "a"\npath = "a.csv"\n{said}\n', encoding="utf-8")
+    with pytest.raises(FlightidError, match="of a log, and there is none"):
+        read_settings(study)
