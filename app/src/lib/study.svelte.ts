@@ -80,6 +80,14 @@ export class Study {
     return waiting.stored;
   }
 
+  /** Change keys whose places hang on what stands there when the turn comes. */
+  editThen(make: () => Edit[]): Promise<boolean> {
+    return this.#inTurn(() => {
+      const edits = make();
+      return this.#store(edits, (etag) => api.change(this.log, etag, edits));
+    });
+  }
+
   /** Put a whole text in place, as a proposal made anew; it can be taken back. */
   replace(text: string): Promise<boolean> {
     return this.#inTurn(() => this.#store([], (etag) => api.replace(this.log, etag, text)));
