@@ -12,8 +12,10 @@ from pathlib import Path, PurePosixPath
 from typing import Any, BinaryIO
 from urllib.parse import unquote, urlsplit
 
+from flightid.conventions import Light
 from flightid.errors import StudyError
 from flightid.extras import extra_module
+from flightid.findings import Finding
 from flightid.frozen import dataclass
 
 SUFFIXES = (".bin", ".ulg", ".bbl", ".bfl", ".tlog", ".log")
@@ -22,6 +24,12 @@ WILD = "*?["
 LOCAL = "file://"
 GONE = "gone"
 """Stamp of a file that cannot be reached: a dangling link, or one removed meanwhile."""
+NO_LOGS = Finding(
+    "no-logs",
+    Light.RED,
+    "there is no log at the places of the fleet file",
+    "name folders, globs or addresses in [fleet] logs",
+)
 
 
 @dataclass(frozen=True)

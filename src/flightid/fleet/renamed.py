@@ -178,6 +178,18 @@ def gone_light(gone: int, *, taken_out: bool = False) -> Iterator[Finding]:
     yield Finding("gone-logs", Light.GREEN, f"{whose} {where} {verb} all the same", action)
 
 
-def outdated_light(renamed: Iterable[RenamedLog], gone: int) -> tuple[Finding, ...]:
-    """Both, of a catalogue that no run has brought up to date."""
-    return (*renamed_light(list(renamed), followed=False), *gone_light(gone))
+def altered_light(altered: int) -> Iterator[Finding]:
+    """That logs have other bytes than their records are of, as one that was cut has."""
+    if altered:
+        verb, whose = ("is", "a log that has") if altered == 1 else ("are", "logs that have")
+        said = f"{counted(altered, 'record')} {verb} of {whose} other bytes by now"
+        action = "flightid fleet run takes what lies there now; until then the record counts"
+        yield Finding("altered-logs", Light.AMBER, said, action)
+
+
+def outdated_light(
+    renamed: Iterable[RenamedLog], gone: int, altered: int = 0
+) -> tuple[Finding, ...]:
+    """All of it, of a catalogue that no run has brought up to date."""
+    named = renamed_light(list(renamed), followed=False)
+    return (*named, *altered_light(altered), *gone_light(gone))

@@ -13,7 +13,7 @@ from time import sleep
 from flightid.conventions import Light
 from flightid.errors import DataError, OptionError
 from flightid.findings import Finding, counted
-from flightid.fleet.addresses import LogAddress, find_logs
+from flightid.fleet.addresses import NO_LOGS, LogAddress, find_logs
 from flightid.fleet.catalogue.compaction import compact, merge, set_aside
 from flightid.fleet.catalogue.loose import loose_logs, read_loose, write_loose
 from flightid.fleet.catalogue.parts import read_parts
@@ -186,9 +186,9 @@ def _shown(outcomes: Iterable[LogOutcome], number: int, name: str) -> Iterator[L
 
 def _replaced(aside: Sequence[str], replaced: Set[str]) -> Iterator[Finding]:
     if aside:
-        text = (
-            f"{len(aside)} tables were damaged: they lie in quarantine, their logs were taken again"
-        )
+        were, they, their = ("was", "it lies", "its") if len(aside) == 1 else PLURAL
+        said = f"{counted(len(aside), 'part')} of the catalogue {were} damaged"
+        text = f"{said}: {they} in quarantine, {their} logs were taken again"
         yield Finding("damaged-parts", Light.AMBER, text)
     if replaced:
         whose = "its log has" if len(replaced) == 1 else "their logs have"
@@ -215,12 +215,7 @@ def _findings(scheduler: str | None, addresses: list[LogAddress]) -> Iterator[Fi
     if scheduler is not None and (found := scheduler_finding(scheduler)) is not None:
         yield found
     if not addresses:
-        yield Finding(
-            "no-logs",
-            Light.RED,
-            "there is no log at the places of the fleet file",
-            "name folders, globs or addresses in [fleet] logs",
-        )
+        yield NO_LOGS
 
 
 def _nothing_fitted(
@@ -259,6 +254,7 @@ UNCLAIMED = Finding(
     "the catalogue's place keeps no two runs off one log: at the same time they take logs twice",
     "give runs at the same time a part of the addresses each",
 )
+PLURAL = ("were", "they lie", "their")
 POLL_S = 1.0
 """Time between looks at logs that other runs hold."""
 

@@ -36,9 +36,11 @@ class FleetShares:
     waiting : tuple of str
         Files that the next run takes.
     gone : tuple of str
-        Addresses of records whose file is no longer there, or has other bytes.
+        Addresses of records whose file is no longer there.
     renamed : tuple of RenamedLog
         Files that have another name, or another vehicle, than their records until the next run.
+    altered : tuple of str
+        Addresses of records whose file has other bytes by now, as one that was cut.
     """
 
     outcomes: Mapping[str, int]
@@ -46,11 +48,17 @@ class FleetShares:
     waiting: tuple[str, ...]
     gone: tuple[str, ...]
     renamed: tuple[RenamedLog, ...] = ()
+    altered: tuple[str, ...] = ()
+
+    @property
+    def unheld(self) -> tuple[str, ...]:
+        """Addresses of records of which no file has the bytes any more."""
+        return (*self.gone, *self.altered)
 
     @property
     def findings(self) -> tuple[Finding, ...]:
         """What of the catalogue is not as the files are."""
-        return outdated_light(self.renamed, len(self.gone))
+        return outdated_light(self.renamed, len(self.gone), len(self.altered))
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values."""
@@ -95,9 +103,11 @@ class FleetShares:
             else:
                 waiting.append(each.address)
         counts = Counter(entry.outcome for entry in own.values())
-        gone = tuple(sorted(e.address for log, e in entries.items() if log not in of))
+        lost = sorted(e.address for log, e in entries.items() if log not in of)
+        gone = tuple(each for each in lost if each not in there)
+        altered = tuple(each for each in lost if each in there)
         kept = dict(sorted(copies.items()))
-        return cls(dict(counts), kept, tuple(waiting), gone, tuple(renamed))
+        return cls(dict(counts), kept, tuple(waiting), gone, tuple(renamed), altered)
 
 
 def fleet_shares(settings: FleetSettings, store: Store) -> tuple[FleetShares | None, int]:

@@ -8,15 +8,23 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from flightid.conventions import Light
 from flightid.errors import OptionError
 from flightid.findings import Finding
+from flightid.fleet.addresses import NO_LOGS, find_logs
 from flightid.fleet.catalogue.compaction import read_columns
 from flightid.fleet.catalogue.loose import QUARANTINE, loose_logs, read_loose
 from flightid.fleet.catalogue.parts import PARTS, KnownLogs, TablePart, read_parts
 from flightid.fleet.catalogue.store import Store
-from flightid.fleet.opening import catalogue_place, earlier_light, names_fleet_file, opened_store
+from flightid.fleet.opening import (
+    catalogue_place,
+    earlier_light,
+    has_catalogue,
+    names_fleet_file,
+    opened_store,
+)
 from flightid.fleet.reasons import RefusalReason, grouped_reasons
-from flightid.fleet.settings import read_fleet
+from flightid.fleet.settings import FleetSettings, read_fleet
 from flightid.fleet.shares import FleetShares, fleet_shares
 from flightid.fleet.unnamed import unnamed_light, unnamed_logs
 from flightid.frozen import dataclass
@@ -39,7 +47,7 @@ class FleetStatus(Result, schema="flightid.fleet_status/1"):
     parts, loose : int
         Compacted tables, and files that are not compacted yet.
     quarantine : tuple of str
-        Records and parts that could not be read.
+        Records and parts that could not be read, each once however many files it is.
     n_bytes : int
         Size of parts and loose files, B.
     reasons : tuple of RefusalReason
@@ -49,8 +57,8 @@ class FleetStatus(Result, schema="flightid.fleet_status/1"):
     unnamed : int
         Logs with a model that name no vehicle, and count in no answer.
     findings : tuple of Finding
-        These, logs with another name or vehicle than their records, and records of logs that are
-        gone.
+        These, logs with another name, vehicle or bytes than their records, records of logs that
+        are gone; or that nothing was run yet.
 
     Example
     -------
@@ -86,11 +94,11 @@ class FleetStatus(Result, schema="flightid.fleet_status/1"):
                 ("copies of these", len(shares.copies)),
                 ("not taken yet", len(shares.waiting)),
             ]
-            gone = len(shares.gone)
-            rows += [("records of files that are gone", gone)] if gone else []
+            left = (("are gone", shares.gone), ("have other bytes now", shares.altered))
+            rows += [(f"records of files that {what}", len(e)) for what, e in left if e]
         rows += [("parts", self.parts), ("loose files", self.loose)]
         rows += [
-            ("in quarantine", len(self.quarantine)),
+            ("records and parts in quarantine", len(self.quarantine)),
             ("size [MB]", f"{self.n_bytes / 1e6:.2f}"),
         ]
         return Table(f"Catalogue {self.catalogue}", (Column("what"), Column("number")), tuple(rows))
@@ -112,7 +120,8 @@ def fleet_status(place: str | Path) -> FleetStatus:
     Raises
     ------
     DataError
-        There is no catalogue.
+        There is no catalogue at a place that is no fleet file; of one that no run has taken yet its
+        logs are counted.
 
     Example
     -------
@@ -124,16 +133,30 @@ def fleet_status(place: str | Path) -> FleetStatus:
     if not names_fleet_file(place):
         return _counted(opened_store(where), where)
     settings = read_fleet(place)
+    if not has_catalogue(where):
+        return _before_a_run(settings, where)
     store = opened_store(where)
     shares, found = fleet_shares(settings, store)
-    gone = frozenset(() if shares is None else shares.gone)
+    gone = frozenset(() if shares is None else shares.unheld)
     findings = (*earlier_light(settings, store), *(() if shares is None else shares.findings))
     counted = _counted(store, where, gone)
     return replace(counted, found=found, shares=shares, findings=(*findings, *counted.findings))
 
 
+def _before_a_run(settings: FleetSettings, where: str) -> FleetStatus:
+    """Of a fleet file that no run has taken: its logs, all of them waiting."""
+    found = find_logs([settings.place(each) for each in settings.words.logs])
+    waiting = tuple(each.address for each in found)
+    action = "flightid fleet run takes all of them"
+    told = Finding("no-catalogue", Light.GREEN, "nothing was run yet", action)
+    shares = FleetShares({}, {}, waiting, ())
+    return FleetStatus(
+        *(where, len(found), {}, 0, 0), shares=shares, findings=(told if found else NO_LOGS,)
+    )
+
+
 def _counted(store: Store, where: str, gone: Collection[str] = ()) -> FleetStatus:
-    """All of a catalogue; reasons without those of files that are gone."""
+    """All of a catalogue; reasons without those of files that are gone or have other bytes."""
     parts, broken = read_parts(store)
     known = KnownLogs(store, parts)
     loose = [log for log in loose_logs(store) if not known.in_parts(log)]
@@ -146,8 +169,8 @@ def _counted(store: Store, where: str, gone: Collection[str] = ()) -> FleetStatu
         counts[record.outcome] += 1
         told.append(record.rows["logs"][0])
         n_bytes += len(record.to_bytes())
-    kept = (f"{QUARANTINE}/{name}" for name in sorted(store.names(QUARANTINE)))
-    unusable = (*kept, *(f"{PARTS}/{name}" for name in broken))
+    kept = dict.fromkeys(name.partition(".")[0] for name in sorted(store.names(QUARANTINE)))
+    unusable = (*(f"{QUARANTINE}/{e}" for e in kept), *(f"{PARTS}/{name}" for name in broken))
     return FleetStatus(
         where, None, dict(counts), len(parts), len(loose), unusable, n_bytes,
         grouped_reasons(row for row in told if row["address"] not in gone),
