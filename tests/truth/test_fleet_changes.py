@@ -16,6 +16,7 @@ from flightid.fleet.statistics.events import (
     FleetEvent,
     beside_steps,
     event_effect,
+    event_effects,
     event_steps,
 )
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
@@ -279,7 +280,7 @@ def test_what_an_event_explains_is_no_alarm_and_what_is_beyond_is(
     events = [] if event is None else [FleetEvent("x", t * DAY_S, vehicles) for t in (12.0, event)]
     found = find_drift(data, None, events)
     assert len(found.alarms) == n_alarms
-    if event == 12.0:  # told twice, as two events of one day are: the second step is beyond both
+    if event == 12.0:  # told twice, which counts once: the second step is beyond both
         assert found.alarms[0].vehicle == "b"
         assert found.alarms[0].changed_s == (25 * DAY_S, 26 * DAY_S)
         assert {h.vehicle for h, _ in found.by_event} == {"a", "b"}
@@ -309,7 +310,7 @@ def test_an_event_is_a_change_where_its_interval_holds_none(freedom: float) -> N
     for level in np.repeat([-1.0, 1.0], 150):
         values = level + 0.1 * rng.normal(size=8) + np.where(days >= 4, 0.16, 0.0)
         found = event_effect(
-            FleetEvent("motor", 3.5), "gain", "1", values, 0.01 * np.eye(8), days, freedom
+            (FleetEvent("motor", 3.5),), "gain", "1", values, 0.01 * np.eye(8), days, freedom
         )
         assert found.chance is not None
         told += found.chance < 0.05
@@ -372,3 +373,34 @@ def test_a_change_is_seldom_called_by_the_other_kind(gradual: bool, name: str, o
         found.append(change_kind(1.0 + level + noise, np.diag(errors**2), time_s))
     assert found.count(other) <= 10
     assert found.count(name) >= 65
+
+
+@pytest.mark.parametrize(("later", "flights"), [(0.2, 0), (1.0, 1), (2.0, 2)])
+def test_events_that_flights_do_not_tell_apart_share_their_change(
+    later: float, flights: int
+) -> None:
+    """New propellers and new firmware of one day were each given all 15 %, and tested twice."""
+    rng, days, held = np.random.default_rng(9), np.arange(14.0), []
+    motor, board = FleetEvent("motor", 5.5, ("a",)), FleetEvent("board", 5.5 + later, ("a",))
+    for _ in range(100):
+        values = 10.0 + 0.3 * rng.normal(size=14) - 1.5 * (days >= 6)
+        found = event_effects(
+            *((board, motor, motor), "gain", "1", values, 0.09 * np.eye(14)),
+            *(days, np.zeros(14)),
+        )
+        assert [each.names for each in found] == (
+            [("motor", "board")] if flights == 0 else [("motor",), ("board",), ("motor", "board")]
+        )
+        assert found[-1].between == flights
+        ends = [each.percent.interval95 or (np.inf, -np.inf) for each in found]
+        truth = [-15.0] if flights == 0 else [-15.0, 0.0, -15.0]
+        held.append([low <= true <= high for (low, high), true in zip(ends, truth, strict=True)])
+    if flights:  # What one alone did is hardly known: both together are.
+        widths = [high - low for low, high in ends]
+        assert min(widths[:2]) > 1.3 * widths[2]
+    assert np.all(np.mean(held, axis=0) >= 0.89)
+    history = cast("ParameterHistory", SimpleNamespace(name="gain"))
+    said = event_words(history, found[-1], {})
+    assert said.partition(" at the ")[2] == "events “motor” and “board”" + (
+        " together" if flights else ", which no flight tells apart"
+    )

@@ -229,7 +229,7 @@ def _history(of: TypeAnswers, each: ParameterHistory) -> FleetHistory:
         changed=each.is_alarm, kind=each.kind,
         words=change_words(each, of.labels) if each.is_alarm else "",
         changed_s=each.changed_s if each.is_alarm else None,
-        events=[(one.event.time_s, one.event.what) for one in each.events],
+        events=list(dict.fromkeys((one.time_s, one.what) for one in each.happened)),
         logs=[logs.get((each.vehicle, at), "")[:16] for at in each.time_s.tolist()],
     )  # fmt: skip
 

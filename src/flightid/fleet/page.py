@@ -270,8 +270,8 @@ def events_table(drift: FleetDrift, labels: Mapping[str, str]) -> Table:
     happened.sort(key=lambda pair: 2.0 if pair[0].chance is None else pair[0].chance)
     for each, history in happened[:NAMED]:
         low, high = each.percent.interval(shown()) or (None, None)
-        event = each.event.what
-        value, reason = each.percent.value, each.percent.reason or None
+        event = ", ".join(each.names)
+        value, reason = each.percent.value, each.percent.reason or each.together or None
         name = labels.get(history.name, history.name)
         rows.append(
             (event, history.vehicle, name, value, low, high, chance_cell(each.chance), reason)

@@ -68,9 +68,9 @@ def _history(made: go.PlotFigure, each: ParameterHistory, name: str, row: int, c
             row, column, type="rect", x0=low, x1=high, y0=bottom, y1=top,
             fillcolor="rgba(213,94,0,0.18)", line={"width": 0},
         )  # fmt: skip
-    for effect in each.events:
+    for event in each.happened:
         bottom, top = float(np.min(each.values - half)), float(np.max(each.values + half))
-        when = _date(effect.event.time_s)
+        when = _date(event.time_s)
         made.add_trace(
             go.Scatter(
                 x=[when, when],
@@ -78,7 +78,7 @@ def _history(made: go.PlotFigure, each: ParameterHistory, name: str, row: int, c
                 mode="lines",
                 line={"color": look.PURPLE, "width": 1.5, "dash": "dot"},
                 showlegend=False,
-                hovertemplate=f"{effect.event.what}<extra></extra>",
+                hovertemplate=f"{event.what}<extra></extra>",
             ),
             row,
             column,

@@ -80,7 +80,12 @@ def event_words(history: ParameterHistory, effect: EventEffect, labels: Mapping[
     name, size = labels.get(history.name, history.name), effect.percent
     size = effect.change if size.value is None else size
     did = "may have changed" if _holds_zero(size) else "changed"
-    return f"{name} {did}{_size_words(size)} at the event “{effect.event.what}”"
+    said = (
+        f"{name} {did}{_size_words(size)} at the event{'s' * bool(effect.together)} {effect.what}"
+    )
+    if not effect.together:
+        return said
+    return f"{said} together" if effect.between else f"{said}, which no flight tells apart"
 
 
 def _holds_zero(change: Reading) -> bool:

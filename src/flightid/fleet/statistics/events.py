@@ -6,14 +6,16 @@ which leaves what is beyond it to be judged.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.fleet.statistics.few_days import beside_spread
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
+from flightid.fleet.statistics.largest_step import SHORTEST
 from flightid.fleet.statistics.neighbours import histories_in_time
 from flightid.frozen import dataclass
 from flightid.uncertainty.estimate import Estimate, Interval, Reading
@@ -55,23 +57,49 @@ class FleetEvent:
 
 @dataclass(frozen=True)
 class EventEffect:
-    """What one event did to one parameter of one vehicle.
+    """What one event, or several together, did to one parameter of one vehicle.
 
     Attributes
     ----------
-    event : FleetEvent
+    events : tuple of FleetEvent
+        In time. Several where the vehicle did not fly between them, which leaves one step of all;
+        or too little to tell them apart surely: then each has an effect of its own beside this one.
+    between : int
+        Flights between the first and the last of them.
     change : Estimate
-        Level behind it less the level before, in the parameter's unit.
+        Level behind all less the level before any, in the parameter's unit.
     percent : Estimate
         The same of the level before; the error of that level is in its interval.
     chance : float or None
         Chance of a change as large were there none.
     """
 
-    event: FleetEvent
+    events: tuple[FleetEvent, ...]
+    between: int
     change: Reading
     percent: Reading
     chance: float | None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What was done, each once."""
+        return tuple(dict.fromkeys(each.what for each in self.events))
+
+    @property
+    def what(self) -> str:
+        """The same as words of a sentence, each in quotation marks."""
+        *first, last = (f"“{each}”" for each in self.names)
+        return f"{', '.join(first)} and {last}" if first else last
+
+    @property
+    def together(self) -> str:
+        """Why several share one change; empty for one."""
+        if len(self.names) == 1:
+            return ""
+        if not self.between:
+            return "no flight between them tells them apart"
+        flights = "1 flight lies" if self.between == 1 else f"{self.between} flights lie"
+        return f"of all together: {flights} between them"
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +145,7 @@ class PercentEnds:
 
 
 def event_effect(
-    event: FleetEvent,
+    events: tuple[FleetEvent, ...],
     name: str,
     unit: str,
     values: Array,
@@ -129,7 +157,9 @@ def event_effect(
 
     Parameters
     ----------
-    event : FleetEvent
+    events : tuple of FleetEvent
+        One, or several in time: flights between these are the level before, where `covariance`
+        does not leave them open.
     name, unit : str
         Of the parameter.
     values : ndarray, shape (n,)
@@ -149,14 +179,15 @@ def event_effect(
     Example
     -------
     >>> motor = FleetEvent("motor replaced", 1.5)
-    >>> event_effect(motor, "gain", "1", np.array([2.0, 2.0, 3.0, 3.0]), 0.01 * np.eye(4),
+    >>> event_effect((motor,), "gain", "1", np.array([2.0, 2.0, 3.0, 3.0]), 0.01 * np.eye(4),
     ...              np.arange(4.0)).percent
     Estimate(gain = 50 (38.18 to 63.27) %)
     """
-    behind = time_s >= event.time_s
-    if behind.all() or not behind.any():
+    begun, behind = (time_s >= each.time_s for each in (events[0], events[-1]))
+    between = int(np.count_nonzero(begun)) - int(np.count_nonzero(behind))
+    if begun.all() or not behind.any():
         none: Reading = Estimate(name, None, unit, reason=FEW)
-        return EventEffect(event, none, Estimate(name, None, "%", reason=FEW), None)
+        return EventEffect(events, between, none, Estimate(name, None, "%", reason=FEW), None)
     design = np.column_stack([np.ones(len(values)), behind])
     weighed = np.linalg.solve(covariance, design)
     errors = np.linalg.inv(design.T @ weighed)
@@ -169,7 +200,7 @@ def event_effect(
     told = None if np.isinf(freedom) else freedom
     change = Estimate(name, float(step), unit, stderr, freedom=told)
     chance = beside_spread(two_sided_chance(step / stderr), freedom)
-    return EventEffect(event, change, percent, chance)
+    return EventEffect(events, between, change, percent, chance)
 
 
 def event_effects(
@@ -184,16 +215,61 @@ def event_effects(
 ) -> tuple[EventEffect, ...]:
     """The step at each event as `event_effect` has it, those of the others left open.
 
-    What was done to all vehicles is in what they share, which `values` lack.
+    Events without a flight between them have one step; those with few have one more of all
+    together. What was done to all vehicles is in what they share, which `values` lack.
     """
     known = event_steps(events, time_s)
     found = []
-    for event in events:
-        others = known[:, np.any(known != (time_s >= event.time_s)[:, None], axis=0)]
-        around = opened(covariance, others)
-        own = values if event.vehicles else values + shared
-        found.append(event_effect(event, name, unit, own, around, time_s, freedom))
+    for asked in asked_together(events, time_s):
+        around = opened(covariance, _beside(asked, known, time_s))
+        own = values if all(each.vehicles for each in asked) else values + shared
+        found.append(event_effect(asked, name, unit, own, around, time_s, freedom))
     return tuple(found)
+
+
+def asked_together(events: Sequence[FleetEvent], time_s: Array) -> Iterator[tuple[FleetEvent, ...]]:
+    """Events of one vehicle as they are asked about, in time.
+
+    Parameters
+    ----------
+    events : sequence of FleetEvent
+    time_s : ndarray, shape (n,)
+        Of its flights.
+
+    Yields
+    ------
+    tuple of FleetEvent
+        Those between which it did not fly; then, where `SHORTEST` flights do not lie between
+        neighbours, all of these.
+
+    Example
+    -------
+    >>> happened = [FleetEvent(what, at) for what, at in (("a", 3.5), ("b", 3.6), ("c", 4.5))]
+    >>> [[e.what for e in each] for each in asked_together(happened, np.arange(9.0))]
+    [['a', 'b'], ['c'], ['a', 'b', 'c']]
+    """
+    apart: dict[int, list[FleetEvent]] = {}
+    for event in sorted(events, key=lambda each: each.time_s):
+        apart.setdefault(int(np.count_nonzero(time_s >= event.time_s)), []).append(event)
+    yield from map(tuple, apart.values())
+    mixed = [behind for behind in apart if 0 < behind < len(time_s)]
+    near: list[FleetEvent] = []
+    for behind, following in pairwise((*mixed, 0)):
+        near += apart[behind]
+        if following and behind - following < SHORTEST:
+            continue
+        if len(near) > len(apart[behind]):
+            yield tuple(near)
+        near = []
+
+
+def _beside(asked: tuple[FleetEvent, ...], known: Array, time_s: Array) -> Array:
+    """Steps of the other events; of those asked about, levels of the flights between them."""
+    begun, behind = (time_s >= each.time_s for each in (asked[0], asked[-1]))
+    counts = np.count_nonzero(known, axis=0)
+    others, counts = known[:, counts != behind.sum()], counts[counts != behind.sum()]
+    between = (counts > behind.sum()) & (counts <= begun.sum())
+    return np.asarray(others - np.outer(behind, between))
 
 
 def event_steps(events: Sequence[FleetEvent], time_s: Array) -> Array:

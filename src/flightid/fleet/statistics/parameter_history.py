@@ -59,6 +59,7 @@ class ParameterHistory:
     false_share : float or None
         Benjamini–Hochberg over all vehicles and parameters; an alarm at 0.05 or less.
     events : tuple of EventEffect
+        Of each event, and of those together between which few flights lie.
     kind : str
         Of an alarm: ``"a step"``, ``"drift"``, or ``"changed"`` where its flights do not tell.
     apart_chance, apart_share : float or None
@@ -88,6 +89,11 @@ class ParameterHistory:
         if self.step_chance is None or self.walk_chance is None:
             return None
         return min(1.0, TESTS * min(self.step_chance, self.walk_chance))
+
+    @property
+    def happened(self) -> tuple[FleetEvent, ...]:
+        """Events that concern it, each once."""
+        return tuple(dict.fromkeys(one for each in self.events for one in each.events))
 
     @property
     def is_alarm(self) -> bool:
