@@ -316,3 +316,63 @@ def test_few_fleets_whose_days_go_on_alarm_and_independent_ones_keep_their_power
     assert sum(bool(each.alarms) for each in longer) <= 2  # of what goes on in proportion 7
     found = [_drift(seed, 10, 24, change=0.1, changed=2, last=8) for seed in range(24)]
     assert sum(len(_alarmed(each) & {0, 1}) for each in found) >= 44
+
+
+def _of_two(seed: int) -> FleetDrift:
+    """Six vehicles of 20 days that go on by 0.8 at 5 %, in parameters of 3 and 5 % errors."""
+    rng, errors = np.random.default_rng(seed), np.array([0.3, 0.5])
+    days = rng.normal(size=(6, 20, 2))
+    for day in range(1, 20):
+        days[:, day] = 0.8 * days[:, day - 1] + 0.6 * days[:, day]
+    values = 10.0 * (1.0 + 0.06 * rng.normal(size=(6, 1, 2))) + 0.5 * days
+    values += errors * rng.normal(size=(6, 20, 2))
+    return find_drift(
+        FlightEstimates.of(
+            ["Lp", "T_m"],
+            np.repeat([*"abcdef"], 20).tolist(),
+            values.reshape(-1, 2),
+            np.tile(np.diag(errors**2), (120, 1, 1)),
+            time_s=np.tile(10.0 * DAY_S * np.arange(20.0), 6),
+        )
+    )
+
+
+def test_what_goes_on_in_one_parameter_or_on_few_days_may_go_on() -> None:
+    """Red where its own days alone did not tell: of two parameters one, and on twelve days."""
+    found = _of_two(13)
+    assert set(found.persistent) == {"Lp", "T_m"}
+    assert not found.alarms
+    few = _drift(9, 10, 24, a_day=2, days=0.05, memory=0.9)
+    assert not few.alarms
+    assert few.going_on
+    assert "Lp: flights may go on as their neighbours did" in " ".join(few.summary().notes)
+
+
+@pytest.mark.slow
+def test_few_fleets_of_few_days_that_go_on_alarm() -> None:
+    """Of 60 each 7 and 11 did, in 120 now 6; of two parameters 11 of 40, 1 of 60."""
+    alone = [_drift(seed, 10, 24, a_day=2, days=0.05, memory=0.9) for seed in range(40)]
+    assert sum(bool(each.alarms) for each in alone) <= 5
+    assert sum(bool(_of_two(seed).alarms) for seed in range(40)) <= 4
+
+
+def test_errors_told_worse_than_others_are_not_taken_for_less_where_days_go_on() -> None:
+    """Of what goes on by 0.9 a flight with errors twelve times as large had a tenth of its own."""
+    rng, days = np.random.default_rng(4), np.zeros((6, 20))
+    for day in range(20):
+        days[:, day] = 0.9 * days[:, max(day - 1, 0)] + 0.44 * rng.normal(size=6)
+    errors = 0.2 * np.where(np.arange(6) == 5, 12.0, 1.0)[:, None] * np.ones((6, 20))
+    values = 10.0 + days + 0.2 * rng.normal(size=(6, 20))
+    data = FlightEstimates.of(
+        ["Lp"],
+        np.repeat([*"abcdef"], 20).tolist(),
+        values.reshape(-1, 1),
+        (errors**2).reshape(-1, 1, 1),
+        time_s=np.tile(10.0 * DAY_S * np.arange(20.0), 6),
+    )
+    found = find_drift(data)
+    assert found.persistent["Lp"].share >= 0.6
+    least = {each.vehicle: each.least_step for each in found.histories}
+    assert least["f"] is not None
+    # Steps of independent errors of 24 %, four of five at the level of one in six.
+    assert (least["f"].value or 0.0) > 45.0

@@ -142,8 +142,32 @@ def _asked_history(
     )
 
 
+def persisting_together(
+    asked: Sequence[Sequence[AskedHistory]],
+) -> list[tuple[Persistence | None, list[AskedHistory]]]:
+    """`beside_persistence` of all parameters of one model, each suspected where another's goes on.
+
+    Parameters
+    ----------
+    asked : sequence of sequence of AskedHistory
+        By parameter.
+
+    Returns
+    -------
+    list of (Persistence or None, list of AskedHistory)
+        By parameter.
+    """
+    apart = [beside_persistence(each) for each in asked]
+    if not any(found is not None and found.is_sure for found, _ in apart):
+        return apart
+    return [
+        beside_persistence(each, suspected=True) if found[0] is None else found
+        for each, found in zip(asked, apart, strict=True)
+    ]
+
+
 def beside_persistence(
-    asked: Sequence[AskedHistory],
+    asked: Sequence[AskedHistory], *, suspected: bool = False
 ) -> tuple[Persistence | None, list[AskedHistory]]:
     """Histories of one parameter, by errors that go on where days do.
 
@@ -155,6 +179,9 @@ def beside_persistence(
     ----------
     asked : sequence of AskedHistory
         By independent days.
+    suspected : bool
+        Whether days of another parameter of the same fits go on: air, battery and payload move all.
+        Then these count as going on as far as they may.
 
     Returns
     -------
@@ -165,10 +192,11 @@ def beside_persistence(
     changed = changed_vehicles(asked)
     series = day_series(asked, changed)
     found = persistence(series, changed)
+    is_told = found is not None and (found.is_told or suspected)
     if found is None or not (found.is_told or changed):
         return None, list(asked)
     rivals = [_settled(series, changed, frozenset())]
-    if found.is_told:
+    if is_told:
         rivals.append(_settled(series, changed, changed))
     elif rivals[0].fitness < found.apart + MARGIN:
         return None, list(asked)
@@ -178,6 +206,10 @@ def beside_persistence(
         if own is None or not own.is_told:
             return None, list(asked)
         best = own
+    if best.share == 0.0:
+        return None, list(asked)
+    if is_told:  # As sure as those are that did not change: a step looks like days that go on.
+        best = replace(best, likelier=found.likelier)
     return best, [_persisting(each, best) for each in asked]
 
 

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.fleet.statistics.asked_histories import asked_histories, beside_persistence
+from flightid.fleet.statistics.asked_histories import asked_histories, persisting_together
 from flightid.fleet.statistics.covariates import (
     Covariate,
     design_covariates,
@@ -250,6 +250,8 @@ def find_drift(
     """
     design = design_covariates(covariates or {})
     histories: list[AskedHistory] = []
+    every_asked: list[list[AskedHistory]] = []
+    newest_of: list[tuple[FlightEstimates, int, Array, Array]] = []
     persistent: dict[str, Persistence] = {}
     slopes: dict[str, tuple[Reading, ...]] = {}
     odd: dict[str, int] = {}
@@ -281,10 +283,14 @@ def find_drift(
         moved = every.values[:, i] - data.values[:, i]
         fitted, mine = asked_histories(data, i, design, variances, by_day, events, moved)
         slopes[name] = fitted.effects
-        goes_on, mine = beside_persistence(mine)
+        every_asked.append(mine)
+        newest_of.append((level, i, usual, variances))
+    for name, newest_one, (goes_on, mine) in zip(
+        data.names, newest_of, persisting_together(every_asked), strict=True
+    ):
         if goes_on is not None:
             persistent[name] = goes_on
-        newest += newest_flights(level, i, usual, variances, goes_on)
+        newest += newest_flights(*newest_one, goes_on)
         histories += mine
     return FleetDrift(
         *(judged_histories(histories), repeats, slopes, design.missing, odd, errors),

@@ -118,7 +118,8 @@ def _covariance(variances: Array, time_s: Array, memory: Persistence | None) -> 
     lag = np.abs(np.subtract.outer(day, day))
     apart = (lag > 0) | np.eye(len(day), dtype=bool)
     going_on = np.where(apart, memory.share * memory.typical * memory.correlation**lag, 0.0)
-    return np.asarray(memory.factor * ((1.0 - memory.share) * np.diag(variances) + going_on))
+    around = memory.factor * ((1.0 - memory.share) * np.diag(variances) + going_on)
+    return np.asarray(around + np.diag(np.maximum(variances - np.diag(around), 0.0)))
 
 
 def judged_newest(asked: Sequence[NewestFlight]) -> tuple[NewestFlight, ...]:
