@@ -19,12 +19,12 @@ from flightid.fleet.statistics.drift import FleetDrift, find_drift
 from flightid.fleet.statistics.events import FleetEvent
 from flightid.fleet.statistics.events_of_nobody import events_of_nobody
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
+from flightid.fleet.statistics.moderated_errors import moderated_errors
 from flightid.fleet.statistics.odd_flights import without_odd_flights
 from flightid.fleet.statistics.outliers import FleetOutliers, find_outliers
 from flightid.fleet.statistics.population import Population, estimate_population
 from flightid.fleet.statistics.spread_search import FEWEST
 from flightid.frozen import dataclass
-from flightid.uncertainty.quantiles import LEVEL, half_width
 
 Row = Mapping[str, Any]
 Rows = Mapping[str, Sequence[Row]]
@@ -197,15 +197,19 @@ def _estimates(rows: Sequence[Row], covariances: Sequence[Row]) -> FlightEstimat
     logs = list(heads)
     units = {each["name"]: each["unit"] or "1" for each in rows}
     values, known = np.zeros((len(logs), len(names))), np.zeros((len(logs), len(names)), dtype=bool)
+    errors, freedom = np.ones(values.shape), np.full(values.shape, np.inf)
     matrices = np.zeros((len(logs), len(names), len(names)))
     place = {log: n for n, log in enumerate(logs)}
     columns = {name: i for i, name in enumerate(names)}
     for each in rows:
         n, i = place[each["log"]], columns[each["name"]]
         values[n, i], known[n, i] = each["value"], True
-        # As `Fit.carried`: what Student's distribution adds to a 95 % interval.
-        wider = half_width(LEVEL, each.get("freedom")) / half_width(LEVEL)
-        matrices[n, i, i] = (wider * each["stderr"]) ** 2
+        errors[n, i] = each["stderr"]
+        if each.get("freedom") is not None:
+            freedom[n, i] = each["freedom"]
+    for i in range(len(names)):
+        told = known[:, i]
+        matrices[told, i, i] = moderated_errors(errors[told, i], freedom[told, i]) ** 2
     for each in covariances:
         if each["log"] in place:
             _set_covariance(matrices[place[each["log"]]], each, columns)
