@@ -25,6 +25,7 @@ from flightid.fleet.statistics.largest_step import (
     largest_step_limit,
     scan_steps,
 )
+from flightid.fleet.statistics.least_step import LOST, POWER, largest_step_bound, least_step
 from flightid.fleet.statistics.local_level import follow_level
 from flightid.fleet.statistics.multiple_testing import corrected
 from flightid.fleet.statistics.parameter_history import ParameterHistory
@@ -62,6 +63,50 @@ def test_chances_of_unequal_errors_are_even_and_bounded_in_the_tail() -> None:
     correlations = scan_steps(np.zeros(30), covariance).correlations
     near, far = (largest_step_chance(s, correlations) for s in (63.9, 64.1))
     assert 0.3 < far / near * np.exp(0.1) < 3.0  # exact below 8 standard errors, a bound above
+
+
+@pytest.mark.parametrize("freedom", [np.inf, 6.0])
+def test_four_of_five_steps_of_the_least_size_are_seen(freedom: float) -> None:
+    """At any place of 14 flights with errors of 1 to 4, at the level of one of twenty histories."""
+    rng, n, level = np.random.default_rng(3), 14, 0.05 / 40.0
+    errors = rng.uniform(1.0, 4.0, n)
+    scan = replace(scan_steps(np.zeros(n), np.diag(errors**2)), freedom=freedom)
+    bound = largest_step_bound(scan.correlations, level)
+    assert 0.9 * level <= largest_step_chance(bound**2, scan.correlations) <= level
+    size, found = least_step(scan, level) / LOST, []
+    for place in np.tile(scan.places, 60):
+        scale = 1.0 if np.isinf(freedom) else np.sqrt(freedom / rng.chisquare(freedom))
+        values = errors * rng.normal(size=n) + size * (np.arange(n) > place)
+        drawn = scan_steps(scale * values, np.diag(errors**2))
+        found.append(replace(drawn, freedom=freedom).chance <= level)
+    # A step shows at places beside its own as well.
+    assert POWER - 0.05 <= np.mean(found) <= POWER + 0.09
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("vehicles", "n"), [(6, 12), (10, 24)])
+def test_the_least_step_that_is_told_is_found_in_fleets(vehicles: int, n: int) -> None:
+    found = []
+    for seed in range(40):
+        drawn = [np.random.default_rng((vehicles, seed, k)) for k in range(2)]
+        values = [10.0 + 0.3 * rng.normal(size=(vehicles, n)) for rng in drawn]
+        told = find_drift(_of_rows(values[0])).histories[0]
+        assert told.least_step is not None
+        values[1][0, drawn[1].integers(3, n - 2) :] += 0.1 * (told.least_step.value or 0.0)
+        found.append(find_drift(_of_rows(values[1])).histories[0].is_alarm)
+    assert 0.7 <= np.mean(found) <= 0.95
+
+
+def _of_rows(values: np.ndarray) -> FlightEstimates:
+    """A row a vehicle, a flight every third day, errors of 0.3."""
+    vehicles, n = values.shape
+    return FlightEstimates.of(
+        ["gain"],
+        np.repeat([f"{i:03}" for i in range(vehicles)], n).tolist(),
+        values.reshape(-1, 1),
+        np.full((vehicles * n, 1, 1), 0.09),
+        time_s=np.tile(3.0 * DAY_S * np.arange(n), vehicles),
+    )
 
 
 def test_the_filter_is_the_regression_that_it_stands_for() -> None:

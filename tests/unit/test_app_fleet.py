@@ -48,7 +48,7 @@ def test_the_page_says_of_a_fleet_what_its_report_says(tmp_path: Path) -> None:
     row = dict(zip(kind.tables[0].columns, kind.tables[0].rows[1], strict=True))
     assert (row["next vehicle low"], row["next vehicle high"]) == (low, high)
     assert (row["parameter"], row["symbol"]) == ("roll control power", "Ltphi")
-    *_, changes, events = kind.tables
+    *_, changes, events, _ = kind.tables
     assert {each[1] for each in changes.rows} <= set(kind.labels.values())
     assert ("new motor", "v02") in {(each[0], each[1]) for each in events.rows}
     drift = answers.types[0].drift

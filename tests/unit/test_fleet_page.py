@@ -60,7 +60,11 @@ def test_each_vehicle_has_the_light_that_its_truth_asks_for(answers: FleetAnswer
     assert "roll damping normal" in lights["v01"].message
     # What was told is no reason to look: README's fleet was red for a new motor.
     assert lights["v02"].message.startswith("v02: roll control power changed by +")
-    assert " at the event “motor replaced”; beyond that no change, like" in lights["v02"].message
+    assert re.search(
+        r" at the event “motor replaced”; beyond that no change \(80 % of such steps would be "
+        r"found: roll damping \d+ %, roll control power \d+(\.\d)? %\), like its type$",
+        lights["v02"].message,
+    )
     sound = [each for name, each in lights.items() if name not in ("v00", "v01")]
     assert all(each.light is Light.GREEN for each in sound), sound
     # The worst first, and of one light the least likely.
@@ -95,6 +99,32 @@ def test_a_parameter_that_never_scatters_and_an_event_of_nobody_are_told() -> No
     (unknown,) = [each for each in document.findings if each.code == "event-of-nobody"]
     assert unknown.light is Light.AMBER
     assert "“new arms” is of v2, of which no flight with a model is known" in unknown.message
+
+
+def test_a_parameter_that_was_never_judged_is_named_and_not_green() -> None:
+    """Five flights of 24 told it: green, "no change"; and what would have shown was not said."""
+    rows = fleet_rows(3, 4)
+    few = {each["log"] for each in rows["logs"] if each["vehicle"] == "v03"}
+    few = {log for n, log in enumerate(sorted(few)) if n > 4}
+    rows["parameters"] = [
+        each for each in rows["parameters"] if each["name"] != "Lp" or each["log"] not in few
+    ]
+    for each in rows["parameters"]:
+        if each["vehicle"] == "v02":
+            each["stderr"] *= 12.0
+    found = answer_questions(rows, covariates=["battery"])
+    lights = fleet_vehicles(found)
+    assert lights["v03"].light is Light.UNKNOWN
+    assert "whether roll damping changed (5 flights tell it, 6 are needed)" in (
+        lights["v03"].message
+    )
+    assert re.search(r"found: roll control power [\d.]+ %\)", lights["v03"].message)
+    # Errors of which no step that leaves anything would stand out answer nothing either.
+    assert lights["v02"].light is Light.UNKNOWN
+    assert re.search(r"roll damping changed \(only steps above \d+ %", lights["v02"].message)
+    tables = [b for s in fleet_document(found).sections for b in s.blocks if hasattr(b, "table")]
+    (least,) = [b.table for b in tables if b.table.title == "What would have been seen"]
+    assert "v03" in {row[0] for row in least.rows}
 
 
 def test_few_vehicles_that_all_moved_alike_are_amber() -> None:
@@ -173,7 +203,8 @@ def test_a_long_history_without_a_type_is_no_green_light() -> None:
     found = fleet_document(answer_questions(some)).findings
     (first, _) = [each for each in found if each.code == "vehicle"]
     assert first.light is Light.UNKNOWN
-    assert first.message.startswith("v03: no change; cannot tell whether it is like its type (")
+    assert first.message.startswith("v03: no change (80 % of such steps would be found: roll")
+    assert "%); cannot tell whether it is like its type (" in first.message
 
 
 def test_the_correlation_of_a_fit_is_carried_on(answers: FleetAnswers) -> None:

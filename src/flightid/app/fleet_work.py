@@ -35,6 +35,7 @@ from flightid.fleet.page import (
     events_table,
     fleet_vehicles,
     fleet_words,
+    least_steps_table,
     lights_counted,
     odd_words,
     red_words,
@@ -184,6 +185,7 @@ def _type(each: TypeAnswers) -> FleetType:
         tables.append(slopes_table(each.drift, each.labels))
         tables.append(each.drift.summary(labels=each.labels))
         tables.append(events_table(each.drift, each.labels))
+        tables.append(least_steps_table(each.drift, each.labels))
         reasons += [each.drift.reason] if each.drift.reason else []
     return FleetType(
         name=each.type_name, model=each.model, reasons=reasons,

@@ -1,17 +1,25 @@
 """The light of a vehicle of which no alarm was raised: green only where both questions were judged.
 
-A question that was not asked, or that the data could not answer, is no answer of "no".
+A question that was not asked, or that the data could not answer, is no answer of "no"; and "no
+change" says which one would have been found.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 from flightid.conventions import Light
 from flightid.findings import Finding, counted
 from flightid.fleet.statistics.answers import UNDATED, TypeAnswers
 from flightid.fleet.statistics.largest_step import FEWEST
+from flightid.fleet.statistics.least_step import POWER
+from flightid.fleet.statistics.parameter_history import ParameterHistory
+from flightid.uncertainty.estimate import Reading
 
+WHOLE = 100.0
+"""Percent of a level: where no smaller step would be found, nothing is said of change."""
+NAMED = 4
+"""Parameters whose least step stands in a line; of more the smallest and the largest."""
 MORE = "log more flights of it, and of more vehicles of its type"
 
 
@@ -27,21 +35,22 @@ def quiet_light(vehicle: str, types: Iterable[TypeAnswers]) -> Finding:
     Returns
     -------
     Finding
-        Green where every model of it was held beside its history and its type; unknown, with the
-        reason, where a question that was asked has no answer.
+        Green where every parameter of it was held beside its history and its type; unknown, with
+        the reason, where a question that was asked has no answer.
     """
     mine = [each for each in types if vehicle in each.data.members]
     known, open_ = [], []
-    for words, question, reasons in (
-        ("no change", "whether it changed", [_no_history(vehicle, each) for each in mine]),
-        ("like its type", "whether it is like its type", [_no_type(vehicle, e) for e in mine]),
-    ):
-        asked = [each for each in reasons if each is not None]
-        missing = list(dict.fromkeys(each for each in asked if each))
-        if missing:
-            open_.append(f"cannot tell {question} ({'; '.join(missing)})")
-        elif asked:
-            known.append(words)
+    seen = [(h, each) for each in mine for h in _judged(vehicle, each) if _is_seen(h)]
+    if seen:
+        known.append(f"no change{_seen_words(seen)}")
+    for each in mine:
+        open_ += [f"cannot tell {why}" for why in _unjudged(vehicle, each)]
+    reasons = [_no_type(vehicle, each) for each in mine]
+    missing = list(dict.fromkeys(each for each in reasons if each))
+    if missing:
+        open_.append(f"cannot tell whether it is like its type ({'; '.join(missing)})")
+    elif any(each is not None for each in reasons):
+        known.append("like its type")
     if open_:
         said = "; ".join([*known, *open_])
         return Finding("vehicle", Light.UNKNOWN, f"{vehicle}: {said}", MORE)
@@ -50,14 +59,67 @@ def quiet_light(vehicle: str, types: Iterable[TypeAnswers]) -> Finding:
     return Finding("vehicle", Light.GREEN, f"{vehicle}: {', '.join(known)}")
 
 
-def _no_history(vehicle: str, each: TypeAnswers) -> str | None:
-    """Why a history was not judged; empty where it was, None where nobody asked."""
-    if each.drift is None:
-        return "its flights have no date" if UNDATED in each.reasons else None
-    own = [one for one in each.drift.histories if one.vehicle == vehicle]
-    if any(one.false_share is not None for one in own):
+def _judged(vehicle: str, each: TypeAnswers) -> list[ParameterHistory]:
+    """Histories of a vehicle that were asked whether it changed."""
+    histories = () if each.drift is None else each.drift.histories
+    return [one for one in histories if one.vehicle == vehicle and one.false_share is not None]
+
+
+def _is_seen(history: ParameterHistory) -> bool:
+    """Whether any step that leaves something of the parameter would be found."""
+    least = history.least_step
+    return least is None or least.unit != "%" or (least.value or 0.0) < WHOLE
+
+
+def _seen_words(seen: Sequence[tuple[ParameterHistory, TypeAnswers]]) -> str:
+    """The step of which most would have been found, by parameter."""
+    told = [(h.least_step, of.labels.get(h.name, h.name)) for h, of in seen if h.least_step]
+    if not told:
         return ""
-    return _too_few(vehicle, each, max((len(one.values) for one in own), default=0))
+    sizes = [(each.value or 0.0, f"{name} {_size(each)}") for each, name in told]
+    said = [words for _, words in sizes]
+    if len(said) > NAMED:
+        said = [f"from {min(sizes)[1]} to {max(sizes)[1]}"]
+    return f" ({100.0 * POWER:.0f} % of such steps would be found: {', '.join(said)})"
+
+
+def _size(least: Reading) -> str:
+    unit = "" if least.unit == "1" else f" {least.unit}"
+    return f"{least.value:.2g}{unit}"
+
+
+def _unjudged(vehicle: str, each: TypeAnswers) -> Iterator[str]:
+    """What of its changes was asked and not judged, with the reason."""
+    if each.drift is None:
+        if UNDATED in each.reasons:
+            yield "whether it changed (its flights have no date)"
+        return
+    own = [one for one in each.drift.histories if one.vehicle == vehicle]
+    judged = _judged(vehicle, each)
+    if not judged:
+        most = max((len(one.values) for one in own), default=0)
+        yield f"whether it changed ({_too_few(vehicle, each, most)})"
+        return
+    flights = {one.name: len(one.values) for one in own}
+    asked = {one.name for one in each.drift.histories if one.false_share is not None}
+    missing = [name for name in each.data.names if name in asked | flights.keys()]
+    for name in missing:
+        if name not in {one.name for one in judged}:
+            label, few = each.labels.get(name, name), flights.get(name, 0)
+            yield f"whether {label} changed ({_too_few_of(few)})"
+    for one in judged:
+        if not _is_seen(one) and one.least_step is not None:
+            label = each.labels.get(one.name, one.name)
+            yield f"whether {label} changed (only steps above {_size(one.least_step)} would show)"
+
+
+def _too_few_of(told: int) -> str:
+    """How many flights tell a parameter, and how many are needed."""
+    if told >= FEWEST:
+        return f"fewer than {FEWEST} flights that count beside its events"
+    verb = "tells" if told == 1 else "tell"
+    said = f"{counted(told, 'flight')} {verb}" if told else "no flight tells"
+    return f"{said} it, {FEWEST} are needed"
 
 
 def _too_few(vehicle: str, each: TypeAnswers, told: int) -> str:

@@ -18,6 +18,7 @@ from flightid.fleet.pictures import history_picture, type_picture
 from flightid.fleet.reasons import grouped_reasons, reasons_table
 from flightid.fleet.statistics.answers import RED, FleetAnswers, Row, TypeAnswers, fitted_share
 from flightid.fleet.statistics.drift import FleetDrift
+from flightid.fleet.statistics.least_step import POWER
 from flightid.fleet.statistics.multiple_testing import chance_cell
 from flightid.fleet.taken import copies_named
 from flightid.fleet.unnamed import unnamed_light, unnamed_logs
@@ -229,6 +230,9 @@ def _drift_blocks(drift: FleetDrift, labels: Mapping[str, str]) -> Iterator[Bloc
     events = events_table(drift, labels)
     if events.rows:
         yield TableBlock(events)
+    least = least_steps_table(drift, labels)
+    if least.rows:
+        yield TableBlock(least, folded=True)
     if drift.judged:
         caption = (
             "Estimates of flights with their intervals, what covariates explain taken out; the "
@@ -289,6 +293,29 @@ def events_table(drift: FleetDrift, labels: Mapping[str, str]) -> Table:
     left = len(happened) - len(rows)
     notes = (f"The least likely first; {left} more are not shown.",) if left else ()
     return Table("Events", columns, tuple(rows), notes).without_empty_columns()
+
+
+def least_steps_table(drift: FleetDrift, labels: Mapping[str, str]) -> Table:
+    """What "no change" was able to see, the largest first; no rows where nothing was judged."""
+    told = [(e, e.least_step) for e in drift.judged if e.least_step and not e.is_alarm]
+    told.sort(key=lambda pair: pair[1].value or 0.0, reverse=True)
+    rows: list[tuple[Cell, ...]] = [
+        *(
+            (e.vehicle, labels.get(e.name, e.name), len(e.values), least.value, least.unit)
+            for e, least in told[:NAMED]
+        )
+    ]
+    columns = (
+        *(Column("vehicle"), Column("parameter"), Column("flights")),
+        *(Column("least step", digits=2), Column("unit")),
+    )
+    note = (
+        f"Of lasting steps of this size, at any flight, {100.0 * POWER:.0f} % would be found, at "
+        "the level of the whole fleet; smaller ones may be there."
+    )
+    left = len(told) - len(rows)
+    notes = (note, *((f"The largest first; {left} more are not shown.",) if left else ()))
+    return Table("What would have been seen", columns, tuple(rows), notes)
 
 
 def _refused(answers: FleetAnswers) -> Iterator[Block]:

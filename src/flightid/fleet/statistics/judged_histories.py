@@ -9,10 +9,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.fleet.statistics.change_kind import DRIFT, STEP, change_kind
-from flightid.fleet.statistics.largest_step import SHORTEST, scan_changes, scan_drifts
-from flightid.fleet.statistics.multiple_testing import corrected
-from flightid.fleet.statistics.parameter_history import AskedHistory, ParameterHistory, StepEnds
-from flightid.uncertainty.estimate import Estimate
+from flightid.fleet.statistics.largest_step import (
+    SHORTEST,
+    scan_changes,
+    scan_drifts,
+    scan_steps,
+)
+from flightid.fleet.statistics.least_step import least_step
+from flightid.fleet.statistics.multiple_testing import FALSE_SHARE, corrected
+from flightid.fleet.statistics.parameter_history import (
+    TESTS,
+    AskedHistory,
+    ParameterHistory,
+    StepEnds,
+)
+from flightid.uncertainty.estimate import Estimate, Reading
 
 Array = NDArray[np.float64]
 
@@ -24,13 +35,40 @@ def judged_histories(asked: Sequence[AskedHistory]) -> tuple[ParameterHistory, .
     apart = _shares([
         each.chance if each.apart_chance is None else each.apart_chance for each in histories
     ])  # fmt: skip
+    alarms, every = _counts(shares)
     judged = (
-        replace(each, false_share=share, apart_share=None if each.apart_chance is None else beside)
-        for each, share, beside in zip(histories, shares, apart, strict=True)
+        replace(
+            each,
+            false_share=share,
+            apart_share=None if each.apart_chance is None else beside,
+            least_step=_least_step(of, alarms, every),
+        )
+        for each, of, share, beside in zip(histories, asked, shares, apart, strict=True)
     )
     return tuple(
         _named(each, of) if each.is_alarm else each for each, of in zip(judged, asked, strict=True)
     )
+
+
+def _counts(shares: Sequence[float | None]) -> tuple[int, int]:
+    """Alarms, and histories that were asked."""
+    asked = [share for share in shares if share is not None]
+    return sum(share <= FALSE_SHARE for share in asked), len(asked)
+
+
+def _least_step(of: AskedHistory, alarms: int, every: int) -> Reading | None:
+    """Of a history that was asked, at the level at which one more of the fleet is an alarm."""
+    history = of.history
+    if history.chance is None:
+        return None
+    scan = replace(scan_steps(of.values, of.covariance, of.known), freedom=of.freedom)
+    # Benjamini and Hochberg's for the next one, or for this one among those that are.
+    rank = max(alarms + (history.chance > FALSE_SHARE * alarms / every), 1)
+    size = least_step(scan, FALSE_SHARE * rank / (every * TESTS))
+    if history.change_percent.value is None:
+        return Estimate(history.name, size, history.unit)
+    level = np.average(of.values, weights=1.0 / history.variances)
+    return Estimate(history.name, 100.0 * size / abs(float(level)), "%")
 
 
 def _shares(chances: Sequence[float | None]) -> list[float | None]:

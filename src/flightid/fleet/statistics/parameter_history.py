@@ -62,6 +62,9 @@ class ParameterHistory:
         Of each event, and of those together between which few flights lie.
     kind : str
         Of an alarm: ``"a step"``, ``"drift"``, or ``"changed"`` where its flights do not tell.
+    least_step : Estimate or None
+        The step of which four of five would be an alarm, at any place: percent of the level, or in
+        the parameter's unit where that may be zero. None with too few flights.
     apart_chance, apart_share : float or None
         As `chance` and `false_share` were days independent, where they go on (`persistence`).
     """
@@ -80,6 +83,7 @@ class ParameterHistory:
     false_share: float | None = None
     events: tuple[EventEffect, ...] = ()
     kind: str = ""
+    least_step: Reading | None = None
     apart_chance: float | None = None
     apart_share: float | None = None
 
