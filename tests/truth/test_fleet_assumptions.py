@@ -16,6 +16,7 @@ from flightid.fleet.statistics.flight_estimates import FlightEstimates
 from flightid.fleet.statistics.odd_flights import without_odd_flights
 from flightid.fleet.statistics.population import estimate_population
 from flightid.fleet.statistics.repeats import days_of
+from flightid.fleet.statistics.shared_level import shared_level
 from flightid.fleet.vehicle_lights import going_on_words
 
 DAY_S = 86400.0
@@ -143,6 +144,27 @@ def test_a_change_of_all_is_said_and_is_no_vehicles_own() -> None:
     stepped = _drift(7, 4, 20, change=-0.15, changed=3, last=8)
     assert _alarmed(stepped) == {0, 1, 2}
     assert not stepped.alike
+
+
+def test_a_week_begins_with_its_first_flight() -> None:
+    """By the calendar a round of flights lay in two weeks: of five vehicles no season came off."""
+    rng, (k, n) = np.random.default_rng(2), (12, 14)
+    days = 10.0 * np.arange(n) + 0.3 * np.arange(k)[:, None]
+    values = 10.0 * (
+        1.0 + 0.06 * np.sin(2.0 * np.pi * days / 180.0) + 0.01 * rng.normal(size=(k, n))
+    )
+    data = FlightEstimates.of(
+        ["Lp"],
+        np.repeat([f"{i:02}" for i in range(k)], n).tolist(),
+        values.reshape(-1, 1),
+        np.full((k * n, 1, 1), 0.01),
+        time_s=DAY_S * days.reshape(-1),
+    )
+    found = shared_level(data, 0)
+    assert found is not None
+    left = (values.reshape(-1) - found.moved).reshape(k, n)
+    assert np.all(found.moved != 0.0)
+    assert np.max(np.std(left, axis=1)) < 0.2
 
 
 def test_few_flights_tell_that_their_errors_are_understated() -> None:

@@ -122,7 +122,7 @@ def shared_level(data: FlightEstimates, i: int) -> SharedLevel | None:
     if since is None:
         return None
     begun = _first_of(time_s, day)[day]  # A day is of one week, whatever clock it is told by.
-    _, bins = np.unique(2 * np.floor(begun / WEEK_S) + (begun >= since), return_inverse=True)
+    bins = _weeks(begun, since)
     level, variance, counts = _levels(residual, member, bins)
     if np.count_nonzero(counts) < 2:
         return None
@@ -176,6 +176,21 @@ def _first_of(time_s: Array, day: Places) -> Array:
     first = np.full(int(day.max()) + 1, np.inf)
     np.minimum.at(first, day, time_s)
     return first
+
+
+def _weeks(begun: Array, since: float) -> Places:
+    """Number of the week of each flight, by the beginning of its day; weeks end at an instant too.
+
+    A week is of the days up to seven from its first: by the calendar those of one round of flights
+    may lie in two, and too few vehicles in one of them.
+    """
+    starts, place = np.unique(begun, return_inverse=True)
+    week, number, first = np.zeros(len(starts), dtype=np.intp), -1, -np.inf
+    for k, start in enumerate(starts):
+        if start - first >= WEEK_S or first < since <= start:
+            number, first = number + 1, start
+        week[k] = number
+    return np.asarray(week[place], dtype=np.intp)
 
 
 def _common_step(residual: Array, member: Places, time_s: Array, day: Places) -> float | None:
