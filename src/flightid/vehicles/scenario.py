@@ -183,7 +183,7 @@ def _flown(
         return (), stick_moves(largest, seed=seed)
     if stick_rad is not None:
         raise OptionError(
-            "sweeps are flown without sticks", found=f"stick_rad={stick_rad:g}",
+            "sweeps are flown without sticks", found=f"sticks of {stick_rad:g} rad",
             needed="the scenario sticks",
         )  # fmt: skip
     runs = advised_runs() if scenario == "advised" else published_runs()
