@@ -168,7 +168,7 @@ def test_an_event_is_added_to_the_fleet_file_and_asked_about(tmp_path: Path) -> 
     told = add(date="2026-02-01", what=said, vehicle="v00")
     assert [(e.what, e.vehicle) for e in told.events] == [(said, "v00"), ("new motor", "v02")]
     assert "# kept" in told.text
-    *_, events = FleetPart(**fleet_work.answer_fleet(path)).types[0].tables
+    *_, events, _ = FleetPart(**fleet_work.answer_fleet(path)).types[0].tables
     assert (said, "v00") in {(row[0], row[1]) for row in events.rows}
     kept = path.read_bytes()
     with pytest.raises(StudyError, match="already"):

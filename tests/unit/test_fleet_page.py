@@ -111,7 +111,7 @@ def test_a_parameter_that_was_never_judged_is_named_and_not_green() -> None:
     ]
     for each in rows["parameters"]:
         if each["vehicle"] == "v02":
-            each["stderr"] *= 12.0
+            each["stderr"] *= 9.0
     found = answer_questions(rows, covariates=["battery"])
     lights = fleet_vehicles(found)
     assert lights["v03"].light is Light.UNKNOWN
