@@ -208,9 +208,17 @@ def test_a_gust_felt_as_the_velocity_is_found_and_unbends_its_derivatives() -> N
     assert_close(gust["deviation"], 1.0, rtol=0.15, why="60 s of a gust of 1 m/s")
     assert fit.records[0].states["gust"].shape == (record.n_samples,)
     assert white.provenance["gust"] is None
+    assert not any(each.code == "gust-beyond-severe" for each in fit.findings)
     tests = fid.residual_tests(fit)
     assert tests.horizon == "one step ahead"
     assert all(test.counts for test in tests.tests)
+
+
+def test_a_gust_beyond_severe_turbulence_is_red() -> None:
+    fit = fid.identify(gusts.model(), gusts.flight(3, 12.0, 0.5, 20.0), method="filter_error")
+    (said,) = (each for each in fit.findings if each.code == "gust-beyond-severe")
+    assert str(said.light) == "red"
+    assert "calls severe is 7.19 m/s" in said.message
 
 
 def _led_astray(scored: Score) -> Score:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,7 @@ from flightid.identification.filter_error.extended_kalman import (
     has_free_constants,
     sizes_of_states,
 )
+from flightid.identification.filter_error.gust_severity import judge_gust
 from flightid.identification.filter_error.gusts import GUST, GUST_UNKNOWNS, Gust
 from flightid.identification.filter_error.innovation_covariance import innovation_covariance
 from flightid.identification.filter_error.innovations import (
@@ -74,7 +76,7 @@ class _AbsoluteNoise:
     process: Mapping[str, float]
     measurement: Array
     innovation: Array
-    gust: Mapping[str, object] | None
+    gust: Mapping[str, Any] | None
 
 
 def fit_filter_error(
@@ -131,7 +133,11 @@ def fit_filter_error(
         records,
         _fitted_records(problem, records, filtered),
         options,
-        findings=[*_judge(problem, bounded), *tests.findings(biased=False, action=MISSING)],
+        findings=[
+            *_judge(problem, bounded),
+            *_gust_findings(model, noise.gust, records),
+            *tests.findings(biased=False, action=MISSING),
+        ],
         extra={
             "process_noise": dict(noise.process),
             "innovation_covariance": noise.innovation.tolist(),
@@ -244,7 +250,7 @@ def _noises(
 
 def _described(
     problem: InnovationsProblem, gust: Gust, unknowns: Array, common: float
-) -> dict[str, object]:
+) -> dict[str, Any]:
     deviation, time_s = gust.size(unknowns[-GUST_UNKNOWNS:])
     names = list(problem.model.outputs)
     return {
@@ -307,6 +313,16 @@ def _own(
         name: Estimate(name, value, units[name], None, reason, status="free")
         for name, value in zip(names, values, strict=False)
     }
+
+
+def _gust_findings(
+    model: StateSpaceModel, gust: Mapping[str, Any] | None, records: Sequence[Record]
+) -> list[Finding]:
+    if gust is None:
+        return []
+    longest_s = max(record.duration_s for record in records)
+    state = gust["state"]
+    return judge_gust(state, model.states[state], gust["deviation"], gust["time_s"], longest_s)
 
 
 def _judge(problem: InnovationsProblem, bounded: NDArray[np.bool_]) -> list[Finding]:
