@@ -6,10 +6,16 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+import scipy
 
 import flightid as fid
+from flightid.identification.frequency_domain import without_bias
+from flightid.identification.frequency_domain.bias_objective import Objective
+from flightid.identification.frequency_domain.bias_search import SearchOutcome, search
 from flightid.identification.frequency_domain.model_residuals import ModelResiduals
 from flightid.responses.windows.transform import FoldedBasis
+
+MEASURED = {"u": "m/s", "q": "rad/s", "v": "m/s", "p": "rad/s"}
 
 
 def test_a_model_whose_input_the_response_lacks_is_not_corrected() -> None:
@@ -43,16 +49,24 @@ def test_a_model_whose_input_the_response_lacks_is_not_corrected() -> None:
     assert all(each.interval95 is None for each in fit.parameters.values())
 
 
-def test_a_fit_makes_each_basis_and_follows_each_model_once(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    model = fid.load_model("rate_first_order")
+def swept() -> fid.FrequencyResponse:
+    """A sweep of a first-order rate, with a noisy gyro."""
     made = fid.excitation.sweep(
         band_rad_s=(1.0, 20.0), amplitude=0.1, duration_s=40.0, sample_rate_hz=50.0, name="tau_phi"
     )
-    sticks = fid.Record.from_excitation(made)
-    flown = fid.simulate(model, sticks, units={"p": "rad/s"}, noise=fid.Noise(sensor={"p": 0.05}))
-    response = fid.estimate_response(flown, band_rad_s=(1.5, 15.0), n_omega=30)
+    flown = fid.simulate(
+        fid.load_model("rate_first_order"),
+        fid.Record.from_excitation(made),
+        units={"p": "rad/s"},
+        noise=fid.Noise(sensor={"p": 0.05}),
+    )
+    return fid.estimate_response(flown, band_rad_s=(1.5, 15.0), n_omega=30)
+
+
+def test_a_fit_makes_each_basis_and_follows_each_model_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    model, response = fid.load_model("rate_first_order"), swept()
     bases: list[tuple[object, ...]] = []
     followed: list[tuple[ModelResiduals, list[float | None]]] = []
     make, follow = FoldedBasis.of, ModelResiduals._follow
@@ -70,3 +84,75 @@ def test_a_fit_makes_each_basis_and_follows_each_model_once(
     fid.identify(model, response)
     assert len(bases) == len(set(bases)) > 1
     assert not any(one[0] is other[0] and one[1] == other[1] for one, other in pairwise(followed))
+
+
+def hovering() -> fid.StateSpaceModel:
+    """Pitch and roll of a hovering vehicle, each with a slow mode that grows, and coupled."""
+    free = {"Mu": 0.004, "Mv": 0.003, "Lv": -0.03, "Lu": 0.004, "Mq": -1.2, "Lp": -3.0}
+    known = {"Xu": -0.02, "Yv": -0.05, "g": 9.8, "Mlon": 3.0, "Llat": 6.0}
+    units = {"Mq": "1/s", "Lp": "1/s", "Xu": "1/s", "Yv": "1/s", "g": "m/s^2"}
+    units |= {"Mlon": "1/s^2", "Llat": "1/s^2"}
+    return fid.StateSpaceModel(
+        states={**MEASURED, "theta": "rad", "phi": "rad"},
+        input_units={"lon": "rad", "lat": "rad"},
+        measurements={n: fid.Output(n, u) for n, u in MEASURED.items()},
+        equations={
+            "u'": "Xu*u - g*theta",
+            "v'": "Yv*v + g*phi",
+            "q'": "Mu*u + Mv*v + Mq*q + Mlon*lon",
+            "p'": "Lu*u + Lv*v + Lp*p + Llat*lat",
+            "theta'": "q",
+            "phi'": "p",
+        },
+        parameters=fid.Parameters(
+            [
+                fid.Parameter(name, value, units.get(name, "rad/m/s"), free=name in free)
+                for name, value in {**free, **known}.items()
+            ]
+        ),
+        name="hover",
+    )
+
+
+def test_slopes_of_what_a_growing_model_leaves_are_its_differences() -> None:
+    """Of outputs that no model explains: weights and bases of unknown motion move with it too."""
+    rng, n = np.random.default_rng(2), 600
+    noise = scipy.signal.lfilter([0.05], [1.0, -0.95], rng.standard_normal((6, n)), axis=1)
+    record = fid.Record.from_arrays(
+        np.arange(n) / 10.0,
+        inputs=dict(zip(("lon", "lat"), 0.02 * noise[:2], strict=True)),
+        outputs=dict(zip(MEASURED, noise[2:] * [[20.0], [1.0], [20.0], [1.0]], strict=True)),
+        units={"lon": "rad", "lat": "rad", **MEASURED},
+    )
+    response = fid.estimate_response(record, band_rad_s=(1.0, 5.0), n_omega=5)
+    assert response.linear is not None
+    followed = ModelResiduals(response.linear, response.outputs, "zero")
+    model = hovering()
+    free = [(p.name, p.value or 0.0) for p in model.parameters.free]
+    moved = [(model.with_values({n: v * (1.0 + 1e-5)}), v * 1e-5) for n, v in free]
+    slopes = followed.slopes(model, moved)[0]
+    for (name, value), slope in zip(free, slopes, strict=True):
+        ends = [followed.of(model.with_values({name: value * (1.0 + s)}))[0] for s in (-1e-4, 1e-4)]
+        wanted = (ends[0] - ends[1]) / (2e-4 * value)
+        assert np.linalg.norm(slope - wanted) < 0.01 * np.linalg.norm(wanted), name
+
+
+def test_a_fit_that_cannot_be_followed_begins_from_the_model(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Leakage bends the fit without correction, which may diverge where the model does not."""
+    asked: list[np.ndarray] = []
+
+    def refused_first(objective: Objective, x: np.ndarray) -> SearchOutcome:
+        asked.append(x)
+        if len(asked) == 1:
+            raise fid.errors.DataError("the model cannot be followed over the records")
+        return search(objective, x)
+
+    monkeypatch.setattr(without_bias, "search", refused_first)
+    fit = fid.identify(fid.load_model("rate_first_order"), swept())
+    assert fit.provenance["estimator_bias"]["applied"]
+    assert len(asked) == 2
+    begun = [p.value for p in fid.load_model("rate_first_order").parameters.free]
+    assert asked[1].tolist() == begun
+    assert all(p.stderr for p in fit.parameters.values() if p.status == "free")

@@ -8,6 +8,8 @@ response G(jω) of an unstable model is the transform of this two-sided response
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import scipy
 from numpy.typing import NDArray
@@ -48,11 +50,32 @@ class System:
 
 @dataclass(frozen=True)
 class ModeSubset:
-    """Those modes of a system that are followed in one direction of time."""
+    """Those modes of a system that are followed in one direction of time.
+
+    Attributes
+    ----------
+    matrices : tuple of ndarray
+        A, B, C, D in the states of the subset.
+    delays_s : ndarray
+    backwards : bool
+    basis : ndarray, shape (n_states, n), or None
+        From these states to the system's; None where they are the same.
+    """
 
     matrices: tuple[Array, ...]
     delays_s: Array
     backwards: bool
+    basis: Array | None = None
+
+    def turned(self, other: Array) -> ModeSubset:
+        """The same modes in states whose basis is as near as may be to another one."""
+        if self.basis is None or not self.basis.size:
+            return self
+        turn = np.linalg.lstsq(self.basis, other, rcond=None)[0]
+        back = np.linalg.inv(turn)
+        a, b, c, d = self.matrices
+        turned = back @ a @ turn, back @ b, c @ turn, d
+        return ModeSubset(turned, self.delays_s, self.backwards, self.basis @ turn)
 
 
 def systems_of(model: GreyBoxModel) -> list[System]:
@@ -83,7 +106,9 @@ def systems_of(model: GreyBoxModel) -> list[System]:
     return systems
 
 
-def split_modes(system: System, duration_s: float) -> list[ModeSubset]:
+def split_modes(
+    system: System, duration_s: float, like: Sequence[ModeSubset] = ()
+) -> list[ModeSubset]:
     """Part a system into modes that are followed forwards and modes followed backwards.
 
     Parameters
@@ -91,6 +116,9 @@ def split_modes(system: System, duration_s: float) -> list[ModeSubset]:
     system : System
     duration_s : float
         Length of the record, s.
+    like : sequence of ModeSubset
+        Of a system that is hardly another: modes are parted alike, in bases near its own, so that
+        differences between both are small. An ordered Schur form turns its bases at will.
 
     Returns
     -------
@@ -103,13 +131,11 @@ def split_modes(system: System, duration_s: float) -> list[ModeSubset]:
     Schur form and a Sylvester equation.
     """
     a, b, c, d = system.matrices
-    growth = np.linalg.eigvals(a).real * duration_s
-    if np.max(growth, initial=-np.inf) <= SLOW:
+    rates = np.linalg.eigvals(a).real
+    parting = _parting(rates * duration_s, like)
+    if parting is None:
         return [ModeSubset(system.matrices, system.delays_s, backwards=False)]
-    between = np.sort(growth[(growth > SLOW) & (growth < FAST)])
-    edges = np.concatenate([[SLOW], between, [FAST]])
-    widest = int(np.argmax(np.diff(edges)))
-    parting = 0.5 * (edges[widest] + edges[widest + 1]) / duration_s
+    parting /= duration_s
     triangle, turn, n = scipy.linalg.schur(a, output="real", sort=lambda re, _: re <= parting)
     cross = scipy.linalg.solve_sylvester(triangle[:n, :n], -triangle[n:, n:], -triangle[:n, n:])
     to_modes, from_modes = turn.T.copy(), turn.copy()
@@ -117,10 +143,31 @@ def split_modes(system: System, duration_s: float) -> list[ModeSubset]:
     from_modes[:, n:] += turn[:, :n] @ cross
     slow = (triangle[:n, :n], to_modes[:n] @ b, c @ from_modes[:, :n], d)
     fast = (triangle[n:, n:], to_modes[n:] @ b, c @ from_modes[:, n:], np.zeros_like(d))
-    return [
-        ModeSubset(slow, system.delays_s, backwards=False),
-        ModeSubset(fast, system.delays_s, backwards=True),
+    found = [
+        ModeSubset(slow, system.delays_s, backwards=False, basis=from_modes[:, :n]),
+        ModeSubset(fast, system.delays_s, backwards=True, basis=from_modes[:, n:]),
     ]
+    bases = [each.basis for each in like]
+    return [
+        each if basis is None else each.turned(basis)
+        for each, basis in zip(found, bases or [None, None], strict=True)
+    ]
+
+
+def _parting(growth: Array, like: Sequence[ModeSubset]) -> float | None:
+    """Growth over a record at which modes are parted; None where all are followed forwards."""
+    if like:
+        if len(like) == 1:
+            return None
+        n = len(like[0].matrices[0])
+        ordered = np.concatenate([[-np.inf], np.sort(growth), [np.inf]])
+        return float(0.5 * (ordered[n] + ordered[n + 1]))
+    if np.max(growth, initial=-np.inf) <= SLOW:
+        return None
+    between = np.sort(growth[(growth > SLOW) & (growth < FAST)])
+    edges = np.concatenate([[SLOW], between, [FAST]])
+    widest = int(np.argmax(np.diff(edges)))
+    return float(0.5 * (edges[widest] + edges[widest + 1]))
 
 
 def between_samples(values: Array, hold: str) -> Array:

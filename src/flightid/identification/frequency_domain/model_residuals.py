@@ -11,6 +11,11 @@ from numpy.typing import NDArray
 
 from flightid.errors import DataError
 from flightid.frozen import dataclass
+from flightid.identification.frequency_domain.unknown_motion import (
+    FollowedRun,
+    MotionFitter,
+    UnknownMotion,
+)
 from flightid.models import GreyBoxModel
 from flightid.responses.errors.linear_estimate import LinearEstimate
 from flightid.simulation.model_outputs import (
@@ -29,7 +34,6 @@ LARGEST_RESIDUAL = 10.0
 """Largest residual before a simulation is not believed, in multiples of the measured output's rms
 in the record that moves it most. Where other axes are flown, a loop holds an output well below its
 disturbances and what feeds through, but no model that is right diverges so far."""
-_RANK = 1e-9
 AT_ONCE = 2_000_000
 """Samples of derivatives that are worked on together."""
 TINY = float(np.finfo(float).tiny)
@@ -54,114 +58,7 @@ class _SystemRun:
     places: list[int]
 
 
-@dataclass(frozen=True)
-class _Fitter:
-    """Least squares for unknown motion, with each output's weight.
-
-    Attributes
-    ----------
-    gain : ndarray, shape (n_unknowns, n_outputs, k)
-        From parts inside each output's basis to coefficients.
-    normal : ndarray, shape (n_unknowns, n_unknowns)
-        Inverse of the normal equations.
-    scale : ndarray, shape (n_outputs,)
-        By which outputs were divided.
-    """
-
-    gain: Array
-    normal: Array
-    scale: Array
-
-
-@dataclass(frozen=True)
-class _InitialConditions:
-    """Motion by unknown initial states and trims in each fitted output, ready for least squares.
-
-    Attributes
-    ----------
-    motions : ndarray, shape (n_unknowns, n_outputs, n)
-        Means removed, of length one.
-    lengths : ndarray, shape (n_unknowns,)
-        By which they were divided.
-    bases : ndarray, shape (n_outputs, n, k)
-        Orthonormal in each output.
-    triangles : ndarray, shape (n_outputs, k, n_unknowns)
-        Each output's motion is its basis times its triangle.
-    """
-
-    motions: Array
-    lengths: Array
-    bases: Array
-    triangles: Array
-
-    @classmethod
-    def of(cls, free: Array) -> _InitialConditions:
-        """Of motions, shape (n_unknowns, n_outputs, n)."""
-        free = free - free.mean(axis=2, keepdims=True)
-        lengths = np.maximum(np.linalg.norm(free, axis=(1, 2)), TINY)
-        free = free / lengths[:, None, None]
-        bases, triangles = np.linalg.qr(free.transpose(1, 2, 0))
-        return cls(free, lengths, bases, triangles)
-
-    @cached_property
-    def projections(self) -> Array:
-        """Onto what the unknowns can do to each output by itself, (n_outputs, k, k)."""
-        return np.asarray(self.triangles @ np.linalg.pinv(self.triangles, rcond=_RANK))
-
-    def fitter(self, rest: Array) -> _Fitter:
-        """Least squares of all outputs together.
-
-        Fitted to each output by itself, so many unknowns would take what little a record says of
-        its lowest frequencies with them. Outputs count by what they leave of `rest`, shape
-        (n_outputs, n), in such a fit of their own.
-        """
-        inside = np.einsum("ynk,yn->yk", self.bases, rest, optimize=True)
-        # Each output's own fit, by the same unknowns, is a projection inside its basis.
-        alone = np.einsum("yjk,yk->yj", self.projections, inside)
-        left = rest - np.einsum("ynk,yk->yn", self.bases, alone, optimize=True)
-        scale = np.maximum(np.std(left, axis=1), TINY)
-        stacked = (self.triangles / scale[:, None, None]).reshape(-1, self.triangles.shape[2])
-        inverse = np.linalg.pinv(stacked, rcond=_RANK)
-        gain = inverse.reshape(-1, *self.triangles.shape[:2]) / scale[:, None]
-        return _Fitter(gain, inverse @ inverse.T, scale)
-
-    def coefficients(self, fitter: _Fitter, rest: Array) -> Array:
-        """Of the motions that fit best, shape (…, n_unknowns), for rests of shape (…, n_out, n)."""
-        inside = np.einsum("ynk,...yn->...yk", self.bases, rest, optimize=True)
-        return np.asarray(np.einsum("uyk,...yk->...u", fitter.gain, inside, optimize=True))
-
-    def less(self, fitter: _Fitter, rest: Array) -> Array:
-        """Take these motions out."""
-        moved = np.tensordot(self.coefficients(fitter, rest), self.motions, axes=1)
-        return np.asarray(rest - moved)
-
-
-@dataclass(frozen=True)
-class _FollowedRun:
-    """One record with a model beside it.
-
-    Attributes
-    ----------
-    rest : ndarray, shape (n_out, n)
-        Measured less modelled.
-    driven : ndarray, shape (n_fitted, n)
-        Modelled, without unknown motion.
-    fitter : _Fitter
-    start : ndarray, shape (n_unknowns,)
-        Initial states and trims.
-    """
-
-    rest: Array
-    driven: Array
-    fitter: _Fitter
-    start: Array
-
-    def weighed(self, kept: Places) -> Array:
-        """What is left of the fitted outputs, by the squares of their weights."""
-        return np.asarray(self.rest[kept] / self.fitter.scale[:, None] ** 2)
-
-
-_Followed = tuple[list[_FollowedRun], dict[int, tuple[list[_SystemRun], Array, _InitialConditions]]]
+_Followed = tuple[list[FollowedRun], dict[int, tuple[list[_SystemRun], Array, UnknownMotion]]]
 """Runs beside records, and what they have in common by the length of records."""
 
 
@@ -230,19 +127,27 @@ class ModelResiduals:
         turns = [np.zeros((len(moved), len(each.start))) for each in followed]
         for n, (_, free, unknown) in known.items():
             alike = [place for place, change in enumerate(changes) if change.shape[2] == n]
-            starts = np.array([followed[each].start for each in alike])
-            left = np.array([followed[each].weighed(kept).ravel() for each in alike])
+            runs = [followed[each] for each in alike]
+            starts = np.array([one.start for one in runs])
+            left = np.array([one.weighed(kept).ravel() for one in runs])
+            alone = np.array([one.fitter.left_alone for one in runs]).transpose(1, 0, 2)
+            pulls = [one.pulls(kept, unknown) for one in runs]
             for place, (other, step) in enumerate(moved):
-                motions, beyond = self._motion(other, kept, n)
-                turned = ((beyond - free) / step).reshape(len(free), -1)
-                by_start = (starts @ turned).reshape(len(alike), len(kept), n)
+                motions, beyond = self._motion(other, kept, n, known[n][0])
+                turned = (beyond - free) / step
+                flat = turned.reshape(len(free), -1)
+                by_start = (starts @ flat).reshape(len(alike), len(kept), n)
                 # What is left of the outputs turns with the space that was taken out of them.
-                turning = left @ turned.T / unknown.lengths
-                for each, direct, turn in zip(alike, by_start, turning, strict=True):
+                turning = left @ flat.T / unknown.lengths
+                answered = alone @ turned.transpose(1, 2, 0)
+                for row, (each, one) in enumerate(zip(alike, runs, strict=True)):
                     driven = self._driven(motions, kept, self._between[each], n)
-                    change = (driven - followed[each].driven) / step + direct
+                    pushed = (driven - one.driven) / step
+                    change = pushed + by_start[row]
                     changes[each][place, kept] = change - change.mean(axis=1, keepdims=True)
-                    turns[each][place] = turn
+                    turns[each][place] = turning[row] + one.reweighing(
+                        pulls[row], pushed, answered[:, row], unknown.lengths
+                    )
         for change, turn, one in zip(changes, turns, followed, strict=True):
             _take_motion_out(change, kept, one.fitter, known[change.shape[2]][2], turn)
         return changes
@@ -263,13 +168,13 @@ class ModelResiduals:
 
     def _follow(self, model: GreyBoxModel) -> _Followed:
         kept = self._kept(model)
-        known: dict[int, tuple[list[_SystemRun], Array, _InitialConditions]] = {}
+        known: dict[int, tuple[list[_SystemRun], Array, UnknownMotion]] = {}
         found = []
         for measured, between in zip(self.linear.output_records, self._between, strict=True):
             n = measured.shape[1]
             if n not in known:
                 motions, free = self._motion(model, kept, n)
-                known[n] = motions, free, _InitialConditions.of(free)
+                known[n] = motions, free, UnknownMotion.of(free)
             motions, _, unknown = known[n]
             driven = self._driven(motions, kept, between, n)
             rest = measured[kept] - driven
@@ -281,7 +186,7 @@ class ModelResiduals:
             left = measured.copy()
             left[kept] = unknown.less(fitter, rest)
             self._check(kept, left)
-            found.append(_FollowedRun(left, driven, fitter, start))
+            found.append(FollowedRun(left, driven, fitter, start))
         return found, known
 
     def _driven(self, motions: list[_SystemRun], kept: Places, between: Array, n: int) -> Array:
@@ -298,14 +203,19 @@ class ModelResiduals:
         """Inputs of each record, with what they do between their samples."""
         return [between_samples(each, self.hold) for each in self.linear.input_records]
 
-    def _motion(self, model: GreyBoxModel, kept: Places, n: int) -> tuple[list[_SystemRun], Array]:
-        """How each system of a model moves, and what unknown states and trims add."""
+    def _motion(
+        self, model: GreyBoxModel, kept: Places, n: int, like: Sequence[_SystemRun] = ()
+    ) -> tuple[list[_SystemRun], Array]:
+        """How each system of a model moves, and what unknown states and trims add.
+
+        `like` are runs of a model that is hardly another, in whose states it moves.
+        """
         step = self.linear.sample_time_s
         motions, free = [], []
-        for each in systems_of(model):
+        for place, each in enumerate(systems_of(model)):
             if np.max(each.delays_s, initial=0.0) > n * step:
                 raise self._diverges(kept, "a delay longer than the record")
-            modes = split_modes(each, n * step)
+            modes = split_modes(each, n * step, like[place].modes if like else ())
             inputs = self._columns(each.inputs)
             rows = [k for k in kept if self.outputs[k] in each.outputs]
             places = [each.outputs.index(self.outputs[k]) for k in rows]
@@ -356,7 +266,7 @@ class ModelResiduals:
 
 
 def _take_motion_out(
-    change: Array, kept: Places, fitter: _Fitter, unknown: _InitialConditions, turn: Array
+    change: Array, kept: Places, fitter: MotionFitter, unknown: UnknownMotion, turn: Array
 ) -> None:
     """Take initial states and trims out of derivatives, and add what their own turning leaves.
 

@@ -181,7 +181,12 @@ def _searches(objective: Objective, minimum: Sequence[DenseEnd]) -> list[_Minimu
     Leakage can bend the first beyond the reach of the right minimum, which two starts tell.
     """
     plain, count = minimum[0], len(minimum)
-    first = search(objective, plain.x)
+    own = np.array([parameter.value or 0.0 for parameter in objective.model.parameters.free])
+    try:
+        first = search(objective, plain.x)
+    except (FitError, *OUTSIDE):
+        # What leakage bent may not be followed over the records where the model's values can be.
+        return [_Minimum(search(objective, own))]
     lower = first.end.cost <= NOISE * plain.cost
     judged = _Judgement.of(objective, first) if lower and first.step <= TOLERABLE else None
     settled = judged is not None and judged.misfit <= MISFIT
@@ -189,7 +194,6 @@ def _searches(objective: Objective, minimum: Sequence[DenseEnd]) -> list[_Minimu
     begun = _Minimum(first, count, judged)
     if settled and not (bent and objective.size <= FEW):
         return [begun]
-    own = np.array([parameter.value or 0.0 for parameter in objective.model.parameters.free])
     try:
         return [begun, _Minimum(search(objective, own))]
     except (FitError, *OUTSIDE):
