@@ -142,6 +142,10 @@ def test_a_parameter_of_pairs_left_out_stays_where_it_was() -> None:
     assert fit.model.parameters["Nd"].free
     assert "not-seen" in {finding.code for finding in fit.findings}
     assert_close(fit.parameters["La"].value, truth["La"], rtol=0.1, why="seen beside it")
+    with pytest.MonkeyPatch.context() as patch:  # the search itself leaves it, and goes no way off
+        patch.setattr("flightid.identification.frequency_domain.fit.with_starts", lambda f, _: f)
+        searched = fid.identify(model.with_responses("p/a", "r/a"), data)
+    assert_close(searched.parameters["Nd"].value, 0.8 * truth["Nd"], rtol=1e-9, why="held")
 
 
 def test_contradictory_bounds_are_refused() -> None:

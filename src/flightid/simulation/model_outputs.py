@@ -131,7 +131,7 @@ def split_modes(
     Schur form and a Sylvester equation.
     """
     a, b, c, d = system.matrices
-    rates = np.linalg.eigvals(a).real
+    rates = np.linalg.eigvals(a).real.astype(np.float64)
     parting = _parting(rates * duration_s, like)
     if parting is None:
         return [ModeSubset(system.matrices, system.delays_s, backwards=False)]

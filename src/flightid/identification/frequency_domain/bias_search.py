@@ -247,7 +247,9 @@ def jacobian_at(objective: Objective, here: SearchPoint, extra: Curves) -> Array
         They are not finite.
     """
     own = objective.model_slopes(here.x)
-    slopes = [a + b for a, b in zip(own, extra, strict=True)]
+    # What no fitted pair answers to leakage alone would move, until no run can be followed.
+    seen = np.any([np.any(slope != 0.0, axis=1) for slope in own], axis=0)[:, None]
+    slopes = [(a + b) * seen for a, b in zip(own, extra, strict=True)]
     found = objective.jacobian(here.estimates, slopes)
     if not np.all(np.isfinite(found)):
         raise FitError(
