@@ -322,6 +322,14 @@ def test_what_a_log_carries_already_is_not_swept_again(
     assert once.action == f"{asked.action}: flightid plan swept.bin --axes roll"
     assert done.action == "next is flightid tune swept.bin"
     again = {each.code: each for each in fid.plan_flight(opened, axes=("roll",)).findings}
+    # The sweep that a model rests on is flown again as it was; a typical vehicle had sized another.
+    (same,) = fid.plan_flight(opened, axes=("roll",)).sweeps
+    settings = {each.name: each.value for each in same.changes}
+    asked_of = ("SID_MAGNITUDE", "SID_F_START_HZ", "SID_F_STOP_HZ", "SID_T_FADE_IN", "SID_T_REC")
+    assert [settings[name] for name in asked_of] == [0.15, 0.15, 12.0, 3.0, 30.0]
+    assert {"swept-again", "flown-once"} >= set(again) - {"identified-already"}
+    (louder,) = fid.plan_flight(opened, axes=("roll",), amplitude=0.2).sweeps
+    assert (round(louder.amplitude or 0.0, 6), louder.is_flown_again) == (0.2, False)
     assert again["swept-again"].message.startswith("roll: swept already, and the log can carry")
     assert "identified-already" not in again
     # The plan had sent its reader to `tune` and `inspect`, which had sent him to the plan.

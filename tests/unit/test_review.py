@@ -73,6 +73,18 @@ def test_the_step_of_the_attitude_loop_is_that_of_the_simulator(review: fid.Flig
     assert np.max(upper - lower) < 0.4
 
 
+def test_a_setting_is_asked_for_once(review: fid.FlightReview) -> None:
+    """SDLOG_PROFILE 25 was asked for in two sentences of one screen."""
+    slow = replace(
+        review.loops[0], step=np.zeros(0), reason="logged too slowly",
+        action="set SDLOG_PROFILE 25 (now 1) and fly again",
+    )  # fmt: skip
+    px4 = replace(review, kind="px4", noise=GyroNoise(reason="too slow"))
+    for loops, asked in (((), 1), ((slow,), 1)):
+        found = judge_flight(replace(px4, loops=loops))
+        assert sum("SDLOG_PROFILE 25" in each.action for each in found) == asked
+
+
 def test_noise_alone_is_told_from_a_loop() -> None:
     random = np.random.default_rng(2)
     still = LoopSamples(np.zeros(900), random.standard_normal(900), None, (900,), 0.01)

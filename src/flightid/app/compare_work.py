@@ -174,7 +174,7 @@ def _plan(log: Path, options: dict[str, Any]) -> SweepPlan:
 
 
 def _sweep(sweep: AxisSweep, runs: int) -> PlanRow:
-    told = None if sweep.plan is None else sweep.plan.axes[0]
+    told = None if sweep.plan is None or sweep.is_flown_again else sweep.plan.axes[0]
     guess = sweep.guess
     full = None if guess is None else guess.vehicle.full_command
     plan = sweep.plan

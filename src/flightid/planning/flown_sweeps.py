@@ -9,6 +9,7 @@ from weakref import WeakKeyDictionary
 
 from flightid.conventions import Light
 from flightid.evidence.part_checks import AGAIN, ONCE, needs_another
+from flightid.excitation import Excitation, ardupilot_chirp
 from flightid.findings import Finding
 from flightid.frozen import dataclass
 from flightid.inspection import Inspection, inspect_log
@@ -76,6 +77,24 @@ class FlownSweeps:
                 f"{_listed(axes)}: swept already, and no model rests on that: {reason}",
                 "see that it does not happen again before you fly this plan",
             )  # fmt: skip
+
+
+def sweep_again(log: Log, axis: str) -> Excitation | None:
+    """The sweep that a log's autopilot injected at the mixer about an axis, to be flown once more.
+
+    Returns
+    -------
+    Excitation or None
+        None where no such sweep ran to its end.
+    """
+    for run in log.sid_runs:
+        if run.point == "mixer" and run.body_axis == axis and run.is_complete:
+            return ardupilot_chirp(
+                magnitude=run.magnitude, start_hz=run.f_start_hz, stop_hz=run.f_stop_hz,
+                record_s=run.record_s, fade_in_s=run.fade_in_s, fade_out_s=run.fade_out_s,
+                axis=run.axis, name=axis,
+            )  # fmt: skip
+    return None
 
 
 _KNOWN: WeakKeyDictionary[Log, FlownSweeps] = WeakKeyDictionary()

@@ -13,7 +13,7 @@ from flightid.control.autopilots.from_log import autopilot_of, axis_loop_of
 from flightid.control.autopilots.make import axis_loop
 from flightid.conventions import Light
 from flightid.errors import OptionError
-from flightid.excitation import Limits, Plan, plan
+from flightid.excitation import Excitation, Limits, Plan, plan
 from flightid.findings import Finding
 from flightid.inspection.actuators import find_actuators
 from flightid.inspection.advice import LOG_BITS, set_bits
@@ -23,7 +23,7 @@ from flightid.logs import Log, read_log
 from flightid.planning.flight_findings import flight_findings
 from flightid.planning.flight_time import flight_time
 from flightid.planning.flown_axis import FlownAxis
-from flightid.planning.flown_sweeps import FlownSweeps, flown_sweeps
+from flightid.planning.flown_sweeps import FlownSweeps, flown_sweeps, sweep_again
 from flightid.planning.loop_check import CAREFULLY
 from flightid.planning.options import PlanOptions
 from flightid.planning.procedures import PROCEDURES, Procedure, procedure_of
@@ -153,10 +153,13 @@ def plan_flight(
             guess = told_axis(axis, loop, procedure.kind, enters, opened, spans)
             vehicle_swept = replace(guess.vehicle, loop=_while_swept(procedure, loop))
             guess = replace(guess, vehicle=vehicle_swept)
-            made = _sweep(procedure, axis, vehicle_swept, asked)
+            flown_so = _flown_so(procedure, axis, opened, swept, asked)
+            made = _sweep(procedure, axis, vehicle_swept, asked, flown_so)
+            guess = guess if flown_so is None else None
         excitation = None if made is None else made.excitation
         changes = settings_of(procedure, axis, excitation, current, chosen, asked)
-        sweeps.append(AxisSweep(axis, guess, made, changes))
+        again = made is not None and guess is None
+        sweeps.append(AxisSweep(axis, guess, made, changes, is_flown_again=again))
     flown = [] if opened is None else list(swept.findings(opened, chosen))
     flown += flight_findings(opened, phases, sweeps, USUAL_LOOP_HZ if assumed and sweeps else 0.0)
     lengths = [
@@ -209,7 +212,31 @@ def _while_swept(procedure: Procedure, loop: AxisLoop) -> AxisLoop:
     return loop
 
 
-def _sweep(procedure: Procedure, axis: str, vehicle: FlownAxis, asked: PlanOptions) -> Plan:
+def _flown_so(
+    procedure: Procedure, axis: str, log: Log | None, swept: FlownSweeps, asked: PlanOptions
+) -> Excitation | None:
+    """The sweep of the log itself, where a model rests on it and nobody asks for another."""
+    own = (asked.amplitude, asked.band_rad_s, asked.duration_s) != (None, None, None)
+    if log is None or own or procedure.how != "mode" or axis not in swept.carried:
+        return None
+    return sweep_again(log, axis)
+
+
+def _sweep(
+    procedure: Procedure,
+    axis: str,
+    vehicle: FlownAxis,
+    asked: PlanOptions,
+    flown_so: Excitation | None = None,
+) -> Plan:
+    if flown_so is not None:
+        as_flown = replace(
+            asked,
+            amplitude=float(flown_so.peak[0]),
+            band_rad_s=flown_so.band_rad_s,
+            duration_s=flown_so.duration_s,
+        )
+        return replace(_sweep(procedure, axis, vehicle, as_flown), excitation=flown_so)
     by_stick = procedure.how == "stick"
     band = asked.band_rad_s or _band(vehicle, by_stick)
     cycles_s = CYCLES * math.tau / band[0]
@@ -295,7 +322,8 @@ def _findings(
     found = flown + _expected(sweeps)
     typical = {each.axis: bool(each.guess and not each.guess.measured) for each in sweeps}
     for each in sweeps:
-        for told in () if each.plan is None else each.plan.findings:
+        # What is flown again showed enough once: nothing is expected of it that was not seen.
+        for told in () if each.plan is None or each.is_flown_again else each.plan.findings:
             if told.light in (Light.AMBER, Light.RED) and told.code != "chirp-silent-end":
                 unsure = typical.get(each.axis) and told.code == "design-coherence"
                 said = told.message.removeprefix(f"{each.axis} ").removeprefix(f"{each.axis}: ")

@@ -42,12 +42,15 @@ class AxisSweep:
         The sweep with what it would show.
     changes : tuple of GainChange
         Settings that make the autopilot fly and log it.
+    is_flown_again : bool
+        Whether the log flew this sweep, and a model rests on it: nothing is expected, it was seen.
     """
 
     axis: str
     guess: AxisGuess | None
     plan: Plan | None
     changes: tuple[GainChange, ...]
+    is_flown_again: bool = False
 
     @property
     def amplitude(self) -> float | None:
@@ -67,7 +70,9 @@ class AxisSweep:
     @property
     def coherence(self) -> float | None:
         """Predicted coherence of sweep and rate, its mean over the band."""
-        return None if self.plan is None else float(self.plan.axes[0].coherence.mean())
+        if self.plan is None or self.is_flown_again:
+            return None
+        return float(self.plan.axes[0].coherence.mean())
 
     def to_dict(self) -> dict[str, object]:
         """Plain values."""

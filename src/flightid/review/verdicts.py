@@ -62,12 +62,11 @@ def _noise(review: FlightReview) -> Iterator[Finding]:
         told = f"peaks at {tops}" if tops else "no peak stands out of it"
         yield Finding("gyro-noise", Light.GREEN, f"noise of the gyroscope: {told}")
     elif review.phases.airborne:
-        yield Finding(
-            "no-noise-spectrum",
-            Light.UNKNOWN,
-            f"no spectrum of the gyroscope: {review.noise.reason}",
-            FAST_GYRO.get(review.kind, "log the gyroscope faster"),
-        )
+        action = FAST_GYRO.get(review.kind, "log the gyroscope faster")
+        if any(loop.action.startswith(action.partition(",")[0]) for loop in review.loops):
+            action = ""  # A loop asks for the same setting, and says what it is now.
+        said = f"no spectrum of the gyroscope: {review.noise.reason}"
+        yield Finding("no-noise-spectrum", Light.UNKNOWN, said, action)
 
 
 def _flown(review: FlightReview) -> Iterator[Finding]:
