@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import field
 from functools import cached_property
 
@@ -52,6 +53,8 @@ UNITS = {
     CONTROL: "",
 }
 SETTLED_SHARE = 1e-3
+AT_A_TIME = 16
+"""Plants whose pulses are held at once."""
 FIRST_S, LONGEST = 8.0, 1 << 16
 LIKE_ZERO = 1e-4
 """Share of the lowest frequency at which the limit towards zero is taken."""
@@ -189,51 +192,54 @@ def closed_responses(
     # The estimate alone says at little cost how long it takes; then all plants are asked.
     for some in ([closed.first] if len(closed.plants) > 1 else []) + [closed]:
         while True:
-            pulses = _pulses(some, loops, count)
+            steps: dict[str, list[Array]] = {}
+            sizes: dict[str, list[tuple[float, float]]] = {}
+            for told, pulse in _pulses(some, loops, count):
+                steps.setdefault(told, []).append(np.cumsum(pulse[:, : shown(told)[1]], axis=1))
+                size = np.abs(pulse)
+                sizes.setdefault(told, []).append((size[:, -count // 16 :].max(), size.max()))
             # What has not died away at the end stands in each sample that is summed and shown.
-            errors = [
-                min(count, shown(told)[1])
-                * np.abs(each[:, -count // 16 :]).max()
-                / np.abs(each).max()
-                for told, each in pulses.items()
-            ]
+            ends = {told: np.max(each, axis=0) for told, each in sizes.items()}
+            errors = [min(count, shown(told)[1]) * left / top for told, (left, top) in ends.items()]
             if max(errors) < SETTLED_SHARE or count >= LONGEST:
                 break
             count *= 4
     found = {}
-    for told, pulse in pulses.items():
-        name, n = shown(told)
-        time_s = np.arange(min(n, count), dtype=np.float64) * step
-        found[name] = (time_s, np.cumsum(pulse[:, :n], axis=1))
+    for told, parts in steps.items():
+        values = np.concatenate(parts)
+        found[shown(told)[0]] = (np.arange(values.shape[1], dtype=np.float64) * step, values)
     return found
 
 
-def _pulses(closed: ClosedPlants, loops: list[AxisLoop], count: int) -> dict[str, Array]:
-    """Pulse responses, each (n_plants, count)."""
+def _pulses(closed: ClosedPlants, loops: list[AxisLoop], count: int) -> Iterator[tuple[str, Array]]:
+    """Pulse responses, (n, count) of some plants at a time: those of all are a gigabyte."""
     place, gyro, step = closed.place, closed.gyro, closed.plants.sample_time_s
     omega = np.pi / step * np.arange(count // 2 + 1) / (count // 2)
     omega[0], omega[-1] = LIKE_ZERO * omega[1], BELOW_NYQUIST * omega[-1]
     axis = closed.axis(omega, loops)
     feedback, outer = standing(loops[place], omega, gyro)
-    rate = feedback * axis.rate
-    whole = rate + outer * axis.angle
     paths = ControllerPaths(loops[place], gyro, has_angle_loop(loops[place]))
     terms = paths.forward(omega)
     gains = paths.gains_of(loops[place])
     forward = (gains[:-1] if paths.with_angle else gains) @ terms[:-1] + terms[-1]
-    made = {
-        "rate step": forward * axis.rate / (1.0 + rate),
-        "disturbance to rate": axis.rate / (1.0 + whole),
-    }
-    if isinstance(loop := loops[place], PidLoop):
-        # The plants are in the controller's sense; what it puts out and what disturbs that are not.
-        sense = -1.0 if loop.direct else 1.0
-        made[CONTROL] = sense * forward / (1.0 + rate)
-        made["disturbance to rate"] *= sense
-    if paths.with_angle:
-        made["angle step"] = outer * axis.angle / (1.0 + whole)
-        made["disturbance to angle"] = axis.angle / (1.0 + whole)
-    return {name: np.fft.irfft(value, count, axis=-1) for name, value in made.items()}
+
+    def pulse(response: Complex) -> Array:
+        return np.asarray(np.fft.irfft(response, count, axis=-1))
+
+    own = loops[place] if isinstance(loops[place], PidLoop) else None
+    # The plants are in the controller's sense; what it puts out and what disturbs that are not.
+    sense = -1.0 if isinstance(own, PidLoop) and own.direct else 1.0
+    for start in range(0, len(axis.rate), AT_A_TIME):
+        rate, angle = (each[start : start + AT_A_TIME] for each in (axis.rate, axis.angle))
+        inner = feedback * rate
+        opened, whole = 1.0 + inner, 1.0 + (inner + outer * angle)
+        yield "rate step", pulse(forward * rate / opened)
+        yield "disturbance to rate", pulse(sense * rate / whole)
+        if own is not None:
+            yield CONTROL, pulse(sense * forward / opened)
+        if paths.with_angle:
+            yield "angle step", pulse(outer * angle / whole)
+            yield "disturbance to angle", pulse(angle / whole)
 
 
 def response_bands(
