@@ -278,6 +278,8 @@ def test_what_intervals_show_to_be_worse_is_not_green_and_the_tolerance_is_print
         (BANDWIDTH, 10.0, 8.0, True, True),
         (BANDWIDTH, 10.0, 12.0, True, False),
         ("level", 1.0, 1.2, True, True),
+        ("gain at 1 Hz", 0.7, 0.58, True, True),
+        ("gain at 0.25 Hz", 0.7, 0.9, True, False),
         ("level", 1.3, 1.1, True, False),
         ("level", 1.1, 0.7, True, True),
     ],
@@ -409,7 +411,7 @@ def test_a_study_of_another_vehicle_is_told_and_nothing_is_praised(
     flown = fid.review_flight(log)
     (tmp_path / "results.json").write_text(json.dumps({"review": flown.to_dict()}))
     state = flown_for(tmp_path)
-    assert state == FlightState.of(flown)
+    assert state == FlightState.of(flown) == FlightState.of(fid.read_log(log))
     assert state == flown_for(tmp_path / "models" / "roll.toml")
     assert flown_for(log) is None
     kept = fid.compare_with_promise([model], log, review=flown, state=state)

@@ -32,6 +32,7 @@ from flightid.review.before_after import compare_flights, compare_with_promise
 from flightid.review.changes import LoopChange
 from flightid.review.comparison import FlightComparison
 from flightid.review.flight import review_flight
+from flightid.review.flight_state import FlightState
 from flightid.review.next_step import FlownStep, flown_step
 from flightid.study.gain_preview import preview_fits
 from flightid.uncertainty.estimate import Reading
@@ -52,11 +53,12 @@ def make_comparison(
     if not sides[0].promised:
         both = (_reviewed(before, sides[0]), _reviewed(after, sides[1]))
         return _part(compare_flights(*both), None).model_dump()
-    key = f"promise of {sha256_of_file(after)} {study} {text}"
+    key = f"promise of {sha256_of_file(after)} {sha256_of_file(before)} {study} {text}"
     if key not in KEPT:
         with draft_inside(study, text) as draft:
             fits = preview_fits(draft, cache=KEPT)
-        KEPT[key] = compare_with_promise(fits, kept_log(after))
+        state = FlightState.of(kept_log(before))
+        KEPT[key] = compare_with_promise(fits, kept_log(after), state=state)
     made: FlightComparison = KEPT[key]
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

@@ -237,14 +237,13 @@ def _flights(before: str, after: str, models: Sequence[str]) -> FlightComparison
 
 def _beside(before: str, after: str) -> str:
     """That no study was looked at, and the command that holds one's promise against the second."""
-    logs = [Path(PART.sub(r"\1", each)) for each in (before, after)]
-    folders = dict.fromkeys((logs[0].resolve().parent, Path.cwd()))
-    made = models_made_of(logs[0], folders)
-    named = "STUDY-output" if made is None else quote(str(_near(made)))
-    return (
-        "Two logs are judged by themselves, whatever lies beside them; what a study promised of "
-        f"the second: flightid compare {named} {quote(str(logs[0]))} {quote(str(logs[1]))}."
-    )
+    said = "Two logs are judged by themselves, whatever lies beside them"
+    if PART.fullmatch(before) or PART.fullmatch(after):
+        return f"{said}."
+    made = models_made_of(Path(before), dict.fromkeys((Path(before).resolve().parent, Path.cwd())))
+    study = "STUDY-output" if made is None else str(_near(made))
+    named = " ".join(map(quote, (study, before, after)))
+    return f"{said}; what a study promised of the second: flightid compare {named}."
 
 
 def _near(path: Path) -> Path:

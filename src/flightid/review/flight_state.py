@@ -6,6 +6,10 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from flightid.frozen import dataclass
+from flightid.inspection.actuators import find_actuators
+from flightid.inspection.flight_phases import flight_phases
+from flightid.logs import Log
+from flightid.review.identity import flight_identity
 
 if TYPE_CHECKING:
     from flightid.review.result import FlightReview
@@ -39,12 +43,16 @@ class FlightState:
     start_v: float | None = None
 
     @classmethod
-    def of(cls, review: FlightReview) -> FlightState:
-        """State of a reviewed flight."""
-        identity, battery = review.identity, review.identity.battery
+    def of(cls, flown: FlightReview | Log) -> FlightState:
+        """State of a flight, from its review or its log."""
+        if isinstance(flown, Log):
+            identity = flight_identity(flown, flight_phases(flown, find_actuators(flown)))
+        else:
+            identity = flown.identity
+        battery = identity.battery
         cells = None if battery is None else battery.cells
         told = _told(
-            review.kind, review.vehicle, review.firmware, identity.frame, identity.board,
+            flown.kind, flown.vehicle, flown.firmware, identity.frame, identity.board,
             identity.motors, cells,
         )  # fmt: skip
         return cls(dict(told), None if battery is None else battery.start_v)

@@ -18,7 +18,7 @@ from flightid.frozen import dataclass
 from flightid.logs import Log
 from flightid.review.loop_response import LoopResponse
 from flightid.review.loops import SLOWEST_HZ
-from flightid.review.step_features import BANDWIDTH, SEVEN_TENTHS
+from flightid.review.step_features import BANDWIDTH, GAIN, SEVEN_TENTHS
 from flightid.review.typical_axes import TYPICAL, TypicalAxis
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Reading
@@ -36,8 +36,9 @@ LEADS_S = (1e-3, 0.5)
 """Of the yaw of rotors, which push the frame as they speed up; other axes have none."""
 UNTOLD = "the flight tells too few bandwidths and delays of it"
 UNLIKE = "hardly any typical vehicle answers so"
-BY_FREQUENCY = ("phase delay", BANDWIDTH, "frequency at")
+BY_FREQUENCY = ("phase delay", GAIN, BANDWIDTH, "frequency at")
 CROSSOVERS_RAD_S = (2.0, 80.0)
+SLOWEST = SLOWEST_HZ["rate"]
 GRID = np.geomspace(1.0, 500.0, 100)
 LOGS = np.log(GRID)
 SIMPLE = 0.05
@@ -242,8 +243,12 @@ class _Candidates:
         for each in wanted:
             assert each.value is not None
             if each.name.startswith("phase delay"):
-                omega = math.tau * SLOWEST_HZ["rate"]
+                omega = math.tau * SLOWEST
                 found = -_at(phase, np.full(len(phase), math.log(omega))) / omega
+            elif each.name.startswith(GAIN):
+                found = np.exp(
+                    _at(np.log(gain), np.full(len(gain), math.log(0.5 * math.tau * SLOWEST)))
+                )
             elif each.name == BANDWIDTH:
                 found = _falls(gain, SEVEN_TENTHS) / math.tau
             else:
