@@ -12,7 +12,9 @@ import pytest
 
 from flightid.fleet.statistics.change_kind import DRIFT, STEP, change_kind
 from flightid.fleet.statistics.drift import FleetDrift, find_drift
+from flightid.fleet.statistics.event_families import told_effects
 from flightid.fleet.statistics.events import (
+    EventEffect,
     FleetEvent,
     beside_steps,
     event_effect,
@@ -32,6 +34,7 @@ from flightid.fleet.statistics.parameter_history import ParameterHistory
 from flightid.fleet.statistics.repeats import repeat_scatter
 from flightid.fleet.statistics.wandering import squares_chance, wandering_chance
 from flightid.fleet.vehicle_lights import event_words
+from flightid.uncertainty.estimate import Estimate
 from flightid.uncertainty.quantiles import showing
 
 DAY_S = 86400.0
@@ -373,6 +376,27 @@ def test_an_event_is_a_change_where_its_interval_holds_none(freedom: float) -> N
     assert re.search(
         r"gain changed by \+\S+ \(\+\S+ to \+\S+\) at", event_words(history, unlike, {})
     )
+
+
+def test_a_parameter_beside_one_that_changed_is_told_at_its_own_level() -> None:
+    """The example's motor lag "changed" at new propellers, chance 0.03, as thrust surely did."""
+    motor, board = FleetEvent("motor", 3.5, ("a",)), FleetEvent("board", 5.5, ("a",))
+
+    def told(*chances: float, events: tuple[FleetEvent, ...] = (motor,)) -> list[bool]:
+        nothing = Estimate("gain", None, "%", reason="made up")
+        made = [EventEffect(events, 0, nothing, nothing, each) for each in chances]
+        return told_effects([("a", each) for each in made])
+
+    assert told(1e-9, 0.03) == [True, False]
+    assert told(1e-9, 0.02) == [True, True]
+    assert told(0.03) == [True]
+    assert told(0.03, 0.9) == [False, False]
+    assert told() == []
+    # Each event of each vehicle is a family: where half of them did something, half the level.
+    gone = Estimate("gain", None, "%", reason="made up")
+    pairs = [(v, EventEffect((board,), 0, gone, gone, p)) for v, p in (("a", 1e-9), ("b", 0.04))]
+    assert told_effects(pairs) == [True, True]
+    assert told_effects([*pairs, ("c", replace(pairs[1][1], chance=0.6))]) == [True, False, False]
 
 
 def test_understated_errors_show_in_repeats_and_raise_no_alarm() -> None:

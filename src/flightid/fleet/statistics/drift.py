@@ -18,6 +18,7 @@ from flightid.fleet.statistics.covariates import (
 )
 from flightid.fleet.statistics.days import shared_by_day
 from flightid.fleet.statistics.errors_by_value import errors_at_each_vehicle
+from flightid.fleet.statistics.event_families import told_effects
 from flightid.fleet.statistics.events import (
     EventEffect,
     FleetEvent,
@@ -30,7 +31,7 @@ from flightid.fleet.statistics.largest_step import (
     FEWEST,
 )
 from flightid.fleet.statistics.moved_alike import MovedAlike, moved_alike
-from flightid.fleet.statistics.multiple_testing import FALSE_SHARE, chance_cell, corrected
+from flightid.fleet.statistics.multiple_testing import FALSE_SHARE, chance_cell
 from flightid.fleet.statistics.neighbours import variances_with_odd_ones
 from flightid.fleet.statistics.newest_flight import NewestFlight, judged_newest, newest_flights
 from flightid.fleet.statistics.parameter_history import AskedHistory, ParameterHistory
@@ -122,11 +123,9 @@ class FleetDrift(Result, schema="flightid.fleet_drift/1"):
     @cached_property
     def by_event(self) -> tuple[tuple[ParameterHistory, EventEffect], ...]:
         """What events changed, false ones among all of them accounted for."""
-        told = [(h, e, e.chance) for h in self.histories for e in h.events]
-        asked = [(h, e, chance) for h, e, chance in told if chance is not None]
-        shares = corrected([chance for *_, chance in asked])
-        kept = zip(asked, shares, strict=True)
-        return tuple((h, e) for (h, e, _), share in kept if share <= FALSE_SHARE)
+        asked = [(h, e) for h in self.histories for e in h.events]
+        told = told_effects([(h.vehicle, e) for h, e in asked])
+        return tuple(each for each, is_told in zip(asked, told, strict=True) if is_told)
 
     @property
     def judged(self) -> tuple[ParameterHistory, ...]:
