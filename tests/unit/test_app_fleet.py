@@ -72,6 +72,8 @@ def test_the_page_says_of_a_fleet_what_its_report_says(tmp_path: Path) -> None:
     own = fleet_work.answer_vehicle(path, "v02")
     assert [each["name"] for each in own["histories"]] == ["Lp", "Ltphi"]
     assert own["histories"][1]["events"] == [(1769126400.0, "new motor")]
+    assert not own["histories"][0]["changed"]
+    assert own["histories"][0]["words"].startswith("80 % of steps by ")
     # A flight of the vehicle is known by the bytes of its log, as the workspace knows it.
     workspace = Workspace(tmp_path)
     workspace.scan()

@@ -29,6 +29,7 @@ from flightid.fleet import ask_fleet, propose_fleet, read_fleet, run_fleet
 from flightid.fleet import open as open_fleet
 from flightid.fleet.drift_lights import estimate_lights, shared_lights
 from flightid.fleet.engine.address_space import bounded_memory
+from flightid.fleet.normality import least_words
 from flightid.fleet.opening import names_fleet_file
 from flightid.fleet.page import (
     copies_words,
@@ -44,7 +45,7 @@ from flightid.fleet.page import (
 )
 from flightid.fleet.statistics.answers import FleetAnswers, TypeAnswers
 from flightid.fleet.statistics.parameter_history import ParameterHistory
-from flightid.fleet.vehicle_lights import change_words
+from flightid.fleet.vehicle_lights import change_words, going_on_words
 from flightid.table import Table
 from flightid.uncertainty.quantiles import half_width, showing, shown
 
@@ -229,11 +230,18 @@ def _history(of: TypeAnswers, each: ParameterHistory) -> FleetHistory:
         half=[half * math.sqrt(v) for v in each.variances.tolist()],
         level=each.track.level.tolist(), low=ends[:, 0].tolist(), high=ends[:, 1].tolist(),
         changed=each.is_alarm, kind=each.kind,
-        words=change_words(each, of.labels) if each.is_alarm else "",
+        words=_words(of, each),
         changed_s=each.changed_s if each.is_alarm else None,
         events=list(dict.fromkeys((one.time_s, one.what) for one in each.happened)),
         logs=[logs.get((each.vehicle, at), "")[:16] for at in each.time_s.tolist()],
     )  # fmt: skip
+
+
+def _words(of: TypeAnswers, each: ParameterHistory) -> str:
+    """What changed or may have, else what would have been found; empty where nothing was asked."""
+    if each.is_alarm:
+        return change_words(each, of.labels)
+    return going_on_words(each, of.labels) if each.goes_on else least_words(each)
 
 
 def _flight(row: Mapping[str, Any]) -> FleetFlight:

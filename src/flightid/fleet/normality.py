@@ -83,6 +83,13 @@ def _seen_words(seen: Sequence[tuple[ParameterHistory, TypeAnswers]]) -> str:
     return f" ({100.0 * POWER:.0f} % of such steps would be found: {', '.join(said)})"
 
 
+def least_words(history: ParameterHistory) -> str:
+    """The step of one parameter of which most would be found; empty where it was not asked."""
+    if history.least_step is None:
+        return ""
+    return f"{100.0 * POWER:.0f} % of steps by {_size(history.least_step)} would be found"
+
+
 def _size(least: Reading) -> str:
     unit = "" if least.unit == "1" else f" {least.unit}"
     return f"{least.value:.2g}{unit}"
