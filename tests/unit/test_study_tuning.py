@@ -11,16 +11,18 @@ import numpy as np
 import pytest
 from scipy.signal import cont2discrete, lfilter
 
+import flightid as fid
 from flightid import ControllerOptions
 from flightid.cli.output import Exit
 from flightid.cli.program import run
 from flightid.conditioning import flip_sign
-from flightid.conventions import Role
+from flightid.conventions import Light, Role
 from flightid.errors import DataError, StudyError
+from flightid.evidence.evidence import Check, Evidence
 from flightid.study.actuator_range import input_ranges
 from flightid.study.record_files import RecordFile, load_records
 from flightid.study.settings import read_settings
-from flightid.study.tuning import TuneSettings, _controllers, tune_models
+from flightid.study.tuning import TuneSettings, _controllers, _without_errors, tune_models
 from tests.closeness import assert_close
 
 STUDY = """
@@ -162,6 +164,18 @@ def test_models_stand_where_there_are_no_gains(
     assert headline.startswith("Answer: red ("), "as the exit code says"
     assert "report.html" in said.err
     assert (tmp_path / "rig-output" / "report.html").is_file()
+
+
+def test_no_loop_is_asked_for_where_none_could_have_gains() -> None:
+    """DaISy's evaporator: name a loop, then declare the loop open, then there were no errors."""
+    checks = (Check("residuals", Light.AMBER, "inputs foretell errors", "raise the orders"),)
+    lost = SimpleNamespace(covariance=None, evidence=Evidence(checks, ()))
+    told = _without_errors([lost, lost])
+    assert told is not None
+    assert told.found == "inputs foretell errors"
+    assert told.action == "raise the orders"
+    assert _without_errors([lost, SimpleNamespace(covariance=np.eye(2))]) is None
+    assert _without_errors([fid.load_model("rate_motor_lag", axis="roll")]) is None
 
 
 def test_records_alone_hold_no_gains() -> None:

@@ -296,6 +296,8 @@ def _controllers(
     missing = [name for name in controller.loops if name not in {*designs, *errors}]
     if errors and not designs:
         raise next(iter(errors.values()))
+    if not designs and (untold := _without_errors([fit for fit, _ in known])) is not None:
+        raise untold
     if missing or not designs:
         raise StudyError(
             "no model has the loop that is to be closed",
@@ -339,6 +341,19 @@ def _require_loops(by_hand: Mapping[str, float], closed: Sequence[str]) -> None:
             found=", ".join(lost),
             needed=f"Kp, Ki, Kd, or with the output before them: {outputs[0]}/Kp",
         )
+
+
+def _without_errors(fits: Sequence[Any]) -> StudyError | None:
+    """That no fit knows its errors: no loop that one could name would have gains."""
+    if any(getattr(fit, "covariance", fit) is not None for fit in fits):
+        return None
+    why = [each for fit in fits if (each := fit.evidence.reason) is not None]
+    return StudyError(
+        "gains for models whose errors are not known would promise nothing",
+        found="; ".join(dict.fromkeys(each.message for each in why)),
+        needed="a fit with a covariance",
+        action=why[0].action if why else "",
+    )
 
 
 def _first_loop(known: Sequence[tuple[Any, object]]) -> str:
