@@ -33,14 +33,14 @@ def test_the_margins_of_the_vehicle_that_flew_are_among_them(
 
 @pytest.mark.slow
 def test_margins_of_many_flights_are_among_them(tmp_path: Path) -> None:
-    """Sticks are too slow for a racer in a quarter of its flights: nothing is told there."""
+    """Sticks are too slow for a racer in half of its flights: nothing is told there."""
     found = [
         _flown(axis, tmp_path / "a.bin", seed=seed)[1]
         for axis in (Axis(), RACER, replace(Axis(), p=0.05, i=0.05, d=0.001))
         for seed in range(20)
     ]
     told = [each for held in found for each in held]
-    assert len(told) >= 100
+    assert len(told) >= 90
     assert np.mean(told) >= 0.95
 
 
@@ -53,9 +53,13 @@ def _flown(axis: Axis, path: Path, *, seed: int) -> tuple[fid.FlightReview, list
     write_ordinary_log(path, axis=axis, seed=seed, parameters=told)
     log = fid.read_log(path)
     review = fid.review_flight(log)
-    (found,) = review.ranges
-    pairs = zip(_truth(axis, log), (found.phase_margin_deg, found.gain_margin_db), strict=True)
-    return review, [ends[0] <= truth <= ends[1] for truth, ends in pairs if ends is not None]
+    phase, gain = _truth(axis, log)
+    told = [
+        pair
+        for found in review.ranges
+        for pair in ((phase, found.phase_margin_deg), (gain, found.gain_margin_db))
+    ]
+    return review, [ends[0] <= truth <= ends[1] for truth, ends in told if ends is not None]
 
 
 def _truth(axis: Axis, log: fid.Log) -> tuple[float, float]:
