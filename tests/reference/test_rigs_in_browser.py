@@ -116,8 +116,26 @@ def test_gains_of_a_rig_by_hand(desk: Desk, tmp_path: Path) -> None:
     assert page.locator("label[for=slider-Kp]").inner_text() == "Kp V/rad"
     assert page.locator("[role=application][aria-label^='What the controller puts out']").count()
     assert "meets no limit" in page.locator(".reach").inner_text()
+    # What is typed outside the range stands there with the range, and the gain stays.
+    typed, kept = page.get_by_label("Ki, value"), page.get_by_label("Ki, value").input_value()
+    typed.fill("1e9")
+    typed.press("Tab")
+    assert f"; {float(kept):.3g} stands" in page.locator("#range-Ki").inner_text()
+    assert typed.input_value() == "1e9"
+    assert "by_hand" not in desk.study["tune"]
+    typed.fill(kept)
+    typed.press("Tab")
+    page.locator("#range-Ki").wait_for(state="detached")
     slider.press("End")
     page.get_by_text("Nothing to download").wait_for()
+    # A loop that is unstable has no margins, and no share of any.
+    page.locator("#slider-Ki").press("End")
+    page.locator("#slider-Kd").press("Home")
+    page.get_by_text("The loop is unstable with these gains: it has no margins.").wait_for()
+    gains = page.inner_text("section[aria-label^='Gains of']")
+    assert "unstable for 301 of 301 plants" in gains
+    assert "%" not in gains
+    page.get_by_text("The estimate is unstable with these gains.").wait_for()
     by_hand = desk.study["tune"]["by_hand"]
     assert by_hand.keys() == {"Kp", "Ki", "Kd"}
     page.get_by_role("button", name="As found").click()

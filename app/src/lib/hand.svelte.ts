@@ -64,7 +64,7 @@ export class Hand {
       this.refused = answer.error ?? "";
       if (!answer.moved) return;
       const earlier = this.moved?.axis === answer.moved.axis ? this.moved : still;
-      this.moved = responses ? answer.moved : { ...answer.moved, curves: earlier?.curves ?? [] };
+      this.moved = responses ? answer.moved : { ...answer.moved, curves: answer.moved.is_stable ? (earlier?.curves ?? []) : [] };
       if (!responses) this.#rest = setTimeout(() => this.still()?.axis === answer.moved!.axis && this.#judge(values, true), REST_MS) as unknown as number;
     });
   }

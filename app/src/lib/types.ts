@@ -20,6 +20,7 @@ export interface AxisGains {
   by_hand: boolean;
   light: "green" | "amber" | "red" | "unknown";
   sentence: string;
+  is_stable: boolean;
   sliders: GainSlider[];
   margins: MarginRow[];
   curves: TimeCurve[];

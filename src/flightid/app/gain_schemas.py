@@ -95,6 +95,8 @@ class AxisGains(Message):
     by_hand: bool
     light: Light
     sentence: str
+    is_stable: bool = True
+    """Whether the estimate is: an unstable loop has no margins."""
     sliders: list[GainSlider]
     margins: list[MarginRow]
     curves: list[TimeCurve]

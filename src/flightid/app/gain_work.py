@@ -241,6 +241,7 @@ def _axis(
         by_hand=hand,
         light=light_of(worst(findings)),
         sentence=_sentence(moved),
+        is_stable=moved.is_stable,
         sliders=[
             GainSlider(
                 name=each.name,

@@ -41,6 +41,8 @@ class MovedGains:
         Requirements that some plant does not meet.
     unstable : int
         Plants that they do not hold stable.
+    is_stable : bool
+        Whether they hold the estimate: an unstable loop has no margins.
     responses : tuple of ResponseBand
         Of some of the plants; none where the estimate is unstable.
     omega_rad_s : ndarray, shape (n_f,)
@@ -54,6 +56,7 @@ class MovedGains:
     met: NDArray[np.bool_]
     short: tuple[str, ...]
     unstable: int
+    is_stable: bool
     responses: tuple[ResponseBand, ...]
     omega_rad_s: Array
     loops: Mapping[str, Complex]
@@ -124,7 +127,8 @@ def move_gains(
         met,
         short,
         int((~judged.stable[0]).sum()),
-        _bands(design, loop) if responses and bool(judged.stable[0, 0]) else (),
+        holds := bool(judged.stable[0, 0]),
+        _bands(design, loop) if responses and holds else (),
         problem.plants.omega_rad_s,
         curves,
     )
