@@ -14,7 +14,6 @@ from pathlib import Path
 from pkgutil import iter_modules
 
 from flightid.errors import FlightidError
-from flightid.threads import one_linear_algebra_thread
 
 
 def topics() -> list[str]:
@@ -24,8 +23,6 @@ def topics() -> list[str]:
 
 def main(wanted: list[str]) -> int:
     """Print the tables; 2 for an unknown topic, 1 where one could not run."""
-    # As commands do: else a loop beside a command counts threads that spin.
-    one_linear_algebra_thread()
     known = topics()
     stray = [name for name in wanted if name not in known]
     if stray:
