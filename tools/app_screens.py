@@ -22,7 +22,7 @@ def logs(stage: Stage) -> None:
 def flight(stage: Stage) -> None:
     """The demo's flight, its three cards filled."""
     stage.open(f"flight/{stage.log}")
-    stage.page.locator(".step").nth(2).wait_for()
+    stage.page.locator(".cards canvas").nth(2).wait_for()
 
 
 def response(stage: Stage) -> None:
