@@ -13,8 +13,8 @@ from flightid.errors import DataError
 from flightid.frozen import dataclass
 from flightid.identification.frequency_domain.unknown_motion import (
     FollowedRun,
+    MotionBasis,
     MotionFitter,
-    UnknownMotion,
 )
 from flightid.models import GreyBoxModel
 from flightid.responses.errors.linear_estimate import LinearEstimate
@@ -58,7 +58,7 @@ class _SystemRun:
     places: list[int]
 
 
-_Followed = tuple[list[FollowedRun], dict[int, tuple[list[_SystemRun], Array, UnknownMotion]]]
+_Followed = tuple[list[FollowedRun], dict[int, tuple[list[_SystemRun], Array, MotionBasis]]]
 """Runs beside records, and what they have in common by the length of records."""
 
 
@@ -168,13 +168,13 @@ class ModelResiduals:
 
     def _follow(self, model: GreyBoxModel) -> _Followed:
         kept = self._kept(model)
-        known: dict[int, tuple[list[_SystemRun], Array, UnknownMotion]] = {}
+        known: dict[int, tuple[list[_SystemRun], Array, MotionBasis]] = {}
         found = []
         for measured, between in zip(self.linear.output_records, self._between, strict=True):
             n = measured.shape[1]
             if n not in known:
                 motions, free = self._motion(model, kept, n)
-                known[n] = motions, free, UnknownMotion.of(free)
+                known[n] = motions, free, MotionBasis.of(free)
             motions, _, unknown = known[n]
             driven = self._driven(motions, kept, between, n)
             rest = measured[kept] - driven
@@ -266,7 +266,7 @@ class ModelResiduals:
 
 
 def _take_motion_out(
-    change: Array, kept: Places, fitter: MotionFitter, unknown: UnknownMotion, turn: Array
+    change: Array, kept: Places, fitter: MotionFitter, unknown: MotionBasis, turn: Array
 ) -> None:
     """Take initial states and trims out of derivatives, and add what their own turning leaves.
 

@@ -41,7 +41,7 @@ class MotionFitter:
 
 
 @dataclass(frozen=True)
-class UnknownMotion:
+class MotionBasis:
     """Motion by unknown initial states and trims in each fitted output, ready for least squares.
 
     Attributes
@@ -62,7 +62,7 @@ class UnknownMotion:
     triangles: Array
 
     @classmethod
-    def of(cls, free: Array) -> UnknownMotion:
+    def of(cls, free: Array) -> MotionBasis:
         """Of motions, shape (n_unknowns, n_outputs, n)."""
         free = free - free.mean(axis=2, keepdims=True)
         lengths = np.maximum(np.linalg.norm(free, axis=(1, 2)), TINY)
@@ -126,7 +126,7 @@ class FollowedRun:
         """What is left of the fitted outputs, by the squares of their weights."""
         return np.asarray(self.rest[kept] / self.fitter.scale[:, None] ** 2)
 
-    def pulls(self, kept: Places, unknown: UnknownMotion) -> Array:
+    def pulls(self, kept: Places, unknown: MotionBasis) -> Array:
         """What each output's weight asks of the unknowns, shape (n_unknowns, n_fitted)."""
         return np.asarray(np.einsum("uyn,yn->uy", unknown.motions, self.rest[kept], optimize=True))
 
