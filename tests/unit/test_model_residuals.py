@@ -13,7 +13,9 @@ from flightid.identification.frequency_domain import without_bias
 from flightid.identification.frequency_domain.bias_objective import Objective
 from flightid.identification.frequency_domain.bias_search import SearchOutcome, search
 from flightid.identification.frequency_domain.model_residuals import ModelResiduals
+from flightid.responses.errors.noise import NoiseSpectrum, noise_of_residuals
 from flightid.responses.windows.transform import FoldedBasis
+from tests.closeness import assert_close
 
 MEASURED = {"u": "m/s", "q": "rad/s", "v": "m/s", "p": "rad/s"}
 
@@ -156,3 +158,22 @@ def test_a_fit_that_cannot_be_followed_begins_from_the_model(
     begun = [p.value for p in fid.load_model("rate_first_order").parameters.free]
     assert asked[1].tolist() == begun
     assert all(p.stderr for p in fit.parameters.values() if p.status == "free")
+
+
+def test_noise_through_a_growing_mode_is_as_strong_as_its_peak() -> None:
+    """A band narrower than a group of bins, and than the grid of the estimate that it replaces."""
+    rng, step_s, n = np.random.default_rng(3), 0.1, 800
+    pole = np.exp((-0.03 + 0.6j) * step_s)
+    resonance = [1.0, -2.0 * pole.real, abs(pole) ** 2]
+    white = rng.standard_normal((4, 1, n + 2000))
+    left = scipy.signal.lfilter([1.0], resonance, white, axis=2)[:, :, 2000:]
+    given = rng.standard_normal((4, 4, n))
+    omega, gain = scipy.signal.freqz([1.0], resonance, np.linspace(0.5, 0.7, 50) * step_s)
+    truth = 2.0 * step_s * float(np.mean(np.abs(gain) ** 2))
+    at = omega / step_s
+    smooth, found = (noise_of_residuals(left, given, step_s, 5.0, up_to) for up_to in (0.0, 1.2))
+    assert np.mean(smooth.at(at)) < 0.4 * truth < 0.7 * truth < np.mean(found.at(at)) < 1.5 * truth
+    coarse = NoiseSpectrum(np.array([0.25, 3.0]), np.ones((1, 2)))
+    kept = coarse.replaced(found, np.array([0]))
+    assert_close(kept.at(at), found.at(at), rtol=1e-9, why="on its own frequencies")
+    assert_close(found.at(np.array([4.0])), smooth.at(np.array([4.0])), rtol=1e-9, why="above")

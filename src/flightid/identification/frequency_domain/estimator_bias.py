@@ -38,6 +38,7 @@ WHOLE = 1e-9
 """Samples by which a delay may miss a whole number of them."""
 JUST = 1e-6
 """Samples by which a delay stands clear of the jump at its lower end."""
+OCTAVE = 2.0
 TOGETHER = 64
 """Outputs of moved models that are transformed at once: more leave the caches."""
 
@@ -176,7 +177,7 @@ class Correction:
         """
         if self.data.errors is None:
             return None
-        return self._linear.errors_of(self._records.of(model))
+        return self._linear.errors_of(self._records.of(model), _resonant_up_to(model))
 
     def _moved(self, model: GreyBoxModel, parameter: Parameter) -> tuple[GreyBoxModel, float]:
         """The model a small step away, on the side where no held input reaches another sample."""
@@ -252,6 +253,18 @@ class Correction:
     @cached_property
     def _records(self) -> ModelResiduals:
         return ModelResiduals(self._linear, self.data.outputs, self.hold)
+
+
+def _resonant_up_to(model: GreyBoxModel) -> float:
+    """Twice the frequency of the fastest oscillation that grows, rad/s; 0 where none does.
+
+    Gusts pass through such a mode in a band as narrow as its growth, which a loop does not widen
+    in what the model leaves of the outputs.
+    """
+    poles = [np.linalg.eigvals(each.matrices[0]) for each in systems_of(model)]
+    every = np.concatenate(poles)
+    growing = every[(every.real > 0.0) & (every.imag > 0.0)]
+    return OCTAVE * float(np.max(np.abs(growing), initial=0.0))
 
 
 def _middle(rows: Array) -> int:

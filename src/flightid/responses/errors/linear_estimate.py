@@ -43,7 +43,9 @@ class OutputWeights(Protocol):
         """The weights at some places, made ready to be applied again and again."""
         ...
 
-    def errors_of(self, residuals: Sequence[Real], outputs: Places) -> CovarianceSource | None:
+    def errors_of(
+        self, residuals: Sequence[Real], outputs: Places, resonant_rad_s: float = 0.0
+    ) -> CovarianceSource | None:
         """Errors of the whole estimate with the noise of a model's residuals in some outputs.
 
         None where the estimate's own noise is as good.
@@ -96,12 +98,15 @@ class WindowedWeights:
 
         return apply
 
-    def errors_of(self, residuals: Sequence[Real], outputs: Places) -> CovarianceSource | None:
+    def errors_of(
+        self, residuals: Sequence[Real], outputs: Places, resonant_rad_s: float = 0.0
+    ) -> CovarianceSource | None:
         """See `OutputWeights`."""
         step = self.errors.sample_time_s
         highest = float(self.errors.windows.omega[-1]) / step
         instruments = self.errors.windows.instruments
-        return self.errors_with(noise_of_residuals(residuals, instruments, step, highest), outputs)
+        noise = noise_of_residuals(residuals, instruments, step, highest, resonant_rad_s)
+        return self.errors_with(noise, outputs)
 
     def errors_with(self, noise: NoiseSpectrum, outputs: Places) -> CovarianceSource:
         """See `OutputWeights`; the other outputs keep their noise, as independent."""
@@ -142,9 +147,11 @@ class LocalWeights:
 
         return one_by_one(apply)
 
-    def errors_of(self, residuals: Sequence[Real], outputs: Places) -> CovarianceSource | None:
+    def errors_of(
+        self, residuals: Sequence[Real], outputs: Places, resonant_rad_s: float = 0.0
+    ) -> CovarianceSource | None:
         """None: local polynomials have taken the leakage out of their noise already."""
-        del residuals, outputs
+        del residuals, outputs, resonant_rad_s
         return None
 
     def errors_with(self, noise: NoiseSpectrum, outputs: Places) -> CovarianceSource:
@@ -269,20 +276,24 @@ class LinearEstimate:
             kept[key] = apply(pilot.slopes)
         return kept[key]
 
-    def errors_of(self, residuals: Sequence[Real]) -> CovarianceSource | None:
+    def errors_of(
+        self, residuals: Sequence[Real], resonant_rad_s: float = 0.0
+    ) -> CovarianceSource | None:
         """Errors of the response with the noise that a model's residuals show.
 
         Parameters
         ----------
         residuals : sequence of ndarray, each shape (n_out, n_samples)
             Measured less modelled outputs of each record.
+        resonant_rad_s : float
+            Up to which frequency noise may be narrow: see `noise_of_residuals`.
 
         Returns
         -------
         CovarianceSource or None
             None where the estimate's own noise is as good.
         """
-        found = self.weights.errors_of(residuals, self.places[0])
+        found = self.weights.errors_of(residuals, self.places[0], resonant_rad_s)
         return None if found is None else ErrorSelection(found, *self.places)
 
     def errors_with(self, noise: NoiseSpectrum) -> CovarianceSource:

@@ -14,7 +14,13 @@ from numpy.typing import NDArray
 
 from flightid.errors import DataError
 from flightid.frozen import dataclass
-from flightid.responses.windows.local_fit import Bins, bins_needed, fit_locally, local_residuals
+from flightid.responses.windows.local_fit import (
+    Bins,
+    around,
+    bins_needed,
+    fit_locally,
+    local_residuals,
+)
 from flightid.responses.windows.samples import Samples
 
 Complex = NDArray[np.complex128]
@@ -24,6 +30,9 @@ LEAST_NOISE = 1e-12
 """Share of its first estimate below which noise is rounding."""
 AVERAGED = 15
 """Bins, of all records together, over which residuals of a model that leaves noise are averaged."""
+LEAST_NEIGHBOURS, FEWEST_VALUES = 3, 12
+"""Bins of each record, and values of all records together, whose mean stands for a bin of noise
+near a mode that grows."""
 BEYOND_BAND = 1.5
 """Noise is estimated up to this multiple of the highest frequency of the response."""
 
@@ -57,13 +66,26 @@ class NoiseSpectrum:
         return cls(omega_rad_s, np.maximum(density, 0.0).T, coherency)
 
     def replaced(self, other: NoiseSpectrum, outputs: NDArray[np.intp]) -> NoiseSpectrum:
-        """With another noise in some outputs; what these share with the others is left out."""
-        density = self.density.copy()
+        """With another noise in some outputs; what these share with the others is left out.
+
+        On the frequencies of both: a resonance is narrower than the first estimate's bands.
+        """
+        omega = np.union1d(self.omega_rad_s, other.omega_rad_s)
+        density = self.at(omega)
         least = LEAST_NOISE * density[outputs]
-        density[outputs] = np.maximum(other.at(self.omega_rad_s), least)
+        density[outputs] = np.maximum(other.at(omega), least)
         coherency = np.tile(np.eye(len(density), dtype=np.complex128), (density.shape[1], 1, 1))
-        coherency[:, outputs[:, None], outputs] = other.coherency_at(self.omega_rad_s)
-        return NoiseSpectrum(self.omega_rad_s, density, coherency)
+        coherency[:, outputs[:, None], outputs] = other.coherency_at(omega)
+        return NoiseSpectrum(omega, density, coherency)
+
+    def no_less_than(self, other: NoiseSpectrum) -> NoiseSpectrum:
+        """The larger density up to where another one ends, with its coherency there."""
+        omega = np.union1d(self.omega_rad_s, other.omega_rad_s)
+        density, coherency = self.at(omega), np.array(self.coherency_at(omega))
+        low = omega <= other.omega_rad_s[-1]
+        density[:, low] = np.maximum(density[:, low], other.at(omega[low]))
+        coherency[low] = other.coherency_at(omega[low])
+        return NoiseSpectrum(omega, density, coherency)
 
     def at(self, omega_rad_s: Real) -> Real:
         """Density between the grid's frequencies, log-linear; held beyond its ends."""
@@ -165,6 +187,7 @@ def noise_of_residuals(
     regressors: Sequence[Real],
     sample_time_s: float,
     highest_rad_s: float,
+    resonant_rad_s: float = 0.0,
 ) -> NoiseSpectrum:
     """Noise spectra from what a model leaves of the outputs.
 
@@ -181,12 +204,35 @@ def noise_of_residuals(
     sample_time_s : float
     highest_rad_s : float
         Highest frequency of the response.
+    resonant_rad_s : float
+        Up to it gusts may pass through a mode that is narrower than a group of bins, which hardly
+        shows in the group's mean: there noise is no less than that of single bins' neighbours.
     """
     records = [
         Bins.of(np.concatenate([given, left]), sample_time_s)
         for given, left in zip(regressors, residuals, strict=True)
     ]
-    return _gather(list(_groups(records, len(regressors[0]), highest_rad_s)))
+    smooth = _gather(list(_groups(records, len(regressors[0]), highest_rad_s)))
+    if not resonant_rad_s:
+        return smooth
+    bins = [Bins.of(left, sample_time_s) for left in residuals]
+    return smooth.no_less_than(_of_neighbours(bins, resonant_rad_s))
+
+
+def _of_neighbours(records: Sequence[Bins], highest_rad_s: float) -> NoiseSpectrum:
+    """Means over each bin of the longest record and its neighbours in all records."""
+    longest = max(records, key=lambda bins: len(bins.omega)).omega
+    inside = longest[longest <= highest_rad_s]
+    inside = inside if len(inside) else longest[:1]
+    count = max(LEAST_NEIGHBOURS, -(-FEWEST_VALUES // len(records)))
+    found = []
+    for omega in inside:
+        places = [around(bins, float(omega), count) for bins in records]
+        values = np.concatenate(
+            [bins.values[:, place] for bins, place in zip(records, places, strict=True)], axis=1
+        )
+        found.append((float(omega), values.conj() @ values.T / values.shape[1]))
+    return _gather(found)
 
 
 def mean_spectrum(

@@ -282,9 +282,11 @@ class PrewhitenedWeights:
 
         return one_by_one(apply)
 
-    def errors_of(self, residuals: Sequence[Real], outputs: Places) -> CovarianceSource | None:
+    def errors_of(
+        self, residuals: Sequence[Real], outputs: Places, resonant_rad_s: float = 0.0
+    ) -> CovarianceSource | None:
         """None: innovations are the noise already."""
-        del residuals, outputs
+        del residuals, outputs, resonant_rad_s
         return None
 
     def errors_with(self, noise: object, outputs: Places) -> CovarianceSource:
