@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import flightid as fid
+from flightid.identification import hold_likelihood
 from flightid.identification.hold_likelihood import (
     HeldOutputs,
     _products,
@@ -240,10 +242,21 @@ def test_a_response_tells_what_its_records_know_of_a_wrong_hold(shape: str) -> N
     assert str(lights[1].light) == "amber"
 
 
-def test_likelihood_under_another_hold_is_what_a_fit_under_it_finds() -> None:
+def test_likelihood_under_another_hold_is_what_a_fit_under_it_finds(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     record = holds.flight(0, "straight", told=False)
     fit, other = (fid.identify(holds.model(), record, hold=hold) for hold in ("zero", "first"))
+    run, sloped = hold_likelihood.run_with_slopes, list[bool]()
+
+    def counted(*given: Any, **how: bool) -> Any:
+        sloped.append(how["sloped"])
+        return run(*given, **how)
+
+    monkeypatch.setattr(hold_likelihood, "run_with_slopes", counted)
     here, there = held_outputs(fit.model, [record], {}, ["zero", "first"])
+    # Slopes stay where the first step leads nowhere; half a sample is 140 standard errors.
+    assert sloped == [True, False, True, True]
     # The fit itself is where least squares on its records lead, so it is not made again.
     as_fitted, spread = HeldOutputs.of(fit), [fit.parameters[n].stderr or 0.0 for n in fit.names]
     assert np.all(np.abs(as_fitted.values - here.values) < 1e-2 * np.array(spread))

@@ -11,11 +11,10 @@ from scipy.signal import lfilter
 
 import flightid as fid
 from flightid.uncertainty.driven_noise import driven_products
-from flightid.uncertainty.periodograms import periodogram
+from flightid.uncertainty.periodograms import first_lags, periodogram
 from flightid.uncertainty.residual_noise import (
     Autoregression,
     _fitted,
-    _lags,
     autoregression,
 )
 from flightid.uncertainty.slow_drift import FASTEST, SLOWEST, Drift, _parted, is_slow
@@ -134,8 +133,10 @@ def test_slow_noise_does_not_hide_a_missing_lag() -> None:
     assert fit.covariance is None
 
 
-def test_lags_of_a_padded_periodogram_are_those_of_the_samples() -> None:
+@pytest.mark.parametrize(("length", "often"), [(8, False), (8, True), (9, True)])
+def test_lags_of_a_padded_periodogram_are_those_of_the_samples(length: int, often: bool) -> None:
     values = np.array([1.0, -2.0, 0.5, 3.0])
-    found = _lags(np.abs(np.fft.rfft(values, 8)) ** 2, 8, 2)
+    power = np.abs(np.fft.rfft(values, length)) ** 2
+    found = first_lags(power, length, 2, often=often)
     wanted = [float(values[k:] @ values[: 4 - k]) for k in range(3)]
     assert_close(found, np.array(wanted), rtol=1e-12, why="Wiener and Khinchin")

@@ -48,8 +48,10 @@ LAGS = 20
 STEPS = 2
 """Of Gauss and Newton: what a delay moves by half a sample bends by less than the second tells."""
 SHORT = 1000.0
-"""Squared changes of outputs, over what is left of them, up to which slopes stay: some 30 bars. At
-10 bars the second step then ends within 0.04 of one of where full steps do."""
+"""Squared changes of outputs by shared parameters, over what is left of outputs, up to which slopes
+stay: some 30 bars. At 10 the second step then ends within 0.04 of one of where full steps do."""
+NEAR = 4.0
+"""The same by a record's own numbers, for each sample: what noise of a measured start makes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,6 +186,7 @@ def _under(
     values = np.array([prepared.model.parameters[name].value or 0.0 for name in free])
     sizes = np.std(np.concatenate([each[1] for each in prepared.arrays], axis=1), axis=1)
     largest = FAR * sizes
+    samples = sum(each[1].size for each in prepared.arrays)
     slopes: list[Array] = []
     for round_ in range(STEPS):
         if round_:
@@ -198,10 +201,15 @@ def _under(
         left = [_whitened(each, filters) for each in left]
         slopes = slopes or [_whitened(slope, filters) for _, slope in runs]
         steps = _steps(left, slopes, sizes, len(free))
-        changes = [slope @ step for slope, step in zip(slopes, steps, strict=True)]
-        left = [rest - change for rest, change in zip(left, changes, strict=True)]
+        parts = [(slice(None, len(free)), SHORT), (slice(len(free), None), NEAR * samples)]
+        changes = [
+            [slope[:, :, part] @ step[part] for slope, step in zip(slopes, steps, strict=True)]
+            for part, _ in parts
+        ]
+        left = [rest - shared - own for rest, shared, own in zip(left, *changes, strict=True)]
         sizes = np.sqrt(np.mean(np.concatenate(left, axis=1) ** 2, axis=1))
-        if _squares(changes, sizes) > SHORT:
+        moved = [_squares(each, sizes) for each in changes]
+        if any(size > most for size, (_, most) in zip(moved, parts, strict=True)):
             slopes = []
         values = values + steps[0][: len(free)]
         own = [

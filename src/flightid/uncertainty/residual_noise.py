@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import scipy
@@ -21,7 +22,13 @@ from flightid.frozen import dataclass
 from flightid.recursive_filter import filtered_from, state_after
 from flightid.uncertainty.driven_noise import driven_products
 from flightid.uncertainty.fitted_directions import FittedDirections, WhiteNoiseLoss
-from flightid.uncertainty.periodograms import leaking, pooled, transform_length
+from flightid.uncertainty.periodograms import (
+    first_lags,
+    leaking,
+    pooled,
+    transform_length,
+    twice,
+)
 from flightid.uncertainty.slow_drift import Drift, apart, is_slow, n_slow_bins
 
 Array = NDArray[np.float64]
@@ -204,16 +211,17 @@ def autoregression(
     length = transform_length(n) if length is None else length
     model = _fitted(power, n, length)
     if known is None:
-        fast, drift = apart(model, power, n, length, lambda part: _fitted(part, n, length))
+        again = partial(_fitted, n=n, length=length, often=True)
+        fast, drift = apart(model, power, n, length, again)
         return replace(fast, drift=drift)
     for _ in range(SEPARATIONS):
         own = model.spectrum()
         share = own / np.maximum(own + known, np.finfo(float).tiny)
-        model = _fitted(share**2 * power + share * known, n, length)
+        model = _fitted(share**2 * power + share * known, n, length, often=True)
     return model
 
 
-def _fitted(power: Array, n: int, length: int) -> Autoregression:
+def _fitted(power: Array, n: int, length: int, *, often: bool = False) -> Autoregression:
     """Stable autoregression of a periodogram.
 
     A periodogram that a fit's share was given back to can be negative somewhere: then it is no
@@ -221,17 +229,12 @@ def _fitted(power: Array, n: int, length: int) -> Autoregression:
     What is negative is cut off there; of a power all reflections are below one.
     """
     largest = min(LARGEST_ORDER, n // 20)
-    lags = _lags(power, length, largest)
+    lags = first_lags(power, length, largest, often=often)
     weights, sound = autoregression_weights(lags, n)
     if not sound:
-        lags = _lags(np.maximum(power, 0.0), length, largest)
+        lags = first_lags(np.maximum(power, 0.0), length, largest)
         weights, _ = autoregression_weights(lags, n)
     return Autoregression(lags, weights, n, length)
-
-
-def _lags(power: Array, length: int, largest: int) -> Array:
-    """Autocovariance at lags 0 to `largest` from a zero-padded periodogram."""
-    return np.asarray(scipy.fft.irfft(power, length)[: largest + 1])
 
 
 def noise_models(
@@ -294,7 +297,7 @@ def _white_models(
     First lags and slowest bins of a periodogram tell a white model.
     """
     count, bins = min(LARGEST_ORDER, total // 20) + 1, n_slow_bins(total, length)
-    lags = np.array([_lags(power, length, count - 1) for power in seen])
+    lags = np.array([first_lags(power, length, count - 1) for power in seen])
     slow, directions = seen[:, :bins], None
     models = _all_white(lags, slow, total, length)
     for _ in range(RESTORATIONS):
@@ -330,7 +333,7 @@ def _lost(
     """
     length = models[0].length
     spectra = [model.spectrum() for model in models]
-    weights = [_both(_twice(length) * each / length) for each in spectra]
+    weights = [_both(twice(length) * each / length) for each in spectra]
     inner = [
         np.sum(
             [_squared(e, w, m.is_white) for e, w, m in zip(parts, weights, models, strict=True)],
@@ -382,12 +385,3 @@ def _transform(columns: Array, length: int) -> Array:
 def _both(weights: Array) -> Array:
     """Weights of bins for the real and the imaginary part of each."""
     return np.repeat(weights, 2)
-
-
-def _twice(length: int) -> Array:
-    """How often each bin of a real transform stands in the whole one."""
-    twice = np.full(length // 2 + 1, 2.0)
-    twice[0] = 1.0
-    if length % 2 == 0:
-        twice[-1] = 1.0
-    return twice

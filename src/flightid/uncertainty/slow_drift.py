@@ -169,8 +169,9 @@ def _parted(
         other, own = fast.spectrum(), variance * shape
         share = own / np.maximum(other + own, _TINY)
         mixed = share * other
-        slow = share**2 * whole + mixed
-        fast = fitted((1.0 - share) ** 2 * whole + mixed)
+        slow = share * share * whole + mixed
+        rest = 1.0 - share
+        fast = fitted(rest * rest * whole + mixed)
         total = 2.0 * np.sum(slow) - slow[0] - (2.0 - ends) * slow[-1]
         before, variance = variance, float(total) / length
         if abs(variance - before) <= SETTLED * before:
