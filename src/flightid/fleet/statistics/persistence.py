@@ -25,10 +25,10 @@ LIKELIER = 3.0
 """Twice the logarithm of the ratio of likelihoods from which days go on: of independent ones one
 fleet in twenty has as much."""
 FEW_DAYS, LIKELIER_OF_FEW = 16, 1.0
-"""Days of a vehicle below which they hardly tell, and the same for those: from there on they may go
-on. With `LIKELIER` 7 of 60 fleets of twelve days that go on, by 0.5 at 4 % and by 0.9 at 5 %, had a
-red vehicle each; of 10 independent vehicles a quarter of the steps of 5 %, and one in ten of those
-of 10 %, are told as what may be days that go on."""
+"""Days of several flights below which they hardly tell, and the same for those: from there on they
+may go on. With `LIKELIER` 7 of 60 fleets of twelve days that go on, by 0.5 at 4 % and by 0.9 at
+5 %, had a red vehicle each; of 10 independent vehicles a quarter of the steps of 5 %, and one in
+ten of those of 10 %, are told as what may be days that go on."""
 FEWEST_VOICES = 5
 """Vehicles without a change that this takes: of fewer chance often has as much."""
 KEPT = 11.5
@@ -114,6 +114,8 @@ class DaySeries:
         What may have any size: a level, and the steps of events.
     change : ndarray, shape (d, m)
         The same with the largest step and the steadiest movement; `level` where nothing changed.
+    flights : int
+        On all days.
     """
 
     vehicle: str
@@ -121,6 +123,7 @@ class DaySeries:
     variances: Array
     level: Array
     change: Array
+    flights: int
 
 
 def persistence(
@@ -172,8 +175,7 @@ def persistence(
     best = max(each[2] for each in grid)
     kept = sum(each.vehicle in changed for each in series)
     likelier, apart = 2.0 * (best - none[0]), none[2] - KEPT * kept
-    few = float(np.median([len(each.values) for each in series])) < FEW_DAYS
-    few &= len(series) - kept >= FEWEST_VOICES
+    few = _are_few(series) and len(series) - kept >= FEWEST_VOICES
     needed = LIKELIER_OF_FEW if few else LIKELIER
     found = [
         Persistence(c, r, max(1.0, factor), likelier, typical, whole - KEPT * kept, apart, needed)
@@ -181,6 +183,12 @@ def persistence(
         if 2.0 * (best - value) <= caution
     ]
     return max(found, key=lambda each: each.long_run)
+
+
+def _are_few(series: Sequence[DaySeries]) -> bool:
+    """Whether days are few, beside the flights on them that tell what days differ by."""
+    days = [len(each.values) for each in series]
+    return float(np.median(days)) < FEW_DAYS and sum(e.flights for e in series) > 1.5 * sum(days)
 
 
 def changed_vehicles(asked: Sequence[AskedHistory]) -> frozenset[str]:
@@ -244,8 +252,9 @@ def _days(asked: AskedHistory, has_changed: bool) -> DaySeries | None:
     variances = day_variances(asked)[np.unique(day, return_index=True)[1]]
     level = np.column_stack([np.ones(len(day)), asked.known])
     change = np.column_stack([level, *changes(asked)]) if has_changed else level
-    both = (_apart(weights @ each) for each in (level, change))
-    return DaySeries(asked.history.vehicle, weights @ asked.values, variances, *both)
+    level, change = (_apart(weights @ each) for each in (level, change))
+    values = weights @ asked.values
+    return DaySeries(asked.history.vehicle, values, variances, level, change, len(day))
 
 
 def typical_variance(series: Sequence[DaySeries]) -> float:
