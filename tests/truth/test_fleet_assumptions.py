@@ -372,7 +372,7 @@ def test_what_goes_on_in_one_parameter_or_on_few_days_may_go_on() -> None:
 
 @pytest.mark.slow
 def test_few_fleets_of_few_days_that_go_on_alarm() -> None:
-    """Of 60 each 7 and 11 did, in 120 now 6; of two parameters 11 of 40, 1 of 60."""
+    """Of 60 fleets 7 did, of 200 now 13; of two parameters 11 of 40, and 4 of 100."""
     alone = [_drift(seed, 10, 24, a_day=2, days=0.05, memory=0.9) for seed in range(40)]
     assert sum(bool(each.alarms) for each in alone) <= 5
     assert sum(bool(_of_two(seed).alarms) for seed in range(40)) <= 4
