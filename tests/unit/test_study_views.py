@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,10 +13,13 @@ import pytest
 pytest.importorskip("fastapi", reason="the extra app is not installed")
 
 import flightid as fid
-from flightid.app import filter_work, work
+from flightid.app import compare_work, filter_work, work
 from flightid.app.pyramid import Pyramid
 from flightid.app.study_edits import KeyEdit, edited, parts_of
+from flightid.conventions import Light
 from flightid.errors import FlightidError
+from flightid.findings import Finding
+from flightid.review.next_step import FlownStep
 from flightid.study.faults import Faults
 from flightid.study.settings import read_settings
 from flightid.study.stage_runner import StageRunner
@@ -99,3 +104,25 @@ def test_a_study_refuses_views_that_name_nothing(tmp_path: Path, said: str, refu
     study.write_text(f'{head}[[record]]\nname = "a"\npath = "a.csv"\n{said}\n', encoding="utf-8")
     with pytest.raises(FlightidError, match="of a log, and there is none"):
         read_settings(study)
+
+
+def test_the_page_says_what_a_comparison_left_to_fly_as_the_command_does(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Twenty numbers as promised, one loop not judged: nothing "of it could be judged", it said."""
+    log: Any = SimpleNamespace(sid_runs=[1])
+    monkeypatch.setattr(compare_work, "kept_log", lambda _: log)
+    action = "fly a minute of quick moves of the roll stick by 13 deg at once"
+    beyond = Finding("beyond", Light.UNKNOWN, "roll attitude: not compared", f"{action}, and …")
+    loop = SimpleNamespace(name="roll attitude", action=action)
+    made: Any = SimpleNamespace(
+        findings=(Finding("promise-kept", Light.GREEN, "20 numbers"), beyond),
+        kept=None, changes=(), before=(loop,), after=(loop,),
+    )  # fmt: skip
+    step = FlownStep(tmp_path / "gains-1.param", tmp_path / "gains-2.param", None)
+    *_, left, last = compare_work._with_next(made, step, tmp_path / "step-1.bin")
+    assert left.action == ""
+    assert last.message == (
+        "step-1.bin flew gains-1.param; what was judged is as promised, not judged: roll attitude"
+    )
+    assert last.action.startswith(f"load gains-1.param and {action}; then drop its log here")

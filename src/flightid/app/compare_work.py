@@ -24,16 +24,16 @@ from flightid.app.overview import light_of, step_curve
 from flightid.app.study_reach import draft_inside
 from flightid.app.work import KEPT, kept_log
 from flightid.files import sha256_of_file
-from flightid.findings import worst
+from flightid.findings import Finding, worst
 from flightid.planning.plan import plan_flight
 from flightid.planning.result import DEGREES, AxisSweep, SweepPlan
 from flightid.report.flight_card import card_html
 from flightid.review.before_after import compare_flights, compare_with_promise
 from flightid.review.changes import LoopChange
-from flightid.review.comparison import FlightComparison
+from flightid.review.comparison import FlightComparison, unheld
 from flightid.review.flight import review_flight
 from flightid.review.flight_state import FlightState
-from flightid.review.next_step import FlownStep, flown_step
+from flightid.review.next_step import FlownStep, flown_step, left_to_fly
 from flightid.study.gain_preview import preview_fits
 from flightid.uncertainty.estimate import Reading
 
@@ -66,9 +66,27 @@ def make_comparison(
             (folder / each["name"]).write_text(each["text"], encoding="utf-8")
         step = flown_step([folder], kept_log(after).parameters)
         if step is not None:
-            plain = FlownStep(Path(step.flown.name), _named(step.following), _named(step.back))
-            made = replace(made, findings=(*made.findings, plain.finding(kept=made.kept)))
+            made = replace(made, findings=_with_next(made, step, after))
         return _part(made, step).model_dump()
+
+
+def _with_next(made: FlightComparison, step: FlownStep, after: Path) -> tuple[Finding, ...]:
+    """Verdicts with what to do after the step that a log flew, as the command says it."""
+    plain = FlownStep(Path(step.flown.name), _named(step.following), _named(step.back))
+    to_fly = left_to_fly(made)
+    found = plain.finding(
+        kept=made.kept,
+        to_fly=to_fly,
+        log=after.name,
+        again="drop its log here",
+        swept=bool(kept_log(after).sid_runs),
+    )
+    said = made.findings
+    if to_fly and made.kept is not False:
+        # The last line says what to fly for all of them.
+        left = unheld(made)
+        said = tuple(replace(each, action="") if each in left else each for each in said)
+    return (*said, found)
 
 
 def _named(path: Path | None) -> Path | None:
