@@ -162,3 +162,19 @@ def test_alike_parts_have_one_degree_of_freedom_less_than_they_are() -> None:
     assert _freedom(np.array([1.0, 0.0])) == 1.0
     assert _freedom(np.zeros(3)) == 1.0  # nothing is told
     assert _freedom(np.array([0.9, 0.05, 0.05])) < 1.1
+
+
+def test_a_parameter_that_a_record_does_not_see_leaves_its_halves_alone() -> None:
+    slopes = np.random.default_rng(7).standard_normal((2, 40, 2))
+    unseen = np.concatenate([slopes, np.zeros((2, 40, 1))], axis=2)
+    nothing, residual = np.zeros((2, 40, 0)), np.zeros((2, 40))
+    with np.errstate(all="raise"):
+        halves = [RecordBlock.of(each, nothing, residual).middle for each in (slopes, unseen)]
+    assert halves[0] == halves[1]
+
+
+def test_rounding_below_zero_is_no_noise_of_a_parameter() -> None:
+    noise = np.einsum("kl,ij->kilj", np.eye(2), np.diag([1.0, -1e-18]))
+    part = RecordParts(np.zeros((2, 2)), np.stack([np.diag([1.0, 0.0])] * 2), noise)
+    with np.errstate(all="raise"):
+        assert chance_alike([part], np.inf) is not None

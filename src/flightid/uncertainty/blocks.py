@@ -191,9 +191,8 @@ def _information(slopes: Array) -> Array:
     square = slopes.T @ slopes
     size = np.sqrt(np.diag(square))
     seen = size > 0.0
-    sizes, axes = np.linalg.eigh(
-        (square / np.where(seen, np.outer(size, size), 1.0))[seen][:, seen]
-    )
+    unit = size[seen]
+    sizes, axes = np.linalg.eigh(square[np.ix_(seen, seen)] / unit[:, None] / unit)
     kept = sizes > LEAST_INFORMATION
     turn = np.zeros((len(size), int(kept.sum())))
     turn[seen] = axes[:, kept] / np.sqrt(sizes[kept]) / size[seen, None]

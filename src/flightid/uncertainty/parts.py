@@ -97,8 +97,9 @@ def chance_alike(flights: Sequence[RecordParts], freedom: float) -> float | None
     """
     if not flights or not flights[0].scores.shape[1]:
         return None
-    scale = np.sqrt(sum(np.einsum("kiki->i", each.noise) for each in flights))
-    scale = np.where(scale > 0.0, scale, 1.0)
+    # A parameter that no part sees has no noise, by rounding below zero.
+    total = sum(np.einsum("kiki->i", each.noise) for each in flights)
+    scale = np.sqrt(np.where(total > 0.0, total, 1.0))
     square, rank = 0.0, 0
     bent, pulled = 0.0, 0.0
     for each in flights:
