@@ -111,7 +111,7 @@ def test_a_slower_loop_is_amber_and_its_way_back_is_not(
     assert found.light is Light.AMBER
     assert "worse: " in found.action
     assert "rise time" in found.action
-    quick = replace(slower.before[0], moved=3.0 * (slower.before[0].moved or 0.0))
+    quick = replace(slower.before[0], asked=3.0 * (slower.before[0].asked or 0.0))
     again = compare_loops((quick,), (slower.before[0],), ("a", "b"), promised=False)
     assert [f.light for f in again.findings] == [Light.UNKNOWN]
     assert_close(
@@ -186,6 +186,15 @@ def test_large_moves_of_an_angle_are_not_held_against_small_ones(tmp_path: Path)
     assert low < truth < high
     assert "ATC_ACCEL_R_MAX makes the angle controller" in loops["some"].how
     assert not loops["some"].is_bent
+    # 521 % had been the whole flight's error over the set-point of its small moves alone.
+    flight = fid.read_log(log).table("ANG")
+    wanted, got = (np.asarray(flight[name], dtype=float) for name in ("DesRoll", "Roll"))
+    twice = (loops["some"],), (loops["some"],), ("a", "b")
+    share = compare_loops(*twice, promised=False)[f"roll attitude, {TRACKING}"].before.value
+    assert_close(
+        share or 0.0, 100.0 * np.sqrt(np.mean((got - wanted) ** 2)) / np.std(wanted),
+        rtol=0.03, why="the log's first and last seconds are not in the air",
+    )  # fmt: skip
     large = loops["all"]
     assert large.is_bent
     assert (large["delay to half"].interval95 or (0.0, 0.0))[0] > 1.1 * truth

@@ -269,8 +269,8 @@ def _readings(loop: LoopResponse, end_s: float) -> dict[str, Reading]:
     found = {r.name: r for r in step_features(*_until(loop, end_s)) if r.name in SHOWN}
     found |= {r.name: r for r in loop.readings if r.name.startswith((GAIN, BANDWIDTH))}
     found |= {r.name: r for r in loop.readings if r.name == QUICK[0] and is_too_quick(r)}
-    if loop.tracking is not None and loop.moved:
-        found[TRACKING] = loop.tracking.scaled(100.0 / loop.moved, name=TRACKING, unit="%")
+    if loop.tracking is not None and loop.asked:
+        found[TRACKING] = loop.tracking.scaled(100.0 / loop.asked, name=TRACKING, unit="%")
     return found
 
 

@@ -35,9 +35,9 @@ class LoopResponse(
     pieces : int
         Unbroken pieces of the flight.
     moved : float or None
-        Standard deviation of the set-point, rad/s or rad.
+        Standard deviation of the set-point where the step was read, rad/s or rad.
     tracking : Estimate or None
-        Root mean square of what was measured less the set-point, in the same unit.
+        Root mean square of what was measured less the set-point, in the same unit, of all pieces.
     time_s, step : ndarray, shape (n,)
         Answer to a step of the set-point by 1; empty where `reason` says why.
     draws : ndarray, shape (n_draws, n)
@@ -55,6 +55,8 @@ class LoopResponse(
         Whether the step holds such moves: it is slower than that of small ones.
     proportional_rad : float or None
         Error up to which the angle controller is proportional, where parameters end it.
+    asked : float or None
+        Standard deviation of the set-point over the samples of `tracking`, in the same unit.
 
     Example
     -------
@@ -81,6 +83,7 @@ class LoopResponse(
     beyond: str = ""
     is_bent: bool = False
     proportional_rad: float | None = None
+    asked: float | None = None
 
     @property
     def name(self) -> str:

@@ -116,7 +116,8 @@ def _loop(log: Log, spans: tuple[Span, ...], axis: str, loop: str) -> LoopRespon
     unfit = _uneven(pair, spans) or ("" if pieces else "no span in the air of 2 s holds both")
     if unfit:
         return replace(blank, reason=unfit, action=logging(log))
-    begun = replace(blank, tracking=tracking_error(pieces, "rad/s" if loop == "rate" else "rad"))
+    tracking = tracking_error(pieces, "rad/s" if loop == "rate" else "rad")
+    begun = replace(blank, tracking=tracking, asked=_spread(pieces))
     law = bounded_law(log, axis) if loop == "attitude" else None
     if law is None:
         return _read(log, begun, pieces)
@@ -229,6 +230,12 @@ def _samples(pieces: list[Record], fastest_hz: float) -> LoopSamples:
     ahead = joined("attitude") if "attitude" in pieces[0].channels else None
     lengths = tuple(len(range(0, piece.n_samples, every)) for piece in pieces)
     return LoopSamples(joined("set_point"), joined("measured"), ahead, lengths, step_s)
+
+
+def _spread(pieces: Sequence[Record]) -> float:
+    """Standard deviation of the set-point about its mean in each piece."""
+    asked = [np.asarray(piece["set_point"]) for piece in pieces]
+    return float(np.concatenate([each - each.mean() for each in asked]).std())
 
 
 def tracking_error(pieces: Sequence[Record], unit: str) -> Reading:
