@@ -20,6 +20,7 @@ from flightid.conventions import Light
 from flightid.dynamics.conditions.ratios import difference_of
 from flightid.errors import DataError
 from flightid.files import sha256_of_file
+from flightid.findings import said_once
 from flightid.plot.flight import compared_steps
 from flightid.review.changes import (
     TRACKING,
@@ -109,8 +110,16 @@ def test_a_slower_loop_is_amber_and_its_way_back_is_not(
     slower = fid.compare_flights(reviews["after"], reviews["before"])
     found = next(f for f in slower.findings if f.message.startswith("roll rate"))
     assert found.light is Light.AMBER
-    assert "worse: " in found.action
-    assert "rise time" in found.action
+    assert "rise time" in found.message.partition("; worse: ")[2]
+    # What is to be done is told once, of the first: it had held what got worse of each.
+    pitch = replace(
+        next(c for c in slower.changes if c.key == "roll rate, rise time"), loop="pitch"
+    )
+    both = [replace(pitch, loop="roll"), replace(pitch, name="delay to half")]
+    told = said_once(verdicts(both, [each.key for each in both]))
+    assert [str(e).partition("; worse: ")[2].split(" — ")[0] for e in told] == [
+        "rise time", "delay to half",
+    ]  # fmt: skip
     quick = replace(slower.before[0], asked=3.0 * (slower.before[0].asked or 0.0))
     again = compare_loops((quick,), (slower.before[0],), ("a", "b"), promised=False)
     assert [f.light for f in again.findings] == [Light.UNKNOWN]
@@ -269,7 +278,7 @@ def test_what_intervals_show_to_be_worse_is_not_green_and_the_tolerance_is_print
     assert not change.is_material
     (found,) = verdicts([change], [change.key])
     assert found.light is Light.UNKNOWN
-    assert "5 points of overshoot: overshoot" in found.action
+    assert "5 points of overshoot: overshoot" in found.message
     (kept,) = verdicts([change], [change.key], promised=True)
     assert "but for 1 that changed by less than what counts (10 % of a number, 5 p" in kept.message
     (back,) = verdicts([change_of("yaw attitude", more, less)], [change.key])

@@ -204,7 +204,7 @@ def verdicts(
         said = "; ".join(each.words for each in found)
         if promised:
             yield Finding(
-                "promise-missed", Light.AMBER, f"{loop}, promised → flown: {said}",
+                "promise-missed", Light.AMBER, f"{loop}, promised → flown: {said}: not as promised",
                 "look at the steps before you fly more",
             )  # fmt: skip
         else:
@@ -238,6 +238,7 @@ def _changed(
     What models promised of the new gains is held against the promise, not against the older gains.
     """
     if bent:
+        said += "; moved beyond what its controller is proportional to"
         action = "compare flights whose sticks moved as far: the angle controller answers large "
         return Finding("loop-changed", Light.UNKNOWN, said, action + "moves more slowly than small")
     worse = [each.name for each in found if each.is_worse]
@@ -247,13 +248,14 @@ def _changed(
         little = [each.name for each in found if each.is_slightly_worse]
         if not little:
             return Finding("loop-changed", Light.GREEN, said)
-        action = f"worse beyond chance, by less than {TOLERANCE}: {', '.join(little)}; weigh it"
-        return Finding("loop-changed", Light.UNKNOWN, said, action)
+        said += f"; worse beyond chance, by less than {TOLERANCE}: {', '.join(little)}"
+        return Finding("loop-changed", Light.UNKNOWN, said, "weigh it")
+    said += f"; worse: {', '.join(worse)}"
     if worse == [TRACKING]:
         action = "compare flights whose sticks moved alike: quicker sticks are tracked worse"
         return Finding("loop-changed", Light.UNKNOWN, said, action)
-    action = f"worse: {', '.join(worse)}; look at the loops and at what was set otherwise, and go "
-    return Finding("loop-changed", Light.AMBER, said, action + "back unless you wanted it")
+    action = "look at the loops and at what was set otherwise, and go back unless you wanted it"
+    return Finding("loop-changed", Light.AMBER, said, action)
 
 
 def _beside(said: str, worse: Sequence[str], promise: ExpectedLoop) -> Finding:
