@@ -29,7 +29,7 @@ from flightid.review.changes import (
     change_of,
     verdicts,
 )
-from flightid.review.comparison import compare_loops
+from flightid.review.comparison import compare_loops, expected, unheld
 from flightid.review.flight_state import FlightState
 from flightid.review.loop_response import LoopResponse
 from flightid.review.next_step import FlownStep, flown_step, left_to_fly
@@ -437,6 +437,25 @@ def test_a_study_of_another_vehicle_is_told_and_nothing_is_praised(
     new = replace(state, told={**state.told, "firmware": "V4"})
     later = fid.compare_with_promise([model], log, review=flown, state=new)
     assert (later.findings[0].light, later.kept) == (Light.AMBER, True)
+    # A filter of the study's flight that this one lacks had read as gains to go back from.
+    low_pass = state.gyro[0] if state.gyro else None
+    assert low_pass is not None
+    slow = replace(low_pass, settings="two poles at 20 Hz", rate_hz=low_pass.rate_hz / 4.0)
+    filtered = replace(state, gyro=(slow,))
+    assert state.other_filters(replace(state, gyro=(replace(low_pass, settings="as good"),))) == {}
+    truer = fid.compare_with_promise([model], log, review=flown, state=filtered)
+    assert truer.filters == {low_pass.name: (slow.settings, low_pass.settings)}
+    wrong = model.with_values({"Ltphi": 2.5 * model.parameters["Ltphi"].value})
+    missed = fid.compare_with_promise([wrong], log, review=flown, state=filtered)
+    assert [each.light for each in missed.findings[:2]] == [Light.AMBER, Light.UNKNOWN]
+    assert slow.settings in missed.findings[0].message
+    assert missed.kept is None
+    flew = FlownStep(log, None, log.with_suffix(".rollback"))
+    next_ = flew.finding(kept=missed.kept, otherwise=missed.set_otherwise)
+    assert "rollback" not in next_.action
+    assert f"set {low_pass.name} as before" in next_.action
+    assert not expected(missed)
+    assert missed.findings[0] in unheld(missed)
     others = ({"vehicle": "px4 plane"}, Light.RED), ({"autopilot": "Cube 1"}, Light.AMBER)
     for told, light in others:
         seen = replace(flown, identity=replace(flown.identity, board="Cube 2"))

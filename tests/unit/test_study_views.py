@@ -117,7 +117,7 @@ def test_the_page_says_what_a_comparison_left_to_fly_as_the_command_does(
     loop = SimpleNamespace(name="roll attitude", action=action)
     made: Any = SimpleNamespace(
         findings=(Finding("promise-kept", Light.GREEN, "20 numbers"), beyond),
-        kept=None, changes=(), before=(loop,), after=(loop,),
+        kept=None, changes=(), before=(loop,), after=(loop,), set_otherwise=(),
     )  # fmt: skip
     step = FlownStep(tmp_path / "gains-1.param", tmp_path / "gains-2.param", None)
     *_, left, last = compare_work._with_next(made, step, tmp_path / "step-1.bin")
@@ -126,3 +126,6 @@ def test_the_page_says_what_a_comparison_left_to_fly_as_the_command_does(
         "step-1.bin flew gains-1.param; what was judged is as promised, not judged: roll attitude"
     )
     assert last.action.startswith(f"load gains-1.param and {action}; then drop its log here")
+    made.set_otherwise = ("INS_GYRO_FILTER",)
+    *_, last = compare_work._with_next(made, step, tmp_path / "step-1.bin")
+    assert last.action.startswith("set INS_GYRO_FILTER as before and fly gains-1.param again")

@@ -80,6 +80,7 @@ def _with_next(made: FlightComparison, step: FlownStep, after: Path) -> tuple[Fi
         log=after.name,
         again="drop its log here",
         swept=bool(kept_log(after).sid_runs),
+        otherwise=made.set_otherwise,
     )
     said = made.findings
     if to_fly and made.kept is not False:

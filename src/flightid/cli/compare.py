@@ -279,6 +279,7 @@ def _with_step(
         log=log.path.name,
         again=f"flightid compare {' '.join(map(quote, models))} LOG",
         swept=bool(log.sid_runs),
+        otherwise=promise.set_otherwise,
     )
     if to_fly and promise.kept is not False:
         # The last line says what to fly for all of them.

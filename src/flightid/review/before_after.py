@@ -105,9 +105,17 @@ def compare_with_promise(
     names = "the models", log.path.name
     promise = promised_loops(sources, log)
     flown = review or review_flight(log)
-    unlike = {} if state is None else state.unlike(FlightState.of(flown))
-    limits = loops_in_doubt(flown)
-    return compare_loops(promise, flown.loops, names, unlike=unlike, promised=True, limits=limits)
+    now = FlightState.of(flown)
+    known = now if state is None else state
+    return compare_loops(
+        promise,
+        flown.loops,
+        names,
+        filters=known.other_filters(now),
+        unlike=known.unlike(now),
+        promised=True,
+        limits=loops_in_doubt(flown),
+    )
 
 
 def _review(flown: Flown) -> FlightReview:

@@ -38,6 +38,7 @@ MATERIAL_SHARE, MATERIAL_OVERSHOOT = 0.1, 5.0
 model's simplification alone moves numbers by a few percent, which its covariance does not hold."""
 TOLERANCE = f"{100 * MATERIAL_SHARE:g} % of a number, {MATERIAL_OVERSHOOT:g} points of overshoot"
 IN_MILLISECONDS = 1e3
+MISSED = "promise-missed"
 NO_INTERVAL = "the difference has no interval"
 
 
@@ -204,7 +205,7 @@ def verdicts(
         said = "; ".join(each.words for each in found)
         if promised:
             yield Finding(
-                "promise-missed", Light.AMBER, f"{loop}, promised → flown: {said}: not as promised",
+                MISSED, Light.AMBER, f"{loop}, promised → flown: {said}: not as promised",
                 "look at the steps before you fly more",
             )  # fmt: skip
         else:

@@ -16,6 +16,7 @@ from flightid.findings import Finding, said_once
 from flightid.frozen import dataclass
 from flightid.result import Result
 from flightid.review.changes import (
+    MISSED,
     TRACKING,
     ExpectedLoop,
     LoopChange,
@@ -24,7 +25,7 @@ from flightid.review.changes import (
     significant_of,
     verdicts,
 )
-from flightid.review.flight_state import OTHERS
+from flightid.review.flight_state import MOTORS, OTHERS
 from flightid.review.loop_response import LoopResponse
 from flightid.review.motors import LIMITS
 from flightid.review.step_features import BANDWIDTH, GAIN, creep, step_features
@@ -39,7 +40,8 @@ STEPS = "Steps of both are read over the time that both show"
 REACHED = "level and delay are of what is reached in it, no rise time is told that goes by its end"
 NO_MODEL = "none of them is of its rate"
 NOT_ALONE = "its set-point acts by more than the angle controller"
-CAUSES = (NOT_ALIKE, *LIMITS)
+OTHER_FILTERS = "other-filters"
+CAUSES = (NOT_ALIKE, OTHER_FILTERS, *LIMITS)
 """Findings that excuse a loop, and say nothing of it."""
 NONE: Mapping[str, tuple[Any, Any]] = MappingProxyType({})
 
@@ -93,6 +95,12 @@ class FlightComparison(Result, schema="flightid.flight_comparison/1"):
         if lights & {Light.AMBER, Light.RED}:
             return False
         return None if Light.UNKNOWN in lights else True
+
+    @property
+    def set_otherwise(self) -> tuple[str, ...]:
+        """What a promise rests on that was set otherwise in the flight: filters, motors' curve."""
+        curve = (MOTORS,) if MOTORS in self.unlike else ()
+        return (*self.filters, *curve) if self.promised else ()
 
     def __getitem__(self, name: str) -> LoopChange:
         """A change by ``"roll rate, rise time"``.
@@ -232,11 +240,15 @@ def compare_loops(
     if limits or any(each in unlike for each in OTHERS):
         judged = [replace(e, light=Light.UNKNOWN) if e.light is Light.GREEN else e for e in judged]
     unfit = [bent[loop.name] for loop in before if promised and loop.name in bent]
-    said = _unlike(unlike, names, promised=promised)
+    said = list(_unlike(unlike, names, promised=promised))
+    if promised and filters:
+        said.append(_other_filters(filters, names))
     findings = (*said, *limits, *judged, *map(_beyond, unfit))
-    return FlightComparison(
+    made = FlightComparison(
         names, promised, changes, before, after, gains, filters, unlike, kept, findings
     )
+    excused = tuple(_excused(each, made.set_otherwise) for each in findings)
+    return replace(made, findings=excused) if made.set_otherwise else made
 
 
 def _untold(name: str, loops: Iterable[LoopResponse]) -> str:
@@ -286,6 +298,8 @@ def _unsettled(one: LoopResponse, other: LoopResponse, end_s: float) -> bool:
 def expected(promise: FlightComparison | None) -> dict[str, ExpectedLoop]:
     """What models promised of each loop of a flight that it is held against."""
     found: dict[str, list[LoopChange]] = {}
+    if promise is not None and promise.set_otherwise:
+        promise = None  # Made for other settings, it excuses nothing and accuses nobody.
     for each in () if promise is None else promise.changes:
         if each.chance is not None:
             found.setdefault(each.loop, []).append(each)
@@ -300,14 +314,35 @@ def expected(promise: FlightComparison | None) -> dict[str, ExpectedLoop]:
 
 
 def unheld(promise: FlightComparison) -> tuple[Finding, ...]:
-    """What a promise was not held against, with what to fly for it."""
-    return tuple(each for each in promise.findings if each.light is Light.UNKNOWN)
+    """What a promise was not held against, with what to fly for it, or why it was not."""
+    return tuple(
+        each
+        for each in promise.findings
+        if each.light is Light.UNKNOWN or each.code == OTHER_FILTERS
+    )
 
 
 def _beyond(loop: LoopResponse) -> Finding:
     """That a promise, which is of small moves, is not held against large ones."""
     said = f"{loop.name}: not compared with what was promised of small moves: {loop.beyond}"
     return Finding("beyond-angle-law", Light.UNKNOWN, said, f"{loop.action}, and compare again")
+
+
+def _other_filters(filters: Mapping[str, tuple[str, str]], names: tuple[str, str]) -> Finding:
+    """That a promise was made for filters that the flight did not have."""
+    said = f"{names[0]} promise of other filters than {names[1]} flew: {_apart(filters)}"
+    action = (
+        f"set {', '.join(filters)} as it was promised for, or sweep with the new: flightid plan"
+    )
+    return Finding(OTHER_FILTERS, Light.AMBER, said, f"{action} {names[1]}")
+
+
+def _excused(found: Finding, otherwise: tuple[str, ...]) -> Finding:
+    """A missed promise that was made for other settings: not judged."""
+    if found.code != MISSED:
+        return found
+    said = f"{found.message} of other settings ({', '.join(otherwise)})"
+    return replace(found, light=Light.UNKNOWN, message=said, action="")
 
 
 def _apart(unlike: Mapping[str, tuple[str, str]]) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -48,6 +48,7 @@ class FlownStep:
         log: str = "LOG",
         again: str = "compare again",
         swept: bool = False,
+        otherwise: Sequence[str] = (),
     ) -> Finding:
         """What to do after this step, and with what command it goes on.
 
@@ -62,11 +63,19 @@ class FlownStep:
             Command that compares the promise with the next log.
         swept : bool
             Whether the log holds sweeps, of which models can be made anew.
+        otherwise : sequence of str
+            What was set otherwise than the models promised for: no reason to go back.
         """
         said = f"{log} flew {self.flown.name}"
+        anew = f"flightid {'tune' if swept else 'plan'} {log}"
+        if otherwise and kept is not True:
+            names = ", ".join(otherwise)
+            said += f" with other settings than were promised for ({names}): not judged"
+            action = f"set {names} as before and fly {self.flown} again, then {again}; to keep "
+            action += f"what is set, make models anew: {anew}"
+            return Finding("step-not-judged", Light.UNKNOWN, said, action)
         if kept is False:
             back = "the gains before it" if self.back is None else str(self.back)
-            anew = f"flightid {'tune' if swept else 'plan'} {log}"
             why = "its sweeps tell" if swept else "further sweeps will tell"
             action = f"load {back}; what the models missed {why}: {anew}"
             return Finding("step-back", Light.AMBER, f"{said}, and not as promised", action)
@@ -93,6 +102,8 @@ def left_to_fly(promise: FlightComparison) -> dict[str, str]:
     promise : FlightComparison
         Of `flightid.compare_with_promise`.
     """
+    if promise.set_otherwise:
+        return {}  # Those settings come first.
     judged = {each.loop for each in promise.changes if each.chance is not None}
     flown = {loop.name: loop.action for loop in promise.after}
     promised = [loop.name for loop in promise.before if loop.name not in judged]
