@@ -61,8 +61,9 @@ def test_each_vehicle_has_the_light_that_its_truth_asks_for(answers: FleetAnswer
     # What was told is no reason to look: README's fleet was red for a new motor.
     assert lights["v02"].message.startswith("v02: roll control power changed by +")
     assert re.search(
-        r" at the event “motor replaced”; beyond that no change \(80 % of such steps would be "
-        r"found: roll damping \d+ %, roll control power \d+(\.\d)? %\), like its type$",
+        r" at the event “motor replaced”; beyond that no change \(80 % of such steps, 3 flights "
+        r"or more on either side, would be found: roll damping \d+ %, roll control power "
+        r"\d+(\.\d)? %\), like its type$",
         lights["v02"].message,
     )
     sound = [each for name, each in lights.items() if name not in ("v00", "v01")]
@@ -203,7 +204,7 @@ def test_a_long_history_without_a_type_is_no_green_light() -> None:
     found = fleet_document(answer_questions(some)).findings
     (first, _) = [each for each in found if each.code == "vehicle"]
     assert first.light is Light.UNKNOWN
-    assert first.message.startswith("v03: no change (80 % of such steps would be found: roll")
+    assert first.message.startswith("v03: no change (80 % of such steps, 3 flights or more")
     assert "%); cannot tell whether it is like its type (" in first.message
 
 

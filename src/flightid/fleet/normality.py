@@ -6,12 +6,12 @@ change" says which one would have been found.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence
 
 from flightid.conventions import Light
 from flightid.findings import Finding, counted
 from flightid.fleet.statistics.answers import UNDATED, TypeAnswers
-from flightid.fleet.statistics.largest_step import FEWEST
+from flightid.fleet.statistics.largest_step import FEWEST, SHORTEST
 from flightid.fleet.statistics.least_step import POWER
 from flightid.fleet.statistics.parameter_history import ParameterHistory
 from flightid.uncertainty.estimate import Reading
@@ -20,6 +20,10 @@ WHOLE = 100.0
 """Percent of a level: where no smaller step would be found, nothing is said of change."""
 NAMED = 4
 """Parameters whose least step stands in a line; of more the smallest and the largest."""
+INSIDE = f", {SHORTEST} flights or more on either side,"
+"""Where steps are looked for: of those nearer to an end few are found, the newest by itself."""
+SEVERAL = 2
+"""Vehicles from which a parameter or a model is the type's, and newest flights that are a sign."""
 MORE = "log more flights of it, and of more vehicles of its type"
 
 
@@ -38,13 +42,15 @@ def quiet_light(vehicle: str, types: Iterable[TypeAnswers]) -> Finding:
         Green where every parameter of it was held beside its history and its type; unknown, with
         the reason, where a question that was asked has no answer.
     """
-    mine = [each for each in types if vehicle in each.data.members]
+    every = list(types)
+    mine = [each for each in every if vehicle in each.data.members]
     known, open_ = [], []
     seen = [(h, each) for each in mine for h in _judged(vehicle, each) if _is_seen(h)]
     if seen:
         known.append(f"no change{_seen_words(seen)}")
     for each in mine:
         open_ += [f"cannot tell {why}" for why in _unjudged(vehicle, each)]
+    open_ += [f"cannot tell of {why}" for why in _unfitted(vehicle, mine, every)]
     reasons = [_no_type(vehicle, each) for each in mine]
     missing = list(dict.fromkeys(each for each in reasons if each))
     if missing:
@@ -80,14 +86,15 @@ def _seen_words(seen: Sequence[tuple[ParameterHistory, TypeAnswers]]) -> str:
     said = [words for _, words in sizes]
     if len(said) > NAMED:
         said = [f"from {min(sizes)[1]} to {max(sizes)[1]}"]
-    return f" ({100.0 * POWER:.0f} % of such steps would be found: {', '.join(said)})"
+    return f" ({100.0 * POWER:.0f} % of such steps{INSIDE} would be found: {', '.join(said)})"
 
 
 def least_words(history: ParameterHistory) -> str:
     """The step of one parameter of which most would be found; empty where it was not asked."""
     if history.least_step is None:
         return ""
-    return f"{100.0 * POWER:.0f} % of steps by {_size(history.least_step)} would be found"
+    size = _size(history.least_step)
+    return f"{100.0 * POWER:.0f} % of steps by {size}{INSIDE} would be found"
 
 
 def _size(least: Reading) -> str:
@@ -108,9 +115,7 @@ def _unjudged(vehicle: str, each: TypeAnswers) -> Iterator[str]:
         yield f"whether it changed ({_too_few(vehicle, each, most)})"
         return
     flights = {one.name: len(one.values) for one in own}
-    asked = {one.name for one in each.drift.histories if one.false_share is not None}
-    missing = [name for name in each.data.names if name in asked | flights.keys()]
-    for name in missing:
+    for name in _of_type(each, flights):
         if name not in {one.name for one in judged}:
             label, few = each.labels.get(name, name), flights.get(name, 0)
             yield f"whether {label} changed ({_too_few_of(few)})"
@@ -118,6 +123,48 @@ def _unjudged(vehicle: str, each: TypeAnswers) -> Iterator[str]:
         if not _is_seen(one) and one.least_step is not None:
             label = each.labels.get(one.name, one.name)
             yield f"whether {label} changed (only steps above {_size(one.least_step)} would show)"
+
+
+def _of_type(each: TypeAnswers, own: Container[str]) -> list[str]:
+    """Parameters that a vehicle tells, and those that several of its type do."""
+    known, member = each.data.known, each.data.member_of
+    told = [len(set(member[known[:, i]])) for i in range(len(each.data.names))]
+    pairs = zip(each.data.names, told, strict=True)
+    return [name for name, several in pairs if name in own or several >= SEVERAL]
+
+
+def _unfitted(
+    vehicle: str, mine: Sequence[TypeAnswers], every: Sequence[TypeAnswers]
+) -> Iterator[str]:
+    """Models of its type that no flight of a vehicle tells, and what its newest one does not."""
+    types = {each.type_name for each in mine}
+    for each in every:
+        asked = each.drift is not None or each.outliers is not None or each.reasons
+        if each.type_name not in types or not asked:
+            continue
+        red = each.red.get(vehicle, 0)
+        if vehicle in each.data.members:
+            if each.newest_red.get(vehicle):
+                yield f"its newest flight, of which model “{each.model}” is red"
+        elif red:
+            yield f"model “{each.model}” (red in {red} of its {counted(red, 'flight')} with it)"
+        elif len(each.data.members) >= SEVERAL:
+            yield f"model “{each.model}” (none of its flights gives one that counts)"
+
+
+def newest_red_words(vehicle: str, each: TypeAnswers) -> str:
+    """Of a vehicle whose newest flights do not count, for their model is red; else empty.
+
+    A change that no model fits any more would otherwise be read as none.
+    """
+    newest = each.newest_red.get(vehicle, 0)
+    if newest < SEVERAL or not _judged(vehicle, each):
+        return ""
+    every = each.red[vehicle] + sum(name == vehicle for name in each.data.vehicles)
+    return (
+        f"model “{each.model}” is red in its newest {newest} flights, and in "
+        f"{each.red[vehicle]} of {every}: nothing tells whether it changed since"
+    )
 
 
 def _too_few_of(told: int) -> str:
@@ -145,8 +192,12 @@ def _no_type(vehicle: str, each: TypeAnswers) -> str | None:
     """Why a vehicle was not held beside its type; empty where it was, None where nobody asked."""
     if each.outliers is None:
         return "; ".join(_others(each.reasons)) or None
-    if any(one.vehicle == vehicle for one in each.outliers.vehicles):
-        return each.outliers.beside(vehicle)
+    every = {one.vehicle: [e.name for e in one.deviations] for one in each.outliers.vehicles}
+    if vehicle in every:
+        asked = dict.fromkeys(name for names in every.values() for name in names)
+        left = [each.labels.get(k, k) for k in asked if k not in every[vehicle]]
+        untold = f"its flights do not tell {', '.join(left)}" if left else ""
+        return each.outliers.beside(vehicle, each.labels) or untold
     return each.outliers.reason or "its flights tell none of its parameters"
 
 

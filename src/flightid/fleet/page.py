@@ -13,7 +13,7 @@ from flightid.fleet.drift_lights import (
     estimate_lights,
     shared_lights,
 )
-from flightid.fleet.normality import MORE
+from flightid.fleet.normality import INSIDE, MORE
 from flightid.fleet.pictures import history_picture, type_picture
 from flightid.fleet.reasons import grouped_reasons, reasons_table
 from flightid.fleet.statistics.answers import RED, FleetAnswers, Row, TypeAnswers, fitted_share
@@ -310,8 +310,9 @@ def least_steps_table(drift: FleetDrift, labels: Mapping[str, str]) -> Table:
         *(Column("least step", digits=2), Column("unit")),
     )
     note = (
-        f"Of lasting steps of this size, at any flight, {100.0 * POWER:.0f} % would be found, at "
-        "the level of the whole fleet; smaller ones may be there."
+        f"Of lasting steps of this size{INSIDE} {100.0 * POWER:.0f} % would be found, at the level "
+        "of the whole fleet; smaller ones, and such behind the first or before the last flights, "
+        "may be there."
     )
     left = len(told) - len(rows)
     notes = (note, *((f"The largest first; {left} more are not shown.",) if left else ()))

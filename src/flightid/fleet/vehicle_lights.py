@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from flightid.conventions import Light
 from flightid.findings import Finding
-from flightid.fleet.normality import quiet_light
+from flightid.fleet.normality import newest_red_words, quiet_light
 from flightid.fleet.statistics.answers import TypeAnswers
 from flightid.fleet.statistics.change_kind import DRIFT, STEP
 from flightid.fleet.statistics.events import EventEffect
@@ -30,18 +30,11 @@ def vehicle_light(vehicle: str, types: Sequence[TypeAnswers]) -> Finding:
                 shared = any(e.name == history.name and vehicle in e.vehicles for e in alike)
                 said[-1] += ", as the others did" if shared else ""
                 light = Light.AMBER if shared and light is not Light.RED else Light.RED
-        for history in each.drift.going_on if each.drift is not None else ():
-            if history.vehicle == vehicle:
-                said.append(going_on_words(history, each.labels))
-                light = Light.RED if light is Light.RED else Light.AMBER
-        for newest in each.drift.newest_off if each.drift is not None else ():
-            if newest.vehicle == vehicle:
-                said.append(newest.words(each.labels))
-                light = Light.RED if light is Light.RED else Light.AMBER
+        doubts = list(_doubts(vehicle, each))
         if each.outliers is not None:
-            unlike = each.outliers.differences(vehicle, each.labels)
-            said += unlike
-            light = Light.AMBER if unlike and light is not Light.RED else light
+            doubts += each.outliers.differences(vehicle, each.labels)
+        said += doubts
+        light = Light.AMBER if doubts and light is not Light.RED else light
     if not said:
         quiet = quiet_light(vehicle, types)
         if not done:
@@ -53,17 +46,31 @@ def vehicle_light(vehicle: str, types: Sequence[TypeAnswers]) -> Finding:
     return Finding("vehicle", light, f"{vehicle}: {'; '.join(said)}", act)
 
 
+def _doubts(vehicle: str, each: TypeAnswers) -> Iterator[str]:
+    """What of its flights may be a change, in words."""
+    if each.drift is None:
+        return
+    for history in each.drift.going_on:
+        if history.vehicle == vehicle:
+            yield going_on_words(history, each.labels)
+    for newest in each.drift.newest_off:
+        if newest.vehicle == vehicle:
+            yield newest.words(each.labels)
+    if lost := newest_red_words(vehicle, each):
+        yield lost
+
+
 def change_words(history: ParameterHistory, labels: Mapping[str, str]) -> str:
     """What changed, by how much, in words."""
     how = {STEP: " at once", DRIFT: " by and by, the last flight beside those before"}.get(
         history.kind, ""
     )
-    name, size = labels.get(history.name, history.name), _size_words(history.change_percent)
+    name, change = labels.get(history.name, history.name), history.change_percent
     explained = any(each.change.value is not None for each in history.events)
     beyond = ", beside what its events explain" if explained else ""
-    if _holds_zero(history.change_percent):
-        return f"{name} changed{how}{beyond}; by how much is not told:{size.removeprefix(' by')}"
-    return f"{name} changed{size}{how}{beyond}"
+    if _holds_zero(change):
+        return f"{name} changed{how}{beyond}; by how much is not told{_ends_words(change)}"
+    return f"{name} changed{_size_words(change)}{how}{beyond}"
 
 
 def going_on_words(history: ParameterHistory, labels: Mapping[str, str]) -> str:
@@ -95,7 +102,12 @@ def _holds_zero(change: Reading) -> bool:
 
 
 def _size_words(change: Reading) -> str:
-    ends = change.interval(shown())
     unit = "" if change.unit == "1" else f" {change.unit}"
     size = "" if change.value is None else f" by {change.value:+.2g}{unit}"
-    return size + ("" if ends is None else f" ({ends[0]:+.2g} to {ends[1]:+.2g}{unit})")
+    return size + _ends_words(change)
+
+
+def _ends_words(change: Reading) -> str:
+    ends = change.interval(shown())
+    unit = "" if change.unit == "1" else f" {change.unit}"
+    return "" if ends is None else f" ({ends[0]:+.2g} to {ends[1]:+.2g}{unit})"

@@ -49,6 +49,8 @@ class TypeAnswers:
         Parameters in words, where their models have them: ``"Lp"`` to ``"roll damping"``.
     red : mapping of str to int
         By vehicle: its flights of which this model is red, which count nowhere.
+    newest_red : mapping of str to int
+        By vehicle: how many of them follow the last flight with a date that counts.
     odd_flights : mapping of str to tuple of str
         By parameter: logs left out of the population (`without_odd_flights`), by file name.
     """
@@ -62,6 +64,7 @@ class TypeAnswers:
     reasons: tuple[str, ...] = ()
     labels: Mapping[str, str] = field(default_factory=dict)
     red: Mapping[str, int] = field(default_factory=dict)
+    newest_red: Mapping[str, int] = field(default_factory=dict)
     odd_flights: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
@@ -145,7 +148,10 @@ def answer_questions(
             one = replace(one, reasons=(*one.reasons, UNDATED))
         labels = told_apart({each["name"]: each.get("meaning") for each in mine})
         red = _red_flights(rows["parameters"], type_name, model)
-        answers.append(replace(one, labels=labels, red=red))
+        last = _last_flown(data.chosen(dated)) if dated.any() else {}
+        newest = Counter(str(e["vehicle"]) for e in red if _follows(e, last))
+        lost = Counter(str(each["vehicle"]) for each in red)
+        answers.append(replace(one, labels=labels, red=lost, newest_red=newest))
     nobody = tuple(events_of_nobody(events, {str(each["vehicle"]) for each in told}))
     return FleetAnswers(
         tuple(answers), tuple(rows["logs"]), undated, _red_models(rows), outdated=nobody
@@ -176,9 +182,24 @@ def _heads(rows: Sequence[Row]) -> dict[str, Row]:
     return found
 
 
-def _red_flights(rows: Sequence[Row], type_name: str, model: str) -> Counter[str]:
+def _red_flights(rows: Sequence[Row], type_name: str, model: str) -> list[Row]:
+    """First row of each flight of which a model is red."""
     mine = (e for e in rows if e["light"] == RED and (e["type"], e["model"]) == (type_name, model))
-    return Counter(str(head["vehicle"]) for head in _heads(list(mine)).values())
+    return list(_heads(list(mine)).values())
+
+
+def _last_flown(data: FlightEstimates) -> dict[str, float]:
+    """Start of the newest flight of each vehicle, s."""
+    found: dict[str, float] = {}
+    for vehicle, at in zip(data.vehicles, data.time_s.tolist(), strict=True):
+        found[vehicle] = max(at, found.get(vehicle, -np.inf))
+    return found
+
+
+def _follows(row: Row, last: Mapping[str, float]) -> bool:
+    """Whether a flight came after the last one that counts of its vehicle, if there is one."""
+    at = _instant(row)
+    return at is not None and at > last.get(str(row["vehicle"]), np.inf)
 
 
 def _instant(row: Row) -> float | None:

@@ -160,17 +160,18 @@ class FleetOutliers(Result, schema="flightid.fleet_outliers/1"):
         mine = (each for each in self.minorities if vehicle in each.vehicles)
         return [*odd, *(each.words(labels or {}, vehicle) for each in mine)]
 
-    def beside(self, vehicle: str) -> str:
+    def beside(self, vehicle: str, labels: Mapping[str, str] | None = None) -> str:
         """What hides whether a vehicle is like its type; empty where nothing does."""
         for name, *two in self.pairs:
             if vehicle in two:
                 other = next(each for each in two if each != vehicle)
-                return f"it and {other} are alike in {name}, and apart from all others"
+                named = (labels or {}).get(name, name)
+                return f"it and {other} are alike in {named}, and apart from all others"
         return ""
 
     def _said(self, each: VehicleNormality, labels: Mapping[str, str] | None) -> str:
         said = self.differences(each.vehicle, labels)
-        hidden = self.beside(each.vehicle)
+        hidden = self.beside(each.vehicle, labels)
         return "; ".join(said) or (f"cannot tell: {hidden}" if hidden else each.words(labels))
 
     @property

@@ -1,0 +1,44 @@
+"""Vehicles without an alarm: green only where every model and parameter of the type was judged."""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+import pytest
+
+from flightid.conventions import Light
+from flightid.fleet.page import fleet_vehicles
+from flightid.fleet.statistics.answers import answer_questions
+from tests.fleet_rows import fleet_rows
+
+UNKNOWN = Light.UNKNOWN
+SAID = {
+    "v02": (Light.GREEN, "like its type"),
+    "v03": (UNKNOWN, "model “pitch” (red in 10 of its 10 flights with it)"),
+    "v04": (UNKNOWN, "its newest flight, of which model “pitch” is red"),
+    "v05": (Light.AMBER, "model “pitch” is red in its newest 4 flights, and in 4 of 10"),
+    "v06": (UNKNOWN, "model “pitch” (none of its flights gives one that counts)"),
+    "v07": (UNKNOWN, "(its flights do not tell roll damping)"),
+}
+
+
+@pytest.mark.slow
+def test_nothing_that_was_not_judged_is_green() -> None:
+    """Of these v03, v05 and v06 were green, and v07 was called like its type."""
+    rows, other = fleet_rows(3, 8, 10), copy.deepcopy(fleet_rows(4, 8, 10))
+    pitch = [_spoilt(e | {"model": "pitch"}) for e in other["parameters"]]
+    told = (e for e in pitch if e["vehicle"] != "v06")
+    rows["parameters"] += [e for e in told if (e["vehicle"], e["name"]) != ("v07", "Lp")]
+    rows["covariances"] += [each | {"model": "pitch"} for each in other["covariances"]]
+    found = fleet_vehicles(answer_questions(rows, covariates=["battery"]))
+    assert {name: found[name].light for name in SAID} == {k: v[0] for k, v in SAID.items()}
+    for name, (_, words) in SAID.items():
+        assert words in found[name].message
+
+
+def _spoilt(row: dict[str, Any]) -> dict[str, Any]:
+    """Red in every flight of v03, in the newest of v04, and in the newest four of v05."""
+    since = {"v03": "2026-01-05", "v04": "2026-01-17T11", "v05": "2026-01-14"}
+    red = row["flown_at"] >= since.get(row["vehicle"], "2027")
+    return row | {"light": "red"} if red else row
