@@ -105,8 +105,9 @@ export const propose = (id: string, body: unknown) => json<ProposedStudy>(`/api/
 export const lastRun = (log: string) => json<RunScreen>(`/api/runs/${log}`);
 export const run = (log: string) => json<RunScreen>(`/api/runs/${log}`, sent("POST", {}));
 export const runFigure = (log: string, number: number) => json<{ data: object[]; layout: Record<string, any> }>(`/api/runs/${log}/figures/${number}`);
-export async function rigView(id: string, file: string, manoeuvre: string, series: string[], span: [number, number], columns: number, reading: Reading) {
+export async function rigView(id: string, file: string, manoeuvre: string, series: string[], span: [number, number], columns: number, reading: Reading, inputs: string[]) {
   const query = asked(reading);
+  for (const name of inputs) query.append("inputs", name);
   for (const name of series) query.append("series", name);
   for (const [key, value] of Object.entries({ file, manoeuvre, start_s: span[0], stop_s: span[1], columns: Math.max(10, Math.round(columns)) })) query.set(key, String(value));
   return rowsOf(await (await ask(`/api/records/${id}/view?${query}`)).arrayBuffer());

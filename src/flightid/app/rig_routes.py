@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import hashlib
 import math
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any
@@ -105,12 +106,16 @@ def add_rig_routes(app: FastAPI, backstage: Backstage) -> None:
         time_column: Annotated[str | None, Query(max_length=300)] = None,
         sample_time_s: Annotated[float | None, Query(gt=0.0)] = None,
         resample_to_s: Annotated[float | None, Query(gt=0.0)] = None,
+        inputs: Annotated[tuple[str, ...], Query(max_length=MOST_CHANNELS)] = (),
     ) -> Response:
         if not (math.isfinite(start_s) and math.isfinite(stop_s) and start_s < stop_s):
             raise HTTPException(422, "A span needs two instants, the first before the last.")
         path = _file(rigs, rig, file)
         told: dict[str, Any] = {"time_column": time_column, "sample_time_s": sample_time_s}
         options = _options(RigReading(**told, resample_to_s=resample_to_s))
+        if resample_to_s is not None:
+            # Between the rows an input is held and an output is not: as the study reads them.
+            options |= roles_of(series, inputs)
         levels = [await _levels(backstage, rig, path, manoeuvre, each, options) for each in series]
         table = await asyncio.to_thread(view, levels, (start_s, stop_s), columns)
         head = np.array(table.shape[::-1], np.float64)
@@ -135,6 +140,15 @@ async def _levels(
     work = (rig_work.make_rig_pyramid, path, manoeuvre, channel, options, target)
     await made(backstage.workers.live(*work))
     return await asyncio.to_thread(Pyramid.read, target)
+
+
+def roles_of(series: Sequence[str], inputs: Sequence[str]) -> dict[str, Any]:
+    """Roles of the channels of a view; all that are not inputs answer to them."""
+    sides = {
+        "inputs": [each for each in series if each in inputs],
+        "outputs": [each for each in series if each not in inputs],
+    }
+    return {side: sorted(set(names)) for side, names in sides.items() if names}
 
 
 def _options(reading: RigReading) -> dict[str, Any]:
