@@ -5,11 +5,16 @@ from __future__ import annotations
 import copy
 from typing import Any
 
+import numpy as np
 import pytest
 
 from flightid.conventions import Light
+from flightid.fleet.drift_lights import shared_lights
 from flightid.fleet.page import fleet_vehicles
-from flightid.fleet.statistics.answers import answer_questions
+from flightid.fleet.statistics.answers import TypeAnswers, answer_questions
+from flightid.fleet.statistics.drift import find_drift
+from flightid.fleet.statistics.flight_estimates import FlightEstimates
+from flightid.fleet.vehicle_lights import vehicle_light
 from tests.fleet_rows import fleet_rows
 
 UNKNOWN = Light.UNKNOWN
@@ -35,6 +40,25 @@ def test_nothing_that_was_not_judged_is_green() -> None:
     assert {name: found[name].light for name in SAID} == {k: v[0] for k, v in SAID.items()}
     for name, (_, words) in SAID.items():
         assert words in found[name].message
+
+
+def test_one_that_did_not_change_beside_all_others_is_said_to_be_that() -> None:
+    """All 6 of 6 "changed together" beside one that was red for the other way."""
+    rng, left = np.random.default_rng(1), np.repeat(np.arange(6), 12) == 5
+    behind = np.tile(np.arange(12), 6) >= 7
+    values = 140.0 * (1.0 + 0.02 * rng.normal(size=72)) * np.where(behind & ~left, 1.15, 1.0)
+    ids, time_s = np.repeat([*"abcdef"], 12).tolist(), 2.0 * 86400.0 * np.tile(np.arange(12.0), 6)
+    errors = np.full((72, 1, 1), 2.8**2)
+    data = FlightEstimates.of(["k"], ids, values[:, None], errors, time_s=time_s)
+    drift = find_drift(data)
+    answered = [TypeAnswers("quad", "roll", data, None, None, drift)]
+    (light,) = shared_lights(drift, {})
+    assert "most vehicles changed together by +1" in light.message
+    assert "(5 of 6 vehicles; f may be one that did not)" in light.message
+    found = vehicle_light("f", answered)
+    assert found.light is Light.RED
+    assert "beside what the others did: it may be one that did not change" in found.message
+    assert "a: no change beside what the others did (80 %" in vehicle_light("a", answered).message
 
 
 def _spoilt(row: dict[str, Any]) -> dict[str, Any]:

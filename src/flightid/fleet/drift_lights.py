@@ -42,7 +42,10 @@ def shared_lights(drift: FleetDrift, labels: Mapping[str, str]) -> tuple[Finding
         "from before and after, decide: it stayed, and each changed, or it moved, and the type did"
     )
     return (
-        *(Finding("shared-change", Light.AMBER, each.words(labels), act) for each in drift.shared),
+        *(
+            Finding("shared-change", Light.AMBER, each.words(labels, drift.apart(each)), act)
+            for each in drift.shared
+        ),
         *(Finding("moved-alike", Light.AMBER, each.words(labels), few) for each in drift.alike),
     )
 

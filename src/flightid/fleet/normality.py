@@ -47,7 +47,8 @@ def quiet_light(vehicle: str, types: Iterable[TypeAnswers]) -> Finding:
     known, open_ = [], []
     seen = [(h, each) for each in mine for h in _judged(vehicle, each) if _is_seen(h)]
     if seen:
-        known.append(f"no change{_seen_words(seen)}")
+        beside = " beside what the others did" if any(_is_shared(h, of) for h, of in seen) else ""
+        known.append(f"no change{beside}{_seen_words(seen)}")
     for each in mine:
         open_ += [f"cannot tell {why}" for why in _unjudged(vehicle, each)]
     open_ += [f"cannot tell of {why}" for why in _unfitted(vehicle, mine, every)]
@@ -69,6 +70,12 @@ def _judged(vehicle: str, each: TypeAnswers) -> list[ParameterHistory]:
     """Histories of a vehicle that were asked whether it changed."""
     histories = () if each.drift is None else each.drift.histories
     return [one for one in histories if one.vehicle == vehicle and one.false_share is not None]
+
+
+def _is_shared(history: ParameterHistory, each: TypeAnswers) -> bool:
+    """Whether what all vehicles did by date is out of a history."""
+    every = each.drift.shared if each.drift is not None else ()
+    return any(one.name == history.name for one in every)
 
 
 def _is_seen(history: ParameterHistory) -> bool:

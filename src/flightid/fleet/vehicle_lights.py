@@ -28,7 +28,7 @@ def vehicle_light(vehicle: str, types: Sequence[TypeAnswers]) -> Finding:
             if history.vehicle == vehicle:
                 said.append(change_words(history, each.labels))
                 shared = any(e.name == history.name and vehicle in e.vehicles for e in alike)
-                said[-1] += ", as the others did" if shared else ""
+                said[-1] += ", as the others did" if shared else _left_behind(history, each)
                 light = Light.AMBER if shared and light is not Light.RED else Light.RED
         doubts = list(_doubts(vehicle, each))
         if each.outliers is not None:
@@ -58,6 +58,15 @@ def _doubts(vehicle: str, each: TypeAnswers) -> Iterator[str]:
             yield newest.words(each.labels)
     if lost := newest_red_words(vehicle, each):
         yield lost
+
+
+def _left_behind(history: ParameterHistory, each: TypeAnswers) -> str:
+    """Where most changed, and a vehicle the other way beside them: what else that may be."""
+    every = each.drift.shared if each.drift is not None else ()
+    mine = [one for one in every if one.name == history.name]
+    if each.drift is None or not any(history.vehicle in each.drift.apart(one) for one in mine):
+        return ""
+    return ", beside what the others did: it may be one that did not change"
 
 
 def change_words(history: ParameterHistory, labels: Mapping[str, str]) -> str:

@@ -110,6 +110,14 @@ class FleetDrift(Result, schema="flightid.fleet_drift/1"):
         found = [each for each in self.histories if each.is_alarm]
         return tuple(sorted(found, key=lambda each: each.chance or 0.0))
 
+    def apart(self, shared: SharedLevel) -> tuple[str, ...]:
+        """Vehicles that changed the other way beside a shared step: they may not have changed."""
+        if not shared.is_step:
+            return ()
+        size = shared.change.value or 0.0
+        mine = (one for one in (*self.alarms, *self.going_on) if one.name == shared.name)
+        return tuple(one.vehicle for one in mine if size * (one.change_percent.value or 0.0) < 0.0)
+
     @property
     def going_on(self) -> tuple[ParameterHistory, ...]:
         """Histories that would have changed, were it not for days that go on."""
@@ -198,7 +206,7 @@ class FleetDrift(Result, schema="flightid.fleet_drift/1"):
         notes = (
             note,
             *((f"Flights far off those beside them count for less: {odd}.",) if odd else ()),
-            *(f"{each.words(named)}; no change of one." for each in self.shared),
+            *(f"{each.words(named, self.apart(each))}; no change of one." for each in self.shared),
             *(f"{each.words(named)}." for each in self.alike),
             *(f"{e.words(named.get(name, name))}." for name, e in self.persistent.items()),
             *(f"{each.vehicle}: {each.words(named)}." for each in self.newest_off),

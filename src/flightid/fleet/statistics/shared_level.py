@@ -7,7 +7,7 @@ itself.
 from __future__ import annotations
 
 import datetime
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -72,18 +72,26 @@ class SharedLevel:
     vehicles: int
     agreeing: int
 
-    def words(self, labels: Mapping[str, str]) -> str:
-        """What all did together; dates on the clock of Unix."""
+    def words(self, labels: Mapping[str, str], apart: Collection[str] = ()) -> str:
+        """What all did together, or most beside those that are apart; dates on the clock of Unix.
+
+        A vehicle without the change may move with the others by chance, and is apart all the same.
+        """
         name = labels.get(self.name, self.name)
         unit = "" if self.change.unit == "1" else f" {self.change.unit}"
-        whose = f"{self.agreeing} of {self.vehicles} vehicles"
+        count = min(self.agreeing, self.vehicles - len(apart))
+        whose = f"{count} of {self.vehicles} vehicles"
+        if apart:
+            some = "one" if len(apart) == 1 else "some"
+            whose += f"; {', '.join(sorted(apart))} may be {some} that did not"
+        who = "all" if count == self.vehicles else "most"
         if not self.is_step:
             ends = f"{self.least:+.2g} to {self.most:+.2g}{unit} of its usual value"
-            return f"{name}: all vehicles moved together by date, {ends} ({whose})"
+            return f"{name}: {who} vehicles moved together by date, {ends} ({whose})"
         since = datetime.datetime.fromtimestamp(self.since_s, datetime.UTC).date().isoformat()
         low, high = self.change.interval(shown()) or (-np.inf, np.inf)
         by = f"{self.change.value:+.2g}{unit} ({low:+.2g} to {high:+.2g}{unit})"
-        return f"{name}: all vehicles changed together by {by} from {since} ({whose})"
+        return f"{name}: {who} vehicles changed together by {by} from {since} ({whose})"
 
 
 def shared_level(data: FlightEstimates, i: int) -> SharedLevel | None:
