@@ -198,7 +198,7 @@ def _planned(page: Any) -> list[str]:
     roll = page.get_by_role("group", name="Axes").get_by_role("button", name="roll")
     assert roll.get_attribute("aria-pressed") == "false"
     roll.press("Enter")
-    page.get_by_text("this log holds injected sweeps already").wait_for()
+    page.get_by_text("further runs show whether flights agree").wait_for()
     amplitude = page.locator("td[data-label=Amplitude]")
     amplitude.first.wait_for()
     page.fill("#amplitude", "0.05")
