@@ -26,8 +26,8 @@ BY_NUMBER = "FRAME_CLASS"
 MOTORS = "motors' curve"
 OFF = "off"
 MATERIAL_DELAY_S = 0.5e-3
-"""Of a filter, beyond which it is another one to a loop: a degree at 5.6 Hz. Centres of notches
-that follow the motors differ from flight to flight by less."""
+"""Of a filter, beyond which it is another one to a loop: a degree at 5.6 Hz (ours). Notches
+that follow the motors mostly differ from flight to flight by less."""
 
 
 @dataclass(frozen=True)
