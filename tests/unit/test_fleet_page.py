@@ -63,7 +63,8 @@ def test_each_vehicle_has_the_light_that_its_truth_asks_for(answers: FleetAnswer
     assert re.search(
         r" at the event “motor replaced”; beyond that no change \(80 % of such steps, 3 flights "
         r"or more on either side, would be found: roll damping \d+ %, roll control power "
-        r"\d+(\.\d)? %\), like its type$",
+        r"\d+(\.\d)? %\), like its type \(80 % of such differences would be found: roll damping "
+        r"\d+ %, roll control power \d+ %\)$",
         lights["v02"].message,
     )
     sound = [each for name, each in lights.items() if name not in ("v00", "v01")]

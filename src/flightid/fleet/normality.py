@@ -6,6 +6,7 @@ change" says which one would have been found.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Container, Iterable, Iterator, Sequence
 
 from flightid.conventions import Light
@@ -57,7 +58,7 @@ def quiet_light(vehicle: str, types: Iterable[TypeAnswers]) -> Finding:
     if missing:
         open_.append(f"cannot tell whether it is like its type ({'; '.join(missing)})")
     elif any(each is not None for each in reasons):
-        known.append("like its type")
+        known.append(f"like its type{_apart_words(vehicle, mine)}")
     if open_:
         said = "; ".join([*known, *open_])
         return Finding("vehicle", Light.UNKNOWN, f"{vehicle}: {said}", MORE)
@@ -87,13 +88,27 @@ def _is_seen(history: ParameterHistory) -> bool:
 def _seen_words(seen: Sequence[tuple[ParameterHistory, TypeAnswers]]) -> str:
     """The step of which most would have been found, by parameter."""
     told = [(h.least_step, of.labels.get(h.name, h.name)) for h, of in seen if h.least_step]
-    if not told:
-        return ""
+    said = _sizes(told)
+    return f" ({100.0 * POWER:.0f} % of such steps{INSIDE} would be found: {said})" if told else ""
+
+
+def _apart_words(vehicle: str, mine: Sequence[TypeAnswers]) -> str:
+    """The difference from its type of which most would have been found, by parameter."""
+    told = [
+        (least, each.labels.get(least.name, least.name))
+        for each in mine
+        for least in each.least_differences.get(vehicle, ())
+    ]
+    said = _sizes(told)
+    return f" ({100.0 * POWER:.0f} % of such differences would be found: {said})" if told else ""
+
+
+def _sizes(told: Sequence[tuple[Reading, str]]) -> str:
+    """Sizes by parameter, or the smallest and the largest of many."""
     sizes = [(each.value or 0.0, f"{name} {_size(each)}") for each, name in told]
-    said = [words for _, words in sizes]
-    if len(said) > NAMED:
-        said = [f"from {min(sizes)[1]} to {max(sizes)[1]}"]
-    return f" ({100.0 * POWER:.0f} % of such steps{INSIDE} would be found: {', '.join(said)})"
+    if len(sizes) > NAMED:
+        return f"from {min(sizes)[1]} to {max(sizes)[1]}"
+    return ", ".join(words for _, words in sizes)
 
 
 def least_words(history: ParameterHistory) -> str:
@@ -204,8 +219,25 @@ def _no_type(vehicle: str, each: TypeAnswers) -> str | None:
         asked = dict.fromkeys(name for names in every.values() for name in names)
         left = [each.labels.get(k, k) for k in asked if k not in every[vehicle]]
         untold = f"its flights do not tell {', '.join(left)}" if left else ""
-        return each.outliers.beside(vehicle, each.labels) or untold
+        hidden = each.outliers.beside(vehicle, each.labels) or untold
+        return hidden or _too_far(vehicle, each)
     return each.outliers.reason or "its flights tell none of its parameters"
+
+
+def _too_far(vehicle: str, each: TypeAnswers) -> str:
+    """Parameters in which none but a whole level's difference would be found; empty without."""
+    far = [
+        e for e in each.least_differences.get(vehicle, ())
+        if not math.isfinite(e.value) or (e.unit == "%" and e.value >= WHOLE)
+    ]  # fmt: skip
+    said = ", ".join(
+        f"{each.labels.get(e.name, e.name)} {_size(e)}"
+        if math.isfinite(e.value)
+        else f"{each.labels.get(e.name, e.name)} none"
+        for e in far
+    )
+    count = counted(len(each.data.members), "vehicle")
+    return f"of {count} only differences above these would show: {said}" if far else ""
 
 
 def _others(reasons: Iterable[str]) -> Iterator[str]:

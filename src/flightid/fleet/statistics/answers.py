@@ -19,12 +19,14 @@ from flightid.fleet.statistics.drift import FleetDrift, find_drift
 from flightid.fleet.statistics.events import FleetEvent
 from flightid.fleet.statistics.events_of_nobody import events_of_nobody
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
+from flightid.fleet.statistics.least_difference import least_differences
 from flightid.fleet.statistics.moderated_errors import moderated_errors
 from flightid.fleet.statistics.odd_flights import without_odd_flights
 from flightid.fleet.statistics.outliers import FleetOutliers, find_outliers
 from flightid.fleet.statistics.population import Population, estimate_population
 from flightid.fleet.statistics.spread_search import FEWEST
 from flightid.frozen import dataclass
+from flightid.uncertainty.estimate import Estimate
 
 Row = Mapping[str, Any]
 Rows = Mapping[str, Sequence[Row]]
@@ -53,6 +55,8 @@ class TypeAnswers:
         By vehicle: how many of them follow the last flight with a date that counts.
     odd_flights : mapping of str to tuple of str
         By parameter: logs left out of the population (`without_odd_flights`), by file name.
+    least_differences : mapping of str to tuple of Estimate
+        By vehicle: which difference from its type would have been told, where that was asked.
     """
 
     type_name: str
@@ -66,6 +70,7 @@ class TypeAnswers:
     red: Mapping[str, int] = field(default_factory=dict)
     newest_red: Mapping[str, int] = field(default_factory=dict)
     odd_flights: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    least_differences: Mapping[str, tuple[Estimate, ...]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -276,8 +281,9 @@ def _answered(
         apart = find_outliers(found) if outliers else None
     except FlightidError as error:
         return TypeAnswers(type_name, model, data, None, None, None, (error.reason,))
-    common = found if population else None
-    return TypeAnswers(type_name, model, data, common, apart, None, rare, odd_flights=odd)
+    common, least = found if population else None, least_differences(found) if outliers else {}
+    one = TypeAnswers(type_name, model, data, common, apart, None, rare, odd_flights=odd)
+    return replace(one, least_differences=least)
 
 
 def _shared(data: FlightEstimates) -> tuple[FlightEstimates, tuple[str, ...]]:

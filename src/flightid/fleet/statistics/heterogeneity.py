@@ -6,6 +6,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 from scipy.special import chdtrc, chdtri, ndtr, stdtr
 
 from flightid.errors import DataError
@@ -20,6 +21,10 @@ FEWEST_SHAPED = 4
 SPREADS, MEANS = 200, 60
 """Quantiles of the spread's confidence distribution, and of Student's about each mean."""
 HALVINGS = 60
+TINY = 1e-300
+"""Chance below which none is told from zero."""
+REACH = 9.0
+"""Standard errors beyond which nothing of a normal distribution is told from none."""
 LEFT_OUT = 0.5
 """What is left out of the confidence in no spread where the next vehicle is asked for, share of it.
 
@@ -237,6 +242,30 @@ class VehicleEstimates:
         below = float(np.sum(weights * ndtr((value - centre) / reach)))
         above = float(np.sum(weights * ndtr((centre - value) / reach)))
         return min(1.0, 2.0 * min(below, above))
+
+    def next_reach(self, variance: float, chance: float, power: float) -> float:
+        """Distance of a next vehicle from the mean at which it is called rare with a power.
+
+        Rare is one whose `next_chance` is below `chance`; its own estimate has a variance, and
+        where the mean lies is as uncertain as its confidence distribution says.
+        """
+        centre, deviation, weights = self._mixture
+        middle = float(np.sum(weights * centre))
+
+        def beyond(distance: float) -> float:
+            found = [self.next_chance(middle + s * distance, variance) for s in (-1.0, 1.0)]
+            return float(np.log(max(0.5 * sum(found), TINY))) - float(np.log(chance))
+
+        most = float(np.sqrt(np.sum(weights * deviation**2) + variance))
+        while beyond(most) > 0.0:
+            most *= 2.0
+        limit, own = float(brentq(beyond, 0.0, most, rtol=1e-3)), np.sqrt(variance)
+
+        def missing(distance: float) -> float:
+            return float(np.sum(weights * ndtr((centre - middle + distance - limit) / own))) - power
+
+        far = limit + float(np.max(np.abs(centre - middle))) + REACH * float(own)
+        return float(brentq(missing, 0.0, far, rtol=1e-3))
 
 
 def _shares(count: int) -> tuple[Array, Array]:
