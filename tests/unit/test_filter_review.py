@@ -199,6 +199,13 @@ def test_edited_filters_pass_what_filtering_the_gyro_again_passes(tmp_path: Path
     assert "INS_GYRO_FILTER,25" in shown["files"][0]["text"].replace(" ", "")
     assert "INS_GYRO_FILTER,40" in shown["files"][1]["text"].replace(" ", "")
     assert (shown["raw"], filter_work.try_filters(path, {})["files"]) == (True, [])
+    # What cannot be tried stands beside its field, and the panel works with all others.
+    bad = filter_work.try_filters(path, {"INS_GYRO_FILTER": -5.0, "NO_SUCH": 1.0})
+    assert bad["axes"] == filter_work.try_filters(path, {})["axes"]
+    assert bad["refused"] == {
+        "INS_GYRO_FILTER": "INS_GYRO_FILTER may be 0 to 10000, not -5; 40 flew",
+        "NO_SUCH": "NO_SUCH is no filter of this vehicle",
+    }
     with pytest.raises(OptionError, match="no filter of this vehicle"):
         bench.edited({"ATC_RAT_RLL_P": 0.2})
 

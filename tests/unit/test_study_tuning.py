@@ -212,14 +212,14 @@ def test_limits_are_proposed_from_measured_samples_of_steps_that_ring(tmp_path: 
         name="fit", path=(path.name,), paths=(path,), resample_to_s=0.02, span_s=(1.0, 20.0)
     )
     records = load_records(file, {"u": Role.INPUT, "y": Role.OUTPUT})
-    items: Any = [SimpleNamespace(training=records)]
+    items: Any = [SimpleNamespace(training=(), unfitted=records)]
     # On the new grid they ring beyond what was measured; beyond the span the steps are larger.
     low, high = input_ranges(items)["u"]
     assert low < -2.05
     assert high > 2.05
     assert input_ranges(items, [file]) == {"u": (-2.0, 2.0)}
-    items[0].training = [each.to_units(u="mV") for each in records]
+    items[0].unfitted = [each.to_units(u="mV") for each in records]
     assert input_ranges(items, [file]) == {"u": (-2000.0, 2000.0)}
     # What was done to an input afterwards is told as it stands.
-    items[0].training = [flip_sign(each, ["u"]) for each in records]
+    items[0].unfitted = [flip_sign(each, ["u"]) for each in records]
     assert input_ranges(items, [file]) == input_ranges(items)

@@ -130,6 +130,8 @@ export interface FilterRequest {
 /** Filters of a vehicle on the noise of its flight. */
 export interface FilterScreen {
   values: FilterValue[];
+  refused: Record<string, string>;
+  highest: number;
   suggested: Record<string, number>;
   at_hz: number;
   measured: boolean;

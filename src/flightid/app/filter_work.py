@@ -16,7 +16,7 @@ from flightid.app.plot_schemas import FilterAxis, FilterScreen, FilterValue
 from flightid.app.work import KEPT, kept_log
 from flightid.control.autopilots.parameter_files import parameter_suffix
 from flightid.files import sha256_of_file
-from flightid.review.edited_filters import EditedAxis, FilterBench, filter_bench
+from flightid.review.edited_filters import HIGHEST_HZ, EditedAxis, FilterBench, filter_bench
 from flightid.review.tried_filters import TriedFilters, tried_filters
 
 MOST_POINTS = 300
@@ -30,6 +30,9 @@ def try_filters(path: Path, values: Mapping[str, float]) -> Mapping[str, Any]:
     if key not in KEPT:
         KEPT[key] = filter_bench(kept_log(path))
     bench: FilterBench = KEPT[key]
+    # A study may say what cannot be tried: the others are, so that the page can put it right.
+    refused = bench.refused(values)
+    values = {name: value for name, value in values.items() if name not in refused}
     tried = tried_filters(bench, values)
     axes = tried.axes
     frequency = axes[0].frequency_hz
@@ -46,6 +49,8 @@ def try_filters(path: Path, values: Mapping[str, float]) -> Mapping[str, Any]:
             )
             for name, flown in known.items()
         ],
+        refused={name: _refusal(name, value, known) for name, value in refused.items()},
+        highest=HIGHEST_HZ,
         suggested={} if bench.choice is None else dict(bench.choice.values),
         at_hz=bench.at_hz,
         measured=bench.measured,
@@ -56,6 +61,12 @@ def try_filters(path: Path, values: Mapping[str, float]) -> Mapping[str, Any]:
         files=_files(tried) if tried.is_flyable else [],
         python=_python(path, values),
     ).model_dump()  # fmt: skip
+
+
+def _refusal(name: str, value: float, known: Mapping[str, float]) -> str:
+    if name not in known:
+        return f"{name} is no filter of this vehicle"
+    return f"{name} may be 0 to {HIGHEST_HZ:g}, not {value:g}; {known[name]:g} flew"
 
 
 def _axis(found: EditedAxis, rows: NDArray[np.intp]) -> FilterAxis:

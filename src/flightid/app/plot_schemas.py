@@ -58,6 +58,10 @@ class FilterScreen(Message):
     """Filters of a vehicle on the noise of its flight."""
 
     values: list[FilterValue]
+    refused: dict[str, str]
+    """Why a value of the study is not tried, by its name; all others are."""
+    highest: float
+    """Largest value that a filter may have; the least is 0."""
     suggested: dict[str, float]
     at_hz: float
     measured: bool

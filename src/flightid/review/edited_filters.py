@@ -139,15 +139,19 @@ class FilterBench:
         -------
         The noise ahead of the filters stays as it was: loops that are closed move nothing there.
         """
-        known = self.values
-        bad = {n: v for n, v in values.items() if n not in known or not 0.0 <= v <= HIGHEST_HZ}
+        bad = self.refused(values)
         if bad:
             raise OptionError(
                 "no filter of this vehicle",
                 found=", ".join(f"{name} = {value:g}" for name, value in bad.items()),
-                needed=f"values from 0 to {HIGHEST_HZ:g} of {', '.join(known)}",
+                needed=f"values from 0 to {HIGHEST_HZ:g} of {', '.join(self.values)}",
             )
         return tuple(self._axis(axis, values) for axis in self.loops)
+
+    def refused(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Those of some values that cannot be tried: no such filter, or out of its range."""
+        known = self.values
+        return {n: v for n, v in values.items() if n not in known or not 0.0 <= v <= HIGHEST_HZ}
 
     def changes(self, values: Mapping[str, float]) -> tuple[GainChange, ...]:
         """Parameters that a file would set: what differs, and what a notch rests on beside it.

@@ -36,7 +36,7 @@ LEAVE_INPUTS = frozenset(
 def input_ranges(
     identified: Iterable[ModelResults], files: Sequence[RecordFile] = ()
 ) -> dict[str, tuple[float, float]]:
-    """Least and largest sample of every input in the records that its models were fitted to.
+    """Least and largest sample of every input in all records of its models, fitted or unseen.
 
     Where a record lies on another grid than its file, what a filter made between samples (it rings
     beside a step) went through no actuator: the file's own samples are taken.
@@ -54,7 +54,7 @@ def input_ranges(
     """
     found: dict[str, tuple[float, float]] = {}
     for item in identified:
-        for record in item.training:
+        for record in (*item.training, *item.unfitted):
             for name in record.inputs:
                 samples = _measured(record, name, files)
                 held = samples[np.isfinite(samples)]
