@@ -15,6 +15,7 @@ from flightid.app.guard import POLICY, REPORT_POLICY, _dressed
 from flightid.app.pyramid import Pyramid
 from flightid.app.removed import RemovedList
 from flightid.app.rig_routes import roles_of
+from flightid.app.rig_schemas import RigReading
 from flightid.app.rig_work import make_rig, make_rig_pyramid, require_table
 from flightid.app.rigs import Rigs
 from flightid.app.study_edits import KeyEdit, edited
@@ -161,10 +162,11 @@ def test_stamps_that_are_not_uniform_get_a_grid_on_the_page(tmp_path: Path) -> N
     (told,) = make_rig([path], {"resample_to_s": 0.02})["files"]
     assert (told["error"], told["grid_s"]) == ("", 0.02)
     assert told["manoeuvres"][0]["rate_hz"] == pytest.approx(50.0)
-    reading = {"resample_to_s": 0.02} | roles_of(["u", "y"], ["u"])
-    assert (reading["inputs"], reading["outputs"]) == (["u"], ["y"])
+    reading = {"resample_to_s": 0.02}
+    roles = roles_of(["u", "y"], ["u"], RigReading.model_validate(reading))
+    assert roles == {"inputs": ["u"], "outputs": ["y"]}
     result = tmp_path / "u.npy"
-    make_rig_pyramid(path, "rig", "u", reading, result)
+    make_rig_pyramid(path, "rig", "u", reading | roles, result)
     drawn = Pyramid.read(result)
     assert np.ptp(np.diff(drawn.time_s)) < 1e-9
     # What the study fits: an input is held between its rows and never rings.

@@ -48,10 +48,22 @@ def dead(share: float) -> np.ndarray:
     return samples
 
 
+def encoder(*, frozen: bool = False) -> np.ndarray:
+    """Counts of an angle that rests and swings, read between their instants as resampling does."""
+    swing = 40.0 * np.cos(np.pi * TIME_S / TIME_S[-1]) ** 2 * np.sin(2.0 * TIME_S)
+    counts = np.round(swing + 0.3 * NOISE[2])
+    samples = np.interp(TIME_S + 0.003 * np.sin(TIME_S), TIME_S, counts)
+    if frozen:
+        samples[314 : 314 + N // 5] = samples[314]
+    return np.asarray(samples)
+
+
 @pytest.mark.parametrize(
     ("samples", "unit", "found"),
     [
         (ROLL, "rad", []),
+        (encoder(), "1", []),
+        (encoder(frozen=True), "1", [("flat", Light.RED)]),
         (NOISE[0], "1", []),
         (np.round(20 * ROLL) / 20, "1", []),
         (np.sign(np.sin(1.3 * TIME_S)), "1", []),

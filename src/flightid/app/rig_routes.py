@@ -12,6 +12,7 @@ from typing import Annotated, Any
 
 import numpy as np
 from fastapi import FastAPI, HTTPException, Query, Request, Response
+from numpy.typing import NDArray
 
 from flightid.app import rig_work
 from flightid.app.backstage import Backstage, LogName, made
@@ -112,14 +113,11 @@ def add_rig_routes(app: FastAPI, backstage: Backstage) -> None:
             raise HTTPException(422, "A span needs two instants, the first before the last.")
         path = _file(rigs, rig, file)
         told: dict[str, Any] = {"time_column": time_column, "sample_time_s": sample_time_s}
-        options = _options(RigReading(**told, resample_to_s=resample_to_s))
-        if resample_to_s is not None:
-            # Between the rows an input is held and an output is not: as the study reads them.
-            options |= roles_of(series, inputs)
+        reading = RigReading(**told, resample_to_s=resample_to_s)
+        options = _options(reading) | roles_of(series, inputs, reading)
         levels = [await _levels(backstage, rig, path, manoeuvre, each, options) for each in series]
         table = await asyncio.to_thread(view, levels, (start_s, stop_s), columns)
-        head = np.array(table.shape[::-1], np.float64)
-        return Response(head.tobytes() + table.tobytes(), media_type="application/octet-stream")
+        return Response(_packed(table), media_type="application/octet-stream")
 
 
 async def _levels(
@@ -142,8 +140,20 @@ async def _levels(
     return await asyncio.to_thread(Pyramid.read, target)
 
 
-def roles_of(series: Sequence[str], inputs: Sequence[str]) -> dict[str, Any]:
-    """Roles of the channels of a view; all that are not inputs answer to them."""
+def _packed(table: NDArray[np.float64]) -> bytes:
+    """Columns, rows, then the numbers row by row."""
+    return np.array(table.shape[::-1], np.float64).tobytes() + table.tobytes()
+
+
+def roles_of(
+    series: Sequence[str], inputs: Sequence[str], reading: RigReading
+) -> dict[str, list[str]]:
+    """Roles of the channels of a view on another grid; all that are not inputs answer to them.
+
+    Between the rows an input is held and an output is not: as the study reads them.
+    """
+    if reading.resample_to_s is None:
+        return {}
     sides = {
         "inputs": [each for each in series if each in inputs],
         "outputs": [each for each in series if each not in inputs],

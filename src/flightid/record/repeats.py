@@ -21,6 +21,9 @@ and of first differences over the signal's, below which its noise alone may be r
 FEWEST_PERIODS = 2
 ROUNDING = 1e-9
 """Largest difference of two periods, over the range, that still counts as the same."""
+BESIDE, LONGEST_STEP, DUST, FEWEST_PLATEAUS = 5, 1.5, 1e-9, 20
+"""Steps beside a rest, of so many counts at most; differences over the range that are rounding;
+plateaus below which nobody knows the count."""
 
 
 @dataclass(frozen=True)
@@ -189,3 +192,35 @@ def _candidates(rows: Array, longest: int) -> NDArray[np.intp]:
     lags = np.arange(1, longest + 1)
     away = squares[n - lags] + (squares[n] - squares[lags]) - 2.0 * products[lags]
     return np.asarray(lags[away <= 1e-9 * squares[n]], dtype=np.intp)
+
+
+def rests_within_a_count(
+    values: NDArray[np.float64],
+    *,
+    plateaus: NDArray[np.intp],
+    rests: tuple[NDArray[np.intp], NDArray[np.intp]],
+) -> NDArray[np.bool_]:
+    """Which stretches may be rest between two counts of what is read in steps, as an encoder is.
+
+    The count is the least difference of successive plateaus. Beside a rest nothing moves by more
+    than that; noise that a failure stopped does. Resampling moves by parts of a count.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+    plateaus : ndarray of int
+        First samples of runs of two equal samples at least.
+    rests : tuple of ndarray of int
+        First and last samples of the stretches.
+    """
+    apart = np.abs(np.diff(values[plateaus]))
+    apart = apart[apart > DUST * np.ptp(values)]
+    if apart.size < FEWEST_PLATEAUS:
+        return np.zeros(rests[0].size, dtype=np.bool_)
+    most = LONGEST_STEP * float(np.min(apart))
+    steps = np.abs(np.diff(values))
+    beside = [
+        np.r_[steps[max(0, start - BESIDE) : start], steps[stop : stop + BESIDE]].max(initial=0.0)
+        for start, stop in zip(*rests, strict=True)
+    ]
+    return np.asarray(beside) <= most

@@ -16,7 +16,7 @@ from flightid.findings import Finding, counted
 from flightid.frozen import dataclass
 from flightid.record.commanded_edges import Surroundings, answered, answers
 from flightid.record.outlying import distances, none_stands_out, spread_of
-from flightid.record.repeats import found_staircase, is_switched, stands_still
+from flightid.record.repeats import found_staircase, is_switched, rests_within_a_count, stands_still
 from flightid.units import DIMENSIONLESS, is_convertible, si_base
 
 Array = NDArray[np.float64]
@@ -288,6 +288,7 @@ def _dead(channel: _ExaminedChannel) -> SampleFault | None:
     inner = (starts > 0) & (stops < values.size - 1)
     starts, stops = starts[inner], stops[inner]
     long = (stops - starts) >= max(DEAD_SAMPLES, DEAD_SHARE * values.size)
+    long[long] = ~rests_within_a_count(values, plateaus=starts, rests=(starts[long], stops[long]))
     if not long.any():
         return None
     moving = np.ones(values.size - 1, dtype=np.bool_)
