@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from statistics import median
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,9 +43,9 @@ def variances_with_odd_ones(
     made, odd = variances.copy(), np.zeros(len(variances), dtype=bool)
     for rows in histories_in_time(data, i):
         values, own = data.values[rows, i], variances[rows]
-        usual = float(np.median(own))
+        usual, in_time = float(np.median(own)), values.tolist()
         for place, row in enumerate(rows):
-            off = [values[place] - level for level in _levels_beside(values, place)]
+            off = [in_time[place] - level for level in _levels_beside(in_time, place)]
             nearest = min(off, key=abs, default=0.0)
             if any(nearest * each < 0.0 for each in off):
                 continue
@@ -53,14 +54,14 @@ def variances_with_odd_ones(
     return made, odd
 
 
-def _levels_beside(values: Array, place: int) -> list[float]:
+def _levels_beside(values: Sequence[float], place: int) -> list[float]:
     """Levels before and after a flight; at an end those of the three beside it and the nearest."""
     before, after = values[max(0, place - BESIDE) : place], values[place + 1 : place + 1 + BESIDE]
     if len(before) and len(after):
-        return [float(np.median(before)), float(np.median(after))]
+        return [median(before), median(after)]
     if len(before):
-        return [float(np.median(before)), float(before[-1])]
-    return [float(np.median(after)), float(after[0])] if len(after) else []
+        return [median(before), before[-1]]
+    return [median(after), after[0]] if len(after) else []
 
 
 def histories_in_time(data: FlightEstimates, i: int) -> Iterator[NDArray[np.intp]]:

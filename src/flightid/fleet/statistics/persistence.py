@@ -204,8 +204,11 @@ def explained(series: Sequence[DaySeries], most: Set[str], found: Persistence) -
     kept = []
     for each in (one for one in series if one.vehicle in most):
         values, variances, _ = _scaled(each, each.level, found.typical)
-        inverse, _ = _whitening(variances, found.share, found.correlation)
-        without, beside = (_left(inverse @ values, inverse @ x) for x in (each.level, each.change))
+        root, _ = _root(variances, found.share, found.correlation)
+        without, beside = (
+            float(_left(root, values[:, None], design)[0].sum())
+            for design in (each.level, each.change)
+        )
         if without - beside > 2.0 * KEPT * found.factor:
             kept.append(each.vehicle)
     return frozenset(kept)
@@ -229,10 +232,15 @@ def is_shared(series: Sequence[DaySeries], changed: Set[str], found: Persistence
     return with_it >= without
 
 
-def _left(values: Array, design: Array) -> float:
-    """Squares that a design leaves of values."""
-    along = np.linalg.qr(design)[0].T @ values
-    return float(values @ values - along @ along)
+def _left(root: Array, values: Array, design: Array) -> tuple[Array, Array]:
+    """Squares that whitened designs leave of values, and the sizes of the designs' triangles.
+
+    By the triangle of both side by side; of one vehicle, or of several along the first axis.
+    """
+    white = np.linalg.solve(root, np.concatenate([design, values], axis=-1))
+    ends = np.abs(np.diagonal(np.linalg.qr(white, mode="r"), axis1=-2, axis2=-1))
+    p = design.shape[-1]
+    return ends[..., p:] ** 2, ends[..., :p]
 
 
 def day_series(asked: Sequence[AskedHistory], changed: Set[str]) -> list[DaySeries]:
@@ -302,8 +310,8 @@ def _grouped(series: Sequence[tuple[Array, Array, Array]]) -> list[Group]:
     return [(values[:, :, None], variances, design) for values, variances, design in stacked]
 
 
-def _whitening(variances: Array, share: float, correlation: float) -> tuple[Array, float]:
-    """What makes days independent, and half the logarithm of their covariances' determinants.
+def _root(variances: Array, share: float, correlation: float) -> tuple[Array, float]:
+    """Cholesky roots of days' covariances, and half the logarithm of their determinants.
 
     Variances are of one vehicle, shape (d,), or of several, shape (m, d).
     """
@@ -311,8 +319,7 @@ def _whitening(variances: Array, share: float, correlation: float) -> tuple[Arra
     lag = np.abs(np.subtract.outer(np.arange(n), np.arange(n)))
     own = (1.0 - share) * variances[..., None] * np.eye(n)
     root = np.linalg.cholesky(share * correlation**lag + own)
-    log_root = float(np.sum(np.log(np.diagonal(root, axis1=-2, axis2=-1))))
-    return np.linalg.inv(root), log_root
+    return root, float(np.sum(np.log(np.diagonal(root, axis1=-2, axis2=-1))))
 
 
 def _likelihood(
@@ -325,11 +332,9 @@ def _likelihood(
     total, squares, freedom, whole, count = 0.0, 0.0, 0, 0.0, 0
     for values, variances, design in groups:
         many, n, p = design.shape
-        inverse, log_root = _whitening(variances, share, correlation)
-        q, r = np.linalg.qr(inverse @ design)
-        white = inverse @ values
-        squares += float(np.sum(white**2) - np.sum((np.swapaxes(q, 1, 2) @ white) ** 2))
-        sizes = np.abs(np.diagonal(r, axis1=1, axis2=2))
+        root, log_root = _root(variances, share, correlation)
+        left, sizes = _left(root, values, design)
+        squares += float(left.sum())
         total -= log_root + float(np.sum(np.log(sizes)))
         freedom, count, whole = freedom + many * (n - p), count + many * n, whole - log_root
     factor = squares / freedom
