@@ -26,6 +26,7 @@ from flightid.review.filter_costs import filter_costs
 from flightid.review.filter_findings import _advice
 from flightid.review.gyro_noise import GyroNoise, floor_beneath
 from flightid.review.notch_proposal import _series
+from flightid.review.tried_filters import tried_filters
 from flightid.review.verdicts import judge_flight
 from tests.closeness import assert_close
 
@@ -198,6 +199,13 @@ def test_edited_filters_pass_what_filtering_the_gyro_again_passes(tmp_path: Path
     assert shown["axes"][0]["noise_edited_percent"] == pytest.approx(100.0 * roll.noise_edited)
     assert "INS_GYRO_FILTER,25" in shown["files"][0]["text"].replace(" ", "")
     assert "INS_GYRO_FILTER,40" in shown["files"][1]["text"].replace(" ", "")
+    # Noise is known up to half of the log's rate: who opens a filter beyond it is told so.
+    assert shown["seen_hz"] == pytest.approx(500.0, rel=1e-3)
+    assert "up to 500 Hz" in tried_filters(bench, {}).summary().notes[1]
+    (unseen,) = tried_filters(bench, {"INS_GYRO_FILTER": 2000.0}).findings[-1:]
+    assert (unseen.code, unseen.light) == ("edited-noise-unseen", Light.AMBER)
+    assert "INS_GYRO_FILTER 2000 Hz passes noise above 500 Hz" in unseen.message
+    assert not any(each["code"] == unseen.code for each in shown["findings"])
     assert (shown["raw"], filter_work.try_filters(path, {})["files"]) == (True, [])
     # What cannot be tried stands beside its field, and the panel works with all others.
     bad = filter_work.try_filters(path, {"INS_GYRO_FILTER": -5.0, "NO_SUCH": 1.0})

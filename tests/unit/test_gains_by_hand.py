@@ -86,8 +86,14 @@ def test_gains_by_hand_that_break_a_requirement_are_red_and_not_written(
     assert not made.exists
     assert made.findings[0].light is Light.RED
     assert "set by hand do not meet" in made.findings[0].message
-    with pytest.raises(DataError, match="no gains of roll"):
+    # Which margin, by how much: the number of the worst plant beside what is asked of it.
+    case = made.worst_case("rate loop", "phase margin")
+    least = float(case.required.removeprefix("≥ "))
+    said = f"rate loop: phase margin {case.worst:.3g} deg, {least - (case.worst or 0.0):.3g} deg "
+    with pytest.raises(DataError, match=r"gains of roll do not .* found the gains set") as no:
         made.write(folder / "gains.param")
+    assert f"{said}short of {case.required} (" in str(no.value)
+    assert "no gains meet" not in fid.Tuning((made,), ()).left_out["roll"]
     assert not list(folder.iterdir())
 
 

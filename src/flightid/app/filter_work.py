@@ -55,6 +55,7 @@ def try_filters(path: Path, values: Mapping[str, float]) -> Mapping[str, Any]:
         at_hz=bench.at_hz,
         measured=bench.measured,
         raw=bench.noise.gyro == "raw",
+        seen_hz=bench.seen_hz,
         frequency_hz=[float(f"{each:.5g}") for each in frequency[rows]],
         axes=[_axis(each, rows) for each in axes],
         findings=[shown_finding(each) for each in tried.findings],

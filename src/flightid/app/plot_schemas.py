@@ -67,6 +67,8 @@ class FilterScreen(Message):
     measured: bool
     raw: bool
     """Whether the noise was logged ahead of the filters."""
+    seen_hz: float
+    """Up to where the log shows noise, half of its rate."""
     frequency_hz: list[float]
     axes: list[FilterAxis]
     findings: list[ShownFinding]

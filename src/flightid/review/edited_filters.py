@@ -111,16 +111,25 @@ class FilterBench:
     margins_deg: Mapping[str, tuple[float, float]]
 
     @property
-    def values(self) -> dict[str, float]:
-        """Every filter's parameter that can be edited, as flown."""
-        low_passes = {
+    def seen_hz(self) -> float:
+        """Up to where the log shows noise: half of the rate of its samples."""
+        return 0.5 * self.noise.rate_hz
+
+    @property
+    def low_passes(self) -> dict[str, float]:
+        """Cut-offs that can be edited, as flown, Hz; 0: off."""
+        return {
             loop.names[role]: loop.values[role]
             for loop in self.loops.values()
             for role in MOVABLE
             if role in loop.values
         }
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Every filter's parameter that can be edited, as flown."""
         usual = NOTCHES.get(self.kind, {})
-        return low_passes | {name: self.parameters.get(name, usual[name]) for name in usual}
+        return self.low_passes | {name: self.parameters.get(name, usual[name]) for name in usual}
 
     def edited(self, values: Mapping[str, float]) -> tuple[EditedAxis, ...]:
         """What other filters would make of the noise that was logged.

@@ -58,6 +58,33 @@ def filter_costs(
             )
 
 
+def unseen_noise(
+    low_passes: Mapping[str, float], values: Mapping[str, float], seen_hz: float
+) -> Iterator[Finding]:
+    """Say which low-passes that are opened pass noise of which the log shows nothing.
+
+    Parameters
+    ----------
+    low_passes : mapping of str to float
+        Cut-offs as flown, Hz, by parameter; 0: off.
+    values : mapping of str to float
+        As tried.
+    seen_hz : float
+        Up to where the log shows noise.
+    """
+    for name, flown in low_passes.items():
+        cut = values.get(name, flown)
+        if flown > 0.0 and cut != flown and (cut == 0.0 or cut > max(flown, seen_hz)):
+            yield Finding(
+                "edited-noise-unseen",
+                Light.AMBER,
+                f"{name} {cut:g}{' (off)' if cut == 0.0 else ' Hz'} passes noise above "
+                f"{seen_hz:.4g} Hz, half of the log's rate: none of it is in these numbers",
+                "log the gyro faster (raw batches in ArduPilot, the high rate in PX4) before "
+                "flying this",
+            )
+
+
 def _cost(axis: str, said: str, cost: float, margin: tuple[float, float] | None) -> Finding:
     code, least = f"edited-phase-{axis}", PHASE_GUIDE_DEG
     if margin is None:

@@ -15,7 +15,7 @@ from flightid.frozen import dataclass
 from flightid.logs import Log
 from flightid.result import Result
 from flightid.review.edited_filters import EditedAxis, FilterBench, filter_bench
-from flightid.review.filter_costs import filter_costs
+from flightid.review.filter_costs import filter_costs, unseen_noise
 from flightid.table import Cell, Column, Table
 
 NOTE = "flightid: filters tried on the noise of a flight"
@@ -37,6 +37,8 @@ class TriedFilters(Result, schema="flightid.tried_filters/1", untold={"kind": "o
         Phase and noise that they cost.
     kind : str
         Of the log.
+    seen_hz : float
+        Up to where the log shows noise; none above it is in these numbers.
 
     Example
     -------
@@ -52,6 +54,7 @@ class TriedFilters(Result, schema="flightid.tried_filters/1", untold={"kind": "o
     back: tuple[GainChange, ...]
     findings: tuple[Finding, ...]
     kind: str
+    seen_hz: float
 
     def __repr__(self) -> str:
         """Changes on one line."""
@@ -75,7 +78,8 @@ class TriedFilters(Result, schema="flightid.tried_filters/1", untold={"kind": "o
             )
             for each in self.axes
         ]
-        note = "Phase of the controller with all of its filters; noise in percent of full command."
+        note = "Phase of the controller with all of its filters; noise in percent of full command, "
+        note += f"up to {self.seen_hz:.4g} Hz: half of the log's rate, beyond which it shows none."
         told = change_words(self.changes) or "As flown."
         return Table("Filters tried", columns, tuple(rows), (told, note))
 
@@ -119,9 +123,9 @@ def tried_filters(bench: FilterBench, values: Mapping[str, float]) -> TriedFilte
     """
     axes = bench.edited(values)
     costs = filter_costs(axes, bench.at_hz, bench.margins_deg, measured=bench.measured)
-    return TriedFilters(
-        axes, bench.at_hz, bench.changes(values), bench.way_back(values), tuple(costs), bench.kind
-    )
+    found = (*costs, *unseen_noise(bench.low_passes, values, bench.seen_hz))
+    changes, back = bench.changes(values), bench.way_back(values)
+    return TriedFilters(axes, bench.at_hz, changes, back, found, bench.kind, bench.seen_hz)
 
 
 def tried_on(log: Log, values: Mapping[str, float]) -> TriedFilters:

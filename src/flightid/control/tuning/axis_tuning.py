@@ -27,6 +27,7 @@ from flightid.control.tuning.sampled_plants import (
     loop_grid,
     plants_of_axis,
 )
+from flightid.control.tuning.shortfalls import shortfalls
 from flightid.control.tuning.whole_gains import whole_gains
 from flightid.control.tuning.worst_cases import WorstCase, worst_cases
 from flightid.frozen import dataclass
@@ -249,7 +250,8 @@ def held_by_hand(
     nearest = () if short else (min(least, key=lambda name: least[name]),)
     met = judged.slack[:, 0].min(axis=0) >= 0.0
     exists = bool(met[0]) and float(met.mean()) >= MOST
-    return GainSearchResult(gains, exists, short or nearest, least, by_hand=True)
+    missed = () if exists else shortfalls(problem, judged)
+    return GainSearchResult(gains, exists, short or nearest, least, by_hand=True, missed=missed)
 
 
 def _result(

@@ -11,7 +11,7 @@ from flightid.control.autopilots import AxisLoop
 from flightid.control.gyro import Gyro
 from flightid.control.margins.findings import COHERENCE
 from flightid.control.tuning.axis_tuning import AxisResult
-from flightid.control.tuning.gain_search import INTEGRAL, GainSearchResult
+from flightid.control.tuning.gain_search import INTEGRAL, NO_GAINS, GainSearchResult
 from flightid.control.tuning.gain_steps import Stage, TunedGain
 from flightid.control.tuning.order_statistics import ENOUGH, least_share
 from flightid.conventions import Light
@@ -20,7 +20,7 @@ from flightid.findings import Finding
 Array = NDArray[np.float64]
 NEAR = 2.0**0.5
 """Half an octave to either side."""
-GAINS = ("gains", "no-gains")
+GAINS = ("gains", NO_GAINS)
 """Codes of `verdict`."""
 ADVICE = {
     "stability": "no gains in the ranges hold every plant: identify better, or widen the ranges",
@@ -69,12 +69,13 @@ def _no_gains(found: GainSearchResult) -> Finding:
     short = [_short(name, slack) for name, slack in found.slack.items() if slack < 0.0]
     told = "some plant is unstable with them" if unstable else ", ".join(short)
     if found.by_hand:
+        told = told if unstable or not found.missed else "; ".join(found.missed)
         said = "the gains set by hand do not meet all requirements for every plant: "
         action = "go back towards the gains of the search (leave out by_hand)"
-        return Finding("no-gains", Light.RED, said + told, action)
+        return Finding(NO_GAINS, Light.RED, said + told, action)
     said = "no gains were found that meet all requirements for every plant, on a grid over their "
     said += "ranges nor by search from it; nearest: "
-    return Finding("no-gains", Light.RED, said + told, advice(found.binding))
+    return Finding(NO_GAINS, Light.RED, said + told, advice(found.binding))
 
 
 def _short(name: str, slack: float) -> str:

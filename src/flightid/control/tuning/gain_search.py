@@ -37,6 +37,8 @@ PENALTY = 50.0
 """Loss of merit for a violated limit, in e-folds of the objective."""
 LARGEST_TD_S, TIME_SCALE_S = 0.5, 0.1
 TINY_GAIN = 1e-9
+NO_GAINS = "no-gains"
+"""Code of the finding that says so."""
 INTEGRAL = "ratio of I to P"
 IN_WORDS = {"A": "the angle's P"}
 EDGE = 0.02
@@ -60,6 +62,8 @@ class GainSearchResult:
         Least slack of each requirement over the plants.
     by_hand : bool
         Whether the gains were given and nothing was searched.
+    missed : tuple of str
+        Of gains by hand: each requirement that a plant misses, and by how much; see `shortfalls`.
     """
 
     gains: Array
@@ -67,6 +71,7 @@ class GainSearchResult:
     binding: tuple[str, ...]
     slack: dict[str, float]
     by_hand: bool = False
+    missed: tuple[str, ...] = ()
 
 
 def search(

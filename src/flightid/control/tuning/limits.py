@@ -31,8 +31,8 @@ class Limit:
     loop : str
     field : str
         Of `LoopMetrics`: the number it speaks of.
-    text : str
-        In words, as the tables print it.
+    bound : float
+        What the number may be at least, or at most, in its unit.
     slack : callable
         Values of the number to slack, at least 0 where the requirement is met.
     highest : bool
@@ -44,10 +44,15 @@ class Limit:
     name: str
     loop: str
     field: str
-    text: str
+    bound: float
     slack: Callable[[Array], Array]
     highest: bool = False
     most: bool = False
+
+    @property
+    def text(self) -> str:
+        """In words, as the tables print it."""
+        return f"≤ {self.bound:.4g}" if self.most else f"≥ {self.bound:g}"
 
 
 def limits(
@@ -66,13 +71,9 @@ def limits(
     names = tuple(loops)
     made = [limit for loop in names for limit in _margins(need, loop)]
     if crossover_limit_rad_s is not None:
-        text = f"≤ {crossover_limit_rad_s:.4g}"
-        below = _below(crossover_limit_rad_s)
-        made.append(
-            Limit(
-                "identified band", names[0], "crossover_rad_s", text, below, highest=True, most=True
-            )
-        )
+        most = crossover_limit_rad_s
+        told = ("identified band", names[0], "crossover_rad_s", most, _below(most))
+        made.append(Limit(*told, highest=True, most=True))
     return (*made, *(limit for limit in _targets(need, names[0]) if limit.loop in names))
 
 
@@ -90,12 +91,12 @@ def _margins(need: TuningRequirements, loop: str) -> Iterator[Limit]:
         ("delay margin", "delay_margin_s", None if loop == ANGLE else need.delay_margin_s),
     ):
         if least is not None:
-            yield Limit(f"{loop}: {name}", loop, field, f"≥ {least:g}", _share_above(least))
+            yield Limit(f"{loop}: {name}", loop, field, least, _share_above(least))
     yield Limit(
         f"{loop}: sensitivity peak",
         loop,
         "sensitivity_peak",
-        f"≤ {need.peak:.4g}",
+        need.peak,
         _peak(need.peak),
         most=True,
     )
@@ -113,7 +114,7 @@ def _targets(need: TuningRequirements, inner: str) -> Iterator[Limit]:
         ("angle crossover", ANGLE, "crossover_rad_s", need.angle_crossover_rad_s),
     ):
         if least is not None:
-            yield Limit(f"{TARGET} {name}", loop, field, f"≥ {least:g}", _above(least))
+            yield Limit(f"{TARGET} {name}", loop, field, least, _above(least))
 
 
 def _share_above(least: float) -> Callable[[Array], Array]:

@@ -13,6 +13,7 @@ from flightid.control.autopilots import (
     write_parameters,
 )
 from flightid.control.autopilots.pid_loop import PidLoop
+from flightid.control.tuning.gain_search import NO_GAINS
 from flightid.control.tuning.gain_steps import Stage, TunedGain
 from flightid.control.tuning.loop_problem import LoopProblem
 from flightid.control.tuning.pid_file import write_settings
@@ -134,6 +135,11 @@ class PidDesign(
         raise UnknownNameError(
             "there is no such number of a loop", found=f"{loop}: {name}", needed=known
         )
+
+    @property
+    def without_gains(self) -> Finding | None:
+        """Why there are none: of the search, or what those given by hand miss and by how much."""
+        return next((each for each in self.findings if each.code == NO_GAINS), None)
 
     def response(self, name: str) -> ResponseBand:
         """One time response, for example ``response("rate step")``.
@@ -369,10 +375,13 @@ def require_gains(
     """
     for design in designs:
         if not design.exists:
+            verdict = design.without_gains
             raise DataError(
-                f"no gains of {design.axis} meet the requirements, so none are written",
-                found=", ".join(design.binding),
-                action="relax a requirement that cannot be met, or identify better",
+                f"gains of {design.axis} do not meet the requirements, so none are written",
+                found=verdict.message if verdict else ", ".join(design.binding),
+                action=verdict.action
+                if verdict
+                else "relax a requirement that cannot be met, or identify better",
             )
     said = [*findings, *(finding for design in designs for finding in design.findings)]
     red = {finding.message: finding for finding in said if finding.light is Light.RED}

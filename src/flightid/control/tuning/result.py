@@ -267,7 +267,8 @@ class Tuning(Result, schema="flightid.tuning/1"):
 def _unsound(design: PidDesign) -> str:
     """Why the gains of one axis alone are not to be flown; empty where they may."""
     if not design.exists:
-        return f"no gains meet the requirements: {', '.join(design.binding)}"
+        verdict = design.without_gains
+        return verdict.message if verdict else f"no gains: {', '.join(design.binding)}"
     red = [finding.message for finding in design.findings if finding.light is Light.RED]
     return red[0] if red else ""
 

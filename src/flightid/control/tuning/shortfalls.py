@@ -1,0 +1,54 @@
+"""What given gains miss of their requirements, in the units of the numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.control.tuning.limits import limits
+from flightid.control.tuning.loop_problem import LoopAssessment, LoopProblem
+from flightid.control.tuning.worst_cases import KINDS
+
+UNITS = {each.field: "" if each.unit == "1" else f" {each.unit}" for each in KINDS}
+NAMES = {each.field: each.name for each in KINDS}
+
+
+def shortfalls(problem: LoopProblem, judged: LoopAssessment) -> tuple[str, ...]:
+    """Each requirement that a plant misses: the number of the plant that misses most, and by what.
+
+    Parameters
+    ----------
+    problem : LoopProblem
+    judged : LoopAssessment
+        One candidate, judged by the plants of the problem.
+
+    Returns
+    -------
+    tuple of str
+        In the order of the requirements; stability, which is no number, is left out.
+    """
+    slack = dict(zip(judged.names, judged.slack[:, 0], strict=True))
+    told = []
+    for limit in limits(problem.requirements, judged.metrics, problem.crossover_limit_rad_s):
+        least = slack[limit.name]
+        if least.min() >= 0.0:
+            continue
+        worst = int(least.argmin())
+        if limit.highest:
+            value = limit.bound * float(np.exp(-least[worst]))
+        else:
+            value = float(getattr(judged.metrics[limit.loop], limit.field)[0][worst])
+        name, unit = f"{limit.loop}: {NAMES[limit.field]}", UNITS[limit.field]
+        told.append(_short(name, value, unit, limit.text, limit.bound, least))
+    if problem.noise_limit is not None and (least := slack["output noise"]).min() < 0.0:
+        noise, most = float(judged.noise[0].max()), problem.noise_limit
+        told.append(_short("output noise", noise, "", f"≤ {most:.4g}", most, least))
+    return tuple(told)
+
+
+def _short(
+    name: str, value: float, unit: str, required: str, bound: float, slack: NDArray[np.float64]
+) -> str:
+    missing, short = int((slack < 0.0).sum()), f"{abs(value - bound):.3g}{unit}"
+    plants = f"{missing} of {len(slack)} plants" if len(slack) > 1 else "the model"
+    return f"{name} {value:.3g}{unit}, {short} short of {required} ({plants})"
