@@ -80,7 +80,9 @@ class Desk:
 
     @property
     def study(self) -> dict[str, Any]:
-        (path,) = (self.folder / "studies").glob("[!.]*.toml")
+        """The study that was written last."""
+        paths = (self.folder / "studies").glob("[!.]*.toml")
+        path = max(paths, key=lambda each: each.stat().st_mtime_ns)
         return tomllib.loads(path.read_text(encoding="utf-8"))
 
 

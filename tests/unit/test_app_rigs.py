@@ -16,14 +16,18 @@ from flightid.app.pyramid import Pyramid
 from flightid.app.removed import RemovedList
 from flightid.app.rig_routes import roles_of
 from flightid.app.rig_schemas import RigReading
-from flightid.app.rig_work import make_rig, make_rig_pyramid, require_table
+from flightid.app.rig_work import input_ways, make_rig, make_rig_pyramid, require_table
 from flightid.app.rigs import Rigs
 from flightid.app.study_edits import KeyEdit, edited
 from flightid.app.work import answered
 from flightid.app.workspace import Workspace
 from flightid.errors import FileFormatError, OptionError, StudyError
 from flightid.record import read_records, write_records
+from flightid.record.checks import record_findings
+from flightid.study.previewed import PreviewedStudy
 from flightid.study.proposal.columns import columns_of
+from flightid.study.stage_runner import StageRunner
+from flightid.study.taking import take
 
 TABLE = b"t,u,y\n0,1,2\n1,0,3\n2,1,1\n"
 
@@ -146,6 +150,15 @@ def test_faults_are_told_where_they_are_and_not_from_the_first_to_the_last(tmp_p
     (manoeuvre,) = make_rig([path], {})["files"][0]["manoeuvres"]
     (fault,) = manoeuvre["faults"]
     assert (fault["code"], fault["spans_s"]) == ("spikes", [(12.0, 12.0), (36.0, 36.0)])
+    # What a click on "Bridge them" writes takes out these, and no other sample.
+    asked = {"deviations": fault["deviations"], "channels": ["y"]}
+    (clean,) = read_records(path, outputs=["y"], resample_to_s=0.02, outliers=[asked])
+    assert "spikes" not in [each.code for each in record_findings(clean)]
+    assert np.sum(np.abs(clean["y"] - samples) > 1e-9) == 2
+    # Between them there is none: a record that leaves them out has no such finding.
+    (spiked,) = read_records(path, inputs=["u"], outputs=["y"])
+    assert "spikes" not in [each.code for each in record_findings(spiked.segment(12.1, 35.9))]
+    assert "spikes" in [each.code for each in record_findings(spiked.segment(12.1, 36.1))]
 
 
 def test_stamps_that_are_not_uniform_get_a_grid_on_the_page(tmp_path: Path) -> None:
@@ -155,6 +168,13 @@ def test_stamps_that_are_not_uniform_get_a_grid_on_the_page(tmp_path: Path) -> N
     path = tmp_path / "rig.csv"
     np.savetxt(path, np.column_stack([time_s, u, np.roll(u, 3)]), delimiter=",", comments="",
                header="time,u,y")  # fmt: skip
+    # The stamps' unit is the same before a grid is chosen and after.
+    stamped = tmp_path / "stamped.csv"
+    np.savetxt(stamped, np.column_stack([1e3 * time_s, u, np.roll(u, 3)]), delimiter=",",
+               comments="", header="t_ms,u,y")  # fmt: skip
+    for reading in ({}, {"resample_to_s": 0.02}):
+        told = make_rig([stamped], reading)
+        assert (told["time"], told["time_unit"]) == ("t_ms", "ms")
     (told,) = make_rig([path], {})["files"]
     assert "time stamps are not uniform" in told["error"]
     assert "resample_to_s=0.02," in told["error"]
@@ -171,6 +191,28 @@ def test_stamps_that_are_not_uniform_get_a_grid_on_the_page(tmp_path: Path) -> N
     assert np.ptp(np.diff(drawn.time_s)) < 1e-9
     # What the study fits: an input is held between its rows and never rings.
     assert set(np.unique(drawn.values)) == {-1.0, 1.0}
+    # Another file of the rig with three levels: its input steps too, on the page and in a study.
+    doublet = np.repeat([0.0, 0.6, -0.6, 0.0], [500, 200, 200, 600])
+    np.savetxt(tmp_path / "more.csv", np.column_stack([time_s, doublet, np.roll(doublet, 3)]),
+               delimiter=",", comments="", header="time,u,y")  # fmt: skip
+    ways = input_ways([path, tmp_path / "more.csv"], reading | roles)
+    assert ways == {"more.csv": {"u": "previous"}}
+    tables = "".join(
+        f'[[record]]\nname = "{name}"\npath = "{name}.csv"\nresample_to_s = 0.02\n'
+        for name in ("rig", "more")
+    )
+    model = '[[model]]\nname = "m"\nstructure = "arx"\nna = 1\nnb = 1\nnk = 3\n'
+    model += 'inputs = "u"\noutputs = "y"\n'
+    study = tmp_path / "study.toml"
+    for said, levels in (("", {0.0, 0.6, -0.6}), ('hold = "band_limited"\n', None)):
+        text = f'[study]\ntitle = "T"\n{tables}{said}{model}identify = "rig"\nverify = "more"\n'
+        study.write_text(text, "utf-8")
+        draft = PreviewedStudy.of(study)
+        read = take(draft.settings, draft.tasks(), None, tmp_path, StageRunner()).records
+        (rig,), (more,) = read["rig"].value, read["more"].value
+        # What is said of one record holds in those of which nobody says anything.
+        assert (set(np.unique(rig["u"])) == {-1.0, 1.0}) == (levels is not None)
+        assert (set(np.unique(more["u"])) == levels) == (levels is not None)
 
 
 def test_a_table_of_a_list_is_taken_out() -> None:

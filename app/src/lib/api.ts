@@ -95,7 +95,7 @@ function put<T>(path: string, file: File, seen: (share: number) => void): Promis
   });
 }
 
-type Reading = { time_column?: string | null; sample_time_s?: number | null; resample_to_s?: number | null };
+type Reading = { time_column?: string | null; sample_time_s?: number | null; resample_to_s?: number | null; hold?: string | null };
 const asked = (reading: Reading) => new URLSearchParams(Object.entries(reading).filter(([, each]) => each).map(([key, each]) => [key, String(each)]));
 export const rigs = () => json<RigItem[]>("/api/records");
 export const rig = (id: string, reading: Reading) => json<RigScreen>(`/api/records/${id}?${asked(reading)}`);

@@ -136,6 +136,7 @@ export interface FilterScreen {
   at_hz: number;
   measured: boolean;
   raw: boolean;
+  seen_hz: number;
   frequency_hz: number[];
   axes: FilterAxis[];
   findings: ShownFinding[];
@@ -859,6 +860,7 @@ export interface RigFault {
   message: string;
   action: string;
   spans_s: [number, number][];
+  deviations: number | null;
 }
 
 /** A file: its columns, and the manoeuvres in it or why none can be read. */
@@ -870,6 +872,7 @@ export interface RigFile {
   error: string;
   grid_s: number | null;
   grid_column: string;
+  grid_unit: string;
 }
 
 /** A file to take out of a set of records, or to put back. */
@@ -904,6 +907,7 @@ export interface RigProposal {
   time_column: string | null;
   sample_time_s: number | null;
   resample_to_s: number | null;
+  hold: "zero" | "first" | "band_limited" | null;
   inputs: string[];
   outputs: string[];
   excitations: string[];
@@ -917,6 +921,7 @@ export interface RigReading {
   time_column: string | null;
   sample_time_s: number | null;
   resample_to_s: number | null;
+  hold: "zero" | "first" | "band_limited" | null;
 }
 
 /** A set of record files, and the roles that names and units tell. */

@@ -8,7 +8,7 @@ import math
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from fastapi import FastAPI, HTTPException, Query, Request, Response
@@ -107,14 +107,18 @@ def add_rig_routes(app: FastAPI, backstage: Backstage) -> None:
         time_column: Annotated[str | None, Query(max_length=300)] = None,
         sample_time_s: Annotated[float | None, Query(gt=0.0)] = None,
         resample_to_s: Annotated[float | None, Query(gt=0.0)] = None,
+        hold: Annotated[Literal["zero", "first", "band_limited"] | None, Query()] = None,
         inputs: Annotated[tuple[str, ...], Query(max_length=MOST_CHANNELS)] = (),
     ) -> Response:
         if not (math.isfinite(start_s) and math.isfinite(stop_s) and start_s < stop_s):
             raise HTTPException(422, "A span needs two instants, the first before the last.")
         path = _file(rigs, rig, file)
         told: dict[str, Any] = {"time_column": time_column, "sample_time_s": sample_time_s}
-        reading = RigReading(**told, resample_to_s=resample_to_s)
+        reading = RigReading(**told, resample_to_s=resample_to_s, hold=hold)
         options = _options(reading) | roles_of(series, inputs, reading)
+        if "inputs" in options:
+            ways = await made(workers.live(rig_work.input_ways, _known(rigs, rig), options))
+            options |= {"interpolation": ways[file]} if file in ways else {}
         levels = [await _levels(backstage, rig, path, manoeuvre, each, options) for each in series]
         table = await asyncio.to_thread(view, levels, (start_s, stop_s), columns)
         return Response(_packed(table), media_type="application/octet-stream")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -38,6 +38,8 @@ class RigFault(Message):
     message: str
     action: str
     spans_s: list[tuple[float, float]]
+    deviations: float | None = None
+    """Of spikes: threshold of outliers that bridges them and no other sample."""
 
 
 class RigManoeuvre(Message):
@@ -63,6 +65,8 @@ class RigFile(Message):
     """Sample time of a grid for stamps that are not uniform; None where they are."""
     grid_column: str = ""
     """Column of these stamps."""
+    grid_unit: str = ""
+    """What they were read as; empty: s."""
 
 
 class RigReading(Message):
@@ -71,6 +75,7 @@ class RigReading(Message):
     time_column: str | None = None
     sample_time_s: float | None = Field(None, gt=0.0)
     resample_to_s: float | None = Field(None, gt=0.0)
+    hold: Literal["zero", "first", "band_limited"] | None = None
 
 
 class RigProposal(RigReading):

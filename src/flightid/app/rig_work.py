@@ -16,10 +16,11 @@ from flightid.app.work import KEPT
 from flightid.conventions import Light
 from flightid.errors import FlightidError, UnknownNameError
 from flightid.record import Record, read_records
-from flightid.record.checks import CHECK, checked_history, places_of
+from flightid.record.checks import BRIDGED, CHECK, checked_history, places_of
 from flightid.record.contents import table_contents
 from flightid.record.formats.sniff import file_format
 from flightid.record.grid_proposal import GridProposal, propose_grid
+from flightid.record.shared_ways import shared_ways
 from flightid.record.tables import read_table
 from flightid.study.proposal import propose_study
 from flightid.study.proposal.columns import columns_of
@@ -60,7 +61,8 @@ def make_rig(paths: Sequence[Path], reading: Mapping[str, Any]) -> dict[str, Any
         "outputs": list(outputs),
         "untold": untold,
         "time": _told_of(records, "time") or next((f.grid_column for f in files), ""),
-        "time_unit": _told_of(records, "time_unit"),
+        "time_unit": _told_of(records, "time_unit")
+        or next((f.grid_unit for f in files if f.grid_unit and not f.manoeuvres), ""),
     }
 
 
@@ -91,6 +93,12 @@ def make_rig_pyramid(
         raise UnknownNameError("the records hold no such channel", found=f"{manoeuvre}: {channel}")
     if not is_link(result):
         Pyramid.of(found[0].time_s, found[0][channel]).write(result)
+
+
+def input_ways(paths: Sequence[Path], reading: Mapping[str, Any]) -> dict[str, dict[str, str]]:
+    """Inputs that other files of the set bring to the grid in another way, by name of the file."""
+    ways = shared_ways({path.name: _quietly(path, reading) for path in paths})
+    return {name: {each: str(way) for each, way in own.items()} for name, own in ways.items()}
 
 
 def _records(path: Path, reading: Mapping[str, Any]) -> list[Record]:
@@ -128,6 +136,7 @@ def _file(path: Path, reading: Mapping[str, Any]) -> RigFile:
         name=path.name, columns=columns, notes=notes, manoeuvres=manoeuvres, error=said,
         grid_s=None if grid is None else grid.step_s,
         grid_column="" if grid is None else grid.time_column,
+        grid_unit="" if grid is None else grid.time_unit,
     )  # fmt: skip
 
 
@@ -186,4 +195,5 @@ def _fault(options: Mapping[str, Any]) -> RigFault:
         message=str(options["found"]),
         action=str(options["action"] or ""),
         spans_s=list(places_of(options)),
+        deviations=options.get(BRIDGED),
     )

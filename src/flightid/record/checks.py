@@ -6,6 +6,7 @@ that was made from arrays when it is asked for the first time.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 
 from flightid.conventions import Light
@@ -13,7 +14,8 @@ from flightid.findings import Finding
 from flightid.record.angle_units import angle_unit_faults
 from flightid.record.channel import Channel
 from flightid.record.commanded_edges import Surroundings
-from flightid.record.history import Step
+from flightid.record.history import NEW_BASES, SPREADS, Step
+from flightid.record.interpolation import HALF_LENGTH
 from flightid.record.record import Record
 from flightid.record.sample_faults import Array, SampleFault, sample_faults
 from flightid.table import Cell
@@ -23,6 +25,8 @@ CHECK = "Record.check"
 ENTRIES = frozenset({"read_records", "Log.record", CHECK})
 """Steps after which a record has been examined."""
 REMOVE_OUTLIERS = "conditioning.remove_outliers"
+BRIDGED = "deviations"
+"""Option of a spike: threshold of outliers that bridges it and no other sample."""
 MENDED = {REMOVE_OUTLIERS: "spikes"}
 """What a step takes out of the channels that its options count."""
 
@@ -41,6 +45,7 @@ def fault_steps(faults: Iterable[SampleFault]) -> tuple[Step, ...]:
                 "found": fault.finding.message,
                 "action": fault.finding.action,
                 **({"places_s": _told(fault)} if len(fault.places_s) > 1 else {}),
+                **({} if fault.deviations is None else {BRIDGED: fault.deviations}),
             },
             VERSION,
         )
@@ -99,14 +104,25 @@ def checked_history(record: Record) -> tuple[Step, ...]:
         channels = [(channel, record.time_s, record[n]) for n, channel in record.channels.items()]
         return (*record.history, *record.once(CHECK, lambda: entry_steps(channels)))
     first, last = float(record.time_s[0]), float(record.time_s[-1])
-    return tuple(step for step in record.history if _touches(step, first, last))
+    reach = math.ceil(HALF_LENGTH) * record.sample_time_s
+    return tuple(
+        step
+        for step in record.history
+        if step.operation != CHECK
+        or _touches(step, first, last, reach if _is_spread(record.history, step) else 0.0)
+    )
 
 
-def _touches(step: Step, first_s: float, last_s: float) -> bool:
-    if step.operation != CHECK:
-        return True
-    options = step.options
-    return float(options["stop_s"] or 0.0) >= first_s and float(options["start_s"] or 0.0) <= last_s
+def _touches(step: Step, first_s: float, last_s: float, reach_s: float) -> bool:
+    places = places_of(step.options) or ((0.0, 0.0),)
+    return any(stop + reach_s >= first_s and start - reach_s <= last_s for start, stop in places)
+
+
+def _is_spread(history: Sequence[Step], check: Step) -> bool:
+    """Whether a filter spread what was found of a channel over its length."""
+    channel = str(check.options["channel"])
+    made = [str(s.options.get(channel)) for s in history if s.operation in NEW_BASES]
+    return any(said.startswith(SPREADS) for said in made)
 
 
 def data_findings(

@@ -25,10 +25,13 @@ class GridProposal:
         Column of the stamps.
     step_s : float
         Their mean spacing in few digits, s.
+    time_unit : str
+        Unit that the file or the caller tells of them; empty: none, they are s.
     """
 
     time_column: str
     step_s: float
+    time_unit: str = ""
 
 
 def propose_grid(
@@ -60,18 +63,20 @@ def propose_grid(
     >>> rows = "".join(f"{0.02 * k + 0.001 * (k % 3)},1\n" for k in range(90))
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     propose_grid(write_atomically(Path(folder) / "a.csv", "time,u\n" + rows))
-    GridProposal(time_column='time', step_s=0.02)
+    GridProposal(time_column='time', step_s=0.02, time_unit='')
     """
     source = Path(path)
     table, name = with_time(read_table(source, file_format(source), ()), time_column)
     if name not in table.lengths:
         return None
-    stamps = row_stamps(table, name, with_time_unit({}, name, time_unit), None)
+    units = with_time_unit({}, name, time_unit)
+    unit = units.get(name) or table.units.get(name) or ""
+    stamps = row_stamps(table, name, units, None)
     label = RECORD_COLUMN if RECORD_COLUMN in table.lengths else None
     for part, _ in manoeuvres(table, label, stamps, split_gaps=True) if stamps.size else ():
         try:
             uniform_sample_time(stamps[part])
         except DataError:
             step = rounded_step_s(stamps[part]) if stamps[part].size > 1 else 0.0
-            return GridProposal(name, step) if step > 0.0 else None
+            return GridProposal(name, step, unit) if step > 0.0 else None
     return None

@@ -25,7 +25,7 @@ from flightid.record.interpolation import Interpolation
 from flightid.record.joined_files import with_files
 from flightid.record.options import RECORD_COLUMN
 from flightid.record.record import Record
-from flightid.record.row_grids import ChannelColumn, RowGrid
+from flightid.record.row_grids import ChannelColumn, RowGrid, listed
 from flightid.record.rows import column_unit
 from flightid.record.selection import (
     Names,
@@ -68,7 +68,7 @@ def read_records(
     join_time_column: str | None = None,
     join_time_unit: str | None = None,
     interpolation: Interpolation | str | Mapping[str, Interpolation | str] | None = None,
-    outliers: Mapping[str, Any] | None = None,
+    outliers: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None = None,
     record_column: str | None = RECORD_COLUMN,
     hold: InputHold | None = None,
     period_s: float | None = None,
@@ -141,10 +141,11 @@ def read_records(
         How samples of the new grid arise, for all channels or by name. Default: of inputs with
         `hold` "zero" the previous value, with "first" straight lines, of all else band-limited;
         inputs that were low-passed are band-limited afterwards, whatever they were.
-    outliers : mapping of str to object, optional
+    outliers : mapping of str to object, or sequence of such, optional
         Options ``deviations``, ``half_width`` and ``channels`` of
         `flightid.conditioning.remove_outliers`, carried out on the rows of each manoeuvre before
-        anything is resampled: a filter would spread an outlier.
+        anything is resampled: a filter would spread an outlier. Several, each for its channels, are
+        a sequence.
     record_column : str, optional
         Column that tells manoeuvres apart, used if it is there; None: there is none.
     hold : {"zero", "first", "band_limited"}, optional
@@ -213,7 +214,7 @@ def read_records(
     read = SourceRows(table, shared, tuple(wanted))
     rows = read.rows()
     grid = RowGrid(
-        read.wanted, resample_to_s, max_gap_s, interpolation, outliers, hold, time_column,
+        read.wanted, resample_to_s, max_gap_s, interpolation, listed(outliers), hold, time_column,
         has_clocks=table.clock is not None,
     )  # fmt: skip
     options: dict[str, Cell] = {

@@ -40,6 +40,15 @@ class ChannelColumn:
     column: str
 
 
+def listed(
+    outliers: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None,
+) -> tuple[Mapping[str, Any], ...]:
+    """One set of options or several, as several."""
+    if outliers is None:
+        return ()
+    return (outliers,) if isinstance(outliers, Mapping) else tuple(outliers)
+
+
 @dataclass(frozen=True)
 class RowGrid:
     """What is done to the rows of a manoeuvre before they are a record.
@@ -58,7 +67,7 @@ class RowGrid:
     resample_to_s: float | None
     max_gap_s: float | None
     interpolation: Interpolation | str | Mapping[str, Interpolation | str] | None
-    outliers: Mapping[str, Any] | None
+    outliers: tuple[Mapping[str, Any], ...]
     hold: InputHold | None
     time_column: str
     has_clocks: bool = False
@@ -140,9 +149,9 @@ class RowGrid:
                 else "a column that moves",
             )
         steps: tuple[Step, ...] = ()
-        if self.outliers is not None:
-            rows, step = self._without_outliers(rows, self.outliers)
-            steps = (step,)
+        for asked in self.outliers:
+            rows, step = self._without_outliers(rows, asked)
+            steps = (*steps, step)
         entering = [(c.channel, *rows[c.channel.name]) for c in self.wanted]
         steps += entry_steps(entering, beside)
         step_s = self.step_s(rows)

@@ -6,6 +6,7 @@ be sharp, a sensor coarse, a simulated channel free of noise.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -53,6 +54,8 @@ class SampleFault:
     finding : Finding
     places_s : tuple of tuple of float
         Where in that stretch it is, first and last instant of each place; none: all of it.
+    deviations : float or None
+        Threshold of outliers that bridges spikes and no other sample; None: there is none.
     """
 
     channel: str
@@ -60,6 +63,7 @@ class SampleFault:
     stop_s: float
     finding: Finding
     places_s: tuple[tuple[float, float], ...] = ()
+    deviations: float | None = None
 
 
 def sample_faults(
@@ -232,8 +236,9 @@ def _spikes(channel: _ExaminedChannel) -> SampleFault | None:
         f"{float(np.max(away[at])):.3g}{channel.of_unit} from the neighbours at most "
         f"({100 * share:.0f} % of the channel's variance): {_instants(stamps[at])}"
     )
-    action = _spike_action(away[at], np.delete(away, at), spread)
-    return channel.fault(at, at, ("spikes", light, said, action))
+    between = _between(away[at], np.delete(away, at), spread)
+    found = channel.fault(at, at, ("spikes", light, said, _spike_action(between)))
+    return replace(found, deviations=between)
 
 
 def _instants(stamps: Array) -> str:
@@ -243,15 +248,21 @@ def _instants(stamps: Array) -> str:
     return f"at {', '.join(told)} s{more}"
 
 
-def _spike_action(heights: Array, others: Array, spread: float) -> str:
-    """What takes out the spikes and no more: a threshold between them and all others."""
+def _between(heights: Array, others: Array, spread: float) -> float | None:
+    """A threshold in deviations between spikes and all other samples; None: there is none."""
     least, most = float(np.min(heights)), float(np.max(others))
     if most >= least:
+        return None
+    between = float(np.sqrt(least * max(most, 1e-3 * least)))
+    return float(f"{between / spread if spread > 0.0 else FAR:.0f}")
+
+
+def _spike_action(deviations: float | None) -> str:
+    """What takes out the spikes and no more."""
+    if deviations is None:
         return (
             "cut the record before and after: what bridges them would bridge edges of the commands"
         )
-    between = float(np.sqrt(least * max(most, 1e-3 * least)))
-    deviations = between / spread if spread > 0.0 else FAR
     return (
         "look for their cause (a connector, the logger), and bridge them before any fit: "
         "write [[conditioning]] into the study and below it outliers = { deviations = "

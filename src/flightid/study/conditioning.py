@@ -151,13 +151,13 @@ def require_records(steps: Sequence[Conditioning], names: Sequence[str]) -> None
 
 def outliers_first(
     steps: Sequence[Conditioning], file: RecordFile, channels: Iterable[str]
-) -> Mapping[str, Any] | None:
+) -> list[Mapping[str, Any]] | None:
     """Options of the outliers of a file that is resampled as it is read: they go before.
 
     Raises
     ------
     StudyError
-        Two steps take outliers off one such record.
+        Two steps take outliers off one channel of such a record.
     """
     if file.resample_to_s is None:
         return None
@@ -166,16 +166,19 @@ def outliers_first(
         for step in steps
         if step.outliers is not None and (not step.records or file.name in step.records)
     ]
-    if len(meant) > 1:
+    named = [name for each in meant for name in each.channels or ()]
+    if len(named) > len(set(named)) or (len(meant) > 1 and any(not e.channels for e in meant)):
         raise StudyError(
             f"study file, [[conditioning]]: outliers of record {file.name!r} are taken off twice",
-            needed="one step with outliers for a record that is resampled as it is read",
+            needed="one step with outliers for each channel of a record that is resampled as it is "
+            "read",
         )
-    if not meant:
-        return None
     held = set(channels)
-    chosen = meant[0].channels
-    return vars(meant[0]) | {"channels": chosen and [name for name in chosen if name in held]}
+    return [
+        vars(each)
+        | {"channels": each.channels and [name for name in each.channels if name in held]}
+        for each in meant
+    ] or None
 
 
 def condition(

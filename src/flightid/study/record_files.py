@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields, replace
 from glob import glob, has_magic
 from itertools import takewhile
@@ -137,7 +137,7 @@ def declared(record: Record, shape: InputShape) -> Record:
 def load_records(
     file: RecordFile,
     roles: Mapping[str, Role],
-    outliers: Mapping[str, Any] | None = None,
+    outliers: Sequence[Mapping[str, Any]] | None = None,
 ) -> list[Record]:
     """Read the channels that models need, of one manoeuvre or of all that the files hold.
 
@@ -146,7 +146,7 @@ def load_records(
     file : RecordFile
     roles : mapping of str to Role
         Channels to take.
-    outliers : mapping of str to object, optional
+    outliers : sequence of mapping of str to object, optional
         Options of the outliers that are bridged before anything is resampled.
 
     Returns
@@ -171,7 +171,10 @@ def load_records(
 
 
 def _load(
-    file: RecordFile, path: Path, roles: Mapping[str, Role], outliers: Mapping[str, Any] | None
+    file: RecordFile,
+    path: Path,
+    roles: Mapping[str, Role],
+    outliers: Sequence[Mapping[str, Any]] | None,
 ) -> list[Record]:
     """Records of one file."""
 

@@ -18,6 +18,7 @@ from flightid.logs import Log, read_log
 from flightid.logs.dataflash.sid_runs import SidRun
 from flightid.logs.to_record import EXCITATION
 from flightid.record import Channel, Record, Step
+from flightid.record.shared_ways import joined_ways, shared_ways
 from flightid.record.unit_changes import unit_changes
 from flightid.study.conditioning import Conditioning, condition, outliers_first
 from flightid.study.flight import FlightPlan
@@ -93,6 +94,7 @@ def take(
             for file in settings.record_files
             if file.name in needed
         }
+        files |= _read_alike(files, settings, needed, runner)
         made = _conditioned(files, settings, runner, checks)
         made = _in_units_of(tasks, made, runner)
         return StudyRecords(made, tuple(paths), checks=checks)
@@ -122,6 +124,28 @@ def take(
     made = _conditioned(cut, settings, runner, checks)
     made = _in_units_of(tasks, made, runner)
     return StudyRecords(made, (flown,), inspection, truth, opened, checks)
+
+
+def _read_alike(
+    read: Mapping[str, StageResult[list[Record]]],
+    settings: Settings,
+    needed: Mapping[str, Mapping[str, Role]],
+    runner: StageRunner,
+) -> dict[str, StageResult[list[Record]]]:
+    """Files whose inputs came to their grid in another way than in other records, read again."""
+    found = {}
+    ways = shared_ways({name: each.value for name, each in read.items()})
+    for file in settings.record_files:
+        again = joined_ways(file.interpolation, ways.get(file.name, {}))
+        if again is not None:
+            found[file.name] = runner.stage(
+                f"record, inputs as in the others: {file.name}",
+                load_records,
+                replace(file, interpolation=again),
+                needed[file.name],
+                outliers_first(settings.conditioning, file, needed[file.name]),
+            )
+    return found
 
 
 def _conditioned(

@@ -9,8 +9,9 @@ from typing import Any
 
 from flightid.frozen import dataclass
 from flightid.logs.joinable import joinable
-from flightid.record import read_records
+from flightid.record import Record, read_records
 from flightid.record.formats.columns import channel_name
+from flightid.record.shared_ways import Ways, read_alike
 from flightid.study.proposal.columns import Columns, columns_of, columns_of_model, units_of_channels
 from flightid.study.proposal.options import DataOptions
 from flightid.study.proposal.stretches import Stretch
@@ -79,12 +80,17 @@ def read_source(
 
 def _read(paths: Sequence[Path], reading: Mapping[str, Any]) -> list[Stretch]:
     """Manoeuvres of all files."""
-    return [part for path in paths for part in _parts(path, reading)]
+
+    def read(path: Path, interpolation: Ways) -> list[Record]:
+        joined = {"join": joinable(reading["join"]), "interpolation": interpolation}
+        return read_records(path, **{**reading, **joined})
+
+    found = read_alike(paths, reading.get("interpolation"), read)
+    return [part for path, made in zip(paths, found, strict=True) for part in _parts(path, made)]
 
 
-def _parts(path: Path, reading: Mapping[str, Any]) -> list[Stretch]:
+def _parts(path: Path, found: Sequence[Record]) -> list[Stretch]:
     """Manoeuvres of a file."""
-    found = read_records(path, **{**reading, "join": joinable(reading["join"])})
     if len(found) == 1:
         return [Stretch(found[0], path)]
     return [Stretch(record, path, str(record.name)) for record in found]
