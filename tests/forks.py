@@ -44,14 +44,19 @@ STARTED = pytest.StashKey["_Fork"]()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--forks", help="processes to run tests in: a number, or auto for the cores")
+    parser.addoption(
+        "--forks", help="processes to run tests in: a number, or auto: cores + 1"
+    )
 
 
 def _count(config: pytest.Config) -> int:
     asked = config.getoption("forks")
     if asked is None or config.option.collectonly or config.option.usepdb:
         return 1
-    return len(os.sched_getaffinity(0)) if asked == "auto" else int(asked)
+    if asked != "auto":
+        return int(asked)
+    cores = len(os.sched_getaffinity(0))
+    return cores + 1 if cores > 1 else 1  # Tests of browsers and of processes wait for these.
 
 
 def _together(item: pytest.Item) -> Path:
