@@ -11,11 +11,14 @@ import pytest
 
 pytest.importorskip("fastapi", reason="the extra app is not installed")
 
+from fastapi import HTTPException
 from tools.build_page import is_built, require_in
 from tools.page_types import TARGET, page_types
 
 from flightid.app.plot_layouts import keep_layout, plot_layouts, remove_layout
 from flightid.app.plot_schemas import PlotLayout
+from flightid.app.schemas import Edit, Edits, Step
+from flightid.app.studies import Studies
 from flightid.app.study_edits import KeyEdit, edited, etag_of, write_study
 from flightid.app.workspace import Workspace
 from flightid.errors import OptionError, StudyError
@@ -144,6 +147,48 @@ def test_an_edit_changes_its_key_and_nothing_else(tmp_path: Path) -> None:
         edited(STUDY, [KeyEdit(("model", 7, "name"), "x")])
     assert path.read_text() == more
     assert [each.name for each in tmp_path.iterdir()] == ["study.toml"]
+
+
+def test_undo_goes_back_beyond_a_reload_and_a_kill(tmp_path: Path) -> None:
+    """Each step is asked of a server of its own: what it knows lies in the folder."""
+    workspace, log = Workspace(tmp_path), "0" * 16
+    path = workspace.study_path(log)
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(STUDY, "utf-8")
+
+    def bands() -> tuple[float, int, int]:
+        told = Studies(workspace).read(log)
+        assert told is not None
+        low = told.settings["model"][0]["band_rad_s"][0]
+        return low, told.undoable, told.redoable
+
+    def changed(low: float) -> None:
+        made = Edits(edits=[Edit(path=["model", 0, "band_rad_s"], value=[low, 20.0])])
+        Studies(workspace).change(log, made, etag_of(path.read_text("utf-8")))
+
+    def stepped(*, back: bool) -> tuple[float, int, int]:
+        Studies(workspace).step(log, Step(back=back), etag_of(path.read_text("utf-8")))
+        return bands()
+
+    assert bands() == stepped(back=True) == (1.0, 0, 0)
+    changed(2.0)
+    changed(3.0)
+    assert (stepped(back=True), stepped(back=True)) == ((2.0, 1, 1), (1.0, 0, 2))
+    assert (stepped(back=False), bands()) == ((2.0, 1, 1), (2.0, 1, 1))
+    # A kill after the study was written and before its history was: nothing of it is lost.
+    history = tmp_path / ".flightid" / "undo" / f"{log}.json"
+    kept = history.read_bytes()
+    stepped(back=False)
+    history.write_bytes(kept)
+    assert (bands(), stepped(back=True)) == ((3.0, 2, 0), (2.0, 1, 1))
+    # A hand in an editor is a version as well; what was ahead is gone.
+    path.write_text(STUDY.replace("[1.0, 20.0]", "[5.0, 20.0]"), "utf-8")
+    assert (bands(), stepped(back=True)) == ((5.0, 2, 0), (2.0, 1, 1))
+    with pytest.raises(HTTPException):
+        Studies(workspace).step(log, Step(back=True), "of another version")
+    for broken in (b"", b"[1]", b'{"texts": [], "at": 0}', b'{"texts": ["a"], "at": 4}', b"\xff"):
+        history.write_bytes(broken)
+        assert bands() == (2.0, 0, 0)
 
 
 def test_the_page_has_the_types_of_the_server() -> None:

@@ -65,6 +65,9 @@ export const change = (log: string, etag: string, edits: Edit[]) =>
   json<StudyText>(`/api/studies/${log}`, sent("PATCH", { edits }, { "if-match": etag }));
 export const replace = (log: string, etag: string, text: string) =>
   json<StudyText>(`/api/studies/${log}`, sent("POST", { text }, { "if-match": etag }));
+/** To the version before, or to the next again. */
+export const step = (log: string, etag: string, back: boolean) =>
+  json<StudyText>(`/api/studies/${log}/step`, sent("POST", { back }, { "if-match": etag }));
 
 /** Send a file as it lies on the disk; `seen` hears how much of it has gone. */
 export const upload = (file: File, seen: (share: number) => void) =>

@@ -27,11 +27,8 @@ export class Study {
   known = $state(false);
   /** Requests that wait or are under way; each begins when the one before it has ended. */
   pending = $state(0);
-  #before: string[] = [];
   #turn: Promise<unknown> = Promise.resolve();
   #waiting: Waiting | null = null;
-  undoable = $state(0);
-
   constructor(readonly log: string) {}
 
   get models(): ModelTable[] {
@@ -93,15 +90,13 @@ export class Study {
     return this.#inTurn(() => this.#store([], (etag) => api.replace(this.log, etag, text)));
   }
 
-  undo(): Promise<void> {
-    return this.#inTurn(async () => {
-      const text = this.#before.at(-1);
-      if (text === undefined) return;
-      if (await this.#store([], (etag) => api.replace(this.log, etag, text))) {
-        this.#before.splice(-2);
-        this.undoable = this.#before.length;
-      }
-    });
+  /** Versions are the server's: a reload, and the next window, go back as far. */
+  undo(): Promise<boolean> {
+    return this.#inTurn(async () => !!this.file?.undoable && this.#store([], (etag) => api.step(this.log, etag, true)));
+  }
+
+  redo(): Promise<boolean> {
+    return this.#inTurn(async () => !!this.file?.redoable && this.#store([], (etag) => api.step(this.log, etag, false)));
   }
 
   /** One after the other: a request that went beside another would name a version that is gone. */
@@ -144,8 +139,6 @@ export class Study {
       }
       return false;
     }
-    this.#before.push(before);
-    this.undoable = this.#before.length;
     const old = new Set(before.split("\n"));
     this.changed = this.file.text.split("\n").filter((line) => !old.has(line));
     return true;

@@ -684,6 +684,7 @@ export interface PlanWishes {
   control: number | null;
   rate_rad_s: number | null;
   attitude_rad: number | null;
+  loop_rate_hz: number | null;
 }
 
 /** Plots that stand on the screen Flight: panes, each with fields or formulas of fields. */
@@ -1006,6 +1007,11 @@ export interface ShownParameter {
   changed: boolean;
 }
 
+/** To the version before, or to the next again. */
+export interface Step {
+  back: boolean;
+}
+
 /** The closed rate loop of an axis from ordinary flying. */
 export interface StepCurve {
   axis: string;
@@ -1057,6 +1063,8 @@ export interface StudyText {
   settings: Record<string, unknown>;
   python: string;
   outside: string[];
+  undoable: number;
+  redoable: number;
 }
 
 /** A time response of the estimate, with the extremes of some plants. */

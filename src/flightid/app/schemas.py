@@ -222,6 +222,15 @@ class StudyText(Message):
     python: str
     outside: list[str] = []
     """Files that it names outside the folder of the page, which opens none of them."""
+    undoable: int = 0
+    """How many versions can be gone back."""
+    redoable: int = 0
+
+
+class Step(Message):
+    """To the version before, or to the next again."""
+
+    back: bool
 
 
 class Edit(Message):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +11,9 @@ from fastapi import HTTPException
 
 from flightid.app.own_folders import read_plain, shown_name
 from flightid.app.python_lines import python_lines
-from flightid.app.schemas import Edits, StudyText, WholeText
+from flightid.app.schemas import Edits, Step, StudyText, WholeText
 from flightid.app.study_edits import KeyEdit, edited, etag_of, parts_of, write_study
+from flightid.app.study_history import StudyHistory, Versions
 from flightid.app.study_reach import outside_places
 from flightid.app.workspace import ID, Workspace
 from flightid.errors import FlightidError, StudyError
@@ -31,6 +33,7 @@ class Studies:
 
     def __init__(self, workspace: Workspace) -> None:
         self._workspace = workspace
+        self._history = StudyHistory(workspace)
         self._lock = threading.Lock()
 
     def path(self, log: str) -> Path | None:
@@ -58,7 +61,10 @@ class Studies:
             return None
         text = text_of(path)
         outside = _outside(self._workspace.folder, path)
+        versions = self._history.versions(log, text)
         return StudyText(
+            undoable=versions.behind,
+            redoable=versions.ahead,
             text=text,
             etag=etag_of(text),
             parts=parts_of(text),
@@ -70,13 +76,22 @@ class Studies:
     def change(self, log: str, edits: Edits, tag: str) -> StudyText | None:
         """Change keys of the version that `tag` names; another version is a conflict (409)."""
         made = [KeyEdit(tuple(each.path), each.value) for each in edits.edits]
-        return self._put(log, tag, lambda text: edited(text, made))
+        return self._put(log, tag, lambda old: old.followed_by(edited(old.text, made)))
 
     def replace(self, log: str, whole: WholeText, tag: str) -> StudyText | None:
         """Put a text in place of the version that `tag` names; another is a conflict (409)."""
-        return self._put(log, tag, lambda _: whole.text)
+        return self._put(log, tag, lambda old: old.followed_by(whole.text))
 
-    def _put(self, log: str, tag: str, made: Any) -> StudyText | None:  # noqa: ANN401
+    def step(self, log: str, steps: Step, tag: str) -> StudyText | None:
+        """Go a version back, or forward again; nothing happens where there is none."""
+        by = -1 if steps.back else 1
+
+        def moved(old: Versions) -> Versions:
+            return old.moved(by) if (old.behind if steps.back else old.ahead) else old
+
+        return self._put(log, tag, moved)
+
+    def _put(self, log: str, tag: str, made: Callable[[Versions], Versions]) -> StudyText | None:
         path = self.path(log)
         if path is None:
             return None
@@ -84,7 +99,10 @@ class Studies:
             text = text_of(path)
             if etag_of(text) != tag:
                 raise HTTPException(409, {"text": text, "etag": etag_of(text)})
-            write_study(path, made(text))
+            versions = made(self._history.versions(log, text))
+            if versions.text != text:
+                write_study(path, versions.text)
+                self._history.keep(log, versions)
             return self.read(log)
 
 

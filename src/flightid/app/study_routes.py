@@ -9,7 +9,7 @@ from typing import Annotated
 from fastapi import FastAPI, Header, HTTPException, Response
 
 from flightid.app.backstage import Backstage, LogName
-from flightid.app.schemas import Edits, StudyText, WholeText
+from flightid.app.schemas import Edits, Step, StudyText, WholeText
 
 
 def add_study_routes(app: FastAPI, backstage: Backstage) -> None:
@@ -38,6 +38,15 @@ def add_study_routes(app: FastAPI, backstage: Backstage) -> None:
         if_match: Annotated[str | None, Header()] = None,
     ) -> StudyText:
         return await _stored(studies.replace, log, whole, if_match, response)
+
+    @app.post("/api/studies/{log}/step")
+    async def step(
+        log: LogName,
+        steps: Step,
+        response: Response,
+        if_match: Annotated[str | None, Header()] = None,
+    ) -> StudyText:
+        return await _stored(studies.step, log, steps, if_match, response)
 
 
 async def _stored(
