@@ -115,6 +115,7 @@ STUDY: dict[str, type[Options]] = {
     "[[loop]]": LoopSettings,
     "[filters]": FilterSettings,
     "[[plot]]": PlotSettings,
+    "[plan], of a log, which tells vehicle and autopilot": PlanOptions,
 }
 """Tables of a study that are no verb's alone."""
 

@@ -247,9 +247,15 @@ def test_what_the_stick_moves_is_no_gust() -> None:
 def test_command_writes_card_and_settings(
     log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert run(["plan", str(log), "--axes", "roll", "--output", str(tmp_path / "out")]) == 0
+    # A study names the log and says what is asked for; the command line goes before it.
+    study = tmp_path / "study.toml"
+    words = '[study]\ntitle = "A"\n[plan]\naxes = ["roll", "pitch"]\nn_records = 1\n'
+    study.write_text(f"{words}[log]\npath = '{log}'\n", "utf-8")
+    asked = ["--axes", "roll", "--n-records", "3", "--output", str(tmp_path / "out")]
+    assert run(["plan", str(study), *asked]) == 0
     shown = capsys.readouterr()
     assert "0.0" in shown.out
+    assert any(line.split()[-2:] == ["3", "roll.param"] for line in shown.out.splitlines())
     assert "this flight" in shown.out
     assert {path.name for path in (tmp_path / "out").iterdir()} == {
         "roll.param", "roll.rollback.param", "card.html",

@@ -14,8 +14,12 @@ pytest.importorskip("fastapi", reason="the extra app is not installed")
 
 import flightid as fid
 from flightid.app import compare_work, filter_work, work
+from flightid.app.compare_schemas import PlanWishes
+from flightid.app.plot_layouts import keep_layout
+from flightid.app.plot_schemas import PlotLayout
 from flightid.app.pyramid import Pyramid
 from flightid.app.study_edits import KeyEdit, edited, parts_of
+from flightid.app.workspace import Workspace
 from flightid.conventions import Light
 from flightid.errors import FlightidError
 from flightid.findings import Finding
@@ -27,6 +31,7 @@ from flightid.study.views import view_log
 from tests.unit.test_filter_review import _write
 
 ASKED = {"INS_GYRO_FILTER": 25.0, "INS_HNTCH_ENABLE": 1.0}
+PLAN = {"axes": ["roll"], "amplitude": 0.05}
 SERIES = ["GYR.GyrX", "=GYR.GyrX - GYR.GyrY", "NOT.There"]
 BARE = '[study]\ntitle = "Shaken"\n[log]\npath = "shaken.bin"\n'
 
@@ -38,8 +43,11 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
     _write(folder / "shaken.bin", tone=0.6, white=0.01, esc=False)
     clicks = [
         KeyEdit(("filters",), {"parameters": ASKED}),
-        KeyEdit(("plot",), [{"series": SERIES}]),
+        KeyEdit(("plot",), [{"series": SERIES}, {"layout": "../plots/rates.toml"}]),
+        KeyEdit(("plan",), PLAN),
     ]
+    workspace = Workspace(folder.parent)
+    keep_layout(workspace, PlotLayout(name="rates", panes=[["GYR.GyrZ"], ["=-GYR.GyrZ"]]))
     (folder / "study.toml").write_text(edited(BARE, clicks), encoding="utf-8")
     return folder / "study.toml"
 
@@ -48,7 +56,7 @@ def test_keys_of_a_study_give_the_numbers_of_the_page(study: Path, tmp_path: Pat
     log = study.parent / "shaken.bin"
     settings, runner = read_settings(study), StageRunner()
     opened = runner.stage("log", fid.read_log, log)
-    tried, plots = view_log(settings.views, opened, runner, Faults(), tmp_path)
+    tried, plots, plan = view_log(settings.views, opened, runner, Faults(), tmp_path)
     page = filter_work.try_filters(log, ASKED)
     assert tried is not None
     for mine, shown in zip(tried.axes, page["axes"], strict=True):
@@ -59,7 +67,19 @@ def test_keys_of_a_study_give_the_numbers_of_the_page(study: Path, tmp_path: Pat
     for file in page["files"]:
         assert (tmp_path / file["name"]).read_text("utf-8") == file["text"]
     # A formula of fields, as the page draws it; what the log lacks is named, and the others stand.
-    (plot,) = plots
+    plot, *panes = plots
+    # A layout that the page keeps is named, and brings its panes.
+    assert [[each.name for each in pane.series] for pane in panes] == [["GYR.GyrZ"], ["-GYR.GyrZ"]]
+    # The plan of the page, with its files.
+    shown = compare_work.make_plan(log, PlanWishes.model_validate(PLAN).given())
+    assert plan is not None
+    assert [each.axis for each in plan.sweeps] == ["roll"]
+    assert [each.amplitude for each in plan.sweeps] == [e["amplitude"] for e in shown["rows"]]
+    assert plan.sweeps[0].amplitude == pytest.approx(0.05)
+    assert plan.verdict == shown["verdict"]
+    written = {path.name: path.read_text("utf-8") for path in (tmp_path / "plan").iterdir()}
+    assert written.keys() == {"card.html", *(each["name"] for each in shown["files"])}
+    assert all(written[each["name"]] == each["text"] for each in shown["files"])
     unit = work.make_formula(log, "GYR.GyrX - GYR.GyrY", tmp_path / "levels.npy")
     assert [each.name for each in plot.series] == ["GYR.GyrX", "GYR.GyrX - GYR.GyrY"]
     assert plot.series[1].unit == unit
@@ -93,6 +113,9 @@ def test_a_run_reports_filters_and_fields(study: Path) -> None:
         ('[[plot]]\nseries = ["= ATT.Roll +"]', "no formula of fields"),
         ("[filters]\nparameters = { A = 'b' }", "parameters"),
         ("[filters]", "parameters"),
+        ('[[plot]]\nseries = ["ATT.Roll"]\nlayout = "a.toml"', "series and a layout"),
+        ('[plan]\nvehicle = "heli"', "vehicle is the log's to tell"),
+        ("[plan]\namplitude = -1.0", "amplitude"),
     ],
 )
 def test_a_study_refuses_views_that_name_nothing(tmp_path: Path, said: str, refusal: str) -> None:

@@ -73,6 +73,7 @@ class PlanWishes(Message):
     control: float | None = None
     rate_rad_s: float | None = None
     attitude_rad: float | None = None
+    loop_rate_hz: float | None = None
 
     def given(self) -> dict[str, Any]:
         """What was asked for."""

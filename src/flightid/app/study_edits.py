@@ -18,7 +18,7 @@ from flightid.frozen import dataclass
 from flightid.reading import DOCUMENT_BYTES
 from flightid.study.settings import read_settings
 
-VIEWS = ("filters", "plot")
+VIEWS = ("filters", "plot", "plan")
 """Tables of a study on which neither models nor gains rest."""
 
 

@@ -26,7 +26,7 @@ def _fields() -> dict[str, type[Options]]:
     fields_of=_fields,
     short_help="Say what to fly next: sweeps, settings with the way back, a card.",
 )
-@click.argument("log", required=False, type=FILES)
+@click.argument("log", metavar="[LOG|STUDY]", required=False, type=FILES)
 @click.option(
     "--output",
     type=click.Path(file_okay=False, path_type=Path),
@@ -49,7 +49,8 @@ def command(
     this flight showed it, which amplitude gives which rates, attitudes and coherence. Writes
     card.html, one page to print and take to the field, and the settings of each axis with the file
     that takes them back. Axes of which LOG can carry a model already are left out, unless --axes
-    names them. The exit code is 1 for no-go, which leaves no settings.
+    names them. The exit code is 1 for no-go, which leaves no settings. A STUDY (*.toml) names
+    its log, and says under [plan] what is asked for; options of the command line go first.
     """
     from flightid import plan_flight
     from flightid.files import write_atomically
@@ -57,6 +58,8 @@ def command(
     from flightid.report.flight_card import card_html
 
     (asked,) = parted(options, _fields())
+    if log is not None and log.suffix == ".toml":
+        log, asked = _of_study(log, asked)
     if (log is None) == ("vehicle" not in asked):
         raise click.UsageError("name a LOG, or without one a --vehicle")
     if log is not None and "autopilot" in asked:
@@ -81,3 +84,15 @@ def command(
         note("No settings written: no-go (--write-no-go writes them)")
     note(f"Wrote {write_atomically(place / 'card.html', card_html(plan))}: print it")
     leave_by_verdict(plan.findings)
+
+
+def _of_study(study: Path, asked: dict[str, Any]) -> tuple[Path, dict[str, Any]]:
+    """Log of a study, and what it says under [plan] beneath what was asked for."""
+    from flightid.study.settings import read_settings
+    from flightid.study.taking import require_log
+    from flightid.study.view_settings import TOLD_BY_LOG
+
+    settings = read_settings(study)
+    said = {} if settings.views.plan is None else vars(settings.views.plan)
+    known = {key: value for key, value in said.items() if key not in TOLD_BY_LOG}
+    return require_log(settings.log, study), {**known, **asked}

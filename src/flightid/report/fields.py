@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from flightid.logs.field_plot import FieldPlot
+from flightid.planning import SweepPlan
 from flightid.report.content import Block, Lights, TableBlock
 from flightid.report.figures import figure_block
 from flightid.review.tried_filters import TriedFilters
@@ -22,6 +23,14 @@ def tried_blocks(tried: TriedFilters) -> Iterator[Block]:
     yield TableBlock(tried.summary())
     for each in tried.axes:
         yield figure_block(tried.plot(axis=each.axis), NOISE.format(axis=each.axis))
+
+
+def plan_blocks(plan: SweepPlan) -> Iterator[Block]:
+    """Verdicts of the next flight, what is flown, and what that will show."""
+    if plan.findings:
+        yield Lights(plan.findings)
+    for table in plan._tables():
+        yield TableBlock(table)
 
 
 def field_blocks(plots: Iterable[FieldPlot]) -> Iterator[Block]:

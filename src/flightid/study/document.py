@@ -77,7 +77,7 @@ def study_document(study: StudyResults) -> Document:
         *_uses(study),
         section_of("The records" if study.inspection is None else "The log", _source_blocks, study),
         *_review(study),
-        *view_sections(study.tried, study.plots),
+        *view_sections(study.tried, study.plots, study.plan),
         Section("Provenance", provenance(study.files, _options(study))),
     )
     return Document(

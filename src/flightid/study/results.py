@@ -13,6 +13,7 @@ from flightid.findings import Finding
 from flightid.frozen import dataclass
 from flightid.inspection import Inspection
 from flightid.logs.field_plot import FieldPlot
+from flightid.planning import SweepPlan
 from flightid.record import Record
 from flightid.result import Result
 from flightid.review import FlightReview
@@ -80,6 +81,8 @@ class StudyResults(
         Filters that the study tries on the noise of the flight.
     plots : tuple of FieldPlot
         Fields of the log that the study shows.
+    plan : SweepPlan or None
+        Of the next flight, where the study asks for one.
     """
 
     settings: Settings
@@ -101,6 +104,7 @@ class StudyResults(
     review: FlightReview | None = None
     tried: TriedFilters | None = None
     plots: tuple[FieldPlot, ...] = ()
+    plan: SweepPlan | None = None
 
     @property
     def has_equations(self) -> bool:

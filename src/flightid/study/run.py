@@ -154,7 +154,7 @@ def _run(
         reviewed = None
         if taken.log is not None:
             reviewed = faults.spare("the flight review", _reviewed, None, runner, taken.log)
-        tried, plots = view_log(settings.views, taken.log, runner, faults, folder)
+        tried, plots, plan = view_log(settings.views, taken.log, runner, faults, folder)
         study = Study(
             settings,
             final,
@@ -175,6 +175,7 @@ def _run(
             reviewed,
             tried,
             plots,
+            plan,
         )
         _write(study, folder)
         advance()

@@ -217,7 +217,7 @@ def read_settings(path: Path) -> Settings:
     models = collected.each(readers, model, folder)
     named = [str(values.get("name")) for _, values in collected.read(root.rows, [], "model")]
     uses = collected.read(read_uses, UsesSettings(), root, named)
-    views = collected.read(read_views, ViewSettings(), root)
+    views = collected.read(read_views, ViewSettings(), root, folder)
     collected.read(root.finish, None)
     if files and segments:
         collected.errors.append(
