@@ -206,6 +206,19 @@ def test_from_a_dropped_log_to_a_dragged_band(desk: Desk, tmp_path: Path) -> Non
     chart = page.locator("[role=application][aria-label^='IMU.GyrX over time']")
     zoomed_by_keys(chart, page.locator(".plots").get_by_role("button", name="Whole flight"))
     said += _findings(page)
+    # The strip by keys: a sweep is read where it begins, taken, and let go; Shift draws a span.
+    strip = page.get_by_role("application", name="The flight over time")
+    for key in ("Home", "PageDown", "PageDown"):
+        strip.press(key)
+    page.get_by_role("status").filter(has_text="injected sweep roll").wait_for()
+    strip.press("Enter")
+    page.get_by_role("group", name="Use this span").get_by_text("23.9 s chosen:").wait_for()
+    strip.press("Escape")
+    page.get_by_role("group", name="Use this span").wait_for(state="detached")
+    strip.press("Shift+ArrowRight")
+    strip.press("Shift+ArrowRight")
+    page.get_by_role("group", name="Use this span").get_by_text("1.7 s chosen:").wait_for()
+    strip.press("Escape")
     # A span is typed; the model is fitted on it; the change is taken back.
     before = desk.study
     page.locator("input[type=number]").nth(0).fill("40")
@@ -282,6 +295,9 @@ def test_a_second_window_overwrites_nothing(desk: Desk) -> None:
     second.page.fill("#least", "0.7")
     second.page.press("#least", "Tab")
     second.page.wait_for_selector("dialog[open]")
+    for _ in range(3):  # Chromium closes it at the second, whatever was said to the first
+        second.page.keyboard.press("Escape")
+        second.page.wait_for_selector("dialog[open]")
     assert "n_omega = 31" in second.page.inner_text("dialog pre >> nth=0")
     assert "minimum_coherence" not in str(desk.study)
     second.page.click("text=Take theirs, then mine")

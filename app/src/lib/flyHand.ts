@@ -5,7 +5,8 @@ export const KEYS: Record<string, [Hand, number]> = {
   ArrowDown: ["pitch", 1], ArrowUp: ["pitch", -1], ArrowRight: ["roll", 1], ArrowLeft: ["roll", -1],
   d: ["yaw", 1], a: ["yaw", -1], w: ["heave", 1], s: ["heave", -1],
 };
-const KEY_REACH = 0.25;
+/** Share of the travel that a key reaches, and with Shift. */
+const [KEY_REACH, FAR] = [0.25, 1];
 const KEY_RATE = 1.2;
 const BACK_RATE = 2.5;
 const DEAD = 0.06;
@@ -14,6 +15,8 @@ const DEAD = 0.06;
 export class FlyHand {
   readonly held = new Set<string>();
   placed: Partial<Sticks> = {};
+  /** Whether Shift is held. */
+  far = false;
   #keyed: Sticks = { pitch: 0, roll: 0, yaw: 0, heave: 0 };
 
   press(key: string) {
@@ -23,7 +26,7 @@ export class FlyHand {
     return true;
   }
   release(key: string) { this.held.delete(key.length === 1 ? key.toLowerCase() : key); }
-  letGo() { this.held.clear(); this.placed = {}; }
+  letGo() { this.held.clear(); this.far = false; this.placed = {}; }
 
   /** Name of the gamepad that is read; empty: none. */
   get pad() { return navigator.getGamepads?.().find((each) => each?.connected)?.id ?? ""; }
@@ -42,7 +45,7 @@ export class FlyHand {
   /** Where it is after so many seconds. */
   moved(seconds: number): Sticks {
     const aim: Sticks = { pitch: 0, roll: 0, yaw: 0, heave: 0 };
-    for (const key of this.held) aim[KEYS[key][0]] += KEY_REACH * KEYS[key][1];
+    for (const key of this.held) aim[KEYS[key][0]] += (this.far ? FAR : KEY_REACH) * KEYS[key][1];
     const pad = this.#padded();
     const found = { ...this.#keyed };
     for (const axis of Object.keys(aim) as Hand[]) {
