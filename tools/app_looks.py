@@ -37,6 +37,7 @@ def look(stage: Stage, name: str) -> None:
         for colours in COLOURS:
             if page.evaluate("document.documentElement.dataset.theme") != colours:
                 page.locator("button[aria-label$=colours]").click()
+            page.evaluate("scrollTo(0, 0)")
             page.wait_for_timeout(REST_MS)
             page.screenshot(path=folder / f"{name}-{width}-{colours}.png", full_page=True)
     page.set_viewport_size(SIZE)
