@@ -9,7 +9,7 @@ from flightid.fleet.catalogue.loose import write_loose
 from flightid.fleet.catalogue.record import LogRecord
 from flightid.fleet.opening import current_store
 from flightid.fleet.settings import read_fleet
-from tests.fleet_rows import fleet_rows
+from tests.fleet_rows import Rows, fleet_rows
 
 FLEET = (
     '[fleet]\ntitle = "Survey"\nlogs = ["fleet-logs"]\n[questions]\ncovariates = ["battery"]\n'
@@ -17,20 +17,23 @@ FLEET = (
 )
 
 
-def write_fleet(folder: Path, log: Path | None = None, flights: int = 16) -> Path:
-    """A fleet file of three vehicles with its catalogue; v02's newest flight is of that log."""
+def write_fleet(
+    folder: Path, log: Path | None = None, flights: int = 16, vehicles: int = 3
+) -> Path:
+    """A fleet file of vehicles with its catalogue; v02's newest flight is of that log."""
     path = folder / "fleet.toml"
     path.write_text(FLEET)
     (folder / "fleet-logs").mkdir(exist_ok=True)
-    rows = fleet_rows(3, 3, flights)
+    rows = fleet_rows(3, vehicles, flights)
     store = current_store(read_fleet(path))
     flown = [each["log"] for each in rows["logs"] if each["vehicle"] == "v02"]
     names = {} if log is None else {flown[-1]: hashlib.sha256(log.read_bytes()).hexdigest()}
-    for digest in [each["log"] for each in rows["logs"]]:
-        name = names.get(digest, digest)
-        own = {
-            table: [each | {"log": name} for each in held if each["log"] == digest]
-            for table, held in rows.items()
-        }
-        write_loose(store, LogRecord(name, own))
+    own: dict[str, Rows] = {}
+    for table, held in rows.items():
+        for each in held:
+            name = names.get(each["log"], each["log"])
+            kept = own.setdefault(name, {every: [] for every in rows})
+            kept[table].append(each | {"log": name})
+    for name, tables in own.items():
+        write_loose(store, LogRecord(name, tables))
     return path

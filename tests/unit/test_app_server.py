@@ -70,9 +70,9 @@ class Browser:
         plain = "json" in told.get("content-type", "")
         return answer.status, json.loads(content) if plain else content, told
 
-    def socket(self, **more: Any) -> Any:
+    def socket(self, path: str = "/api/live", **more: Any) -> Any:
         given = {"Cookie": f"{self.session.cookie}={self.session.secret}"}
-        address = f"ws://127.0.0.1:{self.session.port}/api/live"
+        address = f"ws://127.0.0.1:{self.session.port}{path}"
         options = {"origin": f"http://127.0.0.1:{self.session.port}", **more}
         return connect(address, additional_headers=given, **options)
 
@@ -255,9 +255,6 @@ def test_requests_that_a_stranger_makes_on_the_wire(browser: Browser, flown: Flo
     paths = ("/../../etc/passwd", "/%2e%2e/%2e%2e/etc/passwd", "/api/logs/..%2f..", "/api/logs/x")
     assert {browser.ask(path)[0] for path in paths} == {404}
     assert browser.ask("/api/logs?name=x.bin", "PUT", b"<script>")[0] == 422
-    for origin in (None, "http://127.0.0.1:1"):
-        with pytest.raises(InvalidStatus), browser.socket(origin=origin):
-            pass
     bound = bound_socket(0)
     assert bound.getsockname()[0] == "127.0.0.1"
     with pytest.raises(OptionError, match="the port cannot be taken"):
@@ -288,6 +285,12 @@ def test_every_route_is_behind_the_guard(browser: Browser) -> None:
         if body is not None:  # a form of a foreign page could send this
             kind = {"Content_Type": "text/plain"}
             assert browser.ask(path, method, body, **kind)[0] == 415, path
+    sockets = {route.path for route in app.routes if not hasattr(route, "methods")}
+    assert {"/api/live", "/api/fly"} <= sockets
+    for path in sockets:
+        for origin in (None, "http://127.0.0.1:1", "https://evil.example"):
+            with pytest.raises(InvalidStatus), browser.socket(path, origin=origin):
+                pass
 
 
 def test_gains_comparisons_and_plans_refuse_what_is_not_there(
