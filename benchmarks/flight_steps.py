@@ -36,7 +36,8 @@ from tests.strangers.ordinary_flights import Axis, Flown, ordinary, step
 from tests.strangers.ordinary_steps import BETAFLIGHT, HELICOPTER, PLANE, PX4, QUADROTOR
 
 from flightid.errors import FlightidError
-from flightid.review.deconvolution import LoopSamples, closed_loop
+from flightid.review.deconvolution import closed_loop
+from flightid.review.loop_samples import LoopSamples
 from flightid.review.step_features import window_features
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.quantiles import tails
@@ -136,17 +137,13 @@ def _rms(values: Array) -> float:
 def flightid_step(axis: Axis, flown: Flown) -> Curve:
     """The estimate and its 95 % band."""
     every = max(1, round(axis.loop_hz / 100.0)) if axis.loop_hz < 1000.0 else 4
-    sample_s = every / axis.loop_hz
-    r, y, angle = flown.rate_wanted[::every], flown.rate[::every], flown.angle[::every]
-    ahead = np.concatenate([[0.0], np.diff(angle) / sample_s])
-    loop = closed_loop(
-        LoopSamples(r - r.mean(), y - y.mean(), ahead - ahead.mean(), (r.size,), sample_s)
-    )
-    count = round(SHOWN_S / sample_s)
+    tick_s = 1.0 / axis.loop_hz
+    rows = (flown.rate_wanted, flown.rate, flown.angle)
+    loop = closed_loop(LoopSamples.of([rows], tick_s, every))
+    count = round(SHOWN_S / loop.sample_time_s)
     steps = loop.step(count)
     low, high = np.quantile(steps[1:], tails(0.95), axis=0)
-    time_s = (np.arange(count) + 0.5) * sample_s - 0.5 / axis.loop_hz
-    return Curve(np.asarray(time_s, dtype=np.float64), steps[0], low, high)
+    return Curve(loop.instants(count, tick_s), steps[0], low, high)
 
 
 def pid_analyzer_step(axis: Axis, flown: Flown) -> Curve:

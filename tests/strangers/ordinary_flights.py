@@ -15,6 +15,8 @@ from scipy.signal import butter
 from tests.strangers import noises
 
 Array = noises.Array
+HAND_S = 0.04
+"""Of the two lags of a hand on a stick."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,7 @@ def sticks(random: np.random.Generator, n: int, tick_s: float, size: float, lag_
         held = int(random.uniform(0.3, 2.0) / tick_s)
         levels[at : at + held] = size * random.standard_normal() * (random.random() < 0.7)
         at += held
-    pole = np.exp(-tick_s / lag_s)
+    pole = np.exp(-tick_s / lag_s) if lag_s else 0.0
     for _ in range(2):
         levels = noises.lfilter([1.0 - pole], [1.0, -pole], levels)
     return levels
@@ -132,11 +134,13 @@ def _biquad(hz: float, rate_hz: float) -> tuple[list[float], list[float]]:
     return b.tolist(), a.tolist()
 
 
-def ordinary(axis: Axis, seed: int, duration_s: float, *, acro: bool, size: float) -> Flown:
+def ordinary(
+    axis: Axis, seed: int, duration_s: float, *, acro: bool, size: float, lag_s: float = HAND_S
+) -> Flown:
     """A flight by sticks in gusts: rates wanted in acro, attitudes wanted else."""
     random = np.random.default_rng(seed)
     n, h = round(duration_s * axis.loop_hz), 1.0 / axis.loop_hz
-    wish = sticks(random, n, h, size, 0.04)
+    wish = sticks(random, n, h, size, lag_s)
     gust = axis.gust * noises.ar1(random, n, np.exp(-h / axis.gust_s))
     noise = axis.noise * random.standard_normal(n)
     return fly(axis, None if acro else wish, wish if acro else None, gust, noise)

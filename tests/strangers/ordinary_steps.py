@@ -10,12 +10,13 @@ from functools import cache, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.review.deconvolution import LoopDraws, LoopSamples
+from flightid.review.deconvolution import LoopDraws
 from flightid.review.loop_response import LoopResponse
+from flightid.review.loop_samples import LoopSamples
 from flightid.review.loops import SLOWEST_HZ, read_step
 from flightid.review.step_features import frequency_features, window_features
 from tests.strangers.counting import Case, Reading, Trial
-from tests.strangers.ordinary_flights import Axis, ordinary, step
+from tests.strangers.ordinary_flights import HAND_S, Axis, ordinary, step
 
 Array = NDArray[np.float64]
 INSTANTS = 8
@@ -66,14 +67,19 @@ def instants(axis: Axis, every: int, count: int) -> Array:
 
 
 def fly_samples(
-    seed: int, axis: Axis, *, acro: bool, duration_s: float = 60.0, every: int = 4
+    seed: int,
+    axis: Axis,
+    *,
+    acro: bool,
+    duration_s: float = 60.0,
+    every: int = 4,
+    logged: int = 1,
+    lag_s: float = HAND_S,
 ) -> LoopSamples:
-    """What a log of one flight would hold of the rate loop."""
-    flown = ordinary(axis, seed, duration_s, acro=acro, size=1.0 if acro else 0.25)
-    sample_s = every / axis.loop_hz
-    r, y, angle = flown.rate_wanted[::every], flown.rate[::every], flown.angle[::every]
-    ahead = np.concatenate([[0.0], np.diff(angle) / sample_s])
-    return LoopSamples(r - r.mean(), y - y.mean(), ahead - ahead.mean(), (r.size,), sample_s)
+    """Samples of so many ticks of the rate loop, of a log with a row every `logged` of them."""
+    flown = ordinary(axis, seed, duration_s, acro=acro, size=1.0 if acro else 0.25, lag_s=lag_s)
+    rows = [each[::logged] for each in (flown.rate_wanted, flown.rate, flown.angle)]
+    return LoopSamples.of([(rows[0], rows[1], rows[2])], logged / axis.loop_hz, every // logged)
 
 
 def fly_loop(samples: LoopSamples, axis: Axis) -> LoopResponse:
@@ -87,10 +93,19 @@ def fly_loop(samples: LoopSamples, axis: Axis) -> LoopResponse:
 
 
 def fly_step(
-    seed: int, *, axis: Axis, acro: bool, duration_s: float = 60.0, every: int = 4
+    seed: int,
+    *,
+    axis: Axis,
+    acro: bool,
+    duration_s: float = 60.0,
+    every: int = 4,
+    logged: int = 1,
+    lag_s: float = HAND_S,
 ) -> Trial:
     """Step at eight instants and every reading of one flight's rate loop."""
-    samples = fly_samples(seed, axis, acro=acro, duration_s=duration_s, every=every)
+    samples = fly_samples(
+        seed, axis, acro=acro, duration_s=duration_s, every=every, logged=logged, lag_s=lag_s
+    )
     begun = time.perf_counter()
     loop = fly_loop(samples, axis)
     spent = time.perf_counter() - begun
@@ -119,7 +134,7 @@ CASES = tuple(
         ("quadrotor, ArduPilot, angle mode", QUADROTOR, False, {}),
         ("quadrotor, ArduPilot, acro", QUADROTOR, True, {}),
         ("quadrotor, PX4, angle mode", PX4, False, {}),
-        ("quadrotor, PX4, acro, 50 Hz", PX4, True, {"every": 8}),
+        ("quadrotor, PX4, acro, 50 Hz", PX4, True, {"every": 8, "logged": 8}),
         ("quadrotor, Betaflight, acro", BETAFLIGHT, True, {"every": 4}),
         ("helicopter, angle mode", HELICOPTER, False, {}),
         ("plane, angle mode", PLANE, False, {}),

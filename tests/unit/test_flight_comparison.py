@@ -15,6 +15,7 @@ import flightid as fid
 from flightid.cli.compare import _flights
 from flightid.cli.next_comparison import flown_for
 from flightid.cli.program import run
+from flightid.control.autopilots.angle_law import AngleLaw
 from flightid.control.autopilots.parameter_files import GainChange, write_ardupilot_parameters
 from flightid.conventions import Light
 from flightid.dynamics.conditions.ratios import difference_of
@@ -22,6 +23,7 @@ from flightid.errors import DataError
 from flightid.files import sha256_of_file
 from flightid.findings import said_once
 from flightid.plot.flight import compared_steps
+from flightid.record import Record
 from flightid.review.changes import (
     TRACKING,
     ExpectedLoop,
@@ -32,8 +34,10 @@ from flightid.review.changes import (
 from flightid.review.comparison import compare_loops, expected, unheld
 from flightid.review.flight_state import FlightState
 from flightid.review.loop_response import LoopResponse
+from flightid.review.loops import _in_proportion
 from flightid.review.next_step import FlownStep, flown_step, left_to_fly
 from flightid.review.promised import promised_loops
+from flightid.review.proportional import excess_of
 from flightid.review.step_features import BANDWIDTH, step_features
 from flightid.uncertainty.estimate import Estimate
 from flightid.uncertainty.uneven import DrawnEnds
@@ -231,6 +235,39 @@ def test_large_moves_of_an_angle_are_not_held_against_small_ones(tmp_path: Path)
     assert "whose sticks moved as far" in flights.findings[0].action
 
 
+def test_small_moves_are_chosen_by_the_set_point_and_hold_enough_of_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Chosen by measured errors, yaws of two flights with the same gains had changed, one by -0.1.
+
+    What was left of the set-point was a tenth of it: gusts.
+    """
+    time_s, law = 0.02 * np.arange(500), AngleLaw(8.0, 0.1, "ATC_ACCEL_Y_MAX")
+    sticks = np.where(time_s < 5.0, 0.05, 0.2) * np.sign(np.sin(2.0 * time_s))
+    gust = np.where((time_s > 2.0) & (time_s < 3.0), 0.3, 0.0)
+    flown = Record.from_arrays(
+        time_s, inputs={"set_point": sticks}, outputs={"measured": sticks + gust}
+    )
+    quiet = [np.where(time_s >= 5.0, 0.2, 0.05)]
+    chosen = excess_of(law, "yaw", [flown], quiet)
+    assert chosen is not None
+    assert [begin > 4.9 for begin, _ in chosen.spans] == [True]
+    read: list[list[Record]] = []
+
+    def stepped(log: object, begun: LoopResponse, pieces: list[Record]) -> LoopResponse:
+        read.append(pieces)
+        return replace(begun, step=np.ones(2))
+
+    monkeypatch.setattr("flightid.review.loops._read", stepped)
+    small, none = flown.segment(0.0, 1.9), np.zeros(0)
+    begun = LoopResponse("yaw", "attitude", "", "", 0.0, 0.0, 0, None, None, none, none, none)
+    for asked, is_bent in ((0.15, False), (0.3, True)):
+        begun = replace(begun, asked=asked)
+        made = _in_proportion(fid.Log, begun, chosen, [flown], [small])  # type: ignore[arg-type]
+        assert made.is_bent is is_bent
+    assert [pieces[0] is flown for pieces in read] == [False, True]
+
+
 def test_gains_filters_and_other_vehicles_are_said(
     stepped: tuple[Path, fid.TransferFunctionModel],
     reviews: dict[str, fid.FlightReview],
@@ -373,6 +410,11 @@ def test_a_promise_is_kept_by_the_truth_and_missed_by_another_vehicle(
         kept["roll rate, rise time"].after.value or 0.0,
         kept["roll rate, rise time"].before.value or 1.0,
         rtol=0.05, why="the truth; sampled to two and a half milliseconds",
+    )  # fmt: skip
+    delay = kept["roll rate, delay to half"]
+    assert_close(
+        delay.before.value or 0.0, delay.after.value or 1.0, rtol=0.01,
+        why="the rate loop takes a set-point a tick, 4 % of this, after its row in the log",
     )  # fmt: skip
     other = model.with_values({"Ltphi": 2.5 * model.parameters["Ltphi"].value})
     missed = fid.compare_with_promise([other], log)

@@ -23,8 +23,9 @@ from flightid.logs.dataflash.writer import DataflashWriter
 from flightid.plot.gains import has_both, measured_and_predicted
 from flightid.plot.glance import flight_glance
 from flightid.review.apart import gains_between
-from flightid.review.deconvolution import LoopSamples, closed_loop
+from flightid.review.deconvolution import closed_loop
 from flightid.review.gyro_noise import GyroNoise
+from flightid.review.loop_samples import LoopSamples
 from flightid.review.loops import _pair, refused, tracking_error
 from flightid.review.motors import motor_use, turning, yaw_trim
 from flightid.review.verdicts import judge_flight

@@ -45,7 +45,8 @@ GLOSSARY = {
     "least gain margin": "Of the worst vehicle: how much the loop's gain may grow.",
     "half way after": "From the step to half of the level that it reaches.",
     "rises in": "From a tenth to nine tenths of the level that the step reaches.",
-    "overshoots by": "How far the step goes beyond the level that it reaches.",
+    "overshoots by": "How far the step goes beyond what was asked; beyond its level where that is "
+    "more than a tenth off.",
     "settles in": "Time after which the step stays within a tenth of its level.",
     "reaches": "Share of what was asked that the step reaches in the time that is read.",
     "phase delay": "Delay of slow set-points: phase over frequency.",

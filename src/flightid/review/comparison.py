@@ -28,7 +28,7 @@ from flightid.review.changes import (
 from flightid.review.flight_state import MOTORS, OTHERS
 from flightid.review.loop_response import LoopResponse
 from flightid.review.motors import LIMITS
-from flightid.review.step_features import BANDWIDTH, GAIN, creep, step_features
+from flightid.review.step_features import BANDWIDTH, GAIN, creep, follows, step_features
 from flightid.review.told_band import QUICK, is_too_quick
 from flightid.table import Column, Table
 from flightid.uncertainty.estimate import Reading
@@ -266,19 +266,25 @@ def _untold(name: str, loops: Iterable[LoopResponse]) -> str:
 def pairs(before: LoopResponse, after: LoopResponse) -> Iterator[tuple[Reading, Reading]]:
     """The same number of both, steps read over the time that both show: where they end counts.
 
-    Where one flight does not tell it, the other's stands beside a gap.
+    Overshoots are of what is asked where both follow it, of their own levels else. Where one flight
+    does not tell a number, the other's stands beside a gap.
     """
     end_s = min(before.time_s[-1], after.time_s[-1])
-    old, new = _readings(before, end_s), _readings(after, end_s)
+    steps = [_until(loop, end_s) for loop in (before, after)]
+    of_asked = all(follows(*each) for each in steps)
+    old, new = (
+        _readings(loop, step_features(*step, of_asked=of_asked))
+        for loop, step in zip((before, after), steps, strict=True)
+    )
     for name, reading in old.items():
         answer = new.get(name)
         if answer is not None and (reading.value is not None or answer.value is not None):
             yield reading, answer
 
 
-def _readings(loop: LoopResponse, end_s: float) -> dict[str, Reading]:
-    """Of what a step reaches in that time, whether it has settled there or not."""
-    found = {r.name: r for r in step_features(*_until(loop, end_s)) if r.name in SHOWN}
+def _readings(loop: LoopResponse, step: tuple[Reading, ...]) -> dict[str, Reading]:
+    """Of what a step reaches in some time, whether it has settled there or not, and the rest."""
+    found = {r.name: r for r in step if r.name in SHOWN}
     found |= {r.name: r for r in loop.readings if r.name.startswith((GAIN, BANDWIDTH))}
     found |= {r.name: r for r in loop.readings if r.name == QUICK[0] and is_too_quick(r)}
     if loop.tracking is not None and loop.asked:

@@ -14,6 +14,7 @@ from flightid.frozen import dataclass
 from flightid.identification.prediction_error.linear_regression import regress
 from flightid.recursive_filter import filtered
 from flightid.review.kernel_posterior import kernel_draws
+from flightid.review.loop_samples import LoopSamples
 
 Array = NDArray[np.float64]
 MEMORY_S = (0.5, 0.1, 0.4)
@@ -22,33 +23,6 @@ FEWEST_LAGS, MOST_LAGS = 4, 50
 ROWS_PER_LAG = 10
 DRAWS = 400
 TOO_FEW = "too few samples"
-
-
-@dataclass(frozen=True, eq=False)
-class LoopSamples:
-    """A set-point and what followed, piece by piece at one sample time, means removed.
-
-    Attributes
-    ----------
-    set_point, measured : ndarray, shape (n,)
-        In the same unit.
-    forerunner : ndarray, shape (n,), or None
-        What the set-point was made from, before the filters of `measured`.
-    lengths : tuple of int
-        Samples of each piece.
-    sample_time_s : float
-    """
-
-    set_point: Array
-    measured: Array
-    forerunner: Array | None
-    lengths: tuple[int, ...]
-    sample_time_s: float
-
-    @property
-    def duration_s(self) -> float:
-        """Seconds in all."""
-        return self.sample_time_s * sum(self.lengths)
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +48,19 @@ class LoopDraws:
         ones = np.ones(count)
         rows = zip(self.numerators, self.denominators, strict=True)
         return np.array([filtered(b, a, ones) for b, a in rows])
+
+    def instants(self, count: int, tick_s: float) -> Array:
+        """When it has them, s, of a set-point that is held for ticks of `tick_s`.
+
+        What is held acts half a tick later than what is smooth.
+        """
+        middles = (np.arange(count) + 0.5) * self.sample_time_s
+        return np.asarray(middles - 0.5 * tick_s)
+
+    def answers(self, samples: LoopSamples) -> list[Array]:
+        """What the set-point alone makes the estimate do in each piece, from rest."""
+        parts = np.split(samples.set_point, np.cumsum(samples.lengths)[:-1])
+        return [filtered(self.numerators[0], self.denominators[0], part) for part in parts]
 
     def response(self, omega_rad_s: Array) -> NDArray[np.complex128]:
         """Frequency responses, shape (1 + draws, n_omega)."""

@@ -231,7 +231,7 @@ class _Candidates:
         opened = plants * loop.feedback(GRID, gyro="filtered", with_hold=False)
         scale = np.exp(-_at(np.log(np.abs(opened)), np.log(crossover[:, 0])))[:, None]
         self.opened = scale * opened
-        forward = loop.forward(GRID, with_hold=False)
+        forward = loop.forward(GRID, with_hold=False) * loop.set_point_delay(GRID)
         self.closed = scale * plants * forward / (1.0 + self.opened)
         self.phase = np.unwrap(np.angle(self.opened), axis=1)
 

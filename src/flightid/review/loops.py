@@ -17,9 +17,10 @@ from flightid.inspection.signals import Signal, Span, find, inside, places, reco
 from flightid.inspection.thresholds import RATE_LEAST
 from flightid.logs import Log
 from flightid.record import Record
-from flightid.review.deconvolution import TOO_FEW, LoopDraws, LoopSamples, closed_loop
+from flightid.review.deconvolution import TOO_FEW, LoopDraws, closed_loop
 from flightid.review.loop_response import LoopResponse
-from flightid.review.proportional import Excess, bounded_law, excess_of
+from flightid.review.loop_samples import LoopSamples
+from flightid.review.proportional import Excess, bounded_law, excess_of, is_proportional
 from flightid.review.step_features import (
     frequency_features,
     step_features,
@@ -29,6 +30,7 @@ from flightid.review.step_features import (
 from flightid.review.thresholds import (
     FASTEST_ATTITUDE,
     FASTEST_RATE,
+    LEFT,
     LIVELY_ATTITUDE,
     LIVELY_RATE,
     OVERSHOOT,
@@ -58,6 +60,8 @@ TRACKING = "tracking error, rms"
 FINER = 4.0
 """Times the usual samples, of a log that has them, where a step rises within too few."""
 TOO_SLOW = "too slowly for a step"
+MOST_ANSWERED_RAD = 10.0
+"""Beyond it a loop of all of the flight runs away, and tells no errors."""
 EVEN = 0.7
 """Least share of rows that may be there, of those that the median interval promises."""
 CHANNELS = {
@@ -125,16 +129,39 @@ def _loop(log: Log, spans: tuple[Span, ...], axis: str, loop: str) -> LoopRespon
     excess = excess_of(law, axis, pieces)
     if excess is None:
         return _read(log, begun, pieces)
+    excess = excess_of(law, axis, pieces, _expected_errors(pieces)) or excess
     small = _pieces(pair, without(spans, list(excess.spans)))
     return _in_proportion(log, begun, excess, pieces, small)
+
+
+def _expected_errors(pieces: list[Record]) -> list[Array] | None:
+    """Errors that the set-point alone makes of the loop as all of the flight tells it, row by row.
+
+    None where the flight does not tell it.
+    """
+    samples = _samples(pieces, FASTEST_ATTITUDE.value)
+    try:
+        answers = closed_loop(samples, pace_s=PACE["attitude"]).answers(samples)
+    except FlightidError:
+        return None
+    if not all(np.abs(each).max() < MOST_ANSWERED_RAD for each in answers):
+        return None
+    wanted = np.split(samples.set_point, np.cumsum(samples.lengths)[:-1])
+    rows = round(samples.sample_time_s / pieces[0].sample_time_s)
+    made = []
+    for piece, one, other in zip(pieces, wanted, answers, strict=True):
+        errors = np.repeat(one - other, rows)
+        made.append(np.pad(errors, (0, piece.n_samples - errors.size), mode="edge"))
+    return made
 
 
 def _in_proportion(
     log: Log, begun: LoopResponse, excess: Excess, pieces: list[Record], small: list[Record]
 ) -> LoopResponse:
     """The step of small errors where the flight tells it, else that of all, which says so."""
-    made = _read(log, begun, small) if small else begun
-    if made.is_told:
+    least = LEFT.value * (begun.asked or 0.0)
+    made = _read(log, begun, small) if small and _spread(small) >= least else begun
+    if made.is_told and is_proportional(excess.law, small):
         return replace(made, beyond=excess.words)
     made = _read(log, begun, pieces)
     if not made.is_told:
@@ -216,20 +243,17 @@ def _pieces(pair: _Pair, spans: tuple[Span, ...]) -> list[Record]:
 
 
 def _samples(pieces: list[Record], fastest_hz: float) -> LoopSamples:
-    """Pieces one behind the other, means removed, no faster than a step needs."""
-    logged = pieces[0].sample_rate_hz
-    every = max(1, round(logged / fastest_hz))
-    step_s = every / logged
-
-    def joined(name: str) -> Array:
-        parts = [np.asarray(piece[name])[::every] for piece in pieces]
-        if name == "attitude":
-            parts = [np.concatenate([[0.0], np.diff(part) / step_s]) for part in parts]
-        return np.concatenate([part - part.mean() for part in parts])
-
-    ahead = joined("attitude") if "attitude" in pieces[0].channels else None
-    lengths = tuple(len(range(0, piece.n_samples, every)) for piece in pieces)
-    return LoopSamples(joined("set_point"), joined("measured"), ahead, lengths, step_s)
+    """Pieces one behind the other, no faster than a step needs."""
+    row_s, has = pieces[0].sample_time_s, pieces[0].channels
+    signals = (
+        (
+            np.asarray(piece["set_point"]),
+            np.asarray(piece["measured"]),
+            np.asarray(piece["attitude"]) if "attitude" in has else None,
+        )
+        for piece in pieces
+    )
+    return LoopSamples.of(signals, row_s, max(1, round(1.0 / (row_s * fastest_hz))))
 
 
 def _spread(pieces: Sequence[Record]) -> float:
@@ -302,10 +326,9 @@ def _longest(draws: LoopDraws, usual_s: float, tick_s: float) -> tuple[Array, Ar
 
 
 def _steps(draws: LoopDraws, window_s: float, tick_s: float) -> tuple[Array, Array]:
-    """Steps at their instants: a held set-point acts half a tick later than a smooth one."""
+    """Steps at their instants."""
     count = max(4, round(window_s / draws.sample_time_s))
-    middles = (np.arange(count) + 0.5) * draws.sample_time_s
-    return draws.step(count), np.asarray(middles - 0.5 * tick_s)
+    return draws.step(count), draws.instants(count, tick_s)
 
 
 def refused(

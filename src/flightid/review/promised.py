@@ -47,9 +47,10 @@ def promised_loops(sources: Iterable[object], log: Log) -> tuple[LoopResponse, .
 
     Notes
     -----
-    Angle loops where the set-point acts by the angle controller alone, without feed-forward of its
-    rate. Axes of one model that couple are closed together. Intervals are of draws over the fit's
-    covariance: what its data allow.
+    Steps begin where the log has the set-point, which the rate loop of some autopilots takes a loop
+    later. Angle loops where the set-point acts by the angle controller alone, without feed-forward
+    of its rate. Axes of one model that couple are closed together. Intervals are of draws over the
+    fit's covariance: what its data allow.
 
     Example
     -------
@@ -106,8 +107,15 @@ def _promised(source: object, axes: list[str], loops: list[AxisLoop]) -> list[Lo
         told = responses(plants, loops, place, "filtered", shown_s=SHOWN_S)
         for loop, name in RESPONSES.items():
             if name in told:
-                made.append(_loop(axis, loop, told[name][1], step_s, bool(evidence.draws)))
+                late = loops[place].set_point_delay_loops if loop == "rate" else 0
+                steps = _later(told[name][1], late)
+                made.append(_loop(axis, loop, steps, step_s, bool(evidence.draws)))
     return made
+
+
+def _later(steps: Array, loops: int) -> Array:
+    """The same by so many samples later."""
+    return np.pad(steps, ((0, 0), (loops, 0)))[:, : steps.shape[1]]
 
 
 def _loop(axis: str, loop: str, steps: Array, step_s: float, known: bool) -> LoopResponse:

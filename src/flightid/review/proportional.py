@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flightid.control.autopilots.angle_law import AngleLaw, angle_law
 from flightid.control.autopilots.from_log import autopilot_of
@@ -14,6 +15,9 @@ from flightid.frozen import dataclass
 from flightid.inspection.signals import Span
 from flightid.logs import Log
 from flightid.record import Record
+from flightid.review.thresholds import BEYOND
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -76,8 +80,17 @@ def bounded_law(log: Log, axis: str) -> AngleLaw | None:
     return law if law is not None and math.isfinite(law.proportional_to_rad) else None
 
 
-def excess_of(law: AngleLaw, axis: str, pieces: Sequence[Record]) -> Excess | None:
+def excess_of(
+    law: AngleLaw,
+    axis: str,
+    pieces: Sequence[Record],
+    expected: Sequence[Array] | None = None,
+) -> Excess | None:
     """Where the attitude was farther from its set-point than the controller is proportional to.
+
+    What is left out for errors that were measured is chosen by gusts as well, and steps read from
+    the rest would go by them: spans are those of errors that the set-point alone makes expected,
+    where that is known.
 
     Parameters
     ----------
@@ -86,6 +99,8 @@ def excess_of(law: AngleLaw, axis: str, pieces: Sequence[Record]) -> Excess | No
     axis : str
     pieces : sequence of Record
         With channels ``"set_point"`` and ``"measured"``, rad.
+    expected : sequence of ndarray, optional
+        Error at each sample of each piece that its set-point alone makes, rad.
 
     Returns
     -------
@@ -94,12 +109,32 @@ def excess_of(law: AngleLaw, axis: str, pieces: Sequence[Record]) -> Excess | No
     """
     spans: list[Span] = []
     most_rad = 0.0
-    for piece in pieces:
-        error = np.asarray(piece["measured"]) - np.asarray(piece["set_point"])
-        error = np.abs((error + np.pi) % (2.0 * np.pi) - np.pi)
+    for place, piece in enumerate(pieces):
+        error = _errors(piece)
         most_rad = max(most_rad, float(error.max()))
-        spans += _runs(piece.time_s, error > law.proportional_to_rad)
-    return Excess(axis, tuple(spans), most_rad, law) if spans else None
+        chosen = error if expected is None else np.abs(expected[place])
+        spans += _runs(piece.time_s, chosen > law.proportional_to_rad)
+    if most_rad <= law.proportional_to_rad:
+        return None
+    return Excess(axis, tuple(spans), most_rad, law)
+
+
+def is_proportional(law: AngleLaw, pieces: Sequence[Record]) -> bool:
+    """Whether errors in pieces were as small as the controller is proportional to, but for gusts.
+
+    Parameters
+    ----------
+    law : AngleLaw
+    pieces : sequence of Record
+        See `excess_of`.
+    """
+    beyond = np.concatenate([_errors(piece) > law.proportional_to_rad for piece in pieces])
+    return bool(beyond.mean() <= BEYOND.value)
+
+
+def _errors(piece: Record) -> Array:
+    error = np.asarray(piece["measured"]) - np.asarray(piece["set_point"])
+    return np.asarray(np.abs((error + np.pi) % (2.0 * np.pi) - np.pi))
 
 
 def _runs(time_s: np.ndarray, marked: np.ndarray) -> list[Span]:

@@ -18,9 +18,10 @@ SETTLED = 0.1
 STRIDE = 0.15
 """Share of the window whose mean, the last, is held against the mean of the one before it. Moves
 between them add up over one more window: a step that would leave its settled band has no level."""
-CREEP = 0.01
-"""Share of the level that a step still gains or loses over one more window before it is said to
-(ours): integrators bring the last of a rate over seconds, and below that nobody minds."""
+CREEP = 0.03
+"""Share of the level that a step surely gains or loses over one more window, by its slope, before
+it is said to (ours): integrators bring the last of a rate over seconds, which is 5 % and more of a
+window; attitudes that settled lose the last two percent of what they overshot."""
 RISE = 2
 """Place of the rise time among the readings of a step."""
 SAME_RISE = 0.1
@@ -36,14 +37,17 @@ SEVEN_TENTHS = float(np.sqrt(0.5))
 UNTOLD = "not reached in every loop that the data allow"
 
 
-def step_features(steps: Array, time_s: Array) -> tuple[Reading, ...]:
+def step_features(
+    steps: Array, time_s: Array, *, of_asked: bool | None = None
+) -> tuple[Reading, ...]:
     """Level, delay, rise, overshoot and settling of step responses, row 0 the estimate.
 
-    All are of the level that steps reach in their window: the mean of its last fifth. Of one that
-    still moves there no settling is told, no overshoot if it is highest there, and no rise time
-    that goes by where the window ends.
+    All are of the level that steps reach in their window, the mean of its last fifth, but an
+    overshoot is of what is asked (`of_asked`) where the step ends within a tenth of that. Of one
+    that still moves there no settling is told, no overshoot if it is highest there, and no rise
+    time that goes by where the window ends.
     """
-    read = window_features(steps, time_s)
+    read = window_features(steps, time_s, of_asked=of_asked)
     if not (way := creep(steps)):
         return read
     why = f"{way} where {_window(time_s)} ends: "
@@ -76,39 +80,51 @@ def _window(time_s: Array) -> str:
 
 def still_moves(steps: Array) -> bool:
     """Whether steps drift at their end by more than counts, and than their draws allow for none."""
-    return abs(_drift(steps)) > SETTLED
+    drift, low, high = _drift(steps)
+    return abs(drift) > SETTLED and not low <= 0.0 <= high
 
 
 def creep(steps: Array) -> str:
-    """``"still rises"`` or ``"still falls"`` of steps that do at their end; else empty."""
-    drift = _drift(steps)
-    if abs(drift) <= CREEP:
-        return ""
-    return RISES if drift > 0.0 else FALLS
+    """``"still rises"`` or ``"still falls"`` of steps that surely do at their end; else empty."""
+    _, low, high = _drift(steps)
+    return RISES if low > CREEP else FALLS if high < -CREEP else ""
 
 
-def _drift(steps: Array) -> float:
-    """What the estimate would move over one more window, of its level; 0 where draws allow none."""
+def _drift(steps: Array) -> tuple[float, float, float]:
+    """What steps would move over one more window, of their level: the estimate, then its ends."""
     count = max(1, round(STRIDE * steps.shape[1]))
     last = steps[:, -count:].mean(axis=1)
     drift = last - steps[:, -2 * count : -count].mean(axis=1)
-    low, high = np.quantile(drift[1:], tails(LEVEL))
-    if low <= 0.0 <= high or last[0] == 0.0:
-        return 0.0
-    return float(drift[0] / (STRIDE * abs(last[0])))
+    if last[0] == 0.0:
+        return 0.0, 0.0, 0.0
+    ends = np.quantile(drift[1:], tails(LEVEL))
+    shares = np.array([drift[0], *ends]) / (STRIDE * abs(last[0]))
+    return float(shares[0]), float(shares[1]), float(shares[2])
 
 
-def window_features(steps: Array, time_s: Array) -> tuple[Reading, ...]:
+def follows(steps: Array, time_s: Array) -> bool:
+    """Whether the estimate's step ends within a tenth of what is asked."""
+    return bool(abs(_levels(steps[:1], time_s)[0] - 1.0) <= SETTLED)
+
+
+def _levels(steps: Array, time_s: Array) -> Array:
+    return np.asarray(steps[:, time_s >= (1.0 - END) * time_s[-1]].mean(axis=1))
+
+
+def window_features(
+    steps: Array, time_s: Array, *, of_asked: bool | None = None
+) -> tuple[Reading, ...]:
     """The same of the mean that the window ends at, whether the step has settled there or not."""
-    level = steps[:, time_s >= (1.0 - END) * time_s[-1]].mean(axis=1)
+    level = _levels(steps, time_s)
     shares = steps / np.where(level > 0.0, level, np.nan)[:, None]
+    asked = follows(steps, time_s) if of_asked is None else of_asked
     half = _crossings(shares, time_s, 0.5)
     rise = _crossings(shares, time_s, 0.9) - _crossings(shares, time_s, 0.1)
     return (
         _reading("level", level, "1"),
         _reading("delay to half", half, "s"),
         _reading("rise time", rise, "s"),
-        _reading("overshoot", _overshoots(shares), "%"),
+        _reading("overshoot", _overshoots(steps if asked else shares), "%"),
         _reading("settling time", _settling(shares, time_s), "s"),
     )
 

@@ -57,8 +57,9 @@ def steps(loops: Iterable[LoopResponse]) -> Table:
     )
     notes = (
         f"In brackets: {interval_words(shown())} intervals.",
-        "Of a set-point that jumps by 1; rise from 10 to 90 %, overshoot and settling (10 %) are "
-        "those of the level that it reaches in the time that is read: the mean of its last fifth.",
+        "Of a set-point that jumps by 1; rise from 10 to 90 % and settling (10 %) are those of the "
+        "level that it reaches in the time that is read: the mean of its last fifth. Overshoot is "
+        "beyond what is asked where that is within a tenth of it, else beyond the level.",
         *untold_notes((loop.name, each) for loop in told for each in loop.readings[:READ]),
     )
     return Table("Steps, from ordinary flying", columns, rows, notes)

@@ -47,6 +47,15 @@ LEVEL_OFF = Threshold(
     "1",
     "of what is asked: a loop with an integrator ends at one; less is wind and fits (ours)",
 )
+BEYOND = Threshold(
+    0.05, "1", "of the samples: errors beyond proportion that gusts make, among small moves (ours)"
+)
+LEFT = Threshold(
+    0.25,
+    "1",
+    "of the set-point's deviation: less, left in small moves, tells gusts. Of yaws of a simulated "
+    "ArduCopter .03 to .21 missed their levels by up to 0.25 and by their bars, .33 to .58 by .01",
+)
 VIBE_GOOD = Threshold(
     30, "m/s^2", "ArduPilot, Measuring Vibration: below 30 m/s/s is normally acceptable"
 )

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.review.deconvolution import LoopSamples
+from flightid.review.loop_samples import LoopSamples
 from flightid.review.step_features import BANDWIDTH
 from flightid.review.thresholds import COHERENT, RISE_BAND
 from flightid.uncertainty.estimate import Estimate, Reading

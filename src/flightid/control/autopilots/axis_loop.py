@@ -92,7 +92,7 @@ class AxisLoop(Result, schema="flightid.axis_loop/1"):
     full_output: ClassVar[float] = 1.0
     """Output of a full command, in its unit."""
     set_point_delay_loops: ClassVar[int] = 0
-    """Loops between an angle error and the rate loop that acts on it."""
+    """Loops between a rate set-point, as it is logged, and the rate loop that acts on it."""
     inner: ClassVar[str] = "rate loop"
     """What the innermost loop is called."""
     gains_are_whole: ClassVar[bool] = False
@@ -216,9 +216,21 @@ class AxisLoop(Result, schema="flightid.axis_loop/1"):
 
     def angle(self, omega_rad_s: ArrayLike) -> Response:
         """From angle error (rad) to rate set-point (rad/s), with the loops it waits."""
+        return np.asarray(self.angle_gain_1_s * self.set_point_delay(omega_rad_s))
+
+    def set_point_delay(self, omega_rad_s: ArrayLike) -> Response:
+        """From a rate set-point, as angle controller and log have it, to the loop that acts on it.
+
+        Example
+        -------
+        >>> import flightid as fid
+        >>> loop = fid.axis_loop("arducopter", "roll", loop_rate_hz=400.0)
+        >>> loop.set_point_delay([10.0]).round(3)
+        array([1.-0.025j])
+        """
         omega = _frequencies(omega_rad_s)
-        delay = np.exp(-1j * omega * self.set_point_delay_loops / self.loop_rate_hz)
-        return np.asarray(self.angle_gain_1_s * delay)
+        delay_s = self.set_point_delay_loops / self.loop_rate_hz
+        return np.asarray(np.exp(-1j * omega * delay_s))
 
     def basis(
         self, omega_rad_s: ArrayLike, *, gyro: Gyro = "raw", with_hold: bool = True

@@ -1,0 +1,85 @@
+"""What a log holds of one loop, at the rate that its step needs: means of its rows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.frozen import dataclass
+
+Array = NDArray[np.float64]
+Piece = tuple[Array, Array, Array | None]
+"""Set-point, measured, attitude of one piece of flight, row by row."""
+
+
+@dataclass(frozen=True, eq=False)
+class LoopSamples:
+    """A set-point and what followed, piece by piece at one sample time, means removed.
+
+    Attributes
+    ----------
+    set_point, measured : ndarray, shape (n,)
+        In the same unit.
+    forerunner : ndarray, shape (n,), or None
+        What the set-point was made from, before the filters of `measured`.
+    lengths : tuple of int
+        Samples of each piece.
+    sample_time_s : float
+    """
+
+    set_point: Array
+    measured: Array
+    forerunner: Array | None
+    lengths: tuple[int, ...]
+    sample_time_s: float
+
+    @classmethod
+    def of(cls, pieces: Iterable[Piece], row_s: float, rows: int) -> LoopSamples:
+        """Samples that are the means of so many rows each.
+
+        Set-points jump between samples, wherever a stick or a mode moves them. One row of each
+        sample would place a jump up to a sample late, by chance, and what is driven by a misplaced
+        input comes out too small: a percent of the level of a loop flown by steps. Means of both
+        sides are of the same loop, and a set-point knows of a gust what the attitude in its rows
+        does, and no more.
+
+        Parameters
+        ----------
+        pieces : iterable of tuple
+            Set-point, measured, attitude or None, shape (n,) each.
+        row_s : float
+            Between rows, s.
+        rows : int
+
+        Example
+        -------
+        >>> made = LoopSamples.of([(np.arange(6.0), np.zeros(6), None)], 0.01, 2)
+        >>> made.set_point, made.sample_time_s, made.lengths
+        (array([-2.,  0.,  2.]), 0.02, (3,))
+        """
+        step_s, set_points, measured, slopes = rows * row_s, [], [], []
+        for wanted, followed, attitude in pieces:
+            set_points.append(_means(wanted, rows))
+            measured.append(_means(followed, rows))
+            if attitude is not None:
+                turned = np.diff(_means(attitude, rows)) / step_s
+                slopes.append(np.concatenate([[0.0], turned]))
+        lengths = tuple(each.size for each in set_points)
+        ahead = _joined(slopes) if slopes else None
+        return cls(_joined(set_points), _joined(measured), ahead, lengths, step_s)
+
+    @property
+    def duration_s(self) -> float:
+        """Seconds in all."""
+        return self.sample_time_s * sum(self.lengths)
+
+
+def _means(values: Array, rows: int) -> Array:
+    return np.asarray(values[: values.size // rows * rows].reshape(-1, rows).mean(axis=1))
+
+
+def _joined(parts: list[Array]) -> Array:
+    """One behind the other, the mean of each removed."""
+    return np.concatenate([part - part.mean() for part in parts])
