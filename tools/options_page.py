@@ -50,6 +50,7 @@ from flightid.study.conditioning import Conditioning, ConsistencyStep, SensorPos
 from flightid.study.fit_settings import FitMethod, VerifySettings
 from flightid.study.flight import FlightPlan
 from flightid.study.model_settings import ModelSettings, ParameterOverride
+from flightid.study.pilot_settings import PilotSettings, RatingSettings
 from flightid.study.proposal.options import ProposalOptions
 from flightid.study.published import MeanSquareErrors, PublishedFigures, Remark
 from flightid.study.qualities_settings import QualitiesSettings, QualityCase
@@ -115,6 +116,8 @@ STUDY: dict[str, type[Options]] = {
     "[[loop]]": LoopSettings,
     "[filters]": FilterSettings,
     "[[plot]]": PlotSettings,
+    "[pilot]": PilotSettings,
+    "rating of [pilot]": RatingSettings,
     "[plan], of a log, which tells vehicle and autopilot": PlanOptions,
 }
 """Tables of a study that are no verb's alone."""

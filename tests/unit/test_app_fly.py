@@ -31,9 +31,12 @@ from flightid.app.fly_schemas import (
     FlySweep,
     FlySwitch,
 )  # fmt: skip
+from flightid.app.fly_text import rate_flight_study, start_of, write_flight_study
 from flightid.app.fly_vehicles import RATE_HZ, VEHICLES, fly_vehicle
+from flightid.cli.program import run
 from flightid.simulation.stepper import Stepper
 from flightid.study.loop_blocks import law_controller
+from flightid.study.pilot_settings import pilot_of
 from tests.closeness import assert_close
 
 STEP_S = 1.0 / RATE_HZ
@@ -174,6 +177,15 @@ def test_a_flight_is_kept_and_a_killed_one_is_offered(tmp_path: Path) -> None:
     assert {each.frame.number for each in news if each.frame} == {4}
     (item,) = kept_flights(tmp_path)
     assert item["finished"]
+    # Its study says the same to the page, with the pilot's rating beside it.
+    rate_flight_study(flight.folder, {"controllable": False, "rating": 10, "comment": "“wild”"})
+    study = flight.folder / "study.toml"
+    asked = start_of(study.read_text("utf-8"), flight.folder, VEHICLES)
+    assert asked == FlyStart(vehicle="ah64_hover", seed=5)
+    told = pilot_of(study)
+    assert told is not None
+    assert told.rating is not None
+    assert (told.rating.rating, told.rating.comment) == (10, "“wild”")
     (record,) = fid.read_records(tmp_path / item["path"])
     assert not (flight.folder / JOURNAL).exists()
     # What is kept is what reached the vehicle: the model alone repeats it, but for its sensors.
@@ -197,6 +209,38 @@ def test_a_flight_is_kept_and_a_killed_one_is_offered(tmp_path: Path) -> None:
     assert (killed / RECORD).is_file()
     with pytest.raises((fid.FlightidError, OSError)):
         journal_record(killed)
+
+
+def test_a_study_is_flown_as_the_page_flies_it(tmp_path: Path) -> None:
+    """`flightid fly STUDY`: law, delays, stick, gusts, a failed sensor; the pilot's hands off."""
+    started = FlyStart(
+        vehicle="ah64_hover", gusts=True, actuator_delay_s=0.03, display_delay_s=0.02,
+        stick_rad_s=20.0, seed=3, failures={"q": "zero"},
+    )  # fmt: skip
+    write_flight_study(tmp_path, started, AH64)
+    study, target = tmp_path / "study.toml", tmp_path / "flown.nc"
+    assert start_of(study.read_text("utf-8"), tmp_path, VEHICLES) == started
+    assert run(["fly", str(study), "--duration-s", "0.2", "--write", str(target)]) == 0
+    (record,) = fid.read_records(target)
+    switches = FlySwitches(gusts=True, failures={"q": "zero"})
+    seat = PilotSeat(0.03, 0.02, 20.0)
+    loop = PilotedVehicle(AH64, STEP_S, switches=switches, seat=seat, seed=3)
+    rows = [(loop.step(loop.rest), dict(loop.driven)) for _ in range(record.n_samples)]
+    assert record.n_samples == 20
+    for name in ("q", "theta", "w"):
+        assert np.array_equal(record[name], [outputs[name] for outputs, _ in rows])
+    assert np.array_equal(record["lon"], [driven["lon"] for _, driven in rows])
+    assert np.ptp(record["lon"]) > 0.0
+    assert not np.any(record["stick_lon"])
+    # What a study of a flight cannot be, or be told beside, is refused; a run names the verb.
+    assert run(["fly", str(study), "--augmentation", "dase"]) == 2
+    assert run(["run", str(study)]) != 0
+    for wrong in ("law = 3", 'vehicle = "no"', "seed = -1", "rating.rating = 12"):
+        key = wrong.partition(" ")[0]
+        kept = [line for line in study.read_text("utf-8").splitlines() if not line.startswith(key)]
+        bad = tmp_path / "bad.toml"
+        bad.write_text("\n".join(kept).replace("[pilot]", f"[pilot]\n{wrong}"), "utf-8")
+        assert run(["fly", str(bad), "--duration-s", "0.1"]) != 0
 
 
 def test_an_upset_ends_a_flight_and_an_empty_one_leaves_nothing(tmp_path: Path) -> None:

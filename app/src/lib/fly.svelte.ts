@@ -19,6 +19,13 @@ export const flights = () => json<FlownItem[]>("/api/fly/flights");
 export const finish = (id: string) => json<FlownItem[]>(`/api/fly/flights/${id}/finish`, {});
 /** A copy of the record among the records of rigs, where it can be identified. */
 export const asRecords = (id: string) => json<FlownRecords>(`/api/fly/flights/${id}/records`, {});
+/** What a study says of a flight, to fly it so; of a kept one, or of a file that was chosen. */
+export const settings = (text: string, flight: string | null = null) => json<FlyStart>("/api/fly/settings", { text, flight });
+export async function studyOf(id: string): Promise<string> {
+  const answer = await fetch(`/api/fly/flights/${id}/study`, { credentials: "same-origin" });
+  if (!answer.ok) throw new Refusal(answer.status, "This flight has no study: it was flown before flights had one.");
+  return answer.text();
+}
 export const rate = (id: string, rating: CooperHarperRating) => json<FlownItem[]>(`/api/fly/flights/${id}/rating`, rating);
 
 /** One instant of the strip: time, stick of the hand, attitude. */

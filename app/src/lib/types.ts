@@ -378,6 +378,12 @@ export interface FlyPose {
   height_m: number;
 }
 
+/** A study of a flight, as text; `flight` names the kept one that it is of. */
+export interface FlySettings {
+  text: string;
+  flight: string | null;
+}
+
 /** Begin a flight; while one is flown, end it and begin anew. */
 export interface FlyStart {
   do: string;
@@ -388,6 +394,7 @@ export interface FlyStart {
   display_delay_s: number;
   stick_rad_s: number | null;
   seed: number;
+  failures: Record<string, "frozen" | "zero" | "biased">;
 }
 
 /** Where the hand is; numbers rise, and come back with the frame that has flown it. */

@@ -27,6 +27,7 @@ from flightid.app.fly_schemas import (
     FlySweep,
     FlySwitch,
 )
+from flightid.app.fly_text import write_flight_study
 from flightid.app.fly_track import GroundTrack
 from flightid.app.fly_vehicles import FlyVehicle, fly_vehicle
 from flightid.errors import DataError, FlightidError, OptionError
@@ -115,7 +116,9 @@ class PilotedFlight:
         self.vehicle = vehicle or fly_vehicle(asked.vehicle)
         self.rate_hz = self.vehicle.rate_hz
         self.loop_units = {n: str(unit) for n, unit in self.vehicle.model.units.items()}
-        self.switches = FlySwitches(law=asked.law and bool(self.vehicle.law), gusts=asked.gusts)
+        self.switches = FlySwitches(
+            asked.law and bool(self.vehicle.law), asked.gusts, dict(asked.failures)
+        )
         seat = PilotSeat(asked.actuator_delay_s, asked.display_delay_s, asked.stick_rad_s)
         self.clock, self._tell = PauseClock(clock), tell
         self.loop = PilotedVehicle(
@@ -133,6 +136,7 @@ class PilotedFlight:
             asked.model_dump(exclude={"do"}) | {"title": self.vehicle.title},
             sample_time_s=1.0 / self.rate_hz,
         )  # fmt: skip
+        write_flight_study(self.folder, asked, self.vehicle)
         self._newest = self._flown = FlyStick(number=0, stick={})
         self._stick: dict[str, float] = {}
         self._ends, self._reason = False, ""

@@ -1,9 +1,9 @@
 """What a flight leaves in the workspace: a journal while it is flown, then a record, and a rating.
 
-``flights/<id>/``: ``flight.json`` what was flown, ``journal.csv`` rows of the loop written each
-second, in its place at the end ``flown.nc``; ``rating.json`` what the pilot thought of it. A server
-that was killed leaves a journal; it becomes a record when somebody asks for it, less the row that
-was half written.
+``flights/<id>/``: ``study.toml`` what flies it again, ``flight.json`` what was flown,
+``journal.csv`` rows of the loop written each second, in its place at the end ``flown.nc``;
+``rating.json`` what the pilot thought of it. A server that was killed leaves a journal; it becomes
+a record when somebody asks for it, less the row that was half written.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from flightid.files import write_atomically
 from flightid.frozen import dataclass
 from flightid.record import Record, Step, write_records
 
-FLIGHTS, RECORD, JOURNAL, ABOUT, RATING = (
-    "flights", "flown.nc", "journal.csv", "flight.json", "rating.json",
+FLIGHTS, RECORD, JOURNAL, ABOUT, RATING, STUDY = (
+    "flights", "flown.nc", "journal.csv", "flight.json", "rating.json", "study.toml",
 )  # fmt: skip
 FLIGHT_ID = re.compile(r"[0-9]{8}-[0-9]{6}-[0-9a-f]{4}")
 FEWEST_ROWS = 10
@@ -184,7 +184,7 @@ def finish_flight(folder: Path) -> Record:
 
 def drop_flight(folder: Path) -> None:
     """Remove a flight that holds nothing: its own files alone."""
-    for name in (JOURNAL, ABOUT):
+    for name in (JOURNAL, ABOUT, STUDY):
         (folder / name).unlink(missing_ok=True)
     folder.rmdir()
 

@@ -16,6 +16,7 @@ from flightid.app.backstage import Backstage, made
 from flightid.app.fly_deck import FlightDeck
 from flightid.app.fly_journal import (
     RECORD,
+    STUDY,
     finish_flight,
     flight_folder,
     keep_rating,
@@ -28,6 +29,7 @@ from flightid.app.fly_schemas import (
     FlyChoice,
     FlyNews,
     FlyOrder,
+    FlySettings,
     FlyStart,
     FlyStick,
     FlySweep,
@@ -35,11 +37,13 @@ from flightid.app.fly_schemas import (
     OwnVehicles,
 )
 from flightid.app.fly_shelf import choice_of, make_shelf, model_files
+from flightid.app.fly_text import rate_flight_study, start_of
 from flightid.app.fly_vehicles import VEHICLES
-from flightid.app.own_folders import is_link
+from flightid.app.own_folders import is_link, read_plain
 from flightid.app.removed import RemovedList
 from flightid.app.rigs import Rigs
 from flightid.errors import FlightidError
+from flightid.reading import DOCUMENT_BYTES
 
 FlyCommand = FlyStart | FlyStick | FlySwitch | FlySweep | FlyOrder
 COMMANDS: TypeAdapter[FlyCommand] = TypeAdapter(Annotated[FlyCommand, Field(discriminator="do")])
@@ -90,7 +94,9 @@ def add_fly_routes(app: FastAPI, backstage: Backstage) -> None:
 
     @app.post("/api/fly/flights/{flight}/rating")
     def rate(flight: str, rating: CooperHarperRating) -> list[FlownItem]:
-        keep_rating(_known(workspace, flight), rating.model_dump())
+        folder = _known(workspace, flight)
+        keep_rating(folder, rating.model_dump())
+        rate_flight_study(folder, rating.model_dump())
         return flights()
 
     @app.get("/api/fly/flights/{flight}/record", response_class=Response)
@@ -114,7 +120,29 @@ def add_fly_routes(app: FastAPI, backstage: Backstage) -> None:
         await asyncio.to_thread(RemovedList(backstage.workspace).put_back, taken)
         return FlownRecords(id=taken)
 
+    _add_studies(app, deck, workspace)
     _add_socket(app, deck)
+
+
+def _add_studies(app: FastAPI, deck: FlightDeck, workspace: Path) -> None:
+    @app.get("/api/fly/flights/{flight}/study", response_class=Response)
+    def study(flight: str) -> Response:
+        try:
+            text = read_plain(_known(workspace, flight) / STUDY, DOCUMENT_BYTES)
+        except OSError as error:
+            raise HTTPException(404, "This flight has no study.") from error
+        attached = {"content-disposition": f'attachment; filename="{flight}.toml"'}
+        return Response(text, media_type="application/toml", headers=attached)
+
+    @app.post("/api/fly/settings")
+    async def settings(asked: FlySettings) -> FlyStart:
+        """What a study says of a flight, to fly it so."""
+        place = workspace if asked.flight is None else _known(workspace, asked.flight)
+        known = [*VEHICLES, *deck.own.values()]
+        try:
+            return await asyncio.to_thread(start_of, asked.text, place, known)
+        except (FlightidError, ValidationError) as error:
+            raise HTTPException(422, str(error)) from error
 
 
 def _add_socket(app: FastAPI, deck: FlightDeck) -> None:

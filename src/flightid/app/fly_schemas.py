@@ -7,6 +7,15 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from flightid.app.schemas import Message
+from flightid.study.pilot_settings import (
+    FASTEST_RAD_S,
+    MOST_COMMENT,
+    MOST_DELAY_S,
+    MOST_SEED,
+    MOST_TASK,
+    SLOWEST_RAD_S,
+    ratings_left,
+)
 
 Fraction = Annotated[float, Field(ge=-1.0, le=1.0)]
 SensorFailure = Literal["frozen", "zero", "biased"]
@@ -52,10 +61,18 @@ class FlyStart(Message):
     vehicle: str = Field(max_length=300)
     law: bool = True
     gusts: bool = False
-    actuator_delay_s: float = Field(default=0.0, ge=0.0, le=0.5)
-    display_delay_s: float = Field(default=0.0, ge=0.0, le=0.5)
-    stick_rad_s: float | None = Field(default=None, ge=3.0, le=100.0)
-    seed: int = Field(default=0, ge=0, le=1 << 31)
+    actuator_delay_s: float = Field(default=0.0, ge=0.0, le=MOST_DELAY_S)
+    display_delay_s: float = Field(default=0.0, ge=0.0, le=MOST_DELAY_S)
+    stick_rad_s: float | None = Field(default=None, ge=SLOWEST_RAD_S, le=FASTEST_RAD_S)
+    seed: int = Field(default=0, ge=0, le=MOST_SEED)
+    failures: dict[str, SensorFailure] = Field(default_factory=dict, max_length=16)
+
+
+class FlySettings(Message):
+    """A study of a flight, as text; `flight` names the kept one that it is of."""
+
+    text: str = Field(max_length=1 << 20)
+    flight: str | None = Field(default=None, max_length=100)
 
 
 class FlyStick(Message):
@@ -126,8 +143,8 @@ class CooperHarperRating(Message):
     adequate: bool | None = None
     satisfactory: bool | None = None
     rating: int = Field(ge=1, le=10)
-    task: str = Field(default="", max_length=300)
-    comment: str = Field(default="", max_length=4000)
+    task: str = Field(default="", max_length=MOST_TASK)
+    comment: str = Field(default="", max_length=MOST_COMMENT)
 
     @model_validator(mode="after")
     def _in_the_tree(self) -> CooperHarperRating:
@@ -138,11 +155,7 @@ class CooperHarperRating(Message):
     @property
     def left(self) -> tuple[int, ...]:
         """Ratings that the answers leave."""
-        if not self.controllable:
-            return (10,)
-        if not self.adequate:
-            return (7, 8, 9)
-        return (1, 2, 3) if self.satisfactory else (4, 5, 6)
+        return ratings_left(self.controllable, self.adequate, self.satisfactory)
 
 
 class FlownItem(Message):

@@ -14,10 +14,14 @@ from flightid.cli.records import FILES
 from flightid.cli.sources import load_source, model_argument, model_options
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from flightid.control.stepped.block_controller import BlockController
     from flightid.control.stepped.gain_controller import GainController
     from flightid.models import Model
     from flightid.options import Options
+    from flightid.simulation.realtime import FlownSession
+    from flightid.study.pilot_settings import PilotSettings
 
 
 def _fields() -> dict[str, type[Options]]:
@@ -69,10 +73,11 @@ def command(
     """Fly MODEL beside the clock, alone or under a controller; Ctrl-C ends and keeps the flight.
 
     MODEL is a .toml file, the folder of a study with one model, the JSON of a fit, or the name of a
-    library model. Inputs come as JSON datagrams such as {"lat": 0.1}, outputs go to a cockpit
-    each frame.
+    library model; or a study with a table [pilot] of vehicle, law, gusts, delays and stick. Inputs
+    come as JSON datagrams such as {"lat": 0.1}, outputs go to a cockpit each frame.
     """
-    from flightid import Noise, write_records
+    from flightid import Noise
+    from flightid.app.fly_study import fly_study
     from flightid.simulation.fly_options import FlyOptions
     from flightid.simulation.realtime import fly_model
 
@@ -89,6 +94,12 @@ def command(
         raise click.UsageError(
             "--gains, --blocks and --augmentation move the same inputs: give one of them"
         )
+    said = _piloted(model)
+    if said is not None:
+        if any((axis, values, gains, blocks, law, noise)):
+            raise click.UsageError(f"{model} says what is flown, under [pilot]: change it there")
+        _fly(lambda: fly_study(said, asked, say=note), target, as_json=as_json)
+        return
     source = load_source(model, axis, values)
     around: GainController | BlockController | None = None
     if gains is not None:
@@ -101,10 +112,27 @@ def command(
         around = law_controller(law, source, asked.step_s(source))
     if around is not None and around.commands:
         note(f"The pilot commands {', '.join(around.commands)} too")
-    # Who ends the flight by a signal keeps it, as Ctrl-C does.
+    _fly(
+        lambda: fly_model(source, asked, controller=around, noise=noise, say=note),
+        target,
+        as_json=as_json,
+    )
+
+
+def _piloted(model: str) -> PilotSettings | None:
+    """What a study says of a pilot's flight; None of a model."""
+    from flightid.study.pilot_settings import pilot_of
+
+    return pilot_of(model) if model.endswith(".toml") and Path(model).is_file() else None
+
+
+def _fly(flown: Callable[[], FlownSession], target: Path | None, *, as_json: bool) -> None:
+    """Fly; who ends the flight by a signal keeps it, as Ctrl-C does."""
+    from flightid import write_records
+
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
-        session = fly_model(source, asked, controller=around, noise=noise, say=note)
+        session = flown()
     finally:
         signal.signal(signal.SIGTERM, before)
     if target is not None:

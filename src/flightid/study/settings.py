@@ -23,6 +23,7 @@ from flightid.study.error_list import ErrorList
 from flightid.study.fit_settings import FitSettings, VerifySettings, read_fit
 from flightid.study.flight import FlightPlan, read_flight
 from flightid.study.model_settings import ModelSettings, placed, read_model
+from flightid.study.pilot_settings import PilotSettings, read_pilot
 from flightid.study.qualities_settings import QualitiesSettings, read_qualities
 from flightid.study.reading import TOP, TableReader, read_table
 from flightid.study.record_files import RecordFile, read_record_file
@@ -141,6 +142,8 @@ class Settings:
         How handling qualities are read off the fits; None: not at all.
     views : ViewSettings
         What is asked of the log besides models.
+    pilot : PilotSettings or None
+        A flight in real time, which `flightid fly` flies and no run does.
     """
 
     title: str
@@ -166,6 +169,7 @@ class Settings:
     uses: UsesSettings = field(default_factory=UsesSettings)
     fly: GainFlightOptions | None = None
     views: ViewSettings = field(default_factory=ViewSettings)
+    pilot: PilotSettings | None = None
 
     @property
     def injected(self) -> tuple[str, ...]:
@@ -218,6 +222,7 @@ def read_settings(path: Path) -> Settings:
     named = [str(values.get("name")) for _, values in collected.read(root.rows, [], "model")]
     uses = collected.read(read_uses, UsesSettings(), root, named)
     views = collected.read(read_views, ViewSettings(), root, folder)
+    pilot = table("pilot", read_pilot)
     collected.read(root.finish, None)
     if files and segments:
         collected.errors.append(
@@ -262,6 +267,7 @@ def read_settings(path: Path) -> Settings:
         uses,
         flown_again,
         views,
+        pilot,
     )
 
 
@@ -325,6 +331,7 @@ def _source(root: TableReader, folder: Path) -> tuple[Path | None, FlightPlan | 
             "study file: the source of the data is not clear",
             found=" and ".join(f"[{key}]" for key in given) or "none",
             needed="one of [log], [flight] and [[record]]",
+            action="" if given or "pilot" not in root else "[pilot] alone is for flightid fly",
         )
     if "log" in root:
         return folder / read_table(LogFile, log).path, None
