@@ -44,9 +44,7 @@ STARTED = pytest.StashKey["_Fork"]()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption(
-        "--forks", help="processes to run tests in: a number, or auto: cores + 1"
-    )
+    parser.addoption("--forks", help="processes to run tests in: a number, or auto: cores + 1")
 
 
 def _count(config: pytest.Config) -> int:

@@ -17,12 +17,12 @@ from flightid.control.tuning.controller_paths import ControllerPaths
 from flightid.control.tuning.gain_search import (
     HEADROOM,
     PENALTY,
-    GainSearchResult,
     _linear_step,
     _lowest,
     _merit,
     search,
 )
+from flightid.control.tuning.gain_search_result import GainSearchResult
 from flightid.control.tuning.loop_problem import LoopProblem
 from flightid.control.tuning.responses import responses
 from flightid.control.tuning.sampled_plants import loop_grid, sample_plants

@@ -235,7 +235,7 @@ def test_a_study_is_flown_as_the_page_flies_it(tmp_path: Path) -> None:
     # What a study of a flight cannot be, or be told beside, is refused; a run names the verb.
     assert run(["fly", str(study), "--augmentation", "dase"]) == 2
     assert run(["run", str(study)]) != 0
-    for wrong in ("law = 3", 'vehicle = "no"', "seed = -1", "rating.rating = 12"):
+    for wrong in ("augmentation = 3", 'vehicle = "no"', "seed = -1", "rating.rating = 12"):
         key = wrong.partition(" ")[0]
         kept = [line for line in study.read_text("utf-8").splitlines() if not line.startswith(key)]
         bad = tmp_path / "bad.toml"

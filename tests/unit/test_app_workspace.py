@@ -17,7 +17,7 @@ from tools.page_types import TARGET, page_types
 
 from flightid.app.plot_layouts import keep_layout, plot_layouts, remove_layout
 from flightid.app.plot_schemas import PlotLayout
-from flightid.app.schemas import Edit, Edits, Step
+from flightid.app.schemas import Edit, Edits, StudyStep
 from flightid.app.studies import Studies
 from flightid.app.study_edits import KeyEdit, edited, etag_of, write_study
 from flightid.app.workspace import Workspace
@@ -167,7 +167,7 @@ def test_undo_goes_back_beyond_a_reload_and_a_kill(tmp_path: Path) -> None:
         Studies(workspace).change(log, made, etag_of(path.read_text("utf-8")))
 
     def stepped(*, back: bool) -> tuple[float, int, int]:
-        Studies(workspace).step(log, Step(back=back), etag_of(path.read_text("utf-8")))
+        Studies(workspace).step(log, StudyStep(back=back), etag_of(path.read_text("utf-8")))
         return bands()
 
     assert bands() == stepped(back=True) == (1.0, 0, 0)
@@ -185,7 +185,7 @@ def test_undo_goes_back_beyond_a_reload_and_a_kill(tmp_path: Path) -> None:
     path.write_text(STUDY.replace("[1.0, 20.0]", "[5.0, 20.0]"), "utf-8")
     assert (bands(), stepped(back=True)) == ((5.0, 2, 0), (2.0, 1, 1))
     with pytest.raises(HTTPException):
-        Studies(workspace).step(log, Step(back=True), "of another version")
+        Studies(workspace).step(log, StudyStep(back=True), "of another version")
     for broken in (b"", b"[1]", b'{"texts": [], "at": 0}', b'{"texts": ["a"], "at": 4}', b"\xff"):
         history.write_bytes(broken)
         assert bands() == (2.0, 0, 0)

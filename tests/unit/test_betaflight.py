@@ -18,7 +18,7 @@ from flightid.control.autopilots import (
 from flightid.control.autopilots.from_log import autopilot_of
 from flightid.control.autopilots.notch_tracking import Centre, NotchTracking
 from flightid.control.tuning.controller_paths import ControllerPaths
-from flightid.control.tuning.gain_search import GainSearchResult
+from flightid.control.tuning.gain_search_result import GainSearchResult
 from flightid.control.tuning.whole_gains import ROUNDED, whole_gains
 from flightid.conventions import Light
 from flightid.errors import DataError, OptionError

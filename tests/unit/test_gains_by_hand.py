@@ -7,7 +7,7 @@ import pytest
 
 import flightid as fid
 from flightid.control.tuning.findings import verdict
-from flightid.control.tuning.gain_search import GainSearchResult
+from flightid.control.tuning.gain_search_result import GainSearchResult
 from flightid.control.tuning.moved_gains import move_gains
 from flightid.conventions import Light
 from flightid.errors import DataError, OptionError

@@ -1014,11 +1014,6 @@ export interface ShownParameter {
   changed: boolean;
 }
 
-/** To the version before, or to the next again. */
-export interface Step {
-  back: boolean;
-}
-
 /** The closed rate loop of an axis from ordinary flying. */
 export interface StepCurve {
   axis: string;
@@ -1060,6 +1055,11 @@ export interface StudyParts {
   models: string;
   gains: string;
   views: string;
+}
+
+/** To the version before, or to the next again. */
+export interface StudyStep {
+  back: boolean;
 }
 
 /** A study file, its tag, and what the page reads off it. */

@@ -80,7 +80,7 @@ def fly_study(
     vehicle = piloted(settings)
     step_s = 1.0 / vehicle.rate_hz
     switches = FlySwitches(
-        settings.law and bool(vehicle.law), settings.gusts, dict(settings.failures)
+        settings.augmentation and bool(vehicle.law), settings.gusts, dict(settings.failures)
     )  # type: ignore[arg-type]
     seat = PilotSeat(settings.actuator_delay_s, settings.display_delay_s, settings.stick_rad_s)
     loop = PilotedVehicle(vehicle, step_s, switches=switches, seat=seat, seed=settings.seed)

@@ -25,7 +25,9 @@ HEAD = "# A flight of the local page: `flightid fly` of this file flies it again
 def write_flight_study(folder: Path, asked: FlyStart, vehicle: FlyVehicle) -> None:
     """Write the study of a flight into its folder; a model file is named from there."""
     name = os.path.relpath(vehicle.path, folder) if vehicle.path else vehicle.name
-    told = PilotSettings(**{**asked.model_dump(exclude={"do"}), "vehicle": Path(name).as_posix()})
+    fields = asked.model_dump(exclude={"do", "law"})
+    fields |= {"vehicle": Path(name).as_posix(), "augmentation": asked.law}
+    told = PilotSettings(**fields)
     document = {"study": {"title": vehicle.title}, "pilot": pilot_table(told)}
     write_atomically(folder / STUDY, HEAD + tomlkit.dumps(document))
 
@@ -69,7 +71,7 @@ def start_of(text: str, folder: Path, known: Sequence[FlyVehicle]) -> FlyStart:
     for each in known:
         if each.name == told.vehicle or (each.path and Path(each.path) == place):
             fields = {k: v for k, v in vars(told).items() if k in FlyStart.model_fields}
-            return FlyStart(**{**fields, "vehicle": each.name})
+            return FlyStart(**{**fields, "vehicle": each.name, "law": told.augmentation})
     raise OptionError(
         "this page offers no such vehicle",
         found=told.vehicle,

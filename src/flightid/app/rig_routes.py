@@ -110,18 +110,35 @@ def add_rig_routes(app: FastAPI, backstage: Backstage) -> None:
         hold: Annotated[Literal["zero", "first", "band_limited"] | None, Query()] = None,
         inputs: Annotated[tuple[str, ...], Query(max_length=MOST_CHANNELS)] = (),
     ) -> Response:
-        if not (math.isfinite(start_s) and math.isfinite(stop_s) and start_s < stop_s):
-            raise HTTPException(422, "A span needs two instants, the first before the last.")
+        _require_span(start_s, stop_s)
         path = _file(rigs, rig, file)
         told: dict[str, Any] = {"time_column": time_column, "sample_time_s": sample_time_s}
         reading = RigReading(**told, resample_to_s=resample_to_s, hold=hold)
-        options = _options(reading) | roles_of(series, inputs, reading)
-        if "inputs" in options:
-            ways = await made(workers.live(rig_work.input_ways, _known(rigs, rig), options))
-            options |= {"interpolation": ways[file]} if file in ways else {}
+        options = await _viewed(backstage, _known(rigs, rig), file, reading, series, inputs)
         levels = [await _levels(backstage, rig, path, manoeuvre, each, options) for each in series]
         table = await asyncio.to_thread(view, levels, (start_s, stop_s), columns)
         return Response(_packed(table), media_type="application/octet-stream")
+
+
+def _require_span(start_s: float, stop_s: float) -> None:
+    if not (math.isfinite(start_s) and math.isfinite(stop_s) and start_s < stop_s):
+        raise HTTPException(422, "A span needs two instants, the first before the last.")
+
+
+async def _viewed(
+    backstage: Backstage,
+    paths: list[Path],
+    file: str,
+    reading: RigReading,
+    series: Sequence[str],
+    inputs: Sequence[str],
+) -> dict[str, Any]:
+    """How a file of a set is read for its chart: each input in one way in all files of the set."""
+    options = _options(reading) | roles_of(series, inputs, reading)
+    if "inputs" not in options:
+        return options
+    ways = await made(backstage.workers.live(rig_work.input_ways, paths, options))
+    return options | ({"interpolation": ways[file]} if file in ways else {})
 
 
 async def _levels(

@@ -227,7 +227,7 @@ class StudyText(Message):
     redoable: int = 0
 
 
-class Step(Message):
+class StudyStep(Message):
     """To the version before, or to the next again."""
 
     back: bool

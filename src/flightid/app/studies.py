@@ -11,7 +11,7 @@ from fastapi import HTTPException
 
 from flightid.app.own_folders import read_plain, shown_name
 from flightid.app.python_lines import python_lines
-from flightid.app.schemas import Edits, Step, StudyText, WholeText
+from flightid.app.schemas import Edits, StudyStep, StudyText, WholeText
 from flightid.app.study_edits import KeyEdit, edited, etag_of, parts_of, write_study
 from flightid.app.study_history import StudyHistory, Versions
 from flightid.app.study_reach import outside_places
@@ -82,7 +82,7 @@ class Studies:
         """Put a text in place of the version that `tag` names; another is a conflict (409)."""
         return self._put(log, tag, lambda old: old.followed_by(whole.text))
 
-    def step(self, log: str, steps: Step, tag: str) -> StudyText | None:
+    def step(self, log: str, steps: StudyStep, tag: str) -> StudyText | None:
         """Go a version back, or forward again; nothing happens where there is none."""
         by = -1 if steps.back else 1
 

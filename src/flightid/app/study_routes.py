@@ -9,7 +9,7 @@ from typing import Annotated
 from fastapi import FastAPI, Header, HTTPException, Response
 
 from flightid.app.backstage import Backstage, LogName
-from flightid.app.schemas import Edits, Step, StudyText, WholeText
+from flightid.app.schemas import Edits, StudyStep, StudyText, WholeText
 
 
 def add_study_routes(app: FastAPI, backstage: Backstage) -> None:
@@ -42,7 +42,7 @@ def add_study_routes(app: FastAPI, backstage: Backstage) -> None:
     @app.post("/api/studies/{log}/step")
     async def step(
         log: LogName,
-        steps: Step,
+        steps: StudyStep,
         response: Response,
         if_match: Annotated[str | None, Header()] = None,
     ) -> StudyText:

@@ -74,7 +74,7 @@ class PilotSettings(Options):
     """A flight in real time: the table ``[pilot]``, which `flightid fly` takes."""
 
     vehicle: str = option(doc="Vehicle of the library, or a model file, beside the study.")
-    law: bool = option(True, doc="Whether its augmentation acts from the take-off.")
+    augmentation: bool = option(True, doc="Whether its law acts from the take-off.")
     gusts: bool = option(False, doc="Whether the air is gusty.")
     actuator_delay_s: float = option(
         0.0, unit="s", minimum=0.0, maximum=MOST_DELAY_S, doc="Between stick and vehicle."

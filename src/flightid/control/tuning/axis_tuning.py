@@ -13,8 +13,9 @@ from flightid.control.gyro import Gyro
 from flightid.control.margins.outside_band import MarginBeyond
 from flightid.control.tuning.controller_paths import ControllerPaths, loop_responses, standing
 from flightid.control.tuning.evidence import TuningEvidence
-from flightid.control.tuning.gain_search import GainSearchResult, search
+from flightid.control.tuning.gain_search import search
 from flightid.control.tuning.gain_search import steps as search_steps
+from flightid.control.tuning.gain_search_result import GainSearchResult
 from flightid.control.tuning.gain_steps import Stage, TunedGain
 from flightid.control.tuning.limits import ANGLE
 from flightid.control.tuning.loop_problem import LoopAssessment, LoopProblem, Plants

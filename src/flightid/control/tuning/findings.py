@@ -11,7 +11,8 @@ from flightid.control.autopilots import AxisLoop
 from flightid.control.gyro import Gyro
 from flightid.control.margins.findings import COHERENCE
 from flightid.control.tuning.axis_tuning import AxisResult
-from flightid.control.tuning.gain_search import INTEGRAL, NO_GAINS, GainSearchResult
+from flightid.control.tuning.gain_search import INTEGRAL
+from flightid.control.tuning.gain_search_result import NO_GAINS, GainSearchResult
 from flightid.control.tuning.gain_steps import Stage, TunedGain
 from flightid.control.tuning.order_statistics import ENOUGH, least_share
 from flightid.conventions import Light

@@ -14,6 +14,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from flightid.control.tuning.gain_search_result import GainSearchResult
 from flightid.control.tuning.limits import TARGET
 from flightid.control.tuning.loop_problem import LoopAssessment, LoopProblem
 from flightid.frozen import dataclass
@@ -37,41 +38,10 @@ PENALTY = 50.0
 """Loss of merit for a violated limit, in e-folds of the objective."""
 LARGEST_TD_S, TIME_SCALE_S = 0.5, 0.1
 TINY_GAIN = 1e-9
-NO_GAINS = "no-gains"
-"""Code of the finding that says so."""
 INTEGRAL = "ratio of I to P"
 IN_WORDS = {"A": "the angle's P"}
 EDGE = 0.02
 """Slack below which a requirement binds."""
-
-
-@dataclass(frozen=True, eq=False)
-class GainSearchResult:
-    """Where a search ended.
-
-    Attributes
-    ----------
-    gains : ndarray, shape (n_gains,)
-        The best, or those that come nearest to the requirements.
-    exists : bool
-        Whether they meet every requirement for every plant.
-    binding : tuple of str
-        Requirements without slack there: what keeps the gains from going further, or what cannot
-        be met.
-    slack : dict of str to float
-        Least slack of each requirement over the plants.
-    by_hand : bool
-        Whether the gains were given and nothing was searched.
-    missed : tuple of str
-        Of gains by hand: each requirement that a plant misses, and by how much; see `shortfalls`.
-    """
-
-    gains: Array
-    exists: bool
-    binding: tuple[str, ...]
-    slack: dict[str, float]
-    by_hand: bool = False
-    missed: tuple[str, ...] = ()
 
 
 def search(

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from flightid.control.tuning.axis_tuning import held_by_hand
 from flightid.control.tuning.controller_paths import ControllerPaths
 from flightid.control.tuning.findings import GAINS, verdict
-from flightid.control.tuning.gain_search import GainSearchResult
+from flightid.control.tuning.gain_search_result import GainSearchResult
 from flightid.control.tuning.pid_design import PidDesign
 from flightid.control.tuning.responses import ResponseBand, response_bands
 from flightid.control.tuning.worst_cases import WorstCase, worst_cases

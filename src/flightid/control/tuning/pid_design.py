@@ -7,13 +7,9 @@ from dataclasses import field
 from itertools import chain
 from pathlib import Path
 
-from flightid.control.autopilots import (
-    AxisLoop,
-    GainChange,
-    write_parameters,
-)
+from flightid.control.autopilots import AxisLoop, GainChange, write_parameters
 from flightid.control.autopilots.pid_loop import PidLoop
-from flightid.control.tuning.gain_search import NO_GAINS
+from flightid.control.tuning.gain_search_result import without_gains
 from flightid.control.tuning.gain_steps import Stage, TunedGain
 from flightid.control.tuning.loop_problem import LoopProblem
 from flightid.control.tuning.pid_file import write_settings
@@ -135,11 +131,6 @@ class PidDesign(
         raise UnknownNameError(
             "there is no such number of a loop", found=f"{loop}: {name}", needed=known
         )
-
-    @property
-    def without_gains(self) -> Finding | None:
-        """Why there are none: of the search, or what those given by hand miss and by how much."""
-        return next((each for each in self.findings if each.code == NO_GAINS), None)
 
     def response(self, name: str) -> ResponseBand:
         """One time response, for example ``response("rate step")``.
@@ -375,13 +366,11 @@ def require_gains(
     """
     for design in designs:
         if not design.exists:
-            verdict = design.without_gains
+            why = without_gains(design.findings, design.binding)
             raise DataError(
                 f"gains of {design.axis} do not meet the requirements, so none are written",
-                found=verdict.message if verdict else ", ".join(design.binding),
-                action=verdict.action
-                if verdict
-                else "relax a requirement that cannot be met, or identify better",
+                found=why.message,
+                action=why.action,
             )
     said = [*findings, *(finding for design in designs for finding in design.findings)]
     red = {finding.message: finding for finding in said if finding.light is Light.RED}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from flightid.control.tuning.gain_search_result import without_gains
 from flightid.control.tuning.pid_design import PidDesign, require_gains, write_steps
 from flightid.control.tuning.together import Together
 from flightid.control.tuning.tuned_filters import TunedFilters
@@ -267,8 +268,7 @@ class Tuning(Result, schema="flightid.tuning/1"):
 def _unsound(design: PidDesign) -> str:
     """Why the gains of one axis alone are not to be flown; empty where they may."""
     if not design.exists:
-        verdict = design.without_gains
-        return verdict.message if verdict else f"no gains: {', '.join(design.binding)}"
+        return without_gains(design.findings, design.binding).message
     red = [finding.message for finding in design.findings if finding.light is Light.RED]
     return red[0] if red else ""
 

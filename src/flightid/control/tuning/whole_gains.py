@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 
 from flightid.control.tuning.controller_paths import ControllerPaths
-from flightid.control.tuning.gain_search import GainSearchResult
+from flightid.control.tuning.gain_search_result import GainSearchResult
 from flightid.control.tuning.loop_problem import LoopProblem
 
 SHARES = (1.0, 0.97, 0.94, 0.9)
