@@ -185,7 +185,7 @@ def _best(call: Callable[[], Array], repeats: int) -> tuple[float, Array]:
 
 def _native(record: fid.Record, starts: int) -> Callable[[], Array]:
     """The search alone, as the peers have it: without statistics, findings and provenance."""
-    from flightid.identification.output_error.fit import search_records  # noqa: PLC0415
+    from flightid.identification.output_error.search import search_records  # noqa: PLC0415
     from flightid.identification.records.options import RecordOptions  # noqa: PLC0415
     from flightid.identification.records.setup import prepare_records  # noqa: PLC0415
 

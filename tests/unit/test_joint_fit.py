@@ -7,7 +7,7 @@ import pytest
 
 import flightid as fid
 from flightid.errors import DataError, FitError, OptionError
-from flightid.identification.output_error.fit import searched
+from flightid.identification.output_error.search import searched
 from flightid.identification.records.options import RecordOptions
 from flightid.identification.records.setup import prepare_records
 from tests.closeness import assert_close

@@ -17,8 +17,9 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from flightid.errors import DataError
+from flightid.errors import DataError, FlightidError
 from flightid.frozen import dataclass
+from flightid.identification.delay_cells import DelayCells
 from flightid.identification.fit import Fit
 from flightid.identification.output_error.distinct import run_with_slopes
 from flightid.identification.output_error.equation_records import (
@@ -151,10 +152,24 @@ def held_outputs(
     runs_of = equation_runs(model, prepared)
     if runs_of is not None:
         prepared = segmented_starts(prepared, runs_of)
+    # Under the hold of the fit no whole sample of a delay is passed: its search tried their sides.
+    cells = {prepared.hold: _cell(prepared)}
     filters = None
     if coloured:
-        filters = _whitening(_under(replace(prepared, hold=holds[0]), runs_of, None).left)
-    return [_under(replace(prepared, hold=hold), runs_of, filters) for hold in holds]
+        first = replace(prepared, hold=holds[0])
+        filters = _whitening(_under(first, runs_of, None, cells.get(holds[0])).left)
+    return [
+        _under(replace(prepared, hold=hold), runs_of, filters, cells.get(hold)) for hold in holds
+    ]
+
+
+def _cell(prepared: RecordSet) -> tuple[Array, Array] | None:
+    cells = DelayCells(tuple({dt for _, _, dt in prepared.arrays}), prepared.hold)
+    try:
+        return cells.around(prepared.model)
+    except FlightidError:
+        # Equations that have no linearisation at their trim.
+        return None
 
 
 def _whitening(left: Sequence[Array]) -> list[Array]:
@@ -180,7 +195,10 @@ def _whitened(values: Array, filters: Sequence[Array] | None) -> Array:
 
 
 def _under(
-    prepared: RecordSet, runs_of: EquationRuns | None, filters: Sequence[Array] | None
+    prepared: RecordSet,
+    runs_of: EquationRuns | None,
+    filters: Sequence[Array] | None,
+    cell: tuple[Array, Array] | None,
 ) -> HeldOutputs:
     free = [parameter.name for parameter in prepared.model.parameters.free]
     values = np.array([prepared.model.parameters[name].value or 0.0 for name in free])
@@ -200,7 +218,8 @@ def _under(
         _require_near(left, [slope for _, slope in runs], largest)
         left = [_whitened(each, filters) for each in left]
         slopes = slopes or [_whitened(slope, filters) for _, slope in runs]
-        steps = _steps(left, slopes, sizes, len(free))
+        limits = None if cell is None else (cell[0] - values, cell[1] - values)
+        steps = _steps(left, slopes, sizes, len(free), limits)
         parts = [(slice(None, len(free)), SHORT), (slice(len(free), None), NEAR * samples)]
         changes = [
             [slope[:, :, part] @ step[part] for slope, step in zip(slopes, steps, strict=True)]
@@ -247,7 +266,11 @@ def _require_near(left: Sequence[Array], slopes: Sequence[Array], largest: Array
 
 
 def _steps(
-    left: Sequence[Array], slopes: Sequence[Array], sizes: Array, n_free: int
+    left: Sequence[Array],
+    slopes: Sequence[Array],
+    sizes: Array,
+    n_free: int,
+    limits: tuple[Array, Array] | None,
 ) -> list[Array]:
     """Least squares: changes of the shared parameters and of each record's own numbers."""
     weights = 1.0 / np.where(sizes > 0.0, sizes, 1.0)
@@ -262,11 +285,24 @@ def _steps(
     inner = [each[m:, m:] for each, m in zip(triangles, n_own, strict=True)]
     whole = triangle_of_rows(np.concatenate(inner))
     shared = np.linalg.lstsq(whole[:, :-1], whole[:, -1])[0]
+    if limits is not None:
+        shared = _inside(shared, whole, limits)
     found = []
     for each, m in zip(triangles, n_own, strict=True):
         rest = each[:m, -1] - each[:m, m:-1] @ shared
         found.append(np.concatenate([shared, np.linalg.lstsq(each[:m, :m], rest)[0]]))
     return found
+
+
+def _inside(step: Array, triangle: Array, limits: tuple[Array, Array]) -> Array:
+    """The step, what would leave its limits held there and the rest solved again."""
+    clipped = np.clip(step, *limits)
+    rest = clipped == step
+    if np.all(rest):
+        return step
+    target = triangle[:, -1] - triangle[:, :-1][:, ~rest] @ clipped[~rest]
+    clipped[rest] = np.linalg.lstsq(triangle[:, :-1][:, rest], target)[0]
+    return np.clip(clipped, *limits)
 
 
 def _products(left: Array, slopes: Array, weights: Array, n_free: int) -> Array:

@@ -32,7 +32,7 @@ from flightid.identification.filter_error.innovations import (
     InnovationsProblem,
     RecordInnovations,
 )
-from flightid.identification.filter_error.search import NEAR, minimise, with_gust
+from flightid.identification.filter_error.search import NEAR, across_jumps, minimise, with_gust
 from flightid.identification.fit import Fit
 from flightid.identification.fitted_record import FittedRecord
 from flightid.identification.innovation_tests import innovation_tests
@@ -219,7 +219,7 @@ def _search(
             found.append(minimise(problem, whole, limits, enough=enough))
         else:
             found.append("no steady filter at the start")
-    return collect(found)
+    return across_jumps(problem, collect(found), limits)
 
 
 def _freedom(problem: InnovationsProblem, filtered: Sequence[RecordInnovations]) -> float:

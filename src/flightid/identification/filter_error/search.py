@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.identification.delay_cells import DelayCells, beyond_jumps
 from flightid.identification.filter_error.gust_score import Score, score
 from flightid.identification.filter_error.gusts import GUST_UNKNOWNS, Gust, candidates
 from flightid.identification.filter_error.innovations import InnovationsProblem
@@ -26,6 +27,8 @@ STILL = 0.7
 """Part of its reach by which all process noise is lowered where a gust is tried in its place."""
 REACHED = 5.0
 """Times its score test's gain that a search for a gust may gain: where one paid, up to 2.3."""
+ALLOWED = 50.0
+"""Rise of −2 ln p just across a jump that two further steps may make up for."""
 NEAR = 0.01
 """Gain of a last step in −2 ln p before gusts are tried or left: far less than they must gain."""
 
@@ -86,6 +89,55 @@ def minimise(
         )
 
 
+def across_jumps(
+    problem: InnovationsProblem, ends: list[DenseEnd], limits: SearchBounds
+) -> list[DenseEnd]:
+    """Ends of all starts, the best of them followed across whole samples of delays."""
+
+    def search(
+        end: DenseEnd, x: Array, bounds: tuple[Array, Array], iterations: int | None
+    ) -> DenseEnd | None:
+        start = np.concatenate([x, end.x[problem.n_free :]])
+        if iterations is not None:
+            start = _along_valley(end, start)
+            start = np.clip(start, *(np.r_[a, b] for a, b in zip(bounds, edges, strict=True)))
+            residuals = problem.residuals(start, with_slopes=False)[0]
+            cost = float(residuals @ residuals)
+            if not problem.n_measured * math.log(cost / end.cost) < ALLOWED:
+                return None
+        inside = replace(limits, lower=bounds[0], upper=bounds[1])
+        return minimise(problem, start, inside, iterations=iterations)
+
+    edges = -problem.reach, problem.reach
+    cells, outer = _cells(problem), (limits.lower, limits.upper)
+    return [beyond_jumps(ends[0], problem.model, cells, outer, search), *ends[1:]]
+
+
+def inside_cell(problem: InnovationsProblem, end: DenseEnd, limits: SearchBounds) -> SearchBounds:
+    """Bounds within which no held input reaches another sample than at an end."""
+    free = [parameter.name for parameter in problem.model.parameters.free]
+    values = dict(zip(free, map(float, end.x), strict=False))
+    around = _cells(problem).around(problem.model.with_values(values))
+    if around is None:
+        return limits
+    lower, upper = np.maximum(limits.lower, around[0]), np.minimum(limits.upper, around[1])
+    return replace(limits, lower=lower, upper=upper)
+
+
+def _cells(problem: InnovationsProblem) -> DelayCells:
+    return DelayCells(tuple({each.sample_time_s for each in problem.data}), problem.hold)
+
+
+def _along_valley(end: DenseEnd, moved: Array) -> Array:
+    """A point beside an end, all numbers that were not moved brought to where they cost least."""
+    step = moved - end.x
+    rest = np.flatnonzero(step == 0.0)
+    scale = np.maximum(np.linalg.norm(end.jacobian[:, rest], axis=0), np.finfo(float).tiny)
+    columns = end.jacobian[:, rest] / scale
+    step[rest] = -np.linalg.lstsq(columns.T @ columns, columns.T @ (end.jacobian @ step))[0] / scale
+    return np.asarray(end.x + step)
+
+
 def with_gust(
     problem: InnovationsProblem, groups: list[list[DenseEnd]], limits: SearchBounds
 ) -> tuple[InnovationsProblem, list[list[DenseEnd]]]:
@@ -106,6 +158,7 @@ def with_gust(
     Schwarz (1978), Annals of Statistics 6; Ljung, *System Identification*, 2nd ed., §16.4; Rao
     (1948), Proc. Cambridge Philosophical Society 44 (score test).
     """
+    outer, limits = limits, inside_cell(problem, groups[0][0], limits)
     noisy = slice(problem.n_free, problem.n_free + len(problem.noisy))
     if np.all(groups[0][0].x[noisy] < CALM):
         groups = _followed(problem, groups, limits)
@@ -128,7 +181,7 @@ def with_gust(
         begun = minimise(tried, begun.x, limits, enough=NEAR)
     if _gained(tried, end, begun) <= needed:
         return problem, _followed(problem, groups, limits)
-    return tried, [[minimise(tried, begun.x, limits)]]
+    return tried, [across_jumps(tried, [minimise(tried, begun.x, limits)], outer)]
 
 
 def _gusts(problem: InnovationsProblem, end: DenseEnd) -> list[Gust]:

@@ -139,7 +139,11 @@ def search(objective: Objective, start: Array) -> SearchOutcome:
         tried = _step(jacobian, here, bounds, damping) if damping else whole
         there = SearchPoint.of(objective, np.clip(here.x + tried, *bounds))
         if there is None or there.cost >= here.cost:
-            cell = objective.correction.cell(objective.at(here.x)) if bounds is limits else None
+            cell = (
+                objective.correction.cells.around(objective.at(here.x))
+                if bounds is limits
+                else None
+            )
             if cell is not None:
                 bounds = np.maximum(cell[0], limits[0]), np.minimum(cell[1], limits[1])
             elif away > 0.0:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from flightid.errors import DataError, ModelError, OptionError, SingularError
 from flightid.frozen import dataclass
+from flightid.identification.delay_cells import DIFFERENCE, DelayCells
 from flightid.identification.frequency_domain.model_residuals import ModelResiduals
 from flightid.models import GreyBoxModel, Parameter
 from flightid.responses import FrequencyResponse
@@ -32,12 +33,6 @@ Places = NDArray[np.intp]
 
 OUTSIDE = (DataError, ModelError, OptionError, SingularError)
 """Ends of models that cannot be followed over the records, delays without bounds among them."""
-DIFFERENCE = 1e-5
-"""Relative change of a parameter for derivatives of modelled outputs."""
-WHOLE = 1e-9
-"""Samples by which a delay may miss a whole number of them."""
-JUST = 1e-6
-"""Samples by which a delay stands clear of the jump at its lower end."""
 OCTAVE = 2.0
 TOGETHER = 64
 """Outputs of moved models that are transformed at once: more leave the caches."""
@@ -188,47 +183,15 @@ class Correction:
         ]
         for way in ways:
             moved = model.with_values({parameter.name: value + way})
-            if np.array_equal(self._lags(moved), self._lags(model)):
+            if np.array_equal(self.cells.lags(moved), self.cells.lags(model)):
                 return moved, way
         way = (ways or [step])[0]
         return model.with_values({parameter.name: value + way}), way
 
-    def cell(self, model: GreyBoxModel) -> tuple[Array, Array] | None:
-        """Bounds of the free parameters between which no held input reaches another sample.
-
-        A step that is held and fed straight through moves an output by a whole sample at once when
-        its delay passes one. None where nothing jumps.
-        """
-        delays = self._jumping(model)
-        if not len(delays):
-            return None
-        step = self._linear.sample_time_s
-        last = np.ceil(delays / step - WHOLE)
-        low, high = (last - 1.0 + JUST) * step - delays, last * step - delays
-        free = model.parameters.free
-        bounds = np.full((2, len(free)), [[-np.inf], [np.inf]])
-        values = np.array([parameter.value or 0.0 for parameter in free])
-        for place, parameter in enumerate(free):
-            change = DIFFERENCE * (abs(values[place]) or 1.0)
-            moved = model.with_values({parameter.name: values[place] + change})
-            slope = (self._jumping(moved) - delays) / change
-            for each in np.flatnonzero(slope):
-                ends = np.sort([low[each] / slope[each], high[each] / slope[each]])
-                bounds[0, place] = max(bounds[0, place], values[place] + ends[0])
-                bounds[1, place] = min(bounds[1, place], values[place] + ends[1])
-        return bounds[0], bounds[1]
-
-    def _lags(self, model: GreyBoxModel) -> Array:
-        return np.ceil(self._jumping(model) / self._linear.sample_time_s - WHOLE)
-
-    def _jumping(self, model: GreyBoxModel) -> Array:
-        """Delays of held inputs that are fed straight through, s."""
-        if self.hold != "zero":
-            return np.zeros(0)
-        systems = systems_of(model)
-        return np.concatenate(
-            [each.delays_s[np.any(each.matrices[3] != 0.0, axis=0)] for each in systems]
-        )
+    @property
+    def cells(self) -> DelayCells:
+        """Where delays may move without a held input reaching another sample."""
+        return DelayCells((self._linear.sample_time_s,), self.hold)
 
     def _weights(self, frequencies: Places) -> Functional:
         key = frequencies.tobytes()

@@ -24,7 +24,7 @@ from flightid.identification.frequency_domain.bias_search import (
 )
 from flightid.identification.joint.options import JointOptions
 from flightid.identification.output_error.beside import WrittenResiduals
-from flightid.identification.output_error.fit import SearchEnd, searched
+from flightid.identification.output_error.search import SearchEnd, searched
 from flightid.identification.records.setup import RecordSet
 from flightid.models import GreyBoxModel
 
@@ -182,7 +182,7 @@ def search_inside(
     """
     model, before, steps = start, np.inf, 0
     objective.estimates(_values(start))  # says why, if it is a simulation that cannot be
-    celled = known is not None and objective.correction.cell(start) is not None
+    celled = known is not None and objective.correction.cells.around(start) is not None
     extra = known or _none(objective)
     for _ in range(MOST_TURNS):
         end = _turn(model, prepared, options, objective, extra, celled=celled)
@@ -199,7 +199,7 @@ def search_inside(
                 return end.settled
             model, end = beyond.found.fitted, replace(beyond, step=np.inf, steps=steps)
         before = end.cost
-        celled = objective.correction.cell(model) is not None
+        celled = objective.correction.cells.around(model) is not None
         extra = added_slopes(objective, _values(model))
     return end
 
@@ -233,7 +233,7 @@ def _turn(
     """One search; its step is how far the response's residuals went, a parameter."""
     inside = InsideResiduals(objective, extra)
     free = model.parameters.free
-    bounds = objective.correction.cell(model) if celled else None
+    bounds = objective.correction.cells.around(model) if celled else None
     if bounds is not None:
         low = np.maximum(bounds[0], [parameter.minimum for parameter in free])
         bounds = low, np.minimum(bounds[1], [parameter.maximum for parameter in free])
@@ -252,7 +252,7 @@ def _beyond(
 ) -> InsideEnd | None:
     """A lower cost across a jump at which the search stands."""
     model = end.found.fitted
-    bounds = objective.correction.cell(model)
+    bounds = objective.correction.cells.around(model)
     if bounds is None:
         return None
     x, best = _values(model), None

@@ -57,11 +57,8 @@ from flightid.identification.joint.independence import judge_independence
 from flightid.identification.joint.options import JointOptions
 from flightid.identification.multistart import cluster
 from flightid.identification.output_error.beside import WhitenedResponses
-from flightid.identification.output_error.fit import (
-    SearchEnd,
-    conclude,
-    searched,
-)
+from flightid.identification.output_error.fit import conclude
+from flightid.identification.output_error.search import SearchEnd, searched
 from flightid.identification.records.findings import judge_channels
 from flightid.identification.records.setup import RecordSet, prepare_records
 from flightid.identification.rival_fits import judged

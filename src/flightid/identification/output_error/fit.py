@@ -13,9 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.errors import FlightidError
 from flightid.findings import Finding
-from flightid.frozen import dataclass
 from flightid.identification.fit import Fit
 from flightid.identification.fit_findings import (
     judge_correlation,
@@ -24,14 +22,11 @@ from flightid.identification.fit_findings import (
 )
 from flightid.identification.fitted_record import FittedRecord
 from flightid.identification.frequency_domain.feedback_findings import judge_feedback
-from flightid.identification.multistart import End, cluster, collect, draw_starts, local_minima
-from flightid.identification.output_error.beside import WhitenedResponses, WrittenResiduals
-from flightid.identification.output_error.distinct import require_distinct, run_with_slopes
+from flightid.identification.multistart import local_minima
+from flightid.identification.output_error.distinct import run_with_slopes
 from flightid.identification.output_error.equation_records import (
     EquationRuns,
-    equation_runs,
     judge_runs,
-    segmented_starts,
 )
 from flightid.identification.output_error.free_runs import (
     keeping_outputs,
@@ -39,6 +34,12 @@ from flightid.identification.output_error.free_runs import (
     runs_of_own,
 )
 from flightid.identification.output_error.process_noise import TURBULENT, judge_process_noise
+from flightid.identification.output_error.search import (
+    RecordEnd,
+    SearchEnd,
+    searched,
+    with_estimates,
+)
 from flightid.identification.records.findings import judge_channels, judge_fit
 from flightid.identification.records.options import RecordOptions, chosen
 from flightid.identification.records.record_parameters import RecordParameters
@@ -50,8 +51,6 @@ from flightid.identification.records.statistics import (
 )
 from flightid.identification.records.white_noise import explained_percent
 from flightid.identification.regression.equation_error import equation_error_start
-from flightid.identification.regression.fourier_output_error_fit import fit_fourier_output_error
-from flightid.identification.regression.options import FourierOutputErrorOptions
 from flightid.identification.rival_fits import judged
 from flightid.identification.withheld_intervals import without_intervals
 from flightid.models import GreyBoxModel, StateSpaceModel
@@ -63,24 +62,6 @@ from flightid.version import VERSION
 Array = NDArray[np.float64]
 _NEAR = 0.5 * np.log(1.1)
 """Log-likelihood of a sample whose residual variance is ten percent larger."""
-ROUNDS = 3
-"""Most searches with a new choice of the modes that are set at the end of a record."""
-NativeEnd = tuple[Array, float, Array, list[Array], list[list[bool]], int, str]
-
-
-@dataclass(frozen=True)
-class RecordEnd(End):
-    """Where one start ended: also R, each record's own numbers and which are determined."""
-
-    noise: Array
-    own: list[Array]
-    determined: list[list[bool]]
-
-    @classmethod
-    def of_native(cls, found: NativeEnd) -> RecordEnd:
-        """From the native half's order."""
-        x, cost, noise, own, determined, iterations, termination = found
-        return cls(x, cost, iterations, termination, noise, own, determined)
 
 
 def fit_output_error(
@@ -98,31 +79,6 @@ def fit_output_error(
     prepared = prepare_records(model, data, options)
     setup = judge_channels(prepared)
     return conclude(searched(model, prepared, options), options, setup)
-
-
-@dataclass(frozen=True)
-class SearchEnd:
-    """Where a search over records ended.
-
-    Attributes
-    ----------
-    model : TransferFunctionModel or StateSpaceModel
-        From which the last round started.
-    prepared : RecordSet
-    runs_of : EquationRuns or None
-    groups : list of list of RecordEnd
-        Ends of all starts, best group first.
-    """
-
-    model: GreyBoxModel
-    prepared: RecordSet
-    runs_of: EquationRuns | None
-    groups: list[list[RecordEnd]]
-
-    @property
-    def fitted(self) -> GreyBoxModel:
-        """The model at the best end."""
-        return _with_estimates(self.model, self.groups[0][0])
 
 
 def conclude(
@@ -149,7 +105,7 @@ def conclude(
     """
     model, prepared, runs_of, groups = found.model, found.prepared, found.runs_of, found.groups
     best = groups[0][0]
-    fitted = _with_estimates(model, best)
+    fitted = with_estimates(model, best)
     own = [start.filled(end) for start, end in zip(prepared.own, best.own, strict=True)]
     ran = own
     outputs: list[Array] = []
@@ -175,105 +131,6 @@ def conclude(
     )
     fit = _assemble(fitted, prepared, options, groups, outputs, known, setup, noise)
     return without_intervals(fit, TURBULENT) if noise else fit
-
-
-def searched(
-    model: GreyBoxModel,
-    prepared: RecordSet,
-    options: RecordOptions,
-    responses: WhitenedResponses | None = None,
-    written: WrittenResiduals | None = None,
-    bounds: tuple[Array, Array] | None = None,
-) -> SearchEnd:
-    """Search, again where the estimates have other growing modes than their start.
-
-    Parameters
-    ----------
-    model : TransferFunctionModel or StateSpaceModel
-    prepared : RecordSet
-    options : RecordOptions
-    responses : WhitenedResponses, optional
-        Fitted together with the records.
-    written : WrittenResiduals, optional
-        The same, of other data.
-    bounds : tuple of ndarray, optional
-        Of the free parameters, lower and upper; default: the model's.
-
-    Raises
-    ------
-    FitError
-        No start led anywhere.
-    """
-    starts = options
-    for turn in range(ROUNDS):
-        runs_of = equation_runs(model, prepared)
-        placed = prepared if runs_of is None else segmented_starts(prepared, runs_of)
-        placed = replace(placed, model=model)
-        if turn == 0 and responses is None and written is None:
-            require_distinct(model, placed, runs_of)
-        groups = cluster(search_records(placed, starts, runs_of, responses, written, bounds))
-        fitted = _with_estimates(model, groups[0][0])
-        after = equation_runs(fitted, prepared)
-        if _growing(after) == _growing(runs_of):
-            break
-        model, starts = _overgrown(model, fitted, after, placed), replace(options, starts=1)
-    return SearchEnd(model, placed, runs_of, groups)
-
-
-def _overgrown(
-    model: GreyBoxModel, fitted: GreyBoxModel, after: EquationRuns | None, prepared: RecordSet
-) -> GreyBoxModel:
-    """Where to search from, once the estimates grow otherwise than the model that was run.
-
-    A run from the first sample to the last of a vehicle that turns out unstable tells nothing, and
-    its estimates may grow without bound. Transforms of the records do not care which modes grow.
-    """
-    if not (after is not None and after.is_segmented and isinstance(model, StateSpaceModel)):
-        return fitted
-    options = FourierOutputErrorOptions(hold=prepared.hold)
-    try:
-        found: GreyBoxModel = fit_fourier_output_error(model, prepared.records, options).model
-        return found
-    except FlightidError:
-        # A nonlinear model, or records too short to transform: what was found is all there is.
-        return fitted
-
-
-def _growing(runs: EquationRuns | None) -> list[int]:
-    return [] if runs is None or not runs.is_segmented else runs.n_growing
-
-
-def _with_estimates(model: GreyBoxModel, end: RecordEnd) -> GreyBoxModel:
-    names = [parameter.name for parameter in model.parameters.free]
-    return model.with_values(dict(zip(names, map(float, end.x), strict=True)))
-
-
-def search_records(
-    prepared: RecordSet,
-    options: RecordOptions,
-    runs_of: EquationRuns | None = None,
-    responses: WhitenedResponses | None = None,
-    written: WrittenResiduals | None = None,
-    bounds: tuple[Array, Array] | None = None,
-) -> list[RecordEnd]:
-    """Ends of all starts, best first; no statistics."""
-    model = prepared.model
-    free = model.parameters.free
-    native = model.native if runs_of is None else runs_of.native
-    if bounds is None:
-        bounds = np.array([p.minimum for p in free]), np.array([p.maximum for p in free])
-    beside = (responses,) if written is None else (responses, written)
-    found = native.fit_records(
-        model.parameters.independent_values(),
-        model.parameters.free_indices,
-        prepared.arrays,
-        [numbers.native for numbers in prepared.own],
-        prepared.hold,
-        (options.noise_covariance == "full", options.limit, options.consistency),
-        (draw_starts(free, options.starts, options.seed), *bounds, options.maximum_iterations),
-        *beside,
-    )
-    return collect([each if isinstance(each, str) else RecordEnd.of_native(each) for each in found])
 
 
 def _held_start(

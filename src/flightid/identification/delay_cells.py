@@ -1,0 +1,171 @@
+"""Delays of held inputs that outputs feel at once, and the whole samples at which a cost jumps.
+
+A step that is held and fed straight through moves an output by a whole sample when its delay
+passes one. A search that goes by slopes ends in front of such a jump, or just behind one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.errors import FlightidError
+from flightid.frozen import dataclass
+from flightid.identification.multistart import End
+from flightid.models import GreyBoxModel
+from flightid.simulation.model_outputs import systems_of
+
+Array = NDArray[np.float64]
+Bounds = tuple[Array, Array]
+E = TypeVar("E", bound=End)
+
+DIFFERENCE = 1e-5
+"""Relative change of a parameter for derivatives of delays."""
+WHOLE = 1e-9
+"""Samples by which a delay may miss a whole number of them."""
+JUST = 1e-6
+"""Samples by which a delay stands clear of the jump at its lower end."""
+ACROSS = 0.01
+"""Share of a cell by which the other side of a jump is tried."""
+NEAR = 0.02
+"""Share of a cell from a jump within which a search may have stumbled at it."""
+LOOK = 2
+"""Steps of a search across a jump, by which it must be lower to go on there."""
+MOST_CROSSINGS = 8
+"""Jumps that one search passes in turn."""
+LOWER = 1e-9
+"""Relative change of a cost that rounding may make."""
+
+
+@dataclass(frozen=True)
+class DelayCells:
+    """Where delays may move without a held input reaching another sample.
+
+    Attributes
+    ----------
+    sample_times_s : tuple of float
+        Of the records, each once.
+    hold : {"band_limited", "first", "zero"}
+
+    Example
+    -------
+    >>> from flightid import load_model
+    >>> DelayCells((0.02,), "first").around(load_model("rate_first_order")) is None
+    True
+    """
+
+    sample_times_s: tuple[float, ...]
+    hold: str
+
+    def delays(self, model: GreyBoxModel) -> Array:
+        """Delays of held inputs that are fed straight through, s."""
+        if self.hold != "zero":
+            return np.zeros(0)
+        return np.concatenate(
+            [each.delays_s[np.any(each.matrices[3] != 0.0, axis=0)] for each in systems_of(model)]
+        )
+
+    def lags(self, model: GreyBoxModel) -> Array:
+        """Whole samples that each of these delays reaches back, by sample time."""
+        return np.ceil(self.delays(model) / np.array(self.sample_times_s)[:, None] - WHOLE)
+
+    def around(self, model: GreyBoxModel) -> Bounds | None:
+        """Bounds of the free parameters between which no held input reaches another sample.
+
+        None where nothing jumps.
+        """
+        delays = self.delays(model)
+        if not len(delays):
+            return None
+        steps, last = np.array(self.sample_times_s)[:, None], self.lags(model)
+        low = np.max((last - 1.0 + JUST) * steps, axis=0) - delays
+        high = np.min(last * steps, axis=0) - delays
+        free = model.parameters.free
+        bounds = np.full((2, len(free)), [[-np.inf], [np.inf]])
+        for place, parameter in enumerate(free):
+            value = parameter.value or 0.0
+            change = DIFFERENCE * (abs(value) or 1.0)
+            moved = self.delays(model.with_values({parameter.name: value + change}))
+            slope = (moved - delays) / change
+            for each in np.flatnonzero(slope):
+                ends = np.sort([low[each] / slope[each], high[each] / slope[each]])
+                bounds[0, place] = max(bounds[0, place], value + ends[0])
+                bounds[1, place] = min(bounds[1, place], value + ends[1])
+        return bounds[0], bounds[1]
+
+
+def beyond_jumps(
+    end: E,
+    model: GreyBoxModel,
+    cells: DelayCells,
+    limits: Bounds,
+    search: Callable[[E, Array, Bounds, int | None], E | None],
+) -> E:
+    """The end of a search, or a lower one across jumps beside it.
+
+    Parameters
+    ----------
+    end : End
+        Its first numbers are the free parameters.
+    model : TransferFunctionModel or StateSpaceModel
+    cells : DelayCells
+    limits : tuple of ndarray
+        Of the free parameters.
+    search : callable
+        From an end, with other free parameters, inside bounds, in so many steps or to its end.
+    """
+    free = [parameter.name for parameter in model.parameters.free]
+    best = end
+    seen: set[bytes] = set()
+    for turn in range(MOST_CROSSINGS):
+        here = model.with_values(dict(zip(free, map(float, best.x), strict=False)))
+        found, inside = best, limits
+        for start, bounds in _around(here, cells, limits, seen, own=turn == 0):
+            tried = search(best, start, bounds, LOOK)
+            if tried is not None and tried.cost < found.cost - LOWER * abs(end.cost):
+                found, inside = tried, bounds
+        if found is best:
+            break
+        gone_on = search(found, found.x[: len(free)], inside, None)
+        best = found if gone_on is None or gone_on.cost > found.cost else gone_on
+    return best
+
+
+def _around(
+    model: GreyBoxModel, cells: DelayCells, limits: Bounds, seen: set[bytes], *, own: bool
+) -> Iterator[tuple[Array, Bounds]]:
+    """Points just across each jump around a model, with the bounds of their cells.
+
+    The point itself too, where `own` and a jump is so near that steps may have stumbled at it.
+    Cells that were `seen` are left out.
+    """
+    try:
+        around = cells.around(model)
+    except FlightidError:
+        # Equations that have no linearisation at their trim.
+        around = None
+    if around is None:
+        return
+    seen.add(cells.lags(model).tobytes())
+    low, high = limits
+    free = model.parameters.free
+    values = np.array([parameter.value or 0.0 for parameter in free])
+    with np.errstate(invalid="ignore"):
+        apart = np.minimum(values - around[0], around[1] - values) / (around[1] - around[0])
+    if own and np.any(apart <= NEAR):
+        yield values, (np.maximum(around[0], low), np.minimum(around[1], high))
+    for edges, way in zip(around, (-1.0, 1.0), strict=True):
+        for place in np.flatnonzero(np.isfinite(edges)):
+            there = values.copy()
+            width = around[1][place] - around[0][place]
+            there[place] = edges[place] + way * ACROSS * width
+            if not low[place] <= there[place] <= high[place]:
+                continue
+            moved = model.with_values({free[place].name: float(there[place])})
+            cell, place_of_cell = cells.around(moved), cells.lags(moved).tobytes()
+            if cell is not None and place_of_cell not in seen:
+                seen.add(place_of_cell)
+                yield there, (np.maximum(cell[0], low), np.minimum(cell[1], high))
