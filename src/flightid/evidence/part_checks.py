@@ -13,6 +13,10 @@ from flightid.uncertainty.agreement import FEWEST_RECORDS, Agreement
 from flightid.uncertainty.foretold import MATERIAL_PERCENT
 
 ONE = "One record does not tell how far flights differ: what is known is of that flight alone"
+ALONE = (
+    "{} of {} estimates are told by one record alone, and known of that flight: repeat each "
+    "manoeuvre to show whether flights differ"
+)
 ONCE = "flown once: nothing shows whether a second flight would agree"
 AGAIN = "repeat the manoeuvre in a second record or segment"
 ALL_AGAIN = "repeat what moves all inputs, and hand in each repetition as one record or segment"
@@ -51,8 +55,10 @@ def agreement_check(found: Agreement, values: NDArray[np.float64] | None = None)
     """
     apart = None if values is None else found.apart_percent(values)
     # Where nothing was compared, the reason says as much.
-    alone = found.tested and needs_another(found.n_records)
-    return replace(_compared(found, apart), limit=ONE if alone else "")
+    limit = ONE if found.tested and needs_another(found.n_records) else ""
+    if found.tested and found.told_once:
+        limit = ALONE.format(found.told_once, len(found.by_noise))
+    return replace(_compared(found, apart), limit=limit)
 
 
 def needs_another(n_records: int) -> bool:

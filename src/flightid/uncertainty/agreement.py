@@ -9,7 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.frozen import dataclass
-from flightid.uncertainty.parts import RecordParts, chance_alike, larger, scatter
+from flightid.uncertainty.parts import (
+    RecordParts,
+    chance_alike,
+    chance_where_seen,
+    larger,
+    scatter,
+    told_once,
+)
 from flightid.uncertainty.quantiles import LEVEL, half_width
 
 Array = NDArray[np.float64]
@@ -40,6 +47,8 @@ class Agreement:
         Standard errors by how far the parts lie apart; None where nothing speaks for that.
     freedom : ndarray, shape (n,), or None
         Degrees of freedom of `by_scatter`; None for halves.
+    told_once : int
+        Estimates that one of several records tells alone, so that nothing is compared.
 
     Example
     -------
@@ -53,6 +62,7 @@ class Agreement:
     by_noise: Array
     by_scatter: Array | None = None
     freedom: Array | None = None
+    told_once: int = 0
 
     @property
     def tested(self) -> bool:
@@ -109,6 +119,7 @@ class Agreement:
             self.by_noise[:count],
             None if self.by_scatter is None else self.by_scatter[:count],
             None if self.freedom is None else self.freedom[:count],
+            min(self.told_once, count),
         )
 
     def to_dict(self) -> dict[str, object]:
@@ -121,6 +132,7 @@ class Agreement:
             "stderr_by_scatter": None if self.by_scatter is None else self.by_scatter.tolist(),
             "freedom_of_scatter": None if self.freedom is None else self.freedom.tolist(),
             "factor": self.factor,
+            "told_once": self.told_once,
         }
 
 
@@ -180,8 +192,10 @@ def compare_parts(
     by_records = by_records and len(whole) > 1
     compared = flights if by_halves else ()
     halves = _combined([chance_alike([flight], level) for flight in compared])
-    records = chance_alike(whole, level) if by_records else None
-    plain = Agreement(len(flights), halves, records, np.sqrt(np.diag(covariance)))
+    records = chance_where_seen(whole, level) if by_records else None
+    once = told_once(whole, solve, covariance) if by_records else 0
+    by_noise = np.sqrt(np.diag(covariance))
+    plain = Agreement(len(flights), halves, records, by_noise, told_once=once)
     if plain.agree and not (records is not None and records < DOUBT):
         return AgreementTest(covariance, freedom, plain)
     parts = whole if by_records else _halved(flights[0])
@@ -192,7 +206,7 @@ def compare_parts(
         # Bars reach as far as the two lie apart; how far they should, noise tells better than both.
         student = np.maximum(student, freedom)
     stated = freedom if student is None else _of_wider(plain.by_noise, freedom, apart, student)
-    agreement = Agreement(len(flights), halves, records, plain.by_noise, apart, student)
+    agreement = replace(plain, by_scatter=apart, freedom=student)
     return AgreementTest(larger(covariance, found.covariance), stated, agreement)
 
 

@@ -18,8 +18,10 @@ from flightid.frozen import dataclass
 Array = NDArray[np.float64]
 LEAST_INFORMATION = 1e-6
 """Share of all parts' noise in a direction below which a part says nothing of it."""
-SEEN_ELSEWHERE = 1e-3
-"""Least share of the other parts in a direction, for what a part says of it to be compared."""
+SEEN_ALIKE = 0.2
+"""Information of a direction, over that of whichever part tells most of it, from which on a part
+is compared there: its error is up to 2.2 times as long. What a part hardly sees is moved by gusts
+that a loop answers, and says nothing of the vehicle."""
 MOST_BY_ONE = 0.999
 """Largest share of one part in an estimate."""
 
@@ -100,27 +102,77 @@ def chance_alike(flights: Sequence[RecordParts], freedom: float) -> float | None
     # A parameter that no part sees has no noise, by rounding below zero.
     total = sum(np.einsum("kiki->i", each.noise) for each in flights)
     scale = np.sqrt(np.where(total > 0.0, total, 1.0))
-    square, rank = 0.0, 0
-    bent, pulled = 0.0, 0.0
-    for each in flights:
-        m, p = each.scores.shape
-        noise = (each.noise / scale[:, None, None] / scale).reshape(m * p, m * p)
-        if not np.isfinite(noise).all():
-            return None
-        sizes, turned = np.linalg.eigh(0.5 * (noise + noise.T))
-        kept = sizes > LEAST_INFORMATION
-        whiten = turned[:, kept].T / np.sqrt(sizes[kept])[:, None]
-        score = whiten @ (each.scores / scale).ravel()
-        slope = whiten @ (each.information / scale[:, None]).reshape(m * p, p)
-        square += float(score @ score)
-        rank += int(np.count_nonzero(kept))
-        bent, pulled = bent + slope.T @ slope, pulled + slope.T @ score
-    sizes, turned = np.linalg.eigh(_scaled(np.asarray(bent)))
+    axes = np.diag(1.0 / scale)
+    return _chance(
+        [_whitened(each.along(axes), axes @ each.information) for each in flights], freedom
+    )
+
+
+def chance_where_seen(parts: Sequence[RecordParts], freedom: float) -> float | None:
+    """The same of parts by what each sees about as well as any other, see `SEEN_ALIKE`.
+
+    Parameters
+    ----------
+    parts : sequence of RecordParts
+        Each as one part.
+    freedom : float
+
+    Returns
+    -------
+    float or None
+        None where no two parts see the same as well.
+
+    Example
+    -------
+    >>> parts = [RecordParts(np.array([[s]]), np.full((1, 1, 1), h), np.full((1, 1, 1, 1), h))
+    ...          for s, h in ((1.0, 1.0), (-1.0, 0.01))]
+    >>> chance_where_seen(parts, np.inf) is None, round(chance_alike(parts, np.inf), 3)
+    (True, 0.0)
+    """
+    total = np.sum([each.information[0] for each in parts], axis=0)
+    if not len(total):
+        return None
+    size = np.sqrt(np.maximum(np.diag(total), np.finfo(float).tiny))
+    sizes, turned = np.linalg.eigh(_scaled(total))
+    kept = sizes > LEAST_INFORMATION * sizes[-1]
+    root = turned[:, kept] / np.sqrt(sizes[kept]) / size[:, None]
+    shares = [root.T @ each.information[0] @ root for each in parts]
+    seen = []
+    for each, share in zip(parts, shares, strict=True):
+        own, axes = np.linalg.eigh(0.5 * (share + share.T))
+        most = np.max([np.sum(axes * (other @ axes), axis=0) for other in shares], axis=0)
+        axes = root @ axes[:, own >= SEEN_ALIKE * most]
+        noise = np.einsum("ij,ip,pj->j", axes, each.noise[0, :, 0], axes)
+        axes = axes / np.sqrt(np.where(noise > 0.0, noise, 1.0))
+        seen.append(_whitened(each.along(axes), axes.T @ each.information @ root))
+    return _chance(seen, freedom)
+
+
+def _whitened(part: RecordParts, slopes: Array) -> tuple[Array, Array] | None:
+    """Scores of unit variance, and their slopes by all parameters; None of no finite size."""
+    m, p = part.scores.shape
+    noise = part.noise.reshape(m * p, m * p)
+    if not np.isfinite(noise).all():
+        return None
+    sizes, turned = np.linalg.eigh(0.5 * (noise + noise.T))
+    kept = sizes > LEAST_INFORMATION
+    whiten = turned[:, kept].T / np.sqrt(sizes[kept])[:, None]
+    return whiten @ part.scores.ravel(), whiten @ slopes.reshape(m * p, slopes.shape[-1])
+
+
+def _chance(whitened: Sequence[tuple[Array, Array] | None], freedom: float) -> float | None:
+    """That scores are of one set of numbers."""
+    known = [each for each in whitened if each is not None]
+    if len(known) < len(whitened):
+        return None
+    bent = np.sum([slope.T @ slope for _, slope in known], axis=0)
+    pulled = np.sum([slope.T @ score for score, slope in known], axis=0)
+    sizes, turned = np.linalg.eigh(_scaled(bent))
     kept = sizes > LEAST_INFORMATION * sizes[-1]
     lengths = np.sqrt(np.maximum(np.diag(bent), np.finfo(float).tiny))
     along = turned[:, kept].T @ (pulled / lengths) / np.sqrt(sizes[kept])
-    square -= float(along @ along)
-    degrees = rank - int(np.count_nonzero(kept))
+    square = sum(float(score @ score) for score, _ in known) - float(along @ along)
+    degrees = sum(len(score) for score, _ in known) - int(np.count_nonzero(kept))
     if degrees < 1:
         return None
     # The level of the noise is an estimate too, and of as much freedom.
@@ -175,20 +227,43 @@ def scatter(parts: Sequence[RecordParts], solve: Array, spread: Array) -> Scatte
     """
     count, size = len(parts), np.sqrt(np.diag(spread))
     left_over = solve @ sum(part.scores[0] for part in parts)
+    lower, back = _root(solve)
     changes, shares = [], []
     for part in parts:
         weight = solve @ part.information[0]
-        others = np.eye(len(size)) - weight * size / size[:, None]
-        left, singular, right = np.linalg.svd(others)
-        kept = singular > SEEN_ELSEWHERE
-        apart = solve @ part.scores[0] - weight @ left_over
-        moved = left.T[kept] @ (apart / size)
-        changes.append(size * (right.T[:, kept] @ (moved / singular[kept])))
+        left, singular, right = np.linalg.svd(np.eye(len(size)) - back @ weight @ lower)
+        kept = singular >= SEEN_ALIKE / (1.0 + SEEN_ALIKE)
+        apart = back @ (solve @ part.scores[0] - weight @ left_over)
+        moved = left.T[kept] @ apart
+        changes.append(lower @ (right.T[:, kept] @ (moved / singular[kept])))
         shares.append(np.diag(weight @ spread) / size**2)
     covariance = (count - 1) / count * sum(np.outer(each, each) for each in changes)
     weights = np.clip(np.array(shares), 0.0, MOST_BY_ONE)
     weights = weights / np.maximum(weights.sum(axis=0), np.finfo(float).tiny)
     return Scatter(np.asarray(covariance), np.array([_freedom(w) for w in weights.T]))
+
+
+def _root(solve: Array) -> tuple[Array, Array]:
+    """Directions of unit information, and what turns changes into them."""
+    size = np.sqrt(np.maximum(np.diag(solve), np.finfo(float).tiny))
+    own, axes = np.linalg.eigh(_scaled(solve))
+    own = np.maximum(own, np.finfo(float).eps * own[-1])
+    return size[:, None] * axes * np.sqrt(own), (axes / np.sqrt(own)).T / size
+
+
+def told_once(parts: Sequence[RecordParts], solve: Array, spread: Array) -> int:
+    """How many estimates are told by one part alone: no other sees them about as well.
+
+    Example
+    -------
+    >>> parts = [RecordParts(np.zeros((1, 2)), np.diag(h)[None], np.diag(h)[None, :, None])
+    ...          for h in ([1.0, 1.0], [0.01, 1.0])]
+    >>> told_once(parts, np.diag([1 / 1.01, 0.5]), np.diag([1 / 1.01, 0.5]))
+    1
+    """
+    size = np.maximum(np.diag(spread), np.finfo(float).tiny)
+    shares = [np.diag(solve @ part.information[0] @ spread) / size for part in parts]
+    return int(np.count_nonzero(np.max(shares, axis=0) > 1.0 / (1.0 + SEEN_ALIKE)))
 
 
 def _freedom(weights: Array) -> float:
