@@ -10,7 +10,7 @@ from few samples of a fine one.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -31,14 +31,15 @@ LEVEL = 0.003
 """Chance below which inputs foretell an error. Pasts are finite, so of right models in gusts that
 noisy sensors measure about three times as many are called wrong."""
 CALM = "verify on a record in calmer air, or with larger inputs: this one cannot tell"
+WRONG = "look for what this output lacks: an input's gain, lag or delay"
 NO_NOISE = 1e-8
 """Share of an error that its past leaves below which no noise made it, and so no gust."""
 RESOLVED = 1e-10
 """Share of an input's past that something else leaves of it below which it tells nothing more."""
 
 
-def foretold_chance(errors: Sequence[Array], inputs: Sequence[Array]) -> float | None:
-    """Chance that past inputs add as much to what the error's own past foretells.
+def foretold_chances(errors: Sequence[Array], inputs: Sequence[Array]) -> Array | None:
+    """Chance, by output, that past inputs add as much to what the errors' own past foretells.
 
     Parameters
     ----------
@@ -47,22 +48,24 @@ def foretold_chance(errors: Sequence[Array], inputs: Sequence[Array]) -> float |
 
     Returns
     -------
-    float or None
-        Over all outputs and grids (Bonferroni); None where records are too short to tell.
+    ndarray, shape (n_outputs,), or None
+        Over all grids (Bonferroni) and among the outputs (Holm): of right models, the least of
+        them is below a level with that chance at most. None where records are too short to tell.
 
     Reference
     ---------
-    Granger, *Econometrica* 37 (1969); Ljung, *System Identification*, 2nd ed., section 13.4.
+    Granger, *Econometrica* 37 (1969); Ljung, *System Identification*, 2nd ed., section 13.4; Holm,
+    A simple sequentially rejective multiple test procedure, *Scandinavian J. Statistics* 6 (1979).
 
     Example
     -------
     >>> rng = np.random.default_rng(0)
     >>> u, e = rng.standard_normal((2, 1, 600))
     >>> gust = scipy.signal.lfilter([1.0], [1.0, -0.98], e)
-    >>> foretold_chance([gust], [u]) > LEVEL
-    True
-    >>> foretold_chance([gust + scipy.signal.lfilter([0.0, 0.3], [1.0, -0.9], u)], [u]) < LEVEL
-    True
+    >>> wrong = gust + scipy.signal.lfilter([0.0, 0.3], [1.0, -0.9], u)
+    >>> other = scipy.signal.lfilter([1.0], [1.0, -0.9], rng.standard_normal((1, 600)))
+    >>> (foretold_chances([np.vstack([wrong, other])], [u]) < LEVEL).tolist()
+    [True, False]
     """
     changing = np.any([np.ptp(rows, axis=1) > 0.0 for rows in errors], axis=0)
     moved = np.any([np.ptp(rows, axis=1) > 0.0 for rows in inputs], axis=0)
@@ -74,11 +77,30 @@ def foretold_chance(errors: Sequence[Array], inputs: Sequence[Array]) -> float |
     chances = []
     step = 1
     while (past := _past(whole // step, channels)) >= SHORTEST_PAST:
-        found = _chance([(_coarser(e, step), _coarser(u, step)) for e, u in pairs], past)
+        found = _chances([(_coarser(e, step), _coarser(u, step)) for e, u in pairs], past)
         if found is not None:
             chances.append(found)
         step *= 2
-    return min(1.0, len(chances) * min(chances)) if chances else None
+    if not chances:
+        return None
+    every = np.ones(len(changing))
+    every[changing] = _holm(len(chances) * np.min(chances, axis=0))
+    return every
+
+
+def _holm(chances: Array) -> Array:
+    """Chances of several tests, each for as many as are no smaller.
+
+    Example
+    -------
+    >>> _holm(np.array([0.01, 0.5, 0.02])).tolist()
+    [0.03, 0.5, 0.04]
+    """
+    order = np.argsort(chances)
+    ranked = np.maximum.accumulate(np.arange(len(chances), 0, -1) * chances[order])
+    adjusted = np.empty_like(ranked)
+    adjusted[order] = ranked
+    return np.minimum(adjusted, 1.0)
 
 
 def unless_gusts(
@@ -86,9 +108,13 @@ def unless_gusts(
 ) -> tuple[Finding, ...]:
     """Verdicts on free runs, none red for an error that no input foretells.
 
+    Each output is judged by its own error, all together by whether any poor one is foretold. An
+    output within its guide whose error is foretold beside others' gusts is amber.
+
     Parameters
     ----------
     findings : sequence of Finding
+        Those of one output begin with its name.
     codes : sequence of str
         Of the findings that weigh the error.
     made : sequence of Prediction
@@ -99,19 +125,45 @@ def unless_gusts(
         return tuple(findings)
     errors = [np.array([each.residual(name) for name in each.outputs]) for each in made]
     inputs = [each.predicted.matrix(each.predicted.inputs) for each in made]
-    chance = foretold_chance(errors, inputs)
-    if chance is None or chance < LEVEL:
+    chances = foretold_chances(errors, inputs)
+    if chances is None:
         return tuple(findings)
+    by_output = dict(zip(made[0].outputs, map(float, chances), strict=True))
+    own = [_output_of(each, by_output) if each.code in codes else None for each in findings]
+    poor = [
+        by_output[name]
+        for name, each in zip(own, findings, strict=True)
+        if name is not None and each.light is not Light.GREEN
+    ]
+    together = min(poor, default=min(by_output.values()))
+    return tuple(
+        _weighed(each, together if name is None else by_output[name])
+        if each.code in codes
+        else each
+        for name, each in zip(own, findings, strict=True)
+    )
+
+
+def _output_of(finding: Finding, names: Iterable[str]) -> str | None:
+    """Which output a verdict is of; None for all together."""
+    return next((name for name in names if finding.message.startswith(f"{name}: ")), None)
+
+
+def _weighed(finding: Finding, chance: float) -> Finding:
+    """A verdict with the chance that inputs foretell as much of its error."""
+    foretold = chance < LEVEL
+    if foretold and finding.light is Light.GREEN:
+        said = (
+            f"; yet inputs foretell some of the error (p = {chance:.2g}): the model is wrong there"
+        )
+        return replace(finding, light=Light.AMBER, message=finding.message + said, action=WRONG)
+    if foretold or finding.light is not Light.RED:
+        return finding
     said = (
         f"; inputs foretell no more of the error than chance does (p = {chance:.2g}): it is "
         "as much as gusts alone make, and contradicts the model in nothing"
     )
-    return tuple(
-        replace(each, light=Light.AMBER, message=each.message + said, action=CALM)
-        if each.code in codes and each.light is Light.RED
-        else each
-        for each in findings
-    )
+    return replace(finding, light=Light.AMBER, message=finding.message + said, action=CALM)
 
 
 def _past(samples: int, channels: int) -> int:
@@ -124,8 +176,8 @@ def _coarser(rows: Array, step: int) -> Array:
     return np.asarray(rows[:, :kept].reshape(len(rows), -1, step).mean(axis=2))
 
 
-def _chance(pairs: Sequence[tuple[Array, Array]], past: int) -> float | None:
-    """Fisher's F of the inputs' past beside that of the errors, over all errors; None: too short.
+def _chances(pairs: Sequence[tuple[Array, Array]], past: int) -> Array | None:
+    """Fisher's F of the inputs' past beside that of the errors, by error; None: too short.
 
     Each record has a constant of its own. Errors without noise are no gusts': chance 0.
     """
@@ -144,12 +196,12 @@ def _chance(pairs: Sequence[tuple[Array, Array]], past: int) -> float | None:
     free = aims.shape[1] - basis.shape[1] - further.shape[1]
     if not further.shape[1] or free < further.shape[1]:
         return None
-    if np.any(np.sum(left**2, axis=1) < NO_NOISE * np.sum(aims**2, axis=1)):
-        return 0.0
     gain = np.sum((left @ further) ** 2, axis=1)
     rest = np.maximum(np.sum(left**2, axis=1) - gain, np.finfo(float).tiny)
     f = gain / further.shape[1] / (rest / free)
-    return float(min(1.0, len(aims) * np.min(scipy.special.fdtrc(further.shape[1], free, f))))
+    quiet = np.sum(left**2, axis=1) < NO_NOISE * np.sum(aims**2, axis=1)
+    found = np.asarray(scipy.special.fdtrc(further.shape[1], free, f))
+    return np.where(quiet, 0.0, found)
 
 
 def _rows(errors: Array, inputs: Array, past: int) -> tuple[Array, Array, Array]:
