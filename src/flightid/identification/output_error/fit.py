@@ -120,7 +120,7 @@ def conclude(
     setup = [*setup, *judge_feedback(known.names, known.covariance, known.bias)]
     noise = (
         []
-        if not judged() or (runs_of is not None and runs_of.is_segmented)
+        if not judged()
         else judge_process_noise(
             fitted,
             prepared.arrays,

@@ -45,6 +45,8 @@ ROUNDING = 1e-8
 """Residuals over outputs below which there is rounding alone."""
 LONGEST = 3000
 """Samples of a record that are looked at."""
+MOST_GROWTH = 6.0
+"""Growth exponent of a mode over the samples looked at, up to which a free run holds it."""
 SAMPLES_PER_NUMBER = 10
 STRONG = 10.0
 """Advantage that counts as very strong: Kass & Raftery (1995), J. American Statistical Ass. 90."""
@@ -192,7 +194,11 @@ def state_noise(
         return None
     white = [each / scale[:, None] for each in cut]
     placed = [observable(a, c / scale[:, None]) for a, c in systems]
-    if any(spectral_radius(a) > 1.0 + 1.0 / LONGEST for a, _ in placed):
+    lengths = [each.shape[1] for each in cut]
+    if any(
+        n * np.log(spectral_radius(a)) > MOST_GROWTH
+        for n, (a, _) in zip(lengths, placed, strict=True)
+    ):
         return None
     if is_white(white):
         return None
