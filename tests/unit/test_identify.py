@@ -131,6 +131,10 @@ def test_data_that_do_not_fit_the_model() -> None:
         fid.identify(MODEL, data_of(coherence=np.full(len(OMEGA), 0.3)), band_rad_s=(1.0, 9.0))
     with pytest.raises(DataError, match="too few points to fit"):
         fid.identify(MODEL, data_of(), band_rad_s=(100.0, 200.0))
+    # Pairs of neighbours between gaps: what `coherent_pairs` keeps is fitted.
+    broken = data_of(coherence=np.where(np.arange(len(OMEGA)) % 3 < 2, 0.9, 0.3))
+    assert fid.coherent_pairs(broken).names
+    assert_close(fid.identify(MODEL, broken).parameters["Lp"].value, -6.0, rtol=1e-8, why="exact")
     weak = fid.identify(
         MODEL,
         data_of(coherence=np.full(len(OMEGA), 0.3)),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -275,3 +276,15 @@ def test_the_next_step_of_a_model_with_two_inputs_can_be_taken(
     told = capsys.readouterr()
     assert "name one: --loops y/u" in told.out
     assert "report.html" in told.err
+
+
+@pytest.mark.parametrize(("rate", "told"), [(-0.2, "--loops w/col"), (0.2, "--loops OUTPUT/INPUT")])
+def test_no_loop_is_picked_around_a_vehicle_that_grows(rate: float, told: str) -> None:
+    """An unstable helicopter was sent to a PID of heave, which holds nothing of it."""
+    a, b = np.diag([-0.5, rate]), np.eye(2)
+    model = fid.LinearSystem(a, b, np.eye(2), np.zeros((2, 2)), ("col", "lon"), ("w", "u"))
+    fit = SimpleNamespace(
+        model=model, covariance=np.eye(1), responses=(), linear_system=lambda: model
+    )
+    study = SimpleNamespace(tuning=None, faults=(), inspection=None)
+    assert told in answer._next(study, "h.toml", [SimpleNamespace(fit=fit)])

@@ -14,7 +14,10 @@ from flightid.inspection.usable_band import NARROW
 from flightid.responses import FrequencyResponse
 from flightid.responses.bands import coherent_band, coherent_parts
 
-MORE = "fly a sweep or multisine over a decade around the crossover, or excite more"
+MORE = (
+    "fly a sweep or multisine over a decade around the crossover; where one was flown, larger "
+    "or in calmer air, or leave the response out"
+)
 """Last words of a check of the band: what was seen holds no dynamics."""
 MOST_PARTS = 3
 """Unbroken runs of frequencies that are named one by one."""

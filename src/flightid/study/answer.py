@@ -9,6 +9,7 @@ from statistics import median
 from typing import TYPE_CHECKING
 
 from flightid.conventions import Light
+from flightid.errors import FlightidError
 from flightid.evidence.evidence import GUIDELINES, PREDICTION
 from flightid.findings import Finding, counted, said_once, worst
 from flightid.frozen import dataclass
@@ -21,6 +22,7 @@ from flightid.study.gain_answer import flown_again, gain_table, gains_finding, m
 from flightid.table import Table
 
 if TYPE_CHECKING:
+    from flightid.identification.fit import Fit
     from flightid.study.identified import ModelResults
     from flightid.study.results import StudyResults
 
@@ -230,11 +232,26 @@ def _next(study: StudyResults, source: str, good: Sequence[ModelResults]) -> str
         return "gains of a PID need a linear model: record small steps about one operating point"
     if all(item.fit is None or item.fit.covariance is None for item in good):
         return "gains of a PID need a model whose errors are known: mend first what is named above"
-    models = [item.fit.model for item in good if item.fit is not None]
+    fits = [item.fit for item in good if item.fit is not None]
+    if any(len(fit.model.inputs) > 1 and _grows(fit) for fit in fits):
+        return (
+            "for gains of a PID name the loops that hold its growing modes, attitudes and rates by "
+            f"their own controls first: flightid tune {source} --controller pi_d "
+            "--loops OUTPUT/INPUT ..."
+        )
+    models = [fit.model for fit in fits]
     loop = ""
     if all(len(each.inputs) + len(each.outputs) > 2 for each in models):
         loop = f" --loops {_loop_of(good)}"
     return f"for gains of a PID: flightid tune {source} --controller pi_d{loop}"
+
+
+def _grows(fit: Fit) -> bool:
+    """Whether a model moves away by itself, so that a loop elsewhere holds nothing of it."""
+    try:
+        return not fit.linear_system().is_stable
+    except FlightidError:
+        return False
 
 
 def _loop_of(items: Sequence[ModelResults]) -> str:

@@ -12,7 +12,7 @@ from flightid.frozen import dataclass
 from flightid.identification.frequency_domain.options import Band, Bands
 from flightid.identification.shared_work import shared
 from flightid.responses import FrequencyResponse, PairResponse
-from flightid.responses.bands import nearest
+from flightid.responses.bands import coherent_band, nearest
 
 COST_POINTS = 20.0
 """The cost is scaled as if 20 frequencies were fitted, whatever their number."""
@@ -147,7 +147,11 @@ def _places(
 ) -> NDArray[np.intp]:
     grid = pair.omega_rad_s
     if band is None:
-        found = pair.usable_band(0.0 if minimum_coherence is None else minimum_coherence)
+        least = 0.0 if minimum_coherence is None else minimum_coherence
+        found = pair.usable_band(least)
+        if found is not None and np.sum((grid >= found[0]) & (grid <= found[1])) < MINIMUM_POINTS:
+            # A band of two points between gaps: all coherent ones, as `coherent_pairs` counts them.
+            found = coherent_band(grid, pair.coherence, least)[0]
         if found is None:
             raise DataError(
                 f"response {name} has no band to fit",
