@@ -133,6 +133,18 @@ def in_order(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     return tuple(sorted(known, key=lambda each: urgency(each, fallen)))
 
 
+def worst_last(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    """Findings from green to red, where eyes are on a terminal; equals in their order.
+
+    Example
+    -------
+    >>> told = [Finding("a", Light.RED, "no"), Finding("b", Light.GREEN, "yes")]
+    >>> [each.code for each in worst_last(told)]
+    ['b', 'a']
+    """
+    return in_order(tuple(findings)[::-1])[::-1]
+
+
 def unsaid(findings: Iterable[Said], others: Iterable[Said]) -> list[Said]:
     """Findings whose fact no other one states: not its code, nor its sentence up to the numbers.
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 from flightid.conventions import Light
-from flightid.findings import Finding, worst
+from flightid.findings import Finding, worst, worst_last
 from flightid.frozen import dataclass
 from flightid.inspection.axes import axes_of
 from flightid.inspection.carried import carried_axes, carried_sentence
@@ -145,19 +145,21 @@ class Inspection(Result, schema="flightid.inspection/1"):
         return Table(f"{self.name}: {self._words()}", columns, rows)
 
     def to_text(self) -> str:
-        """Verdict, sentences and all tables for a terminal."""
-        return "\n\n".join([self._said(), *(t.to_text() for t in self.tables()[1:])])
+        """All tables for a terminal, verdicts last, the worst of them and the answer at the end."""
+        return self._ended_by_verdict(self.tables()[1:])
 
     def on_screen(self) -> str:
         """The same with the rates of what a model would be made of alone, and no clock skews."""
-        tables = (self._axes(), self._excitations(), self._saturations(), self._used_rates())
-        return "\n\n".join([self._said(), *(t.to_text() for t in tables if t.rows)])
+        tables = (self._excitations(), self._saturations(), self._used_rates(), self._axes())
+        return self._ended_by_verdict(t for t in tables if t.rows)
 
-    def _said(self) -> str:
-        head = f"{self.name}: {self.firmware or self.kind}, {self.logged_words}"
-        opening = (*wrapped(head, WIDTH), *wrapped(carried_sentence(self), WIDTH))
-        said = "\n".join(opening)
-        return "\n".join([said, *self._next(), verdict_lines(self.findings)])
+    def _ended_by_verdict(self, tables: Iterable[Table]) -> str:
+        """What the log is, tables, verdicts, and what it can carry where eyes are."""
+        head = wrapped(f"{self.name}: {self.firmware or self.kind}, {self.logged_words}", WIDTH)
+        answer = (*wrapped(carried_sentence(self), WIDTH), *self._next())
+        judged = verdict_lines(worst_last(self.findings))
+        parts = ("\n".join(head), *(t.to_text() for t in tables), judged, "\n".join(answer))
+        return "\n\n".join(part for part in parts if part)
 
     def _next(self) -> Iterator[str]:
         """The command that goes on from a log that carries a model."""

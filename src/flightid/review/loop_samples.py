@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.frozen import dataclass
+from flightid.record import Record
 
 Array = NDArray[np.float64]
 Piece = tuple[Array, Array, Array | None]
@@ -74,6 +75,27 @@ class LoopSamples:
     def duration_s(self) -> float:
         """Seconds in all."""
         return self.sample_time_s * sum(self.lengths)
+
+
+def loop_samples(pieces: Sequence[Record], fastest_hz: float) -> LoopSamples:
+    """Pieces one behind the other, no faster than a step needs.
+
+    Parameters
+    ----------
+    pieces : sequence of Record
+        With channels ``"set_point"``, ``"measured"`` and maybe ``"attitude"``, at one rate.
+    fastest_hz : float
+    """
+    row_s, has = pieces[0].sample_time_s, pieces[0].channels
+    signals = (
+        (
+            np.asarray(piece["set_point"]),
+            np.asarray(piece["measured"]),
+            np.asarray(piece["attitude"]) if "attitude" in has else None,
+        )
+        for piece in pieces
+    )
+    return LoopSamples.of(signals, row_s, max(1, round(1.0 / (row_s * fastest_hz))))
 
 
 def _means(values: Array, rows: int) -> Array:

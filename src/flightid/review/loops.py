@@ -19,8 +19,14 @@ from flightid.logs import Log
 from flightid.record import Record
 from flightid.review.deconvolution import TOO_FEW, LoopDraws, closed_loop
 from flightid.review.loop_response import LoopResponse
-from flightid.review.loop_samples import LoopSamples
-from flightid.review.proportional import Excess, bounded_law, excess_of, is_proportional
+from flightid.review.loop_samples import LoopSamples, loop_samples
+from flightid.review.proportional import (
+    Excess,
+    bounded_law,
+    excess_of,
+    expected_errors,
+    is_proportional,
+)
 from flightid.review.step_features import (
     frequency_features,
     step_features,
@@ -60,8 +66,6 @@ TRACKING = "tracking error, rms"
 FINER = 4.0
 """Times the usual samples, of a log that has them, where a step rises within too few."""
 TOO_SLOW = "too slowly for a step"
-MOST_ANSWERED_RAD = 10.0
-"""Beyond it a loop of all of the flight runs away, and tells no errors."""
 EVEN = 0.7
 """Least share of rows that may be there, of those that the median interval promises."""
 CHANNELS = {
@@ -129,30 +133,9 @@ def _loop(log: Log, spans: tuple[Span, ...], axis: str, loop: str) -> LoopRespon
     excess = excess_of(law, axis, pieces)
     if excess is None:
         return _read(log, begun, pieces)
-    excess = excess_of(law, axis, pieces, _expected_errors(pieces)) or excess
+    excess = excess_of(law, axis, pieces, expected_errors(pieces, PACE["attitude"])) or excess
     small = _pieces(pair, without(spans, list(excess.spans)))
     return _in_proportion(log, begun, excess, pieces, small)
-
-
-def _expected_errors(pieces: list[Record]) -> list[Array] | None:
-    """Errors that the set-point alone makes of the loop as all of the flight tells it, row by row.
-
-    None where the flight does not tell it.
-    """
-    samples = _samples(pieces, FASTEST_ATTITUDE.value)
-    try:
-        answers = closed_loop(samples, pace_s=PACE["attitude"]).answers(samples)
-    except FlightidError:
-        return None
-    if not all(np.abs(each).max() < MOST_ANSWERED_RAD for each in answers):
-        return None
-    wanted = np.split(samples.set_point, np.cumsum(samples.lengths)[:-1])
-    rows = round(samples.sample_time_s / pieces[0].sample_time_s)
-    made = []
-    for piece, one, other in zip(pieces, wanted, answers, strict=True):
-        errors = np.repeat(one - other, rows)
-        made.append(np.pad(errors, (0, piece.n_samples - errors.size), mode="edge"))
-    return made
 
 
 def _in_proportion(
@@ -176,16 +159,26 @@ def _read(log: Log, begun: LoopResponse, pieces: list[Record]) -> LoopResponse:
     if rate_hz := loop_rate_hz(log):
         tick_s = 1.0 / rate_hz
     made = _stepped(known, pieces, fastest_hz, tick_s, logging(log))
-    if TOO_SLOW in made.reason and made.rate_hz < 0.7 * pieces[0].sample_rate_hz:
-        made = _stepped(known, pieces, FINER * fastest_hz, tick_s, logging(log))
+    unsure = not made.is_told and (made.moved or 0.0) > LIVELY[begun.loop].value
+    if not (unsure or TOO_SLOW in made.reason) or made.rate_hz > 0.7 * pieces[0].sample_rate_hz:
+        return made
+    finer = _stepped(known, pieces, FINER * fastest_hz, tick_s, logging(log))
+    if TOO_SLOW in made.reason or (finer.is_told and _is_quick(finer, made.rate_hz)):
+        return finer
     return made
+
+
+def _is_quick(loop: LoopResponse, rate_hz: float) -> bool:
+    """Whether a step rises within so few samples of another rate that they could not show it."""
+    rise = loop["rise time"].value
+    return rise is not None and rise < 2.0 * SAMPLES_IN_RISE.value / rate_hz
 
 
 def _stepped(
     begun: LoopResponse, pieces: list[Record], fastest_hz: float, tick_s: float, advised: str
 ) -> LoopResponse:
     """The step of samples no faster than that."""
-    samples = _samples(pieces, fastest_hz)
+    samples = loop_samples(pieces, fastest_hz)
     known = replace(
         begun,
         rate_hz=1.0 / samples.sample_time_s,
@@ -240,20 +233,6 @@ def _pieces(pair: _Pair, spans: tuple[Span, ...]) -> list[Record]:
         signals.append(pair.attitude)
     made = records(signals, {"set_point"}, spans)
     return [record for record in made if record.duration_s >= SHORTEST_PIECE_S]
-
-
-def _samples(pieces: list[Record], fastest_hz: float) -> LoopSamples:
-    """Pieces one behind the other, no faster than a step needs."""
-    row_s, has = pieces[0].sample_time_s, pieces[0].channels
-    signals = (
-        (
-            np.asarray(piece["set_point"]),
-            np.asarray(piece["measured"]),
-            np.asarray(piece["attitude"]) if "attitude" in has else None,
-        )
-        for piece in pieces
-    )
-    return LoopSamples.of(signals, row_s, max(1, round(1.0 / (row_s * fastest_hz))))
 
 
 def _spread(pieces: Sequence[Record]) -> float:

@@ -10,14 +10,18 @@ from numpy.typing import NDArray
 
 from flightid.control.autopilots.angle_law import AngleLaw, angle_law
 from flightid.control.autopilots.from_log import autopilot_of
-from flightid.errors import DataError
+from flightid.errors import DataError, FlightidError
 from flightid.frozen import dataclass
 from flightid.inspection.signals import Span
 from flightid.logs import Log
 from flightid.record import Record
-from flightid.review.thresholds import BEYOND
+from flightid.review.deconvolution import closed_loop
+from flightid.review.loop_samples import loop_samples
+from flightid.review.thresholds import BEYOND, FASTEST_ATTITUDE
 
 Array = NDArray[np.float64]
+MOST_ANSWERED_RAD = 10.0
+"""Beyond it a loop of all of the flight runs away, and tells no errors."""
 
 
 @dataclass(frozen=True)
@@ -117,6 +121,34 @@ def excess_of(
     if most_rad <= law.proportional_to_rad:
         return None
     return Excess(axis, tuple(spans), most_rad, law)
+
+
+def expected_errors(pieces: Sequence[Record], pace_s: float) -> list[Array] | None:
+    """Errors that the set-point alone makes of the loop as all of the flight tells it, row by row.
+
+    None where the flight does not tell it.
+
+    Parameters
+    ----------
+    pieces : sequence of Record
+        See `excess_of`.
+    pace_s : float
+        See `closed_loop`.
+    """
+    samples = loop_samples(pieces, FASTEST_ATTITUDE.value)
+    try:
+        answers = closed_loop(samples, pace_s=pace_s).answers(samples)
+    except FlightidError:
+        return None
+    if not all(np.abs(each).max() < MOST_ANSWERED_RAD for each in answers):
+        return None
+    wanted = np.split(samples.set_point, np.cumsum(samples.lengths)[:-1])
+    rows = round(samples.sample_time_s / pieces[0].sample_time_s)
+    made = []
+    for piece, one, other in zip(pieces, wanted, answers, strict=True):
+        errors = np.repeat(one - other, rows)
+        made.append(np.pad(errors, (0, piece.n_samples - errors.size), mode="edge"))
+    return made
 
 
 def is_proportional(law: AngleLaw, pieces: Sequence[Record]) -> bool:

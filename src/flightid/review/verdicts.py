@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from flightid.conventions import Light
-from flightid.findings import Finding, in_order
+from flightid.findings import Finding, worst_last
 from flightid.inspection.advice import LOGGING
 from flightid.review.filter_findings import filter_findings
 from flightid.review.loop_response import LoopResponse
@@ -31,7 +31,7 @@ SHAKEN = "balance propellers, damp the autopilot's mount, look for loose parts"
 def judge_flight(review: FlightReview) -> tuple[Finding, ...]:
     """All verdicts, the worst and then a fall last, where eyes are on a terminal."""
     # Of equals the first stays ahead of the others: it leads to them.
-    return in_order(tuple(_all(review))[::-1])[::-1]
+    return worst_last(_all(review))
 
 
 def _all(review: FlightReview) -> Iterator[Finding]:
