@@ -13,6 +13,7 @@ from flightid.control.autopilots import AxisLoop, GainChange
 from flightid.control.autopilots.output_noise import GyroSpectrum, output_noise
 from flightid.control.tuning.filter_choice import choose_filters
 from flightid.control.tuning.result import RefusedAxis
+from flightid.control.tuning.tuned_filters import TunedFilters
 from flightid.errors import DataError
 from tests.closeness import assert_close
 
@@ -201,6 +202,12 @@ def test_tuning_with_a_choice_judges_its_filters_and_leaves_the_flown_margins_al
     assert_close(told.noise_flown, flown_noise, rtol=1e-9, why="as flown")
     exact = output_noise(design.loop, spectrum, flown=loops["roll"]).total
     assert_close(told.noise_tuned, exact, rtol=1e-9, why="filters and gains")
+    # Yaw's gains had quadrupled beside "filters as flown", and nothing said why.
+    grown = replace(told, axis="yaw", noise_flown=1e-4, noise_tuned=1.2e-3)
+    (_, why) = TunedFilters(axes=(grown, replace(grown, axis="roll", noise_tuned=1.5e-4))).words
+    assert "bounds the gains, not 2 times that of the flown ones: they go further" in why
+    assert "yaw 0.0001 as flown, 0.0012" in why
+    assert "roll" not in why
     first, back, *_ = with_choice.write(tmp_path / "gains.param")
     names = {"INS_GYRO_FILTER", "ATC_RAT_RLL_FLTD"}
     written, before = fid.read_parameters(first), fid.read_parameters(back)

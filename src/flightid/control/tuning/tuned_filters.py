@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import field, replace
 
@@ -17,6 +18,7 @@ from flightid.control.tuning.filter_choice import (
     phase_deg,
 )
 from flightid.control.tuning.pid_design import PidDesign
+from flightid.control.tuning.requirements import TuningRequirements
 from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.frozen import dataclass
@@ -79,14 +81,32 @@ class TunedFilters:
     def words(self) -> tuple[str, ...]:
         """What the filters do to each axis, one sentence each; why there are none."""
         if self.reason or not self.changes:
-            return (f"Filters as flown: {self.reason or 'no other is worth a change'}.",)
-        return tuple(
+            said = f"Filters as flown: {self.reason or 'no other is worth a change'}."
+            return (said, *self._freed())
+        told = (
             f"Filters, {each.axis}: {abs(each.phase_gained_deg):.2g} deg "
             f"{'saved' if each.phase_gained_deg >= 0.0 else 'lost'} at the crossover, output noise "
             f"{each.noise_flown:.2g} as flown, {each.noise_new:.2g} with the filters"
             + ("" if each.noise_tuned is None else f", {each.noise_tuned:.2g} with the gains too")
             for each in self.axes
         )
+        return (*told, *self._freed())
+
+    def _freed(self) -> Iterator[str]:
+        """That measured noise lets gains go further than a bound on its growth would."""
+        usual = TuningRequirements().noise_growth or math.inf
+        freed = [
+            f"{each.axis} {each.noise_flown:.2g} as flown, {each.noise_tuned:.2g} with the new "
+            f"gains ({each.noise_limit:.2g} is fine)"
+            for each in self.axes
+            if each.noise_tuned is not None and each.noise_tuned > usual * each.noise_flown
+        ]
+        if freed:
+            yield (
+                "Where filters are asked for, the noise that was measured bounds the gains, not "
+                f"{usual:g} times that of the flown ones: they go further. Output noise: "
+                f"{', '.join(freed)}."
+            )
 
     def unjudged(self, left: Iterable[str]) -> dict[str, float]:
         """Phase that axes which stay as flown would lose to filters that all axes share, deg."""
