@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -13,6 +14,13 @@ from flightid.fleet.statistics.days import shared_by_day
 from flightid.fleet.statistics.drift import FleetDrift, find_drift
 from flightid.fleet.statistics.events import FleetEvent
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
+from flightid.fleet.statistics.memory_evidence import (
+    CHANGING,
+    SPREADS,
+    DayGroup,
+    change_shapes,
+    evidence,
+)
 from flightid.fleet.statistics.odd_flights import without_odd_flights
 from flightid.fleet.statistics.population import estimate_population
 from flightid.fleet.statistics.repeats import days_of
@@ -368,6 +376,44 @@ def test_what_goes_on_in_one_parameter_or_on_few_days_may_go_on() -> None:
     assert not few.alarms
     assert few.going_on
     assert "Lp: flights may go on as their neighbours did" in " ".join(few.summary().notes)
+
+
+def test_what_small_fleets_do_not_tell_from_days_that_go_on_is_amber() -> None:
+    """Three vehicles of 16 days by 0.8 at 4 %, without a change: red in each of these fleets."""
+    found = [_drift(seed, 3, 16, days=0.04, memory=0.8) for seed in (4, 5)]
+    assert not any(each.alarms or each.persistent for each in found)
+    doubted = [one for each in found for one in each.going_on]
+    assert all(0 < each.more_days < 60 for each in doubted)
+    said = going_on_words(doubted[0], {})
+    assert re.search(r"which so few do not tell: flights of each vehicle on some \d+ more", said)
+    # What stands far above both is red.
+    for vehicles, n in ((3, 16), (6, 12)):
+        assert 0 in _alarmed(_drift(1, vehicles, n, change=0.2, changed=1, last=6))
+
+
+def test_days_speak_for_a_memory_as_all_changes_averaged_do() -> None:
+    """Against densities of every change by itself, levels left free, of one vehicle."""
+    rng, share, correlation = np.random.default_rng(5), 0.6, 0.8
+    values, variances = 3.0 + rng.normal(size=(1, 9)), rng.uniform(0.5, 2.0, (1, 9))
+    group = DayGroup(values, variances, np.ones((1, 9, 1)))
+    log, factor = evidence([group], share, correlation)
+    lag = np.abs(np.subtract.outer(np.arange(9), np.arange(9)))
+    memory = (1.0 - share) * np.diag(variances[0]) + share * correlation**lag
+
+    def density(added: np.ndarray) -> float:
+        covariance, one = factor * memory + added, np.ones(9)
+        inverse = np.linalg.inv(covariance)
+        known = one @ inverse @ one
+        left = values[0] - one * (one @ inverse @ values[0]) / known
+        log_size = np.linalg.slogdet(covariance)[1] + np.log(known)
+        return float(np.exp(-0.5 * (log_size + left @ inverse @ left)))
+
+    alone, changed = density(np.zeros((9, 9))), 0.0
+    for spread in SPREADS:
+        for kind in change_shapes(9):
+            changed += sum(density(spread**2 * np.outer(s, s)) for s in kind.T) / kind.shape[1] / 6
+    expected = np.mean((1.0 - CHANGING) * alone + CHANGING * changed)
+    assert log == pytest.approx(np.log(expected), abs=1e-9)
 
 
 @pytest.mark.slow

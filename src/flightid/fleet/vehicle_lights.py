@@ -10,6 +10,7 @@ from flightid.findings import Finding
 from flightid.fleet.normality import newest_red_words, quiet_light
 from flightid.fleet.statistics.answers import TypeAnswers
 from flightid.fleet.statistics.change_kind import DRIFT, STEP
+from flightid.fleet.statistics.event_shares import EventShares, event_shares
 from flightid.fleet.statistics.events import EventEffect
 from flightid.fleet.statistics.parameter_history import ParameterHistory
 from flightid.uncertainty.estimate import Reading
@@ -18,11 +19,11 @@ from flightid.uncertainty.quantiles import shown
 
 def vehicle_light(vehicle: str, types: Sequence[TypeAnswers]) -> Finding:
     """Light of one vehicle: changed is red; its newest flight off, or unlike its type, amber."""
-    said, done, light = [], [], Light.GREEN
+    said: list[str] = []
+    done: list[str] = []
+    light = Light.GREEN
     for each in types:
-        for history, effect in each.drift.by_event if each.drift is not None else ():
-            if history.vehicle == vehicle:
-                done.append(event_words(history, effect, each.labels))
+        done += _events_words(vehicle, each)
         alike = each.drift.alike if each.drift is not None else ()
         for history in each.drift.alarms if each.drift is not None else ():
             if history.vehicle == vehicle:
@@ -44,6 +45,19 @@ def vehicle_light(vehicle: str, types: Sequence[TypeAnswers]) -> Finding:
     said += done
     act = "look at what was done to it, and verify its model on a new flight"
     return Finding("vehicle", light, f"{vehicle}: {'; '.join(said)}", act)
+
+
+def _events_words(vehicle: str, each: TypeAnswers) -> Iterator[str]:
+    """What events did to it, and what of that those of all did and its own, where others tell."""
+    if each.drift is None:
+        return
+    told = [effect for history, effect in each.drift.by_event if history.vehicle == vehicle]
+    for history in (one for one in each.drift.histories if one.vehicle == vehicle):
+        for effect in history.events:
+            shares = event_shares(history, effect, each.drift.histories)
+            if any(effect is one for one in told) or (shares is not None and shares.is_sure):
+                words = event_words(history, effect, each.labels)
+                yield words if shares is None else f"{words}: {shares_words(shares)}"
 
 
 def _doubts(vehicle: str, each: TypeAnswers) -> Iterator[str]:
@@ -85,10 +99,12 @@ def change_words(history: ParameterHistory, labels: Mapping[str, str]) -> str:
 def going_on_words(history: ParameterHistory, labels: Mapping[str, str]) -> str:
     """What may have changed, or may have gone on, and what would tell."""
     name, size = labels.get(history.name, history.name), _size_words(history.change_percent)
-    return (
-        f"{name} changed{size}, or its flights go on as their neighbours did, as those of all "
-        "vehicles do: flights on more days tell"
-    )
+    did = "may have changed" if _holds_zero(history.change_percent) else "changed"
+    said = f"{name} {did}{size}, or its flights go on as their neighbours did"
+    if not history.more_days:
+        return f"{said}, as those of all vehicles do: flights on more days tell"
+    days = f"{history.more_days} more days" if history.more_days > 1 else "one more day"
+    return f"{said}, which so few do not tell: flights of each vehicle on some {days} would"
 
 
 def event_words(history: ParameterHistory, effect: EventEffect, labels: Mapping[str, str]) -> str:
@@ -104,15 +120,23 @@ def event_words(history: ParameterHistory, effect: EventEffect, labels: Mapping[
     return f"{said} together" if effect.between else f"{said}, which no flight tells apart"
 
 
+def shares_words(shares: EventShares) -> str:
+    """What events of all did of one change, and what that leaves to those of the vehicle."""
+    return (
+        f"{shares.common} did{_size_words(shares.by_common, '')} on {shares.vehicles} others, "
+        f"which leaves{_size_words(shares.by_own, '')} to {shares.own}"
+    )
+
+
 def _holds_zero(change: Reading) -> bool:
     """Whether the interval that is shown holds no change at all."""
     ends = change.interval(shown())
     return ends is not None and ends[0] <= 0.0 <= ends[1]
 
 
-def _size_words(change: Reading) -> str:
+def _size_words(change: Reading, by: str = " by") -> str:
     unit = "" if change.unit == "1" else f" {change.unit}"
-    size = "" if change.value is None else f" by {change.value:+.2g}{unit}"
+    size = "" if change.value is None else f"{by} {change.value:+.2g}{unit}"
     return size + _ends_words(change)
 
 

@@ -14,6 +14,7 @@ from flightid.fleet.statistics.covariates import (
     fit_covariates,
     own_slopes,
 )
+from flightid.fleet.statistics.day_series import day_series
 from flightid.fleet.statistics.days import SharedByDay, covariance_by_day
 from flightid.fleet.statistics.events import (
     FleetEvent,
@@ -26,20 +27,19 @@ from flightid.fleet.statistics.largest_step import (
     FEWEST,
     NEWEST,
     SHORTEST,
+    StepScan,
+    scan_drifts,
     scan_steps,
     step_places,
 )
 from flightid.fleet.statistics.local_level import follow_level
+from flightid.fleet.statistics.multiple_testing import FALSE_SHARE, corrected
 from flightid.fleet.statistics.neighbours import histories_in_time
 from flightid.fleet.statistics.parameter_history import AskedHistory, ParameterHistory, StepEnds
 from flightid.fleet.statistics.persistence import (
-    DaySeries,
+    INDEPENDENT,
+    NEGLIGIBLE,
     Persistence,
-    changed_vehicles,
-    changes,
-    day_series,
-    explained,
-    is_shared,
     persistence,
     persisting,
 )
@@ -47,8 +47,9 @@ from flightid.fleet.statistics.wandering import wandering_chance
 from flightid.uncertainty.estimate import Estimate, Reading
 
 Array = NDArray[np.float64]
-MARGIN = 3.0
-"""Log likelihood by which days that go on explain more than changes, from which they count."""
+SUSPECTED = 0.05
+"""Chance of independent days where those of another parameter of the same fits go on: air, battery
+and payload move all."""
 ROUNDS = 4
 """In which changes are sought beside errors that go on; each leaves fewer of them."""
 TOO_FEW = f"fewer than {FEWEST} flights"
@@ -98,13 +99,32 @@ def asked_histories(
             _asked_history(data, i, rows, design, fitted, errors, by_day, own, moved)
             for rows, own in zip(histories, happened, strict=True)
         ]
-        now = changed_vehicles(asked) if design.names else changed
+        now = _changed_vehicles(asked) if design.names else changed
         if now == changed:
             break
         changed = now
-        shapes = {e.history.vehicle: changes(e) for e in asked if e.history.vehicle in now}
+        shapes = {e.history.vehicle: _changes(e) for e in asked if e.history.vehicle in now}
         beside = {v: np.column_stack([x, *shapes.get(v, ())]) for v, x in known.items()}
     return fitted, asked
+
+
+def _changed_vehicles(asked: Sequence[AskedHistory]) -> frozenset[str]:
+    """Vehicles whose history of one parameter would be an alarm by itself among those asked."""
+    judged = [each.history for each in asked if each.history.chance is not None]
+    shares = corrected([each.chance or 0.0 for each in judged])
+    told = zip(judged, shares, strict=True)
+    return frozenset(each.vehicle for each, share in told if share <= FALSE_SHARE)
+
+
+def _changes(asked: AskedHistory) -> list[Array]:
+    """The step and the steady movement that explain most of a history."""
+    n, time_s = len(asked.values), asked.history.time_s
+    place = scan_steps(asked.values, asked.covariance, asked.known).place
+    found = [(np.arange(n) > place).astype(np.float64)[:, None]]
+    if time_s[0] < time_s[-3]:
+        start = scan_drifts(asked.values, asked.covariance, time_s).place
+        found.append(np.maximum(time_s - time_s[start], 0.0)[:, None] / (time_s[-1] - time_s[0]))
+    return found
 
 
 def _asked_history(
@@ -161,85 +181,98 @@ def persisting_together(
     if not any(found is not None and found.is_sure for found, _ in apart):
         return apart
     return [
-        beside_persistence(each, suspected=True) if found[0] is None else found
+        found if found[0] is not None else beside_persistence(each, independent=SUSPECTED)
         for each, found in zip(asked, apart, strict=True)
     ]
 
 
 def beside_persistence(
-    asked: Sequence[AskedHistory], *, suspected: bool = False
+    asked: Sequence[AskedHistory], *, independent: float = INDEPENDENT
 ) -> tuple[Persistence | None, list[AskedHistory]]:
-    """Histories of one parameter, by errors that go on where days do.
+    """Histories of one parameter, judged as days may go on: each way as likely as it is.
 
-    Days go on where they do beside all changes that independent days would show; or where they
-    explain these changes better than as many vehicles that happened to change. In a large fleet
-    they go on in vehicles without a change as well, or nowhere.
+    Chances are those of independent days and of days that go on, averaged; errors are, too.
 
     Parameters
     ----------
     asked : sequence of AskedHistory
         By independent days.
-    suspected : bool
-        Whether days of another parameter of the same fits go on: air, battery and payload move all.
-        Then these count as going on as far as they may.
+    independent : float
+        Chance that they are, before any is seen.
 
     Returns
     -------
     persistence : Persistence or None
-        None where days are independent.
+        None where days are not told to go on.
     histories : list of AskedHistory
     """
-    changed = changed_vehicles(asked)
-    series = day_series(asked, changed)
-    found = persistence(series, changed)
-    is_told = found is not None and (found.is_told or suspected)
-    if found is None or not (found.is_told or changed):
+    found = persistence(day_series(asked), independent=independent)
+    if found is None or found.chance < NEGLIGIBLE:
         return None, list(asked)
-    rivals = [_settled(series, changed, frozenset())]
-    if is_told:
-        rivals.append(_settled(series, changed, changed))
-    elif rivals[0].fitness < found.apart + MARGIN:
-        return None, list(asked)
-    best = max(rivals, key=lambda each: each.fitness)
-    if not is_shared(series, changed, best):
-        own = persistence([each for each in series if each.vehicle not in changed], frozenset())
-        if own is None or not own.is_told:
-            return None, list(asked)
-        best = own
-    if best.share == 0.0:
-        return None, list(asked)
-    if is_told:  # As sure as those are that did not change: a step looks like days that go on.
-        best = replace(best, likelier=found.likelier)
-    return best, [_persisting(each, best) for each in asked]
-
-
-def _settled(
-    series: Sequence[DaySeries], most: frozenset[str], changed: frozenset[str]
-) -> Persistence:
-    """Days that go on beside just those changes, of `most`, that explain more than they cost."""
-    for _ in range(ROUNDS):
-        now = explained(series, most, _known(persistence(series, changed, caution=0.0)))
-        if now == changed:
-            break
-        changed = now
-    return _known(persistence(series, changed))
-
-
-def _known(found: Persistence | None) -> Persistence:
-    """What days tell, where some do."""
-    assert found is not None
-    return found
+    return found if found.is_told else None, [_persisting(each, found) for each in asked]
 
 
 def _persisting(asked: AskedHistory, found: Persistence) -> AskedHistory:
-    """The same judged by errors that go on from day to day."""
-    wider = replace(asked, errors=persisting(asked, found))
-    return _tested(
-        replace(wider, history=replace(asked.history, apart_chance=asked.history.chance))
+    """The same judged by errors that may go on from day to day."""
+    history, apart = asked.history, 1.0 - found.chance
+    step, walk = history.step_chance, history.walk_chance
+    if history.chance is None or step is None or walk is None:
+        return asked
+    going_on = [(each.chance, persisting(asked, each)) for each in found.parts]
+    rivals = ((apart, asked.errors), *going_on)
+    mixed = replace(
+        asked,
+        errors=np.sum([weight * errors for weight, errors in rivals], axis=0),
+        rivals=rivals,
+    )
+    # Where independent days alone leave enough chance the others add nothing that would be seen.
+    if apart * history.chance <= FALSE_SHARE:
+        beside = [(weight, replace(asked, errors=errors)) for weight, errors in going_on]
+        step = apart * step + sum(weight * _step_chance(each) for weight, each in beside)
+        walk = apart * walk + sum(weight * _walk_chance(each) for weight, each in beside)
+    sized = _sized(mixed)
+    more = 0 if found.is_told else found.more_days
+    return replace(
+        sized,
+        history=replace(
+            sized.history,
+            step_chance=step,
+            walk_chance=walk,
+            apart_chance=history.chance,
+            more_days=more,
+        ),
     )
 
 
+def _scanned(asked: AskedHistory) -> StepScan:
+    """Steps with two flights behind them at the least."""
+    scan = scan_steps(asked.values, asked.covariance, asked.known, newest=NEWEST)
+    return replace(scan, freedom=asked.freedom)
+
+
+def _step_chance(asked: AskedHistory) -> float:
+    """Of the largest step with three flights behind it."""
+    return _scanned(asked).up_to(len(asked.values) - SHORTEST - 1).chance
+
+
+def _walk_chance(asked: AskedHistory) -> float:
+    chance = wandering_chance(asked.values, asked.covariance, asked.history.time_s)
+    return beside_spread(chance, asked.freedom)
+
+
 def _tested(asked: AskedHistory) -> AskedHistory:
+    """With its chances, where it is long enough, and sizes."""
+    sized = _sized(asked)
+    if sized.history.changed_s is None:
+        return sized
+    history = replace(
+        sized.history, step_chance=_step_chance(asked), walk_chance=_walk_chance(asked)
+    )
+    return replace(sized, history=history)
+
+
+def _sized(asked: AskedHistory) -> AskedHistory:
+    """With the effects of its events, and the largest step beside them."""
     history = asked.history
     effects = event_effects(
         *(asked.events, history.name, history.unit, asked.measured, asked.errors),
@@ -249,23 +282,16 @@ def _tested(asked: AskedHistory) -> AskedHistory:
     if not len(step_places(len(asked.values), asked.known)):
         return replace(asked, history=history)
     # A step is looked for with three flights behind it; where one is, it may be of the last two.
-    values, covariance = asked.values, asked.covariance
-    scan = scan_steps(values, covariance, asked.known, newest=NEWEST)
-    scan = replace(scan, freedom=asked.freedom)
-    old = scan.up_to(len(values) - SHORTEST - 1)
+    scan = _scanned(asked)
     first, last = scan.place_ends()
     base = scan.level
     change: Reading = Estimate(history.name, None, "%", reason="the level before it may be zero")
     if np.all(np.abs(scan.before) > 3.0 * np.sqrt(scan.before_variances)):
         percent = 100.0 * scan.size / abs(base)
         change = Estimate(history.name, percent, "%", ends=StepEnds(scan))
-    tested = replace(
+    sized = replace(
         history,
-        step_chance=old.chance,
-        walk_chance=beside_spread(
-            wandering_chance(values, covariance, history.time_s), asked.freedom
-        ),
         change_percent=change,
         changed_s=(float(history.time_s[first]), float(history.time_s[last + 1])),
     )
-    return replace(asked, history=tested)
+    return replace(asked, history=sized)

@@ -55,6 +55,18 @@ class FleetEvent:
         return not self.vehicles or vehicle in self.vehicles
 
 
+def event_names(events: Sequence[FleetEvent]) -> str:
+    """What was done, each once, in quotation marks.
+
+    Example
+    -------
+    >>> event_names([FleetEvent(what, 0.0) for what in ("motor", "board", "motor")])
+    '“motor” and “board”'
+    """
+    *first, last = (f"“{each}”" for each in dict.fromkeys(one.what for one in events))
+    return f"{', '.join(first)} and {last}" if first else last
+
+
 @dataclass(frozen=True)
 class EventEffect:
     """What one event, or several together, did to one parameter of one vehicle.
@@ -88,8 +100,7 @@ class EventEffect:
     @property
     def what(self) -> str:
         """The same as words of a sentence, each in quotation marks."""
-        *first, last = (f"“{each}”" for each in self.names)
-        return f"{', '.join(first)} and {last}" if first else last
+        return event_names(self.events)
 
     @property
     def together(self) -> str:

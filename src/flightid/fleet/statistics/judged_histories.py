@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from flightid.fleet.statistics.change_kind import DRIFT, STEP, change_kind
 from flightid.fleet.statistics.largest_step import (
     SHORTEST,
+    StepScan,
     scan_changes,
     scan_drifts,
     scan_steps,
@@ -26,6 +27,9 @@ from flightid.fleet.statistics.parameter_history import (
 from flightid.uncertainty.estimate import Estimate, Reading
 
 Array = NDArray[np.float64]
+SPOKEN = 10.0
+"""By which a step makes a memory likelier that explains it: as likely as flights without one leave
+it, of 40 steps of the least size 21 were found in six vehicles of 12 flights, so 28."""
 
 
 def judged_histories(asked: Sequence[AskedHistory]) -> tuple[ParameterHistory, ...]:
@@ -61,14 +65,24 @@ def _least_step(of: AskedHistory, alarms: int, every: int) -> Reading | None:
     history = of.history
     if history.chance is None:
         return None
-    scan = replace(scan_steps(of.values, of.covariance, of.known), freedom=of.freedom)
     # Benjamini and Hochberg's for the next one, or for this one among those that are.
     rank = max(alarms + (history.chance > FALSE_SHARE * alarms / every), 1)
-    size = least_step(scan, FALSE_SHARE * rank / (every * TESTS))
+    chance = FALSE_SHARE * rank / (every * TESTS)
+    size = max(
+        least_step(_of_errors(of, errors), min(chance / min(1.0, SPOKEN * weight), 0.5))
+        for weight, errors in of.rivals or ((1.0, of.errors),)
+        if SPOKEN * weight > chance
+    )
     if history.change_percent.value is None:
         return Estimate(history.name, size, history.unit)
     level = np.average(of.values, weights=1.0 / history.variances)
     return Estimate(history.name, 100.0 * size / abs(float(level)), "%")
+
+
+def _of_errors(of: AskedHistory, errors: Array) -> StepScan:
+    """Steps of a history by other errors of its flights."""
+    one = replace(of, errors=errors)
+    return replace(scan_steps(one.values, one.covariance, one.known), freedom=one.freedom)
 
 
 def _shares(chances: Sequence[float | None]) -> list[float | None]:

@@ -7,7 +7,7 @@ integrals: no simulation, and exact in the tail where thousands of series are co
 
 from __future__ import annotations
 
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,8 @@ NODES = 24
 """Least number of nodes of each integral."""
 NODES_A_STEP = 5.0
 """Nodes over the width that the chain moves by in one step."""
+NODES_APART = 8
+"""Numbers of nodes that are kept lie as far apart: they take as long to find as the integrals."""
 MOST_NODES = 400
 FAR = 8.0
 """Standard errors from which chances, some 1e-13, are bounded instead of computed."""
@@ -346,7 +348,7 @@ def largest_step_chance(statistic: float, correlations: Array) -> float:
     moves = np.sqrt(np.maximum(1.0 - correlations**2, 1e-12))
     least = float(moves.min(initial=1.0))
     count = int(min(max(NODES, NODES_A_STEP * limit / least), MOST_NODES))
-    nodes, weights = np.polynomial.legendre.leggauss(count)
+    nodes, weights = _nodes(count + -count % NODES_APART)
     nodes, weights = 0.5 * limit * (nodes + 1.0), 0.5 * limit * weights
     # Of the absolute value: what goes to −x comes from x as what goes to x comes from −x.
     density = 2.0 * _normal(nodes)
@@ -361,6 +363,12 @@ def largest_step_chance(statistic: float, correlations: Array) -> float:
         kernel += _normal((nodes[:, None] + shifted) / move)
         density = kernel @ mass / move
     return float(min(outside, 1.0))
+
+
+@cache
+def _nodes(count: int) -> tuple[Array, Array]:
+    """Of an integral from -1 to 1, and their weights (Gauss and Legendre)."""
+    return np.polynomial.legendre.leggauss(count)
 
 
 def _normal(x: Array) -> Array:

@@ -117,8 +117,7 @@ def _covariance(variances: Array, time_s: Array, memory: Persistence | None) -> 
     day = days_of(time_s)
     lag = np.abs(np.subtract.outer(day, day))
     apart = (lag > 0) | np.eye(len(day), dtype=bool)
-    going_on = np.where(apart, memory.share * memory.typical * memory.correlation**lag, 0.0)
-    around = memory.factor * ((1.0 - memory.share) * np.diag(variances) + going_on)
+    around = np.where(apart, memory.of_days(np.diag(variances), lag), 0.0)
     return np.asarray(around + np.diag(np.maximum(variances - np.diag(around), 0.0)))
 
 

@@ -66,7 +66,10 @@ class ParameterHistory:
         The step of which four of five would be an alarm, at any place: percent of the level, or in
         the parameter's unit where that may be zero. None with too few flights.
     apart_chance, apart_share : float or None
-        As `chance` and `false_share` were days independent, where they go on (`persistence`).
+        As `chance` and `false_share` were days independent, where they may go on (`persistence`).
+    more_days : int
+        Days of each vehicle after which independent ones would be told from those that go on; 0
+        where they are told.
     """
 
     vehicle: str
@@ -86,6 +89,7 @@ class ParameterHistory:
     least_step: Reading | None = None
     apart_chance: float | None = None
     apart_share: float | None = None
+    more_days: int = 0
 
     @property
     def chance(self) -> float | None:
@@ -130,6 +134,8 @@ class AskedHistory:
         Variances that flights of one day share, a part of those of the history.
     freedom : float
         Of these variances, where days told them; infinite else.
+    rivals : tuple of (float, ndarray)
+        How likely days are independent, and go on, and `errors` then; empty where one is sure.
     """
 
     history: ParameterHistory
@@ -139,6 +145,7 @@ class AskedHistory:
     shared: Array
     by_day: Array
     freedom: float = np.inf
+    rivals: tuple[tuple[float, Array], ...] = ()
 
     @cached_property
     def known(self) -> Array:

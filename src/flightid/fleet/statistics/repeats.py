@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc, chdtri
@@ -81,11 +83,17 @@ def days_of(time_s: NDArray[np.float64]) -> NDArray[np.int64]:
     """
     order = np.argsort(time_s, kind="stable")
     sorted_s, day = time_s[order], np.zeros(len(time_s), dtype=np.int64)
-    begin, number = 0, 0
-    while begin < len(sorted_s):
-        end = int(np.searchsorted(sorted_s, sorted_s[begin] + DAY_S, side="right"))
-        day[order[begin:end]] = number
-        begin, number = end, number + 1
+    # A gap longer than a day's flights lie apart parts two days for sure.
+    gaps = (np.flatnonzero(np.diff(sorted_s) > DAY_S) + 1).tolist()
+    number = 0
+    for start, end in pairwise((0, *gaps, len(sorted_s))):
+        begin = start
+        while begin < end:
+            last = end
+            if sorted_s[end - 1] - sorted_s[begin] > DAY_S:
+                last = int(np.searchsorted(sorted_s, sorted_s[begin] + DAY_S, side="right"))
+            day[order[begin:last]] = number
+            begin, number = last, number + 1
     return day
 
 
