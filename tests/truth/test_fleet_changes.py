@@ -24,7 +24,6 @@ from flightid.fleet.statistics.events import (
 )
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
 from flightid.fleet.statistics.largest_step import (
-    largest_step_chance,
     largest_step_limit,
     scan_steps,
 )
@@ -33,6 +32,7 @@ from flightid.fleet.statistics.local_level import follow_level
 from flightid.fleet.statistics.multiple_testing import corrected
 from flightid.fleet.statistics.parameter_history import ParameterHistory
 from flightid.fleet.statistics.repeats import repeat_scatter
+from flightid.fleet.statistics.step_chances import largest_step_chance
 from flightid.fleet.statistics.wandering import squares_chance, wandering_chance
 from flightid.fleet.vehicle_lights import event_words, shares_words
 from flightid.uncertainty.estimate import Estimate

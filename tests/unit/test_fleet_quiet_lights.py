@@ -63,7 +63,7 @@ def test_one_that_did_not_change_beside_all_others_is_said_to_be_that() -> None:
     assert "most vehicles changed together by +1" in light.message
     assert "(5 of 6 vehicles; f may be one that did not)" in light.message
     found = vehicle_light("f", answered)
-    assert found.light is Light.RED
+    assert found.light is Light.AMBER
     assert "beside what the others did: it may be one that did not change" in found.message
     assert "a: no change beside what the others did (80 %" in vehicle_light("a", answered).message
 

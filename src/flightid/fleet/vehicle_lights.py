@@ -29,8 +29,10 @@ def vehicle_light(vehicle: str, types: Sequence[TypeAnswers]) -> Finding:
             if history.vehicle == vehicle:
                 said.append(change_words(history, each.labels))
                 shared = any(e.name == history.name and vehicle in e.vehicles for e in alike)
-                said[-1] += ", as the others did" if shared else _left_behind(history, each)
-                light = Light.AMBER if shared and light is not Light.RED else Light.RED
+                behind = "" if shared else _left_behind(history, each)
+                said[-1] += ", as the others did" if shared else behind
+                own = not (shared or behind)
+                light = Light.RED if own or light is Light.RED else Light.AMBER
         doubts = list(_doubts(vehicle, each))
         if each.outliers is not None:
             doubts += each.outliers.differences(vehicle, each.labels)

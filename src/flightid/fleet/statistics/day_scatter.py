@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from flightid.fleet.statistics.largest_step import largest_step_chance
+from flightid.fleet.statistics.step_chances import largest_step_chance
 from flightid.frozen import dataclass
 
 Array = NDArray[np.float64]

@@ -50,7 +50,7 @@ from flightid.frozen import dataclass
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Reading
-from flightid.uncertainty.quantiles import interval_words, shown
+from flightid.uncertainty.quantiles import LEVEL, half_width, interval_words, shown
 
 Array = NDArray[np.float64]
 
@@ -111,12 +111,11 @@ class FleetDrift(Result, schema="flightid.fleet_drift/1"):
         return tuple(sorted(found, key=lambda each: each.chance or 0.0))
 
     def apart(self, shared: SharedLevel) -> tuple[str, ...]:
-        """Vehicles that changed the other way beside a shared step: they may not have changed."""
+        """Vehicles that changed by a shared step the other way: they may not have changed."""
         if not shared.is_step:
             return ()
-        size = shared.change.value or 0.0
         mine = (one for one in (*self.alarms, *self.going_on) if one.name == shared.name)
-        return tuple(one.vehicle for one in mine if size * (one.change_percent.value or 0.0) < 0.0)
+        return tuple(one.vehicle for one in mine if _is_the_other_way(one, shared))
 
     @property
     def going_on(self) -> tuple[ParameterHistory, ...]:
@@ -305,6 +304,16 @@ def find_drift(
         judged_scales(scales),
         persistent,
     )
+
+
+def _is_the_other_way(history: ParameterHistory, shared: SharedLevel) -> bool:
+    """Whether its change is what is left where a shared step is taken out of what stayed."""
+    change, (step, stderr) = history.change_percent, (shared.change.value, shared.change.stderr)
+    ends = change.interval(LEVEL)
+    if stderr is None or ends is None or step * (change.value or 0.0) >= 0.0:
+        return False
+    wide = half_width(LEVEL) * stderr
+    return ends[0] - wide <= -step <= ends[1] + wide
 
 
 def _variances(data: FlightEstimates, i: int) -> Array:

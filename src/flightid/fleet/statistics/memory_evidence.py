@@ -48,7 +48,7 @@ class DayGroup:
 
 
 @dataclass(frozen=True, eq=False)
-class _Whitened:
+class _ApartFromLevels:
     """Vehicles beside days of one memory: squares about a level, and what each change explains."""
 
     squares: Array
@@ -85,7 +85,7 @@ def evidence(groups: Sequence[DayGroup], share: float, correlation: float) -> tu
     Patterson & Thompson, *Biometrika* 58 (1971), 545–554 (restricted likelihood); Kass & Raftery,
     *J. Am. Stat. Assoc.* 90 (1995), 773–795 (likelihoods averaged over what is unknown).
     """
-    held = [_whitened(each, share, correlation) for each in groups]
+    held = [_apart_from_levels(each, share, correlation) for each in groups]
     free = sum(each.free for each in held)
     spread = sum(float(each.squares.sum()) for each in held) / free
     if spread <= 0.0:
@@ -102,7 +102,7 @@ def evidence(groups: Sequence[DayGroup], share: float, correlation: float) -> tu
     return best[0], best[2]
 
 
-def _whitened(group: DayGroup, share: float, correlation: float) -> _Whitened:
+def _apart_from_levels(group: DayGroup, share: float, correlation: float) -> _ApartFromLevels:
     d = group.values.shape[1]
     steps, ramps = change_shapes(d)
     shapes = np.hstack([steps, ramps])
@@ -119,9 +119,11 @@ def _whitened(group: DayGroup, share: float, correlation: float) -> _Whitened:
     along = np.einsum("mdk,md->mk", shapes, y)
     sizes = np.log(np.abs(np.diagonal(triangle, axis1=1, axis2=2))).sum()
     sizes += np.log(np.diagonal(root, axis1=1, axis2=2)).sum()
-    priors = np.repeat([-np.log(2.0 * each.shape[1]) for each in (steps, ramps)],
-                       [each.shape[1] for each in (steps, ramps)])  # fmt: skip
-    return _Whitened(np.sum(y**2, axis=1), along, information, priors, -float(sizes), group.free)
+    counts = [each.shape[1] for each in (steps, ramps)]
+    priors = np.repeat([-np.log(2.0 * count) for count in counts], counts)
+    return _ApartFromLevels(
+        np.sum(y**2, axis=1), along, information, priors, -float(sizes), group.free
+    )
 
 
 def change_shapes(days: int) -> tuple[Array, Array]:
@@ -141,7 +143,7 @@ def change_shapes(days: int) -> tuple[Array, Array]:
     return steps, np.maximum(at[:, None] - begun, 0.0) / (days - 1.0 - begun)
 
 
-def _at(held: Sequence[_Whitened], free: int, factor: float) -> tuple[float, float]:
+def _at(held: Sequence[_ApartFromLevels], free: int, factor: float) -> tuple[float, float]:
     """Log likelihood at one factor, and the factor that squares beside changes leave."""
     squares = sum(float(each.squares.sum()) for each in held)
     alone = sum(each.log_sizes for each in held)
@@ -159,7 +161,7 @@ def _at(held: Sequence[_Whitened], free: int, factor: float) -> tuple[float, flo
 
 
 def _changes(
-    held: Sequence[_Whitened], factor: float, about: Sequence[tuple[float, float]]
+    held: Sequence[_ApartFromLevels], factor: float, about: Sequence[tuple[float, float]]
 ) -> tuple[float, float, float]:
     """Log of how much likelier changes make it all, how many vehicles change, what that explains.
 
@@ -180,7 +182,7 @@ def _changes(
 
 
 def _beside_changes(
-    held: _Whitened, factor: float, means: Array, spreads: Array
+    held: _ApartFromLevels, factor: float, means: Array, spreads: Array
 ) -> tuple[Array, Array]:
     """Of each vehicle by prior of sizes: how much likelier a change makes it, and its squares."""
     information = held.information[:, :, None] / factor
