@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 import flightid as fid
+from flightid.study.pilot_settings import pilot_of
 from tests.reference.test_app_in_browser import Desk, Window, _findings, desk
 
 __all__ = ["desk"]
@@ -89,6 +90,15 @@ def test_by_keyboard_from_take_off_to_a_rated_record(desk: Desk) -> None:
     assert max(record["stick_lat"]) == pytest.approx(0.25 * 4.5, rel=0.02)
     assert max(abs(record["sweep_lon"])) > 0.0
     assert '"rating": 10' in (folder / "rating.json").read_text(encoding="utf-8")
+    # Its study says what was flown and how it was rated; the page takes it up again.
+    told = pilot_of(folder / "study.toml")
+    assert told is not None
+    assert told.rating is not None
+    assert (told.vehicle, told.augmentation, told.rating.rating) == ("ah64_hover", True, 10)
+    page.get_by_role("button", name="Augmentation").press("Enter")
+    page.get_by_role("button", name="Augmentation", pressed=False).wait_for()
+    page.get_by_role("button", name=f"Fly so, as {folder.name}").press("Enter")
+    page.get_by_role("button", name="Augmentation", pressed=True).wait_for()
     # The flight is opened as records: its sticks and sweeps, whose model can be identified.
     page.get_by_role("button", name=f"Open {folder.name} under Records").press("Enter")
     page.get_by_role("heading", name=f"{folder.name}.nc").wait_for()
