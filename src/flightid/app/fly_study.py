@@ -6,10 +6,11 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 
-from flightid.app.fly_loop import FlySwitches, PilotedVehicle, PilotSeat
+from flightid.app.fly_loop import Failure, FlySwitches, PilotedVehicle, PilotSeat
 from flightid.app.fly_seat import vehicle_of
 from flightid.app.fly_vehicles import VEHICLES, FlyVehicle, fly_vehicle
 from flightid.errors import OptionError
@@ -79,9 +80,8 @@ def fly_study(
         )
     vehicle = piloted(settings)
     step_s = 1.0 / vehicle.rate_hz
-    switches = FlySwitches(
-        settings.augmentation and bool(vehicle.law), settings.gusts, dict(settings.failures)
-    )  # type: ignore[arg-type]
+    failures = cast("dict[str, Failure]", dict(settings.failures))
+    switches = FlySwitches(settings.augmentation and bool(vehicle.law), settings.gusts, failures)
     seat = PilotSeat(settings.actuator_delay_s, settings.display_delay_s, settings.stick_rad_s)
     loop = PilotedVehicle(vehicle, step_s, switches=switches, seat=seat, seed=settings.seed)
     rows: list[list[float]] = []

@@ -51,10 +51,11 @@ def view_log(
         if tried is not None and tried.is_flyable:
             path = folder / f"filters{parameter_suffix(tried.kind)}"
             faults.spare("the file of the filters", tried.write, None, path)
+    none: tuple[tuple[str, ...], ...] = ()
     panes = [
         (series, each.span_s)
         for each in asked.plots
-        for series in faults.spare("a layout of plots", _panes, (), each)
+        for series in faults.spare("a layout of plots", _panes, none, each)
     ]
     shown = (faults.spare("a plot of fields", _plotted, None, runner, log, *pane) for pane in panes)
     plots = tuple(each for each in shown if each is not None)
