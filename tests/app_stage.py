@@ -87,7 +87,7 @@ def furnish(desk: Desk, made: Path) -> Stage:
     planted = SweepFlight(sweep_s=6.0, rate_hz=50.0, injected=False).write(made)
     shutil.copy(planted, desk.folder / f"{PLANTED}.bin")
     (desk.folder / "models").mkdir(exist_ok=True)
-    (desk.folder / "models" / "planted.toml").write_text(MODEL)
+    (desk.folder / "models" / f"{PLANTED}.toml").write_text(MODEL)
     page.set_input_files("input[type=file]", _flown(made, "first.bin"))
     page.wait_for_selector(".cards")
     stage = Stage(desk, window, made, {}, "")
