@@ -176,10 +176,22 @@ class Rivals:
     def by_likelihood(self, holds: Sequence[InputHold]) -> list[OtherHold]:
         """What the records alone say of other holds, without a fit."""
         asked = holds if self.is_likeliest else [self.assumed, *holds]
-        found = held_outputs(
-            self.fit.model, self.records, self.given, asked, coloured=not self.is_likeliest
-        )
-        here, *others = [HeldOutputs.of(self.fit), *found] if self.is_likeliest else found
+        found = self._held(asked)
+        if not self.is_likeliest:
+            return self._beside(found[0], holds, found[1:])
+        known = self._beside(HeldOutputs.of(self.fit), holds, found)
+        if any(each.doubts for each in known):
+            # The fit's own hold is stepped as its rivals were before one of them is preferred.
+            known = self._beside(self._held([self.assumed])[0], holds, found)
+        return known
+
+    def _held(self, holds: Sequence[InputHold]) -> list[HeldOutputs]:
+        coloured = not self.is_likeliest
+        return held_outputs(self.fit.model, self.records, self.given, holds, coloured=coloured)
+
+    def _beside(
+        self, here: HeldOutputs, holds: Sequence[InputHold], others: Sequence[HeldOutputs]
+    ) -> list[OtherHold]:
         free = [parameter.name for parameter in self.fit.model.parameters.free]
         places = [free.index(name) for name in self.fit.names]
         return [
