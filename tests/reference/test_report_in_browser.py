@@ -97,7 +97,11 @@ def test_paper_shows_all_plots_and_columns_at_its_own_width(tmp_path: Path) -> N
         page = browser.new_page(viewport={"width": 1440, "height": 500}, color_scheme="dark")
         page.goto(file.as_uri())
         page.wait_for_selector(".main-svg", timeout=60_000)
-        page.wait_for_timeout(1500)
+        # Frames in which what is in sight is drawn, and then nothing left to do.
+        page.evaluate(
+            """new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(
+                () => requestIdleCallback(done))))"""
+        )
         drawn, widths, paper, frames = page.evaluate(
             """() => {
                 const plots = [...document.querySelectorAll(".plot")];
