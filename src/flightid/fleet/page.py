@@ -18,11 +18,12 @@ from flightid.fleet.pictures import history_picture, type_picture
 from flightid.fleet.reasons import grouped_reasons, reasons_table
 from flightid.fleet.statistics.answers import RED, FleetAnswers, Row, TypeAnswers, fitted_share
 from flightid.fleet.statistics.drift import FleetDrift
+from flightid.fleet.statistics.event_shares import event_shares
 from flightid.fleet.statistics.least_step import POWER
 from flightid.fleet.statistics.multiple_testing import chance_cell
 from flightid.fleet.taken import copies_named
 from flightid.fleet.unnamed import unnamed_light, unnamed_logs
-from flightid.fleet.vehicle_lights import vehicle_light
+from flightid.fleet.vehicle_lights import shares_words, vehicle_light
 from flightid.report.content import Block, Document, Lights, Paragraph, Section, TableBlock
 from flightid.report.figures import figure_block
 from flightid.table import Cell, Column, Table
@@ -276,6 +277,8 @@ def events_table(drift: FleetDrift, labels: Mapping[str, str]) -> Table:
         low, high = each.percent.interval(shown()) or (None, None)
         event = ", ".join(each.names)
         value, reason = each.percent.value, each.percent.reason or each.together or None
+        if shares := event_shares(history, each, drift.histories):
+            reason = f"{reason}: {shares_words(shares)}"
         name = labels.get(history.name, history.name)
         rows.append(
             (event, history.vehicle, name, value, low, high, chance_cell(each.chance), reason)
