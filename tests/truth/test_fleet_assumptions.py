@@ -386,6 +386,8 @@ def test_what_small_fleets_do_not_tell_from_days_that_go_on_is_amber() -> None:
     """Three vehicles of 16 days by 0.8 at 4 %, without a change: red in each of these fleets."""
     found = [_drift(seed, 3, 16, days=0.04, memory=0.8) for seed in (4, 5)]
     assert not any(each.alarms or each.persistent for each in found)
+    # Of 8 days no memory was asked: red as well.
+    assert not any(_drift(seed, 3, 8, days=0.05, memory=0.9).alarms for seed in (1, 5))
     doubted = [one for each in found for one in each.going_on]
     assert all(0 < each.more_days < 60 for each in doubted)
     said = going_on_words(doubted[0], {})

@@ -185,7 +185,7 @@ def persistence(
     Returns
     -------
     Persistence or None
-        None where no vehicle has ten days, or none scatters at all.
+        None where no vehicle has six days, or none scatters at all.
 
     Assumes
     -------
