@@ -70,7 +70,8 @@ class DelayCells:
 
     def lags(self, model: GreyBoxModel) -> Array:
         """Whole samples that each of these delays reaches back, by sample time."""
-        return np.ceil(self.delays(model) / np.array(self.sample_times_s)[:, None] - WHOLE)
+        steps = np.array(self.sample_times_s)[:, None]
+        return np.asarray(np.ceil(self.delays(model) / steps - WHOLE))
 
     def around(self, model: GreyBoxModel) -> Bounds | None:
         """Bounds of the free parameters between which no held input reaches another sample.

@@ -284,7 +284,7 @@ def _steps(
     n_own = [each.shape[1] - n_free - 1 for each in triangles]
     inner = [each[m:, m:] for each, m in zip(triangles, n_own, strict=True)]
     whole = triangle_of_rows(np.concatenate(inner))
-    shared = np.linalg.lstsq(whole[:, :-1], whole[:, -1])[0]
+    shared: Array = np.asarray(np.linalg.lstsq(whole[:, :-1], whole[:, -1])[0], dtype=np.float64)
     if limits is not None:
         shared = _inside(shared, whole, limits)
     found = []
