@@ -18,7 +18,7 @@ FLEET = (
 
 
 def write_fleet(
-    folder: Path, log: Path | None = None, flights: int = 16, vehicles: int = 3
+    folder: Path, log: Path | None = None, flights: int = 20, vehicles: int = 3
 ) -> Path:
     """A fleet file of vehicles with its catalogue; v02's newest flight is of that log."""
     path = folder / "fleet.toml"

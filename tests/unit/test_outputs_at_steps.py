@@ -22,7 +22,7 @@ WANTED = tuple(
     ChannelColumn(Channel(name, "1", role), name)
     for name, role in (("u", Role.INPUT), ("y", Role.OUTPUT))
 )
-GRID = RowGrid(WANTED, None, None, None, None, None, "time", has_clocks=True)
+GRID = RowGrid(WANTED, None, None, None, (), None, "time", has_clocks=True)
 
 
 def rig(seed: int, input_hz: int = 50, *, gain: float = 0.0) -> Rows:
