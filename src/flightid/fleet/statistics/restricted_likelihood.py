@@ -124,9 +124,7 @@ class RestrictedLikelihood:
         )
         spread = np.linalg.inv(mean_information)
         between_slope = mean_information - pull.T @ pull
-        between_slope = between_slope - np.einsum(
-            "kij,kjl->il", precision @ spread, precision, optimize=True
-        )
+        between_slope = between_slope - _summed(precision @ spread, precision)
         within_slope = np.zeros((self.p, self.p))
         if within is not None:
             within_slope = self._within_slope(weights, between, shrink, pull, mean, spread)
@@ -145,6 +143,11 @@ class RestrictedLikelihood:
         residual = np.einsum("nij,nj->ni", weights, left)
         design = weights @ shrink[repeat]
         slope = weights.sum(axis=0) - residual.T @ residual
-        slope = slope - np.einsum("nij,njl->il", weights @ shared, weights, optimize=True)
-        found = slope - np.einsum("nij,nkj->ik", design @ spread, design, optimize=True)
-        return np.asarray(found)
+        slope = slope - _summed(weights @ shared, weights)
+        return np.asarray(slope - _summed(design @ spread, design.transpose(0, 2, 1)))
+
+
+def _summed(left: Array, right: Array) -> Array:
+    """Σₖ Lₖ Rₖ as one product: a search asks for it thousands of times, each of few numbers."""
+    p = left.shape[1]
+    return np.asarray(left.transpose(1, 0, 2).reshape(p, -1) @ right.reshape(-1, right.shape[2]))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -82,7 +84,7 @@ class SpreadStructure:
     def gradient(self, numbers: Array, slope: Array) -> Array:
         """Slope along the free numbers from the symmetric one along T, shape (size,)."""
         if self.kind == "full":
-            return np.asarray((2.0 * slope @ self._lower(numbers))[np.tril_indices(self.p)])
+            return np.asarray((2.0 * slope @ self._lower(numbers))[_lower_places(self.p)])
         own = 2.0 * np.diag(slope) * numbers[: self.p]
         if self.kind == "diagonal":
             return np.asarray(own)
@@ -91,7 +93,7 @@ class SpreadStructure:
     def start(self, deviations: Array) -> Array:
         """Free numbers of independent spreads with these standard deviations."""
         if self.kind == "full":
-            return np.asarray(np.diag(deviations)[np.tril_indices(self.p)])
+            return np.asarray(np.diag(deviations)[_lower_places(self.p)])
         if self.kind == "diagonal":
             return deviations.copy()
         # A factor of zero would be a saddle, which no step along its slope leaves.
@@ -99,7 +101,7 @@ class SpreadStructure:
 
     def _lower(self, numbers: Array) -> Array:
         lower = np.zeros((self.p, self.p))
-        lower[np.tril_indices(self.p)] = numbers
+        lower[_lower_places(self.p)] = numbers
         return lower
 
 
@@ -201,3 +203,9 @@ def telling_repeats(data: FlightEstimates) -> Array:
         there = squares > 0.0
         found[i] = np.sum(sums[there] ** 2 / squares[there] - 1.0)
     return found
+
+
+@cache
+def _lower_places(p: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Places of a lower triangle: searches ask for them thousands of times."""
+    return np.tril_indices(p)
