@@ -10,6 +10,7 @@ from flightid.record import Record
 from flightid.record.hold import common_loop
 from flightid.record.repeats import found_period
 from flightid.record.several import as_records
+from flightid.threads import on_one_thread
 from flightid.uncertainty.feedback import MAXIMUM_SAMPLES, find_feedback
 from flightid.uncertainty.feedback_result import (
     FeedbackTest,
@@ -30,6 +31,7 @@ def loop_seen(
     return feedback_test(records, inputs=inputs, outputs=outputs)
 
 
+@on_one_thread
 def feedback_test(
     records: Record | Sequence[Record],
     *,

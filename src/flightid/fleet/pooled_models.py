@@ -21,6 +21,7 @@ from flightid.fleet.statistics.pooling import pooled_model
 from flightid.fleet.vehicle_lights import vehicle_light
 from flightid.models.kinds import model_from_description
 from flightid.reading import parse_toml
+from flightid.threads import on_one_thread
 
 if TYPE_CHECKING:
     from flightid.fleet.catalogue.catalogue import Catalogue
@@ -29,6 +30,7 @@ Row = Mapping[str, Any]
 POOLED = ("logs", "parameters", "covariances", "covariates", "models", "responses")
 
 
+@on_one_thread
 def type_models(
     place: str | Path, *, type_name: str | None = None, joint: bool = False
 ) -> dict[str, Any]:

@@ -34,6 +34,7 @@ from flightid.record import Record
 from flightid.record.hold import Loop
 from flightid.responses import FrequencyResponse
 from flightid.responses.windows.kept_bases import bases_kept
+from flightid.threads import on_one_thread
 from flightid.uncertainty.feedback_result import declared_loop
 
 JointData = tuple[FrequencyResponse, Record | Sequence[Record]]
@@ -41,6 +42,7 @@ Data = FrequencyResponse | Record | Sequence[Record] | JointData
 Structure = GreyBoxModel | NarxStructure | PolynomialStructure | SubspaceStructure
 
 
+@on_one_thread
 def identify(
     model: Structure,
     data: Data,

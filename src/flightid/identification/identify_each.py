@@ -11,8 +11,10 @@ from flightid.identification.identify import Data, Structure, identify
 from flightid.identification.shared_work import shared_work
 from flightid.progress import track
 from flightid.record.hold import Loop
+from flightid.threads import on_one_thread
 
 
+@on_one_thread
 def identify_each(
     model: Structure,
     data_sets: Iterable[Data],

@@ -15,8 +15,10 @@ from flightid.inspection.stamps import log_span
 from flightid.inspection.usable_band import axis_bands
 from flightid.inspection.verdicts import judge
 from flightid.logs import Log, read_log
+from flightid.threads import on_one_thread
 
 
+@on_one_thread
 def inspect_log(log: Log | str | Path) -> Inspection:
     """Say what a log holds and whether it can support identification.
 

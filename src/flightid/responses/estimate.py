@@ -34,10 +34,12 @@ from flightid.responses.windows.defaults import DEFAULT_FREQUENCIES, DEFAULT_OVE
 from flightid.responses.windows.planning import plan_frequencies, plan_windows
 from flightid.responses.windows.samples import Samples, gather
 from flightid.table import Cell
+from flightid.threads import on_one_thread
 from flightid.uncertainty.feedback_result import FeedbackTest
 from flightid.version import VERSION
 
 
+@on_one_thread
 def estimate_response(
     records: Record | Iterable[Record],
     *,

@@ -13,10 +13,12 @@ from flightid.review.flight_state import FlightState
 from flightid.review.promised import promised_loops
 from flightid.review.result import FlightReview
 from flightid.review.verdicts import loops_in_doubt
+from flightid.threads import on_one_thread
 
 Flown = FlightReview | Log | str | Path
 
 
+@on_one_thread
 def compare_flights(
     before: Flown, after: Flown, *, promise: FlightComparison | None = None
 ) -> FlightComparison:
@@ -66,6 +68,7 @@ def compare_flights(
     )
 
 
+@on_one_thread
 def compare_with_promise(
     sources: Iterable[object],
     after: Log | str | Path,

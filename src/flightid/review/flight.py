@@ -21,8 +21,10 @@ from flightid.review.motors import motor_use, turning, yaw_trim
 from flightid.review.result import FlightReview
 from flightid.review.verdicts import judge_flight
 from flightid.review.vibration import vibrations
+from flightid.threads import on_one_thread
 
 
+@on_one_thread
 def review_flight(
     log: Log | str | Path, *, span_s: tuple[float, float] | None = None
 ) -> FlightReview:

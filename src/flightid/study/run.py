@@ -37,6 +37,7 @@ from flightid.study.tuning import TuneSettings, tune_models
 from flightid.study.uses import use_models
 from flightid.study.views import view_log
 from flightid.surface import as_key, speaking
+from flightid.threads import on_one_thread
 from flightid.uncertainty.quantiles import checked_level
 from flightid.vehicles import GainFlight
 
@@ -49,6 +50,7 @@ def _tuning(of_study: TuneSettings | None, asked: bool | Mapping[str, Any]) -> T
     return found.changed(asked) if isinstance(asked, Mapping) else found
 
 
+@on_one_thread
 def run_study(
     path: str | Path,
     *,

@@ -41,6 +41,7 @@ from flightid.control.tuning.tuned_filters import tuned_filters
 from flightid.errors import DataError, FlightidError, ModelError, OptionError
 from flightid.frozen import dataclass
 from flightid.progress import progress
+from flightid.threads import on_one_thread
 
 Array = NDArray[np.float64]
 ROUNDS = 4
@@ -50,6 +51,7 @@ SETTLED = 0.02
 """Largest relative change of a gain from one round to the next that ends the rounds."""
 
 
+@on_one_thread
 def tune(
     fits: Mapping[str, object],
     *,

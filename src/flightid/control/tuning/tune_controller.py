@@ -28,6 +28,7 @@ from flightid.models import Model
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.models.model import model_of
 from flightid.progress import progress
+from flightid.threads import on_one_thread
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -48,6 +49,7 @@ MOST_AGAINST = 0.05
 """Share of the plants drawn that may answer a steady input the other way."""
 
 
+@on_one_thread
 def tune_controller(
     fit: object,
     *,

@@ -37,6 +37,7 @@ from flightid.control.tuning.structure_error import Band, perturbed
 from flightid.errors import ModelError, OptionError
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.progress import progress
+from flightid.threads import on_one_thread
 from flightid.version import VERSION
 
 CHANNELS = {"roll": ("tau_phi", "p"), "pitch": ("tau_theta", "q"), "yaw": ("tau_psi", "r")}
@@ -48,6 +49,7 @@ ANSWER_S = 0.15
 """Time from a step of output in which a vehicle has turned the right way."""
 
 
+@on_one_thread
 def tune_pid(
     fit: object,
     *,

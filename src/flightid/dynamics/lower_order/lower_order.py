@@ -21,6 +21,7 @@ from flightid.identification.uncertain_of import source_findings, uncertain_of
 from flightid.models import GreyBoxModel, LinearSystem, StateSpaceModel, TransferFunctionModel
 from flightid.models.model import linear_system
 from flightid.responses import FrequencyResponse
+from flightid.threads import on_one_thread
 from flightid.uncertainty.uncertain import Uncertain, uncertain_numbers
 from flightid.validation.verification.muad import Mismatch, mismatch
 
@@ -32,6 +33,7 @@ UNKNOWN_ERRORS = "the errors of the response are not known"
 Array = NDArray[np.float64]
 
 
+@on_one_thread
 def lower_order(
     source: object,
     inputs: str | None = None,

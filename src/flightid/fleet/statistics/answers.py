@@ -26,6 +26,7 @@ from flightid.fleet.statistics.outliers import FleetOutliers, find_outliers
 from flightid.fleet.statistics.population import Population, estimate_population
 from flightid.fleet.statistics.spread_search import FEWEST
 from flightid.frozen import dataclass
+from flightid.threads import on_one_thread
 from flightid.uncertainty.estimate import Estimate
 
 Row = Mapping[str, Any]
@@ -103,6 +104,7 @@ class FleetAnswers:
     copies: Mapping[str, str] = field(default_factory=dict)
 
 
+@on_one_thread
 def answer_questions(
     rows: Rows,
     *,

@@ -49,6 +49,7 @@ from flightid.fleet.statistics.vehicle_errors import (
 from flightid.frozen import dataclass
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
+from flightid.threads import on_one_thread
 from flightid.uncertainty.estimate import Reading
 from flightid.uncertainty.quantiles import LEVEL, half_width, interval_words, shown
 
@@ -219,6 +220,7 @@ class FleetDrift(Result, schema="flightid.fleet_drift/1"):
         return Table("What changed", columns, tuple(rows), notes)
 
 
+@on_one_thread
 def find_drift(
     data: FlightEstimates,
     covariates: Mapping[str, Covariate] | None = None,

@@ -18,6 +18,7 @@ from flightid.fleet.statistics.spread_search import SpreadFit, search_spreads
 from flightid.frozen import dataclass
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
+from flightid.threads import on_one_thread
 from flightid.uncertainty.estimate import Estimate
 
 Array = NDArray[np.float64]
@@ -215,6 +216,7 @@ class FleetOutliers(Result, schema="flightid.fleet_outliers/1"):
         return Table(f"Vehicles of type “{self.type_name}”", columns, rows, notes)
 
 
+@on_one_thread
 def find_outliers(population: Population) -> FleetOutliers:
     """Hold every vehicle beside what all others predict for the next one.
 

@@ -15,6 +15,7 @@ from flightid.fleet.statistics.spread_search import SpreadFit, search_spreads
 from flightid.frozen import dataclass
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
+from flightid.threads import on_one_thread
 from flightid.uncertainty.estimate import Estimate, Reading
 from flightid.uncertainty.quantiles import LEVEL, half_width, interval_words, shown
 
@@ -230,6 +231,7 @@ class Population(
         return named.get(name, name), name if name in named else None, "" if unit == "1" else unit
 
 
+@on_one_thread
 def estimate_population(
     data: FlightEstimates,
     type_name: str = "",

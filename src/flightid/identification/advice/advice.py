@@ -28,6 +28,7 @@ from flightid.record import Record
 from flightid.record.hold import Loop
 from flightid.result import Result
 from flightid.table import Column, Table
+from flightid.threads import on_one_thread
 
 Array = NDArray[np.float64]
 LARGEST_ORDER = 50
@@ -104,6 +105,7 @@ class Advice(Result, schema="flightid.advice/1"):
         )
 
 
+@on_one_thread
 def advise(
     records: Record | Sequence[Record],
     *,

@@ -22,11 +22,13 @@ from flightid.models import GreyBoxModel
 from flightid.progress import progress
 from flightid.record import Record
 from flightid.responses import FrequencyResponse
+from flightid.threads import on_one_thread
 
 BY_HAND = "by hand"
 AFTER_RISE = ("stop", "next")
 
 
+@on_one_thread
 def reduce(
     fit: Fit,
     data: FrequencyResponse | Record | Sequence[Record],

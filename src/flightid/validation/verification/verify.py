@@ -29,6 +29,7 @@ from flightid.record.chosen_hold import chosen_hold
 from flightid.record.hold import HOLDS, InputHold
 from flightid.record.several import as_records
 from flightid.responses import FrequencyResponse
+from flightid.threads import on_one_thread
 from flightid.validation.verification.baseline import baseline_findings
 from flightid.validation.verification.comparison import Comparison, compared
 from flightid.validation.verification.contradiction import contradictions
@@ -81,6 +82,7 @@ def verify(
 ) -> Verification: ...
 
 
+@on_one_thread
 def verify(
     source: object,
     records: Record | Sequence[Record],
