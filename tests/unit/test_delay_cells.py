@@ -10,7 +10,8 @@ import pytest
 from numpy.typing import NDArray
 
 import flightid as fid
-from flightid.identification.delay_cells import DelayCells
+from flightid.evidence.gather import CONVERGED
+from flightid.identification.delay_cells import LOOK, DelayCells
 
 STEP_S = 0.02
 TRUE = {"Zw": -0.35, "Zc": -9.0, "tau": 0.06}
@@ -81,6 +82,17 @@ def test_a_search_passes_whole_samples(
     assert abs(fit.parameters["Zc"].value - TRUE["Zc"]) < 0.1
     assert "hold-contradicted" not in {each.code for each in fit.findings}
     assert len(fit.minima) == 1
+
+
+@pytest.mark.parametrize("start", [0.03, 0.055])
+def test_a_delay_of_whole_samples_is_an_end(model: fid.StateSpaceModel, start: float) -> None:
+    """Slopes of a jump's other side made a search stall, or a look's two steps were its end."""
+    fit = fid.identify(
+        model.with_values({"tau": start}), flight(TRUE["tau"], seed=2), method="output_error"
+    )
+    assert fit.parameters["tau"].value == pytest.approx(TRUE["tau"], abs=1e-7)
+    assert fit.termination in CONVERGED
+    assert fit.iterations > LOOK + 9
 
 
 def test_a_cell_ends_where_an_input_reaches_another_sample(model: fid.StateSpaceModel) -> None:

@@ -7,6 +7,7 @@ passes one. A search that goes by slopes ends in front of such a jump, or just b
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
@@ -27,7 +28,8 @@ DIFFERENCE = 1e-5
 WHOLE = 1e-9
 """Samples by which a delay may miss a whole number of them."""
 JUST = 1e-6
-"""Samples by which a delay stands clear of the jump at its lower end."""
+"""Samples by which a delay stands clear of the jumps at its ends: on one, cost and slope are of
+different sides, and a search stalls."""
 ACROSS = 0.01
 """Share of a cell by which the other side of a jump is tried."""
 NEAR = 0.02
@@ -83,7 +85,7 @@ class DelayCells:
             return None
         steps, last = np.array(self.sample_times_s)[:, None], self.lags(model)
         low = np.max((last - 1.0 + JUST) * steps, axis=0) - delays
-        high = np.min(last * steps, axis=0) - delays
+        high = np.min((last - JUST) * steps, axis=0) - delays
         free = model.parameters.free
         bounds = np.full((2, len(free)), [[-np.inf], [np.inf]])
         for place, parameter in enumerate(free):
@@ -96,6 +98,11 @@ class DelayCells:
                 bounds[0, place] = max(bounds[0, place], value + ends[0])
                 bounds[1, place] = min(bounds[1, place], value + ends[1])
         return bounds[0], bounds[1]
+
+    def within(self, limits: Bounds, around: Bounds) -> Bounds:
+        """Bounds of a cell inside limits; a limit at a jump leaves of the cell that limit alone."""
+        lower = np.maximum(limits[0], around[0])
+        return lower, np.maximum(lower, np.minimum(limits[1], around[1]))
 
 
 def beyond_jumps(
@@ -117,22 +124,36 @@ def beyond_jumps(
         Of the free parameters.
     search : callable
         From an end, with other free parameters, inside bounds, in so many steps or to its end.
+
+    Returns
+    -------
+    End
+        Its steps are those of all searches that led there.
     """
     free = [parameter.name for parameter in model.parameters.free]
     best = end
     seen: set[bytes] = set()
+    rounding = LOWER * abs(end.cost)
     for turn in range(MOST_CROSSINGS):
         here = model.with_values(dict(zip(free, map(float, best.x), strict=False)))
         found, inside = best, limits
         for start, bounds in _around(here, cells, limits, seen, own=turn == 0):
             tried = search(best, start, bounds, LOOK)
-            if tried is not None and tried.cost < found.cost - LOWER * abs(end.cost):
-                found, inside = tried, bounds
+            if tried is not None and tried.cost < found.cost - rounding:
+                found, inside = _after(best, tried), bounds
         if found is best:
             break
         gone_on = search(found, found.x[: len(free)], inside, None)
-        best = found if gone_on is None or gone_on.cost > found.cost else gone_on
+        # A look ends where its steps do; where the search goes on to the same cost, its end counts.
+        best = found
+        if gone_on is not None and gone_on.cost <= found.cost + rounding:
+            best = _after(found, gone_on)
     return best
+
+
+def _after(before: E, end: E) -> E:
+    """An end, with the steps of the search before it."""
+    return replace(end, iterations=before.iterations + end.iterations)
 
 
 def _around(
@@ -157,7 +178,7 @@ def _around(
     with np.errstate(invalid="ignore"):
         apart = np.minimum(values - around[0], around[1] - values) / (around[1] - around[0])
     if own and np.any(apart <= NEAR):
-        yield values, (np.maximum(around[0], low), np.minimum(around[1], high))
+        yield values, cells.within(limits, around)
     for edges, way in zip(around, (-1.0, 1.0), strict=True):
         for place in np.flatnonzero(np.isfinite(edges)):
             there = values.copy()
@@ -169,4 +190,4 @@ def _around(
             cell, place_of_cell = cells.around(moved), cells.lags(moved).tobytes()
             if cell is not None and place_of_cell not in seen:
                 seen.add(place_of_cell)
-                yield there, (np.maximum(cell[0], low), np.minimum(cell[1], high))
+                yield there, cells.within(limits, cell)

@@ -120,7 +120,7 @@ def inside_cell(problem: InnovationsProblem, end: DenseEnd, limits: SearchBounds
     around = _cells(problem).around(problem.model.with_values(values))
     if around is None:
         return limits
-    lower, upper = np.maximum(limits.lower, around[0]), np.minimum(limits.upper, around[1])
+    lower, upper = _cells(problem).within((limits.lower, limits.upper), around)
     return replace(limits, lower=lower, upper=upper)
 
 
