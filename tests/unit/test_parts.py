@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 from scipy import stats
 
@@ -97,15 +98,28 @@ def test_records_that_differ_carry_the_scatter_and_students_freedom() -> None:
     assert agreement_check(two.agreement).light is Light.RED
 
 
-def test_a_pair_in_doubt_reaches_its_scatter_with_the_freedom_of_the_noise() -> None:
-    """Student's 12.7 of one freedom made bars 6.5 times as long of 9 in 100 sound pairs."""
-    half = np.full((1, 1), 0.5)
-    for apart, freedom in ((2.8, 40.0), (8.0, 1.0)):
-        pair = _flights(np.array([[0.0], [apart]]), np.ones((2, 1, 1)))
-        found = compare_parts(pair, half, half, np.array([40.0]))
-        assert found.agreement.agree is (apart < 4.0)
-        assert_close(found.covariance, [[apart**2 / 4.0]], rtol=1e-9, why="rounding")
-        assert_close(found.freedom, [freedom], rtol=1e-9, why="noise, or proven scatter")
+@pytest.mark.parametrize("informations", [[1.0, 1.0], [4.0, 1.0, 1.0, 1.0]])
+def test_scatter_in_doubt_of_few_has_the_freedom_of_the_noise(informations: list[float]) -> None:
+    """Student's 12.7 of one freedom made bars 6.5 times as long of 9 in 100 sound fits."""
+    weights = np.array(informations)[:, None, None]
+    spread = 1.0 / weights.sum(axis=0)
+    means = np.append(np.zeros(len(weights) - 1), 1.0)[:, None]
+    for apart, agree in ((2.9, True), (8.0, False)):
+        found = compare_parts(
+            _flights(apart * means, weights), spread, spread, np.array([40.0]), by_halves=False
+        )
+        assert found.agreement.agree is agree
+        assert found.agreement.by_scatter is not None
+        said = agreement_check(found.agreement, np.array([100.0]))
+        assert ("not beyond doubt" in said.limit) is agree
+        if agree:
+            assert_close(found.freedom, [40.0], rtol=1e-9, why="the noise's")
+        else:
+            wide = stats.t.ppf(0.975, found.freedom) * np.sqrt(np.diag(found.covariance))
+            assert found.agreement.freedom is not None
+            of_scatter = stats.t.ppf(0.975, found.agreement.freedom) * found.agreement.by_scatter
+            assert_close(wide, of_scatter, rtol=1e-6, why="noise lengthens no proven scatter")
+            assert f"and to ±{wide[0]:.2g} %" in said.what
 
 
 def test_halves_hold_the_same_information_where_the_tail_is_quiet() -> None:
@@ -121,7 +135,7 @@ def test_halves_hold_the_same_information_where_the_tail_is_quiet() -> None:
 
 def test_halves_that_differ_by_little_are_amber_with_the_wider_interval() -> None:
     noise, apart = np.array([0.01, 0.02]), np.array([0.1, 0.02])
-    found = Agreement(1, 1e-9, None, noise, apart)
+    found = Agreement(1, 1e-9, None, noise, apart, reach=1.96 * np.array([noise, apart]))
     near = agreement_check(found, np.array([-5.0, 0.001]))
     assert near.light is Light.AMBER
     assert "up to 10 times and to ±3.9 %" in near.what

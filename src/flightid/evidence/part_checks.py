@@ -17,6 +17,12 @@ ALONE = (
     "{} of {} estimates are told by one record alone, and known of that flight: repeat each "
     "manoeuvre to show whether flights differ"
 )
+DOUBT = (
+    "{} records agree, but not beyond doubt (p = {:.2g}): intervals are up to {:.2g} times as long "
+    "as by noise alone"
+)
+SHOWN = 1.05
+"""Factor from which longer bars are said."""
 ONCE = "flown once: nothing shows whether a second flight would agree"
 AGAIN = "repeat the manoeuvre in a second record or segment"
 ALL_AGAIN = "repeat what moves all inputs, and hand in each repetition as one record or segment"
@@ -58,7 +64,15 @@ def agreement_check(found: Agreement, values: NDArray[np.float64] | None = None)
     limit = ONE if found.tested and needs_another(found.n_records) else ""
     if found.tested and found.told_once:
         limit = ALONE.format(found.told_once, len(found.by_noise))
-    return replace(_compared(found, apart), limit=limit)
+    doubt = _doubt(found)
+    return replace(_compared(found, apart), limit=". ".join(filter(None, (limit, doubt))))
+
+
+def _doubt(found: Agreement) -> str:
+    """What longer bars of records that agree are for, beside the light."""
+    if not found.agree or found.records is None or found.factor < SHOWN:
+        return ""
+    return DOUBT.format(found.n_records, found.records, found.factor)
 
 
 def needs_another(n_records: int) -> bool:
@@ -77,7 +91,7 @@ def _compared(found: Agreement, apart: float | None) -> Check:
     several = found.n_records > 1
     widened = ""
     if found.factor > 1.0:
-        reach = "" if apart is None or found.agree else f" and to ±{apart:.2g} %"
+        reach = f" and to ±{apart:.2g} %" if apart and not found.agree else ""
         how = "intervals are widened by how far they lie apart"
         widened = f"; {how}, up to {found.factor:.2g} times{reach}"
     if found.agree:

@@ -25,8 +25,11 @@ FALSE_ALARM = 0.005
 CERTAIN = 1.0 - 1e-15
 DOUBT = 0.1
 """Chance below which scatter between records is carried on: what is not proven may be there."""
-PAIR = 2
-"""Records whose scatter has one degree of freedom: Student's interval is 6.5 times as long."""
+TELLING = 2.0
+"""Degrees of freedom from which scatter in doubt has its own: below, as of a pair or where one
+record tells most, Student's interval is up to 6.5 times as long."""
+AS_LONG = 1e-9
+"""Share by which lengths may differ by rounding."""
 FEWEST_RECORDS = 3
 """Records whose scatter tells enough of the others for their mean to be used."""
 
@@ -49,6 +52,9 @@ class Agreement:
         Degrees of freedom of `by_scatter`; None for halves.
     told_once : int
         Estimates that one of several records tells alone, so that nothing is compared.
+    reach : ndarray, shape (2, n), or None
+        Half-widths of 95 % intervals by the noise within records, and as they stand; None where
+        nothing is carried on.
 
     Example
     -------
@@ -63,6 +69,7 @@ class Agreement:
     by_scatter: Array | None = None
     freedom: Array | None = None
     told_once: int = 0
+    reach: Array | None = None
 
     @property
     def tested(self) -> bool:
@@ -81,34 +88,34 @@ class Agreement:
 
     @property
     def factor(self) -> float:
-        """Largest ratio of a standard error by scatter to that by noise; one at least."""
-        if self.by_scatter is None:
+        """Largest ratio of a 95 % interval, as it stands, to that by noise; one at least."""
+        if self.reach is None:
             return 1.0
-        return float(max(1.0, np.max(self.by_scatter / self.by_noise, initial=1.0)))
+        return float(max(1.0, np.max(self.reach[1] / self.reach[0], initial=1.0)))
 
     def apart_percent(self, values: Array) -> float | None:
-        """How far the parts lie apart: 95 % half-width by scatter over the estimate, in percent.
+        """How far the parts lie apart: 95 % half-width, as it stands, over the estimate, percent.
 
-        The largest among estimates that noise alone tells from zero, and whose bar the scatter at
-        least doubles; None where no scatter is carried on.
+        The largest among estimates that noise alone tells from zero, and whose bar at least
+        doubles; zero where there is none, None where no scatter is carried on.
 
         Example
         -------
-        >>> apart = Agreement(1, 1e-6, None, np.array([0.01, 0.01]), np.array([0.05, 0.01]))
+        >>> reach = np.array([[0.02, 0.02], [0.1, 0.02]])
+        >>> apart = Agreement(1, 1e-6, None, np.array([0.01, 0.01]), reach=reach)
         >>> round(apart.apart_percent(np.array([-5.0, 1.0])), 1)
         2.0
         """
-        if self.by_scatter is None:
+        if self.reach is None:
             return None
+        noise, stated = self.reach
         size = np.maximum(np.abs(values), np.finfo(float).tiny)
-        told = size > half_width() * self.by_noise
-        doubled = self.by_scatter > 2.0 * self.by_noise
-        shares = 100.0 * half_width() * self.by_scatter / size
-        return float(np.max(shares, where=told & doubled, initial=0.0))
+        counts = (size > noise) & (stated > 2.0 * noise)
+        return float(np.max(100.0 * stated / size, where=counts, initial=0.0))
 
     def without_bars(self) -> Agreement:
         """What parts say of each other; what their scatter does to bars goes with the bars."""
-        return replace(self, by_scatter=None, freedom=None)
+        return replace(self, by_scatter=None, freedom=None, reach=None)
 
     def of(self, count: int) -> Agreement:
         """The same of the first parameters alone."""
@@ -120,6 +127,7 @@ class Agreement:
             None if self.by_scatter is None else self.by_scatter[:count],
             None if self.freedom is None else self.freedom[:count],
             min(self.told_once, count),
+            None if self.reach is None else self.reach[:, :count],
         )
 
     def to_dict(self) -> dict[str, object]:
@@ -202,12 +210,22 @@ def compare_parts(
     found = scatter([*parts, *([] if rest is None else [rest])], solve, covariance)
     apart = np.sqrt(np.diag(found.covariance))
     student = found.freedom if by_records else None
-    if student is not None and plain.agree and len(whole) == PAIR:
-        # Bars reach as far as the two lie apart; how far they should, noise tells better than both.
-        student = np.maximum(student, freedom)
-    stated = freedom if student is None else _of_wider(plain.by_noise, freedom, apart, student)
-    agreement = replace(plain, by_scatter=apart, freedom=student)
-    return AgreementTest(larger(covariance, found.covariance), stated, agreement)
+    if student is not None and not _differ(records):
+        # Bars reach as far as records lie apart; how far they should, noise tells better than two.
+        student = np.where(student < TELLING, np.maximum(student, freedom), student)
+    both = larger(covariance, found.covariance)
+    stderr = np.sqrt(np.diag(both))
+    stated = freedom if student is None else _of_wider(stderr, freedom, apart, student)
+    reach = np.array([_lengths(by_noise, freedom), _lengths(stderr, stated)])
+    agreement = replace(plain, by_scatter=apart, freedom=student, reach=reach)
+    return AgreementTest(both, stated, agreement)
+
+
+def _lengths(stderr: Array, freedom: Array) -> Array:
+    """Half-widths of 95 % intervals."""
+    return np.array(
+        [half_width(LEVEL, f) * s for s, f in zip(stderr, map(float, freedom), strict=True)]
+    )
 
 
 def _combined(chances: Sequence[float | None]) -> float | None:
@@ -227,18 +245,31 @@ def _halved(flight: RecordParts) -> list[RecordParts]:
     ]
 
 
-def _of_wider(noise: Array, freedom: Array, apart: Array, student: Array) -> Array:
-    """Degrees of freedom of whichever makes the wider interval."""
-    widths = [
-        (
-            half_width(LEVEL, float(a)) * one,
-            half_width(LEVEL, float(b)) * other,
-        )
-        for one, a, other, b in zip(noise, freedom, apart, student, strict=True)
-    ]
+def _of_wider(stderr: Array, freedom: Array, apart: Array, student: Array) -> Array:
+    """Degrees of freedom with which errors reach as far as they do by noise, or as scatter does.
+
+    Student's factor is of the scatter alone: noise beside it is known as well as before.
+    """
+    wanted = _lengths(apart, student) / stderr
     return np.array(
         [
-            b if wide > narrow else a
-            for (narrow, wide), a, b in zip(widths, freedom, student, strict=True)
+            _freedom_of(float(width), float(least), float(most))
+            for width, least, most in zip(wanted, student, freedom, strict=True)
         ]
     )
+
+
+def _freedom_of(width: float, least: float, most: float) -> float:
+    """Degrees of freedom of a half-width in standard errors, between two."""
+    if most <= least or width >= half_width(LEVEL, least) * (1.0 - AS_LONG):
+        return least
+    if width <= half_width(LEVEL, most):
+        return most
+    low, high = 1.0 / most, 1.0 / least
+    while high - low > AS_LONG * high:
+        middle = 0.5 * (low + high)
+        if half_width(LEVEL, 1.0 / middle) < width:
+            low = middle
+        else:
+            high = middle
+    return 2.0 / (low + high)
