@@ -208,7 +208,9 @@ def test_a_gust_felt_as_the_velocity_is_found_and_unbends_its_derivatives() -> N
     assert_close(gust["deviation"], 1.0, rtol=0.15, why="60 s of a gust of 1 m/s")
     assert fit.records[0].states["gust"].shape == (record.n_samples,)
     assert white.provenance["gust"] is None
-    assert not any(each.code == "gust-beyond-severe" for each in fit.findings)
+    (said,) = (each for each in fit.findings if each.code.startswith("gust"))
+    assert (said.code, str(said.light)) == ("gust-found", "green")
+    assert said.message.startswith(f"a gust on w of {gust['deviation']:.3g} m/s")
     tests = fid.residual_tests(fit)
     assert tests.horizon == "one step ahead"
     assert all(test.counts for test in tests.tests)

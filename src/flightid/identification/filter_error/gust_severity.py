@@ -1,4 +1,4 @@
-"""Whether the gust that a fit found can be air: severe turbulence is the strongest that there is.
+"""The gust that a fit found: severe turbulence is the strongest that air holds.
 
 Where a model lacks what the inputs do, a gust state can hold it, and is as strong as that takes.
 """
@@ -21,7 +21,7 @@ MIL-F-8785C (1980), figures 7, 10 and 11, read as JSBSim's `FGWinds` has them.""
 def judge_gust(
     state: str, unit: str, deviation: float, time_s: float, long_s: float
 ) -> list[Finding]:
-    """Say where a gust is stronger than severe turbulence.
+    """Say how large a gust is: red where it is stronger than severe turbulence.
 
     Parameters
     ----------
@@ -39,21 +39,24 @@ def judge_gust(
     Returns
     -------
     list of Finding
-        Empty where the air can be so.
+        One: green where the air can be so, and of no speed.
 
     Example
     -------
     >>> [str(each.light) for each in judge_gust("w", "m/s", 20.0, 1.5, 60.0)]
     ['red']
-    >>> judge_gust("w", "m/s", 5.0, 1.5, 60.0), judge_gust("r", "rad/s", 90.0, 1.5, 60.0)
-    ([], [])
+    >>> print(*judge_gust("w", "m/s", 5.0, 1.5, 60.0))
+    [green] a gust on w of 5 m/s (rms 4.88 m/s within one record), memory 1.5 s, is filtered out
     """
-    if not same_dimension(unit, "ft/s"):
-        return []
     felt = deviation * math.sqrt(felt_share(time_s, long_s))
-    limit = SEVEREST_FT_S * conversion_factor("ft/s", unit)
+    speed = same_dimension(unit, "ft/s")
+    limit = SEVEREST_FT_S * conversion_factor("ft/s", unit) if speed else math.inf
     if felt <= limit:
-        return []
+        what = (
+            f"a gust on {state} of {deviation:.3g} {unit} (rms {felt:.3g} {unit} within one "
+            f"record), memory {time_s:.3g} s, is filtered out"
+        )
+        return [Finding("gust-found", Light.GREEN, what)]
     return [
         Finding(
             "gust-beyond-severe",
