@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import hashlib
+import tomllib
 from collections.abc import AsyncIterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -217,7 +218,12 @@ def test_stamps_that_are_not_uniform_get_a_grid_on_the_page(tmp_path: Path) -> N
 
 def test_a_table_of_a_list_is_taken_out() -> None:
     text = "[[model]]\nname = 'A'\n\n[[model]]\nname = 'B'\n"
-    assert edited(text, [KeyEdit(("model", 0), None)]).strip() == "[[model]]\nname = 'B'"
+    left = edited(text, [KeyEdit(("model", 0), None)])
+    assert left.strip() == "[[model]]\nname = 'B'"
+    # The last one leaves no empty list, into which no table could go any more.
+    for bare in (edited(left + "[tune]\n", [KeyEdit(("model", 0), None)]), "model = []\n[tune]\n"):
+        again = edited(bare, [KeyEdit(("model", 0), {"name": "C", "fit": {"seed": 1}})])
+        assert tomllib.loads(again) == {"tune": {}, "model": [{"name": "C", "fit": {"seed": 1}}]}
 
 
 def test_only_the_report_has_another_policy() -> None:

@@ -116,9 +116,12 @@ def edited(text: str, edits: Sequence[KeyEdit]) -> str:
 
 def _apply(document: Any, edit: KeyEdit) -> None:  # noqa: ANN401 - a parsed document
     *parents, last = edit.path
-    place = document
+    place = around = document
     for number, key in enumerate(parents):
         following = edit.path[number + 1]
+        if isinstance(following, int) and isinstance(key, str) and place.get(key) == []:
+            # A list that was emptied: values go into it, no tables.
+            del place[key]
         if isinstance(key, str) and key not in place:
             # Beside `parameters.T_m = {…}` a header would open a table of the whole document.
             inline = number > 0 and edit.path[number - 1] == "parameters"
@@ -126,10 +129,12 @@ def _apply(document: Any, edit: KeyEdit) -> None:  # noqa: ANN401 - a parsed doc
             place.append(key, tomlkit.aot() if isinstance(following, int) else made)
         elif isinstance(key, int) and key == len(place):
             place.append(tomlkit.table())
-        place = place[key]
+        around, place = place, place[key]
     if edit.value is None:
         if isinstance(last, int) or last in place:
             del place[last]
+        if isinstance(last, int) and not place:
+            del around[parents[-1]]
     elif isinstance(last, int) and last == len(place):
         place.append(tomlkit.item(edit.value))
     else:
