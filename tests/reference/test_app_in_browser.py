@@ -202,6 +202,10 @@ def test_from_a_dropped_log_to_a_dragged_band(desk: Desk, tmp_path: Path) -> Non
     page.get_by_label("Name of the layout").fill("gyros")
     page.get_by_label("Name of the layout").press("Enter")
     page.get_by_text("plots/gyros.toml").wait_for()
+    # A whole name is that field, whatever else begins so (RATE.PDes).
+    page.fill("#field", "rate.p")
+    page.press("#field", "Enter")
+    page.wait_for_selector("section[aria-label='Plot of RATE.P'] canvas")
     assert f"={GYROS}" in (desk.folder / "plots" / "gyros.toml").read_text("utf-8")
     # By keyboard what a drag does by mouse, and the values at the cursor.
     chart = page.locator("[role=application][aria-label^='IMU.GyrX over time']")
@@ -279,6 +283,19 @@ def test_from_a_dropped_log_to_a_dragged_band(desk: Desk, tmp_path: Path) -> Non
         page.wait_for_timeout(100)
     assert desk.study["model"][0]["band_rad_s"][0] > 1.05 * low
     assert desk.study["model"][0]["band_rad_s"][1] == high
+    # What a layout names and this log lacks is in no line of Python either.
+    layout = desk.folder / "plots" / "gyros.toml"
+    named = layout.read_text("utf-8").replace('"IMU.GyrX"', '"NOT.There", "IMU.GyrX"')
+    layout.write_text(named, "utf-8")
+    page.click("nav >> text=Flight")
+    page.wait_for_selector("section[aria-label='Plot of RATE.P'] canvas")
+    page.locator("#layout").select_option("")
+    page.locator("#layout").select_option("gyros")
+    page.get_by_text("left out of its plots: NOT.There").wait_for()
+    page.get_by_role("button", name="Python", exact=True).click()
+    lines = page.locator("pre[aria-label='Python lines']").inner_text()
+    assert 'log.table("IMU")["GyrX"]' in lines
+    assert "There" not in lines
     said += _findings(page)
     assert not said
     assert not window.complaints
