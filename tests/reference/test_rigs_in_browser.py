@@ -55,11 +55,35 @@ def test_from_dropped_tables_to_a_report(desk: Desk, tmp_path: Path) -> None:
     for name in ("drive", "swing"):
         chart = page.locator(f"[role=application][aria-label^='{name} of steps over time']")
         zoomed_by_keys(chart, page.get_by_role("button", name="Whole", exact=True))
+    # What is bridged before structures are tried is so in the study, for all of its records.
+    page.get_by_role("button", name="Bridge it").click()
+    page.get_by_text("will be bridged").wait_for()
+    unit = page.get_by_label("Unit of drive")
+    unit.fill("mV")
+    unit.press("Tab")
     page.click("text=Write the study")
     page.locator("#content .box").wait_for()
     rig = page.url.rpartition("/")[2]
     study = desk.folder / "studies" / f"{rig}.toml"
     assert desk.study["model"][0]["inputs"] == ["drive"]
+    assert [each["records"] for each in desk.study["conditioning"]] == [["steps"]]
+    # A unit is read back from where the study says it, and stays in a proposal made anew.
+    page.reload()
+    assert unit.input_value() == "mV"
+    page.click("text=Propose anew")
+    page.locator("pre .changed").first.wait_for(state="detached")
+    page.get_by_role("button", name="Propose anew").wait_for()
+    assert unit.input_value() == "mV"
+    assert {each["units"]["drive"] for each in desk.study["record"]} == {"mV"}
+    assert [each["records"] for each in desk.study["conditioning"]] == [["steps"]]
+    unit.fill("V")
+    unit.press("Tab")
+    page.locator("pre .changed", has_text='drive = "V"').wait_for()
+    assert not any("units" in each for each in desk.study["record"])
+    page.select_option("#place", label="steps.csv: steps")
+    page.get_by_role("button", name="Do not bridge").click()
+    page.locator("pre .changed", has_text="Tried before outliers").wait_for()
+    assert not desk.study.get("conditioning")
     # What is advised about the spike is a click, and Undo takes it back.
     page.get_by_role("button", name="Bridge it").click()
     page.get_by_text("bridged by the study").wait_for()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,9 +16,10 @@ from flightid.cli.wording import as_typed
 from flightid.conventions import Light
 from flightid.errors import DataError, OptionError, StudyError, UnknownNameError
 from flightid.findings import Finding
-from flightid.study.proposal import Proposal, propose_study
+from flightid.study.proposal import Proposal, of_records, propose_study
 from flightid.study.proposal.columns import columns_of
 from flightid.study.proposal.of_records import study_of_records
+from flightid.study.proposal.structures_of import GroupScans
 from flightid.surface import speaking
 from tests.ordinary_log import write_ordinary_log
 
@@ -242,6 +244,37 @@ def test_data_without_a_model_give_no_study(tmp_path: Path) -> None:
     )
     said = " ".join(made.refusal().split())
     assert "the record is too short: 30 samples, 7 of them to choose orders by" in said
+
+
+@pytest.mark.parametrize("grid", [None, 0.1])
+def test_structures_are_tried_behind_what_the_study_conditions(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, grid: float | None
+) -> None:
+    """Of a servo with two spikes arx had 8 deg in place of .986, and the sentence stayed."""
+    time_s = np.arange(400) * 0.1
+    swing = np.sin(3.0 * time_s) + 0.01 * np.random.default_rng(0).standard_normal(400)
+    swing[[100, 260]] += 30.0
+    rows = np.column_stack([time_s, np.sign(np.sin(3.0 * time_s)), swing])
+    np.savetxt(tmp_path / "rig.csv", rows, delimiter=",", header="t_s,u,y", comments="")
+    seen: list[GroupScans] = []
+    monkeypatch.setattr(
+        of_records, "structures_of", lambda asked: (seen.append(asked), ([], []))[1]
+    )
+    outliers = {"deviations": 9, "channels": ["y"]}
+    told = {"conditioning": [
+        {"records": ["rig.csv: rig"], "outliers": outliers},
+        {"records": ["gone.csv: gone"], "detrend": "mean"},
+    ]}  # fmt: skip
+    for kept, most in ((told, 1.1), ({}, 29.0)):
+        made = propose_study(
+            [tmp_path / "rig.csv"], folder=tmp_path, inputs=["u"], outputs=["y"],
+            resample_to_s=grid, **kept,
+        )  # fmt: skip
+        flown = seen.pop().scans.flown("y", ("u",))
+        assert (np.abs(flown["y"]).max() < most) == bool(kept)
+        names = ["rig, fitted", "rig, choice", "rig, unseen"]
+        tables = [{"records": names, "outliers": outliers}] if kept else []
+        assert tomllib.loads(made.text).get("conditioning", []) == tables
 
 
 def test_units_and_a_fall_come_first_then_the_commands_that_go_on(tmp_path: Path) -> None:

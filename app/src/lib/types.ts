@@ -922,6 +922,7 @@ export interface RigProposal {
   model: string | null;
   units: Record<string, string>;
   actuators: Record<string, number>;
+  conditioning: Record<string, unknown>[];
 }
 
 /** How files are read, where they do not tell: as in `[defaults.record]` of a study. */

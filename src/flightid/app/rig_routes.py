@@ -33,6 +33,8 @@ from flightid.app.rigs import Rigs
 from flightid.app.study_edits import write_study
 from flightid.models import library_names
 
+ROLES = {"inputs", "outputs", "excitations", "model", "actuators", "conditioning"}
+"""What a proposal is asked beside how its files are read."""
 MOST_CHANNELS = 128
 """In one view: as many inputs and outputs as a study of records may be asked for."""
 
@@ -86,7 +88,7 @@ def add_rig_routes(app: FastAPI, backstage: Backstage) -> None:
         paths, target = _known(rigs, rig), workspace.study_path(rig)
         if asked.model is not None and asked.model not in library_names():
             raise HTTPException(422, f"The library has no model {asked.model}.")
-        roles = asked.model_dump(include={"inputs", "outputs", "excitations", "model", "actuators"})
+        roles = asked.model_dump(include=ROLES)
         reading = _options(asked) | ({"units": asked.units} if asked.units else {})
         # Structures are tried for as long as that takes, where it holds up no hand that drags.
         call = workers.proposed(rig, rig_work.propose, paths, target.parent, roles, reading)

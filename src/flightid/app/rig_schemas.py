@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
@@ -90,6 +90,8 @@ class RigProposal(RigReading):
     model: str | None = Field(None, pattern="^[a-z0-9_]{1,80}$")
     units: dict[str, str] = Field(default_factory=dict)
     actuators: dict[str, Annotated[float, Field(gt=0.0)]] = Field(default_factory=dict)
+    conditioning: list[dict[str, Any]] = Field(default_factory=list, max_length=64)
+    """Tables ``[[conditioning]]`` to keep; `records` are manoeuvres, ``FILE: MANOEUVRE``."""
 
 
 class RigScreen(Message):

@@ -243,7 +243,7 @@ class Edit(Message):
 class Edits(Message):
     """Edits that are made together."""
 
-    edits: list[Edit] = Field(min_length=1, max_length=32)
+    edits: list[Edit] = Field(min_length=1, max_length=256)
 
 
 class WholeText(Message):

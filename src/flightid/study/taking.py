@@ -22,7 +22,7 @@ from flightid.record.shared_ways import joined_ways, shared_ways
 from flightid.record.unit_changes import unit_changes
 from flightid.study.conditioning import Conditioning, condition, outliers_first
 from flightid.study.flight import FlightPlan
-from flightid.study.record_files import declared, load_records, made_by
+from flightid.study.record_files import RecordFile, declared, load_records, made_by
 from flightid.study.settings import Segment, Settings
 from flightid.study.stage_runner import StageResult, StageRunner
 from flightid.study.task import Task
@@ -95,7 +95,7 @@ def take(
             if file.name in needed
         }
         files |= _read_alike(files, settings, needed, runner)
-        made = _conditioned(files, settings, runner, checks)
+        made = conditioned(files, settings.record_files, settings.conditioning, runner, checks)
         made = _in_units_of(tasks, made, runner)
         return StudyRecords(made, tuple(paths), checks=checks)
     flown, truth = _obtain_log(settings, given, folder, runner)
@@ -121,7 +121,7 @@ def take(
         if segment.name in needed
     }
     inspection = runner.stage("inspection", inspect_log, opened) if inspects else None
-    made = _conditioned(cut, settings, runner, checks)
+    made = conditioned(cut, (), settings.conditioning, runner, checks)
     made = _in_units_of(tasks, made, runner)
     return StudyRecords(made, (flown,), inspection, truth, opened, checks)
 
@@ -148,19 +148,20 @@ def _read_alike(
     return found
 
 
-def _conditioned(
+def conditioned(
     records: Mapping[str, StageResult[list[Record]]],
-    settings: Settings,
+    files: Iterable[RecordFile],
+    asked: Iterable[Conditioning],
     runner: StageRunner,
     checks: dict[str, KinematicConsistency],
 ) -> dict[str, StageResult[list[Record]]]:
     """Records after the steps that are meant for them; what their checks found is added."""
     made = dict(records)
-    read = {file.name for file in settings.record_files if file.resample_to_s is not None}
+    read = {file.name for file in files if file.resample_to_s is not None}
     for name, record in records.items():
         steps = tuple(
             replace(step, records=(), outliers=None if name in read else step.outliers)
-            for step in settings.conditioning
+            for step in asked
             if not step.records or name in step.records
         )
         if steps:

@@ -18,6 +18,7 @@ from flightid.record.time_question import time_said
 from flightid.simulation.actuators import check_actuators
 from flightid.study.model_settings import placed
 from flightid.study.proposal.columns import Columns
+from flightid.study.proposal.kept_conditioning import KeptConditioning
 from flightid.study.proposal.options import DataOptions, told
 from flightid.study.proposal.order_scans import ProposedScans, record_file
 from flightid.study.proposal.proposal import Proposal
@@ -49,6 +50,7 @@ def study_of_records(
     excitations: tuple[str, ...] = (),
     actuators: Mapping[str, float] | None = None,
     reading: DataOptions | None = None,
+    conditioning: Sequence[Mapping[str, Any]] = (),
     cache: MutableMapping[str, Any] | None = None,
 ) -> Proposal:
     """Study file for records.
@@ -69,6 +71,8 @@ def study_of_records(
         Bandwidths, rad/s, of known actuators between columns and the inputs of equations.
     reading : DataOptions, optional
         How the files are read.
+    conditioning : sequence of mapping
+        Tables ``[[conditioning]]`` of the study; `records` are manoeuvres, ``FILE: MANOEUVRE``.
     cache : mutable mapping of str to object, optional
         Takes the records and scans of the study, so that its run finds them done.
 
@@ -101,6 +105,8 @@ def study_of_records(
     runner = StageRunner(cache)
     names: list[str] = []
     together: list[str] = []
+    kept = KeptConditioning(tuple(conditioning))
+    cut: list[tuple[str, Stretch]] = []
     for whole in groups:
         segments = segments_of(whole) if swept is None else swept[1]
         short = too_short(whole, segments) if model is None else None
@@ -109,6 +115,7 @@ def study_of_records(
             continue
         group, still = _driven(whole, segments) if swept is None else (whole, [])
         missed += still
+        cut += [(name, part) for name, part, _ in segments.all]
         tables = {}
         for name, part, span in segments.all:
             timed = [] if source.reading.time_column else part.time_key()
@@ -117,7 +124,9 @@ def study_of_records(
         fitted, choice = (
             record_file(tables[n], folder) for n in (segments.fitted, segments.choice)
         )
-        scans = ProposedScans(fitted, choice, group.inputs, columns.outputs, injected, runner)
+        scans = ProposedScans(
+            fitted, choice, group.inputs, columns.outputs, injected, runner, kept.steps(segments)
+        )  # fmt: skip
         asked = GroupScans(group, segments, scans)
         if model is not None:
             names.append(Path(model).stem)
@@ -129,6 +138,7 @@ def study_of_records(
         for each in found:
             body += each.lines
             together += each.said
+    body += kept.lines(cut)
     with speaking(as_key):
         keyed = _times(read)
     told_of = (*columns.said, *converted, *_times(read), *_stamps(read), *together)

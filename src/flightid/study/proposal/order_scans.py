@@ -18,6 +18,7 @@ from flightid.reading import parse_toml
 from flightid.record import Record
 from flightid.responses.coherent_pairs import DRIVING_DECADES
 from flightid.simulation.metrics import rms_error
+from flightid.study.conditioning import Conditioning, outliers_first
 from flightid.study.kind_scans import scan_narx, scan_subspace
 from flightid.study.reading import TableReader
 from flightid.study.record_files import RecordFile, load_records, read_record_file
@@ -30,6 +31,7 @@ from flightid.study.stages import (
     select_coherent,
 )
 from flightid.study.structure_settings import SUBSPACE, StructureSettings
+from flightid.study.taking import conditioned
 from flightid.study.task import narrowed
 from flightid.surface import as_key, speaking
 from flightid.validation import OrderScan
@@ -62,6 +64,8 @@ class ProposedScans:
     inputs, outputs, injected : tuple of str
         Channels of all models of the study; injected ones are read with what is fitted.
     runner : StageRunner
+    conditioning : tuple of Conditioning
+        Steps of the study, by the names of its records.
     """
 
     fitted: RecordFile
@@ -70,20 +74,27 @@ class ProposedScans:
     outputs: tuple[str, ...]
     injected: tuple[str, ...]
     runner: StageRunner
+    conditioning: tuple[Conditioning, ...] = ()
 
     @cached_property
     def _records(self) -> tuple[StageResult[list[Record]], StageResult[list[Record]]]:
-        """Loaded as the study does it, without what it conditions: a proposal asks for none."""
+        """Loaded and conditioned as the study does it."""
         roles = {
             **dict.fromkeys(self.inputs, Role.INPUT),
             **dict.fromkeys(self.outputs, Role.OUTPUT),
         }
         beside = dict.fromkeys(self.injected, Role.EXCITATION)
         first, second = (
-            self.runner.stage(f"record: {file.name}", load_records, file, channels, None)
+            self._record(file, channels)
             for file, channels in ((self.fitted, beside | roles), (self.choice, roles))
         )
         return first, second
+
+    def _record(self, file: RecordFile, channels: Mapping[str, Role]) -> StageResult[list[Record]]:
+        first = outliers_first(self.conditioning, file, channels)
+        read = self.runner.stage(f"record: {file.name}", load_records, file, channels, first)
+        steps = self.conditioning
+        return conditioned({file.name: read}, (file,), steps, self.runner, {})[file.name]
 
     def driving(self, outputs: tuple[str, ...], band_rad_s: Band | None) -> tuple[str, ...]:
         """Inputs that the study will take for outputs: those whose responses are coherent.

@@ -25,6 +25,7 @@ def propose_study(
     outputs: Sequence[str] = (),
     excitations: Sequence[str] = (),
     actuators: Mapping[str, float] | None = None,
+    conditioning: Sequence[Mapping[str, Any]] = (),
     tune: bool = False,
     cache: MutableMapping[str, Any] | None = None,
     **reading: Any,  # noqa: ANN401 — fields of DataOptions
@@ -48,6 +49,9 @@ def propose_study(
     actuators : mapping of str to float, optional
         Bandwidths, rad/s, of known first-order actuators that lie between a column and the input
         of `model`: they are taken out of the records.
+    conditioning : sequence of mapping, optional
+        Tables ``[[conditioning]]`` of a study of records, which structures are tried behind; their
+        `records` are manoeuvres, ``FILE: MANOEUVRE``.
     tune : bool
         Let the study end in gains of the autopilot that flew.
     cache : mutable mapping of str to object, optional
@@ -71,7 +75,8 @@ def propose_study(
     paths = [Path(file) for file in files]
     asked = checked(DataOptions, reading, "a study of records")
     # Columns that are named are those of the topics of a bag, or of a decoded blackbox.
-    named = bool(inputs or outputs or excitations or actuators or told(asked) != asked.declared)
+    roles = inputs or outputs or excitations or actuators or conditioning
+    named = bool(roles or told(asked) != asked.declared)
     if model is not None and model.endswith(".toml") and Path(model).is_file():
         model = Path(os.path.relpath(model, folder)).as_posix()
     logs = [path for path in paths if is_log(path) and not (named and is_table_too(path))]
@@ -85,6 +90,7 @@ def propose_study(
             excitations=tuple(excitations),
             actuators=actuators or {},
             reading=asked,
+            conditioning=conditioning,
             cache=cache,
         )
     if len(paths) > 1 or named:
