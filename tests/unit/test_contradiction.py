@@ -10,8 +10,11 @@ from scipy.signal import lfilter
 
 import flightid as fid
 from flightid.conventions import Light
+from flightid.identification.prediction.predict import predictor_of
+from flightid.identification.prediction.request import FREE_RUN, Request
+from flightid.identification.prediction.result import Prediction
 from flightid.identification.withheld_intervals import without_intervals
-from flightid.validation.verification.contradiction import CODE
+from flightid.validation.verification.contradiction import CODE, contradictions
 
 TIME_S = np.arange(800) / 20.0
 
@@ -56,3 +59,28 @@ def test_bars_of_the_parameters_allow_for_what_the_fit_could_not_tell() -> None:
     short = flown(3, 1.0, noise=3.0)
     fit = fid.identify(STRUCTURES[0], short.segment(0.0, 10.0))
     assert not [each for each in fid.verify(fit, flown(4, 1.2)).findings if each.code == CODE]
+
+
+def test_what_bars_allow_is_of_all_outputs_together_as_the_run_was() -> None:
+    """One output alone told so little of start and biases that any error was allowed."""
+
+    def two(seed: int, gain: float) -> fid.Record:
+        made = flown(seed, gain)
+        rows = {"y": made["y"], "z": flown(seed + 10, 0.0)["y"] - made["y"]}
+        return fid.Record.from_arrays(TIME_S, inputs={"u": made["u"]}, outputs=rows)
+
+    fit = fid.identify(fid.InnovationsModel.subspace("u", ("y", "z"), order=1), two(1, 1.0))
+    model, way = predictor_of(fit)
+    asked = []
+
+    def watched(
+        model: object, record: fid.Record, outputs: tuple[str, ...], request: Request
+    ) -> Prediction:
+        asked.append(outputs)
+        return way(model, record, outputs, request)
+
+    request = Request(FREE_RUN)
+    run = way(model, two(2, 2.5), ("y", "z"), request)
+    said = [each.light for each in contradictions(fit, watched, [run], request)]
+    assert said == [Light.RED, Light.RED]
+    assert set(asked) == {("y", "z")}

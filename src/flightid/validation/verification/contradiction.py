@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from functools import partial
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import cache, partial
 
 import numpy as np
 import scipy
@@ -17,9 +18,11 @@ from flightid.identification.prediction.predict import Predictor
 from flightid.identification.prediction.remembered import of_record, provenance_entry
 from flightid.identification.prediction.request import FREE_RUN, Request
 from flightid.identification.prediction.result import Prediction
+from flightid.identification.prediction.weights import guide_factor
 from flightid.identification.uncertain_of import uncertain_of
 from flightid.models.model import model_of
 from flightid.uncertainty.foretold import independent_samples
+from flightid.validation.verification.foretold_error import LEVEL, chances_by_output
 
 Array = NDArray[np.float64]
 CODE = "unseen-contradicts"
@@ -40,7 +43,8 @@ def contradictions(
 
     Allowed is the power of what the fit's own free run left of its records, with what the errors of
     the parameters add to this run. Their ratio is tested by Fisher's F with as many degrees of
-    freedom as there are independent samples in both errors.
+    freedom as there are independent samples in both errors. None is red where inputs foretell no
+    error: a right model errs so in more gust than the fit's records had.
 
     Parameters
     ----------
@@ -66,29 +70,27 @@ def contradictions(
     entry = provenance_entry(source, LEFT)
     if not isinstance(entry, Mapping) or request.horizon != FREE_RUN:
         return ()
-    found = (
-        _judged(source, way, each, request, name, entry[name])
-        for each in made
-        for name in each.outputs
-        if name in entry
-    )
-    return tuple(each for each in found if each is not None)
+    alone = cache(partial(_no_input_foretells, made))
+    found = []
+    for run in made:
+        moved = cache(partial(_by_parameters, source, way, run, request))
+        beyond = (_judged(run, name, entry[name], moved) for name in run.outputs if name in entry)
+        found += [each for each in beyond if each is not None]
+    return tuple(_as_gusts_may(each) if _is_red(each) and alone() else each for each in found)
 
 
 def _judged(
-    source: object,
-    way: Predictor,
     run: Prediction,
-    request: Request,
     name: str,
     left: Mapping[str, float],
+    moved: Callable[[], Mapping[str, float]],
 ) -> Finding | None:
     y, y_hat = run.scored(name)
     error, power = y - y_hat, float(np.mean(y**2))
     size, own = float(np.mean(error**2)), float(left["rms"]) ** 2
     if not _is_beyond(size, own, power):
         return None
-    known = _by_parameters(source, way, run, request, name)
+    known = moved().get(name)
     own += known or 0.0
     freedom = (independent_samples([error]), float(left["independent_samples"]))
     chance = float(scipy.special.fdtrc(*freedom, size / max(own, np.finfo(float).tiny)))
@@ -114,22 +116,48 @@ def _is_beyond(size: float, allowed: float, power: float) -> bool:
     return size > BEYOND**2 * allowed and size - allowed > MATERIAL * power
 
 
+def _is_red(finding: Finding) -> bool:
+    return finding.light is Light.RED
+
+
+def _no_input_foretells(made: Sequence[Prediction]) -> bool:
+    """Whether no output's error is foretold by the inputs, as none of a right model in gusts is.
+
+    Gusts move what flies: motions in the units of these alone are asked.
+    """
+    if all(guide_factor(made[0].measured.unit(name)) is None for name in made[0].outputs):
+        return False
+    chances = chances_by_output(made)
+    return bool(chances) and min(chances.values()) >= LEVEL
+
+
+def _as_gusts_may(finding: Finding) -> Finding:
+    said = "; inputs foretell none of the errors: gusts beyond those of the fit's records may be it"
+    return replace(finding, light=Light.AMBER, message=finding.message + said)
+
+
 def _by_parameters(
-    source: object, way: Predictor, run: Prediction, request: Request, name: str
-) -> float | None:
-    """Mean square of what errors of the parameters move in this run; None where none are known."""
+    source: object, way: Predictor, run: Prediction, request: Request
+) -> dict[str, float]:
+    """Mean squares of what errors of the parameters move in this run; none where none are known.
+
+    All outputs are predicted together, as they were in the run: start and biases are solved for on
+    them, and one alone tells too little of these.
+    """
     try:
-        answer = partial(_answer, source, way, run, request, name)
+        answer = partial(_answer, source, way, run, request)
         ends = uncertain_of(source).steps(STEP)
         moved = [answer(model_of(up)) - answer(model_of(down)) for up, down in ends]
     except FlightidError:
-        return None
-    size = [float(np.mean(np.square(each))) for each in moved]
-    return float(np.nansum(size)) / (2.0 * STEP) ** 2 if size else None
+        return {}
+    if not moved:
+        return {}
+    size = np.nansum([np.mean(np.square(each), axis=1) for each in moved], axis=0)
+    return dict(zip(run.outputs, map(float, size / (2.0 * STEP) ** 2), strict=True))
 
 
 def _answer(
-    source: object, way: Predictor, run: Prediction, request: Request, name: str, model: object
+    source: object, way: Predictor, run: Prediction, request: Request, model: object
 ) -> Array:
-    made = way(of_record(source, model, run.measured), run.measured, (name,), request)
-    return np.asarray(made.predicted[name][run.start :])
+    made = way(of_record(source, model, run.measured), run.measured, run.outputs, request)
+    return np.array([made.predicted[name][run.start :] for name in run.outputs])

@@ -32,6 +32,7 @@ LEVEL = 0.003
 noisy sensors measure about three times as many are called wrong."""
 CALM = "verify on a record in calmer air, or with larger inputs: this one cannot tell"
 WRONG = "look for what this output lacks: an input's gain, lag or delay"
+FIRST = "look first for what {} lacks: an input's gain, lag or delay"
 NO_NOISE = 1e-8
 """Share of an error that its past leaves below which no noise made it, and so no gust."""
 RESOLVED = 1e-10
@@ -123,25 +124,33 @@ def unless_gusts(
     whole = all(each.horizon == FREE_RUN and each.diverged_at is None for each in made)
     if not red or not whole:
         return tuple(findings)
-    errors = [np.array([each.residual(name) for name in each.outputs]) for each in made]
-    inputs = [each.predicted.matrix(each.predicted.inputs) for each in made]
-    chances = foretold_chances(errors, inputs)
-    if chances is None:
+    by_output = chances_by_output(made)
+    if not by_output:
         return tuple(findings)
-    by_output = dict(zip(made[0].outputs, map(float, chances), strict=True))
     own = [_output_of(each, by_output) if each.code in codes else None for each in findings]
     poor = [
         by_output[name]
         for name, each in zip(own, findings, strict=True)
-        if name is not None and each.light is not Light.GREEN
+        if name is not None and each.light in (Light.AMBER, Light.RED)
     ]
     together = min(poor, default=min(by_output.values()))
+    wrong = [name for name, chance in by_output.items() if chance < LEVEL]
     return tuple(
-        _weighed(each, together if name is None else by_output[name])
+        _weighed(each, together if name is None else by_output[name], wrong)
         if each.code in codes
         else each
         for name, each in zip(own, findings, strict=True)
     )
+
+
+def chances_by_output(made: Sequence[Prediction]) -> dict[str, float]:
+    """`foretold_chances` of free runs, by output; none where records are too short to tell."""
+    errors = [np.array([each.residual(name) for name in each.outputs]) for each in made]
+    inputs = [each.predicted.matrix(each.predicted.inputs) for each in made]
+    chances = foretold_chances(errors, inputs)
+    if chances is None:
+        return {}
+    return dict(zip(made[0].outputs, map(float, chances), strict=True))
 
 
 def _output_of(finding: Finding, names: Iterable[str]) -> str | None:
@@ -149,21 +158,29 @@ def _output_of(finding: Finding, names: Iterable[str]) -> str | None:
     return next((name for name in names if finding.message.startswith(f"{name}: ")), None)
 
 
-def _weighed(finding: Finding, chance: float) -> Finding:
-    """A verdict with the chance that inputs foretell as much of its error."""
+def _weighed(finding: Finding, chance: float, wrong: Sequence[str]) -> Finding:
+    """A verdict with the chance that inputs foretell as much of its error.
+
+    `wrong` are the outputs whose errors inputs foretell: what such a record shows is not of gusts
+    alone.
+    """
     foretold = chance < LEVEL
-    if foretold and finding.light is Light.GREEN:
+    if foretold and finding.light in (Light.GREEN, Light.UNKNOWN):
         said = (
             f"; yet inputs foretell some of the error (p = {chance:.2g}): the model is wrong there"
         )
         return replace(finding, light=Light.AMBER, message=finding.message + said, action=WRONG)
     if foretold or finding.light is not Light.RED:
         return finding
-    said = (
-        f"; inputs foretell no more of the error than chance does (p = {chance:.2g}): it is "
-        "as much as gusts alone make, and contradicts the model in nothing"
-    )
-    return replace(finding, light=Light.AMBER, message=finding.message + said, action=CALM)
+    said = "; beyond its own past inputs foretell no more of the error than chance does "
+    said += f"(p = {chance:.2g}): "
+    others = ", ".join(wrong)
+    if wrong:
+        said += f"it may follow from what is wrong in {others}, or be gusts"
+    else:
+        said += "gusts alone could make it, and this record does not tell them from a wrong model"
+    action = FIRST.format(others) if wrong else CALM
+    return replace(finding, light=Light.AMBER, message=finding.message + said, action=action)
 
 
 def _past(samples: int, channels: int) -> int:

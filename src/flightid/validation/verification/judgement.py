@@ -12,6 +12,7 @@ from flightid.identification.prediction.request import FREE_RUN, Request
 from flightid.identification.prediction.result import Prediction
 from flightid.identification.prediction.weights import guide_factor, guide_weights, is_vehicle
 from flightid.simulation import metrics
+from flightid.validation.verification.beside_noise import BesideNoise, beside_noise
 from flightid.validation.verification.muad import Mismatch
 from flightid.validation.verification.of_the_fit import weighed
 from flightid.validation.verification.result import Verification
@@ -19,6 +20,7 @@ from flightid.validation.verification.result import Verification
 THEIL_GUIDE = (0.25, 0.30)
 THEIL = "verification-theil"
 J_RMS_GUIDE = (1.0, 2.0)
+MOVE_MORE = "verify on a record that moves the output more"
 
 
 def judge(
@@ -94,7 +96,9 @@ def overall_theil(predictions: Sequence[Prediction], compared: tuple[str, ...]) 
     return float(error / (seen + said))
 
 
-def _theil_findings(overall: float, theil: dict[str, float]) -> list[Finding]:
+def _theil_findings(
+    overall: float, theil: dict[str, float], predictions: Sequence[Prediction]
+) -> list[Finding]:
     """All outputs together, then each; a poor one is no red by itself where all together agree.
 
     An output that these inputs hardly move is mostly gust and noise, and no model predicts that.
@@ -104,20 +108,39 @@ def _theil_findings(overall: float, theil: dict[str, float]) -> list[Finding]:
     values = {"all outputs together": overall, **theil} if several else theil
     found = []
     for name, value in values.items():
+        said = ""
         light = light_of(value, THEIL_GUIDE)
         if light is Light.RED and verdict is not Light.RED:
             light = Light.AMBER
         action = "" if light is Light.GREEN else "look where the prediction parts from the record"
+        beside = None
+        if light is not Light.GREEN and name in theil:
+            beside = beside_noise(predictions, name)
+        if beside is not None:
+            light, said, action = _with_noise(light, beside, action)
         found.append(
             Finding(
                 THEIL,
                 light,
                 f"{name}: Theil coefficient {value:.3f}, guide at most {THEIL_GUIDE[0]:g} "
-                f"to {THEIL_GUIDE[1]:g}",
+                f"to {THEIL_GUIDE[1]:g}{said}",
                 action,
             )
         )
     return found
+
+
+def _with_noise(light: Light, beside: BesideNoise, action: str) -> tuple[Light, str, str]:
+    """Light, further words and action of an output whose error is noise in part.
+
+    Noise that no model explains is no misfit; where it hides the motion, nothing is told of either.
+    """
+    said = f"; white noise of the measurement makes {beside.noise_percent:.3g} % of the error"
+    if beside.most <= THEIL_GUIDE[0]:
+        return Light.GREEN, f"{said}, without it at most {beside.most:.2g}", ""
+    if beside.least > THEIL_GUIDE[0]:
+        return light, f"{said}, without it at least {beside.least:.2g}", action
+    return Light.UNKNOWN, f"{said} and hides whether the rest is within it", MOVE_MORE
 
 
 def _findings(
@@ -126,7 +149,7 @@ def _findings(
     j_rms: float | None,
     predictions: tuple[Prediction, ...],
 ) -> tuple[Finding, ...]:
-    found = _theil_findings(overall, theil)
+    found = _theil_findings(overall, theil, predictions)
     if j_rms is not None:
         # The guide is in absolute units, for piloted aircraft and modest inputs: no red by itself.
         light = Light.GREEN if j_rms <= J_RMS_GUIDE[1] else Light.AMBER
