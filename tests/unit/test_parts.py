@@ -141,6 +141,8 @@ def test_halves_that_differ_by_little_are_amber_with_the_wider_interval() -> Non
     assert "up to 10 times and to ±3.9 %" in near.what
     assert agreement_check(found, np.array([-0.5, 1.0])).light is Light.RED
     assert agreement_check(found).light is Light.RED
+    both = agreement_check(Agreement(2, 1e-9, 1e-4, noise))
+    assert both.what.endswith("(p = 1e-09), and so do records (p = 0.0001)")
 
 
 def test_one_record_says_that_it_cannot_know() -> None:

@@ -98,7 +98,8 @@ def _compared(found: Agreement, apart: float | None) -> Check:
         return Check(AGREEMENT, Light.GREEN, _alike(found) + widened)
     if found.halves_differ:
         whose = "a record" if several else "the record"
-        what = f"halves of {whose} differ by more than noise (p = {found.halves:.2g}){widened}"
+        so = f", and so do records (p = {found.records:.2g})" if found.records_differ else ""
+        what = f"halves of {whose} differ by more than noise (p = {found.halves:.2g}){so}{widened}"
         small = apart is not None and apart < MATERIAL_PERCENT
         return Check(AGREEMENT, Light.AMBER if small else Light.RED, what, HALVES_ACTION)
     what = f"{found.n_records} records differ by more than noise (p = {found.records:.2g}){widened}"

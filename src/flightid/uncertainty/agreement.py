@@ -79,12 +79,17 @@ class Agreement:
     @property
     def agree(self) -> bool:
         """Whether all parts that were compared agree."""
-        return not (_differ(self.halves) or _differ(self.records))
+        return not (self.halves_differ or self.records_differ)
 
     @property
     def halves_differ(self) -> bool:
         """Whether halves of a record differ by more than their noise."""
         return _differ(self.halves)
+
+    @property
+    def records_differ(self) -> bool:
+        """Whether records differ by more than their noise."""
+        return _differ(self.records)
 
     @property
     def factor(self) -> float:
