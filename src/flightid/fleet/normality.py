@@ -26,6 +26,7 @@ INSIDE = f", {SHORTEST} flights or more on either side,"
 SEVERAL = 2
 """Vehicles from which a parameter or a model is the type's, and newest flights that are a sign."""
 MORE = "log more flights of it, and of more vehicles of its type"
+WITH_ALL = "look for what all share; a vehicle that did not fly meanwhile tells wear from the rest"
 
 
 def quiet_light(vehicle: str, types: Iterable[TypeAnswers]) -> Finding:
@@ -40,8 +41,9 @@ def quiet_light(vehicle: str, types: Iterable[TypeAnswers]) -> Finding:
     Returns
     -------
     Finding
-        Green where every parameter of it was held beside its history and its type; unknown, with
-        the reason, where a question that was asked has no answer.
+        Green where every parameter of it was held beside its history and its type, amber where one
+        rose or fell with all vehicles; unknown, with the reason, where a question that was asked
+        has no answer.
     """
     every = list(types)
     mine = [each for each in every if vehicle in each.data.members]
@@ -64,6 +66,9 @@ def quiet_light(vehicle: str, types: Iterable[TypeAnswers]) -> Finding:
         return Finding("vehicle", Light.UNKNOWN, f"{vehicle}: {said}", MORE)
     if not known:
         return Finding("vehicle", Light.UNKNOWN, f"{vehicle}: nothing was asked of it")
+    if trends := [words for history, of in seen for words in _trend_words(history, of)]:
+        said = f"{', '.join(known)}; {'; '.join(trends)}"
+        return Finding("vehicle", Light.AMBER, f"{vehicle}: {said}", WITH_ALL)
     return Finding("vehicle", Light.GREEN, f"{vehicle}: {', '.join(known)}")
 
 
@@ -77,6 +82,14 @@ def _is_shared(history: ParameterHistory, each: TypeAnswers) -> bool:
     """Whether what all vehicles did by date is out of a history."""
     every = each.drift.shared if each.drift is not None else ()
     return any(one.name == history.name for one in every)
+
+
+def _trend_words(history: ParameterHistory, each: TypeAnswers) -> Iterator[str]:
+    """Where a parameter rose or fell with all vehicles: beside them it did not change."""
+    for one in each.drift.shared if each.drift is not None else ():
+        if one.name == history.name and one.trend is not None:
+            name = each.labels.get(one.name, one.name)
+            yield f"{name} went with all vehicles, which {one.trend.words}"
 
 
 def _is_seen(history: ParameterHistory) -> bool:

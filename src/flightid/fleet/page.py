@@ -227,7 +227,7 @@ def _drift_blocks(drift: FleetDrift, labels: Mapping[str, str]) -> Iterator[Bloc
         yield Paragraph(f"Not answered: {drift.reason}.")
     else:
         changes = drift.summary(labels=labels)
-        yield TableBlock(changes) if changes.rows else Paragraph(_unchanged(changes))
+        yield TableBlock(changes) if changes.rows else Paragraph(_unchanged(drift, changes))
     events = events_table(drift, labels)
     if events.rows:
         yield TableBlock(events)
@@ -242,8 +242,10 @@ def _drift_blocks(drift: FleetDrift, labels: Mapping[str, str]) -> Iterator[Bloc
         yield figure_block(history_picture(drift.judged[:SHOWN], labels), caption)
 
 
-def _unchanged(changes: Table) -> str:
-    return " ".join(("Nothing changed:", changes.notes[0], *changes.notes[1:]))
+def _unchanged(drift: FleetDrift, changes: Table) -> str:
+    together = drift.shared or drift.alike
+    said = "No vehicle changed beside the others:" if together else "Nothing changed:"
+    return " ".join((said, *changes.notes))
 
 
 def slopes_table(drift: FleetDrift, labels: Mapping[str, str]) -> Table:

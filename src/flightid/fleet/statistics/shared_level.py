@@ -15,7 +15,14 @@ from numpy.typing import NDArray
 from scipy.special import bdtrc
 
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
+from flightid.fleet.statistics.own_steps import own_steps
 from flightid.fleet.statistics.repeats import days_of
+from flightid.fleet.statistics.shared_trend import (
+    TRENDLIKE,
+    SharedTrend,
+    line_share,
+    shared_trend,
+)
 from flightid.frozen import dataclass
 from flightid.record.outlying import NORMAL_MAD
 from flightid.uncertainty.estimate import Estimate
@@ -58,7 +65,10 @@ class SharedLevel:
     least, most : float
         Of the whole movement, in the unit of `change`.
     vehicles, agreeing : int
-        Vehicles that tell it, and those of them that move with the others.
+        Vehicles that tell it, and those of them that move with the others: of a step those whose
+        own is told apart from none, and not apart from it.
+    trend : SharedTrend or None
+        Where all rise or fall by and by.
     """
 
     name: str
@@ -71,6 +81,7 @@ class SharedLevel:
     most: float
     vehicles: int
     agreeing: int
+    trend: SharedTrend | None = None
 
     def words(self, labels: Mapping[str, str], apart: Collection[str] = ()) -> str:
         """What all did together, or most beside those that are apart; dates on the clock of Unix.
@@ -84,13 +95,18 @@ class SharedLevel:
         if apart:
             some = "one" if len(apart) == 1 else "some"
             whose += f"; {', '.join(sorted(apart))} may be {some} that did not"
+        elif count < self.vehicles and self.is_step:
+            whose += " tell it by themselves"
         who = "all" if count == self.vehicles else "most"
+        if self.trend is not None:
+            return f"{name}: {who} vehicles {self.trend.words} ({whose})"
         if not self.is_step:
             ends = f"{self.least:+.2g} to {self.most:+.2g}{unit} of its usual value"
             return f"{name}: {who} vehicles moved together by date, {ends} ({whose})"
         since = datetime.datetime.fromtimestamp(self.since_s, datetime.UTC).date().isoformat()
         low, high = self.change.interval(shown()) or (-np.inf, np.inf)
         by = f"{self.change.value:+.2g}{unit} ({low:+.2g} to {high:+.2g}{unit})"
+        who = who if 2 * count > self.vehicles else "the"
         return f"{name}: {who} vehicles changed together by {by} from {since} ({whose})"
 
 
@@ -100,7 +116,8 @@ def shared_level(data: FlightEstimates, i: int) -> SharedLevel | None:
     r = y / m − 1 with the median m of each vehicle (y − m where a median may be zero); the shared
     level of a week is the median of r over its flights, weeks parted at the largest common step.
     It counts where ≥ 85 % of vehicles have Σ r c > 0 with the level c of the others, and so many by
-    chance in less than 5 %.
+    chance in less than 5 %, and not where more than a few stayed (`OwnSteps.some_stayed`): of three
+    of six that change by 10 % the level would be half of it, and all six move with it.
 
     Parameters
     ----------
@@ -142,18 +159,23 @@ def shared_level(data: FlightEstimates, i: int) -> SharedLevel | None:
     there = counts > 0
     after = np.array([time_s[bins == b].min() >= since for b in np.flatnonzero(there)])
     told = _step(level[there], variance[there], counts[there], after)
+    step = Estimate(data.names[i], told[0], "1", told[1])
+    steps = own_steps(residual - level[bins], member, day, time_s >= since, step)
+    if steps.some_stayed:
+        return None
     size, unit = (100.0, "%") if in_percent else (1.0, data.units[i])
+    change = Estimate(data.names[i], size * told[0], unit, size * told[1])
+    when = np.array([time_s[bins == b].mean() for b in np.flatnonzero(there)])
+    line = line_share(level[there], variance[there], counts[there], when)
+    beside = line_share(level[there], np.zeros(len(when)), counts[there], when)
+    is_trend = line >= TRENDLIKE and beside > told[2]
+    is_step = told[2] >= STEPLIKE and not is_trend
     return SharedLevel(
         data.names[i],
-        moved,
-        variances,
-        told[2] >= STEPLIKE,
-        since,
-        Estimate(data.names[i], size * told[0], unit, size * told[1]),
-        size * float(level[there].min()),
-        size * float(level[there].max()),
-        vehicles,
-        agreeing,
+        *(moved, variances, is_step, since, change),
+        *(size * float(level[there].min()), size * float(level[there].max())),
+        *(vehicles, steps.told if is_step else agreeing),
+        shared_trend(residual, member, time_s, day, change) if is_trend else None,
     )
 
 

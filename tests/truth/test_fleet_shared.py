@@ -1,0 +1,61 @@
+"""What a small fleet shares by date: not what half of it did, and wear with direction and size."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from flightid.conventions import Light
+from flightid.fleet.statistics.answers import TypeAnswers
+from flightid.fleet.statistics.drift import FleetDrift, find_drift
+from flightid.fleet.statistics.flight_estimates import FlightEstimates
+from flightid.fleet.vehicle_lights import vehicle_light
+
+VEHICLES, FLIGHTS = [*"abcdef"], 12
+
+
+def _fleet(seed: int, moved: np.ndarray) -> tuple[FlightEstimates, FleetDrift]:
+    """Six vehicles with twelve flights each, one every second day, with errors of 3 %."""
+    rng, shape = np.random.default_rng(seed), (len(VEHICLES), FLIGHTS)
+    levels = 140.0 * (1.0 + 0.08 * rng.normal(size=(len(VEHICLES), 1))) * (1.0 + moved)
+    values = levels * (1.0 + 0.03 * rng.normal(size=shape))
+    data = FlightEstimates.of(
+        ["k"],
+        np.repeat(VEHICLES, FLIGHTS).tolist(),
+        values.reshape(-1, 1),
+        ((0.03 * levels) ** 2).reshape(-1, 1, 1),
+        time_s=np.tile(2.0 * 86400.0 * np.arange(FLIGHTS), len(VEHICLES)),
+    )
+    return data, find_drift(data)
+
+
+@pytest.mark.parametrize("seed", [10, 34])
+def test_half_of_a_small_fleet_is_not_all_of_it(seed: int) -> None:
+    """It was "all vehicles changed together by −5 % (6 of 6 vehicles)", and all six were green."""
+    moved = np.zeros((len(VEHICLES), FLIGHTS))
+    moved[:3, 6:] = -0.1
+    data, drift = _fleet(seed, moved)
+    assert not drift.shared
+    answered = [TypeAnswers("quad", "roll", data, None, None, drift)]
+    lights = [vehicle_light(each, answered).light for each in VEHICLES]
+    assert set(lights[:3]) <= {Light.RED, Light.AMBER}
+    assert Light.RED not in lights[3:]
+
+
+def test_wear_of_all_has_direction_size_and_dates() -> None:
+    """It was "moved together by date, −9 to +7 %", and each vehicle green."""
+    worn = -0.2 * np.arange(FLIGHTS) / (FLIGHTS - 1)
+    data, drift = _fleet(1, np.tile(worn, (len(VEHICLES), 1)))
+    (shared,) = drift.shared
+    assert not drift.alarms
+    assert shared.trend is not None
+    low, high = shared.trend.change.interval(0.95) or (0.0, 0.0)
+    assert -26.0 < low < -20.0 < high < -14.0
+    said = shared.words({})
+    assert said.startswith("k: all vehicles fell by ")
+    assert "from 1970-01-01 to 1970-01-23: wear of all, a season, or a change of what" in said
+    answered = [TypeAnswers("quad", "roll", data, None, None, drift)]
+    for each in VEHICLES:
+        found = vehicle_light(each, answered)
+        assert found.light is Light.AMBER
+        assert "k went with all vehicles, which fell by " in found.message
