@@ -226,6 +226,13 @@ def _of_plan(stage: Stage) -> Iterator[str]:
     stage.open(f"plan/{stage.logs['calm']}")
     page.locator("section[aria-label='What is asked for'], .error").first.wait_for()
     yield "an ordinary log"
+    page.fill("#amplitude", "0.05")
+    page.press("#amplitude", "Tab")
+    page.locator("button:enabled", has_text="Undo").first.wait_for()
+    page.reload()
+    page.locator("#amplitude").wait_for()
+    assert page.input_value("#amplitude") == "0.05", "of a log without a model too"
+    yield "what is asked of an ordinary log"
     stage.open(f"plan/{stage.logs['first']}")
     page.get_by_role("heading", name="This log already carries").wait_for()
     page.get_by_role("group", name="Axes").get_by_role("button", name="roll").press("Enter")

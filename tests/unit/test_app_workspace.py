@@ -15,13 +15,16 @@ from fastapi import HTTPException
 from tools.build_page import is_built, require_in
 from tools.page_types import TARGET, page_types
 
+from flightid.app import bare_study
+from flightid.app.bare_study import UNWRITTEN
 from flightid.app.plot_layouts import keep_layout, plot_layouts, remove_layout
 from flightid.app.plot_schemas import PlotLayout
-from flightid.app.schemas import Edit, Edits, StudyStep
+from flightid.app.schemas import Edit, Edits, StudyStep, StudyText
 from flightid.app.studies import Studies
 from flightid.app.study_edits import KeyEdit, edited, etag_of, write_study
 from flightid.app.workspace import Workspace
 from flightid.errors import OptionError, StudyError
+from flightid.study.settings import read_settings
 from tests.sweep_log import SweepFlight
 
 
@@ -189,6 +192,43 @@ def test_undo_goes_back_beyond_a_reload_and_a_kill(tmp_path: Path) -> None:
     for broken in (b"", b"[1]", b'{"texts": [], "at": 0}', b'{"texts": ["a"], "at": 4}', b"\xff"):
         history.write_bytes(broken)
         assert bands() == (2.0, 0, 0)
+
+
+def test_what_a_log_without_a_model_asks_begins_its_study(
+    tmp_path: Path, log: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A plan, filters and plots of it were gone after a reload."""
+    workspace = Workspace(tmp_path)
+    known = asyncio.run(workspace.take("calm.bin", _pieces(log.read_bytes())))
+    studies = Studies(workspace)
+
+    def changed(key: str, value: object, tag: str, of: str = known) -> StudyText | None:
+        return studies.change(of, Edits(edits=[Edit(path=[key], value=value)]), tag)
+
+    # The job that inspects a log writes the study of its models: nothing goes before.
+    assert changed("plan", {"amplitude": 0.05}, UNWRITTEN) is None
+    monkeypatch.setattr(bare_study, "kept_overview", lambda *_: object())
+    assert changed("plan", {"amplitude": 0.05}, UNWRITTEN, "0" * 16) is None
+    with pytest.raises(StudyError):
+        changed("plan", {"amplitude": -1.0}, UNWRITTEN)
+    assert studies.read(known) is None
+    told = changed("plan", {"amplitude": 0.05}, UNWRITTEN)
+    assert told is not None
+    assert told.settings["plan"] == {"amplitude": 0.05}
+    read = read_settings(workspace.study_path(known)).log
+    assert read is not None
+    assert read.resolve() == workspace.log_path(known)
+    with pytest.raises(HTTPException):
+        changed("plan", {"amplitude": 0.1}, UNWRITTEN)
+    # What is taken back leaves a study that reads; what is asked instead stands alone.
+    for key, value, tables in (("plan", None, {"plan"}), ("plot", [{"series": ["A.B"]}], {"plot"})):
+        told = changed(key, value, told.etag)
+        assert told is not None
+        assert told.settings.keys() - {"study", "log"} == tables
+    for _ in range(3):
+        told = studies.step(known, StudyStep(back=True), told.etag)
+        assert told is not None
+    assert (told.undoable, told.redoable, told.settings["plan"]) == (0, 3, {})
 
 
 def test_the_page_has_the_types_of_the_server() -> None:

@@ -15,6 +15,8 @@ interface Waiting {
   edits: Edit[];
   stored: Promise<boolean>;
 }
+/** What a change names where there is no study yet: of a log it begins one. */
+const UNWRITTEN = '""';
 const keysOf = (edits: Edit[]) => JSON.stringify(edits.map((each) => each.path));
 
 /** The study file of a log: every click of the page changes it here, and nowhere else. */
@@ -121,14 +123,14 @@ export class Study {
   }
 
   async #store(edits: Edit[], store: (etag: string) => Promise<StudyText>): Promise<boolean> {
-    if (!this.file) return false;
+    if (!this.file && !this.known) return false;
     if (this.conflict) {
       this.conflict.mine.push(...edits);
       return false;
     }
-    const before = this.file.text;
+    const before = this.file?.text ?? "";
     try {
-      this.file = await store(this.file.etag);
+      this.file = await store(this.file?.etag ?? UNWRITTEN);
       this.error = "";
     } catch (error) {
       const refusal = error as api.Refusal;

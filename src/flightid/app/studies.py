@@ -9,6 +9,7 @@ from typing import Any
 
 from fastapi import HTTPException
 
+from flightid.app.bare_study import UNWRITTEN, bare_study, completed, opened
 from flightid.app.own_folders import read_plain, shown_name
 from flightid.app.python_lines import python_lines
 from flightid.app.schemas import Edits, StudyStep, StudyText, WholeText
@@ -74,9 +75,18 @@ class Studies:
         )
 
     def change(self, log: str, edits: Edits, tag: str) -> StudyText | None:
-        """Change keys of the version that `tag` names; another version is a conflict (409)."""
+        """Change keys of the version that `tag` names; another version is a conflict (409).
+
+        Where there is none, a change of `UNWRITTEN` begins the study of a log.
+        """
         made = [KeyEdit(tuple(each.path), each.value) for each in edits.edits]
-        return self._put(log, tag, lambda old: old.followed_by(edited(old.text, made)))
+
+        def changed(old: Versions) -> Versions:
+            return old.followed_by(completed(edited(opened(old.text), made)))
+
+        if tag == UNWRITTEN and self.path(log) is None:
+            return self._begin(log, changed)
+        return self._put(log, tag, changed)
 
     def replace(self, log: str, whole: WholeText, tag: str) -> StudyText | None:
         """Put a text in place of the version that `tag` names; another is a conflict (409)."""
@@ -90,6 +100,18 @@ class Studies:
             return old.moved(by) if (old.behind if steps.back else old.ahead) else old
 
         return self._put(log, tag, moved)
+
+    def _begin(self, log: str, made: Callable[[Versions], Versions]) -> StudyText | None:
+        """Write the first version of a study that no proposal wrote; None where it has no place."""
+        with self._lock:
+            bare = bare_study(self._workspace, log)
+            path = self._workspace.study_path(log)
+            if bare is None or path.exists():
+                return None
+            versions = made(Versions((bare,), 0))
+            write_study(path, versions.text)
+            self._history.keep(log, versions)
+            return self.read(log)
 
     def _put(self, log: str, tag: str, made: Callable[[Versions], Versions]) -> StudyText | None:
         path = self.path(log)
