@@ -76,7 +76,7 @@ def contradictions(
         moved = cache(partial(_by_parameters, source, way, run, request))
         beyond = (_judged(run, name, entry[name], moved) for name in run.outputs if name in entry)
         found += [each for each in beyond if each is not None]
-    return tuple(_as_gusts_may(each) if _is_red(each) and alone() else each for each in found)
+    return tuple(_as_gusts_may(each) if alone() else each for each in found)
 
 
 def _judged(
@@ -114,10 +114,6 @@ def _judged(
 
 def _is_beyond(size: float, allowed: float, power: float) -> bool:
     return size > BEYOND**2 * allowed and size - allowed > MATERIAL * power
-
-
-def _is_red(finding: Finding) -> bool:
-    return finding.light is Light.RED
 
 
 def _no_input_foretells(made: Sequence[Prediction]) -> bool:
