@@ -14,6 +14,8 @@ Places = NDArray[np.intp]
 APART = 12.0
 """By how much the weighted squares (Cochran's Q) must fall where some of the vehicles stayed at
 zero, in units of what is left: of six that share one step about 3 % fall as much."""
+SMALL = 30
+"""Vehicles, above which half of them does not pass for all by the signs of what they share."""
 MOST = 0.15
 """Share of vehicles that may stay where most changed together."""
 
@@ -42,10 +44,11 @@ class OwnSteps:
         that goes on between the two leaves much within the kinds, and parts nothing.
         """
         k, fewest = len(self.sizes), int(max(1.0, MOST * len(self.sizes))) + 1
-        if k <= fewest:
+        if not fewest < k <= SMALL:
             return False
         weight = 1.0 / self.variances
-        toward = self.sizes * (np.sign(self.shared.value) or 1.0)
+        # One that went the other way by itself did not go with the others: it stayed, for this.
+        toward = np.maximum(self.sizes * (np.sign(self.shared.value) or 1.0), 0.0)
         order = np.argsort(toward)
         toward, weight = toward[order], weight[order]
         one = _squares(toward, weight)
