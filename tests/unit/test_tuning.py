@@ -151,7 +151,7 @@ def test_hopeless_plants_have_no_gains_and_it_is_said_why() -> None:
     assert not design.exists
     assert design.findings[0].light is Light.RED
     assert design.findings[0].code == "no-gains"
-    assert "target crossover" in design.findings[0].message
+    assert "rate loop: crossover of the target" in design.findings[0].message
     assert design.loop is design.flown
     assert "no gains" in repr(design)
     assert "Cannot be met together" in str(design.summary())

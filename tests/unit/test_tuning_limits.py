@@ -8,6 +8,7 @@ import numpy as np
 
 from flightid.control.tuning.limits import ANGLE, WHOLE, limits
 from flightid.control.tuning.requirements import TuningRequirements
+from flightid.control.tuning.shortfalls import NAMES
 
 RATE = "rate loop"
 ASKED = TuningRequirements(
@@ -30,6 +31,7 @@ def test_the_limit_in_words_is_the_limit_in_figures() -> None:
         at = np.array([float(number) * inside, float(number) / inside])
         met, missed = limit.slack(at)
         assert met > 0.0 > missed, limit.name
+        assert limit.name.startswith(f"{limit.loop}: {NAMES[limit.field]}")
     assert len({limit.name for limit in made}) == len(made)
 
 
@@ -41,4 +43,4 @@ def test_every_requirement_on_a_loop_is_a_limit() -> None:
 def test_loops_that_are_not_there_have_no_limits() -> None:
     made = limits(ASKED, (RATE,), None)
     assert {limit.loop for limit in made} == {RATE}
-    assert "identified band" not in {limit.name for limit in made}
+    assert not [limit.name for limit in made if "identified band" in limit.name]

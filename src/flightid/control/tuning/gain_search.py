@@ -243,7 +243,7 @@ def _split(judged: LoopAssessment) -> tuple[Array, Array]:
     """
     n = judged.slack.shape[1]
     slack = judged.slack - HEADROOM - 2.0 * ~judged.stable[None]
-    targets = np.array([name.startswith(TARGET) for name in judged.names])
+    targets = np.array([name.endswith(TARGET) for name in judged.names])
     margins = np.hstack(
         [
             slack[~targets].transpose(1, 0, 2).reshape(n, -1),

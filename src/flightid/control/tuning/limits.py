@@ -16,7 +16,9 @@ from flightid.frozen import dataclass
 
 Array = NDArray[np.float64]
 WHOLE, ANGLE = "whole loop", "angle loop"
-TARGET = "target"
+TARGET = "of the target"
+IN_BAND = "in the identified band"
+"""Ends of names: which requirement on a number that can have several."""
 TINY = 1e-12
 
 
@@ -27,7 +29,8 @@ class Limit:
     Attributes
     ----------
     name : str
-        Unique among the requirements of a problem.
+        Unique among the requirements of a problem: the loop, a colon, its number as tables name it,
+        and which of several is meant.
     loop : str
     field : str
         Of `LoopMetrics`: the number it speaks of.
@@ -72,7 +75,8 @@ def limits(
     made = [limit for loop in names for limit in _margins(need, loop)]
     if crossover_limit_rad_s is not None:
         most = crossover_limit_rad_s
-        told = ("identified band", names[0], "crossover_rad_s", most, _below(most))
+        name = f"{names[0]}: crossover {IN_BAND}"
+        told = (name, names[0], "crossover_rad_s", most, _below(most))
         made.append(Limit(*told, highest=True, most=True))
     return (*made, *(limit for limit in _targets(need, names[0]) if limit.loop in names))
 
@@ -111,10 +115,10 @@ def _targets(need: TuningRequirements, inner: str) -> Iterator[Limit]:
             "disturbance_bandwidth_rad_s",
             need.disturbance_bandwidth_rad_s,
         ),
-        ("angle crossover", ANGLE, "crossover_rad_s", need.angle_crossover_rad_s),
+        ("crossover", ANGLE, "crossover_rad_s", need.angle_crossover_rad_s),
     ):
         if least is not None:
-            yield Limit(f"{TARGET} {name}", loop, field, least, _above(least))
+            yield Limit(f"{loop}: {name} {TARGET}", loop, field, least, _above(least))
 
 
 def _share_above(least: float) -> Callable[[Array], Array]:

@@ -49,6 +49,7 @@ def shortfalls(problem: LoopProblem, judged: LoopAssessment) -> tuple[str, ...]:
 def _short(
     name: str, value: float, unit: str, required: str, bound: float, slack: NDArray[np.float64]
 ) -> str:
-    missing, short = int((slack < 0.0).sum()), f"{abs(value - bound):.3g}{unit}"
+    missing, by = int((slack < 0.0).sum()), f"{abs(value - bound):.3g}{unit}"
+    beyond = "above" if value > bound else "short of"
     plants = f"{missing} of {len(slack)} plants" if len(slack) > 1 else "the model"
-    return f"{name} {value:.3g}{unit}, {short} short of {required} ({plants})"
+    return f"{name} {value:.3g}{unit}, {by} {beyond} {required} ({plants})"
