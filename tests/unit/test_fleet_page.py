@@ -19,7 +19,7 @@ from flightid.fleet.catalogue.loose import write_loose
 from flightid.fleet.catalogue.record import LogRecord
 from flightid.fleet.normality import quiet_light
 from flightid.fleet.opening import current_store
-from flightid.fleet.page import fleet_document, fleet_vehicles
+from flightid.fleet.page import fleet_document, fleet_vehicles, lights_counted
 from flightid.fleet.pictures import type_picture
 from flightid.fleet.settings import read_fleet
 from flightid.fleet.statistics.answers import FleetAnswers, TypeAnswers, answer_questions
@@ -181,7 +181,7 @@ def test_flights_too_few_for_change_leave_a_sentence_and_no_empty_picture() -> N
     assert "Not answered: whether a vehicle changed: that takes 6 flights of it" in said
     assert "and the most is 4." in said
     told = "standard errors of 1 parameter not borne out by flights"
-    assert f"(of 6 vehicles 6 not judged; {told})" in said
+    assert f"(all 6 not judged; {told})" in said
     # No heading claims of vehicles what is true of a few.
     assert "Changed, or unlike" not in said
     alike = answer_questions(fleet_rows(3, 4, 7), covariates=["battery"])
@@ -273,6 +273,7 @@ def test_a_catalogue_without_models_says_so() -> None:
         each["vehicle"] = "v07"
     said = to_text(fleet_document(answer_questions(rows)))
     assert "3 logs, 0 with a model, of 1 vehicle" in said
+    assert lights_counted(answer_questions(rows)) == "not judged"
     assert "[not judged] v07: none of its 3 logs gave a model that counts" in said
 
 

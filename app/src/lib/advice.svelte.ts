@@ -1,7 +1,11 @@
+import { FORMS } from "./forms";
+
 /** The log or records that the page is on; empty where none is open. */
 class Here {
   log = $state("");
   ofRig = $state(false);
+  /** The screen that is open. */
+  open = $state("");
   /** Screens that a link leads to: those of this log, without the one that is open. */
   screens = $state<string[]>([]);
 }
@@ -17,16 +21,29 @@ const COMMAND = /flightid (tune|plan|inspect|flight|compare|response)\b((?: (?:[
 
 export interface AdvicePart { text: string; href: string | null }
 
+/** Keys of a study by what the page has for them. */
+const inWords = (text: string) =>
+  text.replace("leave out by_hand", "press As found").replace(/\btake the form (\w+)/, (all, form) => (FORMS[form] ? `take the form “${FORMS[form]}”` : all));
+
+/** What the open screen is asked in place of its own command. */
+function onScreen(screen: string, title: string, options: string) {
+  const axes = options.match(/--axes (\S+)/)?.[1].split(",").join(", ");
+  return screen === "plan" && axes ? `press ${axes} under Asked for` : `the screen ${title}`;
+}
+
 /** What to do, with screens that there are in place of the commands that they stand for. */
-export function adviceParts(text: string, log: string, screens: string[]): AdvicePart[] {
+export function adviceParts(given: string, log: string, screens: string[]): AdvicePart[] {
   const parts: AdvicePart[] = [];
+  const text = inWords(given);
   let done = 0;
-  for (const found of log ? text.matchAll(COMMAND) : []) {
+  for (const found of text.matchAll(COMMAND)) {
     const [all, verb, rest] = found;
     if (rest.includes("--controller") && !here.ofRig) continue;
     const [screen, title] = SCREEN_OF[verb];
-    if (!screens.includes(screen)) continue;
-    parts.push({ text: text.slice(done, found.index), href: null }, { text: title, href: `#/${screen}/${log}` });
+    const linked = Boolean(log) && screens.includes(screen);
+    if (log && !linked && screen !== here.open) continue;
+    const named = log ? onScreen(screen, title, rest) : `${title} of the log`;
+    parts.push({ text: text.slice(done, found.index), href: null }, linked ? { text: title, href: `#/${screen}/${log}` } : { text: named, href: null });
     done = found.index + all.length;
   }
   return [...parts, { text: text.slice(done), href: null }].filter((each) => each.text);

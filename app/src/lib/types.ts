@@ -238,7 +238,7 @@ export interface FleetRows {
 /** What the last run of a fleet from the page did. */
 export interface FleetRunPart {
   lines: string[];
-  said: string[];
+  said: ShownFinding[];
 }
 
 /** A fleet: its file, how far it is, and its jobs. */

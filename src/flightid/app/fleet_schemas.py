@@ -128,7 +128,7 @@ class FleetRunPart(Message):
     """What the last run of a fleet from the page did."""
 
     lines: list[str]
-    said: list[str]
+    said: list[ShownFinding]
 
 
 class FleetScreen(Message):

@@ -62,7 +62,7 @@ _held: list[tuple[str, FleetAnswers | None]] = [NOTHING_HELD]
 def make_fleet(path: Path, result: Path) -> None:
     """Run a fleet file as `flightid fleet run` does, and write what became of it."""
     done = run_fleet(path)
-    part = FleetRunPart(lines=[*done.lines], said=[str(each) for each in done.findings])
+    part = FleetRunPart(lines=[*done.lines], said=[_finding(each) for each in done.findings])
     write_atomically(result, part.model_dump_json())
 
 

@@ -220,11 +220,11 @@ def _searched(tuning: Tuning, axis: str) -> Mapping[str, float]:
 
 
 def _refusal(tuning: Tuning) -> str:
-    """Why there is nothing to download; empty where there is."""
+    """What keeps gains from being written, what to do stands with it as a verdict; else empty."""
     try:
         tuning.writable()
     except FlightidError as error:
-        return str(error)
+        return str(error.found or error.problem)
     return ""
 
 

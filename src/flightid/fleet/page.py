@@ -67,9 +67,11 @@ def damaged_light(parts: int) -> Finding | None:
 
 
 def lights_counted(answers: FleetAnswers) -> str:
-    """Vehicles by light, in words; other verdicts of the page are on estimates, not on vehicles."""
+    """Vehicles by light, in words, to stand behind `fleet_words`; other verdicts are on estimates."""
     found = Counter(each.light for each in fleet_vehicles(answers).values())
     said = ", ".join(f"{found[light]} {light.words}" for light in ORDER if found[light])
+    if len(found) == 1:
+        said = said.removeprefix("1 ") if found.total() == 1 else f"all {said}"
     errors = Counter(
         finding.light
         for each in answers.types
@@ -84,7 +86,7 @@ def lights_counted(answers: FleetAnswers) -> str:
         )
         if errors[light]
     )
-    return f"of {counted(found.total(), 'vehicle')} {said}{rest}" if said else ""
+    return f"{said}{rest}" if said else ""
 
 
 def fleet_words(answers: FleetAnswers) -> str:
