@@ -93,6 +93,12 @@ def test_gains_by_hand_that_break_a_requirement_are_red_and_not_written(
     with pytest.raises(DataError, match=r"gains of roll do not .* found the gains set") as no:
         made.write(folder / "gains.param")
     assert f"{said}short of {case.required} (" in str(no.value)
+    # What may be at most so much is above it; none is short of a largest value.
+    peak = made.worst_case("rate loop", "sensitivity peak")
+    over = (peak.worst or 0.0) - float(peak.required.removeprefix("≤ "))
+    told = f"rate loop: sensitivity peak {peak.worst:.3g}, {over:.3g} above {peak.required} ("
+    assert told in str(no.value)
+    assert "short of ≤" not in str(no.value)
     assert "no gains meet" not in fid.Tuning((made,), ()).left_out["roll"]
     assert not list(folder.iterdir())
 

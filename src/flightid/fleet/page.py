@@ -67,7 +67,7 @@ def damaged_light(parts: int) -> Finding | None:
 
 
 def lights_counted(answers: FleetAnswers) -> str:
-    """Vehicles by light, in words, to stand behind `fleet_words`; other verdicts are on estimates."""
+    """Vehicles by light, in words, behind `fleet_words`; other verdicts are on estimates."""
     found = Counter(each.light for each in fleet_vehicles(answers).values())
     said = ", ".join(f"{found[light]} {light.words}" for light in ORDER if found[light])
     if len(found) == 1:
