@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -304,7 +305,7 @@ def test_records_without_times_take_a_sample_time_into_the_study(tmp_path: Path)
     asked = {"folder": tmp_path, "model": "rate_first_order"}
     made = propose_study([bare], **asked, sample_time_s=0.1)
     told = [line for line in made.lines if line.startswith("sample_time_s")]
-    assert told == ["sample_time_s = 0.1"] * 3
+    assert told == ["sample_time_s = 0.1"] * 2
     with pytest.raises(OptionError, match="no time column"):
         propose_study([bare], **asked)
 
@@ -322,7 +323,7 @@ def test_uneven_stamps_take_a_new_grid_into_the_study(tmp_path: Path) -> None:
     made = propose_study([uneven], resample_to_s=0.1, **asked)
     assert [line for line in made.lines if line.startswith("resample")] == [
         "resample_to_s = 0.1"
-    ] * 3
+    ] * 2
 
 
 def test_a_folder_for_gains_is_asked_for_before_the_work(
@@ -404,6 +405,14 @@ def test_sweeps_of_one_input_each_are_fitted_together(tmp_path: Path) -> None:
         outputs=["p", "q"], excitations=["sweep_lat"],
     )  # fmt: skip
     assert 'identify = "a, fitted"' in one.text
+    # No part ranks equations that are given; the sweep of `lat` ends at 9.5 rad/s.
+    assert "choice" not in one.text
+    band = re.search(r"band_rad_s = \[([\d.]+), ([\d.]+)\]", one.text)
+    assert band is not None
+    assert 8.0 < float(band[2]) < 10.5
+    (said,) = [each.message for each in one.findings if each.code == "inputs-unswept"]
+    assert said.startswith("lon: not swept, sweep_lat alone is")
+    assert not [each for each in made.findings if each.code == "inputs-unswept"]
 
 
 def test_a_known_servo_is_taken_out_ahead_of_the_model(tmp_path: Path) -> None:
@@ -444,7 +453,7 @@ def test_columns_of_other_names_are_those_of_the_model(tmp_path: Path) -> None:
     named = {"folder": tmp_path, "inputs": ("u",), "outputs": ("y",)}
     made = propose_study([path], model="rate_first_order", **named)
     lines = [line for line in made.lines if line.startswith("columns")]
-    assert lines == ['columns = { tau_phi = "u", p = "y" }'] * 3
+    assert lines == ['columns = { tau_phi = "u", p = "y" }'] * 2
     made.write(tmp_path / "study.toml")
     (model,) = run_study(tmp_path / "study.toml", output=tmp_path / "out").identified
     assert abs(model.fit.parameters["Lp"].value + 5.27) < 0.5  # ln 0.9 / 0.02 s

@@ -749,6 +749,7 @@ export interface ProposedStudy {
   text: string;
   models: string[];
   said: string[];
+  findings: ShownFinding[];
 }
 
 /** A request on the socket: what the page shows under edits that are not written yet. */

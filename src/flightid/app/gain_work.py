@@ -25,8 +25,7 @@ from flightid.app.gain_schemas import (
     RigController,
     TimeCurve,
 )
-from flightid.app.overview import light_of
-from flightid.app.schemas import ShownFinding
+from flightid.app.overview import light_of, shown_finding
 from flightid.app.study_edits import VIEWS, KeyEdit, edited
 from flightid.app.study_reach import draft_inside, named_places
 from flightid.app.work import KEPT
@@ -360,14 +359,3 @@ def _loops(moved: MovedGains) -> list[NicholsCurve]:
 
 def _plain(values: np.ndarray) -> list[float]:
     return [float(f"{each:.{DIGITS}g}") for each in values.tolist()]
-
-
-def shown_finding(finding: Finding) -> ShownFinding:
-    """A finding as the page is told it."""
-    return ShownFinding(
-        code=finding.code,
-        light=light_of(finding.light),
-        message=finding.message,
-        action=finding.action,
-        spans_s=[],
-    )

@@ -241,3 +241,14 @@ def _events(log: Log) -> list[StripEvent]:
 
 def _finite(values: NDArray[np.float64]) -> list[float | None]:
     return [float(f"{each:.6g}") if math.isfinite(each) else None for each in values.tolist()]
+
+
+def shown_finding(finding: Finding) -> ShownFinding:
+    """A finding as the page is told it."""
+    return ShownFinding(
+        code=finding.code,
+        light=light_of(finding.light),
+        message=finding.message,
+        action=finding.action,
+        spans_s=[],
+    )

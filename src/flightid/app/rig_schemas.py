@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from flightid.app.schemas import Job, Light, Message
+from flightid.app.schemas import Job, Light, Message, ShownFinding
 
 
 class RigItem(Message):
@@ -124,3 +124,4 @@ class ProposedStudy(Message):
     text: str
     models: list[str]
     said: list[str]
+    findings: list[ShownFinding]

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from flightid.app.overview import light_of
+from flightid.app.overview import light_of, shown_finding
 from flightid.app.own_folders import is_link
 from flightid.app.pyramid import Pyramid
 from flightid.app.rig_schemas import ProposedStudy, RigColumn, RigFault, RigFile, RigManoeuvre
@@ -77,10 +77,13 @@ def propose(
 ) -> dict[str, Any]:
     """The study that `flightid new` writes for these files."""
     made = propose_study(paths, folder=folder, cache=KEPT, **asked, **reading)
-    missed = [f"{each.message}" for each in made.findings]
+    missed = [each.message for each in made.findings]
     text = made.text if made.models else ""
     return ProposedStudy(
-        text=text, models=list(made.models), said=[*made.said, *missed]
+        text=text,
+        models=list(made.models),
+        said=[*made.said, *missed],
+        findings=[shown_finding(each) for each in made.findings],
     ).model_dump()
 
 

@@ -29,9 +29,11 @@ from flightid.study.proposal.stretches import (
     Stretch,
     one_experiment,
     segments_of,
+    segments_of_equations,
     too_short,
 )
 from flightid.study.proposal.structures_of import GroupScans, structures_of
+from flightid.study.proposal.swept import swept_band, unswept
 from flightid.study.proposal.unit_steps import unit_steps
 from flightid.study.stage_runner import StageRunner
 from flightid.surface import as_key, speaking
@@ -108,7 +110,12 @@ def study_of_records(
     kept = KeptConditioning(tuple(conditioning))
     cut: list[tuple[str, Stretch]] = []
     for whole in groups:
-        segments = segments_of(whole) if swept is None else swept[1]
+        if swept is not None:
+            segments = swept[1]
+        else:
+            segments = (
+                segments_of(whole) if model is None else segments_of_equations(whole, injected)
+            )
         short = too_short(whole, segments) if model is None else None
         if short is not None:
             missed.append(short)
@@ -130,6 +137,7 @@ def study_of_records(
         asked = GroupScans(group, segments, scans)
         if model is not None:
             names.append(Path(model).stem)
+            missed += unswept(columns.inputs, asked)
             body += _equations(model, asked, renamed)
             continue
         found, without = structures_of(asked)
@@ -250,10 +258,10 @@ def _equations(model: str, asked: GroupScans, renamed: Mapping[str, str]) -> lis
     template = [f"template = {toml_value(model)}"]
     if not scans.injected:
         template += ['fit = { method = "output_error" }']
-    elif asked.band is not None:
+    elif (band := swept_band(asked)) is not None:
         said = "# By way of what was injected: a controller in the loop does not bias that."
         names = toml_value(list(scans.injected))
-        template += [f"band_rad_s = {toml_value(list(asked.band))}", said]
+        template += [f"band_rad_s = {toml_value(list(band))}", said]
         template += [f'response = {{ estimator = "instrument", excitations = {names} }}']
     if segments.together:
         # Of inputs times outputs some say nothing: coherence tells which are fitted.

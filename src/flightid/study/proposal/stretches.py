@@ -101,6 +101,28 @@ def segments_of(group: Group) -> Segments:
     )  # fmt: skip
 
 
+def segments_of_equations(group: Group, injected: tuple[str, ...]) -> Segments:
+    """The longest record and what verifies: equations are given, so no part chooses between them.
+
+    A record that is alone is fitted but for a quarter: the first of a rising sweep, whose band then
+    lies in what is fitted, else the last. `injected` are channels that tell, else the inputs.
+    """
+    first, record = group.parts[0], group.parts[0].record
+    start, stop = float(record.time_s[0]), float(record.time_s[-1])
+    name, rest = first.name, [(part.name, part, None) for part in group.parts[1:]]
+    fitted = (start, stop)
+    unseen: list[tuple[str, Stretch, tuple[float, float] | None]] = [*rest]
+    if not rest:
+        moved = tuple(each for each in injected or group.inputs if np.ptp(record[each]) > 0.0)
+        rises = bool(moved) and _ends_richer(record, moved)
+        cut = rounded(start + ((1.0 - ALONE[1]) if rises else ALONE[1]) * (stop - start))
+        fitted, left = ((cut, stop), (start, cut)) if rises else ((start, cut), (cut, stop))
+        unseen = [(f"{name}, unseen", first, left)]
+    part = (f"{name}, fitted", first, fitted)
+    names = tuple(each[0] for each in unseen)
+    return Segments((part, *unseen), part[0], part[0], names, (fitted, fitted))
+
+
 def too_short(group: Group, segments: Segments) -> Finding | None:
     """Why a record is too short for a structure to be chosen on a part of it; None: it is not."""
     record = group.parts[0].record
