@@ -210,11 +210,23 @@ def _planned(page: Any) -> list[str]:
     told.value.wait_for_load_state()
     assert "0.05 of full" in told.value.inner_text("body")
     told.value.close()
+    # What makes no band with the other end stays, marked, and is taken with what is typed there.
+    page.fill("#low", "50")
+    page.press("#low", "Tab")
+    page.get_by_text("say where it shall end").wait_for()
+    assert page.get_attribute("#low", "aria-invalid") == "true"
+    page.fill("#high", "1")
+    page.press("#high", "Tab")
+    page.get_by_text("needs a lowest frequency below its highest").wait_for()
+    assert (page.input_value("#low"), page.input_value("#high")) == ("50", "1")
+    page.fill("#low", "")
+    page.press("#low", "Tab")
+    page.get_by_text("needs a lowest frequency below its highest").wait_for(state="detached")
     page.fill("#amplitude", "0.0001")
     page.press("#amplitude", "Tab")
     page.locator("h1", has_text="no-go").wait_for()
     assert not page.locator("section[aria-label='To take along'] button").count()
-    page.locator("section[aria-label='What is asked for'] button", has_text="Undo").press("Enter")
+    page.get_by_role("button", name="Undo", exact=True).press("Enter")
     amplitude.filter(has_text="0.05 of full").first.wait_for()
     return said
 

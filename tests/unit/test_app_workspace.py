@@ -132,6 +132,11 @@ band_rad_s = [1.0, 20.0] # by hand
 def test_an_edit_changes_its_key_and_nothing_else(tmp_path: Path) -> None:
     band = KeyEdit(("model", 0, "band_rad_s"), [2.5, 31.4])
     assert edited(STUDY, [band]) == STUDY.replace("[1.0, 20.0]", "[2.5, 31.4]")
+    # A table of a list that the file had not begins below an empty line, and one alone.
+    spikes = KeyEdit(("conditioning", 0, "outliers"), {"deviations": 9.0})
+    for end in ("", "\n"):
+        assert "\n\n[[conditioning]]\n" in (made := edited(STUDY.rstrip() + "\n" + end, [spikes]))
+        assert "\n\n\n" not in made
     more = edited(
         STUDY,
         [

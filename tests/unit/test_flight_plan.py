@@ -356,6 +356,12 @@ def test_what_a_log_carries_already_is_not_swept_again(
     assert run(["plan", str(path), "--output", str(tmp_path / "out")]) == 0
     assert "a model of roll, pitch and yaw" in " ".join(capsys.readouterr().out.split())
     assert not (tmp_path / "out").exists()
+    once = replace(every, moved=axes)
+    monkeypatch.setattr("flightid.planning.plan.flown_sweeps", lambda *_: once)
+    # "Not needed" stood over "repeat the manoeuvre"; a sweep that is repeated rests on itself.
+    assert fid.plan_flight(opened).verdict == "once more"
+    assert same.rests_on.startswith("the sweep of this log")
+    assert louder.rests_on in ("this flight", "a typical vehicle")
 
 
 def test_a_log_without_the_rate_of_the_controller_is_planned(

@@ -677,7 +677,7 @@ export interface PlanRow {
   rate_deg_s: number | null;
   attitude_deg: number | null;
   coherence: number | null;
-  measured: boolean;
+  rests_on: string;
   settings: Record<string, number>;
 }
 

@@ -103,7 +103,7 @@ class PlanRow(Message):
     rate_deg_s: float | None
     attitude_deg: float | None
     coherence: float | None
-    measured: bool
+    rests_on: str
     settings: dict[str, float]
 
 

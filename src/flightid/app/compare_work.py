@@ -212,6 +212,6 @@ def _sweep(sweep: AxisSweep, runs: int) -> PlanRow:
         rate_deg_s=None if told is None else DEGREES * told.peak_rate_rad_s,
         attitude_deg=None if told is None else DEGREES * told.peak_attitude_rad,
         coherence=sweep.coherence,
-        measured=guess is not None and guess.measured,
+        rests_on=sweep.rests_on,
         settings={each.name: each.value for each in sweep.changes},
     )

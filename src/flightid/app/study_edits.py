@@ -126,6 +126,8 @@ def _apply(document: Any, edit: KeyEdit) -> None:  # noqa: ANN401 - a parsed doc
             # Beside `parameters.T_m = {…}` a header would open a table of the whole document.
             inline = number > 0 and edit.path[number - 1] == "parameters"
             made = tomlkit.inline_table() if inline else tomlkit.table()
+            if not number and not str(tomlkit.dumps(document)).endswith("\n\n"):
+                document.add(tomlkit.nl())
             place.append(key, tomlkit.aot() if isinstance(following, int) else made)
         elif isinstance(key, int) and key == len(place):
             place.append(tomlkit.table())

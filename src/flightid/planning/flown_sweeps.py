@@ -19,6 +19,8 @@ from flightid.inspection.flight_phases import FlightPhases
 from flightid.inspection.usable_band import AxisBand
 from flightid.logs import Log
 
+FLOWN_ONCE = "flown-once"
+"""Code: an axis that is carried has one manoeuvre alone."""
 UNTOLD = "the log does not tell why"
 
 
@@ -56,7 +58,7 @@ class FlownSweeps:
         once = [axis for axis in done if needs_another(self.moved.count(axis))]
         if once:
             yield Finding(
-                "flown-once", Light.UNKNOWN, f"{_listed(once)}: {ONCE}",
+                FLOWN_ONCE, Light.UNKNOWN, f"{_listed(once)}: {ONCE}",
                 f"{AGAIN}: flightid plan {name} --axes {','.join(once)}",
             )  # fmt: skip
         again = Counter(axis for axis in self.injected if axis in planned)

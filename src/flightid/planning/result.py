@@ -20,6 +20,7 @@ from flightid.findings import Finding, said_once, worst
 from flightid.frozen import dataclass
 from flightid.planning.axis_guess import AxisGuess
 from flightid.planning.flight_time import FlightTime
+from flightid.planning.flown_sweeps import FLOWN_ONCE
 from flightid.planning.loop_check import MISSED
 from flightid.planning.procedures import STOP, Procedure
 from flightid.planning.settings import INTEGERS, betaflight_cli
@@ -27,6 +28,9 @@ from flightid.result import Result
 from flightid.table import Cell, Column, Table
 
 DEGREES = math.degrees(1.0)
+
+
+TYPICAL = "a typical vehicle"
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +70,13 @@ class AxisSweep:
         if unit == "1":
             return f"{self.amplitude:.3g} of full"
         return f"{DEGREES * self.amplitude:.2g} {unit.replace('rad', 'deg')}"
+
+    @property
+    def rests_on(self) -> str:
+        """What it is sized by: the sweep that it repeats, the flight, or what is typical."""
+        if self.is_flown_again:
+            return "the sweep of this log, as it flew"
+        return "this flight" if self.guess is not None and self.guess.measured else TYPICAL
 
     @property
     def coherence(self) -> float | None:
@@ -135,14 +146,15 @@ class SweepPlan(Result, schema="flightid.sweep_plan/1"):
 
     @property
     def verdict(self) -> str:
-        """``"no-go"``, ``"not needed"``, ``"begin small"`` or ``"go"``.
+        """``"no-go"``, ``"once more"``, ``"not needed"``, ``"begin small"`` or ``"go"``.
 
-        Not needed: the log carries every axis. Small: the flight missed an expected loop.
+        Not needed: the log carries every axis; once more: one of them was flown a single time.
+        Small: the flight missed an expected loop.
         """
         if not self.is_go:
             return "no-go"
         if not self.sweeps:
-            return "not needed"
+            return "once more" if any(f.code == FLOWN_ONCE for f in self.findings) else "not needed"
         return "begin small" if any(f.code == MISSED for f in self.findings) else "go"
 
     def summary(self) -> Table:
@@ -182,7 +194,7 @@ class SweepPlan(Result, schema="flightid.sweep_plan/1"):
                 (
                     *(each.axis, size * told.peak_control, DEGREES * told.peak_rate_rad_s),
                     *(DEGREES * told.peak_attitude_rad, each.coherence),
-                    "this flight" if each.guess.measured else "a typical vehicle",
+                    each.rests_on,
                 )
             )
         notes = ("Peaks are of the sweep with the loops closed; coherence, of sweep and rate, is a "

@@ -234,10 +234,10 @@ def _spikes(channel: _ExaminedChannel) -> SampleFault | None:
     said = (
         f"{counted(at.size, 'sample')} of {name} {'stands' if at.size == 1 else 'stand'} alone, "
         f"{float(np.max(away[at])):.3g}{channel.of_unit} from the neighbours at most "
-        f"({100 * share:.0f} % of the channel's variance): {_instants(stamps[at])}"
+        f"({_percent(share)} of the channel's variance): {_instants(stamps[at])}"
     )
     between = _between(away[at], np.delete(away, at), spread)
-    found = channel.fault(at, at, ("spikes", light, said, _spike_action(between)))
+    found = channel.fault(at, at, ("spikes", light, said, _spike_action(between, at.size)))
     return replace(found, deviations=between)
 
 
@@ -257,16 +257,22 @@ def _between(heights: Array, others: Array, spread: float) -> float | None:
     return float(f"{between / spread if spread > 0.0 else FAR:.0f}")
 
 
-def _spike_action(deviations: float | None) -> str:
+def _percent(share: float) -> str:
+    """Whole percents; what is there is not called none."""
+    return f"{100 * share:.0f} %" if share >= 0.005 else "less than 1 %"
+
+
+def _spike_action(deviations: float | None, number: int) -> str:
     """What takes out the spikes and no more."""
     if deviations is None:
         return (
             "cut the record before and after: what bridges them would bridge edges of the commands"
         )
+    them, whose = ("it", "its") if number == 1 else ("them", "their")
     return (
-        "look for their cause (a connector, the logger), and bridge them before any fit: "
+        f"look for {whose} cause (a connector, the logger), and bridge {them} before any fit: "
         "write [[conditioning]] into the study and below it outliers = { deviations = "
-        f"{deviations:.0f} }}, which lies between them and all other samples"
+        f"{deviations:.0f} }}, which lies between {them} and all other samples"
     )
 
 
