@@ -158,11 +158,6 @@ def test_faults_are_told_where_they_are_and_not_from_the_first_to_the_last(tmp_p
     assert np.sum(np.abs(clean["y"] - samples) > 1e-9) == 2
     # Between them there is none: a record that leaves them out has no such finding.
     (spiked,) = read_records(path, inputs=["u"], outputs=["y"])
-    (both,) = [each for each in record_findings(spiked) if each.code == "spikes"]
-    assert "and bridge them before any fit" in both.action
-    one = next(e for e in record_findings(spiked.segment(0.0, 30.0)) if e.code == "spikes")
-    assert "look for its cause" in one.action
-    assert "and bridge it before any fit" in one.action
     assert "spikes" not in [each.code for each in record_findings(spiked.segment(12.1, 35.9))]
     assert "spikes" in [each.code for each in record_findings(spiked.segment(12.1, 36.1))]
 

@@ -19,8 +19,7 @@ from flightid.app.compare_schemas import (
     PlanRow,
 )
 from flightid.app.gain_schemas import GainFile
-from flightid.app.gain_work import shown_finding
-from flightid.app.overview import light_of, step_curve
+from flightid.app.overview import light_of, shown_finding, step_curve
 from flightid.app.study_reach import draft_inside
 from flightid.app.work import KEPT, kept_log
 from flightid.files import sha256_of_file

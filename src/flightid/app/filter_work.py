@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.app.gain_schemas import GainFile
-from flightid.app.gain_work import shown_finding
+from flightid.app.overview import shown_finding
 from flightid.app.plot_schemas import FilterAxis, FilterScreen, FilterValue
 from flightid.app.work import KEPT, kept_log
 from flightid.control.autopilots.parameter_files import parameter_suffix
