@@ -110,12 +110,7 @@ def study_of_records(
     kept = KeptConditioning(tuple(conditioning))
     cut: list[tuple[str, Stretch]] = []
     for whole in groups:
-        if swept is not None:
-            segments = swept[1]
-        else:
-            segments = (
-                segments_of(whole) if model is None else segments_of_equations(whole, injected)
-            )
+        segments = swept[1] if swept is not None else _segments(whole, model, injected)
         short = too_short(whole, segments) if model is None else None
         if short is not None:
             missed.append(short)
@@ -143,15 +138,19 @@ def study_of_records(
         found, without = structures_of(asked)
         missed += without
         names += [each.name for each in found]
-        for each in found:
-            body += each.lines
-            together += each.said
+        body += [line for each in found for line in each.lines]
+        together += [said for each in found for said in each.said]
     body += kept.lines(cut)
     with speaking(as_key):
         keyed = _times(read)
     told_of = (*columns.said, *converted, *_times(read), *_stamps(read), *together)
     head = _head(paths, (*columns.said, *converted, *keyed, *_stamps(read), *together), missed)
     return Proposal((*head, *body), tuple(names), tuple(missed), said=told_of)
+
+
+def _segments(group: Group, model: str | None, injected: tuple[str, ...]) -> Segments:
+    """What is fitted, what chooses where no equations are given, and what verifies."""
+    return segments_of(group) if model is None else segments_of_equations(group, injected)
 
 
 def _needs_equations(
