@@ -90,14 +90,15 @@ def study_of_records(
         paths, reading or DataOptions(), equations, inputs, outputs, excitations
     )  # fmt: skip
     read, columns, injected, renamed = source.parts, source.columns, source.injected, source.renamed
-    records = [part.record for part in read]
     keys = _keys(source.reading, folder)
     if renamed:
         keys.append(f"columns = {toml_value(renamed)}")
     if injected and model is None:
         raise _needs_equations(paths, columns, injected)
     units, converted = (
-        ([], []) if model is None else unit_steps(model, records, columns, folder, renamed)
+        ([], [])
+        if model is None
+        else unit_steps(model, [part.record for part in read], columns, folder, renamed)
     )
     body = [*units, *_servos(actuators or {}, columns, model, renamed)]
     groups, missed = _groups(read, columns)
