@@ -20,7 +20,7 @@ def test_from_a_fleet_to_a_vehicle_to_its_log(desk: Desk) -> None:
     window = desk.open("#/fleet")
     page = window.page
     page.get_by_role("link", name="fleet.toml").press("Enter")
-    page.get_by_text("51 logs, 48 with a model, of 3 vehicles").wait_for()
+    page.get_by_text("63 logs, 60 with a model, of 3 vehicles").wait_for()
     name = "v02: roll control power"
     page.get_by_role("application", name=name).wait_for()
     assert "rate too low" in page.get_by_label("Logs that could not be used").inner_text()
