@@ -42,6 +42,7 @@ def rig_tables(folder: Path, seed: int = 0) -> list[Path]:
 
 def test_from_dropped_tables_to_a_report(desk: Desk, tmp_path: Path) -> None:
     """Roles by hand, the study, one key, a run that equals `run_study`, the page and the zip."""
+    expect = pytest.importorskip("playwright.sync_api").expect
     window = desk.open()
     page = window.page
     page.wait_for_selector(".empty")
@@ -69,11 +70,11 @@ def test_from_dropped_tables_to_a_report(desk: Desk, tmp_path: Path) -> None:
     assert [each["records"] for each in desk.study["conditioning"]] == [["steps"]]
     # A unit is read back from where the study says it, and stays in a proposal made anew.
     page.reload()
-    assert unit.input_value() == "mV"
+    expect(unit).to_have_value("mV")
     page.click("text=Propose anew")
     page.locator("pre .changed").first.wait_for(state="detached")
     page.get_by_role("button", name="Propose anew").wait_for()
-    assert unit.input_value() == "mV"
+    expect(unit).to_have_value("mV")
     assert {each["units"]["drive"] for each in desk.study["record"]} == {"mV"}
     assert [each["records"] for each in desk.study["conditioning"]] == [["steps"]]
     unit.fill("V")

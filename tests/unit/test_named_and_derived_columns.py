@@ -165,7 +165,6 @@ def test_manoeuvres_of_one_file_become_a_study_that_runs(tmp_path: Path) -> None
     )  # fmt: skip
     assert [line for line in made.lines if line.startswith("manoeuvre")] == [
         'manoeuvre = "bare[0]"',
-        'manoeuvre = "bare[0]"',
         'manoeuvre = "bare[1]"',
     ]
     assert 'derive = { v = "2*u" }' in made.lines
