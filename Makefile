@@ -15,6 +15,8 @@ PYTEST = PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN
 STARTED = -n $(JOBS) --dist worksteal
 # Forked processes share what one of them collected; where a fork is not safe, each is started.
 SPREAD := $(if $(filter Linux,$(shell uname -s)),-p tests.forks --forks $(JOBS),$(STARTED))
+# A test that waits for good says where, and ends the run.
+PATIENT = -o faulthandler_timeout=300 -o faulthandler_exit_on_timeout=true
 
 .PHONY: demo app test test-slow test-nightly docs fuzz fuzz-files kills mutants same-wheel bench lint hooks format stubs develop wheel constraints clean help
 
@@ -66,7 +68,7 @@ stubs: develop  ## regenerate src/flightid/_native.pyi
 test: wheel lint  ## everything that must pass before a merge
 	cargo test --workspace --quiet
 	@command -v chromium google-chrome >/dev/null || echo "No Chromium: the page is not tried in a browser (apt-get install chromium)"
-	$(PYTEST) $(SPREAD) --doctest-modules tests --pyargs flightid
+	$(PYTEST) $(SPREAD) $(PATIENT) --doctest-modules tests --pyargs flightid
 
 test-nightly: wheel  ## every example whole and longer draws of properties, minutes; then what test-slow does
 	HYPOTHESIS_PROFILE=nightly $(PYTEST) $(STARTED) -m "nightly or slow or hypothesis"

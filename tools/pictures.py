@@ -15,7 +15,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from http.server import BaseHTTPRequestHandler, HTTPServer
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 from PIL import Image
@@ -53,7 +53,7 @@ class _Late(BaseHTTPRequestHandler):
 @contextmanager
 def _shutter() -> Iterator[int]:
     """Port of a server on this machine that is slow to answer."""
-    with HTTPServer(("127.0.0.1", 0), _Late) as server:
+    with ThreadingHTTPServer(("127.0.0.1", 0), _Late) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
         yield server.server_port
         server.shutdown()

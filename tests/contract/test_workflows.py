@@ -88,8 +88,10 @@ def test_windows_runs_the_steps_of_make_test() -> None:
     text = (ROOT / "Makefile").read_text(encoding="utf-8")
     pytest_line = next(line for line in text.splitlines() if "$(PYTEST) $(SPREAD)" in line)
     (meaning,) = re.findall(r"^PYTEST = .*\$\(BIN\)/(.*)$", text, re.MULTILINE)
-    (started,) = re.findall(r"^STARTED = (.*)$", text, re.MULTILINE)
-    wanted = pytest_line.strip().replace("$(PYTEST)", meaning).replace("$(SPREAD)", started)
+    wanted = pytest_line.strip().replace("$(PYTEST)", meaning).replace("$(SPREAD)", "$(STARTED)")
+    for name in ("STARTED", "PATIENT"):
+        (said,) = re.findall(rf"^{name} = (.*)$", text, re.MULTILINE)
+        wanted = wanted.replace(f"$({name})", said)
     wanted = wanted.replace("$(JOBS)", "auto")
     assert wanted in _commands(dict(JOBS)["test.windows"])
 

@@ -14,7 +14,7 @@ import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from http.server import BaseHTTPRequestHandler, HTTPServer
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
@@ -374,7 +374,8 @@ TRIES = """async (ours) => {
 def test_a_page_of_another_local_port_gets_nothing(desk: Desk) -> None:
     """The browser sends it our cookie, as SameSite=Strict does not part ports."""
     logs = sorted((desk.folder / "logs").rglob("*"))
-    with HTTPServer(("127.0.0.1", 0), _Stranger) as server:
+    # Chromium may open a connection ahead and ask nothing: one thread would wait for it for good.
+    with ThreadingHTTPServer(("127.0.0.1", 0), _Stranger) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
         page = desk.context.new_page()
         page.goto(f"http://127.0.0.1:{server.server_port}/")
