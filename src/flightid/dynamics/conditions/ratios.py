@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from flightid.dynamics.modes.modes import UNFITTED
 from flightid.frozen import dataclass
 from flightid.identification.uncertain_of import NO_COVARIANCE
 from flightid.uncertainty.estimate import Estimate, Interval, Reading
 from flightid.uncertainty.quantiles import half_width, two_sided_chance
+from flightid.uncertainty.several_tests import holm_adjusted
 
 EXACT = ("", "exact", "fixed", "same fit", UNFITTED, NO_COVARIANCE)
 """Reasons of a number without an interval that was declared, so that it counts as exact."""
@@ -221,10 +224,5 @@ def holm(chances: dict[str, float], level: float = 0.05) -> set[str]:
     >>> sorted(holm({"a": 0.001, "b": 0.03, "c": 0.2}))
     ['a']
     """
-    found: set[str] = set()
-    order = sorted(chances, key=lambda name: chances[name])
-    for place, name in enumerate(order):
-        if chances[name] > level / (len(order) - place):
-            break
-        found.add(name)
-    return found
+    adjusted = holm_adjusted(np.array(list(chances.values())))
+    return {name for name, chance in zip(chances, adjusted, strict=True) if chance <= level}

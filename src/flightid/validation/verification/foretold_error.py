@@ -21,6 +21,7 @@ from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.identification.prediction.request import FREE_RUN
 from flightid.identification.prediction.result import Prediction
+from flightid.uncertainty.several_tests import holm_adjusted
 
 Array = NDArray[np.float64]
 LONGEST_PAST, SHORTEST_PAST = 6, 3
@@ -85,23 +86,8 @@ def foretold_chances(errors: Sequence[Array], inputs: Sequence[Array]) -> Array 
     if not chances:
         return None
     every = np.ones(len(changing))
-    every[changing] = _holm(len(chances) * np.min(chances, axis=0))
+    every[changing] = holm_adjusted(len(chances) * np.min(chances, axis=0))
     return every
-
-
-def _holm(chances: Array) -> Array:
-    """Chances of several tests, each for as many as are no smaller.
-
-    Example
-    -------
-    >>> _holm(np.array([0.01, 0.5, 0.02])).tolist()
-    [0.03, 0.5, 0.04]
-    """
-    order = np.argsort(chances)
-    ranked = np.maximum.accumulate(np.arange(len(chances), 0, -1) * chances[order])
-    adjusted = np.empty_like(ranked)
-    adjusted[order] = ranked
-    return np.minimum(adjusted, 1.0)
 
 
 def unless_gusts(
