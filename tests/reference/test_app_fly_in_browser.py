@@ -135,19 +135,28 @@ p = "rad/s"
 K = { value = 20.0, unit = "rad/s^2/V", status = "free" }
 a = { value = 3.0, unit = "1/s", status = "free" }
 """
-GREENER = """() => {
+GREENER = """() => new Promise((done) => {
   const place = document.createElement("canvas");
   [place.width, place.height] = [64, 40];
   const pen = place.getContext("2d", { willReadFrequently: true });
-  pen.drawImage(document.querySelector("canvas.outside"), 0, 0, 64, 40);
   const share = (top) => {
     const told = pen.getImageData(0, top, 64, 10).data;
     let green = 0;
     for (let k = 0; k < told.length; k += 4) green += told[k + 1] > told[k + 2] ? 1 : 0;
     return green / (told.length / 4);
   };
-  return [share(2), share(28)];
-}"""
+  const look = () => {
+    const outside = document.querySelector("canvas.outside");
+    if (outside) pen.drawImage(outside, 0, 0, 64, 40);
+    const drawn = pen.getImageData(32, 20, 1, 1).data.slice(0, 3).some((each) => each > 0);
+    if (!outside || drawn) done(outside && [share(2), share(28)]);
+    else requestAnimationFrame(look);
+  };
+  requestAnimationFrame(look);
+})"""
+"""What was drawn can be read in its own frame alone, and on a busy machine not every one draws.
+
+Nothing where the machine drew so slowly meanwhile that the scenery was given up."""
 
 
 def own_complaints(window: Window) -> list[str]:
@@ -170,12 +179,8 @@ def test_a_model_of_the_folder_flies_over_scenery(desk: Desk) -> None:
     page.get_by_role("button", name="Fly", exact=True).press("Enter")
     page.get_by_text("flying", exact=True).wait_for()
     page.locator("dl dd", has_text="0.0 s").first.wait_for(state="detached")
-    if page.locator("canvas.outside.shown").count():
-        # What was drawn is there in its own frame alone.
-        above, below = page.evaluate(
-            f"new Promise((done) => requestAnimationFrame(() => done(({GREENER})())))"
-        )
-        assert (above, below) == (0.0, pytest.approx(1.0, abs=0.2))
+    if page.locator("canvas.outside.shown").count() and (seen := page.evaluate(GREENER)):
+        assert seen == [0.0, pytest.approx(1.0, abs=0.2)]
     page.get_by_role("button", name="End and keep").press("Enter")
     page.get_by_text("landed", exact=True).wait_for()
     assert not own_complaints(window)

@@ -166,6 +166,16 @@ window.fetch = ((real) => async (path, options) => {
 })(window.fetch);
 """
 """Two messages that pause at one instant, as in PX4's logs: such a log never came into sight."""
+HELD_BACK = """(() => {
+  const place = Object.getOwnPropertyDescriptor(WebSocket.prototype, "onmessage");
+  Object.defineProperty(WebSocket.prototype, "onmessage", { ...place, set(hear) {
+    place.set.call(this, (event) => {
+      if (window.held && JSON.parse(event.data).response) window.held.push(() => hear(event));
+      else hear(event);
+    });
+  }});
+})();"""
+"""As on a machine with much to do: while there is `held`, answers wait in it."""
 GYROS = "IMU.GyrX - IMU.GyrY"
 
 
@@ -173,6 +183,7 @@ def test_from_a_dropped_log_to_a_dragged_band(desk: Desk, tmp_path: Path) -> Non
     window = desk.open()
     page = window.page
     page.add_init_script(GAPS_AT_ONCE)
+    page.add_init_script(HELD_BACK)
     page.reload()
     page.wait_for_selector(".empty")
     said = _findings(page)
@@ -287,8 +298,17 @@ def test_from_a_dropped_log_to_a_dragged_band(desk: Desk, tmp_path: Path) -> Non
     layout = desk.folder / "plots" / "gyros.toml"
     named = layout.read_text("utf-8").replace('"IMU.GyrX"', '"NOT.There", "IMU.GyrX"')
     layout.write_text(named, "utf-8")
+    # An answer that comes when the screen was left is heard by nobody, and nobody asks on.
+    page.click("nav >> text=Flight")
+    page.locator(".cards").wait_for()
+    page.evaluate("() => { window.held = []; }")
+    page.click("nav >> text=Response")
+    page.wait_for_function("held.length > 0")
     page.click("nav >> text=Flight")
     page.wait_for_selector("section[aria-label='Plot of RATE.P'] canvas")
+    page.evaluate(
+        "() => { const late = held; delete window.held; late.forEach((each) => each()); }"
+    )
     page.locator("#layout").select_option("")
     page.locator("#layout").select_option("gyros")
     page.get_by_text("left out of its plots: NOT.There").wait_for()

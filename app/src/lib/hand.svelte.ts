@@ -1,3 +1,4 @@
+import { onDestroy } from "svelte";
 import { live } from "./live.svelte";
 import type { AxisGains, GainsAnswer, GainsQuestion } from "./types";
 
@@ -16,9 +17,12 @@ export class Hand {
   #slow = 0;
   /** Counts what takes the place of moved gains: answers to what was asked before come too late. */
   #turn = 0;
+  #ask = live.asker<GainsQuestion, GainsAnswer>("gains");
 
-  /** `still` is the axis as its study has it. */
-  constructor(readonly log: string, readonly still: () => AxisGains | null) {}
+  /** `still` is the axis as its study has it; made with the component whose hand it is. */
+  constructor(readonly log: string, readonly still: () => AxisGains | null) {
+    onDestroy(() => this.forget());
+  }
 
   /** What is shown of the axis. */
   get shown() {
@@ -57,7 +61,7 @@ export class Hand {
     const [still, turn] = [this.still()!, this.#turn];
     clearTimeout(this.#slow);
     this.#slow = setTimeout(() => (this.late = true), LATE_MS) as unknown as number;
-    live.ask<GainsQuestion, GainsAnswer>("gains", { log: this.log, edits: [], axis: still.axis, values, responses }, (answer) => {
+    this.#ask({ log: this.log, edits: [], axis: still.axis, values, responses }, (answer) => {
       if (turn !== this.#turn) return;
       clearTimeout(this.#slow);
       this.late = false;

@@ -1,3 +1,4 @@
+import { onDestroy } from "svelte";
 import * as api from "./api";
 import type { Reply, Job, Question } from "./types";
 
@@ -53,11 +54,24 @@ class Live {
     };
   }
 
-  /** Ask; answers to older questions of this kind are not heard any more. */
-  ask<Q extends Question, A extends Reply>(kind: string, question: Omit<Q, "request" | "kind">, hear: (answer: A) => void) {
-    const made = { ...question, kind, request: ++this.#last } as unknown as Q;
-    this.#waiting[kind] = { question: made, answered: false, hear };
-    if (this.#socket?.readyState === WebSocket.OPEN) this.#socket.send(JSON.stringify(made));
+  /**
+   * Questions of one kind by the component that is being made; of several the newest alone is answered.
+   * Once it is gone nothing is heard and nothing asked: an answer that came late asked on for nobody.
+   */
+  asker<Q extends Question, A extends Reply>(kind: string) {
+    let gone = false;
+    let mine: Waiting | null = null;
+    onDestroy(() => {
+      gone = true;
+      // Another component may have asked meanwhile.
+      if (mine && this.#waiting[kind] === mine) delete this.#waiting[kind];
+    });
+    return (question: Omit<Q, "request" | "kind">, hear: (answer: A) => void) => {
+      if (gone) return;
+      const made = { ...question, kind, request: ++this.#last } as unknown as Q;
+      this.#waiting[kind] = mine = { question: made, answered: false, hear };
+      if (this.#socket?.readyState === WebSocket.OPEN) this.#socket.send(JSON.stringify(made));
+    };
   }
 
   /** What a socket does not tell: whether anybody is there, and knows this page. */
