@@ -28,7 +28,7 @@ AXE = ROOT / "app" / "node_modules" / "axe-core" / "axe.min.js"
 REQUIRED = os.environ.get("FLIGHTID_BROWSER") == "required"
 ARGUMENTS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
 SERIOUS = ("serious", "critical")
-WAIT_MS = 60_000
+WAIT_MS = 120_000
 
 
 def _missing() -> str:
@@ -113,9 +113,10 @@ def opened_desk(folder: Path) -> Iterator[Desk]:
     with sync_playwright() as tools:
         browser = tools.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
         context = browser.new_context(viewport={"width": 1280, "height": 800})
+        context.set_default_timeout(WAIT_MS)
         first = context.new_page()
         first.goto(session.address)
-        first.wait_for_selector(".drop", timeout=WAIT_MS)
+        first.wait_for_selector(".drop")
         first.close()
         yield Desk(browser, context, session.address, folder)
         browser.close()
