@@ -10,7 +10,7 @@ from few samples of a fine one.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -91,8 +91,8 @@ def foretold_chances(errors: Sequence[Array], inputs: Sequence[Array]) -> Array 
 
 
 def unless_gusts(
-    findings: Sequence[Finding], codes: Sequence[str], made: Sequence[Prediction]
-) -> tuple[Finding, ...]:
+    verdicts: Mapping[str | None, Finding], made: Sequence[Prediction]
+) -> dict[str | None, Finding]:
     """Verdicts on free runs, none red for an error that no input foretells.
 
     Each output is judged by its own error, all together by whether any poor one is foretold. An
@@ -100,33 +100,27 @@ def unless_gusts(
 
     Parameters
     ----------
-    findings : sequence of Finding
-        Those of one output begin with its name.
-    codes : sequence of str
-        Of the findings that weigh the error.
+    verdicts : mapping of str or None to Finding
+        That weigh the error, by output; None: of all together.
     made : sequence of Prediction
     """
-    red = any(each.code in codes and each.light is Light.RED for each in findings)
     whole = all(each.horizon == FREE_RUN and each.diverged_at is None for each in made)
-    if not red or not whole:
-        return tuple(findings)
+    if not whole or all(each.light is not Light.RED for each in verdicts.values()):
+        return dict(verdicts)
     by_output = chances_by_output(made)
     if not by_output:
-        return tuple(findings)
-    own = [_output_of(each, by_output) if each.code in codes else None for each in findings]
+        return dict(verdicts)
     poor = [
         by_output[name]
-        for name, each in zip(own, findings, strict=True)
+        for name, each in verdicts.items()
         if name is not None and each.light in (Light.AMBER, Light.RED)
     ]
     together = min(poor, default=min(by_output.values()))
     wrong = [name for name, chance in by_output.items() if chance < LEVEL]
-    return tuple(
-        _weighed(each, together if name is None else by_output[name], wrong)
-        if each.code in codes
-        else each
-        for name, each in zip(own, findings, strict=True)
-    )
+    return {
+        name: _weighed(each, together if name is None else by_output[name], wrong)
+        for name, each in verdicts.items()
+    }
 
 
 def chances_by_output(made: Sequence[Prediction]) -> dict[str, float]:
@@ -137,11 +131,6 @@ def chances_by_output(made: Sequence[Prediction]) -> dict[str, float]:
     if chances is None:
         return {}
     return dict(zip(made[0].outputs, map(float, chances), strict=True))
-
-
-def _output_of(finding: Finding, names: Iterable[str]) -> str | None:
-    """Which output a verdict is of; None for all together."""
-    return next((name for name in names if finding.message.startswith(f"{name}: ")), None)
 
 
 def _weighed(finding: Finding, chance: float, wrong: Sequence[str]) -> Finding:

@@ -12,7 +12,7 @@ from flightid.identification.prediction.request import Request
 from flightid.identification.prediction.result import Prediction
 from flightid.record.chosen_hold import ASSUMED, ChosenHold
 from flightid.record.hold import BETWEEN, HOLDS, InputHold
-from flightid.validation.verification.judgement import judge
+from flightid.validation.verification.judgement import numbers_of
 from flightid.validation.verification.result import Verification
 
 SMOOTH: tuple[InputHold, ...] = ("first", "band_limited")
@@ -50,10 +50,10 @@ def hold_findings(
             continue
         try:
             made = tuple(run(replace(request, hold=other)))
-            found = judge(made, judged.outputs, request, None, {})
+            found = numbers_of(made, judged.outputs)["fit_percent"]
         except FlightidError:
             return held.findings
-        shifts = (found.fit_percent[name] - judged.fit_percent[name] for name in judged.outputs)
+        shifts = (found[name] - judged.fit_percent[name] for name in judged.outputs)
         moved = max(moved, *map(abs, shifts))
     if moved >= NO_MATTER_PERCENT:
         return held.findings

@@ -13,12 +13,14 @@ from flightid.identification.prediction.result import Prediction
 from flightid.identification.prediction.weights import guide_factor, guide_weights, is_vehicle
 from flightid.simulation import metrics
 from flightid.validation.verification.beside_noise import BesideNoise, beside_noise
+from flightid.validation.verification.foretold_error import unless_gusts
 from flightid.validation.verification.muad import Mismatch
-from flightid.validation.verification.of_the_fit import weighed
+from flightid.validation.verification.of_the_fit import GUSTS, weighed
 from flightid.validation.verification.result import Verification
 
 THEIL_GUIDE = (0.25, 0.30)
 THEIL = "verification-theil"
+TOGETHER = "all outputs together"
 J_RMS_GUIDE = (1.0, 2.0)
 MOVE_MORE = "verify on a record that moves the output more"
 
@@ -29,23 +31,14 @@ def judge(
     request: Request,
     mismatch: Mismatch | None,
     own: Mapping[str, float],
+    gusts: Mapping[str, float],
 ) -> Verification:
     """Numbers by output over all records together, and verdicts against the guides.
 
-    `own` are errors of the fitted model in the records of its fit, by output, where it has any.
+    `own` are errors of the fitted model in the records of its fit, by output, where it has any, and
+    `gusts` what the process noise that it found makes of these runs.
     """
-    numbers: dict[str, dict[str, float]] = {
-        key: {} for key in ("theil", "rms_error", "mse", "fit_percent", "vaf", "r_squared")
-    }
-    for name in compared:
-        pairs = [each.scored(name) for each in predictions]
-        y, y_hat = (np.concatenate([pair[side] for pair in pairs]) for side in (0, 1))
-        numbers["theil"][name] = float(metrics.theil(y, y_hat))
-        numbers["rms_error"][name] = float(metrics.rms_error(y, y_hat))
-        numbers["mse"][name] = float(metrics.mse(y, y_hat))
-        numbers["fit_percent"][name] = float(metrics.fit_percent(y, y_hat))
-        numbers["vaf"][name] = float(metrics.vaf_percent(y, y_hat))
-        numbers["r_squared"][name] = float(metrics.r_squared(y, y_hat))
+    numbers = numbers_of(predictions, compared)
     first = predictions[0].measured
     factors = [guide_factor(first.unit(name)) for name in compared]
     j_rms = None
@@ -58,8 +51,11 @@ def judge(
         j_rms = float(np.sqrt(np.mean(np.square(errors))))
     overall = overall_theil(predictions, compared)
     guided = j_rms if is_vehicle([first.unit(name) for name in compared]) else None
-    verdicts = _findings(overall, numbers["theil"], guided, predictions)
-    verdicts = weighed(verdicts, THEIL, numbers["rms_error"], own)
+    verdicts = weighed(
+        _theil_verdicts(overall, numbers["theil"], predictions), numbers["rms_error"], own
+    )
+    verdicts = unless_gusts(weighed(verdicts, numbers["rms_error"], gusts, GUSTS), predictions)
+    found = (*verdicts.values(), *_findings(guided, predictions))
     return Verification(
         outputs=compared,
         predictions=predictions,
@@ -72,11 +68,30 @@ def judge(
         hold=request.hold,
         mismatch=mismatch,
         findings=(
-            *(verdicts if request.horizon == FREE_RUN else ()),
+            *(found if request.horizon == FREE_RUN else ()),
             *(() if mismatch is None else mismatch.findings),
         ),
         **numbers,
     )
+
+
+def numbers_of(
+    predictions: Sequence[Prediction], compared: Sequence[str]
+) -> dict[str, dict[str, float]]:
+    """Coefficients and errors by name and output, over all records together."""
+    numbers: dict[str, dict[str, float]] = {
+        key: {} for key in ("theil", "rms_error", "mse", "fit_percent", "vaf", "r_squared")
+    }
+    for name in compared:
+        pairs = [each.scored(name) for each in predictions]
+        y, y_hat = (np.concatenate([pair[side] for pair in pairs]) for side in (0, 1))
+        numbers["theil"][name] = float(metrics.theil(y, y_hat))
+        numbers["rms_error"][name] = float(metrics.rms_error(y, y_hat))
+        numbers["mse"][name] = float(metrics.mse(y, y_hat))
+        numbers["fit_percent"][name] = float(metrics.fit_percent(y, y_hat))
+        numbers["vaf"][name] = float(metrics.vaf_percent(y, y_hat))
+        numbers["r_squared"][name] = float(metrics.r_squared(y, y_hat))
+    return numbers
 
 
 def overall_theil(predictions: Sequence[Prediction], compared: tuple[str, ...]) -> float:
@@ -96,36 +111,35 @@ def overall_theil(predictions: Sequence[Prediction], compared: tuple[str, ...]) 
     return float(error / (seen + said))
 
 
-def _theil_findings(
+def _theil_verdicts(
     overall: float, theil: dict[str, float], predictions: Sequence[Prediction]
-) -> list[Finding]:
+) -> dict[str | None, Finding]:
     """All outputs together, then each; a poor one is no red by itself where all together agree.
 
     An output that these inputs hardly move is mostly gust and noise, and no model predicts that.
     """
     verdict = light_of(overall, THEIL_GUIDE)
     several = len(theil) > 1
-    values = {"all outputs together": overall, **theil} if several else theil
-    found = []
-    for name, value in values.items():
+    values: list[tuple[str | None, float]] = [*theil.items()]
+    values = [(None, overall), *values] if several else values
+    found = {}
+    for name, value in values:
         said = ""
         light = light_of(value, THEIL_GUIDE)
         if light is Light.RED and verdict is not Light.RED:
             light = Light.AMBER
         action = "" if light is Light.GREEN else "look where the prediction parts from the record"
         beside = None
-        if light is not Light.GREEN and name in theil:
+        if light is not Light.GREEN and name is not None:
             beside = beside_noise(predictions, name)
         if beside is not None:
             light, said, action = _with_noise(light, beside, action)
-        found.append(
-            Finding(
-                THEIL,
-                light,
-                f"{name}: Theil coefficient {value:.3f}, guide at most {THEIL_GUIDE[0]:g} "
-                f"to {THEIL_GUIDE[1]:g}{said}",
-                action,
-            )
+        found[name] = Finding(
+            THEIL,
+            light,
+            f"{name or TOGETHER}: Theil coefficient {value:.3f}, guide at most "
+            f"{THEIL_GUIDE[0]:g} to {THEIL_GUIDE[1]:g}{said}",
+            action,
         )
     return found
 
@@ -143,13 +157,9 @@ def _with_noise(light: Light, beside: BesideNoise, action: str) -> tuple[Light, 
     return Light.UNKNOWN, f"{said} and hides whether the rest is within it", MOVE_MORE
 
 
-def _findings(
-    overall: float,
-    theil: dict[str, float],
-    j_rms: float | None,
-    predictions: tuple[Prediction, ...],
-) -> tuple[Finding, ...]:
-    found = _theil_findings(overall, theil, predictions)
+def _findings(j_rms: float | None, predictions: tuple[Prediction, ...]) -> list[Finding]:
+    """What is said beside the coefficients."""
+    found = []
     if j_rms is not None:
         # The guide is in absolute units, for piloted aircraft and modest inputs: no red by itself.
         light = Light.GREEN if j_rms <= J_RMS_GUIDE[1] else Light.AMBER
@@ -193,7 +203,7 @@ def _findings(
                 "settle_s with a longer first stretch, or initial_state='trim'",
             )
         )
-    return tuple(found)
+    return found
 
 
 def _shifted_inputs(predictions: tuple[Prediction, ...]) -> list[Finding]:

@@ -128,12 +128,11 @@ def _power(a: Array, c: Array, density: Array, start: Array, duration_s: float) 
 
 
 def weighed(
-    findings: Sequence[Finding],
-    code: str,
+    verdicts: Mapping[str | None, Finding],
     errors: Mapping[str, float],
     own: Mapping[str, float],
     said: str = "in the records of the fit: little here rises above it",
-) -> tuple[Finding, ...]:
+) -> dict[str | None, Finding]:
     """Verdicts on a prediction, none red for an error that the fit itself shows.
 
     Where no output is predicted worse than the fit explains its own records, a poor share of the
@@ -142,24 +141,23 @@ def weighed(
 
     Parameters
     ----------
-    findings : sequence of Finding
-    code : str
-        Of the findings that weigh errors by the motion.
+    verdicts : mapping of str or None to Finding
+        That weigh errors by the motion, by output; None: of all together.
     errors, own : mapping of str to float
         Error by output: of the prediction, and of the fit in its own records.
     said : str
         Where the latter stands.
     """
     if not errors or any(error > AS_MUCH * own.get(name, 0.0) for name, error in errors.items()):
-        return tuple(findings)
+        return dict(verdicts)
     said = f"; the error is no larger than {said}"
     action = "verify on a record that moves the output more"
-    return tuple(
-        replace(each, light=Light.AMBER, message=each.message + said, action=action)
-        if each.code == code and each.light is Light.RED
+    return {
+        name: replace(each, light=Light.AMBER, message=each.message + said, action=action)
+        if each.light is Light.RED
         else each
-        for each in findings
-    )
+        for name, each in verdicts.items()
+    }
 
 
 def seen_findings(

@@ -33,16 +33,13 @@ from flightid.threads import on_one_thread
 from flightid.validation.verification.baseline import baseline_findings
 from flightid.validation.verification.comparison import Comparison, compared
 from flightid.validation.verification.contradiction import contradictions
-from flightid.validation.verification.foretold_error import unless_gusts
 from flightid.validation.verification.held_otherwise import hold_findings
-from flightid.validation.verification.judgement import THEIL, THEIL_GUIDE, judge
+from flightid.validation.verification.judgement import THEIL_GUIDE, judge
 from flightid.validation.verification.muad import mismatch
 from flightid.validation.verification.of_the_fit import (
-    GUSTS,
     gust_errors,
     own_errors,
     seen_findings,
-    weighed,
 )
 from flightid.validation.verification.pieces import growth_findings
 from flightid.validation.verification.result import Verification
@@ -210,10 +207,8 @@ def verify(
     ):
         seen = None if responses is None else mismatch(model, responses)
         own = own_errors(each, THEIL_GUIDE[0])
-        judged = judge(tuple(made), chosen, request, seen, own)
         gusts = gust_errors(each, model, [record.duration_s for record in flown])
-        verdicts = weighed(judged.findings, THEIL, judged.rms_error, gusts, GUSTS)
-        judged = replace(judged, findings=unless_gusts(verdicts, (THEIL,), made))
+        judged = judge(tuple(made), chosen, request, seen, own, gusts)
         beside = (
             *baseline_findings(each, made, request),
             *contradictions(each, way, made, request),
