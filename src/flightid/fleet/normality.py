@@ -9,12 +9,15 @@ from __future__ import annotations
 import math
 from collections.abc import Container, Iterable, Iterator, Sequence
 
+import numpy as np
+
 from flightid.conventions import Light
 from flightid.findings import Finding, counted
 from flightid.fleet.statistics.answers import UNDATED, TypeAnswers
 from flightid.fleet.statistics.largest_step import FEWEST, SHORTEST
 from flightid.fleet.statistics.least_step import POWER
 from flightid.fleet.statistics.parameter_history import ParameterHistory
+from flightid.fleet.statistics.shared_level import SharedLevel
 from flightid.uncertainty.estimate import Reading
 
 WHOLE = 100.0
@@ -26,7 +29,12 @@ INSIDE = f", {SHORTEST} flights or more on either side,"
 SEVERAL = 2
 """Vehicles from which a parameter or a model is the type's, and newest flights that are a sign."""
 MORE = "log more flights of it, and of more vehicles of its type"
-WITH_ALL = "look for what all share; a vehicle that did not fly meanwhile tells wear from the rest"
+WITH_ALL = (
+    "look for what all share, and name what was done to all as an event; a vehicle that did not "
+    "fly meanwhile tells wear from the rest"
+)
+NEAR = 1
+"""Flights of a vehicle that may lie between an event of all and the step that all share."""
 
 
 def quiet_light(vehicle: str, types: Iterable[TypeAnswers]) -> Finding:
@@ -42,8 +50,8 @@ def quiet_light(vehicle: str, types: Iterable[TypeAnswers]) -> Finding:
     -------
     Finding
         Green where every parameter of it was held beside its history and its type, amber where one
-        rose or fell with all vehicles; unknown, with the reason, where a question that was asked
-        has no answer.
+        rose, fell or stepped with all vehicles and no event of all says why; unknown, with the
+        reason, where a question that was asked has no answer.
     """
     every = list(types)
     mine = [each for each in every if vehicle in each.data.members]
@@ -66,8 +74,8 @@ def quiet_light(vehicle: str, types: Iterable[TypeAnswers]) -> Finding:
         return Finding("vehicle", Light.UNKNOWN, f"{vehicle}: {said}", MORE)
     if not known:
         return Finding("vehicle", Light.UNKNOWN, f"{vehicle}: nothing was asked of it")
-    if trends := [words for history, of in seen for words in _trend_words(history, of)]:
-        said = f"{', '.join(known)}; {'; '.join(trends)}"
+    if together := [words for history, of in seen for words in _together_words(history, of)]:
+        said = f"{', '.join(known)}; {'; '.join(together)}"
         return Finding("vehicle", Light.AMBER, f"{vehicle}: {said}", WITH_ALL)
     return Finding("vehicle", Light.GREEN, f"{vehicle}: {', '.join(known)}")
 
@@ -84,12 +92,23 @@ def _is_shared(history: ParameterHistory, each: TypeAnswers) -> bool:
     return any(one.name == history.name for one in every)
 
 
-def _trend_words(history: ParameterHistory, each: TypeAnswers) -> Iterator[str]:
-    """Where a parameter rose or fell with all vehicles: beside them it did not change."""
+def _together_words(history: ParameterHistory, each: TypeAnswers) -> Iterator[str]:
+    """Where a parameter went with all vehicles to another level: beside them it did not change."""
     for one in each.drift.shared if each.drift is not None else ():
-        if one.name == history.name and one.trend is not None:
+        if one.name == history.name and _is_moved(history, one):
             name = each.labels.get(one.name, one.name)
-            yield f"{name} went with all vehicles, which {one.trend.words}"
+            yield f"{name} went with all vehicles, which {one.course}"
+
+
+def _is_moved(history: ParameterHistory, shared: SharedLevel) -> bool:
+    """Whether a vehicle went along to another level that no event of all explains."""
+    time_s, since = history.time_s, shared.since_s
+    if shared.trend is not None:
+        return True
+    if not shared.is_step or not time_s[0] < since <= time_s[-1]:
+        return False
+    ends = [sorted((each.time_s, since)) for each in history.happened if not each.vehicles]
+    return all(np.count_nonzero((time_s >= a) & (time_s < b)) > NEAR for a, b in ends)
 
 
 def _is_seen(history: ParameterHistory) -> bool:

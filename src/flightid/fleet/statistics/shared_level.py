@@ -17,12 +17,8 @@ from scipy.special import bdtrc
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
 from flightid.fleet.statistics.own_steps import own_steps
 from flightid.fleet.statistics.repeats import days_of
-from flightid.fleet.statistics.shared_trend import (
-    TRENDLIKE,
-    SharedTrend,
-    line_share,
-    shared_trend,
-)
+from flightid.fleet.statistics.shared_shape import SharedShape, shared_shape
+from flightid.fleet.statistics.shared_trend import SharedTrend, shared_trend
 from flightid.frozen import dataclass
 from flightid.record.outlying import NORMAL_MAD
 from flightid.uncertainty.estimate import Estimate
@@ -38,9 +34,6 @@ AGREEING = 0.85
 vehicles, with the others by chance either way, as many seem to."""
 CHANCE = 0.05
 """Of as many vehicles that agree were each as likely not to."""
-STEPLIKE = 0.9
-"""Share of the squares of a shared level that one step explains, from which it is one; of a wave it
-explains 81 %."""
 SMALL = 30
 """Vehicles, up to which one counts in the median it is held against."""
 
@@ -57,7 +50,7 @@ class SharedLevel:
     variances : ndarray, shape (n,)
         Of `moved`.
     is_step : bool
-        Whether one step explains nine tenths of it.
+        Whether it may be one step (`shared_shape`).
     since_s : float
         First instant behind the step that explains most.
     change : Estimate
@@ -68,7 +61,7 @@ class SharedLevel:
         Vehicles that tell it, and those of them that move with the others: of a step those whose
         own is told apart from none, and not apart from it.
     trend : SharedTrend or None
-        Where all rise or fall by and by.
+        Where all may rise or fall by and by; beside a step where days do not tell which it is.
     """
 
     name: str
@@ -89,7 +82,6 @@ class SharedLevel:
         A vehicle without the change may move with the others by chance, and is apart all the same.
         """
         name = labels.get(self.name, self.name)
-        unit = "" if self.change.unit == "1" else f" {self.change.unit}"
         count = min(self.agreeing, self.vehicles - len(apart))
         whose = f"{count} of {self.vehicles} vehicles"
         if apart:
@@ -98,16 +90,27 @@ class SharedLevel:
         elif count < self.vehicles and self.is_step:
             whose += " tell it by themselves"
         who = "all" if count == self.vehicles else "most"
-        if self.trend is not None:
-            return f"{name}: {who} vehicles {self.trend.words} ({whose})"
-        if not self.is_step:
-            ends = f"{self.least:+.2g} to {self.most:+.2g}{unit} of its usual value"
-            return f"{name}: {who} vehicles moved together by date, {ends} ({whose})"
+        who = who if not self.is_step or 2 * count > self.vehicles else "the"
+        return f"{name}: {who} vehicles {self.course} ({whose})"
+
+    @property
+    def course(self) -> str:
+        """What they did: at once, by and by, either where their days do not tell, or otherwise."""
+        unit = "" if self.change.unit == "1" else f" {self.change.unit}"
         since = datetime.datetime.fromtimestamp(self.since_s, datetime.UTC).date().isoformat()
         low, high = self.change.interval(shown()) or (-np.inf, np.inf)
         by = f"{self.change.value:+.2g}{unit} ({low:+.2g} to {high:+.2g}{unit})"
-        who = who if 2 * count > self.vehicles else "the"
-        return f"{name}: {who} vehicles changed together by {by} from {since} ({whose})"
+        at_once = f"changed together by {by} from {since}"
+        if self.trend is not None and self.is_step:
+            return (
+                f"{at_once}, or {self.trend.words}; their days do not tell at once from by and by"
+            )
+        if self.trend is not None:
+            return self.trend.words
+        if self.is_step:
+            return at_once
+        ends = f"{self.least:+.2g} to {self.most:+.2g}{unit} of its usual value"
+        return f"moved together by date, {ends}"
 
 
 def shared_level(data: FlightEstimates, i: int) -> SharedLevel | None:
@@ -165,18 +168,27 @@ def shared_level(data: FlightEstimates, i: int) -> SharedLevel | None:
         return None
     size, unit = (100.0, "%") if in_percent else (1.0, data.units[i])
     change = Estimate(data.names[i], size * told[0], unit, size * told[1])
-    when = np.array([time_s[bins == b].mean() for b in np.flatnonzero(there)])
-    line = line_share(level[there], variance[there], counts[there], when)
-    beside = line_share(level[there], np.zeros(len(when)), counts[there], when)
-    is_trend = line >= TRENDLIKE and beside > told[2]
-    is_step = told[2] >= STEPLIKE and not is_trend
+    shape = _shape(residual, member, (bins, day), time_s, since)
+    trend = shared_trend(residual, member, time_s, day, change) if shape.may_line else None
     return SharedLevel(
         data.names[i],
-        *(moved, variances, is_step, since, change),
+        *(moved, variances, shape.may_step, since, change),
         *(size * float(level[there].min()), size * float(level[there].max())),
-        *(vehicles, steps.told if is_step else agreeing),
-        shared_trend(residual, member, time_s, day, change) if is_trend else None,
+        *(vehicles, steps.told if shape.may_step else agreeing),
+        trend,
     )
+
+
+def _shape(
+    residual: Array, member: Places, bins: tuple[Places, Places], time_s: Array, since: float
+) -> SharedShape:
+    """By days where more of them than of weeks have five vehicles, for they tell more."""
+    held = [(each, *_levels(residual, member, each)) for each in bins]
+    each, level, variance, counts = max(held, key=lambda one: np.count_nonzero(one[3]))
+    there = np.flatnonzero(counts)
+    at = np.array([time_s[each == b].mean() for b in there])
+    after = np.array([time_s[each == b].min() >= since for b in there])
+    return shared_shape(level[there], variance[there], counts[there], at, after)
 
 
 def without_shared(data: FlightEstimates, i: int, shared: SharedLevel | None) -> FlightEstimates:
@@ -287,13 +299,11 @@ def _agreeing(residual: Array, member: Places, bins: Places, level: Array) -> tu
 
 def _step(
     level: Array, variance: Array, counts: Array, after: NDArray[np.bool_]
-) -> tuple[float, float, float]:
-    """Step of weekly levels, its standard error, and the share of their squares it explains."""
+) -> tuple[float, float]:
+    """Step of weekly levels, and its standard error."""
     shares = [
         np.where(side, counts, 0.0) / max(counts[side].sum(), 1.0) for side in (~after, after)
     ]
-    means = [float(share @ level) for share in shares]
+    before, behind = (float(share @ level) for share in shares)
     stderr = float(np.sqrt(sum(float(share**2 @ variance) for share in shares)))
-    every = float(np.sum(counts * (level - np.average(level, weights=counts)) ** 2))
-    left = float(np.sum(counts * (level - np.where(after, means[1], means[0])) ** 2))
-    return means[1] - means[0], stderr, 1.0 - left / every if every > 0.0 else 0.0
+    return behind - before, stderr

@@ -13,9 +13,6 @@ from flightid.uncertainty.quantiles import LEVEL, shown
 
 Array = NDArray[np.float64]
 Places = NDArray[np.intp]
-TRENDLIKE = 0.75
-"""Share of the squares of a shared level, its errors taken off, that a line explains, from which it
-is one: of a whole wave it explains 61 %."""
 LONG = 0.5
 """Share of the fleet's time that a vehicle's flights span, from which its own slope counts."""
 FEWEST = 3
@@ -106,25 +103,6 @@ def shared_trend(
     if held is None or held[0] <= 0.0 <= held[1]:
         return None
     return SharedTrend(change, first_s, last_s)
-
-
-def line_share(level: Array, variance: Array, counts: Array, at: Array) -> float:
-    """Share of the squares of weekly levels, without their errors, that a line explains.
-
-    Example
-    -------
-    >>> at = np.arange(4.0)
-    >>> round(line_share(2.0 * at, np.zeros(4), np.ones(4), at), 3)
-    1.0
-    """
-    moved = level - np.average(level, weights=counts)
-    course = at - np.average(at, weights=counts)
-    spread = float(counts @ course**2)
-    if spread <= 0.0:
-        return 0.0
-    explained = float(counts @ (course * moved)) ** 2 / spread
-    every = max(float(counts @ moved**2) - float(counts @ variance), explained)
-    return explained / every if every > 0.0 else 0.0
 
 
 def _variance_of_days(beside: Array, at: Array, day: Places) -> tuple[float, int]:
