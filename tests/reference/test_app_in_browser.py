@@ -10,8 +10,9 @@ import asyncio
 import os
 import shutil
 import threading
+import time
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -140,6 +141,14 @@ def _findings(page: Any) -> list[str]:
     return found
 
 
+def until(page: Any, holds: Callable[[], bool]) -> None:
+    """Wait for what no element shows, as long as for an element."""
+    end = time.monotonic() + WAIT_MS / 1e3
+    while not holds():
+        assert time.monotonic() < end, "it never came to be"
+        page.wait_for_timeout(100)
+
+
 def zoomed_by_keys(chart: Any, whole: Any, reading: str = " s: ") -> None:
     """Plus, minus, an arrow and 0 on a chart, values by Shift; the whole by a button."""
     for back in ("-", "0"):
@@ -203,10 +212,7 @@ def test_from_a_dropped_log_to_a_dragged_band(desk: Desk, tmp_path: Path) -> Non
     page.press("#field", "Enter")
     page.wait_for_selector(f"section[aria-label='Plot of ={GYROS}'] canvas")
     # Both are tables of the study, which a run reports.
-    for _ in range(100):
-        if len(desk.study.get("plot", [])) == 4:
-            break
-        page.wait_for_timeout(100)
+    until(page, lambda: len(desk.study.get("plot", [])) == 4)
     assert desk.study["plot"][2:] == [{"series": ["IMU.GyrX"]}, {"series": [f"={GYROS}"]}]
     page.click("text=Keep as a layout …")
     page.get_by_label("Name of the layout").fill("gyros, raw")
@@ -247,10 +253,7 @@ def test_from_a_dropped_log_to_a_dragged_band(desk: Desk, tmp_path: Path) -> Non
     assert {"name": named[0], "span_s": [40.0, 55.5]} in desk.study["segment"]
     # Twice at once takes two changes back, one after the other.
     page.click("text=fit Pitch rate")
-    for _ in range(100):
-        if desk.study["model"][1]["identify"] == ["pitch 40 s to 55.5 s"]:
-            break
-        page.wait_for_timeout(100)
+    until(page, lambda: desk.study["model"][1]["identify"] == ["pitch 40 s to 55.5 s"])
     assert desk.study["model"][1]["identify"] == ["pitch 40 s to 55.5 s"]
     page.locator("pre .changed", has_text='["pitch 40').wait_for()
     page.get_by_role("button", name="Undo").dblclick()
@@ -276,10 +279,7 @@ def test_from_a_dropped_log_to_a_dragged_band(desk: Desk, tmp_path: Path) -> Non
         const held = () => new KeyboardEvent("keydown", { key: "ArrowRight", bubbles: true });
         for (let k = 0; k < 8; k++) handle.dispatchEvent(held()); }"""
     )
-    for _ in range(100):
-        if desk.study["model"][0]["band_rad_s"][1] > 1.25 * high:
-            break
-        page.wait_for_timeout(100)
+    until(page, lambda: desk.study["model"][0]["band_rad_s"][1] > 1.25 * high)
     high = desk.study["model"][0]["band_rad_s"][1]
     assert high == pytest.approx(before["model"][0]["band_rad_s"][1] * 1.03**7, rel=1e-2)
     assert not page.locator("dialog[open]").count()
@@ -289,10 +289,7 @@ def test_from_a_dropped_log_to_a_dragged_band(desk: Desk, tmp_path: Path) -> Non
     page.mouse.down()
     page.mouse.move(middle[0] + 60.0, middle[1], steps=6)
     page.mouse.up()
-    for _ in range(100):
-        if desk.study["model"][0]["band_rad_s"][0] != low:
-            break
-        page.wait_for_timeout(100)
+    until(page, lambda: desk.study["model"][0]["band_rad_s"][0] != low)
     assert desk.study["model"][0]["band_rad_s"][0] > 1.05 * low
     assert desk.study["model"][0]["band_rad_s"][1] == high
     # What a layout names and this log lacks is in no line of Python either.
@@ -304,7 +301,7 @@ def test_from_a_dropped_log_to_a_dragged_band(desk: Desk, tmp_path: Path) -> Non
     page.locator(".cards").wait_for()
     page.evaluate("() => { window.held = []; }")
     page.click("nav >> text=Response")
-    page.wait_for_function("held.length > 0")
+    until(page, lambda: page.evaluate("held.length > 0"))
     page.click("nav >> text=Flight")
     page.wait_for_selector("section[aria-label='Plot of RATE.P'] canvas")
     page.evaluate(
