@@ -1,8 +1,9 @@
 """Kill server, worker and browser of the page: `python -m tests.stress.app_kills --kills 100`.
 
 A session in Chromium drops logs, edits studies, keeps models, runs studies. At a random moment of
-it one of the three is killed; what the page was told is done must be there afterwards, whole, and
-what it was told is begun must be there or be offered again. A line follows each kill.
+it one of them is killed, or the process that workers are forked from; what the page was told is
+done must be there afterwards, whole, and what it was told is begun must be there or be offered
+again. A line follows each kill.
 """
 
 from __future__ import annotations
@@ -20,9 +21,9 @@ from playwright.sync_api import Error as BrowserError
 from playwright.sync_api import Playwright, sync_playwright
 
 from tests.stress.app_kept import Kept, losses
-from tests.stress.app_session import RefusedError, Server, Session, descendants, kill
+from tests.stress.app_session import RefusedError, Server, Session, forkers, kill, workers
 
-KINDS = ("server", "worker", "browser")
+KINDS = ("server", "worker", "forker", "browser")
 FOLDER_KILLS = 10
 """Kills on one folder, before a new one is begun."""
 LEFT_S = 40.0
@@ -47,8 +48,10 @@ class Victim:
         elif self.kind == "server":
             kill(self._server.pid)
         else:
-            workers = [p for p, words in descendants(self._server.pid) if "spawn_main" in words]
-            kill(random.choice(workers)) if workers else None
+            find = workers if self.kind == "worker" else forkers
+            while not (found := find(self._server.pid)):
+                time.sleep(0.05)  # the server begins them
+            kill(random.choice(found))
         self.fell.set()
 
     def wait(self) -> None:

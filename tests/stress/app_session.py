@@ -40,6 +40,8 @@ Ltphi = { value = 100.0, unit = "rad/s^2", min = 0.1, max = 10000.0, status = "f
 Lp = { value = -3.0, unit = "1/s", min = -100.0, max = 10.0, status = "free" }
 """
 PATIENCE_MS = 180_000
+FORKS, SPAWNED = "multiprocessing.forkserver", "spawn_main"
+"""Words of Python's own processes of either kind."""
 EDITS = 6
 ASK = """async ([path, options]) => {
   const told = await fetch(path, options);
@@ -73,6 +75,25 @@ def descendants(process: int) -> list[tuple[int, str]]:
             words = Path(f"/proc/{each}/cmdline").read_bytes().replace(b"\0", b" ")
             told.append((each, words.decode(errors="replace")))
     return told
+
+
+def parent_of(process: int) -> int:
+    """Which process has started one; 0 where it has ended."""
+    with suppress(OSError):
+        stat = Path(f"/proc/{process}/stat").read_text()
+        return int(stat.rpartition(")")[2].split()[1])
+    return 0
+
+
+def forkers(server: int) -> list[int]:
+    """Of a server, the process that has imported once and is forked for each worker."""
+    return [p for p, words in descendants(server) if FORKS in words and parent_of(p) == server]
+
+
+def workers(server: int) -> list[int]:
+    """Processes that work for a server: forks of that one, or begun each for itself."""
+    begun = forkers(server)
+    return [p for p, words in descendants(server) if parent_of(p) in begun or SPAWNED in words]
 
 
 class Server:
