@@ -56,6 +56,10 @@ def test_from_dropped_tables_to_a_report(desk: Desk, tmp_path: Path) -> None:
     for name in ("drive", "swing"):
         chart = page.locator(f"[role=application][aria-label^='{name} of steps over time']")
         zoomed_by_keys(chart, page.get_by_role("button", name="Whole", exact=True))
+    # A button stands where the command has a table to be written.
+    fault = page.locator(".fault", has_text="swing").first.inner_text()
+    assert "bridge it before any fit" in fault
+    assert "conditioning" not in fault
     # What is bridged before structures are tried is so in the study, for all of its records.
     page.get_by_role("button", name="Bridge it").click()
     page.get_by_text("will be bridged").wait_for()

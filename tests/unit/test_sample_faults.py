@@ -204,3 +204,17 @@ def test_findings_reach_responses_and_the_evidence_of_fits() -> None:
     (one,), (two,) = sample_checks([good, bad], {"y"}), sample_checks([good, bad, worse], {"y"})
     assert two.what == f"{one.what} (and 1 other finding on the samples)"
     assert sample_checks([good], {"y"}) == []
+
+
+def test_one_spike_is_told_as_one_and_several_as_several() -> None:
+    told = {}
+    for at in ([700], [700, 1900]):
+        samples = ROLL.copy()
+        samples[at] += 30.0
+        (found,) = record_findings(Record.from_arrays(TIME_S, outputs={"phi": samples}))
+        told[len(at)] = f"{found.message} {found.action}"
+    assert "1 sample of phi stands alone, 30" in told[1]
+    assert "from its neighbours (" in told[1]
+    assert "look for its cause" in told[1]
+    assert "from the neighbours at most (" in told[2]
+    assert "look for their cause" in told[2]

@@ -233,7 +233,8 @@ def _spikes(channel: _ExaminedChannel) -> SampleFault | None:
     light = Light.RED if share >= RED_SHARE else Light.AMBER
     said = (
         f"{counted(at.size, 'sample')} of {name} {'stands' if at.size == 1 else 'stand'} alone, "
-        f"{float(np.max(away[at])):.3g}{channel.of_unit} from the neighbours at most "
+        f"{float(np.max(away[at])):.3g}{channel.of_unit} from "
+        f"{'its neighbours' if at.size == 1 else 'the neighbours at most'} "
         f"({_percent(share)} of the channel's variance): {_instants(stamps[at])}"
     )
     between = _between(away[at], np.delete(away, at), spread)
@@ -264,11 +265,12 @@ def _percent(share: float) -> str:
 
 def _spike_action(deviations: float | None, number: int) -> str:
     """What takes out the spikes and no more."""
+    them, whose = ("it", "its") if number == 1 else ("them", "their")
     if deviations is None:
         return (
-            "cut the record before and after: what bridges them would bridge edges of the commands"
+            f"cut the record before and after {them}: what bridges {them} would bridge edges of "
+            "the commands"
         )
-    them, whose = ("it", "its") if number == 1 else ("them", "their")
     return (
         f"look for {whose} cause (a connector, the logger), and bridge {them} before any fit: "
         "write [[conditioning]] into the study and below it outliers = { deviations = "
