@@ -77,12 +77,18 @@ def test_by_keyboard_from_take_off_to_a_rated_record(desk: Desk) -> None:
     page.keyboard.press("Enter")
     page.get_by_text("landed", exact=True).wait_for()
     page.get_by_role("link", name="record", exact=True).wait_for()
+    # Which stick was swept, and which was not; numbers in a pilot's order.
+    page.get_by_text("Not swept: lat, ped and col").wait_for()
+    numbers = page.locator("section[aria-label=Instruments] dt").all_inner_texts()
+    assert numbers[:6] == ["time", "phi", "theta", "p", "q", "r"]
     assert page.title() == "Fly · flightid"
     page.get_by_role("group", name="Was it controllable?").get_by_role("button", name="No").press(
         "Enter"
     )
     page.get_by_role("button", name="Keep the rating").press("Enter")
     page.get_by_text("Kept beside the flight.").wait_for()
+    # What was flown stands there as a study, its rating with it.
+    page.locator("pre[aria-label='Study file']", has_text="rating = 10").wait_for()
     said += _findings(page)
     (folder,) = (desk.folder / "flights").iterdir()
     (record,) = fid.read_records(folder / "flown.nc")

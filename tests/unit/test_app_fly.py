@@ -177,6 +177,10 @@ def test_a_flight_is_kept_and_a_killed_one_is_offered(tmp_path: Path) -> None:
     assert {each.frame.number for each in news if each.frame} == {4}
     (item,) = kept_flights(tmp_path)
     assert item["finished"]
+    # Which stick was swept and which was not, in the air and afterwards; sticks alone sweep none.
+    last = [each.frame for each in news if each.frame][-1]
+    assert item["swept_s"] == pytest.approx(last.swept_s, abs=0.05)
+    assert item["swept_s"] == pytest.approx({"lon": 0, "lat": 6, "ped": 0, "col": 0}, abs=0.05)
     # Its study says the same to the page, with the pilot's rating beside it.
     rate_flight_study(flight.folder, {"controllable": False, "rating": 10, "comment": "“wild”"})
     study = flight.folder / "study.toml"
@@ -203,7 +207,9 @@ def test_a_flight_is_kept_and_a_killed_one_is_offered(tmp_path: Path) -> None:
     text = "".join(",".join(map(repr, row)) + "\n" for row in matrix.tolist())
     (killed / JOURNAL).write_text(text[:-9])
     assert [each["finished"] for each in kept_flights(tmp_path)] == [True, False]
+    assert kept_flights(tmp_path)[1]["swept_s"] is None
     made = finish_flight(killed)
+    assert kept_flights(tmp_path)[1]["swept_s"] == item["swept_s"]
     assert made.n_samples == record.n_samples - 1
     assert np.array_equal(made["q"], record["q"][:-1])
     assert (killed / RECORD).is_file()

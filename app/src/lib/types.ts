@@ -312,6 +312,7 @@ export interface FlownItem {
   law: boolean;
   finished: boolean;
   path: string;
+  swept_s: Record<string, number> | null;
   rating: CooperHarperRating | null;
 }
 
@@ -344,6 +345,7 @@ export interface FlyFrame {
   added: Record<string, number>;
   late_frames: number;
   sweeping: boolean;
+  swept_s: Record<string, number>;
 }
 
 /** An input of a vehicle, and the axis of the hand that moves it. */
@@ -653,6 +655,7 @@ export interface PlanPart {
   battery: string;
   logging: string;
   findings: ShownFinding[];
+  why: string;
   files: GainFile[];
   refusal: string;
 }
@@ -678,6 +681,7 @@ export interface PlanRow {
   attitude_deg: number | null;
   coherence: number | null;
   rests_on: string;
+  untold: string;
   settings: Record<string, number>;
 }
 

@@ -133,7 +133,8 @@ class PilotedFlight:
         self.folder = flight_folder(workspace, self.id)
         self._journal = FlightJournal(
             self.folder, self._columns(),
-            asked.model_dump(exclude={"do"}) | {"title": self.vehicle.title},
+            asked.model_dump(exclude={"do"})
+            | {"title": self.vehicle.title, "moved": list(self.vehicle.reach)},
             sample_time_s=1.0 / self.rate_hz,
         )  # fmt: skip
         write_flight_study(self.folder, asked, self.vehicle)
@@ -247,7 +248,7 @@ class PilotedFlight:
             time_s=time_s, number=self._flown.number, outputs=dict(outputs),
             pose=FlyPose.model_construct(**asdict(self._track.moved(outputs))),
             driven=dict(loop.driven), added=dict(loop.added), late_frames=self._late,
-            sweeping=loop.sweeping,
+            sweeping=loop.sweeping, swept_s=dict(loop.swept_s),
         )  # fmt: skip
         self._display.append(frame)
         shown = self._display.popleft()

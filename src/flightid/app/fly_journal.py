@@ -29,7 +29,7 @@ FLIGHTS, RECORD, JOURNAL, ABOUT, RATING, STUDY = (
     "flights", "flown.nc", "journal.csv", "flight.json", "rating.json", "study.toml",
 )  # fmt: skip
 FLIGHT_ID = re.compile(r"[0-9]{8}-[0-9]{6}-[0-9a-f]{4}")
-FEWEST_ROWS = 10
+FEWEST_ROWS, MOST_ABOUT = 10, 1 << 20
 MOST_TITLE = 200
 EVERY_S = 1.0
 KINDS = ("input", "output", "excitation", "other")
@@ -118,7 +118,7 @@ def about_flight(folder: Path) -> dict[str, Any]:
         The file is not what was written.
     """
     try:
-        found = json.loads(read_plain(folder / ABOUT, 1 << 20))
+        found = json.loads(read_plain(folder / ABOUT, MOST_ABOUT))
         columns = [FlightColumn(*each) for each in found["columns"]]
         step = float(found["sample_time_s"])
         sound = all(each.kind in KINDS for each in columns) and 1e-4 < step < 1.0
@@ -174,12 +174,26 @@ def finish_flight(folder: Path) -> Record:
         As `journal_record`.
     """
     made = journal_record(folder)
+    told = json.loads(read_plain(folder / ABOUT, MOST_ABOUT))
+    told["swept_s"] = _swept_s(made, told.get("moved"))
+    write_atomically(folder / ABOUT, json.dumps(told, allow_nan=False))
     target = folder / RECORD
     if is_link(target):
         target.unlink()
     write_records(made, target)
     (folder / JOURNAL).unlink(missing_ok=True)
     return made
+
+
+def _swept_s(flown: Record, moved: object) -> dict[str, float]:
+    """How long each input that a hand moves was swept, s."""
+    known = [name for name in flown.inputs if not isinstance(moved, list) or name in moved]
+    step_s = 1.0 / flown.sample_rate_hz
+    return {
+        name: float(np.count_nonzero(flown[f"sweep_{name}"]) * step_s)
+        if f"sweep_{name}" in flown else 0.0
+        for name in known
+    }  # fmt: skip
 
 
 def drop_flight(folder: Path) -> None:
@@ -208,6 +222,7 @@ def kept_flights(workspace: Path) -> list[dict[str, Any]]:
             "finished": done,
             "law": bool(about.get("law", False)), "rating": kept_rating(entry),
             "path": f"{FLIGHTS}/{entry.name}/{RECORD if done else JOURNAL}",
+            "swept_s": about.get("swept_s") if done else None,
         })  # fmt: skip
     return found
 

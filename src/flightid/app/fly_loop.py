@@ -130,6 +130,8 @@ class PilotedVehicle(Stepper):
         What the law has added.
     swept : dict of str to float
         What the sweep has added; the instrument of an identification.
+    swept_s : dict of str to float
+        How long each input that a hand moves was swept so far, s.
     """
 
     def __init__(
@@ -154,6 +156,7 @@ class PilotedVehicle(Stepper):
         self._reach = vehicle.reach
         self._sweep: dict[str, NDArray[np.float64]] = {}
         self._swept_frames = 0
+        self._step_s, self.swept_s = sample_time_s, dict.fromkeys(vehicle.reach, 0.0)
         self._seen = dict.fromkeys(self.outputs, 0.0)
         self.driven = dict(self.rest)
         self.swept, self.added = (dict.fromkeys(self.inputs, 0.0) for _ in range(2))
@@ -197,6 +200,7 @@ class PilotedVehicle(Stepper):
         for name, row in list(self._sweep.items()):
             if self._swept_frames < len(row):
                 found[name] = float(row[self._swept_frames])
+                self.swept_s[name] = self.swept_s.get(name, 0.0) + self._step_s
             else:
                 self._sweep = {}
         self._swept_frames += bool(self._sweep)

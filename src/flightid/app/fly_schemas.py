@@ -131,6 +131,8 @@ class FlyFrame(Message):
     added: dict[str, float]
     late_frames: int
     sweeping: bool
+    swept_s: dict[str, float]
+    """How long each input was swept so far, s."""
 
 
 class CooperHarperRating(Message):
@@ -167,6 +169,8 @@ class FlownItem(Message):
     law: bool
     finished: bool
     path: str
+    swept_s: dict[str, float] | None
+    """How long each input was swept, s; None of a flight that is no record yet."""
     rating: CooperHarperRating | None
 
 
