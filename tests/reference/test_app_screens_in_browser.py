@@ -23,6 +23,7 @@ SLOW_MS = 5 * WAIT_MS
 MOST_TABS = 500
 WALKS = 4  # a slow machine draws what was asked for while Tab goes round
 PHONE = {"width": 390, "height": 844}
+DESK = {"width": 1440, "height": 900}
 REACHED = """() => { window.reached = new Set();
   document.addEventListener("focusin", (event) => window.reached.add(event.target)); }"""
 AT_THE_END = "document.activeElement === document.body"
@@ -40,6 +41,21 @@ LEFT = """() => {
     && !each.closest(`${can}, label, [tabindex='0']`) && !each.querySelector(can));
   return [...controls.filter((each) => !window.reached.has(each)), ...pressed].map(told);
 }"""
+CLIPPED = """() => {
+  const pen = document.createElement("canvas").getContext("2d");
+  const shown = (each) => each.value || each.placeholder;
+  const told = (each) => `${each.getAttribute("aria-label") || each.id}: ${shown(each)}`;
+  return [...document.querySelectorAll("input")]
+    .filter((each) => ["text", "number", "search"].includes(each.type) && each.checkVisibility())
+    .filter((each) => {
+      const style = getComputedStyle(each);
+      const edges = parseFloat(style.paddingLeft) + parseFloat(style.paddingRight);
+      pen.font = style.font;
+      return pen.measureText(shown(each)).width > each.clientWidth - edges + 1;
+    })
+    .map(told);
+}"""
+"""Fields that hold more than they show."""
 CROWDED = """() => document.documentElement.scrollWidth - document.documentElement.clientWidth"""
 
 
@@ -72,6 +88,9 @@ def looked_at(page: Any) -> list[str]:
             break
     said += [f"not reached by Tab: {each}" for each in left]
     wide = page.viewport_size
+    page.set_viewport_size(DESK)
+    page.wait_for_timeout(300)
+    said += [f"clipped at {DESK['width']}: {each}" for each in page.evaluate(CLIPPED)]
     page.set_viewport_size(PHONE)
     page.wait_for_timeout(300)
     if more := page.evaluate(CROWDED):
@@ -195,10 +214,13 @@ def _planned(page: Any) -> list[str]:
     _opened(page, "Plan")
     page.get_by_role("heading", name="This log already carries roll").wait_for()
     said = looked_at(page)
+    page.get_by_text("press roll under Asked for").wait_for()
     roll = page.get_by_role("group", name="Axes").get_by_role("button", name="roll")
     assert roll.get_attribute("aria-pressed") == "false"
     roll.press("Enter")
     page.get_by_text("further runs show whether flights agree").wait_for()
+    # What repeats the sweep of the log foretells nothing, and says so.
+    page.get_by_role("cell", name="seen in this log, so nothing is foretold").wait_for()
     amplitude = page.locator("td[data-label=Amplitude]")
     amplitude.first.wait_for()
     page.fill("#amplitude", "0.05")

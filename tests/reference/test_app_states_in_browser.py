@@ -2,7 +2,7 @@
 
 States are those that a walk to an answer does not pass: refusals, files that cannot be read, work
 under way, long names, a fleet of hundreds, a server that has gone. Nothing serious is found,
-nothing is wider than the window, and what a stranger has named like a script is words.
+nothing is wider than the window or its field, and what a stranger has named like a script is words.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ pytest.importorskip("duckdb", reason="the extra fleet is not installed")
 
 from tests.app_stage import LONG, MANY, PLANTED, Stage, furnish
 from tests.reference.test_app_in_browser import AXE, SERIOUS, Desk, desk
-from tests.reference.test_app_screens_in_browser import CROWDED
+from tests.reference.test_app_screens_in_browser import CLIPPED, CROWDED
 
 __all__ = ["desk"]
 pytestmark = pytest.mark.slow
@@ -36,6 +36,7 @@ def looked_at(page: Any, state: str) -> list[str]:
         page.wait_for_timeout(200)
         if more := page.evaluate(CROWDED):
             said.append(f"{state}, {width}: {more} px too wide")
+        said += [f"{state}, {width}: clipped {each}" for each in page.evaluate(CLIPPED)]
         for theme in THEMES:
             page.evaluate(f"document.documentElement.dataset.theme = '{theme}'")
             said += [
@@ -233,6 +234,9 @@ def _of_plan(stage: Stage) -> Iterator[str]:
     page.locator("#amplitude").wait_for()
     assert page.input_value("#amplitude") == "0.05", "of a log without a model too"
     yield "what is asked of an ordinary log"
+    page.get_by_role("navigation").get_by_role("link", name="Report").press("Enter")
+    stage.button("Run the study").wait_for()
+    yield "a report without a model"
     stage.open(f"plan/{stage.logs['first']}")
     page.get_by_role("heading", name="This log already carries").wait_for()
     page.get_by_role("group", name="Axes").get_by_role("button", name="roll").press("Enter")

@@ -187,6 +187,8 @@ def test_chirps_are_as_asked(tmp_path: Path) -> None:
         vehicle="quad", autopilot="betaflight", axes=("roll", "yaw"), band_rad_s=band,
         amplitude=np.radians(120.0), duration_s=40.0,
     )  # fmt: skip
+    # What the autopilot sizes was said to rest on a typical vehicle.
+    assert {each.rests_on for each in asked.sweeps} == {"the autopilot, which sizes it"}
     lines = asked.write(tmp_path)[0].read_text().splitlines()
     assert "set chirp_amplitude_roll = 120" in lines
     assert "set chirp_frequency_start_deci_hz = 10" in lines

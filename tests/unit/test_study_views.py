@@ -77,6 +77,9 @@ def test_keys_of_a_study_give_the_numbers_of_the_page(study: Path, tmp_path: Pat
     assert [each.amplitude for each in plan.sweeps] == [e["amplitude"] for e in shown["rows"]]
     assert plan.sweeps[0].amplitude == pytest.approx(0.05)
     assert plan.verdict == shown["verdict"]
+    worst = [each["message"] for each in shown["findings"] if each["light"] == shown["light"]]
+    assert shown["why"] == ("" if shown["light"] == "green" else worst[0])
+    assert not any(each["untold"] for each in shown["rows"])
     written = {path.name: path.read_text("utf-8") for path in (tmp_path / "plan").iterdir()}
     assert written.keys() == {"card.html", *(each["name"] for each in shown["files"])}
     assert all(written[each["name"]] == each["text"] for each in shown["files"])

@@ -17,7 +17,7 @@ const SCREEN_OF: Record<string, [string, string]> = {
   compare: ["compare", "Compare"], response: ["response", "Response"],
 };
 /** A command with its files, options and words in capitals; the sentence goes on behind it. */
-const COMMAND = /flightid (tune|plan|inspect|flight|compare|response)\b((?: (?:[^;:()\n]*?\.(?:bin|log|ulg|bbl|bfl|tlog|px4log|toml)\b|--controller \w+|--[\w-]+|"[^"]*"|[^\s;,:()]*[./][^\s;,:()]*[^\s;,:().]|(?:LOG|STUDY)\b))*)/gi;
+const COMMAND = /flightid (tune|plan|inspect|flight|compare|response)\b((?: (?:[^;:()\n]*?\.(?:bin|log|ulg|bbl|bfl|tlog|px4log|toml)\b|--(?:axes|controller|filters) [\w,]+|--[\w-]+|"[^"]*"|[^\s;,:()]*[./][^\s;,:()]*[^\s;,:().]|(?:LOG|STUDY)\b))*)/gi;
 
 export interface AdvicePart { text: string; href: string | null }
 
@@ -38,6 +38,12 @@ export function adviceParts(given: string, log: string, screens: string[]): Advi
   let done = 0;
   for (const found of text.matchAll(COMMAND)) {
     const [all, verb, rest] = found;
+    // A log that is still to be flown: it is opened where all are.
+    if (verb === "inspect" && rest === " LOG") {
+      parts.push({ text: text.slice(done, found.index), href: null }, { text: "Logs", href: "#/" });
+      done = found.index + all.length;
+      continue;
+    }
     if (rest.includes("--controller") && !here.ofRig) continue;
     const [screen, title] = SCREEN_OF[verb];
     const linked = Boolean(log) && screens.includes(screen);

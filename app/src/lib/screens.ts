@@ -35,6 +35,8 @@ export interface Screen {
 }
 
 const hasModels = ({ log, study }: Given) => Boolean(log && study?.models.length);
+/** One without a model still tells filters, fields and a plan. */
+const hasStudy = ({ log, study }: Given) => Boolean(log && study?.file);
 
 /** Whether the address is that of records of a rig, which have no flight. */
 export const ofRecords = ({ study }: Given) => location.hash.startsWith("#/records/") || Boolean(study?.file?.settings.record);
@@ -50,7 +52,7 @@ export const SCREENS: Screen[] = [
   { name: "records", title: "Records", component: Records, ofLog: true, needsStudy: false, shows: (given) => Boolean(given.log) && ofRecords(given) },
   { name: "model", title: "Model", component: Model, ofLog: true, needsStudy: true, shows: hasModels },
   { name: "verify", title: "Verify", component: Verify, ofLog: true, needsStudy: true, shows: hasModels },
-  { name: "report", title: "Report", component: Report, ofLog: true, needsStudy: true, shows: hasModels },
+  { name: "report", title: "Report", component: Report, ofLog: true, needsStudy: true, shows: hasStudy },
   { name: "fleet", title: "Fleet", component: Fleet, ofLog: false, needsStudy: false, shows: () => true },
   { name: "fly", title: "Fly", component: Fly, ofLog: false, needsStudy: false, shows: () => true },
 ];

@@ -104,6 +104,8 @@ class PlanRow(Message):
     attitude_deg: float | None
     coherence: float | None
     rests_on: str
+    untold: str
+    """Why nothing is expected of it; empty where something is."""
     settings: dict[str, float]
 
 
@@ -121,5 +123,7 @@ class PlanPart(Message):
     battery: str
     logging: str
     findings: list[ShownFinding]
+    why: str
+    """What makes the light what it is; empty where it is green."""
     files: list[GainFile]
     refusal: str

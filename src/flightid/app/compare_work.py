@@ -20,8 +20,10 @@ from flightid.app.compare_schemas import (
 )
 from flightid.app.gain_schemas import GainFile
 from flightid.app.overview import light_of, shown_finding, step_curve
+from flightid.app.plan_words import as_asked
 from flightid.app.study_reach import draft_inside
 from flightid.app.work import KEPT, kept_log
+from flightid.conventions import Light
 from flightid.files import sha256_of_file
 from flightid.findings import Finding, worst
 from flightid.planning.plan import plan_flight
@@ -34,6 +36,7 @@ from flightid.review.flight import review_flight
 from flightid.review.flight_state import FlightState
 from flightid.review.next_step import FlownStep, flown_step, left_to_fly
 from flightid.study.gain_preview import preview_fits
+from flightid.surface import speaking
 from flightid.uncertainty.estimate import Reading
 
 
@@ -157,6 +160,7 @@ def _row(change: LoopChange, significant: bool) -> ChangeRow:
 def make_plan(log: Path, options: dict[str, Any]) -> Mapping[str, Any]:
     """The next flight of the vehicle of a log."""
     plan = _plan(log, options)
+    light = worst(plan.findings)
     files: list[GainFile] = []
     refusal = "" if plan.is_go else "no-go: nothing is written that a vehicle could load"
     if plan.is_go and plan.sweeps:
@@ -168,13 +172,14 @@ def make_plan(log: Path, options: dict[str, Any]) -> Mapping[str, Any]:
     return PlanPart(
         title=plan.title,
         verdict=plan.verdict,
-        light=light_of(worst(plan.findings)),
+        light=light_of(light),
         axes=list(plan.procedure.axes),
         carried=list(plan.carried),
         rows=[_sweep(each, plan.n_records) for each in plan.sweeps],
         battery=plan.flight_time.words,
         logging=plan.logging,
         findings=[shown_finding(each) for each in plan.findings],
+        why=next((f.message for f in plan.findings if f.light is light is not Light.GREEN), ""),
         files=files,
         refusal=refusal,
     ).model_dump()
@@ -188,7 +193,8 @@ def make_card(log: Path, options: dict[str, Any]) -> str:
 def _plan(log: Path, options: dict[str, Any]) -> SweepPlan:
     key = f"plan of {sha256_of_file(log)} {json.dumps(options, sort_keys=True)}"
     if key not in KEPT:
-        KEPT[key] = plan_flight(kept_log(log), **options)
+        with speaking(as_asked):
+            KEPT[key] = plan_flight(kept_log(log), **options)
     made: SweepPlan = KEPT[key]
     return made
 
@@ -212,5 +218,13 @@ def _sweep(sweep: AxisSweep, runs: int) -> PlanRow:
         attitude_deg=None if told is None else DEGREES * told.peak_attitude_rad,
         coherence=sweep.coherence,
         rests_on=sweep.rests_on,
+        untold=_untold(sweep),
         settings={each.name: each.value for each in sweep.changes},
     )
+
+
+def _untold(sweep: AxisSweep) -> str:
+    """Why no number is expected of a sweep."""
+    if sweep.plan is None:
+        return "the autopilot sizes this sweep"
+    return "seen in this log, so nothing is foretold" if sweep.is_flown_again else ""

@@ -336,7 +336,7 @@ def _findings(
                 Light.UNKNOWN,
                 "flightid cannot say what amplitude does here: the autopilot or its defaults size "
                 "the sweep",
-                "fly one axis, then look at it: flightid inspect LOG",
+                "fly one axis, then look at its log: flightid inspect LOG",
             )
         )
     if procedure.how == "mode" and log is not None and "SID_AXIS" not in log.parameters:

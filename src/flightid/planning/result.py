@@ -31,6 +31,7 @@ DEGREES = math.degrees(1.0)
 
 
 TYPICAL = "a typical vehicle"
+BY_AUTOPILOT = "the autopilot, which sizes it"
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,9 +74,11 @@ class AxisSweep:
 
     @property
     def rests_on(self) -> str:
-        """What it is sized by: the sweep that it repeats, the flight, or what is typical."""
+        """What sizes it: the autopilot, the sweep that it repeats, the flight, what is typical."""
         if self.is_flown_again:
             return "the sweep of this log, as it flew"
+        if self.plan is None:
+            return BY_AUTOPILOT
         return "this flight" if self.guess is not None and self.guess.measured else TYPICAL
 
     @property
