@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from flightid.errors import DataError
 from flightid.frozen import dataclass
-from flightid.identification.prediction_error.linear_regression import regress
 from flightid.recursive_filter import filtered
-from flightid.review.kernel_posterior import kernel_draws
+from flightid.review.loop_predictors import Predictor, predictors
 from flightid.review.loop_samples import LoopSamples
 
 Array = NDArray[np.float64]
@@ -72,39 +69,6 @@ class LoopDraws:
         return np.asarray(top / bottom)
 
 
-@dataclass(frozen=True)
-class _Equation:
-    """One predicted channel: coefficients of its own past, of the other's, of the set-point.
-
-    `summed` is that of the sum of errors, set-point less measured, up to the sample before.
-    """
-
-    own: Array
-    other: Array
-    summed: Array
-    driven: Array
-
-    @classmethod
-    def rows(cls, found: Array, own: int, other: int) -> list[_Equation]:
-        """Of coefficients of so many lags of both channels, one sum, and the set-point."""
-        ends = [own, own + other, own + other + 1]
-        return [cls(*np.split(row, ends)) for row in found]
-
-    @property
-    def past(self) -> Array:
-        """One less what its own past makes of it."""
-        return _delayed(-self.own, 1.0)
-
-    @property
-    def through(self) -> Array:
-        """What the other channel makes of it."""
-        return _delayed(self.other)
-
-    def differences(self, polynomial: Array, sign: float = 1.0) -> Array:
-        """A polynomial with the sum beside it, both times what makes differences of sums."""
-        return _sum(np.convolve(polynomial, [1.0, -1.0]), sign * _delayed(self.summed))
-
-
 def closed_loop(samples: LoopSamples, *, pace_s: float = 1.0, seed: int = 0) -> LoopDraws:
     """Estimate a closed loop from ordinary flying, with draws of what the data still allow.
 
@@ -139,25 +103,8 @@ def closed_loop(samples: LoopSamples, *, pace_s: float = 1.0, seed: int = 0) -> 
     own, other, driven = (_lags(memory * pace_s, samples.sample_time_s) for memory in MEMORY_S)
     _require_rows(samples, own + other + driven)
     random = np.random.default_rng(seed)
-    w, y, r = samples.forerunner, samples.measured, samples.set_point
-    sums = _sums_of_errors(samples)
-    if w is None:
-        found = _predicted(y, (sums, r), samples, (own, 1, driven), random)
-        return _polynomials(_Equation.rows(found, own, 0), None, samples.sample_time_s)
-    ahead = _predicted(y, (w, sums, r), samples, (own, other, 1, driven), random)
-    beside = _predicted(w, (y, sums, r), samples, (other, own, 1, driven), random)
-    first, second = _Equation.rows(ahead, own, other), _Equation.rows(beside, other, own)
-    return _polynomials(first, second, samples.sample_time_s)
-
-
-def _sums_of_errors(samples: LoopSamples) -> Array:
-    """Running sum of set-point less measured in each piece, as the controller's integrator has it.
-
-    An integrator takes slow gusts away: what predicts the rest remembers them without end. Lags
-    alone forget, and what they forget made steps of slow integrators end too low.
-    """
-    errors, ends = samples.set_point - samples.measured, np.cumsum(samples.lengths)[:-1]
-    return np.concatenate([np.cumsum(part) for part in np.split(errors, ends)])
+    made = predictors(samples, (own, other, driven), DRAWS, random)
+    return _polynomials([_Equation.rows(each) for each in made], samples.sample_time_s)
 
 
 def _lags(memory_s: float, sample_time_s: float) -> int:
@@ -177,51 +124,51 @@ def _require_rows(samples: LoopSamples, coefficients: int) -> None:
         )
 
 
-def _predicted(
-    channel: Array,
-    others: Sequence[Array],
-    samples: LoopSamples,
-    lags: Sequence[int],
-    random: np.random.Generator,
-) -> Array:
-    """Coefficients of a one-step predictor, the estimate and draws, signs as of inputs."""
-    delays = [1] * len(others)
-    regression = regress(
-        channel, np.vstack(others), samples.lengths, lags[0], list(lags[1:]), delays, levels=True
-    )
-    if regression.dependent is not None or not np.isfinite(regression.triangle).all():
-        raise DataError("not enough motion: the set-point holds too few frequencies")
-    # The past of the channels is fitted freely: what a prior would take from it, the set-point
-    # would get. The triangle has it first: its last block is what is left for the set-point.
-    past = regression.theta.size - lags[-1]
-    triangle, wanted = regression.factor, -regression.triangle[:-1, -1]
-    variance = regression.sum_of_squares / (regression.n_rows - regression.theta.size)
-    mean, drawn = kernel_draws(triangle[past:, past:], wanted[past:], variance, DRAWS, random)
-    driven = np.vstack([mean, drawn])
-    left = wanted[:past] - driven @ triangle[:past, past:].T
-    left[1:] += math.sqrt(variance) * random.standard_normal((DRAWS, past))
-    freely = scipy.linalg.solve_triangular(triangle[:past, :past], left.T).T
-    freely[:, : lags[0]] *= -1.0
-    return np.hstack([freely, driven])
-
-
-def _polynomials(
-    first: Sequence[_Equation], second: Sequence[_Equation] | None, sample_time_s: float
-) -> LoopDraws:
-    """Closed loops of predictors: what a set-point does to the first channel by way of both.
+def _polynomials(equations: Sequence[Sequence[_Equation]], sample_time_s: float) -> LoopDraws:
+    """Closed loops of predictors: what a set-point does to the first channel by way of all.
 
     All times what makes differences of sums, which takes the infinite memory of these away.
     """
     made = []
-    for place, one in enumerate(first):
+    for one, *others in zip(*equations, strict=True):
         a, b = one.differences(one.past), one.differences(_delayed(one.driven))
-        if second is not None:
-            two = second[place]
+        for two in others:
             driven, back = two.differences(_delayed(two.driven)), two.differences(two.through, -1.0)
             b = _sum(np.convolve(two.past, b), np.convolve(one.through, driven))
             a = _sum(np.convolve(two.past, a), -np.convolve(one.through, back))
         made.append((b, a))
     return LoopDraws(np.array([b for b, _ in made]), np.array([a for _, a in made]), sample_time_s)
+
+
+@dataclass(frozen=True)
+class _Equation:
+    """One row of a predictor as polynomials in the delay of one sample."""
+
+    own: Array
+    other: Array
+    summed: Array
+    driven: Array
+
+    @classmethod
+    def rows(cls, made: Predictor) -> list[_Equation]:
+        """Of the estimate, then of each draw."""
+        return [
+            cls(*row) for row in zip(made.own, made.other, made.summed, made.driven, strict=True)
+        ]
+
+    @property
+    def past(self) -> Array:
+        """One less what its own past makes of it."""
+        return _delayed(-self.own, 1.0)
+
+    @property
+    def through(self) -> Array:
+        """What the other channel makes of it."""
+        return _delayed(self.other)
+
+    def differences(self, polynomial: Array, sign: float = 1.0) -> Array:
+        """A polynomial with the sum beside it, both times what makes differences of sums."""
+        return _sum(np.convolve(polynomial, [1.0, -1.0]), sign * _delayed(self.summed))
 
 
 def _delayed(coefficients: Array, first: float = 0.0) -> Array:

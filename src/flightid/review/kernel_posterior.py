@@ -11,19 +11,21 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 MEMORIES = np.geomspace(2.0, 40.0, 8)
-"""Lags after which the prior's deviation is largest."""
+"""Lags in which the prior's deviation falls to 1/e."""
 ROUGHNESSES = np.geomspace(0.01, 0.6, 7)
 """One less the correlation of neighbours."""
-WIDENING = 1.25
-"""Scatter of draws over that of the posterior, whose prior is centred on no response: counted by
-`tests/strangers/ordinary_steps.py`."""
 SIZES = 18
 SMALLEST, LARGEST = 1e-3, 1e2
 """What the prior adds to each row, in noise variances and in mean squares of the data."""
 
 
 def kernel_draws(
-    factor: Array, wanted: Array, variance: float, count: int, random: np.random.Generator
+    factor: Array,
+    wanted: Array,
+    variance: float,
+    noise: Array,
+    widening: float,
+    random: np.random.Generator,
 ) -> tuple[Array, Array]:
     """Posterior mean, and draws, of coefficients whose prior is any of many decaying kernels.
 
@@ -38,8 +40,10 @@ def kernel_draws(
         What it times the coefficients should give.
     variance : float
         Of the noise.
-    count : int
-        Draws.
+    noise : ndarray, shape (count, n)
+        Of each draw: what it adds to `wanted`.
+    widening : float
+        Scatter of draws over that of the posterior.
     random : Generator
 
     Returns
@@ -53,7 +57,7 @@ def kernel_draws(
     Processes for Machine Learning*, section 5.2 (what a best kernel alone leaves out); Journel &
     Huijbregts (1978), *Mining Geostatistics*, section VII.A (draws of a posterior by kriging).
     """
-    n = wanted.size
+    count, n = noise.shape
     roots = _roots(n)
     lowest = SMALLEST * variance
     powers = np.geomspace(lowest, max(LARGEST * float(wanted @ wanted) / n, 10.0 * lowest), SIZES)
@@ -66,7 +70,9 @@ def kernel_draws(
     weights = np.exp(-0.5 * (evidence - evidence.min()))
     weights /= weights.sum()
     chosen = random.multinomial(count, weights.ravel()).reshape(weights.shape)
-    mean, drawn = np.zeros(n), []
+    # In any order: two equations whose draws went from short to long memories would go together.
+    order, used = random.permutation(count), 0
+    mean, drawn = np.zeros(n), np.empty((count, n))
     for place, step in np.argwhere((weights >= 1e-4) | (chosen > 0)):
         root = math.sqrt(sizes[place, step]) * roots[place]
         damped = vectors[place] / (sizes[place, step] * values[place] + variance)
@@ -74,28 +80,31 @@ def kernel_draws(
         found = gain @ wanted
         mean += weights[place, step] * found
         # What the data leave of values of the prior, told with their noise: no root is taken.
-        prior = random.standard_normal((chosen[place, step], n)) @ root.T
-        noise = math.sqrt(variance) * random.standard_normal((chosen[place, step], n))
-        left = prior - (prior @ factor.T + noise) @ gain.T
-        drawn.append(found + WIDENING * left)
-    return mean, np.vstack(drawn)
+        rows = order[used : used + chosen[place, step]]
+        used += rows.size
+        prior = random.standard_normal((rows.size, n)) @ root.T
+        left = prior - (prior @ factor.T - noise[rows]) @ gain.T
+        drawn[rows] = found + widening * left
+    return mean, drawn
 
 
 @cache
 def _roots(count: int) -> Array:
     """Lower triangles of every shape of the prior, shape (shapes, count, count).
 
-    Bumps that begin at zero, as what follows a delay and a motor's lag does; what correlates as
-    powers of the distance is a chain, whose triangle is known.
+    Deviations that are largest at once and decay. Shapes that begin at zero, as what follows a
+    delay does, lose the first hundredth of a step where sticks are slow: no data tell it there, and
+    it was told to be late by more than its error. What correlates as powers of the distance is a
+    chain, whose triangle is known.
     """
     lag = np.arange(1, count + 1)
     apart = np.maximum(lag[:, None] - lag, 0)
     made = []
     for memory, roughness in product(MEMORIES, ROUGHNESSES):
-        bump = lag / memory * np.exp(1.0 - lag / memory)
+        deviation = np.exp(-lag / memory)
         chain = np.tril((1.0 - roughness) ** apart)
         chain[:, 1:] *= math.sqrt(1.0 - (1.0 - roughness) ** 2)
-        made.append(bump[:, None] * chain)
+        made.append(deviation[:, None] * chain)
     return np.array(made)
 
 

@@ -28,6 +28,8 @@ class LoopSamples:
     lengths : tuple of int
         Samples of each piece.
     sample_time_s : float
+    mean_errors : tuple of float, optional
+        Set-point less measured, the mean of each piece; zeros where nobody tells.
     """
 
     set_point: Array
@@ -35,6 +37,7 @@ class LoopSamples:
     forerunner: Array | None
     lengths: tuple[int, ...]
     sample_time_s: float
+    mean_errors: tuple[float, ...] = ()
 
     @classmethod
     def of(cls, pieces: Iterable[Piece], row_s: float, rows: int) -> LoopSamples:
@@ -69,7 +72,22 @@ class LoopSamples:
                 slopes.append(np.concatenate([[0.0], turned]))
         lengths = tuple(each.size for each in set_points)
         ahead = _joined(slopes) if slopes else None
-        return cls(_joined(set_points), _joined(measured), ahead, lengths, step_s)
+        both = zip(set_points, measured, strict=True)
+        means = tuple(float(one.mean() - other.mean()) for one, other in both)
+        return cls(_joined(set_points), _joined(measured), ahead, lengths, step_s, means)
+
+    def sums_of_errors(self) -> Array:
+        """Running sum of set-point less measured in each piece, as an integrator has it.
+
+        Of the channels as they are: without its mean the sum of a piece ends where it began, and an
+        integrator that took up a slow gust does not.
+        """
+        ends = np.cumsum(self.lengths)[:-1]
+        parts = np.split(self.set_point - self.measured, ends)
+        means = self.mean_errors or (0.0,) * len(parts)
+        return np.concatenate(
+            [np.cumsum(part + mean) for part, mean in zip(parts, means, strict=True)]
+        )
 
     @property
     def duration_s(self) -> float:
