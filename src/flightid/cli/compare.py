@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import filecmp
 import re
 from collections.abc import Sequence
 from dataclasses import replace
@@ -85,6 +86,7 @@ def command(
 
     if len(set(files)) < len(files):
         raise click.UsageError("a file is named twice: parts of a log are flight.BIN@20:80")
+    _require_different(files)
     flights = [file for file in files if _is_flight(file)]
     _require_sides(files, flights, closed=bool(gains or feedback))
     if not flights:
@@ -115,6 +117,15 @@ def command(
             for table in made.settings_tables():
                 click.echo(f"{table}\n")
         show(made, "Comparison", as_json=as_json, html=html, level=level)
+
+
+def _require_different(files: Sequence[str]) -> None:
+    """Refuse a copy of a file beside it: a difference of none would pass for a finding."""
+    there = [file for file in files if Path(file).is_file()]
+    for place, one in enumerate(there):
+        for other in there[place + 1 :]:
+            if filecmp.cmp(one, other, shallow=False):
+                raise click.UsageError(f"{one} and {other} hold the same bytes: name two files")
 
 
 def _require_sides(files: Sequence[str], flights: Sequence[str], *, closed: bool) -> None:

@@ -13,6 +13,7 @@ from flightid.cli.records import FILES
 
 if TYPE_CHECKING:
     from flightid.options import Options
+    from flightid.planning.result import SweepPlan
 
 
 def _fields() -> dict[str, type[Options]]:
@@ -53,9 +54,7 @@ def command(
     its log, and says under [plan] what is asked for; options of the command line go first.
     """
     from flightid import plan_flight
-    from flightid.files import write_atomically
     from flightid.progress import progress
-    from flightid.report.flight_card import card_html
 
     (asked,) = parted(options, _fields())
     if log is not None and log.suffix == ".toml":
@@ -66,24 +65,33 @@ def command(
         raise click.UsageError("--autopilot belongs to --vehicle: a log tells its own")
     with progress(None, "planning"):
         plan = plan_flight(log, **asked)
-    if as_json:
-        emit_values(plan.to_dict())
-    else:
-        click.echo("\n\n".join(str(table) for table in reversed(plan._tables())))
+    try:
+        _write(plan, output or _place(log, asked), overwrite=overwrite, no_go=write_no_go)
+    finally:
+        # The verdict is to stand where eyes are, whatever could not be written.
+        emit_values(plan.to_dict()) if as_json else click.echo(plan.on_screen())
+    leave_by_verdict(plan.findings)
+
+
+def _place(log: Path | None, asked: dict[str, Any]) -> Path:
+    """Folder of a plan that names none."""
+    return Path(f"{asked['vehicle']}-plan") if log is None else log.parent / f"{log.stem}-plan"
+
+
+def _write(plan: SweepPlan, place: Path, *, overwrite: bool, no_go: bool) -> None:
+    """Write settings where they may be flown, and the card; nothing where nothing is to fly."""
+    from flightid.files import write_atomically
+    from flightid.report.flight_card import card_html
+
     if not plan.sweeps:
-        leave_by_verdict(plan.findings)
         return
-    place = output or (
-        Path(f"{asked['vehicle']}-plan") if log is None else log.parent / f"{log.stem}-plan"
-    )
-    if plan.is_go or write_no_go:
-        for path in plan.write(place, overwrite=overwrite, write_no_go=write_no_go):
+    if plan.is_go or no_go:
+        for path in plan.write(place, overwrite=overwrite, write_no_go=no_go):
             note(f"Wrote {path}")
     else:
         place.mkdir(parents=True, exist_ok=True)
         note("No settings written: no-go (--write-no-go writes them)")
     note(f"Wrote {write_atomically(place / 'card.html', card_html(plan))}: print it")
-    leave_by_verdict(plan.findings)
 
 
 def _of_study(study: Path, asked: dict[str, Any]) -> tuple[Path, dict[str, Any]]:

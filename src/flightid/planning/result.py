@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 from flightid.control.autopilots.parameter_files import (
@@ -16,8 +17,9 @@ from flightid.conventions import Light
 from flightid.errors import OptionError
 from flightid.excitation import Plan
 from flightid.files import write_atomically
-from flightid.findings import Finding, said_once, worst
+from flightid.findings import Finding, said_once, worst, worst_last
 from flightid.frozen import dataclass
+from flightid.inspection.verdict_lines import verdict_lines
 from flightid.planning.axis_guess import AxisGuess
 from flightid.planning.flight_time import FlightTime
 from flightid.planning.flown_sweeps import FLOWN_ONCE
@@ -208,6 +210,13 @@ class SweepPlan(Result, schema="flightid.sweep_plan/1"):
         expected = self.expected()
         return (self.summary(), expected) if expected.rows else (self.summary(),)
 
+    def on_screen(self) -> str:
+        """Tables for a terminal, then every finding, the worst last, and the verdict at the end."""
+        told = replace(self.summary(), notes=tuple(self._flying()))
+        tables = (str(table) for table in reversed((told, *self._tables()[1:])))
+        judged = verdict_lines(worst_last(self.findings))
+        return "\n\n".join(filter(None, (*tables, judged, f"Verdict: {self.verdict}.")))
+
     def file_of(self, axis: AxisSweep) -> str:
         """Name of the file that sets an axis up; empty where nothing is to be set."""
         if self.procedure.how == "chirp":
@@ -223,10 +232,13 @@ class SweepPlan(Result, schema="flightid.sweep_plan/1"):
         return f"Flight plan of {self.name}, {self.procedure.title}"
 
     def _notes(self) -> Iterator[str]:
+        yield from self._flying()
+        yield from map(str, said_once(worst_last(self.findings)))
+
+    def _flying(self) -> Iterator[str]:
         if self.sweeps:
             yield f"{self.flight_time.words[0].upper()}{self.flight_time.words[1:]}."
             yield f"Log: {self.logging.removeprefix('log ')}."
-        yield from map(str, said_once(self.findings))
 
     def settings(self, axis: str) -> Table:
         """What the file of an axis sets, beside what flew.

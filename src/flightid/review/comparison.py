@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from flightid.conventions import Light
 from flightid.errors import DataError
-from flightid.findings import Finding, said_once
+from flightid.findings import Finding, said_once, worst_last
 from flightid.frozen import dataclass
 from flightid.result import Result
 from flightid.review.changes import (
@@ -125,7 +125,7 @@ class FlightComparison(Result, schema="flightid.flight_comparison/1"):
         """
         names = ("promised", "flown") if self.promised else self.names
         beside = filter(None, (self.beside,))
-        notes = (*self._windows(), *beside, *map(str, said_once(self.findings)))
+        notes = (*self._windows(), *beside, *map(str, said_once(worst_last(self.findings))))
         title = f"{self.names[0]} and {self.names[1]}"
         if self.unlike:
             title = f"{title}, of different {', '.join(self.unlike)}"

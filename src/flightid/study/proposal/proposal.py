@@ -52,12 +52,12 @@ class Proposal:
         return f"{body}{STAMP}{_hash(body)}\n"
 
     def refusal(self) -> str:
-        """That there is no model and why, what the data show all the same, and what to do, last."""
-        said = ["No model can be identified from these data."]
+        """What the data show, what to do, and last that there is no model, and why."""
+        answer = ["No model can be identified from these data."]
         sentence, grounded = "", False
         if self.inspection is not None:
             sentence = carried_sentence(self.inspection)
-            said = _wrapped(sentence)
+            answer = _wrapped(sentence)
             grounded = self.inspection.phases.is_known and not self.inspection.phases.airborne
         reasons: dict[str, list[str]] = {}
         for finding in self.findings:
@@ -65,19 +65,20 @@ class Proposal:
             reasons.setdefault(why, []).append(what)
         for why, parts in reasons.items():
             if why not in sentence and not grounded:
-                said += _wrapped(f"- {', '.join(parts)}: {why}")
+                answer += _wrapped(f"- {', '.join(parts)}: {why}")
         actions = [finding.action for finding in self.findings if finding.action]
+        said = []
         if self.inspection is not None:
-            said += ["", self.inspection.in_short()]
+            said = [self.inspection.in_short(), ""]
             noted = self.inspection.findings
             first = [f.action for f in in_order(noted) if f.code in FIRST]
             found = [*actions, *(each.action for each in noted if each.action)]
             planned = [each for each in found if "flightid plan" in each]
             actions = [*first, *self._next(planned=bool(planned)), *planned, *found]
-        said += ["", "What to do, the first first"] if actions else []
+        said += ["What to do, the first first"] if actions else []
         once = [a for a in dict.fromkeys(actions) if not any(_goes_on(b, a) for b in actions)]
         said += [line for each in once for line in _wrapped(f"- {each}")]
-        return "\n".join(said)
+        return "\n".join([*said, *([""] if actions else []), *answer])
 
     def _next(self, *, planned: bool) -> Iterator[str]:
         """Commands that go on from a log of a flight without a model."""
