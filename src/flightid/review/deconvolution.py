@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from flightid.errors import DataError
 from flightid.frozen import dataclass
 from flightid.recursive_filter import filtered
-from flightid.review.loop_predictors import Predictor, predictors
+from flightid.review.loop_predictors import LoopPredictor, predictors
 from flightid.review.loop_samples import LoopSamples
 
 Array = NDArray[np.float64]
@@ -150,7 +150,7 @@ class _Equation:
     driven: Array
 
     @classmethod
-    def rows(cls, made: Predictor) -> list[_Equation]:
+    def rows(cls, made: LoopPredictor) -> list[_Equation]:
         """Of the estimate, then of each draw."""
         return [
             cls(*row) for row in zip(made.own, made.other, made.summed, made.driven, strict=True)

@@ -23,7 +23,7 @@ Biometrika 48), and no prior is centred on the response: counted by
 
 
 @dataclass(frozen=True, eq=False)
-class Predictor:
+class LoopPredictor:
     """One predicted channel: coefficients of its own past, of the other's, of the set-point.
 
     Row 0 of each is the estimate, the others are draws; signs are those of inputs.
@@ -122,15 +122,15 @@ class _Regression:
             made.append(left - left.mean())
         return np.concatenate(made)
 
-    def predictor(self, found: Array) -> Predictor:
+    def predictor(self, found: Array) -> LoopPredictor:
         """Its coefficients by what they stand for."""
         own, *others, summed, _, driven = np.split(found, np.cumsum(self.lags)[:-1], axis=1)
-        return Predictor(-own, others[0] if others else found[:, :0], summed, driven)
+        return LoopPredictor(-own, others[0] if others else found[:, :0], summed, driven)
 
 
 def predictors(
     samples: LoopSamples, lags: tuple[int, int, int], draws: int, random: np.random.Generator
-) -> tuple[Predictor, ...]:
+) -> tuple[LoopPredictor, ...]:
     """Of the measured channel, and of its forerunner where there is one, with joint draws.
 
     Both have the same regressors, so that what chance does to one it does to the other by as much
