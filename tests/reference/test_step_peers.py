@@ -81,7 +81,8 @@ def test_two_other_ways_find_the_same_step(samples: LoopSamples) -> None:
 def test_steps_are_not_too_low(lag_s: float, sticks: str) -> None:
     """Lags of half a second forget what an integrator remembers: 7 of 7 levels were too low.
 
-    Of rows that a sample leaves out it does not know when a set-point jumped: half a percent.
+    Of rows that a sample leaves out it does not know when a set-point jumped: half a percent. Means
+    do not know where within a sample it jumped: half a percent too high in calm air.
     """
     calm, seeds = replace(CREEPING, gust=0.2, noise=0.005), range(3)
     _, exact = truths(calm, 4, 200)
@@ -90,4 +91,4 @@ def test_steps_are_not_too_low(lag_s: float, sticks: str) -> None:
         - exact[100:]
         for seed in seeds
     ]
-    assert abs(np.mean(off)) < 0.005, sticks
+    assert -0.003 < np.mean(off) < 0.008, sticks
