@@ -221,7 +221,9 @@ def test_a_table_of_a_list_is_taken_out() -> None:
     left = edited(text, [KeyEdit(("model", 0), None)])
     assert left.strip() == "[[model]]\nname = 'B'"
     # The last one leaves no empty list, into which no table could go any more.
-    for bare in (edited(left + "[tune]\n", [KeyEdit(("model", 0), None)]), "model = []\n[tune]\n"):
+    gone = edited(left + "[tune]\n", [KeyEdit(("model", 0), None)])
+    assert tomllib.loads(gone) == {"tune": {}}
+    for bare in (gone, "model = []\n[tune]\n"):
         again = edited(bare, [KeyEdit(("model", 0), {"name": "C", "fit": {"seed": 1}})])
         assert tomllib.loads(again) == {"tune": {}, "model": [{"name": "C", "fit": {"seed": 1}}]}
 
