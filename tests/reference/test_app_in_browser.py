@@ -109,20 +109,25 @@ def opened_desk(folder: Path) -> Iterator[Desk]:
     bound = bound_socket(0)
     session = Session(bound.getsockname()[1])
     server = server_of(Workspace(folder), page_files(), session)
-    thread = threading.Thread(target=lambda: asyncio.run(server.serve(sockets=[bound])))
+    thread = threading.Thread(
+        target=lambda: asyncio.run(server.serve(sockets=[bound])), name=f"desk on {folder}"
+    )
     thread.start()
-    with sync_playwright() as tools:
-        browser = tools.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
-        context = browser.new_context(viewport={"width": 1280, "height": 800})
-        context.set_default_timeout(WAIT_MS)
-        first = context.new_page()
-        first.goto(session.address)
-        first.wait_for_selector(".drop")
-        first.close()
-        yield Desk(browser, context, session.address, folder)
-        browser.close()
-    server.should_exit = True
-    thread.join()
+    # Whatever fails in between: a server that goes on would keep the tests from ever ending.
+    try:
+        with sync_playwright() as tools:
+            browser = tools.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+            context = browser.new_context(viewport={"width": 1280, "height": 800})
+            context.set_default_timeout(WAIT_MS)
+            first = context.new_page()
+            first.goto(session.address)
+            first.wait_for_selector(".drop")
+            first.close()
+            yield Desk(browser, context, session.address, folder)
+            browser.close()
+    finally:
+        server.should_exit = True
+        thread.join()
 
 
 def _findings(page: Any) -> list[str]:
@@ -345,6 +350,15 @@ def test_a_second_window_overwrites_nothing(desk: Desk) -> None:
     assert all("409" in each for each in second.complaints)
     for window in (first, second):
         window.page.close()
+
+
+def test_a_desk_that_cannot_be_opened_leaves_no_server(desk: Desk, tmp_path: Path) -> None:
+    """A second browser of one thread is refused; its server would have kept pytest for good."""
+    del desk
+    folder = tmp_path / "second"
+    with pytest.raises(Exception, match="Sync API"), opened_desk(folder):
+        pass
+    assert not [each.name for each in threading.enumerate() if str(folder) in each.name]
 
 
 class _Stranger(BaseHTTPRequestHandler):
