@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 from scipy.signal import lfilter
 
 import flightid as fid
 from flightid.conventions import Light
+from flightid.identification.output_error.disturbed_states import disturbances, moved_together
 from flightid.identification.output_error.process_noise import state_noise
 from tests.strangers.noises import ar1
 from tests.strangers.turbulence import CASES
@@ -190,3 +192,104 @@ def test_a_lag_that_is_left_out_is_no_turbulence_to_a_filter() -> None:
         assert (fit.parameters["Lda"].interval95 is not None) is told
         codes = {finding.code for finding in fit.findings}
         assert ("inputs-in-errors" in codes) is not told
+
+
+LATERAL = fid.StateSpaceModel.from_dict(
+    {
+        "name": "sideslip, roll and yaw",
+        "states": {"v": "m/s", "p": "rad/s", "r": "rad/s", "phi": "rad", "psi": "rad"},
+        "inputs": {"da": "rad", "dr": "rad"},
+        "outputs": {
+            "v": "v",
+            "p": "p",
+            "r": "r",
+            "phi": "phi",
+            "psi": "psi",
+            "ay": {"expression": "Yv*v", "unit": "m/s^2"},
+        },
+        "parameters": {
+            "Yv": {"value": -0.15, "unit": "1/s"},
+            "Lv": {"value": -0.06, "unit": "rad/(m*s)"},
+            "Lp": {"value": -2.5, "unit": "1/s"},
+            "Lda": {"value": 15.0, "unit": "1/s^2"},
+            "Nv": {"value": 0.08, "unit": "rad/(m*s)"},
+            "Nr": {"value": -0.6, "unit": "1/s"},
+            "Ndr": {"value": -4.0, "unit": "1/s^2"},
+            "V": {"value": 25.0, "unit": "m/s", "fixed": True},
+            "g": {"value": 9.81, "unit": "m/s^2", "fixed": True},
+        },
+        "equations": {
+            "v'": "Yv*v - V*r + g*phi",
+            "p'": "Lv*v + Lp*p + Lda*da",
+            "r'": "Nv*v + Nr*r + Ndr*dr",
+            "phi'": "p",
+            "psi'": "r",
+        },
+    }
+)
+SENSORS = {"v": 0.3, "p": 0.01, "r": 0.01, "phi": 0.005, "psi": 0.005, "ay": 0.1}
+
+
+def _light_gust(seed: int, gust_m_s: float) -> list[fid.Record]:
+    """Two doublets, each of one input, by SciPy's expm; the gust is felt where v is."""
+    random, step, n = np.random.default_rng(seed), 0.02, 800
+    a, b = np.zeros((5, 5)), np.zeros((5, 2))
+    a[:3, 0], a[0, 2:4], a[1, 1], a[2, 2] = (-0.15, -0.06, 0.08), (-25.0, 9.81), -2.5, -0.6
+    a[3, 1] = a[4, 2] = 1.0
+    b[1, 0], b[2, 1] = 15.0, -4.0
+    felt = -a[:, :1]
+    whole = expm(step * np.block([[a, b, felt], [np.zeros((3, 8))]]))
+    records = []
+    for moved in range(2):
+        stick = np.zeros((2, n))
+        stick[moved, 100:130], stick[moved, 130:160] = 0.03, -0.03
+        wind = lfilter([np.sqrt(1.0 - 0.98**2)], [1.0, -0.98], random.standard_normal(n))
+        drive = np.vstack([stick, gust_m_s * wind])
+        x, rows = np.zeros(5), np.empty((6, n))
+        for k in range(n):
+            rows[:, k] = [*x, -0.15 * (x[0] - drive[2, k])]
+            x = whole[:5, :5] @ x + whole[:5, 5:] @ drive[:, k]
+        rows += np.array([*SENSORS.values()])[:, None] * random.standard_normal((6, n))
+        records.append(
+            fid.Record.from_arrays(
+                np.arange(n) * step,
+                inputs={"da": stick[0], "dr": stick[1]},
+                outputs=dict(zip(SENSORS, rows, strict=True)),
+                units={**LATERAL.units},
+                hold="zero",
+            )
+        )
+    return records
+
+
+def test_a_gust_below_the_noise_of_every_sensor_is_named() -> None:
+    """Half a foot a second: no output alone, and no free gain, had told it."""
+    fit = fid.identify(LATERAL, _light_gust(1, 0.15), method="output_error")
+    said = next(finding for finding in fit.findings if finding.code == "process-noise")
+    assert "move together as" in said.message
+    assert " on v moves them" in said.message
+    assert fit.covariance is None
+    blamed = {check.name for check in fit.evidence.checks if check.light.value in ("red", "amber")}
+    assert not blamed & {"input hold", "agreement of parts"}
+
+
+def test_sensors_alone_move_together_by_chance_as_often_as_is_said() -> None:
+    systems = disturbances(LATERAL, [LATERAL.state_space()[::2][:2]])
+    chances = []
+    for seed in range(40):
+        random = np.random.default_rng(seed)
+        pole, common = (0.0, 0.9, 0.99)[seed % 3], 0.5 * (seed % 2)
+        drawn = random.standard_normal((6, 600)) + common * random.standard_normal(600)
+        found = moved_together([lfilter([1.0], [1.0, -pole], drawn)], systems, [0.02])
+        assert found is not None
+        chances.append(found.chance)
+    assert sum(chance < 0.01 for chance in chances) <= 2
+    assert sum(chance < 0.1 for chance in chances) <= 8
+
+
+def test_short_manoeuvres_of_one_input_each_are_asked_no_coherence() -> None:
+    """Their free runs show where the model holds; no window is long enough to tell coherence."""
+    fit = fid.identify(LATERAL, _light_gust(2, 0.0), method="output_error")
+    checks = {check.name: check for check in fit.evidence.checks}
+    assert {checks[name].light.value for name in ("excitation band", "coherence")} == {"green"}
+    assert "the free run explains" in checks["excitation band"].what

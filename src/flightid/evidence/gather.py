@@ -32,8 +32,9 @@ from flightid.evidence.evidence import (
     Check,
     Evidence,
 )
+from flightid.evidence.explained import FreeRun, by_free_runs
 from flightid.evidence.parameter_checks import declared_signs
-from flightid.evidence.part_checks import agreement_check
+from flightid.evidence.part_checks import agreement_check, beside_disturbances
 from flightid.evidence.spans import Span, judge_coherence, judge_span
 from flightid.findings import Finding, worst
 from flightid.frozen import dataclass
@@ -67,6 +68,8 @@ WINDOWS_SHORT = "windows-short"
 WINDOWS_LENGTHENED = "windows-lengthened"
 """Of a response whose windows come from the damping that a first fit found."""
 LIMITS = (ON_A_WORD, WINDOWS_SHORT, WINDOWS_LENGTHENED)
+PROCESS_NOISE = "process-noise"
+"""Of residuals that hold noise on the states."""
 OVERFIT = "overfit"
 """An order that may be one too high: intervals hold what it costs."""
 BELONGS = {
@@ -85,7 +88,7 @@ BELONGS = {
     "input-not-excited": BAND,
     "residuals-coloured": RESIDUALS,
     "output-unexplained": RESIDUALS,
-    "process-noise": RESIDUALS,
+    PROCESS_NOISE: RESIDUALS,
     "errors-not-white": RESIDUALS,
     "inputs-in-errors": RESIDUALS,
     "excitation-refutes": RESIDUALS,
@@ -121,6 +124,8 @@ class FitFacts:
         Estimates, in its order.
     at_once : tuple of str
         Inputs that a sampled model answers within the same sample.
+    free_runs : sequence of FreeRun
+        Of equations through the records that they were fitted to, where the fit made such.
     """
 
     data: Sequence[FrequencyResponse | Record]
@@ -134,6 +139,7 @@ class FitFacts:
     agreement: Agreement | None = None
     values: NDArray[np.float64] | None = None
     at_once: tuple[str, ...] = ()
+    free_runs: Sequence[FreeRun] = ()
 
 
 def gather_evidence(made: FitFacts) -> Evidence:
@@ -150,7 +156,8 @@ def gather_evidence(made: FitFacts) -> Evidence:
     if made.spans:
         checks += [judge_span(made.spans), judge_coherence(made.spans)]
     elif records:
-        checks += power_of_records(tuple(records), made.inputs, made.outputs)
+        seen = power_of_records(tuple(records), made.inputs, made.outputs)
+        checks += by_free_runs(seen, made.outputs, made.free_runs)
     declared = None if made.loop is None else loop_check(declared_loop(made.loop))
     if _is_by_excitation(made.termination, records) and made.loop != "open":
         declared = loop_check(FeedbackTest("closed", "instrument"))
@@ -159,7 +166,9 @@ def gather_evidence(made: FitFacts) -> Evidence:
         loop = loop_of_records(tuple(records), made.inputs, made.outputs)
     checks += [] if loop is None else [not_turned_round(loop, made.at_once)]
     if made.agreement is not None:
-        checks.append(agreement_check(made.agreement, made.values))
+        check = agreement_check(made.agreement, made.values)
+        disturbed = any(each.code == PROCESS_NOISE for each in made.findings)
+        checks.append(beside_disturbances(check) if disturbed else check)
     if made.signs:
         checks.append(declared_signs(made.signs))
     checks = _with_findings(checks, made)

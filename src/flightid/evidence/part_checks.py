@@ -34,6 +34,8 @@ RECORDS_ACTION = (
     "the estimates are of the mean vehicle: fit the records by themselves and look for what sets "
     "them apart (mass, trim, condition)"
 )
+DISTURBED = "; noise on the states, which the residuals hold, makes parts differ so by itself"
+DISTURBED_ACTION = "compare parts by a method that knows that noise (method='filter_error')"
 
 
 def agreement_check(found: Agreement, values: NDArray[np.float64] | None = None) -> Check:
@@ -73,6 +75,20 @@ def _doubt(found: Agreement) -> str:
     if not found.agree or found.records is None or found.factor < SHOWN:
         return ""
     return DOUBT.format(found.n_records, found.records, found.factor)
+
+
+def beside_disturbances(check: Check) -> Check:
+    """A comparison of parts whose residuals hold noise on the states: that moves parts too.
+
+    Example
+    -------
+    >>> apart = agreement_check(Agreement(2, None, 0.001, np.ones(1)))
+    >>> apart.light.value, beside_disturbances(apart).light.value
+    ('red', 'unknown')
+    """
+    if check.light not in (Light.RED, Light.AMBER):
+        return check
+    return replace(check, light=Light.UNKNOWN, what=check.what + DISTURBED, action=DISTURBED_ACTION)
 
 
 def needs_another(n_records: int) -> bool:

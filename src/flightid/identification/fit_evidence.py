@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.evidence import Evidence, gather_evidence
+from flightid.evidence.explained import FreeRun
 from flightid.evidence.gather import FitFacts
 from flightid.evidence.parameter_checks import Signed
 from flightid.evidence.spans import Span
@@ -49,8 +50,24 @@ def evidence_of(fit: Fit, data: Sequence[Any], loop: Loop | None = None) -> Evid
             fit.agreement,
             _compared(fit),
             _at_once(fit.model),
+            _free_runs(fit),
         )
     )
+
+
+def _free_runs(fit: Fit) -> list[FreeRun]:
+    """Runs of equations through records; black boxes are judged by what they foretell."""
+    if fit.details is not None or fit.residual_horizon != "free_run":
+        return []
+    return [
+        FreeRun(
+            each.measured.matrix(each.outputs),
+            each.modelled.matrix(each.outputs),
+            each.measured.sample_time_s,
+        )
+        for each in fit.records
+        if tuple(each.outputs) == tuple(fit.model.outputs)
+    ]
 
 
 def _at_once(model: object) -> tuple[str, ...]:

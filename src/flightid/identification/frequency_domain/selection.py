@@ -18,6 +18,10 @@ COST_POINTS = 20.0
 """The cost is scaled as if 20 frequencies were fitted, whatever their number."""
 MINIMUM_POINTS = 3
 _EDGE = 1e-9
+COHERENT_ALONE = (
+    'fit the coherent responses alone: responses = "coherent" in a study, '
+    "model.with_responses(*flightid.coherent_pairs(response).names) in Python"
+)
 
 
 def coherence_weight(coherence: ArrayLike) -> NDArray[np.float64]:
@@ -157,7 +161,7 @@ def _places(
                 f"response {name} has no band to fit",
                 found=f"coherence of at most {pair.coherence.max():.2f}",
                 needed=f"neighbouring frequencies with at least {minimum_coherence}",
-                action="give band_rad_s and a lower minimum_coherence, or leave the response out",
+                action=f"give band_rad_s and a lower minimum_coherence, or {COHERENT_ALONE}",
             )
         band = found
     low, high = band
@@ -178,7 +182,7 @@ def _places(
             found=f"{len(usable)} between {low:.4g} and {high:.4g} rad/s"
             + ("" if minimum_coherence is None else f" with coherence ≥ {minimum_coherence:g}"),
             needed=f"at least {MINIMUM_POINTS}",
-            action="widen band_rad_s, lower minimum_coherence, or leave the response out",
+            action=f"widen band_rad_s, lower minimum_coherence, or {COHERENT_ALONE}",
         )
     wanted = np.geomspace(grid[usable[0]], grid[usable[-1]], n_omega)
     return np.asarray(usable[np.unique(nearest(grid[usable], wanted))])

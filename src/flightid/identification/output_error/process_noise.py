@@ -7,8 +7,10 @@ itself (sensors), and noise on the states with the best K, white or, where the m
 with a pole of its own as gusts have. The third has to beat the first at a
 nominal false-alarm rate. Against the second it has to win by far, or outputs have to move together
 at different times: sensors do not. Where the model oscillates it need not win by far: no sensor has
-that colour. A single output whose noise has the colour of one real mode is left to sensors: nothing
-tells them apart, and a covariance by that colour holds for both.
+that colour. A light gust hides below the noise of every single output, and in the many numbers of
+a gain: products of different outputs are asked for it too, each as one disturbance would make them
+(`disturbed_states`). A single output whose noise has the colour of one real mode is left to
+sensors: nothing tells them apart, and a covariance by that colour holds for both.
 """
 
 from __future__ import annotations
@@ -21,8 +23,13 @@ from numpy.typing import NDArray
 
 from flightid.conventions import Light
 from flightid.errors import FlightidError
+from flightid.evidence.gather import PROCESS_NOISE
 from flightid.findings import Finding
 from flightid.frozen import dataclass
+from flightid.identification.output_error.disturbed_states import (
+    disturbances,
+    moved_together,
+)
 from flightid.identification.output_error.innovation_gain import (
     ORDER,
     innovations,
@@ -125,17 +132,30 @@ def judge_process_noise(
         residuals,
         [(scipy.linalg.expm(a * dt), c) for (a, c), dt in zip(systems, steps, strict=True)],
     )
-    if found is None or not found.is_found:
-        return []
-    worst = int(np.argmin(found.left))
-    light = Light.RED if found.left[worst] < HALF else Light.AMBER
-    return [
-        Finding(
-            "process-noise",
-            light,
+    disturbed = disturbances(fitted, systems)
+    shown = moved_together(residuals, disturbed, steps)
+    together = "" if shown is None or shown.chance >= FALSE_ALARMS else disturbed[0].ways[shown.way]
+    if found is not None and found.is_found:
+        worst = int(np.argmin(found.left))
+        light = Light.RED if found.left[worst] < HALF else Light.AMBER
+        what = (
             "residuals follow the model's own modes, as turbulence makes them, or dynamics that it "
             f"lacks: one sample ahead {np.sqrt(found.left[worst]):.2g} of the free run's error is "
-            f"left in {fitted.outputs[worst]}",
+            f"left in {fitted.outputs[worst]}"
+        ) + (f"; most like {together}" if together else "")
+    elif shown is not None and together:
+        light = Light.AMBER
+        what = (
+            f"residuals of different outputs move together as {together} moves them, or dynamics "
+            f"that the model lacks (p = {shown.chance:.1g} of sensors alone)"
+        )
+    else:
+        return []
+    return [
+        Finding(
+            PROCESS_NOISE,
+            light,
+            what,
             "use method='filter_error', which has noise on the states. A lag or delay that the "
             "model lacks looks alike: in calm air mend the model; else inputs that foretell the "
             "filter's innovations, or a fit that a lag or delay improves, tell",

@@ -1,0 +1,252 @@
+"""Whether residuals move together as one disturbance of the states would move them.
+
+A gust disturbs few states, and from there goes into every output by the model's own responses. In
+the residuals of one output it may hide below the noise; outputs tell it together. Of independent
+sensors, whatever their colour, products of different outputs at a frequency average to nothing. So
+these alone are weighed, as each disturbance would make them: the locally most powerful test of that
+disturbance beside noise of known colour, with products of one output left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.frozen import dataclass
+from flightid.identification.records.held_model import LinearPoint
+from flightid.models import GreyBoxModel, StateSpaceModel
+from flightid.recursive_filter import filtered
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+LAGS = 12
+"""Of the filters that take the colour of each output off."""
+SMOOTH = 8
+"""Frequencies to each side over which a whitened output's power is averaged."""
+FEWEST = 100
+"""Samples of a record that is looked at."""
+MEMORIES_S = (0.3, 2.0)
+"""Of gusts, s, beside disturbances without memory."""
+TRIED = 2
+"""Disturbances whose chance is worked out: those that stand out most."""
+HALVINGS = 25
+
+
+@dataclass(frozen=True)
+class System:
+    """A model at a record's middle, in continuous time.
+
+    Attributes
+    ----------
+    a : ndarray, shape (n, n)
+    c : ndarray, shape (n_outputs, n)
+    pushes : ndarray, shape (n, n_ways)
+        What each disturbance adds to the state derivatives.
+    seen : ndarray, shape (n_outputs, n_ways)
+        What outputs feel of it at once.
+    ways : tuple of str
+        Disturbances in words.
+    """
+
+    a: Array
+    c: Array
+    pushes: Array
+    seen: Array
+    ways: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Together:
+    """What stands out most.
+
+    Attributes
+    ----------
+    way : int
+        Column of `System.pushes`.
+    chance : float
+        Of independent outputs that stand out as much in any of the ways (Bonferroni).
+    """
+
+    way: int
+    chance: float
+
+
+def disturbances(fitted: GreyBoxModel, systems: Sequence[tuple[Array, Array]]) -> list[System]:
+    """Noise on each state, and a gust on each that equations feel by a parameter.
+
+    Parameters
+    ----------
+    fitted : GreyBoxModel
+    systems : sequence of tuple of ndarray
+        A and C of it at each record's middle.
+    """
+    n, p = systems[0][0].shape[0], systems[0][1].shape[0]
+    names = list(fitted.states) if isinstance(fitted, StateSpaceModel) else []
+    driven, seen = np.ones((n, n)) if names else np.zeros((n, n)), np.zeros((p, n))
+    if isinstance(fitted, StateSpaceModel) and fitted.is_linear:
+        point = LinearPoint.of(fitted, fitted.parameters.independent_values())
+        driven = 1.0 * np.any(point.a[1:] != 0.0, axis=0)
+        seen = 1.0 * np.any(point.c[1:] != 0.0, axis=0)
+    felt = np.flatnonzero(np.any(driven, axis=0))
+    names = names if len(names) == n else [""] * n
+    ways = [*(f"noise on {name}" for name in names), *(f"a gust on {names[k]}" for k in felt)]
+    if not any(names):
+        ways = ["noise on the states"] * len(ways)
+    return [
+        System(
+            a,
+            c,
+            np.hstack([np.eye(n), (a * driven)[:, felt]]),
+            np.hstack([np.zeros((p, n)), (c * seen)[:, felt]]),
+            tuple(ways),
+        )
+        for a, c in systems
+    ]
+
+
+def moved_together(
+    residuals: Sequence[Array], systems: Sequence[System], steps_s: Sequence[float]
+) -> Together | None:
+    """The disturbance that residuals show most, and its chance; None where they tell nothing.
+
+    Parameters
+    ----------
+    residuals : sequence of ndarray, shape (n_outputs, n_samples)
+        Of each record.
+    systems : sequence of System
+    steps_s : sequence of float
+        Sample time of each record, s.
+
+    Reference
+    ---------
+    Whittle (1953), Arkiv för Matematik 2, p. 423 (likelihood by frequencies); Rao (1948), Proc.
+    Cambridge Philosophical Society 44 (score tests); Daniels (1987), International Statistical
+    Review 55 (tails by saddlepoint).
+    """
+    kept = [k for k, each in enumerate(residuals) if each.shape[1] >= FEWEST + LAGS]
+    if not kept or residuals[0].shape[0] < 2:
+        return None
+    rows = [residuals[k] - residuals[k].mean(axis=1, keepdims=True) for k in kept]
+    filters = _filters(rows)
+    if filters is None:
+        return None
+    white = [
+        np.array([filtered(f, [1.0], row) for f, row in zip(filters, each, strict=True)])[:, LAGS:]
+        for each in rows
+    ]
+    apart = _apart(white)
+    forms = [
+        _forms(each, filters, apart, systems[k], steps_s[k])
+        for each, k in zip(white, kept, strict=True)
+    ]
+    weights, told = (np.concatenate(parts, axis=-1) for parts in zip(*forms, strict=True))
+    size = np.abs(weights) ** 2
+    score = np.abs(np.sum(np.conj(weights) * told, axis=1)) ** 2
+    score = np.sum(score - np.sum(size * np.abs(told) ** 2, axis=1), axis=-1)
+    spread = np.sqrt(np.sum(np.sum(size, axis=1) ** 2 - np.sum(size**2, axis=1), axis=-1))
+    shown = score / np.where(spread > 0.0, spread, np.inf)
+    best = np.argsort(-shown)[:TRIED]
+    chances = [_chance(score[way], size[way]) for way in best]
+    place = int(np.argmin(chances))
+    way = int(best[place]) % systems[0].pushes.shape[1]
+    return Together(way, min(len(shown) * chances[place], 1.0))
+
+
+def _filters(rows: Sequence[Array]) -> list[Array] | None:
+    """Of each output, the filter that takes its colour off; None where there is rounding alone."""
+    found = []
+    for output in range(rows[0].shape[0]):
+        own = [each[output] for each in rows]
+        now = np.concatenate([each[LAGS:] for each in own])
+        past = np.concatenate(
+            [[each[LAGS - k : each.size - k] for k in range(1, LAGS + 1)] for each in own], axis=1
+        )
+        weights = np.linalg.lstsq(past.T, now, rcond=None)[0]
+        if not np.all(np.isfinite(weights)) or np.mean((now - weights @ past) ** 2) <= 0.0:
+            return None
+        found.append(np.concatenate([[1.0], -weights]))
+    return found
+
+
+def _apart(white: Sequence[Array]) -> Array:
+    """Inverse root of the covariance at one instant: sensors may share that (a supply, a mount)."""
+    whole = np.concatenate(white, axis=1)
+    size = np.sqrt(np.mean(whole**2, axis=1))
+    whole = whole / size[:, None]
+    values, vectors = np.linalg.eigh(whole @ whole.T / whole.shape[1])
+    root = vectors / np.sqrt(np.maximum(values, np.finfo(float).eps))
+    return np.asarray(root @ vectors.T / size)
+
+
+def _forms(
+    white: Array, filters: Sequence[Array], apart: Array, system: System, step_s: float
+) -> tuple[Complex, Complex]:
+    """Weights (n_ways, n_outputs, n_omega) and whitened residuals (n_outputs, n_omega)."""
+    spectra = apart @ np.fft.rfft(white, axis=1)[:, 1:]
+    n = white.shape[1]
+    omega = 2.0 * np.pi * np.arange(1, spectra.shape[1] + 1) / (n * step_s)
+    power = _smoothed(np.abs(spectra) ** 2)
+    lags = np.exp(-1j * np.outer(np.arange(LAGS + 1), omega * step_s))
+    through = np.array(filters) @ lags
+    states = np.linalg.solve(
+        1j * omega[:, None, None] * np.eye(len(system.a)) - system.a, system.pushes[None]
+    )
+    moved = (system.c @ states + system.seen).transpose(2, 1, 0) * through
+    moved = (apart @ moved) / np.sqrt(power)
+    memories = [np.ones_like(omega), *(1.0 / np.abs(1j * omega * t + 1.0) for t in MEMORIES_S)]
+    weights = np.concatenate([moved * each for each in memories])
+    return weights, spectra / np.sqrt(power)
+
+
+def _smoothed(power: Array) -> Array:
+    """Means over neighbouring frequencies, (n_outputs, n_omega)."""
+    sums = np.cumsum(np.pad(power, ((0, 0), (1, 0))), axis=1)
+    place = np.arange(power.shape[1])
+    low = np.maximum(place - SMOOTH, 0)
+    high = np.minimum(place + SMOOTH + 1, power.shape[1])
+    means = (sums[:, high] - sums[:, low]) / (high - low)
+    return np.asarray(np.maximum(means, np.finfo(float).tiny))
+
+
+def _chance(score: float, size: Array) -> float:
+    """Probability of so large a sum over frequencies, size (n_outputs, n_omega), by saddlepoint.
+
+    v* (w w* - diag |w|²) v of complex normal v has the logarithm of its moments
+    K(s) = -Σ ln(1 + s |w|²) - ln(1 - s Σ |w|²/(1 + s |w|²)).
+    """
+    if score <= 0.0 or not np.any(size > 0.0):
+        return 1.0
+    low, high = 0.0, _largest(size)
+    for _ in range(HALVINGS):
+        tilt = 0.5 * (low + high)
+        low, high = (low, tilt) if _moments(tilt, size)[1] > score else (tilt, high)
+    moments, _, bend = _moments(low, size)
+    bound = float(np.exp(min(moments - low * score, 0.0)))
+    return bound / max(1.0, low * float(np.sqrt(2.0 * np.pi * bend)))
+
+
+def _moments(tilt: float, size: Array) -> tuple[float, float, float]:
+    """K, its slope and its bend at an exponent, summed over frequencies."""
+    near = 1.0 / (1.0 + tilt * size)
+    share = size * near
+    first, second = np.sum(share, axis=0), np.sum(share * near, axis=0)
+    left = 1.0 - tilt * first
+    bend = np.sum(share**2, axis=0) - 2.0 * np.sum(share**2 * near, axis=0) / left
+    return (
+        float(np.sum(np.log(near)) - np.sum(np.log(left))),
+        float(np.sum(second / left - first)),
+        float(np.sum(bend + (second / left) ** 2)),
+    )
+
+
+def _largest(size: Array) -> float:
+    """Exponent below which the moments of all frequencies are finite, by bisection."""
+    others = float(np.max(np.sum(size, axis=0) - np.max(size, axis=0)))
+    low, high = 0.0, 1.0 / max(others, np.finfo(float).tiny)
+    for _ in range(HALVINGS):
+        tried = 0.5 * (low + high)
+        finite = np.all(tried * np.sum(size / (1.0 + tried * size), axis=0) < 1.0)
+        low, high = (tried, high) if finite else (low, tried)
+    return low
