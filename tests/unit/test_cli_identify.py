@@ -16,6 +16,7 @@ from flightid.findings import Finding
 from flightid.inspection.flight_phases import FlightPhases
 from flightid.inspection.inspection import Inspection
 from flightid.logs.dataflash.writer import DataflashWriter
+from flightid.responses.store import read_response
 from flightid.study.proposal import propose_study
 from flightid.vehicles import PilotDoublet, SidActivation, fly, write_ardupilot_log
 
@@ -111,6 +112,10 @@ def test_a_log_gives_its_sweep_and_its_instrument_as_the_study_of_it_does(
     doublet = PilotDoublet("roll", start_s=26.0, amplitude=0.2)
     write_ardupilot_log(fly(runs=[sweep], doublets=[doublet], duration_s=36.0, seed=2), log)
     asked = ["response", str(log), "--inputs", "tau_phi", "--outputs", "p", "--json"]
+    kept_as = tmp_path / "response.nc"
+    assert run([*asked, "--hold", "zero", "--write", str(kept_as)]) in (0, 1)
+    assert read_response(kept_as).input_shape.hold == "zero"
+    capsys.readouterr()
     assert run(asked) in (0, 1)
     alone = capsys.readouterr()
     assert "flight.BIN: roll sweep, 14.0 to 30.0 s" in alone.err

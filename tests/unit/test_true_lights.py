@@ -48,8 +48,8 @@ def test_a_fit_that_ended_at_no_minimum_ranks_behind_all_others() -> None:
 def test_a_prediction_as_good_as_the_fit_is_not_red(
     error: float, own: dict[str, float], light: Light
 ) -> None:
-    (found,) = weighed([Finding("theil", Light.RED, "y", "look")], "theil", {"y": error}, own)
-    assert found.light is light
+    found = weighed({"y": Finding("theil", Light.RED, "y", "look")}, {"y": error}, own)
+    assert found["y"].light is light
 
 
 def test_too_few_samples_for_residual_tests_end_no_study() -> None:

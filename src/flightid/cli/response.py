@@ -34,10 +34,15 @@ write_option = click.option(
 
 
 def _fields() -> dict[str, type[Options]]:
-    from flightid.record.options import ChannelOptions
+    from flightid.record.options import ChannelOptions, InputOptions
     from flightid.responses.options import ResponseOptions
 
-    return {"channels": ChannelOptions, "response": ResponseOptions, **reading()}
+    return {
+        "channels": ChannelOptions,
+        "response": ResponseOptions,
+        "inputs": InputOptions,
+        **reading(),
+    }
 
 
 @click.command(cls=OptionsCommand, fields_of=_fields)
@@ -62,9 +67,11 @@ def command(
     from flightid.progress import progress
     from flightid.responses import estimate_response
 
-    channels, of_response, *of_files = parted(options, _fields())
+    channels, of_response, known, *of_files = parted(options, _fields())
     injected = of_response.get("excitations")
     records = read_files(files, *of_files, **channels, excitations=injected, take="flown")
+    if known:
+        records = [record.declare(**known) for record in records]
     of_response = with_instrument(of_response, files, records, channels.get("inputs") or ())
     with progress(None, "Estimating"):
         response = estimate_response(records, **channels, **of_response)

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from flightid.frozen import dataclass
 from flightid.options import Options, option
+from flightid.record.hold import HOLDS, InputHold
 from flightid.record.interpolation import Interpolation
 
 RECORD_COLUMN = "record"
@@ -36,6 +37,23 @@ class ChannelOptions(ComparedOptions):
     """
 
     inputs: tuple[str, ...] | None = option(None, doc="Channels that drive; default: all.")
+
+
+@dataclass(frozen=True)
+class InputOptions(Options):
+    """What is known of the inputs of records; see `Record.declare`.
+
+    Example
+    -------
+    >>> InputOptions(hold="zero").to_dict()
+    {'hold': 'zero'}
+    """
+
+    hold: InputHold | None = option(
+        None,
+        choices=HOLDS,
+        doc="What inputs do between samples; default: what the records know. Kept with results.",
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,6 +16,7 @@ from flightid.record.history import Step
 from flightid.record.hold import InputHold, InputShape, Loop
 from flightid.record.samples import LabelledSamples
 from flightid.record.unit_change import in_units
+from flightid.record.unit_changes import unit_changes
 from flightid.record.validation import (
     inside_span,
     labelled_samples,
@@ -25,6 +27,15 @@ from flightid.record.validation import (
 from flightid.result import Result
 from flightid.table import Cell, Table
 from flightid.version import VERSION
+
+
+class HasUnits(Protocol):
+    """A model, or whatever else tells units by channel."""
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """Unit of each channel."""
+        ...
 
 
 class Record(LabelledSamples, Result, schema="flightid.record/1"):
@@ -237,6 +248,27 @@ class Record(LabelledSamples, Result, schema="flightid.record/1"):
         samples, channels, trim = in_units(self, units)
         step = Step("Record.to_units", dict(units))
         return self.replace(samples, channels=channels, trim=trim, step=step)
+
+    def to_units_of(self, model: HasUnits) -> Record:
+        """Copy with all channels that a model has in its units, US ones too, trim values included.
+
+        Channels that the model lacks, or whose unit nothing tells, stay as they are.
+
+        Parameters
+        ----------
+        model : HasUnits
+            Anything with `units` by channel.
+
+        Example
+        -------
+        >>> import flightid as fid
+        >>> record = Record.from_arrays([0.0, 0.1], outputs={"p": [0.0, 180.0], "u": [50.0, 60.0]},
+        ...                             units={"p": "deg/s", "u": "kt"})
+        >>> flown = record.to_units_of(fid.load_model("rate_first_order"))
+        >>> flown.unit("p"), flown.unit("u")
+        ('rad/s', 'kt')
+        """
+        return self.to_units(**unit_changes(self, model.units))
 
     def select(self, names: Iterable[str]) -> Record:
         """Copy with only the named channels, in that order."""

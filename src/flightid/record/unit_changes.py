@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from flightid.record.record import Record
+from flightid.record.samples import LabelledSamples
 from flightid.units import canonical, is_convertible
 
 
-def unit_changes(record: Record, units: Mapping[str, str]) -> dict[str, str]:
+def unit_changes(record: LabelledSamples, units: Mapping[str, str]) -> dict[str, str]:
     """Channels in another unit of the same dimension than is wanted, and that unit.
 
     Parameters
@@ -19,6 +19,7 @@ def unit_changes(record: Record, units: Mapping[str, str]) -> dict[str, str]:
 
     Example
     -------
+    >>> from flightid.record.record import Record
     >>> record = Record.from_arrays([0.0, 0.1], outputs={"w": [0.0, 1.0], "p": [0.0, 1.0]},
     ...                             units={"w": "kt", "p": "rad/s"})
     >>> unit_changes(record, {"w": "ft/s", "p": "rad/s"})
