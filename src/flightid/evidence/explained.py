@@ -29,7 +29,7 @@ FEWEST = 64
 
 
 @dataclass(frozen=True, eq=False)
-class FreeRun:
+class ExplainedRun:
     """One record beside the run of a model through it.
 
     Attributes
@@ -43,13 +43,15 @@ class FreeRun:
     sample_time_s: float
 
 
-def explained_spans(outputs: Sequence[str], runs: Sequence[FreeRun]) -> tuple[list[Span], Span]:
+def explained_spans(
+    outputs: Sequence[str], runs: Sequence[ExplainedRun]
+) -> tuple[list[Span], Span]:
     """Band of each output in which its run explains it, and that of all together.
 
     Parameters
     ----------
     outputs : sequence of str
-    runs : sequence of FreeRun
+    runs : sequence of ExplainedRun
 
     Returns
     -------
@@ -62,7 +64,7 @@ def explained_spans(outputs: Sequence[str], runs: Sequence[FreeRun]) -> tuple[li
     >>> t = np.arange(1000) * 0.02
     >>> run = np.sum([np.sin(w * t) for w in np.geomspace(1.0, 20.0, 60)], axis=0)
     >>> noise = 0.01 * np.random.default_rng(0).standard_normal(1000)
-    >>> _, whole = explained_spans(["p"], [FreeRun((run + noise)[None], run[None], 0.02)])
+    >>> _, whole = explained_spans(["p"], [ExplainedRun((run + noise)[None], run[None], 0.02)])
     >>> whole.ratio > 10.0
     True
     """
@@ -82,7 +84,7 @@ def explained_spans(outputs: Sequence[str], runs: Sequence[FreeRun]) -> tuple[li
     return spans, _span("the outputs", omega, share.max(axis=0))
 
 
-def _powers(run: FreeRun, edges: Array) -> Array:
+def _powers(run: ExplainedRun, edges: Array) -> Array:
     """Of the run and of what it leaves, in each bin: shape (2, n_outputs, n_bins)."""
     n = run.measured.shape[1]
     middle = run.measured.mean(axis=1, keepdims=True)
@@ -102,7 +104,7 @@ def _span(name: str, omega: Array, share: Array) -> Span:
 
 
 def by_free_runs(
-    checks: Sequence[Check], outputs: Sequence[str], runs: Sequence[FreeRun]
+    checks: Sequence[Check], outputs: Sequence[str], runs: Sequence[ExplainedRun]
 ) -> list[Check]:
     """Checks of band and coherence, green where the free runs of the fit say what was asked.
 
@@ -114,7 +116,7 @@ def by_free_runs(
     checks : sequence of Check
         Of band and coherence, from a quick response.
     outputs : sequence of str
-    runs : sequence of FreeRun
+    runs : sequence of ExplainedRun
     """
     if all(each.light is Light.GREEN for each in checks) or not runs:
         return list(checks)

@@ -32,7 +32,7 @@ from flightid.evidence.evidence import (
     Check,
     Evidence,
 )
-from flightid.evidence.explained import FreeRun, by_free_runs
+from flightid.evidence.explained import ExplainedRun, by_free_runs
 from flightid.evidence.parameter_checks import declared_signs
 from flightid.evidence.part_checks import agreement_check, beside_disturbances
 from flightid.evidence.spans import Span, judge_coherence, judge_span
@@ -124,7 +124,7 @@ class FitFacts:
         Estimates, in its order.
     at_once : tuple of str
         Inputs that a sampled model answers within the same sample.
-    free_runs : sequence of FreeRun
+    free_runs : sequence of ExplainedRun
         Of equations through the records that they were fitted to, where the fit made such.
     """
 
@@ -139,7 +139,7 @@ class FitFacts:
     agreement: Agreement | None = None
     values: NDArray[np.float64] | None = None
     at_once: tuple[str, ...] = ()
-    free_runs: Sequence[FreeRun] = ()
+    free_runs: Sequence[ExplainedRun] = ()
 
 
 def gather_evidence(made: FitFacts) -> Evidence:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.evidence import Evidence, gather_evidence
-from flightid.evidence.explained import FreeRun
+from flightid.evidence.explained import ExplainedRun
 from flightid.evidence.gather import FitFacts
 from flightid.evidence.parameter_checks import Signed
 from flightid.evidence.spans import Span
@@ -55,12 +55,12 @@ def evidence_of(fit: Fit, data: Sequence[Any], loop: Loop | None = None) -> Evid
     )
 
 
-def _free_runs(fit: Fit) -> list[FreeRun]:
+def _free_runs(fit: Fit) -> list[ExplainedRun]:
     """Runs of equations through records; black boxes are judged by what they foretell."""
     if fit.details is not None or fit.residual_horizon != "free_run":
         return []
     return [
-        FreeRun(
+        ExplainedRun(
             each.measured.matrix(each.outputs),
             each.modelled.matrix(each.outputs),
             each.measured.sample_time_s,

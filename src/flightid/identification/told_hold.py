@@ -18,7 +18,7 @@ from flightid.conventions import Light
 from flightid.evidence.gather import ON_A_WORD
 from flightid.findings import Finding
 from flightid.identification.fit import Fit
-from flightid.identification.rival_holds import DOUBTFUL, NEGLIGIBLE, OtherHold, Rivals
+from flightid.identification.rival_holds import CHANCE, DOUBTFUL, NEGLIGIBLE, OtherHold, Rivals
 from flightid.record.chosen_hold import DECLARED, RECORDED, SEEN, ChosenHold
 from flightid.record.history import FLOWN
 from flightid.record.hold import BETWEEN, HOLDS, InputHold
@@ -31,7 +31,8 @@ COULD_TELL = 1.0
 """Expected gain of likelihood from which bars of rough samples reach steps that fit better."""
 AUDIBLE, MILD = 0.3, 1.0
 """Expected gain of likelihood from which data have a say beside samples that stand still and jump,
-and standard deviations of a gain that 1 of 6 right words exceeds: the test there."""
+and standard deviations of a gain that 1 of 6 right words exceeds: bars reach the rival there. Amber
+is what 1 of 24 exceeds: two witnesses, word and samples, are not doubted sooner than a word."""
 UNPROVEN = "hold-unproven"
 PROOF = (
     "prove it: let the same device send steps of several samples or two levels, or sample faster, "
@@ -128,6 +129,15 @@ def _on_samples(likely: Sequence[OtherHold], whose: str) -> tuple[Finding | None
     if not leaning:
         return None, []
     best = max(leaning, key=lambda each: each.gain or 0.0)
+    if not _leans(best, CHANCE):
+        # Of right words that two witnesses bear out, 1 of 6 comes here: no doubt, longer bars.
+        said = (
+            f"inputs are {BETWEEN['zero']} between samples {whose}, as samples that stand still "
+            f"and jump bear out; were they {BETWEEN[best.hold]}, which fit about as well, "
+            f"{best.parameter} would be {best.moved:.2g} standard errors away{best.by}, which the "
+            "intervals reach"
+        )
+        return Finding(ON_A_WORD, Light.GREEN, said), [best]
     finding = Finding(
         UNPROVEN,
         Light.AMBER,
@@ -140,9 +150,9 @@ def _on_samples(likely: Sequence[OtherHold], whose: str) -> tuple[Finding | None
     return finding, [best] if best.expected >= COULD_TELL and (best.gain or 0.0) > 0.0 else []
 
 
-def _leans(other: OtherHold) -> bool:
-    """Whether data that have a say would be as good for it by chance in 1 of 6 flights alone."""
-    chance = MILD * math.sqrt(2.0 * other.expected) - other.expected
+def _leans(other: OtherHold, deviations: float = MILD) -> bool:
+    """Whether data that have a say are as good for it by chance beyond so many deviations alone."""
+    chance = deviations * math.sqrt(2.0 * other.expected) - other.expected
     return other.gain is not None and other.expected >= AUDIBLE and other.gain > chance
 
 

@@ -29,13 +29,21 @@ FEWEST = 100
 """Samples of a record that is looked at."""
 MEMORIES_S = (0.3, 2.0)
 """Of gusts, s, beside disturbances without memory."""
+FALSE_ALARMS = 0.001
+"""Share of records with noise of sensors alone in which a disturbance is named."""
 TRIED = 2
 """Disturbances whose chance is worked out: those that stand out most."""
 HALVINGS = 25
+REACH = 25
+"""Samples of the past of inputs whose answer is taken out of residuals."""
+SAMPLES_A_NUMBER = 5
+"""Of all records, for each number of that answer."""
+ROUNDING = 1e-6
+"""Of the largest direction of inputs, below which one tells nothing."""
 
 
 @dataclass(frozen=True)
-class System:
+class DisturbedSystem:
     """A model at a record's middle, in continuous time.
 
     Attributes
@@ -58,13 +66,13 @@ class System:
 
 
 @dataclass(frozen=True)
-class Together:
+class Disturbance:
     """What stands out most.
 
     Attributes
     ----------
     way : int
-        Column of `System.pushes`.
+        Column of `DisturbedSystem.pushes`.
     chance : float
         Of independent outputs that stand out as much in any of the ways (Bonferroni).
     """
@@ -72,8 +80,15 @@ class Together:
     way: int
     chance: float
 
+    @property
+    def is_found(self) -> bool:
+        """Whether sensors alone would hardly do it."""
+        return self.chance < FALSE_ALARMS
 
-def disturbances(fitted: GreyBoxModel, systems: Sequence[tuple[Array, Array]]) -> list[System]:
+
+def disturbances(
+    fitted: GreyBoxModel, systems: Sequence[tuple[Array, Array]]
+) -> list[DisturbedSystem]:
     """Noise on each state, and a gust on each that equations feel by a parameter.
 
     Parameters
@@ -95,7 +110,7 @@ def disturbances(fitted: GreyBoxModel, systems: Sequence[tuple[Array, Array]]) -
     if not any(names):
         ways = ["noise on the states"] * len(ways)
     return [
-        System(
+        DisturbedSystem(
             a,
             c,
             np.hstack([np.eye(n), (a * driven)[:, felt]]),
@@ -107,17 +122,23 @@ def disturbances(fitted: GreyBoxModel, systems: Sequence[tuple[Array, Array]]) -
 
 
 def moved_together(
-    residuals: Sequence[Array], systems: Sequence[System], steps_s: Sequence[float]
-) -> Together | None:
+    residuals: Sequence[Array],
+    systems: Sequence[DisturbedSystem],
+    steps_s: Sequence[float],
+    inputs: Sequence[Array] = (),
+) -> Disturbance | None:
     """The disturbance that residuals show most, and its chance; None where they tell nothing.
 
     Parameters
     ----------
     residuals : sequence of ndarray, shape (n_outputs, n_samples)
         Of each record.
-    systems : sequence of System
+    systems : sequence of DisturbedSystem
     steps_s : sequence of float
         Sample time of each record, s.
+    inputs : sequence of ndarray, shape (n_inputs, n_samples)
+        What neighbouring samples of them foretell is taken out first: a lag, delay or hold that the
+        model has wrong moves outputs together too, and is no disturbance.
 
     Reference
     ---------
@@ -129,6 +150,7 @@ def moved_together(
     if not kept or residuals[0].shape[0] < 2:
         return None
     rows = [residuals[k] - residuals[k].mean(axis=1, keepdims=True) for k in kept]
+    rows = _unforetold(rows, [inputs[k] for k in kept] if inputs else [])
     filters = _filters(rows)
     if filters is None:
         return None
@@ -151,7 +173,30 @@ def moved_together(
     chances = [_chance(score[way], size[way]) for way in best]
     place = int(np.argmin(chances))
     way = int(best[place]) % systems[0].pushes.shape[1]
-    return Together(way, min(len(shown) * chances[place], 1.0))
+    return Disturbance(way, min(len(shown) * chances[place], 1.0))
+
+
+def _unforetold(rows: Sequence[Array], inputs: Sequence[Array]) -> list[Array]:
+    """Residuals less what a response of `REACH` samples to the inputs makes of them."""
+    moved = [k for k in range(len(inputs[0]) if inputs else 0) if any(np.ptp(u[k]) for u in inputs)]
+    samples = sum(each.shape[1] for each in rows)
+    reach = min(REACH, samples // (SAMPLES_A_NUMBER * max(len(moved), 1)))
+    if not moved or reach < 2:
+        return list(rows)
+    lagged = [_lagged(u[moved], reach) for u in inputs]
+    basis, size, _ = np.linalg.svd(np.concatenate(lagged, axis=1).T, full_matrices=False)
+    basis = basis[:, size > ROUNDING * size[0]]
+    whole = np.concatenate(rows, axis=1)
+    whole = whole - (whole @ basis) @ basis.T
+    return np.split(whole, np.cumsum([each.shape[1] for each in rows])[:-1], axis=1)
+
+
+def _lagged(inputs: Array, reach: int) -> Array:
+    """Inputs from a sample ahead to `reach` behind, about their means: (n_inputs · …, n)."""
+    n = inputs.shape[1]
+    middle = inputs - inputs.mean(axis=1, keepdims=True)
+    padded = np.pad(middle, ((0, 0), (reach, 1)), mode="edge")
+    return np.concatenate([padded[:, k : k + n] for k in range(reach + 2)])
 
 
 def _filters(rows: Sequence[Array]) -> list[Array] | None:
@@ -181,7 +226,7 @@ def _apart(white: Sequence[Array]) -> Array:
 
 
 def _forms(
-    white: Array, filters: Sequence[Array], apart: Array, system: System, step_s: float
+    white: Array, filters: Sequence[Array], apart: Array, system: DisturbedSystem, step_s: float
 ) -> tuple[Complex, Complex]:
     """Weights (n_ways, n_outputs, n_omega) and whitened residuals (n_outputs, n_omega)."""
     spectra = apart @ np.fft.rfft(white, axis=1)[:, 1:]

@@ -133,8 +133,8 @@ def judge_process_noise(
         [(scipy.linalg.expm(a * dt), c) for (a, c), dt in zip(systems, steps, strict=True)],
     )
     disturbed = disturbances(fitted, systems)
-    shown = moved_together(residuals, disturbed, steps)
-    together = "" if shown is None or shown.chance >= FALSE_ALARMS else disturbed[0].ways[shown.way]
+    shown = moved_together(residuals, disturbed, steps, [u for u, _, _ in records])
+    together = disturbed[0].ways[shown.way] if shown is not None and shown.is_found else ""
     if found is not None and found.is_found:
         worst = int(np.argmin(found.left))
         light = Light.RED if found.left[worst] < HALF else Light.AMBER
