@@ -524,3 +524,10 @@ def test_angle_loops_are_promised_where_nothing_else_moves_them(
     assert [loop.name for loop in promised_loops([model], fed)] == ["roll rate"]
     with pytest.raises(DataError, match="no model promises anything"):
         promised_loops([fid.load_model("r50_hover")], fid.read_log(log))
+
+
+def test_a_copy_of_a_flight_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for name in ("day.bin", "copy.bin"):
+        (tmp_path / name).write_bytes(b"\xa3\x95" * 40)
+    assert run(["compare", str(tmp_path / "day.bin"), str(tmp_path / "copy.bin")]) == 2
+    assert "are one flight, byte by byte" in capsys.readouterr().err

@@ -86,8 +86,8 @@ def command(
 
     if len(set(files)) < len(files):
         raise click.UsageError("a file is named twice: parts of a log are flight.BIN@20:80")
-    _require_different(files)
     flights = [file for file in files if _is_flight(file)]
+    _require_different(flights)
     _require_sides(files, flights, closed=bool(gains or feedback))
     if not flights:
         loops = compared_loops(files, axis, gains, feedback, loop_rate_hz)
@@ -119,13 +119,13 @@ def command(
         show(made, "Comparison", as_json=as_json, html=html, level=level)
 
 
-def _require_different(files: Sequence[str]) -> None:
-    """Refuse a copy of a file beside it: a difference of none would pass for a finding."""
-    there = [file for file in files if Path(file).is_file()]
+def _require_different(flights: Sequence[str]) -> None:
+    """Refuse a copy of a flight beside it: a difference of none would pass for a finding."""
+    there = [file for file in flights if Path(file).is_file()]
     for place, one in enumerate(there):
         for other in there[place + 1 :]:
             if filecmp.cmp(one, other, shallow=False):
-                raise click.UsageError(f"{one} and {other} hold the same bytes: name two files")
+                raise click.UsageError(f"{one} and {other} are one flight, byte by byte: name two")
 
 
 def _require_sides(files: Sequence[str], flights: Sequence[str], *, closed: bool) -> None:
