@@ -8,7 +8,11 @@ import scipy
 
 from flightid.review.deconvolution import closed_loop
 from flightid.review.loop_predictors import _Regression, _seen_from, predictors
+from flightid.review.loop_response import LoopResponse
 from flightid.review.loop_samples import LoopSamples
+from flightid.review.loops import refused
+from flightid.uncertainty.estimate import Estimate
+from flightid.uncertainty.uneven import DrawnEnds
 from tests.strangers.ordinary_steps import BETAFLIGHT, fly_samples, truths
 
 
@@ -76,3 +80,19 @@ def test_slow_sticks_do_not_make_the_begin_of_a_step_late() -> None:
     low, high = np.quantile(steps[1:], [0.025, 0.975])
     assert known == pytest.approx(0.065, abs=0.001)
     assert low <= known <= high
+
+
+@pytest.mark.parametrize(("level", "half", "told"), [(0.3, 0.38, False), (0.9, 0.38, True)])
+def test_a_step_that_may_be_none_is_not_told(level: float, half: float, *, told: bool) -> None:
+    """A yaw loop at its limits, logged at 10 Hz, was said to end at .3 (.01 to .77)."""
+    ends = DrawnEnds(np.linspace(level - half, level + half, 401))
+    readings = (
+        Estimate("level", level, "1", ends=ends),
+        Estimate("delay to half", 0.1, "s"),
+        Estimate("rise time", 0.2, "s"),
+        Estimate("overshoot", 0.0, "%"),
+    )
+    none = np.zeros(0)
+    begun = LoopResponse("yaw", "rate", "", "", 10.0, 25.0, 1, 1.0, None, none, none, none)
+    unfit = refused(begun, readings, 0.01, "log faster")
+    assert (unfit is None) == told

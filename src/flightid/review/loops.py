@@ -347,8 +347,11 @@ def _is_late_or_early(readings: tuple[Reading, ...]) -> bool:
 
 
 def _is_told(level: Reading) -> bool:
-    half = level.half_width95
-    return half is not None and half <= WIDEST_LEVEL.value
+    """Whether a level is known to half of the step, or of itself where it ends lower."""
+    half, value = level.half_width95, level.value
+    if half is None or value is None:
+        return False
+    return half <= WIDEST_LEVEL.value * min(1.0, abs(value))
 
 
 def what_to_fly(begun: LoopResponse) -> str:

@@ -27,7 +27,7 @@ RISE_BAND = Threshold(
     "set-points held 0 of 22 rise times, quicker ones 26 of 30 (ours)",
 )
 WIDEST_LEVEL = Threshold(
-    0.5, "1", "half of the step either way: such a step tells nothing about gains"
+    0.5, "1", "half of the step either way, or of its level: such a step tells nothing about gains"
 )
 WIDEST_DELAY = Threshold(
     9,
