@@ -12,6 +12,7 @@ from flightid.fleet.statistics.answers import TypeAnswers
 from flightid.fleet.statistics.drift import FleetDrift, find_drift
 from flightid.fleet.statistics.events import FleetEvent
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
+from flightid.fleet.statistics.shared_level import shared_level
 from flightid.fleet.vehicle_lights import vehicle_light
 
 VEHICLES, FLIGHTS = [*"abcdef"], 12
@@ -109,3 +110,19 @@ def test_what_days_do_not_tell_from_a_step_is_not_called_one() -> None:
         _, drift = _fleet(seed, np.tile(-0.1 * (course > 0.5), (len(VEHICLES), 1)))
         assert drift.shared[0].is_step
         assert drift.shared[0].trend is None
+
+
+def test_few_fleets_that_share_nothing_are_said_to() -> None:
+    """By the signs of agreeing vehicles 12 of 100 fleets of eight were, with all eight amber."""
+    found = []
+    for seed in range(40):
+        values = 140.0 * (1.0 + 0.03 * np.random.default_rng((8, seed)).normal(size=(8, FLIGHTS)))
+        data = FlightEstimates.of(
+            ["k"],
+            np.repeat([*"abcdefgh"], FLIGHTS).tolist(),
+            values.reshape(-1, 1),
+            np.full((8 * FLIGHTS, 1, 1), 17.6),
+            time_s=np.tile(2.0 * 86400.0 * np.arange(FLIGHTS), 8),
+        )
+        found.append(shared_level(data, 0))
+    assert sum(each is not None for each in found) <= 3

@@ -34,7 +34,7 @@ def test_the_status_of_a_fleet_before_a_run_cut_and_damaged(
     assert (early.found, len(early.shares.waiting), early.outcomes) == (3, 3, {})
     said = CliRunner().invoke(command, ["status", str(fleet)])
     assert said.exit_code == 0
-    assert "nothing was run yet — flightid fleet run takes all of them" in said.output
+    assert "[not judged] nothing was run yet — flightid fleet run takes all of them" in said.output
     run_fleet(fleet, workers=1)
     (logs / "1.bin").write_bytes(b"cut")
     (logs / "2.bin").unlink()

@@ -179,12 +179,13 @@ def report(place: str, html: Path | None, as_json: bool) -> None:
     from flightid.fleet import fleet_report
     from flightid.report.html import to_html
     from flightid.report.json import to_dict
-    from flightid.report.text import to_text
+    from flightid.report.text import to_text, verdict_line
 
     document = fleet_report(place)
     if html is not None:
         write_atomically(html, to_html(document))
         note(f"Wrote {html}")
+        note(verdict_line(document))
     elif as_json:
         emit_values(to_dict(document))
     else:

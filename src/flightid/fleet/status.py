@@ -148,7 +148,7 @@ def _before_a_run(settings: FleetSettings, where: str) -> FleetStatus:
     found = find_logs([settings.place(each) for each in settings.words.logs])
     waiting = tuple(each.address for each in found)
     action = "flightid fleet run takes all of them"
-    told = Finding("no-catalogue", Light.GREEN, "nothing was run yet", action)
+    told = Finding("no-catalogue", Light.UNKNOWN, "nothing was run yet", action)
     shares = FleetShares({}, {}, waiting, ())
     return FleetStatus(
         *(where, len(found), {}, 0, 0), shares=shares, findings=(told if found else NO_LOGS,)

@@ -37,7 +37,7 @@ def to_text(document: Document) -> str:
         log may hold are shown as ``\N{REPLACEMENT CHARACTER}`` so that no terminal obeys them.
     """
     parts = [document.title, "=" * len(document.title)]
-    parts += [line for line in (document.subtitle, _verdict(document)) if line]
+    parts += [line for line in (document.subtitle, verdict_line(document)) if line]
     for section in document.sections:
         parts += ["", *_section(section, level=1)]
     if document.footer:
@@ -45,7 +45,8 @@ def to_text(document: Document) -> str:
     return without_controls("\n".join(parts)) + "\n"
 
 
-def _verdict(document: Document) -> str:
+def verdict_line(document: Document) -> str:
+    """The worst light of a document and what it is made of; empty where nothing was judged."""
     if not document.tally:
         return ""
     return f"Verdict: {document.verdict} ({document.tally})"

@@ -7,7 +7,7 @@ itself.
 from __future__ import annotations
 
 import datetime
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,6 +17,7 @@ from scipy.special import bdtrc
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
 from flightid.fleet.statistics.own_steps import own_steps
 from flightid.fleet.statistics.repeats import days_of
+from flightid.fleet.statistics.shared_chance import shared_chance
 from flightid.fleet.statistics.shared_shape import SharedShape, shared_shape
 from flightid.fleet.statistics.shared_trend import SharedTrend, shared_trend
 from flightid.frozen import dataclass
@@ -34,6 +35,8 @@ AGREEING = 0.85
 vehicles, with the others by chance either way, as many seem to."""
 CHANCE = 0.05
 """Of as many vehicles that agree were each as likely not to."""
+FLIPPED = 1.0 / 16.0
+"""Chance of a common step as large (`shared_chance`): the least that five vehicles can tell."""
 SMALL = 30
 """Vehicles, up to which one counts in the median it is held against."""
 
@@ -118,8 +121,9 @@ def shared_level(data: FlightEstimates, i: int) -> SharedLevel | None:
 
     r = y / m − 1 with the median m of each vehicle (y − m where a median may be zero); the shared
     level of a week is the median of r over its flights, weeks parted at the largest common step.
-    It counts where ≥ 85 % of vehicles have Σ r c > 0 with the level c of the others, and so many by
-    chance in less than 5 %, and not where more than a few stayed (`OwnSteps.some_stayed`): of three
+    It counts where its largest step is rare were nothing shared (`shared_chance`), ≥ 85 % of
+    vehicles have Σ r c > 0 with the level c of the others, and so many by chance in less than 5 %,
+    and not where more than a few stayed (`OwnSteps.some_stayed`): of three
     of six that change by 10 % the level would be half of it, and all six move with it.
 
     Parameters
@@ -146,8 +150,9 @@ def shared_level(data: FlightEstimates, i: int) -> SharedLevel | None:
     scale, residual, in_percent = _residuals(data, i, rows)
     member, time_s = data.member_of[rows], data.time_s[rows]
     day = days_of(time_s)
-    since = _common_step(residual, member, time_s, day)
-    if since is None:
+    places = _told_on_both_sides(day, member)
+    since = _common_step(residual, time_s, day, places)
+    if since is None or shared_chance(residual, member, day, np.array(places)) > FLIPPED:
         return None
     begun = _first_of(time_s, day)[day]  # A day is of one week, whatever clock it is told by.
     bins = _weeks(begun, since)
@@ -235,15 +240,17 @@ def _weeks(begun: Array, since: float) -> Places:
     return np.asarray(week[place], dtype=np.intp)
 
 
-def _common_step(residual: Array, member: Places, time_s: Array, day: Places) -> float | None:
-    """First instant behind the largest step of the days' medians; None with too few vehicles."""
+def _common_step(
+    residual: Array, time_s: Array, day: Places, places: Sequence[int]
+) -> float | None:
+    """First instant behind the largest step of the days' medians; None where there is no place."""
     begun = _first_of(time_s, day)
     medians = np.array([np.median(residual[day == d]) for d in range(len(begun))])
     counts = np.bincount(day).astype(np.float64)
     best, since = -1.0, None
     total, whole = float(counts @ medians), float(counts.sum())
     before, weight = np.cumsum(counts * medians), np.cumsum(counts)
-    for place in _told_on_both_sides(day, member):
+    for place in places:
         n = float(weight[place - 1])
         apart = float(before[place - 1]) / n - (total - float(before[place - 1])) / (whole - n)
         if n * (whole - n) * apart**2 > best:

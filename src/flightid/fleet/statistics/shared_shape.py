@@ -12,9 +12,12 @@ FITS = 0.87
 """Share of the squares of a shared level, its errors taken off, from which a shape is its: a step
 explains 81 % of a wave and 75 % of a line, a line 61 % of a wave and 75 % of a step."""
 SEARCHED = 2.0
-"""By how much the best date of a step alone lowers the squares, in variances."""
+"""By how much the best date of a step, and of a wave, lowers the squares more, in variances."""
 APART = 6.0
 """By how much squares differ, in variances, where one of two shapes is told (20 to 1)."""
+
+WAVELIKE = 5
+"""Levels, up to which a wave over the whole time says nothing beside a step."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +36,7 @@ class SharedShape:
 def shared_shape(
     level: Array, variance: Array, counts: Array, at: Array, after: NDArray[np.bool_]
 ) -> SharedShape:
-    """Hold a step and a line beside a shared level.
+    """Hold a step and a line beside a shared level; neither where one wave fits better than both.
 
     Parameters
     ----------
@@ -52,15 +55,21 @@ def shared_shape(
     """
     whole = float(counts @ (level - np.average(level, weights=counts)) ** 2)
     of_error = float(np.mean(counts * variance))
-    left = np.array([_left(level, counts, each) for each in (after.astype(np.float64), at)])
+    turn = 2.0 * np.pi * (at - at[0]) / max(np.ptp(at) * len(at) / max(len(at) - 1, 1), 1e-9)
+    wave = np.column_stack([np.sin(turn), np.cos(turn)])
+    courses = (after.astype(np.float64)[:, None], at[:, None], wave)
+    left = np.array([_left(level, counts, each) for each in courses])
     every = np.maximum(whole - (len(level) - 1) * of_error, whole - left)
     fits = whole - left >= FITS * every
     error = max(of_error, float(left.min()) / max(len(level) - 3, 1))
-    apart = left[1] - left[0] - SEARCHED * error
-    near = abs(apart) <= APART * error
-    may_step = (fits[0] and (apart > 0.0 or near)) or (fits[1] and near)
-    may_line = (fits[1] and (apart < 0.0 or near)) or (fits[0] and near)
-    return SharedShape(bool(may_step and whole > 0.0), bool(may_line and whole > 0.0))
+    step, line, season = left + SEARCHED * error * np.array([1.0, 0.0, 1.0])
+    if whole == 0.0 or (len(level) > WAVELIKE and season < min(step, line)):
+        return SharedShape(may_step=False, may_line=False)
+    near = bool(np.any(fits[:2]) and abs(line - step) <= APART * error)
+    return SharedShape(
+        may_step=near or bool(fits[0] and step < line),
+        may_line=near or bool(fits[1] and line < step),
+    )
 
 
 def _left(level: Array, counts: Array, course: Array) -> float:
