@@ -7,13 +7,17 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.fleet.statistics.flight_estimates import Flags, FlightEstimates
+from flightid.fleet.statistics.flight_estimates import FlightEstimates
 
 Array = NDArray[np.float64]
 SURE = 2.0
-"""Standard errors off zero from which a size says anything of its error."""
+"""Standard errors off zero, in the median, from which sizes say anything of errors."""
 MOST = 0.9
-"""Share of flights that must be so: of a parameter about zero nothing is relative."""
+"""Share of flights on one side of zero: of a parameter about zero nothing is relative."""
+FEWEST = 3
+"""Flights from which errors are held beside sizes."""
+LEAST = 1e-3
+"""Of the median, below which no estimate is taken: its error would leave all reason."""
 
 
 def errors_at_the_type(data: FlightEstimates) -> FlightEstimates:
@@ -36,8 +40,8 @@ def errors_at_the_type(data: FlightEstimates) -> FlightEstimates:
     Returns
     -------
     FlightEstimates
-        The same values; of parameters nine of ten of whose flights lie on one side of zero, by two
-        standard errors or more, errors of these flights at the median. Correlations stand.
+        The same values; of parameters nine of ten of whose flights lie on one side of zero, in the
+        median by two standard errors or more, errors at the median. Correlations stand.
 
     Assumes
     -------
@@ -80,22 +84,25 @@ def _at_a_median(data: FlightEstimates, group: NDArray[np.intp]) -> FlightEstima
 
 def _set_scale(scale: Array, data: FlightEstimates, i: int, group: NDArray[np.intp]) -> None:
     """Factors of the standard errors of one parameter, where its errors may be relative."""
-    there = data.known[:, i]
-    values, errors = data.values[:, i], np.sqrt(data.covariances[:, i, i])
-    sure = there & _one_sided(values, errors, there)
-    if np.count_nonzero(sure) < max(3.0, MOST * np.count_nonzero(there)):
+    there = np.flatnonzero(data.known[:, i])
+    values, errors = data.values[there, i], np.sqrt(data.covariances[there, i, i])
+    if len(there) < FEWEST or not _is_one_sided(values, errors):
         return
-    size = np.log(np.abs(values[sure]))
-    share = relative_share(size, np.log(errors[sure]), group[sure])
-    for one in np.unique(group[sure]):
-        mine = group[sure] == one
-        scale[np.flatnonzero(sure)[mine]] = np.exp(share * (np.median(size[mine]) - size[mine]))
+    # What lies near zero or beyond it by chance states the least error of all where it is relative.
+    usual = float(np.median(np.abs(values)))
+    size = np.log(np.maximum(np.abs(values), LEAST * usual))
+    group = group[there]
+    share = relative_share(size, np.log(errors), group)
+    for one in np.unique(group):
+        mine = group == one
+        scale[there[mine]] = np.exp(share * (np.median(size[mine]) - size[mine]))
 
 
-def _one_sided(values: Array, errors: Array, there: Flags) -> Flags:
-    """Estimates on the usual side of zero and sure of it."""
-    side = np.sign(np.median(values[there])) if there.any() else 1.0
-    return np.asarray(side * values > SURE * errors)
+def _is_one_sided(values: Array, errors: Array) -> bool:
+    """Whether nearly all estimates lie on one side of zero, and the usual one surely."""
+    side = np.sign(np.median(values))
+    away = float(np.median(side * values / errors))
+    return bool(away > SURE and np.mean(side * values > 0.0) >= MOST)
 
 
 def relative_share(log_values: Array, log_errors: Array, group: NDArray[np.intp]) -> float:
