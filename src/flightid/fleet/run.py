@@ -158,7 +158,7 @@ def _run(
     findings += _nothing_fitted(counts, store, len(addresses), bool(fitted))
     return FleetRun(
         settings.catalogue, len(addresses), kept, counts, tuple(findings), taken.reasons(),
-        taken.copies,
+        taken.copies, taken.memory_bytes,
     )  # fmt: skip
 
 

@@ -32,6 +32,8 @@ class FleetRun(Result, schema="flightid.fleet_run/1"):
     copies : mapping of str to str
         Addresses whose bytes another log had that was taken, and its address: found is the sum of
         what was kept, all outcomes and these.
+    memory_bytes : int or None
+        Most that a process had which took a log, B; None where none was taken, or nobody knows.
 
     Example
     -------
@@ -46,6 +48,7 @@ class FleetRun(Result, schema="flightid.fleet_run/1"):
     findings: tuple[Finding, ...] = ()
     reasons: tuple[RefusalReason, ...] = ()
     copies: Mapping[str, str] = field(default_factory=dict)
+    memory_bytes: int | None = None
 
     @property
     def lines(self) -> tuple[str, ...]:
@@ -57,6 +60,8 @@ class FleetRun(Result, schema="flightid.fleet_run/1"):
         ('3 logs, 1 of them in the catalogue before', '2 fitted')
         >>> FleetRun("catalogue", 3, 3, {}).lines
         ('3 logs, all in the catalogue before: nothing new',)
+        >>> FleetRun("catalogue", 1, 0, {"fitted": 1}, memory_bytes=312_000_000).lines[-1]
+        'at most 312 MB a process'
         """
         is_new = self.kept < self.found or not self.found
         before = f"{self.kept} of them" if is_new else "all"
@@ -66,6 +71,7 @@ class FleetRun(Result, schema="flightid.fleet_run/1"):
             f"{counted(self.found, 'log')}, {before} in the catalogue before{nothing}",
             *(f"{number} {outcome}" for outcome, number in sorted(self.outcomes.items())),
             *([f"{copies} with the bytes of another"] if copies else []),
+            *([f"at most {self.memory_bytes / 1e6:.0f} MB a process"] if self.memory_bytes else []),
         )
 
     def summary(self) -> Table:
@@ -73,6 +79,8 @@ class FleetRun(Result, schema="flightid.fleet_run/1"):
         rows: list[tuple[str, int]] = [("logs found", self.found), ("kept", self.kept)]
         rows += [(f"{name} logs", n) for name, n in sorted(self.outcomes.items())]
         rows += [("copies of these", len(self.copies))] if self.copies else []
+        if self.memory_bytes is not None:
+            rows.append(("most memory of a process [MB]", round(self.memory_bytes / 1e6)))
         columns = (Column("what"), Column("number"))
         return Table(f"Run of {self.catalogue}", columns, tuple(rows))
 

@@ -28,12 +28,15 @@ class TakenContents:
         Logs that the catalogue had, and where they lie, copies too.
     fitted : dict of str to str
         Vehicle of each log that gave a model now; empty where it names none.
+    memory_bytes : int or None
+        Most that a process had which took one; None where the system does not say.
     """
 
     def __init__(self) -> None:
         self.outcomes: dict[str, str] = {}
         self.known: dict[str, list[LogAddress]] = {}
         self.fitted: dict[str, str] = {}
+        self.memory_bytes: int | None = None
         self._told: dict[str, Mapping[str, str]] = {}
         self._first: dict[str, str] = {}
         self._copied: dict[str, str] = {}
@@ -41,6 +44,8 @@ class TakenContents:
     def add(self, outcome: LogOutcome) -> None:
         """Note an outcome; of copies that one counts which is not merely known."""
         log, address = outcome.log, outcome.order.address.address
+        if outcome.memory_bytes is not None:
+            self.memory_bytes = max(outcome.memory_bytes, self.memory_bytes or 0)
         if self._first.setdefault(log, address) != address:
             self._copied[address] = log
         if outcome.outcome == KNOWN:
