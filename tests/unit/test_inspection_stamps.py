@@ -72,5 +72,5 @@ def test_a_log_without_anything_to_judge_says_so_and_claims_no_rest(tmp_path: Pa
         "no-command-logged",
         "motion-unknown",
     }
-    assert inspection.bands[0].reason == "tau_phi and p not logged"
+    assert inspection.bands[0].reason == "mixer command and body rate are not logged"
     assert inspection.duration_s == 0.0

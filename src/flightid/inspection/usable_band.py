@@ -164,8 +164,9 @@ def axis_bands(
     for axis, (tau, rate, _) in axes.items():
         command, motion = inputs[axis], outputs[axis]
         if command is None or motion is None:
-            absent = [name for name, s in ((tau, command), (rate, motion)) if s is None]
-            missing = f"{' and '.join(absent)} not logged"
+            both = (("mixer command", command), ("body rate", motion))
+            absent = [name for name, signal in both if signal is None]
+            missing = f"{' and '.join(absent)} {'are' if absent[1:] else 'is'} not logged"
             found.append(AxisBand(axis, "", "", 0.0, None, None, missing))
             continue
         own = tuple((e.start_s, e.stop_s) for e in excited if e.is_injected and e.axis == axis)

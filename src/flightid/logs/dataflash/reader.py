@@ -330,7 +330,8 @@ class DataflashSource:
             yield Finding(
                 "bytes-skipped",
                 Light.AMBER,
-                f"{size} of {self._file.size()} bytes in {len(lost)} places are no message",
+                f"{size} of {self._file.size()} bytes, in {counted(len(lost), 'place')}, "
+                "are no message",
                 "copy the log from the vehicle again; look for gaps in the span you use",
             )
 

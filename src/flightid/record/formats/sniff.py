@@ -59,6 +59,12 @@ def file_format(path: Path) -> FileFormat:
         return FileFormat.BAG
     with path.open("rb") as stream:
         head = stream.read(SNIFFED)
+    if not head:
+        raise FileFormatError(
+            f"{path.name} is an empty file",
+            needed="an autopilot's log, or records as a table",
+            action="copy it again",
+        )
     suffix = path.suffix.lower()
     strange = foreign(head)
     found = None if strange else _by_content(head, suffix)
