@@ -113,13 +113,35 @@ def test_scatter_in_doubt_of_few_has_the_freedom_of_the_noise(informations: list
         said = agreement_check(found.agreement, np.array([100.0]))
         assert ("not beyond doubt" in said.limit) is agree
         if agree:
-            assert_close(found.freedom, [40.0], rtol=1e-9, why="the noise's")
+            # Of a pair the noise's; towards two degrees of freedom those of the scatter.
+            share = _freedom(weights[:, 0, 0] / weights.sum()) - 1.0
+            eased = 1.0 / (share / 2.0 + (1.0 - share) / 40.0)
+            assert_close(found.freedom, [eased], rtol=1e-6, why="bisection of its interval")
         else:
             wide = stats.t.ppf(0.975, found.freedom) * np.sqrt(np.diag(found.covariance))
             assert found.agreement.freedom is not None
             of_scatter = stats.t.ppf(0.975, found.agreement.freedom) * found.agreement.by_scatter
             assert_close(wide, of_scatter, rtol=1e-6, why="noise lengthens no proven scatter")
             assert f"and to ±{wide[0]:.2g} %" in said.what
+
+
+def test_weights_that_differ_by_a_hair_change_no_interval_at_once() -> None:
+    """Three records of one weight took Student's 4.30 in doubt, of nearly one weight 1.96."""
+    lengths = []
+    for hair in (0.0, 0.05):
+        weights = np.array([1.0, 1.0 + hair, 1.0 - hair])[:, None, None]
+        spread = 1.0 / weights.sum(axis=0)
+        found = compare_parts(
+            _flights(np.array([[-1.7], [0.0], [1.7]]), weights),
+            spread,
+            spread,
+            np.array([np.inf]),
+            by_halves=False,
+        )
+        assert found.agreement.records is not None and 0.01 < found.agreement.records < 0.1
+        assert found.agreement.reach is not None
+        lengths.append(found.agreement.reach[1])
+    assert_close(lengths[1], lengths[0], rtol=0.1, why="a twentieth of the weight")
 
 
 def test_halves_hold_the_same_information_where_the_tail_is_quiet() -> None:

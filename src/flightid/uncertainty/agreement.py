@@ -26,8 +26,8 @@ CERTAIN = 1.0 - 1e-15
 DOUBT = 0.1
 """Chance below which scatter between records is carried on: what is not proven may be there."""
 TELLING = 2.0
-"""Degrees of freedom from which scatter in doubt has its own: below, as of a pair or where one
-record tells most, Student's interval is up to 6.5 times as long."""
+"""Degrees of freedom from which scatter in doubt has its own: below, towards a pair or where one
+record tells most, Student's interval is up to 6.5 times as long, and gives way to the noise's."""
 AS_LONG = 1e-9
 """Share by which lengths may differ by rounding."""
 FEWEST_RECORDS = 3
@@ -216,14 +216,25 @@ def compare_parts(
     apart = np.sqrt(np.diag(found.covariance))
     student = found.freedom if by_records else None
     if student is not None and not _differ(records):
-        # Bars reach as far as records lie apart; how far they should, noise tells better than two.
-        student = np.where(student < TELLING, np.maximum(student, freedom), student)
+        student = _in_doubt(student, freedom)
     both = larger(covariance, found.covariance)
     stderr = np.sqrt(np.diag(both))
     stated = freedom if student is None else _of_wider(stderr, freedom, apart, student)
     reach = np.array([_lengths(by_noise, freedom), _lengths(stderr, stated)])
     agreement = replace(plain, by_scatter=apart, freedom=student, reach=reach)
     return AgreementTest(both, stated, agreement)
+
+
+def _in_doubt(student: Array, freedom: Array) -> Array:
+    """Degrees of freedom of scatter that may be noise's: below two they rise to those of noise.
+
+    Bars reach as far as records lie apart; how far they should, noise tells better than one pair.
+    In steps of 1/f between the two: weights that differ by a hair from those of three records alike
+    change nothing at once.
+    """
+    share = np.clip((student - 1.0) / (TELLING - 1.0), 0.0, 1.0)
+    eased = 1.0 / (share / TELLING + (1.0 - share) / freedom)
+    return np.where(student < TELLING, np.maximum(student, eased), student)
 
 
 def _lengths(stderr: Array, freedom: Array) -> Array:
