@@ -138,7 +138,8 @@ def test_weights_that_differ_by_a_hair_change_no_interval_at_once() -> None:
             np.array([np.inf]),
             by_halves=False,
         )
-        assert found.agreement.records is not None and 0.01 < found.agreement.records < 0.1
+        assert found.agreement.records is not None
+        assert 0.01 < found.agreement.records < 0.1
         assert found.agreement.reach is not None
         lengths.append(found.agreement.reach[1])
     assert_close(lengths[1], lengths[0], rtol=0.1, why="a twentieth of the weight")

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from flightid.frozen import dataclass
 from flightid.responses.response import FrequencyResponse
 from flightid.responses.unbiased import unbiased
+from flightid.uncertainty.magnitude import magnitude_interval
 from flightid.uncertainty.quantiles import LEVEL, half_width
 
 Real = NDArray[np.float64]
@@ -27,7 +28,8 @@ class ResponseIntervals:
     centre : ndarray of complex, shape (n_f,)
         What the intervals stand about: the response less the bias that could be foretold.
     gain : ndarray, shape (2, n_f)
-        Lower and upper end, in the unit of the response; from zero where noise could hide it all.
+        Lower and upper end, in the unit of the response; from zero where noise alone could make as
+        large a one. Noise lengthens weak responses: the lower end lies further away than the upper.
     phase_rad : ndarray, shape (2, n_f)
         About the unwrapped phase of `centre`; wider than a turn where it is not known.
     reason : str
@@ -140,14 +142,17 @@ def _intervals(known: FrequencyResponse, reason: str, level: float) -> ResponseI
     spread = spread_of(known)
     if spread is None:
         return None
-    along, across = half_width(level) * spread
+    across = half_width(level) * spread[1]
     size = np.abs(centre)
     phase = np.unwrap(np.angle(centre))
-    turned = np.where(across < size, np.arcsin(np.minimum(across / size, 1.0)), np.pi)
+    gain = magnitude_interval(size, *spread, level=level)
+    # Where noise alone makes as much, no direction is known: half of all would be behind.
+    known_at = (gain[0] > 0.0) & (across < size)
+    turned = np.where(known_at, np.arcsin(np.minimum(across / size, 1.0)), np.pi)
     return ResponseIntervals(
         known.omega_rad_s,
         centre,
-        np.stack([np.maximum(size - along, 0.0), size + along]),
+        gain,
         np.stack([phase - turned, phase + turned]),
         reason,
     )
