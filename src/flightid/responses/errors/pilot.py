@@ -40,6 +40,8 @@ LEAST = 1e-10
 MOST_SPENT = 0.95  # of a bin's noise, that a fit is held to have taken
 SPENT = 3.0
 """Equations for each unknown that a fit needs."""
+PASSES = 3
+"""Fits by the noise that the one before left: of all orders twice, then of the one found."""
 PATIENCE = 2
 """Orders beyond the best that are still tried."""
 
@@ -171,9 +173,10 @@ def _fit_output(data: PilotBins) -> Pilot | None:
     best: PilotState | None = None
     slopes, taken = np.zeros(0, dtype=np.complex128), (np.zeros(0), np.zeros(0))
     weights = np.ones(data.size)
-    for _ in range(2):
+    tried = ORDERS
+    for _ in range(PASSES):
         lowest, found, since = np.inf, None, 0
-        for order in ORDERS:
+        for order in tried:
             unknowns = (order + 1) * (n_in + n_records) + order + SPARE * n_records
             if 2 * data.size < SPENT * unknowns:
                 break
@@ -190,9 +193,12 @@ def _fit_output(data: PilotBins) -> Pilot | None:
                 break
         if found is None:
             break
+        if best is not None:
+            tried = (len(found.denominator) - 1,)
         best, slopes = found, _slopes(data, found, scale)
         taken = _taken(slopes, weights)
-        weights = _weights(target - found.modelled, target, taken[0])
+        omega = np.concatenate(data.omega)
+        weights = noise_weights(omega, target - found.modelled, target, taken[0])
     return None if best is None else _pilot(data, best, scale, slopes, taken)
 
 
@@ -233,10 +239,33 @@ def _pilot(
     )
 
 
-def _weights(residual: Complex, target: Complex, spent: Real) -> Real:
-    """One over the root of the noise's spectrum: that of the residuals with what a fit spent."""
+def noise_weights(omega_rad_s: Real, residual: Complex, target: Complex, spent: Real) -> Real:
+    """One over the root of the noise's spectrum: that of the residuals with what a fit spent.
+
+    Averaged over neighbours in frequency, of whichever record: gusts that pass a slow mode rise and
+    fall within fifteen bins of one record, and noise that is taken to be less than it is there
+    gives a pilot errors that are too small.
+
+    Parameters
+    ----------
+    omega_rad_s : ndarray, shape (n_bins,)
+        Bins of all records, one record after the other.
+    residual, target : ndarray of complex, shape (n_bins,)
+    spent : ndarray, shape (n_bins,)
+
+    Example
+    -------
+    >>> two = np.tile(np.arange(1.0, 41.0), 2)
+    >>> noise = np.where(two < 8.0, 2.0, 1.0) + 0j
+    >>> weights = noise_weights(two, noise, noise, np.zeros(80))
+    >>> bool(np.all(weights[[0, 40]] == 0.5)), bool(np.all(weights[[20, 79]] == 1.0))
+    (True, True)
+    """
+    order = np.argsort(omega_rad_s, kind="stable")
     window = np.ones(min(SMOOTHED, len(residual)))
-    power = np.convolve(np.abs(residual) ** 2, window, "same")
-    power /= np.convolve(1.0 - spent, window, "same")
+    power = np.convolve(np.abs(residual[order]) ** 2, window, "same")
+    power /= np.convolve(1.0 - spent[order], window, "same")
     least = LEAST * float(np.mean(np.abs(target) ** 2))
-    return np.asarray(1.0 / np.sqrt(np.maximum(power, least)))
+    weights = np.empty(len(residual))
+    weights[order] = 1.0 / np.sqrt(np.maximum(power, least))
+    return weights
