@@ -12,8 +12,10 @@ import flightid as fid
 from flightid.identification.frequency_domain import without_bias
 from flightid.identification.frequency_domain.bias_objective import Objective
 from flightid.identification.frequency_domain.bias_search import SearchOutcome, search
+from flightid.identification.frequency_domain.estimator_bias import Correction, resonant_up_to
 from flightid.identification.frequency_domain.model_residuals import ModelResiduals
 from flightid.responses.errors.noise import NoiseSpectrum, noise_of_residuals
+from flightid.responses.errors.random_error import ErrorSelection
 from flightid.responses.windows.transform import FoldedBasis
 from tests.closeness import assert_close
 
@@ -158,6 +160,42 @@ def test_a_fit_that_cannot_be_followed_begins_from_the_model(
     begun = [p.value for p in fid.load_model("rate_first_order").parameters.free]
     assert asked[1].tolist() == begun
     assert all(p.stderr for p in fit.parameters.values() if p.status == "free")
+
+
+def test_noise_through_a_slow_light_mode_is_as_strong_as_its_peak() -> None:
+    """Gusts of a mode that decays: a mean over a group of bins held a third of their power."""
+    rng, step_s, n = np.random.default_rng(5), 0.1, 800
+    pole = np.exp((-0.1 + 0.6j) * step_s)
+    resonance = [1.0, -2.0 * pole.real, abs(pole) ** 2]
+    records = []
+    for _ in range(4):
+        control, gust = rng.standard_normal((2, n + 2000))
+        output = scipy.signal.lfilter([0.0, 0.01], resonance, control)
+        output += scipy.signal.lfilter([0.01], resonance, gust)
+        records.append(
+            fid.Record.from_arrays(
+                np.arange(n) * step_s,
+                inputs={"u": control[2000:]},
+                outputs={"y": output[2000:]},
+                units={"u": "1", "y": "1"},
+                hold="zero",
+            )
+        )
+    response = fid.estimate_response(records, band_rad_s=(0.4, 5.0), n_omega=20, loop="open")
+    parameters = [
+        fid.Parameter("K", 1.0, "1/s^2"),
+        fid.Parameter("d", 0.2, "1/s"),
+        fid.Parameter("w2", 0.37, "1/s^2"),
+    ]
+    path = fid.TransferFunction("y", "u", "K", denominator=("s^2 + d*s + w2",))
+    model = fid.TransferFunctionModel((path,), fid.Parameters(parameters))
+    known = Correction(response, "zero").errors(model)
+    assert isinstance(known, ErrorSelection)
+    noise = known.errors.noise  # type: ignore[attr-defined]
+    omega, gain = scipy.signal.freqz([0.01], resonance, np.linspace(0.5, 0.7, 50) * step_s)
+    truth = 2.0 * step_s * float(np.mean(np.abs(gain) ** 2))
+    assert 0.6 * truth < np.mean(noise.at(omega / step_s)) < 1.6 * truth
+    assert resonant_up_to(model, 0.05) == 0.0, "groups that are narrower than the mode show it"
 
 
 def test_noise_through_a_growing_mode_is_as_strong_as_its_peak() -> None:

@@ -32,7 +32,7 @@ AVERAGED = 15
 """Bins, of all records together, over which residuals of a model that leaves noise are averaged."""
 LEAST_NEIGHBOURS, FEWEST_VALUES = 3, 12
 """Bins of each record, and values of all records together, whose mean stands for a bin of noise
-near a mode that grows."""
+near a light mode."""
 BEYOND_BAND = 1.5
 """Noise is estimated up to this multiple of the highest frequency of the response."""
 
