@@ -173,7 +173,7 @@ def _fit_output(data: PilotBins) -> Pilot | None:
     best: PilotState | None = None
     slopes, taken = np.zeros(0, dtype=np.complex128), (np.zeros(0), np.zeros(0))
     weights = np.ones(data.size)
-    tried = ORDERS
+    tried: tuple[int, ...] = ORDERS
     for _ in range(PASSES):
         lowest, found, since = np.inf, None, 0
         for order in tried:
