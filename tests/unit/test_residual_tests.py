@@ -157,6 +157,19 @@ def test_a_two_level_input_is_not_testable_squared(signal: np.ndarray) -> None:
     assert "residuals-not-testable" not in {finding.code for finding in tests.findings}
 
 
+def test_power_beside_a_doublet_is_judged_at_its_nominal_rate() -> None:
+    """Sums of few squares have a long tail: 2 of 120 were below 0.1 %."""
+    chances = []
+    for seed in range(60):
+        u = np.zeros(1000)
+        u[100:128], u[128:156] = 1.2, -1.2
+        e = np.random.default_rng(seed).standard_normal((2, 1000))
+        tests = fid.residual_tests(e, u, horizon=STEP, loop="open")
+        chances += [tests.test("u²ε²", name, "u1").p_value or 1.0 for name in ("e1", "e2")]
+    assert sum(chance < 0.01 for chance in chances) <= 4
+    assert sum(chance < 0.001 for chance in chances) == 0
+
+
 def test_three_levels_are_testable() -> None:
     assert not is_two_level((np.tile([1.0, 0.0, -1.0, -1.0], 50),))
 

@@ -66,7 +66,7 @@ class DisturbedSystem:
 
 
 @dataclass(frozen=True)
-class Disturbance:
+class ShownDisturbance:
     """What stands out most.
 
     Attributes
@@ -126,7 +126,7 @@ def moved_together(
     systems: Sequence[DisturbedSystem],
     steps_s: Sequence[float],
     inputs: Sequence[Array] = (),
-) -> Disturbance | None:
+) -> ShownDisturbance | None:
     """The disturbance that residuals show most, and its chance; None where they tell nothing.
 
     Parameters
@@ -173,7 +173,7 @@ def moved_together(
     chances = [_chance(score[way], size[way]) for way in best]
     place = int(np.argmin(chances))
     way = int(best[place]) % systems[0].pushes.shape[1]
-    return Disturbance(way, min(len(shown) * chances[place], 1.0))
+    return ShownDisturbance(way, min(len(shown) * chances[place], 1.0))
 
 
 def _unforetold(rows: Sequence[Array], inputs: Sequence[Array]) -> list[Array]:
