@@ -41,7 +41,8 @@ def test_margins_of_many_flights_are_among_them(tmp_path: Path) -> None:
     ]
     told = [each for held in found for each in held]
     assert len(told) >= 90
-    assert np.mean(told) >= 0.95
+    # 95 % intervals: two deviations of chance over so many.
+    assert np.mean(told) >= 0.9
 
 
 def _flown(axis: Axis, path: Path, *, seed: int) -> tuple[fid.FlightReview, list[bool]]:
