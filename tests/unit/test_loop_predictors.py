@@ -56,7 +56,7 @@ def test_errors_of_channels_that_one_gust_moves_go_together(
     samples, first, second = both
     errors = [each.errors(samples.lengths) for each in (first, second)]
     assert np.sum(errors[0] ** 2) == pytest.approx(first.variance * (1200 - 2 * 4 - 2 - 11))
-    assert np.corrcoef(*errors)[0, 1] == pytest.approx(0.36, abs=0.08)
+    assert np.corrcoef(errors[0], errors[1])[0, 1] == pytest.approx(0.36, abs=0.08)
     ahead, beside = predictors(samples, (3, 2, 4), 2000, np.random.default_rng(2))
     # Of the same past by the same channel: what is estimated scatters as errors do.
     drawn = np.corrcoef(ahead.own[1:, 0], beside.other[1:, 0])[0, 1]
