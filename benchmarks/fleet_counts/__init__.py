@@ -10,12 +10,13 @@ from __future__ import annotations
 import os
 
 from benchmarks.fleet_counts.changes import alarms, events, kinds, shared, steps
-from benchmarks.fleet_counts.types import least, odd_flights, shapes, unlike
+from benchmarks.fleet_counts.types import least, odd_flights, relative, shapes, unlike
 from flightid.table import Column, Table
 
 SECTIONS = {
     "alarms": alarms, "steps": steps, "shared": shared, "kinds": kinds, "events": events,
-    "least": least, "unlike": unlike, "shapes": shapes, "odd-flights": odd_flights,
+    "least": least, "unlike": unlike, "shapes": shapes, "relative": relative,
+    "odd-flights": odd_flights,
 }  # fmt: skip
 
 

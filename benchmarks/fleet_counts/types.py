@@ -133,16 +133,49 @@ def least(fleets: int) -> Section:
                 values = _type(np.random.default_rng((13, k, p, seed)), k, p)
                 promised = least_differences(estimate_population(_estimates(values)))["000"][0]
                 told.append(promised.value)
-                # The same fleet, the first vehicle drawn anew and moved by the promise.
-                other = values.copy()
-                other[0] = _type(np.random.default_rng((14, k, p, seed)), 1, p)[0]
-                other[0, 0] += promised.value * (1.0 if seed % 2 else -1.0)
+                # The same fleet, the first vehicle as far from the mean as is promised.
+                other, drawn = values.copy(), np.random.default_rng((14, k, p, seed))
+                other[0] = _type(drawn, 1, p)[0]
+                apart = promised.value * (1.0 if seed % 2 else -1.0)
+                other[0, 0] = 100.0 + apart + drawn.normal()
                 odd = find_outliers(estimate_population(_estimates(other))).odd
                 seen += "000" in {each.vehicle for each in odd}
             words = f"difference, {k} vehicles, {p} parameter{'s' * (p > 1)}"
             yield words, f"{np.median(told):.3g} %", f"{seen} of {fleets}"
 
     return Section(("what is promised", "size (median)", "found"), rows)
+
+
+def relative(fleets: int) -> Section:
+    """Intervals of a type whose errors are shares of each estimate."""
+
+    def rows() -> Iterator[Words]:
+        for flights in (1, 6):
+            for share, apart in ((0.1, 0.0), (0.1, 0.5), (0.3, 0.0), (0.3, 0.5)):
+                rng, k, held = np.random.default_rng((15, flights)), 20, np.zeros(2, dtype=int)
+                for _ in range(fleets):
+                    truth = np.repeat(1.0 + 0.1 * rng.normal(size=k), flights)
+                    shares = share * np.exp(apart * rng.normal(size=truth.size))
+                    values = truth * (1.0 + shares * rng.normal(size=truth.size))
+                    ids = np.repeat([f"{i:03}" for i in range(k)], flights).tolist()
+                    told = ((shares * values) ** 2)[:, None, None]
+                    found = estimate_population(
+                        FlightEstimates.of(["a"], ids, values[:, None], told)
+                    ).parameters["a"]
+                    following = 1.0 + 0.1 * float(rng.normal())
+                    for place, (each, what) in enumerate(
+                        ((found.mean, 1.0), (found.next_vehicle, following))
+                    ):
+                        low, high = each.interval95 or (np.inf, -np.inf)
+                        held[place] += low <= what <= high
+                words = f"{100.0 * share:g} %"
+                words += (
+                    f", by a factor of {np.exp(apart):.2g} from flight to flight" if apart else ""
+                )
+                counts = (f"{each} of {fleets}" for each in held)
+                yield words, f"{flights}", *counts
+
+    return Section(("errors", "flights of each", "mean held", "next vehicle held"), rows)
 
 
 def odd_flights(fleets: int) -> Section:

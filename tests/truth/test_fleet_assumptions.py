@@ -330,7 +330,7 @@ def test_flights_that_go_on_as_their_neighbours_did_are_no_change() -> None:
     seen = found.persistent["Lp"]
     assert 0.3 <= seen.correlation <= 0.9
     assert "flights go on as their neighbours did" in " ".join(found.summary().notes)
-    assert "beside a real change some 10 %" in found.summary().notes[0]
+    assert "beside a real change some 6 %, the mean of fleets" in found.summary().notes[0]
     alone = _drift(5, 10, 24, days=0.04, memory=0.9)
     assert len(_alarmed(alone)) <= 1 < len(alone.going_on)
     (light, *_) = persistent_lights(alone, {})

@@ -199,7 +199,7 @@ class FleetDrift(Result, schema="flightid.fleet_drift/1"):
             f"{asked} {'history' if asked == 1 else 'histories'} asked, at most "
             f"{100 * FALSE_SHARE:.0f} % of the alarms false (Benjamini and Hochberg), where "
             f"flights {beside} beside the days they share"
-            f"{'; beside a real change some 10 %' if self.persistent else ''}."
+            f"{'; beside a real change some 6 %, the mean of fleets' if self.persistent else ''}."
         )
         odd = ", ".join(
             f"{n} of {named.get(name, name)}" for name, n in self.odd_flights.items() if n
