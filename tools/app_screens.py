@@ -63,7 +63,9 @@ def plan(stage: Stage) -> None:
     stage.open(f"plan/{stage.log}")
     page = stage.page
     page.get_by_role("heading", name="This log already carries").wait_for()
-    page.get_by_role("group", name="Axes").get_by_role("button", name="yaw").click()
+    yaw = page.get_by_role("group", name="Axes").get_by_role("button", name="yaw")
+    if yaw.get_attribute("aria-pressed") != "true":  # it stays in the study of the folder
+        yaw.click()
     page.locator("section[aria-label=Sweeps]").wait_for()
 
 
