@@ -326,12 +326,11 @@ class DataflashSource:
                 "hand in the .bin file that it was made from, if it still exists",
             )
         if lost:
-            size = sum(r.size for r in lost)
+            size, places = sum(r.size for r in lost), counted(len(lost), "place")
             yield Finding(
                 "bytes-skipped",
                 Light.AMBER,
-                f"{size} of {self._file.size()} bytes, in {counted(len(lost), 'place')}, "
-                "are no message",
+                f"{size} of {self._file.size()} bytes, in {places}, are no message",
                 "copy the log from the vehicle again; look for gaps in the span you use",
             )
 
