@@ -415,6 +415,53 @@ def test_sweeps_of_one_input_each_are_fitted_together(tmp_path: Path) -> None:
     assert not [each for each in made.findings if each.code == "inputs-unswept"]
 
 
+def test_a_cut_leaves_no_input_without_its_sweep(tmp_path: Path) -> None:
+    """Two sticks of one flight in turn: one of them last and once, once each, twice each.
+
+    Each sweep is of 300 samples; what is still between them is exactly so.
+    """
+    rng, sweep = np.random.default_rng(6), np.sin(0.002 * np.arange(300) ** 1.7)
+    proposed = {}
+    for order in ("aaab", "ab", "abab", "abb", "aab"):
+        injected = np.zeros((2, 20 + 320 * len(order)))
+        for k, stick in enumerate(order):
+            injected["ab".index(stick), 20 + 320 * k :][:300] = sweep
+        stick = injected + 0.01 * rng.standard_normal(injected.shape)
+        flown = Record.from_arrays(
+            0.02 * np.arange(injected.shape[1]),
+            inputs={"lat": stick[0], "lon": stick[1]},
+            outputs={"p": np.cumsum(stick[0]), "q": np.cumsum(stick[1])},
+            excitations={"sweep_lat": injected[0], "sweep_lon": injected[1]},
+            name=order,
+        )
+        write_records(flown, tmp_path / f"{order}.nc")
+        made = propose_study(
+            [tmp_path / f"{order}.nc"], folder=tmp_path, model="r50_hover", inputs=["lat", "lon"],
+            outputs=["p", "q"], excitations=["sweep_lat", "sweep_lon"],
+        )  # fmt: skip
+        assert not [each for each in made.findings if each.code == "inputs-unswept"]
+        study = proposed[order] = tomllib.loads(made.text)
+        start, stop = study["record"][0]["span_s"]
+        fitted = (flown.time_s >= start) & (flown.time_s <= stop)
+        swept = [np.count_nonzero(channel[fitted]) for channel in injected]
+        assert min(swept) >= 0.7 * np.count_nonzero(sweep), order
+        (said,) = [e for e in made.findings if e.code == "nothing-unseen"] or [None]
+        assert (said is None) == (len(study["record"]) == 2) == ("verify" in study["model"][0])
+        if order == "ab":
+            assert said is not None
+            assert said.message.startswith("a stretch to verify on: every cut of ab leaves an inp")
+            assert "fly a second flight, sweeps or doublets" in said.action
+    spans = {name: [each["span_s"] for each in made["record"]] for name, made in proposed.items()}
+    assert spans["ab"] == [[0.0, pytest.approx(0.02 * 659)]]
+    # The last quarter goes where that leaves each its sweep; else the cut follows what does not.
+    assert len(spans["abab"]) == len(spans["abb"]) == len(spans["aab"]) == 2
+    assert spans["aaab"][1][0] == spans["aab"][1][0] == 0.0
+    # Of sweeps in turn some responses say nothing, as of those in files of their own.
+    for made in proposed.values():
+        assert made["model"][0]["responses"] == "coherent"
+        assert made["model"][0]["outputs"] == ["p", "q"]
+
+
 def test_a_known_servo_is_taken_out_ahead_of_the_model(tmp_path: Path) -> None:
     """SciPy's servo of 12 rad/s before a vehicle of 4 rad/s: it takes the model's place."""
     n, rate_hz = 3000, 50.0

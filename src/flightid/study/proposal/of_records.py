@@ -33,7 +33,7 @@ from flightid.study.proposal.stretches import (
     too_short,
 )
 from flightid.study.proposal.structures_of import GroupScans, structures_of
-from flightid.study.proposal.swept import swept_band, unswept
+from flightid.study.proposal.swept import all_fitted, swept_band, unswept
 from flightid.study.proposal.unit_steps import unit_steps
 from flightid.study.stage_runner import StageRunner
 from flightid.surface import as_key, speaking
@@ -133,7 +133,7 @@ def study_of_records(
         asked = GroupScans(group, segments, scans)
         if model is not None:
             names.append(Path(model).stem)
-            missed += unswept(columns.inputs, asked)
+            missed += [*unswept(columns.inputs, asked), *all_fitted(asked)]
             body += _equations(model, asked, renamed)
             continue
         found, without = structures_of(asked)
@@ -263,7 +263,7 @@ def _equations(model: str, asked: GroupScans, renamed: Mapping[str, str]) -> lis
         names = toml_value(list(scans.injected))
         template += [f"band_rad_s = {toml_value(list(band))}", said]
         template += [f'response = {{ estimator = "instrument", excitations = {names} }}']
-    if segments.together:
+    if segments.together or len(scans.injected) > 1:
         # Of inputs times outputs some say nothing: coherence tells which are fitted.
         channels = {column: channel for channel, column in renamed.items()}
         told_outputs = [channels.get(output, output) for output in scans.outputs]

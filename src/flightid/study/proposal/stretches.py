@@ -16,6 +16,7 @@ from flightid.frozen import dataclass
 from flightid.models.save import toml_value
 from flightid.record import Record
 from flightid.record.time_question import time_column
+from flightid.study.proposal.cut import cut_that_keeps
 
 FITTED, CHOSEN, ALONE = 0.6, 1.0, (0.5, 0.75)
 """Part of a record that is fitted, the rest ranks structures; and where it also has to verify."""
@@ -105,7 +106,9 @@ def segments_of_equations(group: Group, injected: tuple[str, ...]) -> Segments:
     """The longest record and what verifies: equations are given, so no part chooses between them.
 
     A record that is alone is fitted but for a quarter: the first of a rising sweep, whose band then
-    lies in what is fitted, else the last. `injected` are channels that tell, else the inputs.
+    lies in what is fitted, else the last. Where that would leave an input without its sweep, the
+    cut lies where it does not; where there is none, all is fitted and nothing is left to verify.
+    `injected` are channels that tell, else the inputs.
     """
     first, record = group.parts[0], group.parts[0].record
     start, stop = float(record.time_s[0]), float(record.time_s[-1])
@@ -115,9 +118,10 @@ def segments_of_equations(group: Group, injected: tuple[str, ...]) -> Segments:
     if not rest:
         moved = tuple(each for each in injected or group.inputs if np.ptp(record[each]) > 0.0)
         rises = bool(moved) and _ends_richer(record, moved)
-        cut = rounded(start + ((1.0 - ALONE[1]) if rises else ALONE[1]) * (stop - start))
-        fitted, left = ((cut, stop), (start, cut)) if rises else ((start, cut), (cut, stop))
-        unseen = [(f"{name}, unseen", first, left)]
+        spans = cut_that_keeps(record, moved, rises=rises)
+        if spans is not None:
+            fitted = spans[0]
+            unseen = [(f"{name}, unseen", first, spans[1])]
     part = (f"{name}, fitted", first, fitted)
     names = tuple(each[0] for each in unseen)
     return Segments((part, *unseen), part[0], part[0], names, (fitted, fitted))

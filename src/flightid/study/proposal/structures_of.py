@@ -53,10 +53,12 @@ class GroupScans:
     def records(self) -> list[str]:
         """Lines of a model that name what is fitted and what verifies."""
         names = list(self.segments.together) or self.segments.fitted
-        return [
-            f"identify = {toml_value(names)}",
-            f"verify = {toml_value(list(self.segments.unseen))}",
-        ]
+        verify = f"verify = {toml_value(list(self.segments.unseen))}"
+        if not self.segments.unseen:
+            verify = (
+                "# Nothing stays unseen: fly sweeps or doublets again, name that record for verify."
+            )
+        return [f"identify = {toml_value(names)}", verify]
 
     @property
     def band(self) -> Band | None:

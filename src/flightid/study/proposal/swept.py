@@ -35,7 +35,9 @@ def swept_band(asked: GroupScans) -> tuple[float, float] | None:
 
 
 def unswept(inputs: tuple[str, ...], asked: GroupScans) -> list[Finding]:
-    """That fewer sweeps move in what is fitted than the equations have inputs: no fit takes that.
+    """That fewer sweeps move in what was flown than the equations have inputs: no fit takes that.
+
+    Records are judged whole: what is fitted of one keeps every sweep.
 
     Parameters
     ----------
@@ -43,8 +45,8 @@ def unswept(inputs: tuple[str, ...], asked: GroupScans) -> list[Finding]:
         Of the equations, those that stand still among them.
     asked : GroupScans
     """
-    injected, parts = asked.scans.injected, _fitted(asked)
-    moved = [name for name in injected if any(_moves(r, at, name) for r, at in parts)]
+    injected, flown = asked.scans.injected, [record for record, _ in _fitted(asked)]
+    moved = [n for n in injected if any(n in r and np.ptp(r[n]) > 0.0 for r in flown)]
     missing = len(inputs) - len(moved)
     if not injected or missing <= 0:
         return []
@@ -56,6 +58,23 @@ def unswept(inputs: tuple[str, ...], asked: GroupScans) -> list[Finding]:
     )
     action = "fly a sweep of each, or of the others beside this flight, and write the study anew"
     return [Finding("inputs-unswept", Light.RED, said, action)]
+
+
+def all_fitted(asked: GroupScans) -> list[Finding]:
+    """That nothing stays unseen, where a record has one sweep of each input and no other is there.
+
+    Parameters
+    ----------
+    asked : GroupScans
+    """
+    if asked.segments.unseen:
+        return []
+    said = (
+        f"a stretch to verify on: every cut of {asked.group.parts[0].name} leaves an input without "
+        "its only sweep, or nothing that moves, so all of it is fitted"
+    )
+    action = "fly a second flight, sweeps or doublets, and write the study of both files"
+    return [Finding("nothing-unseen", Light.AMBER, said, action)]
 
 
 def _fitted(asked: GroupScans) -> list[tuple[Record, Inside]]:
