@@ -84,7 +84,7 @@ class PartComparison:
         parts = np.array(shares)
         compared = partial(
             compare_parts,
-            by_halves=_fair(parts) and not self._rings_across,
+            by_halves=self._each_input_fair(parts) and not self._rings_across,
             by_records=_fair(parts[0::2] + parts[1::2]),
         )
         total = np.sum(information, axis=0)
@@ -101,6 +101,20 @@ class PartComparison:
             part = np.array(information[both]) @ np.linalg.inv(total)
             flights.append(RecordParts(np.array(scores[both]), part, noise))
         return compared(flights, np.eye(n), known[0, :, 0], np.full(n, np.inf))
+
+    def _each_input_fair(self, shares: Array) -> bool:
+        """Whether every part makes a fair share of most points of each input.
+
+        Over the points of all inputs, those swept in the other half stand in for each other.
+        """
+        inputs = [
+            each.measured.input
+            for run in self.errors.runs
+            for _ in ("real", "imaginary")
+            for each in self.selected[run.first : run.first + run.count]
+            for _ in each.places
+        ]
+        return all(_fair(shares[:, np.array(inputs) == name]) for name in dict.fromkeys(inputs))
 
     @property
     def _rings_across(self) -> bool:
