@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from flightid.conventions import Light
+from flightid.fleet.normality import _is_moved
 from flightid.fleet.statistics.answers import TypeAnswers
 from flightid.fleet.statistics.drift import FleetDrift, find_drift
 from flightid.fleet.statistics.events import FleetEvent
 from flightid.fleet.statistics.flight_estimates import FlightEstimates
 from flightid.fleet.statistics.shared_level import shared_level
+from flightid.fleet.statistics.shared_trend import SharedTrend
 from flightid.fleet.vehicle_lights import vehicle_light
 
 VEHICLES, FLIGHTS = [*"abcdef"], 12
@@ -86,6 +89,11 @@ def test_a_step_of_all_is_amber_on_each_until_an_event_of_all_says_why() -> None
         assert "at the event “firmware”" in found.message
         assert "went with all vehicles" not in found.message
         assert found.light is not Light.AMBER
+    # Where days do not tell a step from wear, the event still says why.
+    (shared,), (history,) = drift.shared, [e for e in drift.histories if e.vehicle == "a"]
+    wear = SharedTrend(shared.change, 0.0, 2.0 * 86400.0 * FLIGHTS)
+    assert not _is_moved(history, replace(shared, is_step=True, trend=wear))
+    assert _is_moved(history, replace(shared, is_step=False, trend=wear))
     # Of one vehicle alone it explains nothing of what all did.
     data, drift = _fleet(1, stepped, [FleetEvent("motor", firmware.time_s, ("a",))])
     answered = [TypeAnswers("quad", "roll", data, None, None, drift)]
@@ -104,8 +112,34 @@ def test_what_days_do_not_tell_from_a_step_is_not_called_one() -> None:
         assert "or fell by " in said
         assert "their days do not tell at once from by and by" in said
     wave = np.tile(0.06 * np.sin(2.0 * np.pi * np.arange(FLIGHTS) / FLIGHTS), (len(VEHICLES), 1))
-    steps = sum(_fleet(seed, wave)[1].shared[0].is_step for seed in range(4))
-    assert steps == 0
+    waves = [_fleet(seed, wave) for seed in range(4)]
+    assert not any(drift.shared[0].is_step for _, drift in waves)
+    # Whatever shape it has, it is no "no change".
+    for data, drift in waves:
+        (shared,) = drift.shared
+        assert shared.trend is not None or "moved together by date" in shared.words({})
+        answered = [TypeAnswers("quad", "roll", data, None, None, drift)]
+        assert vehicle_light("a", answered).light is Light.AMBER
+
+
+def test_a_vehicle_that_does_not_tell_the_step_is_not_said_to_have_gone_along() -> None:
+    """Of eight of which one stayed, it "went with all vehicles" in 14 of 48 fleets."""
+    behind = np.arange(FLIGHTS) >= FLIGHTS // 2
+    data, drift = _fleet(1, np.tile(-0.1 * behind, (len(VEHICLES), 1)))
+    (shared,) = drift.shared
+    assert set(shared.telling) <= set(VEHICLES)
+    assert len(shared.telling) == shared.agreeing
+    told = replace(drift, shared=(replace(shared, telling=tuple("abcde")),))
+    answered = [TypeAnswers("quad", "roll", data, None, None, told)]
+    assert "went with all" in vehicle_light("a", answered).message
+    stayed = vehicle_light("f", answered)
+    assert stayed.light is Light.AMBER
+    assert "went with all" not in stayed.message
+    assert "its own flights do not tell that it went along" in stayed.message
+
+
+def test_a_step_of_all_is_called_one() -> None:
+    course = np.arange(FLIGHTS) / (FLIGHTS - 1)
     for seed in (2, 17):
         _, drift = _fleet(seed, np.tile(-0.1 * (course > 0.5), (len(VEHICLES), 1)))
         assert drift.shared[0].is_step

@@ -11,7 +11,7 @@ import pytest
 
 from flightid.conventions import Light
 from flightid.fleet.drift_lights import shared_lights
-from flightid.fleet.normality import quiet_light
+from flightid.fleet.normality import normal_light, quiet_light
 from flightid.fleet.page import fleet_vehicles
 from flightid.fleet.statistics.answers import TypeAnswers, answer_questions
 from flightid.fleet.statistics.drift import find_drift
@@ -66,6 +66,18 @@ def test_one_that_did_not_change_beside_all_others_is_said_to_be_that() -> None:
     assert found.light is Light.AMBER
     assert "beside what the others did: it may be one that did not change" in found.message
     assert "a: no change beside what the others did (80 %" in vehicle_light("a", answered).message
+
+
+def test_many_green_vehicles_say_which_steps_would_be_found() -> None:
+    """It was "93 vehicles neither changed nor are unlike", with three that had fallen by 10 %."""
+    rng, ids = np.random.default_rng(4), np.repeat([*"abcdef"], 12).tolist()
+    values = 140.0 * (1.0 + 0.02 * rng.normal(size=72))
+    time_s, errors = 2.0 * 86400.0 * np.tile(np.arange(12.0), 6), np.full((72, 1, 1), 2.8**2)
+    data = FlightEstimates.of(["k"], ids, values[:, None], errors, time_s=time_s)
+    answered = TypeAnswers("quad", "roll", data, None, None, find_drift(data))
+    said = normal_light({*"abcde"}, [answered]).message
+    assert re.match(r"5 vehicles: no change of any was found \(80 % of such steps", said)
+    assert re.search(r"from k [\d.]+ % to k [\d.]+ %", said)
 
 
 def test_like_its_type_says_which_difference_would_be_found() -> None:

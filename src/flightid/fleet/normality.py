@@ -7,7 +7,7 @@ change" says which one would have been found.
 from __future__ import annotations
 
 import math
-from collections.abc import Container, Iterable, Iterator, Sequence
+from collections.abc import Collection, Container, Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -50,7 +50,7 @@ def quiet_light(vehicle: str, types: Iterable[TypeAnswers]) -> Finding:
     -------
     Finding
         Green where every parameter of it was held beside its history and its type, amber where one
-        rose, fell or stepped with all vehicles and no event of all says why; unknown, with the
+        moved with all vehicles and no event of all says why they stepped; unknown, with the
         reason, where a question that was asked has no answer.
     """
     every = list(types)
@@ -80,6 +80,21 @@ def quiet_light(vehicle: str, types: Iterable[TypeAnswers]) -> Finding:
     return Finding("vehicle", Light.GREEN, f"{vehicle}: {', '.join(known)}")
 
 
+def normal_light(vehicles: Collection[str], types: Iterable[TypeAnswers]) -> Finding:
+    """Light of the vehicles of a large fleet that are green, all together.
+
+    As of one alone it says of which steps most would have been found: smaller ones may hide.
+    """
+    seen = [
+        (history, each)
+        for each in types
+        for history in (() if each.drift is None else each.drift.histories)
+        if history.vehicle in vehicles and history.false_share is not None and _is_seen(history)
+    ]
+    words = f"{counted(len(vehicles), 'vehicle')}: no change of any was found{_seen_words(seen)}"
+    return Finding("vehicles-normal", Light.GREEN, f"{words}, and none unlike its type")
+
+
 def _judged(vehicle: str, each: TypeAnswers) -> list[ParameterHistory]:
     """Histories of a vehicle that were asked whether it changed."""
     histories = () if each.drift is None else each.drift.histories
@@ -95,18 +110,25 @@ def _is_shared(history: ParameterHistory, each: TypeAnswers) -> bool:
 def _together_words(history: ParameterHistory, each: TypeAnswers) -> Iterator[str]:
     """Where a parameter went with all vehicles to another level: beside them it did not change."""
     for one in each.drift.shared if each.drift is not None else ():
-        if one.name == history.name and _is_moved(history, one):
-            name = each.labels.get(one.name, one.name)
+        if one.name != history.name or not _is_moved(history, one):
+            continue
+        name = each.labels.get(one.name, one.name)
+        if one.is_step and history.vehicle not in one.telling:
+            yield (
+                f"{name} was held beside all vehicles, which {one.course}; its own flights do not "
+                "tell that it went along"
+            )
+        else:
             yield f"{name} went with all vehicles, which {one.course}"
 
 
 def _is_moved(history: ParameterHistory, shared: SharedLevel) -> bool:
     """Whether a vehicle went along to another level that no event of all explains."""
     time_s, since = history.time_s, shared.since_s
-    if shared.trend is not None:
+    if not shared.is_step:
         return True
-    if not shared.is_step or not time_s[0] < since <= time_s[-1]:
-        return False
+    if not time_s[0] < since <= time_s[-1]:
+        return shared.trend is not None
     ends = [sorted((each.time_s, since)) for each in history.happened if not each.vehicles]
     return all(np.count_nonzero((time_s >= a) & (time_s < b)) > NEAR for a, b in ends)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from flightid.conventions import Light
 from flightid.findings import Finding, counted
@@ -13,7 +13,7 @@ from flightid.fleet.drift_lights import (
     estimate_lights,
     shared_lights,
 )
-from flightid.fleet.normality import INSIDE, MORE
+from flightid.fleet.normality import INSIDE, MORE, normal_light
 from flightid.fleet.pictures import history_picture, type_picture
 from flightid.fleet.reasons import grouped_reasons, reasons_table
 from flightid.fleet.statistics.answers import RED, FleetAnswers, Row, TypeAnswers, fitted_share
@@ -155,7 +155,7 @@ def _vehicles(answers: FleetAnswers) -> Iterator[Block]:
         shown_lights = tuple(found.values())
     else:
         worrying = [e for e in found.values() if e.light in (Light.RED, Light.AMBER)]
-        shown_lights = (*worrying, *_counts(list(found.values())))
+        shown_lights = (*worrying, *_counts(found, answers.types))
     yield Lights(shown_lights, "The worst first")
     if answers.undated:
         yield Paragraph(
@@ -164,13 +164,12 @@ def _vehicles(answers: FleetAnswers) -> Iterator[Block]:
         )
 
 
-def _counts(found: Sequence[Finding]) -> Iterator[Finding]:
+def _counts(found: Mapping[str, Finding], types: Iterable[TypeAnswers]) -> Iterator[Finding]:
     """How many of a large fleet are normal, and of how many that cannot be told."""
-    green = sum(each.light is Light.GREEN for each in found)
-    unjudged = sum(each.light is Light.UNKNOWN for each in found)
+    green = {name for name, each in found.items() if each.light is Light.GREEN}
+    unjudged = sum(each.light is Light.UNKNOWN for each in found.values())
     if green:
-        words = f"{green} vehicles neither changed nor are unlike"
-        yield Finding("vehicles-normal", Light.GREEN, words)
+        yield normal_light(green, types)
     if unjudged:
         words = f"{counted(unjudged, 'vehicle')} not judged: too few flights or vehicles to tell"
         yield Finding("vehicles-unknown", Light.UNKNOWN, words, MORE)

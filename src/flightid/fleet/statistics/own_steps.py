@@ -26,12 +26,14 @@ class OwnSteps:
 
     Attributes
     ----------
+    members : ndarray of int, shape (k,)
+        Vehicles with flights on both sides of the date.
     sizes, variances : ndarray, shape (k,)
-        Of vehicles with flights on both sides of the date.
     shared : Estimate
         The step that all are said to share, in the same shares.
     """
 
+    members: Places
     sizes: Array
     variances: Array
     shared: Estimate
@@ -63,15 +65,16 @@ class OwnSteps:
         return one - two > APART * max(1.0, two / max(k - 2, 1))
 
     @property
-    def told(self) -> int:
+    def telling(self) -> Places:
         """Vehicles whose step is told apart from none, and not apart from the shared one."""
         if not len(self.sizes):
-            return 0
+            return self.members
         own = np.sqrt(self.variances)
         low = (1.0 - LEVEL) / 2.0 / len(self.sizes)
         near = -float(normal_quantiles(low)) * np.hypot(own, self.shared.stderr or 0.0)
         moved = self.sizes * np.sign(self.shared.value) > half_width(LEVEL) * own
-        return int(np.count_nonzero(moved & (np.abs(self.sizes - self.shared.value) <= near)))
+        like_all = np.abs(self.sizes - self.shared.value) <= near
+        return np.asarray(self.members[moved & like_all])
 
 
 def own_steps(
@@ -99,11 +102,12 @@ def own_steps(
     freedom = len(means) - len(side)
     both = np.flatnonzero((side[:-1] % 2 == 0) & (side[1:] == side[:-1] + 1))
     if freedom < 1 or not len(both):
-        return OwnSteps(np.empty(0), np.empty(0), shared)
+        return OwnSteps(np.empty(0, dtype=np.intp), np.empty(0), np.empty(0), shared)
     of_day = float(np.sum((means - level[inverse]) ** 2)) / freedom
     of_day = max(of_day, float(np.finfo(np.float64).tiny))
     sizes = shared.value + level[both + 1] - level[both]
-    return OwnSteps(sizes, of_day * (1.0 / counts[both] + 1.0 / counts[both + 1]), shared)
+    variances = of_day * (1.0 / counts[both] + 1.0 / counts[both + 1])
+    return OwnSteps(side[both] // 2, sizes, variances, shared)
 
 
 def _squares(values: Array, weight: Array) -> float:

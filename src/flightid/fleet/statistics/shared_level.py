@@ -65,6 +65,8 @@ class SharedLevel:
         own is told apart from none, and not apart from it.
     trend : SharedTrend or None
         Where all may rise or fall by and by; beside a step where days do not tell which it is.
+    telling : tuple of str
+        Of a step: vehicles whose own is told apart from none, and not apart from it.
     """
 
     name: str
@@ -78,6 +80,7 @@ class SharedLevel:
     vehicles: int
     agreeing: int
     trend: SharedTrend | None = None
+    telling: tuple[str, ...] = ()
 
     def words(self, labels: Mapping[str, str], apart: Collection[str] = ()) -> str:
         """What all did together, or most beside those that are apart; dates on the clock of Unix.
@@ -179,8 +182,9 @@ def shared_level(data: FlightEstimates, i: int) -> SharedLevel | None:
         data.names[i],
         *(moved, variances, shape.may_step, since, change),
         *(size * float(level[there].min()), size * float(level[there].max())),
-        *(vehicles, steps.told if shape.may_step else agreeing),
+        *(vehicles, len(steps.telling) if shape.may_step else agreeing),
         trend,
+        tuple(data.members[place] for place in steps.telling),
     )
 
 
