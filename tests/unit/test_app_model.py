@@ -151,7 +151,7 @@ def test_a_prediction_is_that_of_the_run(study: Path, monkeypatch: pytest.Monkey
     told = predict_model(path, text, [], "Roll rate", values)["prediction"]
     assert told["curves"][0]["theil"] == found.on_unseen["yaw sweep"].theil["p"]
     # While the slider moves, other holds are not run again: three quarters of the time it took.
-    monkeypatch.delattr(held_otherwise, "judge")
+    monkeypatch.delattr(held_otherwise, "numbers_of")
     assert predict_model(path, text, [], "Roll rate", values)["prediction"] == told
     shown = np.array(told["responses"][0]["gain"])
     fitted = fit.responses[0]

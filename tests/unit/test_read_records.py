@@ -222,10 +222,13 @@ def test_csv_refusals(
 
 
 def test_files_of_no_known_format_are_refused(tmp_path: Path) -> None:
-    for content in (b"", b"\x00\x01\x02", b"\xa3\x95\x80\x80"):
+    for content in (b"\x00\x01\x02", b"\xa3\x95\x80\x80"):
         (tmp_path / "a.bin").write_bytes(content)
         with pytest.raises(FileFormatError, match="of no format that holds records"):
             read_records(tmp_path / "a.bin")
+    (tmp_path / "a.bin").write_bytes(b"")
+    with pytest.raises(FileFormatError, match=r"a\.bin is an empty file"):
+        read_records(tmp_path / "a.bin")
     # A byte that neither UTF-8 nor Windows-1252 knows.
     (tmp_path / "a.csv").write_bytes(b"time,p\x81\n0,1\n")
     with pytest.raises(FileFormatError, match=r"a\.csv is not text"):

@@ -9,7 +9,7 @@ disturbance beside noise of known colour, with products of one output left out.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +38,8 @@ REACH = 25
 """Samples of the past of inputs whose answer is taken out of residuals."""
 SAMPLES_A_NUMBER = 5
 """Of all records, for each number of that answer."""
+AT_ONCE = 2048
+"""Samples or frequencies that are worked on at a time: long records need no more memory."""
 ROUNDING = 1e-6
 """Of the largest direction of inputs, below which one tells nothing."""
 
@@ -159,21 +161,26 @@ def moved_together(
         for each in rows
     ]
     apart = _apart(white)
-    forms = [
-        _forms(each, filters, apart, systems[k], steps_s[k])
+    looked = [
+        _LookedAt.of(each, filters, apart, systems[k], steps_s[k])
         for each, k in zip(white, kept, strict=True)
     ]
-    weights, told = (np.concatenate(parts, axis=-1) for parts in zip(*forms, strict=True))
-    size = np.abs(weights) ** 2
-    score = np.abs(np.sum(np.conj(weights) * told, axis=1)) ** 2
-    score = np.sum(score - np.sum(size * np.abs(told) ** 2, axis=1), axis=-1)
-    spread = np.sqrt(np.sum(np.sum(size, axis=1) ** 2 - np.sum(size**2, axis=1), axis=-1))
+    n_ways = systems[0].pushes.shape[1]
+    every = np.arange(n_ways * (1 + len(MEMORIES_S)))
+    score, spread = np.zeros(len(every)), np.zeros(len(every))
+    for weights, told in (piece for each in looked for piece in each.pieces(every)):
+        size = np.abs(weights) ** 2
+        together = np.abs(np.sum(np.conj(weights) * told, axis=1)) ** 2
+        score += np.sum(together - np.sum(size * np.abs(told) ** 2, axis=1), axis=-1)
+        spread += np.sum(np.sum(size, axis=1) ** 2 - np.sum(size**2, axis=1), axis=-1)
+    spread = np.sqrt(spread)
     shown = score / np.where(spread > 0.0, spread, np.inf)
     best = np.argsort(-shown)[:TRIED]
-    chances = [_chance(score[way], size[way]) for way in best]
+    parts = [np.abs(weights) ** 2 for each in looked for weights, _ in each.pieces(best)]
+    sizes = np.concatenate(parts, axis=-1)
+    chances = [_chance(score[way], size) for way, size in zip(best, sizes, strict=True)]
     place = int(np.argmin(chances))
-    way = int(best[place]) % systems[0].pushes.shape[1]
-    return ShownDisturbance(way, min(len(shown) * chances[place], 1.0))
+    return ShownDisturbance(int(best[place]) % n_ways, min(len(shown) * chances[place], 1.0))
 
 
 def _unforetold(rows: Sequence[Array], inputs: Sequence[Array]) -> list[Array]:
@@ -183,35 +190,58 @@ def _unforetold(rows: Sequence[Array], inputs: Sequence[Array]) -> list[Array]:
     reach = min(REACH, samples // (SAMPLES_A_NUMBER * max(len(moved), 1)))
     if not moved or reach < 2:
         return list(rows)
-    lagged = [_lagged(u[moved], reach) for u in inputs]
-    basis, size, _ = np.linalg.svd(np.concatenate(lagged, axis=1).T, full_matrices=False)
-    basis = basis[:, size > ROUNDING * size[0]]
-    whole = np.concatenate(rows, axis=1)
-    whole = whole - (whole @ basis) @ basis.T
-    return np.split(whole, np.cumsum([each.shape[1] for each in rows])[:-1], axis=1)
+    about = [u[moved] - u[moved].mean(axis=1, keepdims=True) for u in inputs]
+    padded = [np.pad(u, ((0, 0), (reach, 1)), mode="edge") for u in about]
+
+    def pieces() -> Iterator[tuple[int, slice, Array]]:
+        for k, each in enumerate(rows):
+            for part in _parts(each.shape[1]):
+                yield k, part, _lagged(padded[k], part, reach + 2)
+
+    weights, _ = _regressed(((lags, rows[k][:, part]) for k, part, lags in pieces()), ROUNDING)
+    left = [each.copy() for each in rows]
+    for k, part, lags in pieces():
+        left[k][:, part] -= weights @ lags
+    return left
 
 
-def _lagged(inputs: Array, reach: int) -> Array:
-    """Inputs from a sample ahead to `reach` behind, about their means: (n_inputs · …, n)."""
-    n = inputs.shape[1]
-    middle = inputs - inputs.mean(axis=1, keepdims=True)
-    padded = np.pad(middle, ((0, 0), (reach, 1)), mode="edge")
-    return np.concatenate([padded[:, k : k + n] for k in range(reach + 2)])
+def _parts(count: int) -> Iterator[slice]:
+    """Of so many samples or frequencies, what is held in memory at a time."""
+    for start in range(0, count, AT_ONCE):
+        yield slice(start, min(start + AT_ONCE, count))
+
+
+def _lagged(rows: Array, part: slice, count: int) -> Array:
+    """So many neighbouring samples of each row, the oldest first: (count · rows, samples)."""
+    return np.concatenate([rows[:, part.start + k : part.stop + k] for k in range(count)])
+
+
+def _regressed(
+    pieces: Iterable[tuple[Array, Array]], rounding: float | None
+) -> tuple[Array, Array]:
+    """Weights of rows in others, (n_targets, n_rows), and squares they leave, by pieces of samples.
+
+    A QR factor of what was seen is all that is kept (Golub & Van Loan, Matrix Computations, 5.2).
+    """
+    count, root = 0, np.empty((0, 0))
+    for past, now in pieces:
+        count, beside = len(past), np.concatenate([past, now]).T
+        stacked = np.vstack([root, beside]) if root.size else beside
+        root = np.asarray(np.linalg.qr(stacked, mode="r"))
+    weights = np.linalg.lstsq(root[:count, :count], root[:count, count:], rcond=rounding)[0]
+    return np.asarray(weights.T), np.asarray(np.sum(root[count:, count:] ** 2, axis=0))
 
 
 def _filters(rows: Sequence[Array]) -> list[Array] | None:
     """Of each output, the filter that takes its colour off; None where there is rounding alone."""
     found = []
     for output in range(rows[0].shape[0]):
-        own = [each[output] for each in rows]
-        now = np.concatenate([each[LAGS:] for each in own])
-        past = np.concatenate(
-            [[each[LAGS - k : each.size - k] for k in range(1, LAGS + 1)] for each in own], axis=1
-        )
-        weights = np.linalg.lstsq(past.T, now, rcond=None)[0]
-        if not np.all(np.isfinite(weights)) or np.mean((now - weights @ past) ** 2) <= 0.0:
+        own = [each[output : output + 1] for each in rows]
+        pieces = (_lagged(e, part, LAGS + 1) for e in own for part in _parts(e.shape[1] - LAGS))
+        weights, left = _regressed(((lags[:LAGS], lags[LAGS:]) for lags in pieces), None)
+        if not np.all(np.isfinite(weights)) or left[0] <= 0.0:
             return None
-        found.append(np.concatenate([[1.0], -weights]))
+        found.append(np.concatenate([[1.0], -weights[0, ::-1]]))
     return found
 
 
@@ -225,24 +255,50 @@ def _apart(white: Sequence[Array]) -> Array:
     return np.asarray(root @ vectors.T / size)
 
 
-def _forms(
-    white: Array, filters: Sequence[Array], apart: Array, system: DisturbedSystem, step_s: float
-) -> tuple[Complex, Complex]:
-    """Weights (n_ways, n_outputs, n_omega) and whitened residuals (n_outputs, n_omega)."""
-    spectra = apart @ np.fft.rfft(white, axis=1)[:, 1:]
-    n = white.shape[1]
-    omega = 2.0 * np.pi * np.arange(1, spectra.shape[1] + 1) / (n * step_s)
-    power = _smoothed(np.abs(spectra) ** 2)
-    lags = np.exp(-1j * np.outer(np.arange(LAGS + 1), omega * step_s))
-    through = np.array(filters) @ lags
-    states = np.linalg.solve(
-        1j * omega[:, None, None] * np.eye(len(system.a)) - system.a, system.pushes[None]
-    )
-    moved = (system.c @ states + system.seen).transpose(2, 1, 0) * through
-    moved = (apart @ moved) / np.sqrt(power)
-    memories = [np.ones_like(omega), *(1.0 / np.abs(1j * omega * t + 1.0) for t in MEMORIES_S)]
-    weights = np.concatenate([moved * each for each in memories])
-    return weights, spectra / np.sqrt(power)
+@dataclass(frozen=True, eq=False)
+class _LookedAt:
+    """A record's whitened residuals by frequency, `told` (n_outputs, n_omega), and their powers."""
+
+    told: Complex
+    power: Array
+    omega: Array
+    filters: Array
+    apart: Array
+    system: DisturbedSystem
+    step_s: float
+
+    @classmethod
+    def of(
+        cls,
+        white: Array,
+        filters: Sequence[Array],
+        apart: Array,
+        system: DisturbedSystem,
+        step_s: float,
+    ) -> _LookedAt:
+        spectra = apart @ np.fft.rfft(white, axis=1)[:, 1:]
+        omega = 2.0 * np.pi * np.arange(1, spectra.shape[1] + 1) / (white.shape[1] * step_s)
+        power = _smoothed(np.abs(spectra) ** 2)
+        told = spectra / np.sqrt(power)
+        return cls(told, power, omega, np.array(filters), apart, system, step_s)
+
+    def pieces(self, ways: NDArray[np.intp]) -> Iterator[tuple[Complex, Complex]]:
+        """Weights (n_ways, n_outputs, some omega) of disturbances and memories, and `told`."""
+        memory, way = np.divmod(ways, self.system.pushes.shape[1])
+        needed, place = np.unique(way, return_inverse=True)
+        pushes, seen = self.system.pushes[:, needed], self.system.seen[:, needed]
+        for part in _parts(len(self.omega)):
+            omega = self.omega[part]
+            through = self.filters @ np.exp(
+                -1j * np.outer(np.arange(LAGS + 1), omega * self.step_s)
+            )
+            grid = 1j * omega[:, None, None] * np.eye(len(self.system.a))
+            states = np.linalg.solve(grid - self.system.a, pushes[None])
+            moved = (self.system.c @ states + seen).transpose(2, 1, 0) * through
+            moved = (self.apart @ moved) / np.sqrt(self.power[:, part])
+            slow = [1.0 / np.abs(1j * omega * t + 1.0) for t in MEMORIES_S]
+            memories = np.array([np.ones_like(omega), *slow])
+            yield moved[place] * memories[memory][:, None, :], self.told[:, part]
 
 
 def _smoothed(power: Array) -> Array:
