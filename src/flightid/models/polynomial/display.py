@@ -30,12 +30,20 @@ def _term(value: float, word: str) -> str:
 
 def _in_polynomials(model: Polynomials) -> str:
     parts = [
-        f"[{_polynomial(row, k)} / {_polynomial(f, 0)}] {name}(t)"
+        f"{_quotient(row, k, f)} {name}(t)"
         for name, row, k, f in zip(model.inputs, model.b, model.nk, model.f, strict=True)
     ]
-    noise = f"[{_polynomial(model.c, 0)} / {_polynomial(model.d, 0)}] e(t)"
+    noise = f"{_quotient(model.c, 0, model.d)} e(t)"
     left = "" if np.size(model.a) == 1 else f"[{_polynomial(model.a, 0)}] "
     return f"{left}{model.output}(t) = " + " + ".join([*parts, noise])
+
+
+def _quotient(above: object, delay: int, below: object) -> str:
+    """A polynomial over one that begins with 1, each in brackets where it has several terms."""
+    upper, lower = _polynomial(above, delay), _polynomial(below, 0)
+    upper, lower = (f"({each})" if np.asarray(row).size > 1 else each
+                    for each, row in ((upper, above), (lower, below)))  # fmt: skip
+    return f"[{upper} / {lower}]"
 
 
 def _polynomial(row: object, delay: int) -> str:
@@ -52,7 +60,7 @@ def factored(model: Polynomials, input: str) -> str:
     -------
     >>> from flightid.models import PolynomialModel
     >>> factored(PolynomialModel(("u",), "y", 0.1, a=[1, -0.5], b=[[2.0, 1.0]], nk=(1,)), "u")
-    'y/u = 2 (z + 0.5) / z (z - 0.5)'
+    'y/u = 2 (z + 0.5) / (z (z - 0.5))'
     """
     above, below = model.transfer(input)
     first = int(np.argmax(above != 0.0))
@@ -61,7 +69,8 @@ def factored(model: Polynomials, input: str) -> str:
     power = poles.size - zeros.size - first
     upper = f"{above[first]:.5g} {_powers(power)}{_factors(zeros)}".strip()
     lower = f"{_powers(-power)}{_factors(poles)}".strip()
-    return f"{model.output}/{input} = {upper} / {lower or 1}"
+    several = len(poles) - np.count_nonzero(poles.imag > 0.0) + (power < 0) > 1
+    return f"{model.output}/{input} = {upper} / {f'({lower})' if several else lower or 1}"
 
 
 def _powers(power: int) -> str:
