@@ -48,6 +48,10 @@ def test_a_slider_shows_the_numbers_of_the_tuning(fit: fid.Fit, found: fid.PidDe
         each.to_dict() for each in held.worst_cases
     ]
     assert held.gains == dict(moved.values) == as_flown | GENTLE
+    # Far from every requirement none binds: the nearest one is called that.
+    assert held.exists
+    assert held.binding == ()
+    assert "binding: nothing; nearest: angle loop: phase margin" in moved.finding.message
     assert bool(moved.met.all()) == held.exists == (not moved.short)
     for mine, theirs in zip(moved.responses, held.responses, strict=True):
         np.testing.assert_allclose(mine.estimate, theirs.estimate, rtol=0.0, atol=1e-12)

@@ -13,7 +13,7 @@ from flightid.control.gyro import Gyro
 from flightid.control.margins.outside_band import MarginBeyond
 from flightid.control.tuning.controller_paths import ControllerPaths, loop_responses, standing
 from flightid.control.tuning.evidence import TuningEvidence
-from flightid.control.tuning.gain_search import search
+from flightid.control.tuning.gain_search import EDGE, search
 from flightid.control.tuning.gain_search import steps as search_steps
 from flightid.control.tuning.gain_search_result import GainSearchResult
 from flightid.control.tuning.gain_steps import Stage, TunedGain
@@ -248,11 +248,12 @@ def held_by_hand(
     judged = problem.judge(gains[None]) if judged is None else judged
     least = dict(zip(judged.names, judged.slack[:, 0].min(axis=-1).tolist(), strict=True))
     short = tuple(name for name, slack in least.items() if slack < 0.0)
-    nearest = () if short else (min(least, key=lambda name: least[name]),)
+    # Nothing moved these gains up to a requirement: one binds where they stand at it.
+    tight = tuple(name for name, slack in least.items() if slack < EDGE)
     met = judged.slack[:, 0].min(axis=0) >= 0.0
     exists = bool(met[0]) and float(met.mean()) >= MOST
     missed = () if exists else shortfalls(problem, judged)
-    return GainSearchResult(gains, exists, short or nearest, least, by_hand=True, missed=missed)
+    return GainSearchResult(gains, exists, short or tight, least, by_hand=True, missed=missed)
 
 
 def _result(

@@ -45,23 +45,30 @@ def verdict(found: GainSearchResult, met: NDArray[np.bool_], drawn: int) -> Find
     drawn : int
         How many were drawn, those that were left out among them; 0: none.
     """
-    names = ", ".join(found.binding)
     if not found.exists:
         return _no_gains(found)
     if not drawn and found.by_hand:
-        return Finding(
-            "gains", Light.AMBER, f"gains set by hand, for the model alone; nearest: {names}"
-        )
+        said = f"gains set by hand, for the model alone; {_bound(found)}"
+        return Finding("gains", Light.AMBER, said)
     if not drawn:
-        return Finding("gains", Light.AMBER, f"gains found for the model alone; binding: {names}")
+        said = f"gains found for the model alone; {_bound(found)}"
+        return Finding("gains", Light.AMBER, said)
     good, share = int(met.sum()), least_share(int(met.sum()), drawn)
     return Finding(
         "gains",
         Light.GREEN if share >= ENOUGH else Light.AMBER,
         f"{good} of {drawn} fresh plants meet every requirement: at least {share:.1%} of those "
-        f"that the data allow (95 % confidence); binding: {names or 'nothing'}",
+        f"that the data allow (95 % confidence); {_bound(found)}",
         "" if share >= ENOUGH else "draw more plants for the search",
     )
+
+
+def _bound(found: GainSearchResult) -> str:
+    """What binds; where nothing does, the requirement that has the least slack."""
+    if found.binding:
+        return f"binding: {', '.join(found.binding)}"
+    nearest = min(found.slack, key=lambda name: found.slack[name], default="")
+    return f"binding: nothing; nearest: {nearest}" if nearest else "binding: nothing"
 
 
 def _no_gains(found: GainSearchResult) -> Finding:
