@@ -149,7 +149,7 @@ class Comparison(Result, schema="flightid.comparison/1"):
             cells += [result.rms_error[output] for result in each]
             rows.append(tuple(cells))
         notes = [
-            f"{name}: {weighted_error(result.j_rms)}."
+            f"{name}: {weighted_error(result.j_rms, map(result.measured.unit, result.outputs))}."
             for name, result in self.verifications.items()
             if result.j_rms is not None
         ]

@@ -140,7 +140,7 @@ class Verification(Result, schema="flightid.verification/1"):
         ]
         notes = [self.protocol]
         if self.j_rms is not None:
-            notes.append(f"W{weighted_error(self.j_rms)[1:]}.")
+            notes.append(f"W{weighted_error(self.j_rms, map(units.unit, self.outputs))[1:]}.")
         if len(self.outputs) > 1:
             notes.append(f"Theil coefficient of all outputs together {self.overall_theil:.3f}.")
         return Table(repr(self), columns, tuple(rows), (*notes, *map(str, self.findings)))
