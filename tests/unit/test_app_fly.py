@@ -186,6 +186,7 @@ def test_a_flight_is_kept_and_a_killed_one_is_offered(tmp_path: Path) -> None:
     study = flight.folder / "study.toml"
     asked = start_of(study.read_text("utf-8"), flight.folder, VEHICLES)
     assert asked == FlyStart(vehicle="ah64_hover", seed=5)
+    assert "sweeps and switches, as they were flown, are in its record" in study.read_text("utf-8")
     told = pilot_of(study)
     assert told is not None
     assert told.rating is not None

@@ -19,7 +19,10 @@ from flightid.files import write_atomically
 from flightid.reading import DOCUMENT_BYTES
 from flightid.study.pilot_settings import PilotSettings, RatingSettings, pilot_of, pilot_table
 
-HEAD = "# A flight of the local page: `flightid fly` of this file flies it again.\n"
+HEAD = (
+    "# A flight of the local page: `flightid fly` of this file has its vehicle, air and delays in\n"
+    "# hand again. Stick, sweeps and switches, as they were flown, are in its record alone.\n"
+)
 
 
 def write_flight_study(folder: Path, asked: FlyStart, vehicle: FlyVehicle) -> None:
