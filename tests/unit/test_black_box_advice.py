@@ -252,3 +252,4 @@ def test_the_pole_zero_map_has_ellipses():
     edge = [t for t in figure.data if t.xaxis == "x2" and t.name == "poles" and t.mode == "lines"]
     assert near[0] < min(edge[0].x) < max(edge[0].x) < near[1]
     assert np.ptp(edge[0].x) > 0.1 * np.ptp(near)
+    assert [axis.title.text for axis in figure.select_yaxes()] == ["imaginary", "imaginary"]

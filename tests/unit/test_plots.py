@@ -9,10 +9,12 @@ import plotly.graph_objects
 from hypothesis import given
 from hypothesis import strategies as st
 
+import flightid as fid
 from flightid.plot import graph_objects as go
 from flightid.plot import look
 from flightid.plot.fit import EstimateBar, parameter_intervals
 from flightid.plot.frequency_response import Curve, bode, bode_page
+from flightid.plot.pictures import record_history
 from flightid.plot.record import Panel, Trace, thinned, time_histories
 from flightid.responses.response_band import TAKEN_OUT, ResponseIntervals
 from tests.closeness import assert_close
@@ -85,6 +87,13 @@ def test_time_histories_name_each_series_once() -> None:
     made = time_histories(panels)
     assert [trace.name for trace in made.data if trace.showlegend] == ["measured", "model"]
     assert made.layout.xaxis2.title.text == "time [s]"
+
+
+def test_a_record_alone_has_no_legend_of_lines_that_look_alike() -> None:
+    record = fid.Record.from_arrays([0.0, 0.1], inputs={"u": [0, 1]}, outputs={"y": [0, 2]})
+    made = record_history(record)
+    assert made.layout.showlegend is False
+    assert [axis.title.text for axis in made.select_yaxes()] == ["u", "y"]
 
 
 def test_parameter_intervals_are_relative_and_mark_the_truth() -> None:

@@ -97,7 +97,7 @@ def record_history(record: Record) -> go.PlotFigure:
     >>> record_history(made).layout.yaxis.title.text
     'p [rad/s]'
     """
-    return time_histories(
+    made = time_histories(
         [
             Panel(
                 look.axis_title(name, record.unit(name)),
@@ -106,6 +106,9 @@ def record_history(record: Record) -> go.PlotFigure:
             for name in record.channels
         ]
     )
+    # One line a panel, all of one colour: the axes name them, and a legend tells none apart.
+    made.update_layout(showlegend=False)
+    return made
 
 
 def _verification(result: Verification, *, record: int = 0) -> go.PlotFigure:

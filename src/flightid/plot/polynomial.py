@@ -117,7 +117,7 @@ def pole_zero(fit: Fit, response: str | None = None) -> go.PlotFigure:
     for column in (1, 2)[: 1 + zooms]:
         _add_roots(made, within, column)
         made.update_xaxes(title_text="real", col=column)
-    made.update_yaxes(title_text="imaginary", col=1)
+        made.update_yaxes(title_text="imaginary", col=column)
     made.update_xaxes(range=[-reach, reach], col=1)
     made.update_yaxes(range=[-reach, reach], scaleanchor="x", col=1)
     if zooms and box is not None:
