@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import flightid as fid
 from flightid.cli.program import run as command
+from flightid.progress import shown_by
 from flightid.study import document, model_section, uses
 from flightid.study.settings import Settings, read_settings
 from flightid.study.stage_runner import StageRunner
@@ -74,7 +76,16 @@ def folder(tmp_path: Path) -> Path:
 
 
 def test_a_reference_of_zero_ends_no_study(folder: Path) -> None:
-    made = fid.run_study(folder / "study.toml")
+    labels: list[str] = []
+
+    def display(label: str, _: int | None) -> SimpleNamespace:
+        labels.append(label)
+        return SimpleNamespace(advance=lambda *_: None, close=lambda: None)
+
+    with shown_by(display):
+        made = fid.run_study(folder / "study.toml")
+    # A run goes by the title of its study: the page's files are named by numbers.
+    assert labels[0] == made.document.title
     assert not made.faults
     assert "Where that is zero, in percent of the estimate" in str(made.document.sections[0])
     assert (made.output / "report.html").is_file()

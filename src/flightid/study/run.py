@@ -129,7 +129,7 @@ def _run(
         require_pairs(tasks, rated)
     runner = StageRunner(cache)
     # Reading and cutting, three steps for each model, writing; a flight before all of it.
-    with whole_folder(final) as folder, progress(3 + 3 * len(tasks), source.stem) as advance:
+    with whole_folder(final) as folder, progress(3 + 3 * len(tasks), settings.title) as advance:
         taken = take(settings, tasks, None if log is None else Path(log), folder, runner)
         advance(2)
         staged = identify_models(
