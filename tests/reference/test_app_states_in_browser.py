@@ -300,7 +300,7 @@ def _of_records(stage: Stage) -> Iterator[str]:
     yield "roles are missing"
     page.select_option("select[aria-label='Role of drive']", "input")
     page.select_option("select[aria-label='Role of swing']", "output")
-    page.select_option("#place", label="steps.csv: steps")
+    page.select_option("#place", label="steps.csv")
     page.locator(".fault", has_text="swing").first.wait_for()
     yield "a fault"
     stage.button("Write the study").press("Enter")
@@ -318,13 +318,15 @@ def _of_rig_gains(stage: Stage) -> Iterator[str]:
     page.get_by_role("alert").filter(has_text="so no gains are made from it").wait_for()
     yield "a fit that carries no gains"
     stage.open("")
-    alone = stage.folder / "alone.csv"  # a set is known by its first file: this is another one
+    # A set is known by its first file: this is another one, of a name wider than a phone.
+    alone = stage.folder / f"alone-{LONG.removesuffix('.bin')}.csv"
     alone.write_text("".join((stage.folder / "prbs.csv").read_text().splitlines(True)[:-1]))
     page.set_input_files("input[type=file]", alone)
     for name, role in (("drive", "input"), ("swing", "output")):
         page.select_option(f"select[aria-label='Role of {name}']", role)
     stage.button("Write the study").press("Enter")
     page.locator("#content .box").wait_for()
+    yield "records of a long name"
     page.get_by_role("navigation").get_by_role("link", name="Gains").press("Enter")
     page.locator("#slider-Kp").wait_for()
     yield "gains of a rig"
@@ -388,7 +390,7 @@ def _of_a_server_that_has_gone(stage: Stage) -> Iterator[str]:
     page.route("**/api/**", lambda asked: asked.abort())
     page.route_web_socket("**/api/live", lambda socket: socket.close())
     stage.open(f"response/{stage.logs['first']}")
-    page.get_by_role("alert").filter(has_text="does not answer").wait_for()
+    page.get_by_role("alert").filter(has_text="did not answer").wait_for()
     yield "nobody answers"
     page.unroute_all()
 

@@ -18,6 +18,11 @@ export class Gains {
     return this.of !== this.etag;
   }
 
+  /** The work, while it goes on or what it was to make is missing; one that ended of other gains is past. */
+  get work() {
+    return this.job?.state === "waiting" || this.stale || !this.part ? this.job : null;
+  }
+
   async ask(again = false) {
     try {
       const told = await api.gains(this.log, again);
