@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import asdict, replace
 from typing import Protocol, TypeVar
@@ -202,3 +203,19 @@ def counted(number: int, noun: str) -> str:
     ('1 gap', '2 gaps')
     """
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
+EXACT = 1e-9
+"""Relative error of a computed number that stands for a rounder one, as 0.57 times 100 does."""
+
+
+def at_least(value: float, decimals: int = 0) -> str:
+    """A promised lower bound, rounded down: what is written is kept wherever the number is.
+
+    Example
+    -------
+    >>> at_least(45.6), at_least(45.0), at_least(99.97, 1), at_least(100.0 * 0.57)
+    ('45', '45', '99.9', '57')
+    """
+    scaled = value * 10.0**decimals
+    return f"{math.floor(scaled + EXACT * abs(scaled)) / 10.0**decimals:.{decimals}f}"

@@ -320,19 +320,19 @@ def test_what_was_left_out_is_no_model_to_use() -> None:
 def test_margins_below_what_is_asked_and_columns_left_out_are_told() -> None:
     """44 deg stood green beside 45 that are required, and a dash was explained that nobody saw."""
     worst = [
-        SimpleNamespace(loop="loop", name="phase margin", worst=44.1, flown_worst=None),
+        SimpleNamespace(loop="loop", name="phase margin", worst=44.6, flown_worst=None),
         SimpleNamespace(loop="loop", name="gain margin", worst=None, flown_worst=None),
     ]
     asked = SimpleNamespace(phase_margin_deg=45.0, gain_margin_db=6.0, angle_phase_margin_deg=60.0)
     beyond = Finding("margin-beyond-band", Light.GREEN, "read above the band")
     roll = SimpleNamespace(
         axis="roll", loop=None, worst_cases=worst, requirements=asked, findings=(beyond,),
-        share_met=0.984, stages=(SimpleNamespace(gains={}),),
+        share_met=0.9847, stages=(SimpleNamespace(gains={}),),
         flown=SimpleNamespace(autopilot="px4", gains={}),
     )  # fmt: skip
     tuning = SimpleNamespace(sound=[roll], findings=(), left_out={}, designs=())
     said = gains_finding(tuning, "study.toml").message  # type: ignore[arg-type]
-    assert "at least 44°" in said
+    assert "at least 44°" in said, "44.6 are not 45"
     assert said.endswith("(98.4 % of them or more keep 45° and all else asked)")
     way = gains_finding(tuning, "study.toml").action  # type: ignore[arg-type]
     assert way.startswith("flightid tune study.toml --write gains.params writes them")

@@ -11,7 +11,7 @@ from flightid.control.autopilots.parameter_files import parameter_suffix
 from flightid.control.autopilots.pid_loop import PidLoop
 from flightid.control.tuning.limits import ANGLE
 from flightid.conventions import Light
-from flightid.findings import Finding, counted, worst
+from flightid.findings import Finding, at_least, counted, worst
 from flightid.table import Cell, Column, Table
 
 if TYPE_CHECKING:
@@ -41,7 +41,9 @@ def gains_finding(
         for each in design.worst_cases
         if each.name == "phase margin" and each.worst is not None
     ]
-    promise = f" keep at least {min(least):.0f}° of phase margin" if least else " keep their limits"
+    promise = (
+        f" keep at least {at_least(min(least))}° of phase margin" if least else " keep their limits"
+    )
     steps = max(len(design.stages) for design in designs)
     axes = ", ".join(design.axis for design in designs)
     plain = any(isinstance(design.loop, PidLoop) for design in designs)
@@ -65,7 +67,9 @@ def gains_finding(
     asked = designs[0].requirements.phase_margin_deg
     if least and min(least) < asked:
         share = min(design.share_met for design in designs)
-        message += f" ({100.0 * share:.1f} % of them or more keep {asked:g}° and all else asked)"
+        message += (
+            f" ({at_least(100.0 * share, 1)} % of them or more keep {asked:g}° and all else asked)"
+        )
     if left:
         message += f"; none to fly, they stay as flown: {left}"
     else:

@@ -16,7 +16,7 @@ from flightid.control.tuning.gain_search_result import NO_GAINS, GainSearchResul
 from flightid.control.tuning.gain_steps import Stage, TunedGain
 from flightid.control.tuning.order_statistics import ENOUGH, least_share
 from flightid.conventions import Light
-from flightid.findings import Finding
+from flightid.findings import Finding, at_least
 
 Array = NDArray[np.float64]
 NEAR = 2.0**0.5
@@ -57,8 +57,9 @@ def verdict(found: GainSearchResult, met: NDArray[np.bool_], drawn: int) -> Find
     return Finding(
         "gains",
         Light.GREEN if share >= ENOUGH else Light.AMBER,
-        f"{good} of {drawn} fresh plants meet every requirement: at least {share:.1%} of those "
-        f"that the data allow (95 % confidence); {_bound(found)}",
+        f"{good} of {drawn} fresh plants meet every requirement: at least "
+        f"{at_least(100.0 * share, 1)}% of those that the data allow (95 % confidence); "
+        f"{_bound(found)}",
         "" if share >= ENOUGH else "draw more plants for the search",
     )
 

@@ -19,7 +19,7 @@ from flightid.control.tuning.worst_cases import WorstCase
 from flightid.conventions import Light
 from flightid.errors import DataError, UnknownNameError
 from flightid.files import as_path
-from flightid.findings import Finding
+from flightid.findings import Finding, at_least
 from flightid.frozen import dataclass
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
@@ -214,7 +214,8 @@ class PidDesign(
             )
         note = (
             f"Worst: of {self.n_plants} plants drawn from what the data allow; "
-            f"{self.content:.1%} of such plants do at least as well (95 % confidence)."
+            f"{at_least(100.0 * self.content, 1)}% of such plants do at least as well "
+            "(95 % confidence)."
             if self.content
             else "Of the model alone: its errors are not known."
         )
