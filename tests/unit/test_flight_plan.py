@@ -20,7 +20,7 @@ from flightid.inspection.flight_phases import FlightPhases, flight_phases
 from flightid.planning.axis_guess import guess_axis
 from flightid.planning.flight_findings import flight_findings
 from flightid.planning.flown_sweeps import FlownSweeps
-from flightid.planning.loop_check import MISSED
+from flightid.planning.loop_check import CAREFULLY, MISSED
 from flightid.planning.procedures import procedure_of
 from flightid.planning.result import AxisSweep
 from flightid.planning.settings import settings_of
@@ -289,8 +289,13 @@ def test_no_go_leaves_no_settings(plan: fid.SweepPlan, tmp_path: Path) -> None:
     assert not (tmp_path / "none").exists()
     assert "SID_AXIS 1" not in card_html(fell)
     assert len(fell.write(tmp_path / "forced", write_no_go=True)) == 6
-    missed = replace(plan, findings=(Finding(MISSED, Light.AMBER, "yaw: 442% away"),))
-    assert (plan.verdict, missed.verdict, fell.verdict) == ("go", "begin small", "no-go")
+    missed = replace(plan, findings=(Finding(MISSED, Light.AMBER, "yaw: 442% away", CAREFULLY),))
+    told = replace(plan, findings=(Finding("axis-measured", Light.GREEN, "as flown"),))
+    assert (told.verdict, missed.verdict, fell.verdict) == ("go", "begin small", "no-go")
+    # "Verdict: go." stood below "begin with a third of the amplitude".
+    typical = fid.plan_flight(vehicle="quad")
+    assert any(f.action == CAREFULLY for f in typical.findings)
+    assert typical.verdict == "begin small"
     assert 'class="verdict">begin small<' in card_html(missed)
 
 

@@ -20,7 +20,8 @@ from flightid.uncertainty.quantiles import half_width
 LARGEST_ERROR, LEAST_ERROR, FEWEST_POINTS = 0.2, 0.04, 6
 """A frequency counts as measured up to this random error; none weighs more than one of the least;
 so many make a check. The least is what windows may bend of a response."""
-CAREFULLY = "begin with a third of the amplitude, look at the log, then fly the whole"
+SMALLER = "a third of the amplitude"
+CAREFULLY = f"begin with {SMALLER}, look at the log, then fly the whole"
 MISSED = "loop-not-as-flown"
 """Code of the finding that a loop flew otherwise than expected, beyond doubt."""
 LARGEST_MISS = math.log(1.3)
@@ -80,6 +81,11 @@ class LoopCheck:
             f"{_percent(math.expm1(LARGEST_MISS))} is not told",
             f"fly a minute with brisker sticks about {axis} and plan from that log, or {CAREFULLY}",
         )
+
+
+def begins_small(finding: Finding) -> bool:
+    """Whether a finding, by what it says to do, has the first sweep be smaller than planned."""
+    return SMALLER in finding.action
 
 
 def _percent(share: float) -> str:

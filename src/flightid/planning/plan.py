@@ -24,7 +24,7 @@ from flightid.planning.flight_findings import flight_findings
 from flightid.planning.flight_time import flight_time
 from flightid.planning.flown_axis import FlownAxis
 from flightid.planning.flown_sweeps import FlownSweeps, flown_sweeps, sweep_again
-from flightid.planning.loop_check import CAREFULLY
+from flightid.planning.loop_check import CAREFULLY, SMALLER
 from flightid.planning.options import PlanOptions
 from flightid.planning.procedures import PROCEDURES, Procedure, procedure_of
 from flightid.planning.result import AxisSweep, SweepPlan
@@ -45,7 +45,7 @@ ENOUGH_COHERENCE, SMALLEST_SHARE = 0.95, 0.5
 what the limits allow, for the day may be windier than that of the log."""
 WAIT_S = {"mode": 31.0, "stick": 20.0, "autotune": 15.0, "chirp": 10.0}
 """Rest before and behind a run, s."""
-UNSURE = "what the axis does is not known yet: the log of a third of the amplitude tells"
+UNSURE = f"what the axis does is not known yet: the log of {SMALLER} tells"
 QUADPLANE = {"Q_A_RAT_": "ATC_RAT_", "Q_A_ANG_": "ATC_ANG_", "Q_A_ACCEL_": "ATC_ACCEL_"}
 
 

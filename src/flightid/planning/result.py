@@ -23,7 +23,7 @@ from flightid.inspection.verdict_lines import verdict_lines
 from flightid.planning.axis_guess import AxisGuess
 from flightid.planning.flight_time import FlightTime
 from flightid.planning.flown_sweeps import FLOWN_ONCE
-from flightid.planning.loop_check import MISSED
+from flightid.planning.loop_check import begins_small
 from flightid.planning.procedures import STOP, Procedure
 from flightid.planning.settings import INTEGERS, betaflight_cli
 from flightid.result import Result
@@ -131,7 +131,7 @@ class SweepPlan(Result, schema="flightid.sweep_plan/1"):
     >>> import flightid as fid
     >>> plan = fid.plan_flight(vehicle="quad")
     >>> plan
-    SweepPlan('quad', ArduCopter, 3 axes, go)
+    SweepPlan('quad', ArduCopter, 3 axes, begin small)
     """
 
     name: str
@@ -154,13 +154,13 @@ class SweepPlan(Result, schema="flightid.sweep_plan/1"):
         """``"no-go"``, ``"once more"``, ``"not needed"``, ``"begin small"`` or ``"go"``.
 
         Not needed: the log carries every axis; once more: one of them was flown a single time.
-        Small: the flight missed an expected loop.
+        Small: some finding says to begin with a third of the amplitude.
         """
         if not self.is_go:
             return "no-go"
         if not self.sweeps:
             return "once more" if any(f.code == FLOWN_ONCE for f in self.findings) else "not needed"
-        return "begin small" if any(f.code == MISSED for f in self.findings) else "go"
+        return "begin small" if any(map(begins_small, self.findings)) else "go"
 
     def summary(self) -> Table:
         """A line for each axis: what to fly."""
