@@ -26,7 +26,7 @@ PARAMETERS = {
         for name, value in GAINS.items()
     },
 }
-VERBS = ("inspect", "flight", "plan", "tune", "run", "compare")
+VERBS = ("inspect", "flight", "plan", "tune", "run", "new", "compare")
 
 
 @pytest.fixture(scope="module")

@@ -236,6 +236,12 @@ def test_columns_are_told_by_name_then_unit_or_refused() -> None:
 def test_data_without_a_model_give_no_study(tmp_path: Path) -> None:
     with pytest.raises(StudyError, match="carry no model"):
         Proposal((), ()).write(tmp_path / "study.toml")
+    still = tuple(
+        Finding("none", Light.RED, f"{axis}: no model, nothing was injected", "fly a sweep")
+        for axis in ("roll", "yaw")
+    )
+    with pytest.raises(StudyError, match=r"roll, yaw: nothing was injected.*Next: fly a sweep"):
+        Proposal((), (), still).write(tmp_path / "study.toml")
     assert "No model can be identified" in Proposal((), ()).refusal()
     time_s = np.arange(30) * 0.1
     short = np.column_stack([time_s, np.sign(np.sin(3.0 * time_s)), np.sin(3.0 * time_s)])

@@ -9,7 +9,7 @@ import click
 
 from flightid.cli.option_fields import OptionsCommand, parted
 from flightid.cli.output import WRITTEN, note
-from flightid.cli.proposals import note_of, of_data, propose, study_path
+from flightid.cli.proposals import end_without_model, note_of, of_data, propose, study_path
 from flightid.cli.records import FILES
 
 
@@ -41,5 +41,6 @@ def command(
     target = target or study_path(files)
     (asked,) = parted(options, of_data())
     made = propose(files, target, **asked, tune=tune)
+    end_without_model(made)
     note_of(made)
     note(f"Wrote {made.write(target)}: {', '.join(made.models)}")

@@ -47,6 +47,13 @@ def note_of(made: Proposal) -> None:
         note(f"{finding.light.words}: {finding.message}")
 
 
+def end_without_model(made: Proposal) -> None:
+    """Say what is there and what to do, and end the command, where data carry no model."""
+    if not made.models:
+        click.echo(made.refusal())
+        click.get_current_context().exit(Exit.RED)
+
+
 def is_study(files: Sequence[Path]) -> bool:
     """Whether a study is meant: one file in TOML."""
     return len(files) == 1 and files[0].suffix == ".toml"
@@ -91,9 +98,7 @@ def taken_study(
         raise click.UsageError("--log belongs to a study, and there is none")
     target = study_path(files, output)
     made = propose(files, target, **asked, tune=tune, cache=cache)
-    if not made.models:
-        click.echo(made.refusal())
-        click.get_current_context().exit(Exit.RED)
+    end_without_model(made)
     made.write(target)
     note(f"Wrote {target}")
     note_of(made)

@@ -6,7 +6,6 @@ import hashlib
 from collections.abc import Iterator
 from pathlib import Path
 
-from flightid.conventions import Light
 from flightid.errors import StudyError
 from flightid.files import write_atomically
 from flightid.findings import FIRST, Finding, in_order
@@ -59,26 +58,33 @@ class Proposal:
             sentence = carried_sentence(self.inspection)
             answer = _wrapped(sentence)
             grounded = self.inspection.phases.is_known and not self.inspection.phases.airborne
+        for why, parts in self._reasons().items():
+            if why not in sentence and not grounded:
+                answer += _wrapped(f"- {', '.join(parts)}: {why}")
+        actions = self._actions()
+        said = [] if self.inspection is None else [self.inspection.in_short(), ""]
+        said += ["What to do, the first first"] if actions else []
+        said += [line for each in actions for line in _wrapped(f"- {each}")]
+        return "\n".join([*said, *([""] if actions else []), *answer])
+
+    def _reasons(self) -> dict[str, list[str]]:
+        """Why there is no model, with the axes or parts of which it is so."""
         reasons: dict[str, list[str]] = {}
         for finding in self.findings:
             what, _, why = finding.message.partition(": no model, ")
             reasons.setdefault(why, []).append(what)
-        for why, parts in reasons.items():
-            if why not in sentence and not grounded:
-                answer += _wrapped(f"- {', '.join(parts)}: {why}")
+        return reasons
+
+    def _actions(self) -> list[str]:
+        """What to do where there is no model, the first first, each once."""
         actions = [finding.action for finding in self.findings if finding.action]
-        said = []
         if self.inspection is not None:
-            said = [self.inspection.in_short(), ""]
             noted = self.inspection.findings
             first = [f.action for f in in_order(noted) if f.code in FIRST]
             found = [*actions, *(each.action for each in noted if each.action)]
             planned = [each for each in found if "flightid plan" in each]
             actions = [*first, *self._next(planned=bool(planned)), *planned, *found]
-        said += ["What to do, the first first"] if actions else []
-        once = [a for a in dict.fromkeys(actions) if not any(_goes_on(b, a) for b in actions)]
-        said += [line for each in once for line in _wrapped(f"- {each}")]
-        return "\n".join([*said, *([""] if actions else []), *answer])
+        return [a for a in dict.fromkeys(actions) if not any(_goes_on(b, a) for b in actions)]
 
     def _next(self, *, planned: bool) -> Iterator[str]:
         """Commands that go on from a log of a flight without a model."""
@@ -101,11 +107,12 @@ class Proposal:
         """
         file = Path(path)
         if not self.models:
-            first = next((f for f in self.findings if f.light is Light.RED), None)
+            reasons = (": ".join(filter(None, (", ".join(parts), why)))
+                       for why, parts in self._reasons().items())  # fmt: skip
             raise StudyError(
                 "these data carry no model, so no study is written",
-                found="nothing to identify" if first is None else first.message,
-                action="" if first is None else first.action,
+                found="; ".join(reasons) or "nothing to identify",
+                action="; ".join(self._actions()[:1]),
             )
         file.parent.mkdir(parents=True, exist_ok=True)
         if file.exists() and not _is_untouched(file):
