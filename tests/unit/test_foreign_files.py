@@ -79,3 +79,22 @@ def test_a_foreign_file_is_named_and_told_what_to_do(
 )
 def test_tables_and_logs_are_not_foreign(head: bytes) -> None:
     assert foreign(head) is None
+
+
+@pytest.mark.parametrize(
+    ("name", "begins"), [("x.ulg", "a PX4 ULog begins"), ("X.BIN", "a DataFlash log begins")]
+)
+@pytest.mark.parametrize("rest", [b"\x80\x3f\x01\x32\xa3\x95\x07\x91", b"\x80\x3f\x01\x32\x00\x44"])
+def test_the_rest_of_a_log_is_named_and_told_what_to_do(
+    name: str, begins: str, rest: bytes, tmp_path: Path
+) -> None:
+    """A ULog was "not a DataFlash log", or sent a reader of a terminal to `read_log`."""
+    path = tmp_path / name
+    path.write_bytes(rest * 9)
+    assert is_log(path)
+    with pytest.raises(FlightidError, match=f"{begins}.*Next: copy the whole log from the card"):
+        fid.read_log(path)
+    path = path.with_suffix(".rec")
+    path.write_bytes(b"\x80\x00\x01\x00" * 9)
+    with pytest.raises(FlightidError, match=r"bytes of no known kind.*flightid inspect FILE"):
+        fid.read_records(path)

@@ -18,7 +18,7 @@ from flightid.logs.ros.reader import is_vehicle_bag, open_bag
 from flightid.logs.source import LogSource
 from flightid.logs.ulog.reader import UlogSource
 from flightid.reading import require_file
-from flightid.record.formats.foreign import foreign, unknown_kind
+from flightid.record.formats.foreign import foreign, is_text, unknown_kind
 from flightid.record.formats.sniff import file_format, is_bag
 
 ULOG_MAGIC = b"ULog\x01\x12\x35"
@@ -57,6 +57,13 @@ _BROKEN: tuple[tuple[bytes, str, str], ...] = (
         "record it as .tlog, or hand in the vehicle's log",
     ),
 )
+BEGINNINGS = {
+    ".ulg": "PX4 ULog begins with its header",
+    ".bin": "DataFlash log begins with the definitions of its messages",
+    ".bbl": "blackbox log begins with its header",
+    ".bfl": "blackbox log begins with its header",
+}
+"""What the logs of a name begin with, without which nothing in them can be read."""
 
 
 def read_log(path: str | Path) -> Log:
@@ -101,7 +108,13 @@ def read_log(path: str | Path) -> Log:
         if holds(head):
             return Log(path, open_source(path))
     if foreign(head) is None and _BY_CHANCE[0](head):
-        return Log(path, _BY_CHANCE[2](path))
+        try:
+            return Log(path, _BY_CHANCE[2](path))
+        except LogFormatError as error:
+            size = path.stat().st_size
+            raise _without_beginning(path, f"{size} bytes without one message") from error
+    if _lacks_beginning(path, head):
+        raise _without_beginning(path, unknown_kind(head))
     raise _not_a_log(path, head)
 
 
@@ -128,7 +141,7 @@ def is_log(path: str | Path) -> bool:
     try:
         file_format(path)
     except FileFormatError:
-        return _BY_CHANCE[0](head)
+        return _BY_CHANCE[0](head) or _lacks_beginning(path, head)
     return False
 
 
@@ -151,6 +164,24 @@ def _head(path: Path) -> bytes:
         return b""
     with path.open("rb") as file:
         return file.read(SNIFFED)
+
+
+def _lacks_beginning(path: Path, head: bytes) -> bool:
+    """Whether a file has a log's name and holds bytes, of which no reader knows the first."""
+    if path.is_dir() or path.suffix.lower() not in BEGINNINGS or is_text(head):
+        return False
+    return foreign(head) is None and not any(head.startswith(magic) for magic, _, _ in _BROKEN)
+
+
+def _without_beginning(path: Path, found: str) -> LogFormatError:
+    """What is said of the rest of a log: its name tells what it was, as its content cannot."""
+    begins = BEGINNINGS.get(path.suffix.lower(), "log begins with what defines its messages")
+    return LogFormatError(
+        f"{path.name} does not begin as a log does",
+        found=found,
+        needed=f"the whole log: a {begins}",
+        action="copy the whole log from the card again; a part without its beginning has no reader",
+    )
 
 
 def _not_a_log(path: Path, head: bytes) -> LogFormatError:

@@ -11,7 +11,10 @@ from flightid.record.formats.foreign import foreign, is_text, unknown_kind
 
 TEXT_SUFFIXES = {".csv", ".txt", ".tsv", ".dat"}
 SNIFFED = 4096
-OTHERS = "read autopilot logs with read_log; export other data as CSV or Parquet"
+OTHERS = (
+    "hand in the autopilot's own log as it lies on the card, or export the data as CSV or Parquet: "
+    "flightid inspect FILE shows what either holds"
+)
 MCAP, ROSBAG, SQLITE = b"\x89MCAP0\r\n", b"#ROSBAG V2.0\n", b"SQLite format 3\x00"
 """First bytes of bags."""
 BAG_SUFFIXES = (".mcap", ".db3")
