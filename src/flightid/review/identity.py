@@ -85,6 +85,8 @@ class FlightIdentity:
         Board and unique number of the autopilot; empty where the log does not tell them.
     motors : mapping of str to float
         Parameters that make commands thrust.
+    unfed : tuple of str
+        Loops to which parameters feed nothing of the set-point forward, as ``"roll rate"``.
     """
 
     frame: str
@@ -94,6 +96,7 @@ class FlightIdentity:
     changed_gains: tuple[str, ...]
     board: str = ""
     motors: Mapping[str, float] = field(default_factory=dict)
+    unfed: tuple[str, ...] = ()
 
 
 def flight_identity(log: Log, phases: FlightPhases) -> FlightIdentity:
@@ -104,8 +107,34 @@ def flight_identity(log: Log, phases: FlightPhases) -> FlightIdentity:
     motors = {name: log.parameters[name] for name in MOTORS if name in log.parameters}
     battery = _battery(log, phases.airborne)
     return FlightIdentity(
-        _frame(log), mode_spans(log), battery, gains, tuple(sorted(changed)), log.board, motors
-    )
+        _frame(log), mode_spans(log), battery, gains, tuple(sorted(changed)), log.board, motors,
+        unfed_loops(log),
+    )  # fmt: skip
+
+
+def unfed_loops(log: Log) -> tuple[str, ...]:
+    """Loops to which the log's parameters feed nothing of the set-point forward.
+
+    None of those whose parameters the log lacks, or changed while it ran.
+
+    Parameters
+    ----------
+    log : Log
+    """
+    try:
+        autopilot = autopilot_of(log)
+    except DataError:
+        return ()
+    changed = {each.name for each in log.parameter_changes}
+    unfed = []
+    for axis in AXES:
+        roles = [e for e in parameter_entries(autopilot, axis) if e.role in ("ff", "d_ff")]
+        names = [n for each in roles for n in (each.name, *each.older) if n in log.parameters]
+        shaped = ["ATC_RATE_FF_ENAB"] if "ATC_RATE_FF_ENAB" in log.parameters else []
+        for loop, feeding in (("rate", names), ("attitude", shaped)):
+            if feeding and not any(log.parameters[n] or n in changed for n in feeding):
+                unfed.append(f"{axis} {loop}")
+    return tuple(unfed)
 
 
 BATTERY = {

@@ -131,11 +131,13 @@ def _step_words(loop: LoopResponse) -> str:
     )
 
 
+LESS_FED = "feed less of the set-point's rate forward"
 CALMER = {
     "rate": "lower I of this loop, then P; raise D, or take filters with less delay",
-    "attitude": "mend the rate loop first, then lower P of the angle, or feed less of the "
-    "set-point's rate forward",
+    "attitude": f"mend the rate loop first, then lower P of the angle, or {LESS_FED}",
 }
+UNFED_CALMER = {**CALMER, "attitude": CALMER["attitude"].removesuffix(f", or {LESS_FED}")}
+"""The same where parameters feed nothing forward: there is nothing to be fed less."""
 
 
 def _gains(review: FlightReview, sure: str) -> str:
@@ -160,7 +162,8 @@ def _overshoot(review: FlightReview, loop: LoopResponse, said: str) -> tuple[Lig
         return Light.GREEN, said, ""
     sure, may = low > limit, "" if low > limit else "may be "
     said = f"{said}; {may}beyond {limit:g} %, where damping is poor"
-    return Light.AMBER, said, _gains(review, CALMER[loop.loop] if sure else "")
+    calmer = UNFED_CALMER if loop.name in review.identity.unfed else CALMER
+    return Light.AMBER, said, _gains(review, calmer[loop.loop] if sure else "")
 
 
 SHORT = {
@@ -171,7 +174,11 @@ SHORT = {
 }
 LONG = {
     "rate": "look for feed-forward that is too large, and for what the set-point is scaled by",
-    "attitude": "feed less of the set-point's rate forward, and look for what scales the set-point",
+    "attitude": f"{LESS_FED}, and look for what scales the set-point",
+}
+UNFED_LONG = {
+    "rate": "look for what the set-point is scaled by",
+    "attitude": "look for what scales the set-point",
 }
 
 
@@ -196,6 +203,7 @@ def _level(
             action = action or _gains(review, sure)
     elif beyond:
         what, do = "beyond what is asked: sticks give more motion than they stand for", LONG
+        do = UNFED_LONG if loop.name in review.identity.unfed else LONG
     elif light is Light.GREEN and (level.half_width95 or 0.0) > off:
         return Light.UNKNOWN, f"{said}: where it ends is too uncertain to judge", what_to_fly(loop)
     else:
