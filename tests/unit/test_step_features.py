@@ -162,3 +162,14 @@ def test_what_is_quicker_than_the_set_point_ever_was_is_not_told() -> None:
     assert left["rise time"].value is None
     assert left["rise time"].reason.endswith("quicker sticks")
     assert left["delay to half"].value == readings[1].value
+
+
+def test_an_overshoot_of_a_level_that_may_be_either_spans_both() -> None:
+    """A step to .92 (.86 to .98) was read by what is asked alone, which one to .89 is not."""
+    time_s, random = np.arange(0.0, 1.0, 0.005), np.random.default_rng(3)
+    levels = np.concatenate([[0.92], 0.92 + 0.03 * random.standard_normal(400)])
+    course = np.where(time_s < 0.2, 1.15, 1.0) * np.clip(time_s / 0.1, 0.0, 1.0)
+    found = step_features(levels[:, None] * course, time_s)
+    (over,) = (each for each in found if each.name == "overshoot")
+    low, high = over.interval95 or (0.0, 0.0)
+    assert low < 100.0 * (0.92 * 1.15 - 1.0) < 14.9 < high

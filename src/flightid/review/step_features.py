@@ -43,7 +43,8 @@ def step_features(
     """Level, delay, rise, overshoot and settling of step responses, row 0 the estimate.
 
     All are of the level that steps reach in their window, the mean of its last fifth, but an
-    overshoot is of what is asked (`of_asked`) where the step ends within a tenth of that. Of one
+    overshoot is of what is asked (`of_asked`) where the step ends within a tenth of that, each draw
+    by its own end: a level that may lie on either side leaves either overshoot possible. Of one
     that still moves there no settling is told, no overshoot if it is highest there, and no rise
     time that goes by where the window ends.
     """
@@ -117,14 +118,16 @@ def window_features(
     """The same of the mean that the window ends at, whether the step has settled there or not."""
     level = _levels(steps, time_s)
     shares = steps / np.where(level > 0.0, level, np.nan)[:, None]
-    asked = follows(steps, time_s) if of_asked is None else of_asked
+    near = np.abs(level - 1.0) <= SETTLED
+    asked = near if of_asked is None else np.full(len(level), of_asked)
     half = _crossings(shares, time_s, 0.5)
     rise = _crossings(shares, time_s, 0.9) - _crossings(shares, time_s, 0.1)
     return (
         _reading("level", level, "1"),
         _reading("delay to half", half, "s"),
         _reading("rise time", rise, "s"),
-        _reading("overshoot", _overshoots(steps if asked else shares), "%"),
+        # Of draws whose level lies on the other side of the limit each goes by its own.
+        _reading("overshoot", np.where(asked, _overshoots(steps), _overshoots(shares)), "%"),
         _reading("settling time", _settling(shares, time_s), "s"),
     )
 
