@@ -86,10 +86,11 @@ def show_response(
     as_json: bool,
     level: float | None,
 ) -> None:
-    """Print a response, write its file and page where asked for, and leave by its verdict."""
+    """Print a response as it is shown, write what is asked for, and leave by its verdict."""
     from flightid.responses.store import write_response
     from flightid.uncertainty.quantiles import showing
 
+    response = response.shown
     emit(response, as_json=as_json)
     if target is not None:
         note(f"Wrote {write_response(response, target)}")

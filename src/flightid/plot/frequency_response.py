@@ -11,7 +11,7 @@ from flightid.errors import DataError
 from flightid.frozen import dataclass
 from flightid.plot import graph_objects as go
 from flightid.plot import look
-from flightid.responses.response_band import TAKEN_OUT, ResponseIntervals
+from flightid.responses.response_band import ResponseIntervals
 from flightid.uncertainty.quantiles import half_width, shown
 
 Array = NDArray[np.float64]
@@ -38,7 +38,7 @@ class Curve:
     random_error : ndarray, shape (n_freqs,), optional
         Normalised 1 σ random error; shown as a 95 % band.
     intervals : ResponseIntervals, optional
-        Shown as the band in its place.
+        Shown as the band in its place; they stand about this response.
 
     Example
     -------
@@ -225,8 +225,6 @@ def _add_gain(made: go.PlotFigure, curve: Curve, place: tuple[int, int], *, lege
     # A lower edge at or below zero gain has no decibels; it is drawn 40 dB down.
     _add_band(made, curve, (_decibel(np.maximum(low, 0.01 * magnitude)), _decibel(high)), place)
     made.add_trace(_line(curve, _decibel(magnitude), legend=legend), *place)
-    if curve.intervals is not None:
-        _add_centre(made, curve, _decibel(np.abs(curve.intervals.centre)), place, legend=legend)
 
 
 def _add_phase(made: go.PlotFigure, curve: Curve, phase_deg: Array, place: tuple[int, int]) -> None:
@@ -240,21 +238,6 @@ def _add_phase(made: go.PlotFigure, curve: Curve, phase_deg: Array, place: tuple
         low, high = phase_deg - wide, phase_deg + wide
     _add_band(made, curve, (low, high), place)
     made.add_trace(_line(curve, phase_deg, legend=False), *place)
-    if curve.intervals is not None:
-        _add_centre(made, curve, 0.5 * (low + high), place, legend=False)
-
-
-def _add_centre(
-    made: go.PlotFigure, curve: Curve, values: Array, place: tuple[int, int], *, legend: bool
-) -> None:
-    """What the band stands about, where leakage and resolution were taken out."""
-    assert curve.intervals is not None
-    if curve.intervals.reason == TAKEN_OUT:
-        name = f"{curve.name}, leakage taken out"
-        drawn = look.line(
-            name, curve.omega_rad_s, values, colour=look.RIVAL, dash="dot", legend=legend
-        )
-        made.add_trace(drawn, *place)
 
 
 def _add_band(

@@ -20,9 +20,10 @@ def response_figure(
     *,
     minimum_coherence: float = 0.6,
 ) -> go.PlotFigure:
-    """Draw measured responses over frequency, with 95 % bands (`response_band`).
+    """Draw measured responses over frequency as they are shown, with 95 % bands.
 
-    Of a closed loop all is greyed above the power of what excited the inputs.
+    Line, band and coherence are of one estimate, `FrequencyResponse.shown`. Of a closed loop all is
+    greyed above the power of what excited the inputs.
 
     Parameters
     ----------
@@ -37,9 +38,10 @@ def response_figure(
     -------
     PlotFigure
     """
-    chosen = list(pairs) if pairs is not None else leading_pairs(response)
-    drawn = [response.pair(output, name) for output, name in chosen]
-    bands = response_bands(response, chosen, level=shown())
+    known = response.shown
+    chosen = list(pairs) if pairs is not None else leading_pairs(known)
+    drawn = [known.pair(output, name) for output, name in chosen]
+    bands = response_bands(known, chosen, level=shown())
     curves = [
         Curve(
             f"{pair.output} / {pair.input}",

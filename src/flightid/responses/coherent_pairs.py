@@ -145,7 +145,8 @@ def coherent_pairs(
     Parameters
     ----------
     responses : FrequencyResponse
-        Measured responses of all outputs to all inputs.
+        Measured responses of all outputs to all inputs; leakage is no coherence
+        (`FrequencyResponse.shown`).
     minimum_coherence : float
         Coherence γ² from which a frequency counts, 0 to 1.
     minimum_decades : float
@@ -176,8 +177,9 @@ def coherent_pairs(
             found=f"coherence {minimum_coherence}, decades {minimum_decades}",
             needed="a coherence between 0 and 1, and decades above 0",
         )
+    known = responses.shown
     judged = tuple(
-        _judged(responses.pair(output, source), minimum_coherence, minimum_decades)
+        _judged(known.pair(output, source), minimum_coherence, minimum_decades)
         for output in responses.outputs
         for source in responses.inputs
     )

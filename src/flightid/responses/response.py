@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,6 +21,7 @@ from flightid.responses.errors.linear_estimate import LinearEstimate
 from flightid.responses.errors.random_error import CovarianceSource, ErrorSelection
 from flightid.responses.excited_band import excited_band, no_band
 from flightid.responses.pair import PairResponse, quotient_unit
+from flightid.responses.shown import shown_values
 from flightid.result import Result
 from flightid.table import Column, Table
 from flightid.uncertainty.feedback_result import FeedbackTest
@@ -196,6 +198,17 @@ class FrequencyResponse(
         """Number of frequencies."""
         return len(self.omega_rad_s)
 
+    @cached_property
+    def shown(self) -> FrequencyResponse:
+        """The estimate that tables, pictures and bands show: with leakage taken out.
+
+        Its errors are those of its bars, its coherence is no more than they allow, and its findings
+        tell what of the windows' coherence was leakage. Spectra stay those of the windows, errors
+        are by input. The response itself where its records are gone, or it has no errors. A fit
+        takes the response itself, and the leakage out of it by the model it fits.
+        """
+        return replace(self, **shown_values(self))
+
     @property
     def covariance(self) -> NDArray[np.float64] | None:
         """Covariance at all frequencies as from `covariance_at`, (n_out, 2 n_in n_f, 2 n_in n_f).
@@ -316,10 +329,11 @@ class FrequencyResponse(
         )
 
     def summary(self) -> Table:
-        """Table of the pairs: usable band, coherence and random error.
+        """Table of the pairs as they are shown (`shown`): usable band, coherence, random error.
 
         In a closed loop the band ends where the power of what excited the input does.
         """
+        known = self.shown
         columns = (
             Column("output"),
             Column("input"),
@@ -333,8 +347,8 @@ class FrequencyResponse(
         rows = []
         for output in self.outputs:
             for name in self.inputs:
-                pair = self.pair(output, name)
-                band = excited_band(self, output, name)
+                pair = known.pair(output, name)
+                band = excited_band(known, output, name)
                 rows.append(
                     (
                         output,
@@ -348,8 +362,8 @@ class FrequencyResponse(
                         100.0 * float(np.median(pair.random_error)),
                     )
                 )
-        notes = tuple(map(str, (*self.findings, *no_band(self))))
-        return Table(repr(self), columns, tuple(rows), notes)
+        notes = tuple(map(str, (*known.findings, *no_band(known))))
+        return Table(repr(known), columns, tuple(rows), notes)
 
     def _computed(self) -> dict[str, object]:
         return {"history": [str(step) for step in self.history]}

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from flightid.frozen import dataclass
 from flightid.responses.response import FrequencyResponse
-from flightid.responses.unbiased import unbiased
+from flightid.responses.shown import WITHOUT_BIAS
 from flightid.uncertainty.magnitude import magnitude_interval
 from flightid.uncertainty.quantiles import LEVEL, half_width
 
@@ -55,7 +55,7 @@ def response_band(
 
     Windows and local polynomials blur modes and leak at low frequency, which can be many times the
     random error. A pilot model foretells that bias, and the intervals stand about the response less
-    it: near a mode they need not hold the estimate itself.
+    it, `FrequencyResponse.shown`: near a mode they need not hold what the windows gave.
 
     Parameters
     ----------
@@ -123,21 +123,18 @@ def response_bands(
     UnknownNameError
         There is no such channel.
     """
-    known: dict[tuple[str, str], tuple[FrequencyResponse, str]] = {}
-    for control in dict.fromkeys(name for _, name in pairs):
-        outputs = list(dict.fromkeys(output for output, name in pairs if name == control))
-        whole = unbiased(source.select(outputs=outputs, inputs=[control]))
-        for output in outputs:
-            pair = source.select(outputs=[output], inputs=[control])
-            if whole is not None:
-                clean: FrequencyResponse | None = whole.select(outputs=[output])
-            else:  # what one output lacks, others may have
-                clean = unbiased(pair) if len(outputs) > 1 else None
-            known[output, control] = (pair, RANDOM) if clean is None else (clean, TAKEN_OUT)
-    return {pair: _intervals(*known[pair], level) for pair in pairs}
+    outputs, inputs = (tuple(dict.fromkeys(pair[side] for pair in pairs)) for side in (0, 1))
+    whole = set(inputs) == set(source.inputs)
+    known = (source if whole else source.select(outputs=outputs, inputs=inputs)).shown
+    return {pair: _intervals(known, *pair, level) for pair in pairs}
 
 
-def _intervals(known: FrequencyResponse, reason: str, level: float) -> ResponseIntervals | None:
+def _intervals(
+    shown: FrequencyResponse, output: str, source: str, level: float
+) -> ResponseIntervals | None:
+    known = shown.select(outputs=[output], inputs=[source])
+    corrected = known.estimator.endswith(WITHOUT_BIAS) and bool(np.any(known.coherence > 0.0))
+    reason = TAKEN_OUT if corrected else RANDOM
     centre = known.response[0, 0]
     spread = spread_of(known)
     if spread is None:

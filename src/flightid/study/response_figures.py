@@ -48,7 +48,7 @@ def response_figures(item: ModelResults, truth: Truth | None) -> list[Figure]:
     else:
         names = [f"{output}/{name}" for output in response.outputs for name in response.inputs]
     bands = {} if fit is None else {each.name: each.band_rad_s for each in fit.responses}
-    first = next(iter(item.responses.values()))
+    first = next(iter(item.responses.values())).shown
     known = response_bands(first, [_pair(name) for name in names], level=shown())
     if len(names) <= ALONE:
         return [_figure(item, name, truth, bands.get(name), known) for name in names]
@@ -115,7 +115,7 @@ def _curves(
     output, source = _pair(name)
     curves = []
     for number, (method, response) in enumerate(item.responses.items()):
-        pair = response.pair(output, source)
+        pair = response.shown.pair(output, source)
         own = known[output, source] if number == 0 else None
         curves.append(
             Curve(

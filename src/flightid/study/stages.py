@@ -100,7 +100,7 @@ def select_coherent(
         return found
     judged = []
     for pair in found.pairs:
-        band = response.pair(*pair.name.split("/")).usable_band(minimum_coherence)
+        band = response.shown.pair(*pair.name.split("/")).usable_band(minimum_coherence)
         decades = 0.0 if band is None else math.log10(band[1] / band[0])
         kept = pair.kept and decades >= minimum_decades
         reason = pair.reason if kept or not pair.kept else "no unbroken band is wide enough"

@@ -21,7 +21,8 @@ from flightid.findings import Finding
 from flightid.identification.uncertain_of import source_findings, uncertain_of
 from flightid.responses import FrequencyResponse, PairResponse
 from flightid.responses.response_band import spread_of
-from flightid.responses.unbiased import WITHOUT_BIAS, unbiased
+from flightid.responses.shown import WITHOUT_BIAS
+from flightid.responses.unbiased import unbiased
 from flightid.uncertainty.quantiles import half_width
 from flightid.uncertainty.uncertain import Uncertain, uncertain_numbers
 

@@ -16,7 +16,7 @@ from flightid.frozen import dataclass
 from flightid.models import LinearSystem, TransferFunctionModel
 from flightid.models.model import linear_system
 from flightid.responses import FrequencyResponse
-from flightid.responses.unbiased import WITHOUT_BIAS
+from flightid.responses.shown import WITHOUT_BIAS
 from flightid.scalar_search import root_between
 
 LOOKED_BELOW = 30.0

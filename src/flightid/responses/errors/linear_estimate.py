@@ -19,6 +19,7 @@ from flightid.frozen import dataclass
 from flightid.responses.errors.covariance import WindowedErrors
 from flightid.responses.errors.functional import Functional, one_by_one
 from flightid.responses.errors.local_errors import LocalErrors
+from flightid.responses.errors.local_information import local_spread
 from flightid.responses.errors.noise import NoiseSpectrum, noise_of_residuals
 from flightid.responses.errors.pilot import Pilot, Pilots
 from flightid.responses.errors.random_error import CovarianceSource, ErrorSelection
@@ -54,6 +55,14 @@ class OutputWeights(Protocol):
 
     def errors_with(self, noise: NoiseSpectrum, outputs: Places) -> CovarianceSource:
         """Errors of the whole estimate with another noise in some outputs, in their order."""
+        ...
+
+    def local_spread(self, inputs: Sequence[Real]) -> Real | None:
+        """What bins beside a frequency tell by themselves, by the inputs of each record.
+
+        See `flightid.responses.errors.local_information.local_spread`; None where the estimate
+        itself is of these bins alone.
+        """
         ...
 
 
@@ -112,6 +121,11 @@ class WindowedWeights:
         """See `OutputWeights`; the other outputs keep their noise, as independent."""
         return replace(self.errors, known_noise=self.errors.noise.replaced(noise, outputs))
 
+    def local_spread(self, inputs: Sequence[Real]) -> Real | None:
+        """See `OutputWeights`."""
+        windows, step = self.errors.windows, self.errors.sample_time_s
+        return local_spread(inputs, windows.instruments, windows.omega / step, step)
+
 
 @dataclass(frozen=True)
 class LocalWeights:
@@ -157,6 +171,11 @@ class LocalWeights:
     def errors_with(self, noise: NoiseSpectrum, outputs: Places) -> CovarianceSource:
         """See `OutputWeights`; the other outputs keep their noise, as independent."""
         return LocalErrors(self.fits, self.noise.replaced(noise, outputs))
+
+    def local_spread(self, inputs: Sequence[Real]) -> Real | None:
+        """See `OutputWeights`."""
+        del inputs
+        return None
 
 
 @dataclass(frozen=True)
@@ -275,6 +294,14 @@ class LinearEstimate:
             apply = self.weights.functional(rows, np.arange(len(self.inputs)), points)
             kept[key] = apply(pilot.slopes)
         return kept[key]
+
+    def local_spread(self) -> Real | None:
+        """Of the response, what bins beside its frequencies tell alone, (n_in, n_f) or None."""
+        kept = self.pilots.told
+        if not kept:
+            kept.append(self.weights.local_spread(self.input_records))
+        found = kept[0]
+        return None if found is None else np.asarray(found[np.ix_(*self.places[1:])])
 
     def errors_of(
         self, residuals: Sequence[Real], resonant_rad_s: float = 0.0

@@ -111,6 +111,8 @@ class Pilots:
         Highest frequency of the response.
     seen : dict
         The estimate of a pilot's slopes, by output and frequencies: see `LinearEstimate`.
+    told : list
+        Once it was asked for, what bins tell beside each frequency: `LinearEstimate.local_spread`.
     """
 
     inputs: tuple[Real, ...]
@@ -118,6 +120,7 @@ class Pilots:
     sample_time_s: float
     highest_rad_s: float
     seen: dict[tuple[int, bytes], Complex] = field(default_factory=dict, repr=False)
+    told: list[Real | None] = field(default_factory=list, repr=False)
 
     @cached_property
     def found(self) -> list[Pilot | None]:

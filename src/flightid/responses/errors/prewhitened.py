@@ -293,3 +293,8 @@ class PrewhitenedWeights:
         """The errors as they are: they hold a noise model of their own."""
         del noise, outputs
         return PrewhitenedErrors(self.model, self.omega_rad_s)
+
+    def local_spread(self, inputs: Sequence[Real]) -> Real | None:
+        """None: the noise model's errors are of the whole band."""
+        del inputs
+        return None

@@ -1,0 +1,195 @@
+"""An estimate with the bias of its estimator taken out, as numbers: what `unbiased` makes of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.frozen import dataclass
+from flightid.responses.errors.linear_estimate import LinearEstimate
+from flightid.responses.errors.noise import AVERAGED, NoiseSpectrum, mean_spectrum
+from flightid.responses.errors.pilot import Pilot
+from flightid.responses.errors.pilot_search import BEYOND_BAND
+from flightid.uncertainty.quantiles import LEVEL, half_width
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+BENT = 0.02
+"""Twice the share by which a straight line between neighbours may miss a pilot."""
+HALVINGS = 4
+MOST_POINTS = 250
+MOST_RELATIVE = 1e6
+SURER = 1.5
+"""How many times as sure as the bins beside a frequency a pilot may be: windows are 1 to 1.2 times.
+
+Beyond, it rests on what it assumes of the vehicle, where the input has no power of its own.
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class CorrectedResponse:
+    """A response less its foretold bias.
+
+    Attributes
+    ----------
+    omega_rad_s : ndarray, shape (n_f,)
+    values : ndarray of complex, shape (n_out, n_in, n_f)
+    errors : ndarray, shape (n_out, 2 n_in n_f, 2 n_in n_f)
+        Covariance, as `CovarianceSource.covariance` has it.
+    spread : ndarray, shape (n_before, n_f)
+        Straight lines over log frequency from the frequencies before to these.
+    """
+
+    omega_rad_s: Real
+    values: Complex
+    errors: Real
+    spread: Real
+
+    @property
+    def relative(self) -> Real:
+        """Standard error of a part over the size of the response, shape (n_out, n_in, n_f)."""
+        shape = (len(self.values), 2, *self.values.shape[1:])
+        variances = np.diagonal(self.errors, axis1=1, axis2=2).reshape(shape)
+        size = np.maximum(np.abs(self.values), np.finfo(float).tiny)
+        return np.asarray(np.minimum(np.sqrt(variances.mean(axis=1)) / size, MOST_RELATIVE))
+
+    def coherence(self, before: Real) -> Real:
+        """Coherence γ² of the windows, and no more than these errors allow, (n_out, n_in, n_f).
+
+        An estimate of coherence γ² from one independent window, the fewest there are, has a
+        relative error of √((1 − γ²)/(2 γ²)) (Bendat & Piersol, section 9.1); a larger error is
+        leakage that is coherent with leakage.
+
+        Parameters
+        ----------
+        before : ndarray, shape (n_out, n_in, n_before)
+        """
+        return np.minimum(before @ self.spread, 1.0 / (1.0 + 2.0 * self.relative**2))
+
+
+def corrected(
+    linear: LinearEstimate, omega_rad_s: Real, *, refined: bool
+) -> CorrectedResponse | None:
+    """Take the bias out of an estimate, or None where no pilot can foretell it.
+
+    Parameters
+    ----------
+    linear : LinearEstimate
+    omega_rad_s : ndarray, shape (n_before,)
+        Its frequencies.
+    refined : bool
+        Add frequencies where a pilot is no straight line between neighbours.
+    """
+    pilots = linear.pilots_of_outputs()
+    if pilots is None:
+        return None
+    columns = linear.places[1]
+    omega = _refined(omega_rad_s, pilots, columns) if refined else omega_rad_s
+    spread = _between(omega_rad_s, omega)
+    # Linear in changes of the outputs alone: windows keep the shares that the measured ones gave.
+    left = linear.functional()(_residuals(linear, pilots))
+    own = np.stack([each.frequency_response(omega)[columns] for each in pilots])
+    return CorrectedResponse(
+        omega, own + left @ spread, _errors(linear, pilots, omega, spread), spread
+    )
+
+
+def _refined(omega: Real, pilots: Sequence[Pilot], columns: NDArray[np.intp]) -> Real:
+    """With the middles of intervals, in log frequency, over which a pilot is no straight line."""
+    found = omega
+    for _ in range(HALVINGS):
+        middles = np.sqrt(found[1:] * found[:-1])
+        bent = np.zeros(len(middles), dtype=bool)
+        for pilot in pilots:
+            ends = pilot.frequency_response(found)[columns]
+            own = pilot.frequency_response(middles)[columns]
+            # Of a straight line in log gain and phase the middle is the geometric mean.
+            ratio = own**2 / (ends[:, 1:] * ends[:, :-1])
+            bent |= np.any(np.abs(ratio - 1.0) > BENT, axis=0)
+        if not np.any(bent) or len(found) > MOST_POINTS:
+            break
+        found = np.sort(np.concatenate([found, middles[bent]]))
+    return found
+
+
+def _between(before: Real, omega: Real) -> Real:
+    """Straight lines over log frequency from some points to others, shape (n_before, n)."""
+    logs, wanted = np.log(before), np.log(omega)
+    rows = [np.interp(wanted, logs, row) for row in np.eye(len(before))]
+    return np.asarray(rows)
+
+
+def _stacked(outputs: Sequence[tuple[Real, ...]]) -> list[Real]:
+    """Of each record, all outputs."""
+    return [np.stack(each) for each in zip(*outputs, strict=True)]
+
+
+def _residuals(linear: LinearEstimate, pilots: Sequence[Pilot]) -> list[Real]:
+    """Of each record, what the pilots leave of all outputs."""
+    modelled = _stacked([each.outputs for each in pilots])
+    return [y - model for y, model in zip(linear.output_records, modelled, strict=True)]
+
+
+def _errors(
+    linear: LinearEstimate,
+    pilots: Sequence[Pilot],
+    omega: Real,
+    spread: Real,
+) -> Real:
+    """Covariance of the difference, shaped as by `CovarianceSource.covariance`."""
+    columns = linear.places[1]
+    residuals = _residuals(linear, pilots)
+    highest = BEYOND_BAND * linear.pilots.highest_rad_s
+    spent = _stacked([each.spent for each in pilots])
+    noise = mean_spectrum(residuals, linear.sample_time_s, highest, spent)
+    source = linear.errors_with(noise)
+    total = source.covariance(*(np.arange(len(each)) for each in linear.places))
+    onto = np.kron(np.eye(2 * len(columns)), spread)
+    least = _least_variances(linear, noise, omega, spread)
+    found = []
+    for row, pilot in enumerate(pilots):
+        own = _real(pilot.response_slopes(omega)[:, columns])
+        made = _real(linear.of_pilot(row)[:, columns])
+        left = _positive(total[row] - made.T @ pilot.covariance @ made)
+        known = onto.T @ left @ onto + own.T @ pilot.covariance @ own
+        known *= _widened(pilot)
+        if least is not None:
+            longer = np.sqrt(np.maximum(np.tile(least[row], 2) / np.diag(known), 1.0))
+            longer = np.minimum(longer, MOST_RELATIVE)
+            known *= np.outer(longer, longer)
+        found.append(known)
+    return np.stack(found)
+
+
+def _least_variances(
+    linear: LinearEstimate, noise: NoiseSpectrum, omega: Real, spread: Real
+) -> Real | None:
+    """Of real and of imaginary parts, by what is told beside each frequency, (n_out, n_in n_f)."""
+    alone = linear.local_spread()
+    if alone is None:
+        return None
+    ends = np.exp(np.log(np.minimum(alone, np.finfo(float).max)) @ spread)
+    whole = 0.5 * noise.at(omega)[:, None] * ends / SURER**2
+    return np.asarray(whole.reshape(len(whole), -1))
+
+
+def _widened(pilot: Pilot) -> float:
+    """Student's distribution over the normal one at 95 %, squared: noise is known from few bins."""
+    n_bins = sum(map(len, pilot.spent))
+    groups = max(1, n_bins // AVERAGED)
+    freedom = (2.0 * n_bins - len(pilot.covariance)) / groups
+    return (half_width(LEVEL, max(freedom, 1.0)) / half_width(LEVEL)) ** 2
+
+
+def _real(slopes: Complex) -> Real:
+    """Rows of slopes as real parts and then imaginary parts, shape (n, 2 n_in n_f)."""
+    flat = slopes.reshape(len(slopes), -1)
+    return np.concatenate([flat.real, flat.imag], axis=1)
+
+
+def _positive(matrix: Real) -> Real:
+    """The nearest covariance: errors in the noise make small eigenvalues negative."""
+    sizes, turned = np.linalg.eigh((matrix + matrix.T) / 2.0)
+    return np.asarray((turned * np.maximum(sizes, 0.0)) @ turned.T)
