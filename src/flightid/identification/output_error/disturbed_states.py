@@ -9,20 +9,25 @@ disturbance beside noise of known colour, with products of one output left out.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.frozen import dataclass
+from flightid.identification.output_error.whitened_residuals import (
+    LAGS,
+    apart,
+    colour_filters,
+    parts,
+    unforetold,
+)
 from flightid.identification.records.held_model import LinearPoint
 from flightid.models import GreyBoxModel, StateSpaceModel
 from flightid.recursive_filter import filtered
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-LAGS = 12
-"""Of the filters that take the colour of each output off."""
 SMOOTH = 8
 """Frequencies to each side over which a whitened output's power is averaged."""
 FEWEST = 100
@@ -34,14 +39,6 @@ FALSE_ALARMS = 0.001
 TRIED = 2
 """Disturbances whose chance is worked out: those that stand out most."""
 HALVINGS = 25
-REACH = 25
-"""Samples of the past of inputs whose answer is taken out of residuals."""
-SAMPLES_A_NUMBER = 5
-"""Of all records, for each number of that answer."""
-AT_ONCE = 2048
-"""Samples or frequencies that are worked on at a time: long records need no more memory."""
-ROUNDING = 1e-6
-"""Of the largest direction of inputs, below which one tells nothing."""
 
 
 @dataclass(frozen=True)
@@ -152,17 +149,17 @@ def moved_together(
     if not kept or residuals[0].shape[0] < 2:
         return None
     rows = [residuals[k] - residuals[k].mean(axis=1, keepdims=True) for k in kept]
-    rows = _unforetold(rows, [inputs[k] for k in kept] if inputs else [])
-    filters = _filters(rows)
+    rows = unforetold(rows, [inputs[k] for k in kept] if inputs else [])
+    filters = colour_filters(rows)
     if filters is None:
         return None
     white = [
         np.array([filtered(f, [1.0], row) for f, row in zip(filters, each, strict=True)])[:, LAGS:]
         for each in rows
     ]
-    apart = _apart(white)
+    turned = apart(white)
     looked = [
-        _LookedAt.of(each, filters, apart, systems[k], steps_s[k])
+        _LookedAt.of(each, filters, turned, systems[k], steps_s[k])
         for each, k in zip(white, kept, strict=True)
     ]
     n_ways = systems[0].pushes.shape[1]
@@ -176,83 +173,11 @@ def moved_together(
     spread = np.sqrt(spread)
     shown = score / np.where(spread > 0.0, spread, np.inf)
     best = np.argsort(-shown)[:TRIED]
-    parts = [np.abs(weights) ** 2 for each in looked for weights, _ in each.pieces(best)]
-    sizes = np.concatenate(parts, axis=-1)
+    found = [np.abs(weights) ** 2 for each in looked for weights, _ in each.pieces(best)]
+    sizes = np.concatenate(found, axis=-1)
     chances = [_chance(score[way], size) for way, size in zip(best, sizes, strict=True)]
     place = int(np.argmin(chances))
     return ShownDisturbance(int(best[place]) % n_ways, min(len(shown) * chances[place], 1.0))
-
-
-def _unforetold(rows: Sequence[Array], inputs: Sequence[Array]) -> list[Array]:
-    """Residuals less what a response of `REACH` samples to the inputs makes of them."""
-    moved = [k for k in range(len(inputs[0]) if inputs else 0) if any(np.ptp(u[k]) for u in inputs)]
-    samples = sum(each.shape[1] for each in rows)
-    reach = min(REACH, samples // (SAMPLES_A_NUMBER * max(len(moved), 1)))
-    if not moved or reach < 2:
-        return list(rows)
-    about = [u[moved] - u[moved].mean(axis=1, keepdims=True) for u in inputs]
-    padded = [np.pad(u, ((0, 0), (reach, 1)), mode="edge") for u in about]
-
-    def pieces() -> Iterator[tuple[int, slice, Array]]:
-        for k, each in enumerate(rows):
-            for part in _parts(each.shape[1]):
-                yield k, part, _lagged(padded[k], part, reach + 2)
-
-    weights, _ = _regressed(((lags, rows[k][:, part]) for k, part, lags in pieces()), ROUNDING)
-    left = [each.copy() for each in rows]
-    for k, part, lags in pieces():
-        left[k][:, part] -= weights @ lags
-    return left
-
-
-def _parts(count: int) -> Iterator[slice]:
-    """Of so many samples or frequencies, what is held in memory at a time."""
-    for start in range(0, count, AT_ONCE):
-        yield slice(start, min(start + AT_ONCE, count))
-
-
-def _lagged(rows: Array, part: slice, count: int) -> Array:
-    """So many neighbouring samples of each row, the oldest first: (count · rows, samples)."""
-    return np.concatenate([rows[:, part.start + k : part.stop + k] for k in range(count)])
-
-
-def _regressed(
-    pieces: Iterable[tuple[Array, Array]], rounding: float | None
-) -> tuple[Array, Array]:
-    """Weights of rows in others, (n_targets, n_rows), and squares they leave, by pieces of samples.
-
-    A QR factor of what was seen is all that is kept (Golub & Van Loan, Matrix Computations, 5.2).
-    """
-    count, root = 0, np.empty((0, 0))
-    for past, now in pieces:
-        count, beside = len(past), np.concatenate([past, now]).T
-        stacked = np.vstack([root, beside]) if root.size else beside
-        root = np.asarray(np.linalg.qr(stacked, mode="r"))
-    weights = np.linalg.lstsq(root[:count, :count], root[:count, count:], rcond=rounding)[0]
-    return np.asarray(weights.T), np.asarray(np.sum(root[count:, count:] ** 2, axis=0))
-
-
-def _filters(rows: Sequence[Array]) -> list[Array] | None:
-    """Of each output, the filter that takes its colour off; None where there is rounding alone."""
-    found = []
-    for output in range(rows[0].shape[0]):
-        own = [each[output : output + 1] for each in rows]
-        pieces = (_lagged(e, part, LAGS + 1) for e in own for part in _parts(e.shape[1] - LAGS))
-        weights, left = _regressed(((lags[:LAGS], lags[LAGS:]) for lags in pieces), None)
-        if not np.all(np.isfinite(weights)) or left[0] <= 0.0:
-            return None
-        found.append(np.concatenate([[1.0], -weights[0, ::-1]]))
-    return found
-
-
-def _apart(white: Sequence[Array]) -> Array:
-    """Inverse root of the covariance at one instant: sensors may share that (a supply, a mount)."""
-    whole = np.concatenate(white, axis=1)
-    size = np.sqrt(np.mean(whole**2, axis=1))
-    whole = whole / size[:, None]
-    values, vectors = np.linalg.eigh(whole @ whole.T / whole.shape[1])
-    root = vectors / np.sqrt(np.maximum(values, np.finfo(float).eps))
-    return np.asarray(root @ vectors.T / size)
 
 
 @dataclass(frozen=True, eq=False)
@@ -263,7 +188,7 @@ class _LookedAt:
     power: Array
     omega: Array
     filters: Array
-    apart: Array
+    turned: Array
     system: DisturbedSystem
     step_s: float
 
@@ -272,22 +197,22 @@ class _LookedAt:
         cls,
         white: Array,
         filters: Sequence[Array],
-        apart: Array,
+        turned: Array,
         system: DisturbedSystem,
         step_s: float,
     ) -> _LookedAt:
-        spectra = apart @ np.fft.rfft(white, axis=1)[:, 1:]
+        spectra = turned @ np.fft.rfft(white, axis=1)[:, 1:]
         omega = 2.0 * np.pi * np.arange(1, spectra.shape[1] + 1) / (white.shape[1] * step_s)
         power = _smoothed(np.abs(spectra) ** 2)
         told = spectra / np.sqrt(power)
-        return cls(told, power, omega, np.array(filters), apart, system, step_s)
+        return cls(told, power, omega, np.array(filters), turned, system, step_s)
 
     def pieces(self, ways: NDArray[np.intp]) -> Iterator[tuple[Complex, Complex]]:
         """Weights (n_ways, n_outputs, some omega) of disturbances and memories, and `told`."""
         memory, way = np.divmod(ways, self.system.pushes.shape[1])
         needed, place = np.unique(way, return_inverse=True)
         pushes, seen = self.system.pushes[:, needed], self.system.seen[:, needed]
-        for part in _parts(len(self.omega)):
+        for part in parts(len(self.omega)):
             omega = self.omega[part]
             through = self.filters @ np.exp(
                 -1j * np.outer(np.arange(LAGS + 1), omega * self.step_s)
@@ -295,7 +220,7 @@ class _LookedAt:
             grid = 1j * omega[:, None, None] * np.eye(len(self.system.a))
             states = np.linalg.solve(grid - self.system.a, pushes[None])
             moved = (self.system.c @ states + seen).transpose(2, 1, 0) * through
-            moved = (self.apart @ moved) / np.sqrt(self.power[:, part])
+            moved = (self.turned @ moved) / np.sqrt(self.power[:, part])
             slow = [1.0 / np.abs(1j * omega * t + 1.0) for t in MEMORIES_S]
             memories = np.array([np.ones_like(omega), *slow])
             yield moved[place] * memories[memory][:, None, :], self.told[:, part]

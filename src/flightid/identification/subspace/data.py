@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +13,7 @@ from flightid.frozen import dataclass
 from flightid.models.innovations.structure import SubspaceStructure
 from flightid.models.sampled.channels import SampledChannels, gather_channels
 from flightid.record import Record
+from flightid.uncertainty.triangle import folded_triangle
 
 Array = NDArray[np.float64]
 USUAL_HORIZON = 15
@@ -99,7 +100,10 @@ class SubspaceData:
             Rows in the order of the factor, of u then y at one time, time by time. What is
             constant in a record is taken out.
         """
-        triangle: Array = np.zeros((0, len(rows)))
+        return folded_triangle(self._hankel_parts(blocks, rows), len(rows))
+
+    def _hankel_parts(self, blocks: int, rows: NDArray[np.int64]) -> Iterator[Array]:
+        """Columns of the matrix as rows, `BLOCK` at a time."""
         for y, u in zip(self.outputs, self.inputs, strict=True):
             joint, columns = np.vstack([u, y]), y.shape[1] - blocks + 1
             means = np.zeros((blocks * len(joint), 1))
@@ -108,9 +112,7 @@ class SubspaceData:
                 means = np.concatenate([span.mean(axis=1, keepdims=True) for span in spans])
             for first in range(0, columns, BLOCK):
                 part = joint[:, first : min(first + BLOCK, columns) + blocks - 1]
-                some = (_hankel(part, blocks) - means)[rows]
-                triangle = np.asarray(np.linalg.qr(np.vstack([triangle, some.T]), mode="r"))
-        return triangle
+                yield (_hankel(part, blocks) - means)[rows].T
 
     def _about(self, rows: Array) -> Array:
         return rows - rows.mean(axis=1, keepdims=True) if self.channels.levels else rows

@@ -1,0 +1,107 @@
+"""Residuals without what neighbouring inputs foretell of them, without colour and apart.
+
+By pieces of samples: of long records nothing but a triangle is kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.uncertainty.triangle import folded_triangle
+
+Array = NDArray[np.float64]
+LAGS = 12
+"""Of the filters that take the colour of each output off."""
+REACH = 25
+"""Samples of the past of inputs whose answer is taken out of residuals."""
+SAMPLES_A_NUMBER = 5
+"""Of all records, for each number of that answer."""
+AT_ONCE = 2048
+"""Samples or frequencies that are worked on at a time: long records need no more memory."""
+ROUNDING = 1e-6
+"""Of the largest direction of inputs, below which one tells nothing."""
+
+
+def unforetold(rows: Sequence[Array], inputs: Sequence[Array]) -> list[Array]:
+    """Residuals less what a response of `REACH` samples to the inputs makes of them.
+
+    Parameters
+    ----------
+    rows : sequence of ndarray, shape (n_outputs, n_samples)
+        Of each record.
+    inputs : sequence of ndarray, shape (n_inputs, n_samples)
+        None of no record: residuals stay.
+    """
+    moved = [k for k in range(len(inputs[0]) if inputs else 0) if any(np.ptp(u[k]) for u in inputs)]
+    samples = sum(each.shape[1] for each in rows)
+    reach = min(REACH, samples // (SAMPLES_A_NUMBER * max(len(moved), 1)))
+    if not moved or reach < 2:
+        return list(rows)
+    about = [u[moved] - u[moved].mean(axis=1, keepdims=True) for u in inputs]
+    padded = [np.pad(u, ((0, 0), (reach, 1)), mode="edge") for u in about]
+
+    def pieces() -> Iterator[tuple[int, slice, Array]]:
+        for k, each in enumerate(rows):
+            for part in parts(each.shape[1]):
+                yield k, part, _lagged(padded[k], part, reach + 2)
+
+    beside = (np.concatenate([lags, rows[k][:, part]]) for k, part, lags in pieces())
+    count = len(moved) * (reach + 2)
+    weights, _ = _regressed(beside, count, count + len(rows[0]), ROUNDING)
+    left = [each.copy() for each in rows]
+    for k, part, lags in pieces():
+        left[k][:, part] -= weights @ lags
+    return left
+
+
+def colour_filters(rows: Sequence[Array]) -> list[Array] | None:
+    """Of each output, the filter that takes its colour off; None where there is rounding alone.
+
+    By least squares on the past: equations of Yule and Walker, which the noise models of intervals
+    solve (`residual_noise`), give filters whose inverse is stable and bend poles near the circle.
+    """
+    found = []
+    for output in range(rows[0].shape[0]):
+        own = [each[output : output + 1] for each in rows]
+        pieces = (_lagged(e, part, LAGS + 1) for e in own for part in parts(e.shape[1] - LAGS))
+        weights, left = _regressed(pieces, LAGS, LAGS + 1, None)
+        if not np.all(np.isfinite(weights)) or left[0] <= 0.0:
+            return None
+        found.append(np.concatenate([[1.0], -weights[0, ::-1]]))
+    return found
+
+
+def apart(white: Sequence[Array]) -> Array:
+    """Inverse root of the covariance at one instant: sensors may share that (a supply, a mount)."""
+    whole = np.concatenate(white, axis=1)
+    size = np.sqrt(np.mean(whole**2, axis=1))
+    whole = whole / size[:, None]
+    values, vectors = np.linalg.eigh(whole @ whole.T / whole.shape[1])
+    root = vectors / np.sqrt(np.maximum(values, np.finfo(float).eps))
+    return np.asarray(root @ vectors.T / size)
+
+
+def parts(count: int) -> Iterator[slice]:
+    """Of so many samples or frequencies, what is held in memory at a time."""
+    for start in range(0, count, AT_ONCE):
+        yield slice(start, min(start + AT_ONCE, count))
+
+
+def _lagged(rows: Array, part: slice, count: int) -> Array:
+    """So many neighbouring samples of each row, the oldest first: (count · rows, samples)."""
+    return np.concatenate([rows[:, part.start + k : part.stop + k] for k in range(count)])
+
+
+def _regressed(
+    pieces: Iterable[Array], count: int, width: int, rounding: float | None
+) -> tuple[Array, Array]:
+    """Weights in the first `count` of so many rows that foretell the others, and squares left.
+
+    Rows come by pieces of samples; weights (width - count, count).
+    """
+    root = folded_triangle((piece.T for piece in pieces), width)
+    weights = np.linalg.lstsq(root[:count, :count], root[:count, count:], rcond=rounding)[0]
+    return np.asarray(weights.T), np.asarray(np.sum(root[count:, count:] ** 2, axis=0))
