@@ -14,6 +14,10 @@ const NOTHING: [&[u8]; 12] = [
 ///
 /// None where it is anything else, or where its digits are too many to be read in one go.
 pub fn plain_number(text: &[u8], delimiter: u8, point: &mut Option<u8>) -> Option<(f64, usize)> {
+    // A comma that parts cells is no point, and one point is known: nothing is left to find out.
+    if delimiter == b',' || *point == Some(b'.') {
+        return pointed(text, delimiter);
+    }
     let is_negative = text[0] == b'-';
     let mut at = usize::from(is_negative);
     let (mut digits, mut n_digits, mut n_decimals) = (0_u64, 0_usize, 0_usize);
@@ -45,6 +49,17 @@ pub fn plain_number(text: &[u8], delimiter: u8, point: &mut Option<u8>) -> Optio
         return parsed(&text[..at], mark).map(|value| (value, at));
     };
     Some((if is_negative { -value } else { value }, at))
+}
+
+/// A number with a decimal point or none, with an exponent or none.
+fn pointed(text: &[u8], delimiter: u8) -> Option<(f64, usize)> {
+    let first = text[usize::from(text[0] == b'-')..].first()?;
+    if !(first.is_ascii_digit() || *first == b'.') {
+        return None; // a sign more, and words such as inf: cells that are looked at in full
+    }
+    let (value, length) = fast_float2::parse_partial(text).ok()?;
+    let end = *text.get(length)?;
+    (end == delimiter || end == b'\n' || end == b'\r').then_some((value, length))
 }
 
 /// Whether a mark may be the decimal point of a file that has used `point`.
@@ -91,13 +106,29 @@ mod tests {
             for text in [format!("{value}"), format!("{value:.decimals$}"), format!("{value:e}")] {
                 let told: f64 = text.parse().unwrap();
                 let line = format!("{text}\n");
-                let read = match plain_number(line.as_bytes(), b',', &mut None) {
-                    Some((read, length)) => { prop_assert_eq!(length, text.len()); read }
-                    None => number(text.as_bytes(), b',', &mut None).unwrap(),
-                };
-                prop_assert!(read == told || read.is_nan() && told.is_nan(), "{} {}", text, read);
+                for (delimiter, mut point) in [(b',', None), (b';', None), (b';', Some(b'.'))] {
+                    let read = match plain_number(line.as_bytes(), delimiter, &mut point) {
+                        Some((read, length)) => { prop_assert_eq!(length, text.len()); read }
+                        None => number(text.as_bytes(), delimiter, &mut point).unwrap(),
+                    };
+                    prop_assert!(read == told || read.is_nan() && told.is_nan(), "{} {}", text, read);
+                }
             }
         }
+    }
+
+    #[test]
+    fn what_only_begins_as_a_number_is_none_in_one_go() {
+        for text in ["1e", "1.2.3", "1,2", "+1", "inf", "nan", "-", ".", "--1", "1 ", "0x1"] {
+            for point in [None, Some(b'.')] {
+                let line = format!("{text}\n");
+                let read = plain_number(line.as_bytes(), b';', &mut point.clone());
+                let comma = text == "1,2" && point.is_none();
+                assert_eq!(read, comma.then_some((1.2, 3)), "{text}");
+            }
+        }
+        assert_eq!(plain_number(b"1,2\n", b',', &mut None), Some((1.0, 1)));
+        assert_eq!(plain_number(b"12", b',', &mut None), None, "no end in sight");
     }
 
     #[test]
