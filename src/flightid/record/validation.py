@@ -17,6 +17,8 @@ REPEATING = 0.5
 """Least correlation of inputs a declared period apart."""
 FEWEST_COMPARED = 8
 """Samples beyond the first period below which a record tells nothing of it."""
+AT_ONCE = 1 << 14
+"""Stamps that are compared at once."""
 TIME = "time_s"
 """Name of the time dimension and coordinate of a record."""
 
@@ -131,6 +133,20 @@ def require_period(
         )
 
 
+def _farthest(time_s: NDArray[np.float64], sample_time_s: float) -> float:
+    """Longest way of a stamp from its place on the grid, s."""
+    far, count = 0.0, np.arange(min(AT_ONCE, time_s.size), dtype=np.float64)
+    # Spans that stay in the cache: long records are made several times on their way, and each asks.
+    for first in range(0, time_s.size, AT_ONCE):
+        stamps = time_s[first : first + AT_ONCE]
+        away = count[: stamps.size] + first
+        away *= sample_time_s
+        away += time_s[0]
+        away -= stamps
+        far = max(far, float(away.max()), -float(away.min()))
+    return far
+
+
 def uniform_sample_time(time_s: NDArray[np.float64]) -> float:
     """Sample time of uniform stamps, s; refused where they are not uniform."""
     if time_s.ndim != 1 or time_s.size < 2:
@@ -140,12 +156,7 @@ def uniform_sample_time(time_s: NDArray[np.float64]) -> float:
     sample_time_s = float(time_s[-1] - time_s[0]) / (time_s.size - 1)
     if sample_time_s <= 0:
         raise DataError("time stamps do not increase", needed="increasing stamps in seconds")
-    # In place: long records are made several times on their way, and each asks.
-    away = np.arange(time_s.size, dtype=np.float64)
-    away *= sample_time_s
-    away += time_s[0]
-    away -= time_s
-    worst = float(max(away.max(), -away.min())) / sample_time_s
+    worst = _farthest(time_s, sample_time_s) / sample_time_s
     if worst > UNIFORM_TOLERANCE:
         step = rounded_step_s(time_s)
         raise DataError(
