@@ -46,3 +46,16 @@ def test_less_feed_forward_is_advised_only_where_there_is_some(review: fid.Fligh
             assert ("forward" in said[0]) is (value < 9.0 or name == "roll attitude")
             assert said[1]
             assert "forward" not in said[1]
+
+
+def test_px4_feeds_no_attitude_forward_without_its_reference_model() -> None:
+    """Its angle loops were advised to be fed less of what nothing feeds them."""
+    known = {"MC_ROLL_P": 6.5, "MC_PITCH_P": 6.5, "MC_YAW_P": 2.8, "MC_ROLLRATE_FF": 0.0}
+    flown = SimpleNamespace(
+        kind="px4", vehicle="copter", parameters=known, parameter_changes=(), messages={}
+    )
+    assert unfed_loops(cast("fid.Log", flown)) == ("roll rate", "roll attitude", "pitch attitude")
+    flown.parameters = {**known, "MC_REF_FF": 0.4}
+    assert unfed_loops(cast("fid.Log", flown)) == ("roll rate",)
+    flown.parameters = {"MC_ROLLRATE_FF": 0.0}
+    assert unfed_loops(cast("fid.Log", flown)) == ("roll rate",)

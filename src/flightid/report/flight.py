@@ -48,8 +48,7 @@ def flight_blocks(
 
 def flight_document(review: FlightReview) -> Document:
     """A page of its own for a flight."""
-    untold = "" if review.phases.airborne else "Nothing was flown: what the log tells is below."
-    opening = (Paragraph(untold),) if untold else ()
+    opening = (Paragraph(review.answer),)
     return Document(
         f"Flight {review.name}",
         review.in_short,

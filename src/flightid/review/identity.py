@@ -130,11 +130,25 @@ def unfed_loops(log: Log) -> tuple[str, ...]:
     for axis in AXES:
         roles = [e for e in parameter_entries(autopilot, axis) if e.role in ("ff", "d_ff")]
         names = [n for each in roles for n in (each.name, *each.older) if n in log.parameters]
-        shaped = ["ATC_RATE_FF_ENAB"] if "ATC_RATE_FF_ENAB" in log.parameters else []
-        for loop, feeding in (("rate", names), ("attitude", shaped)):
-            if feeding and not any(log.parameters[n] or n in changed for n in feeding):
+        shaped = _shaping(log, autopilot, axis)
+        for loop, feeding in (("rate", names or None), ("attitude", shaped)):
+            if feeding is not None and not any(log.parameters[n] or n in changed for n in feeding):
                 unfed.append(f"{axis} {loop}")
     return tuple(unfed)
+
+
+def _shaping(log: Log, autopilot: str, axis: str) -> list[str] | None:
+    """Parameters by which an attitude's set-point acts on the rate's beside the angle controller.
+
+    None where they are not known. PX4 feeds the yaw stick's rate forward whatever its parameters
+    say, roll and pitch by a reference model alone, which not every firmware has: where the angle's
+    gain is logged and no MC_REF_FF, nothing is fed.
+    """
+    if autopilot == "px4_multicopter":
+        if axis == "yaw" or f"MC_{axis.upper()}_P" not in log.parameters:
+            return None
+        return [name for name in ("MC_REF_FF",) if name in log.parameters]
+    return [name for name in ("ATC_RATE_FF_ENAB",) if name in log.parameters] or None
 
 
 BATTERY = {

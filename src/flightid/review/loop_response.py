@@ -57,6 +57,9 @@ class LoopResponse(
         Error up to which the angle controller is proportional, where parameters end it.
     asked : float or None
         Standard deviation of the set-point over the samples of `tracking`, in the same unit.
+    fly_in : str
+        Mode in which sticks would move this set-point, where the whole flight was by rates; else
+        empty.
 
     Example
     -------
@@ -84,6 +87,7 @@ class LoopResponse(
     is_bent: bool = False
     proportional_rad: float | None = None
     asked: float | None = None
+    fly_in: str = ""
 
     @property
     def name(self) -> str:

@@ -33,6 +33,7 @@ from flightid.review.step_features import (
     still_moves,
     window_features,
 )
+from flightid.review.sticks_to_fly import mode_to_fly, what_to_fly
 from flightid.review.thresholds import (
     FASTEST_ATTITUDE,
     FASTEST_RATE,
@@ -58,8 +59,6 @@ WINDOW_S = {"rate": 0.5, "attitude": 1.5}
 SLOWEST_HZ = {"rate": 2.0, "attitude": 0.5}
 PACE = {"rate": 1.0, "attitude": 2.5}
 STRETCHES = 10
-QUICK_DEG = 10.0, 20.0
-"""Stick moves that tell the loop of an attitude."""
 HARDLY = 0.1
 """Of what counts as quick sticks: a set-point that moves less was not meant to move."""
 TRACKING = "tracking error, rms"
@@ -117,7 +116,10 @@ def _loop(log: Log, spans: tuple[Span, ...], axis: str, loop: str) -> LoopRespon
     if pair is None:
         return None
     labels = pair.set_point.label, pair.measured.label
-    blank = LoopResponse(axis, loop, *labels, 0.0, 0.0, 0, None, None, EMPTY, EMPTY, EMPTY)
+    blank = LoopResponse(
+        axis, loop, *labels, 0.0, 0.0, 0, None, None, EMPTY, EMPTY, EMPTY,
+        fly_in=mode_to_fly(log, loop, spans),
+    )  # fmt: skip
     if not spans:
         return replace(blank, reason="nothing was flown", action="hand in a log of a flight")
     pieces = _pieces(pair, spans)
@@ -352,24 +354,3 @@ def _is_told(level: Reading) -> bool:
     if half is None or value is None:
         return False
     return half <= WIDEST_LEVEL.value * min(1.0, abs(value))
-
-
-def what_to_fly(begun: LoopResponse) -> str:
-    """What to fly so that this loop shows a step."""
-    size, unit = _size_to_fly(begun)
-    now = math.degrees(begun.moved or 0.0)
-    return (
-        f"fly a minute with quick moves of the {begun.axis} stick, {size}, two a second at most "
-        f"(the set-point's standard deviation was {now:.2g} {unit})"
-    )
-
-
-def _size_to_fly(begun: LoopResponse) -> tuple[str, str]:
-    """Size of stick moves, no larger than the angle controller is proportional to, and its unit."""
-    if begun.loop == "rate":
-        return "30 to 60 deg/s to both sides", "deg/s"
-    least, most = QUICK_DEG
-    limit = math.inf if begun.proportional_rad is None else math.degrees(begun.proportional_rad)
-    if limit < least:
-        return f"to both sides by {limit:.2g} deg at once, or less", "deg"
-    return f"{least:g} to {min(most, limit):.2g} deg to both sides", "deg"

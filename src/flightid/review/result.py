@@ -9,9 +9,10 @@ from flightid.frozen import dataclass
 from flightid.inspection.flight_phases import FlightPhases
 from flightid.inspection.log_clock import logged_words
 from flightid.inspection.signals import Signal
-from flightid.inspection.verdict_lines import verdict_lines
+from flightid.inspection.verdict_lines import WIDTH, verdict_lines
 from flightid.result import Result
 from flightid.review import tables
+from flightid.review.closing import closing_lines
 from flightid.review.filters import FilterReview
 from flightid.review.flown_range import FlownRange, range_table
 from flightid.review.gyro_noise import GyroNoise
@@ -21,6 +22,7 @@ from flightid.review.motors import MotorUse
 from flightid.review.vibration import Vibration
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Estimate
+from flightid.wrapping import wrapped
 
 KINDS = {"mavlink": "telemetry of a"}
 """What a reader calls a kind of log."""
@@ -144,23 +146,33 @@ class FlightReview(
             self.noise.summary(),
             self.filters.table(),
             self.filters.noise_table(),
-            self.filters.choice_table(),
+            *(() if self.phases.fall else (self.filters.choice_table(),)),
             tables.modes(self.identity.modes),
             tables.gains(self.identity),
         )
         return tuple(table.without_empty_columns() for table in made if table.rows)
 
     def to_text(self) -> str:
-        """Tables, then the verdicts, the worst last, where eyes are."""
+        """Tables, the verdicts, the worst last, and where eyes are what it comes to."""
         said = (table.to_text() for table in self.tables())
-        return "\n\n".join([*said, verdict_lines(self.findings)])
+        end = (line for each in closing_lines(self) for line in wrapped(each, WIDTH))
+        return "\n\n".join([*said, verdict_lines(self.findings), "\n".join(end)])
 
     def _tables(self) -> tuple[Table, ...]:
         return self.tables()
 
     def _computed(self) -> dict[str, object]:
         known = self.phases.is_known
-        return {"verdict": self.verdict, "airborne_s": self.phases.airborne_s if known else None}
+        return {
+            "verdict": self.verdict,
+            "answer": self.answer,
+            "airborne_s": self.phases.airborne_s if known else None,
+        }
+
+    @property
+    def answer(self) -> str:
+        """What the flight tells and what is next, in sentences."""
+        return " ".join(closing_lines(self))
 
     @property
     def in_short(self) -> str:

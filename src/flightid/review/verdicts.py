@@ -10,10 +10,10 @@ from flightid.findings import Finding, worst_last
 from flightid.inspection.advice import LOGGING
 from flightid.review.filter_findings import filter_findings
 from flightid.review.loop_response import LoopResponse
-from flightid.review.loops import what_to_fly
 from flightid.review.motors import LIMITS, MotorUse
 from flightid.review.result import FlightReview
 from flightid.review.step_features import FALLS, RISES
+from flightid.review.sticks_to_fly import what_to_fly
 from flightid.review.tables import cell
 from flightid.review.thresholds import LEVEL_OFF, OVERSHOOT, SATURATED, UNBALANCED
 from flightid.review.vibration import Vibration
@@ -102,12 +102,11 @@ def _loops(review: FlightReview) -> Iterator[Finding]:
         return
     for loop in review.loops:
         if not loop.is_told:
-            yield Finding(
-                f"no-step-{loop.axis}-{loop.loop}",
-                Light.AMBER,
-                f"{loop.name}: no step, {loop.reason}",
-                loop.action,
-            )
+            light, said = Light.AMBER, f"{loop.name}: no step, {loop.reason}"
+            if loop.fly_in:
+                # Nothing is amiss: nobody asked anything of this loop.
+                light, said = Light.UNKNOWN, f"{said}; all sticks asked for was rates"
+            yield Finding(f"no-step-{loop.axis}-{loop.loop}", light, said, loop.action)
     if not review.loops:
         yield Finding(
             "no-set-points",

@@ -1,0 +1,85 @@
+"""The end of a flight's review: which steps it tells, and the command that goes on from it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from flightid.conventions import Light
+from flightid.findings import CAUSES
+from flightid.surface import spoken
+
+if TYPE_CHECKING:
+    from flightid.review.result import FlightReview
+
+AMISS = (Light.AMBER, Light.RED)
+PLANNED = ("copter", "plane")
+"""Vehicles of ArduPilot for which sweeps can be planned."""
+
+
+def closing_lines(review: FlightReview) -> Iterator[str]:
+    """Sentences that end a review: a fall first, steps of the loops, what is next.
+
+    Parameters
+    ----------
+    review : FlightReview
+        Of which the verdicts are made.
+    """
+    phases = review.phases
+    if phases.is_known and not phases.airborne:
+        yield "This log holds no flight, so it tells nothing of the vehicle in the air."
+        return
+    if phases.fall:
+        yield f"{phases.fall[0].upper()}{phases.fall[1:]}."
+    yield _told(review)
+    if way := _next(review):
+        yield spoken(f"Next: {way}.")
+
+
+def _told(review: FlightReview) -> str:
+    """Loops whose steps are told, by how they are judged, and those whose steps are not."""
+    if not review.loops:
+        return "This flight tells no step: no loop is logged."
+    lights = {each.code: each.light for each in review.findings}
+    groups: dict[Light, list[str]] = {}
+    for loop in review.loops:
+        if loop.is_told:
+            light = lights.get(f"step-{loop.axis}-{loop.loop}", Light.UNKNOWN)
+            groups.setdefault(light, []).append(loop.name)
+    words = {
+        Light.GREEN: "nothing against {}",
+        Light.AMBER: "in doubt {}",
+        Light.UNKNOWN: "too uncertain to judge {}",
+    }
+    parts = [words[light].format(_listed(groups[light])) for light in words if light in groups]
+    count = sum(map(len, groups.values()))
+    if not count:
+        return f"This flight tells no step of its {len(review.loops)} loops."
+    return (
+        f"This flight tells the steps of {count} of {len(review.loops)} loops: {'; '.join(parts)}."
+    )
+
+
+def _next(review: FlightReview) -> str:
+    """What goes on from here: the cause of a fall, sweeps that were flown, or sweeps to fly."""
+    if review.phases.fall:
+        return "find the cause of the fall; sweeps, filters and gains come after it"
+    if review.swept:
+        return f"flightid tune {review.name} (models of its sweeps, then gains)"
+    mended = any(f.light in AMISS and f.code.startswith(CAUSES) for f in review.findings)
+    way = "mend what is said of motors and vibration first" if mended else ""
+    if review.kind != "ardupilot" or review.vehicle in PLANNED:
+        planned = f"flightid plan {review.name} (sweeps to fly, for models and gains)"
+        way = "; then ".join(filter(None, (way, planned)))
+    return way
+
+
+def _listed(names: list[str]) -> str:
+    """Names in a sentence.
+
+    Example
+    -------
+    >>> _listed(["roll rate", "yaw rate", "yaw attitude"])
+    'roll rate, yaw rate and yaw attitude'
+    """
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
