@@ -3,21 +3,59 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from flightid.conventions import Light
-from flightid.findings import CAUSES
+from flightid.findings import CAUSES, Finding
+from flightid.inspection.flight_phases import FlightPhases
+from flightid.review.loop_response import LoopResponse
 from flightid.surface import spoken
-
-if TYPE_CHECKING:
-    from flightid.review.result import FlightReview
 
 AMISS = (Light.AMBER, Light.RED)
 PLANNED = ("copter", "plane")
 """Vehicles of ArduPilot for which sweeps can be planned."""
 
 
-def closing_lines(review: FlightReview) -> Iterator[str]:
+class ReviewedFlight(Protocol):
+    """What is asked of a `FlightReview`."""
+
+    @property
+    def name(self) -> str:
+        """File of its log."""
+        ...
+
+    @property
+    def kind(self) -> str:
+        """Who wrote it."""
+        ...
+
+    @property
+    def vehicle(self) -> str | None:
+        """Kind of vehicle."""
+        ...
+
+    @property
+    def phases(self) -> FlightPhases:
+        """Airborne spans."""
+        ...
+
+    @property
+    def loops(self) -> tuple[LoopResponse, ...]:
+        """Loops of each axis."""
+        ...
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """Verdicts."""
+        ...
+
+    @property
+    def swept(self) -> bool:
+        """Whether the autopilot flew sweeps."""
+        ...
+
+
+def closing_lines(review: ReviewedFlight) -> Iterator[str]:
     """Sentences that end a review: a fall first, steps of the loops, what is next.
 
     Parameters
@@ -36,7 +74,7 @@ def closing_lines(review: FlightReview) -> Iterator[str]:
         yield spoken(f"Next: {way}.")
 
 
-def _told(review: FlightReview) -> str:
+def _told(review: ReviewedFlight) -> str:
     """Loops whose steps are told, by how they are judged, and those whose steps are not."""
     if not review.loops:
         return "This flight tells no step: no loop is logged."
@@ -60,7 +98,7 @@ def _told(review: FlightReview) -> str:
     )
 
 
-def _next(review: FlightReview) -> str:
+def _next(review: ReviewedFlight) -> str:
     """What goes on from here: the cause of a fall, sweeps that were flown, or sweeps to fly."""
     if review.phases.fall:
         return "find the cause of the fall; sweeps, filters and gains come after it"
