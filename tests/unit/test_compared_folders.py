@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import click
 import pytest
 
 import flightid as fid
-from flightid.cli.compared_loops import paired_models
 from flightid.cli.program import run
+from flightid.errors import ModelError
+from flightid.study.paired_models import paired_models
 
 
 def _folder(path: Path, **models: str) -> str:
@@ -33,5 +33,5 @@ def test_models_pair_by_name_else_by_what_they_take_and_give(
     assert "Lp" in said
     assert "Mq" in said
     swapped = _folder(tmp_path / "swapped", Roll="yaw")
-    with pytest.raises(click.UsageError, match=r"Roll \(r of tau_psi\); name the files of two"):
+    with pytest.raises(ModelError, match=r"Roll \(r of tau_psi\)"):
         paired_models([_folder(tmp_path / "only", Roll="roll"), swapped])

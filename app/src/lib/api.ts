@@ -1,4 +1,4 @@
-import type { RemovedItem, CompareRequest, ComparisonPart, Edit, FieldGroup, FilterScreen, FlightScreen, FormulaUnit, GainsScreen, Job, Listing, LogItem, ModelAnswer, OwnModelAnswer, OwnModel, PlanPart, PlanRequest, PlotLayout, ProposedStudy, RigItem, RigScreen, RunScreen, ShownModel, StudyText, UseEdits } from "./types";
+import type { RemovedItem, CompareRequest, ComparisonPart, Edit, FieldGroup, FilterScreen, FlightScreen, FormulaUnit, GainsScreen, Job, Listing, LogItem, ModelAnswer, OwnModelAnswer, OwnModel, PlanPart, PlanRequest, PlotLayout, ProposedStudy, RigItem, RigScreen, RunScreen, ShownModel, StudyComparison, StudyText, UseEdits } from "./types";
 
 /** A refusal of the server, in its own words. */
 export class Refusal extends Error {
@@ -52,6 +52,7 @@ export const fields = (log: string) => json<FieldGroup[]>(`/api/logs/${log}/fiel
 export const study = (log: string) => json<StudyText | null>(`/api/studies/${log}`);
 export const gains = (log: string, again = false) => json<GainsScreen>(`/api/gains/${log}?again=${again}`, sent("POST", {}));
 export const compare = (asked: CompareRequest) => json<ComparisonPart>("/api/comparisons", sent("POST", asked));
+export const compareStudies = (before: string, after: string) => json<StudyComparison>("/api/comparisons/studies", sent("POST", { before, after }));
 export const plan = (asked: PlanRequest) => json<PlanPart>("/api/plans", sent("POST", asked));
 export const library = () => json<ShownModel[]>("/api/library");
 export const model = (log: string, name: string, edits: Edit[] = []) => json<ModelAnswer>(`/api/models/${log}`, sent("POST", { model: name, edits }));

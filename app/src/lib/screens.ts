@@ -47,7 +47,7 @@ export const SCREENS: Screen[] = [
   { name: "flight", title: "Flight", component: Flight, ofLog: true, needsStudy: false, shows: (given) => Boolean(given.log) && !ofRecords(given) },
   { name: "response", title: "Response", component: Response, ofLog: true, needsStudy: true, shows: hasModels },
   { name: "gains", title: "Gains", component: Gains, ofLog: true, needsStudy: true, shows: hasModels },
-  { name: "compare", title: "Compare", component: Compare, ofLog: true, needsStudy: false, shows: (given) => Boolean(given.log) && !ofRecords(given) },
+  { name: "compare", title: "Compare", component: Compare, ofLog: true, needsStudy: false, shows: (given) => Boolean(given.log) && (!ofRecords(given) || hasModels(given)) },
   { name: "plan", title: "Plan", component: Plan, ofLog: true, needsStudy: false, shows: (given) => Boolean(given.log) && !ofRecords(given) },
   { name: "records", title: "Records", component: Records, ofLog: true, needsStudy: false, shows: (given) => Boolean(given.log) && ofRecords(given) },
   { name: "model", title: "Model", component: Model, ofLog: true, needsStudy: true, shows: hasModels },

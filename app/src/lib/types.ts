@@ -1056,6 +1056,20 @@ export interface StripLine {
   high: (number | null)[];
 }
 
+/** What two studies found, each pair of models a section of the report's tree. */
+export interface StudyComparison {
+  names: [string, string];
+  changed: string[];
+  light: "green" | "amber" | "red" | "unknown";
+  sections: Record<string, unknown>[];
+}
+
+/** Two logs, or records, whose studies were run. */
+export interface StudyPairRequest {
+  before: string;
+  after: string;
+}
+
 /** What parts of a study are known by: a change of one leaves what rests on others as it is. */
 export interface StudyParts {
   models: string;

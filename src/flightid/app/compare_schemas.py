@@ -62,6 +62,23 @@ class ComparisonPart(Message):
     back: GainFile | None
 
 
+class StudyPairRequest(Message):
+    """Two logs, or records, whose studies were run."""
+
+    before: str
+    after: str
+
+
+class StudyComparison(Message):
+    """What two studies found, each pair of models a section of the report's tree."""
+
+    names: tuple[str, str]
+    changed: list[str]
+    """Those whose models have changed since the run that is compared."""
+    light: Light
+    sections: list[dict[str, Any]]
+
+
 class PlanWishes(Message):
     """Options of ``flightid plan``; those that are None are as usual."""
 

@@ -27,6 +27,7 @@ from flightid.app.removed_routes import add_removed_routes
 from flightid.app.rig_routes import add_rig_routes
 from flightid.app.run_routes import add_run_routes
 from flightid.app.studies import Studies
+from flightid.app.study_compare_routes import add_study_compare_routes
 from flightid.app.study_routes import add_study_routes
 from flightid.app.workspace import Workspace
 from flightid.errors import FlightidError
@@ -41,6 +42,7 @@ ROUTES: tuple[Callable[[FastAPI, Backstage], None], ...] = (
     add_study_routes,
     add_gain_routes,
     add_compare_routes,
+    add_study_compare_routes,
     add_rig_routes,
     add_run_routes,
     add_fly_routes,

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from flightid.cli.compared_loops import compared_loops, paired_models, short_names
+from flightid.cli.compared_loops import compared_loops, short_names
 from flightid.cli.figures import QuotientRange
 from flightid.cli.hints import PARAMETERS
 from flightid.cli.lists import ListOption, ListsCommand
@@ -159,6 +159,7 @@ def _conditions(
     """Parameters and modes; none of models that have no names for them, where margins are there."""
     from flightid import compare_conditions
     from flightid.errors import ModelError
+    from flightid.study.paired_models import paired_models
 
     if len(files) == 1 and not needed:
         return []

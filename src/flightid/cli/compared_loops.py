@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from flightid.cli.gain_files import controller_of, rate_of
+from flightid.cli.gain_files import rate_of
 from flightid.cli.model_commands import gains_of
 from flightid.cli.sources import load_source
 
 if TYPE_CHECKING:
-    from flightid.models import Model
     from flightid.review import MarginComparison
-
-CONTROLLER = "controller.toml"
-"""Gains of a PID that a study tuned, in the folder of its results."""
 
 
 def compared_loops(
@@ -35,6 +31,8 @@ def compared_loops(
     click.UsageError
         Not two sides.
     """
+    from flightid.control.stepped.controller_files import CONTROLLER
+
     own = [Path(file) / CONTROLLER for file in files]
     if not gains and not feedback and all(each.is_file() for each in own):
         gains = own
@@ -61,6 +59,7 @@ def _compared(
     names: tuple[str, str],
 ) -> Iterator[MarginComparison]:
     from flightid import compare_margins
+    from flightid.control.stepped.controller_files import controller_of
 
     for sources in _sources(files, axis):
         if laws is None:
@@ -73,66 +72,14 @@ def _compared(
 
 def _sources(files: Sequence[str], axis: str | None) -> Iterator[tuple[Any, Any]]:
     """Models of both sides: one pair, or those of two studies."""
+    from flightid.study.paired_models import paired_models
+
     if all(Path(file).is_dir() for file in files):
         pairs = [(each[0], each[-1]) for each in paired_models(files).values()]
     else:
         loaded = [load_source(name, axis) for name in files]
         pairs = [(loaded[0], loaded[-1])]
     yield from pairs
-
-
-def paired_models(folders: Sequence[str]) -> dict[str, tuple[Model, ...]]:
-    """Models that stand for the same in several studies, by the name of the first.
-
-    Those of one name go together; those left over where their inputs and outputs are the same and
-    no other of either folder has these.
-
-    Raises
-    ------
-    click.UsageError
-        The studies share none: what each holds is said.
-    """
-    from flightid.models.saved_files import models_of
-
-    found = [
-        {path.stem: load_source(str(path)) for path in models_of(Path(each))} for each in folders
-    ]
-    first, *others = found
-    pairs: dict[str, tuple[Model, ...]] = {}
-    for name, model in first.items():
-        beside = [_partner(name, model, first, other) for other in others]
-        if all(each is not None for each in beside):
-            pairs[name] = (model, *(each for each in beside if each is not None))
-    if not pairs:
-        held = "; ".join(
-            f"{folder}: {', '.join(f'{n} ({_channels(m)})' for n, m in each.items())}"
-            for folder, each in zip(folders, found, strict=True)
-        )
-        raise click.UsageError(
-            f"no model of one has its name, or its inputs and outputs, in the other: {held}; "
-            "name the files of two models"
-        )
-    return pairs
-
-
-def _partner(
-    name: str, model: Model, own: Mapping[str, Model], other: Mapping[str, Model]
-) -> Model | None:
-    """The model of another study that stands for the same."""
-    same = other.get(name)
-    if same is not None and _channels(same) == _channels(model):
-        return same
-    left = [each for key, each in other.items() if key not in own]
-    alike = [each for each in left if _channels(each) == _channels(model)]
-    mine = [each for key, each in own.items() if key not in other]
-    rivals = [each for each in mine if _channels(each) == _channels(model)]
-    if same is None and len(alike) == len(rivals) == 1:
-        return alike[0]
-    return None
-
-
-def _channels(model: Model) -> str:
-    return f"{', '.join(model.outputs)} of {', '.join(model.inputs)}"
 
 
 def short_names(paths: Sequence[str]) -> list[str]:

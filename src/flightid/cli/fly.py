@@ -141,7 +141,7 @@ def _fly(flown: Callable[[], FlownSession], target: Path | None, *, as_json: boo
 
 
 def _gains(file: Path, model: Model, rate_hz: float) -> GainController:
-    from flightid.cli.gain_files import controller_of
+    from flightid.control.stepped.controller_files import controller_of
 
     note(f"Controllers run at {rate_hz:g} Hz; --rate takes another")
     made = controller_of(file, model, rate_hz)

@@ -39,6 +39,7 @@ from flightid.study.structures import goal_findings
 from flightid.uncertainty.quantiles import interval_words, shown
 
 if TYPE_CHECKING:
+    from flightid.dynamics import Modes
     from flightid.identification import Fit
     from flightid.study.identified import ModelResults
     from flightid.study.truth import Truth
@@ -137,8 +138,8 @@ def _parts(item: ModelResults, truth: Truth | None) -> Iterator[Section]:
         yield section_of("Residual tests", _tests, item.tests)
     if fit is not None and isinstance(fit.model, StateSpaceModel):
         yield section_of("Modes and derivatives", _physics, item, fit)
-    elif fit is not None and item.reference is not None:
-        yield section_of("Modes beside the reference's", _beside, item, fit)
+    elif fit is not None and (found := _modes_of(fit)) is not None:
+        yield section_of("Modes", _plain_modes, item, fit, found)
     for name, verification in item.verifications.items():
         yield section_of(f"Prediction of “{name}”", verification_blocks, verification)
     if item.spectra is not None:
@@ -188,6 +189,20 @@ def _physics(item: ModelResults, fit: Fit) -> Iterator[Block]:
     except ModelError as reason:
         shown = (Paragraph(f"No modes: {reason}."),)
     yield from (*shown, *physics_blocks(approximations, table))
+    yield from _beside(item, fit)
+
+
+def _modes_of(fit: Fit) -> Modes | None:
+    """Modes of a model without equations; None where it has none: no linear system, or delays."""
+    try:
+        found = modes(fit)
+    except ModelError:
+        return None
+    return found if len(found) else None
+
+
+def _plain_modes(item: ModelResults, fit: Fit, found: Modes) -> Iterator[Block]:
+    yield from modes_blocks(found)
     yield from _beside(item, fit)
 
 
