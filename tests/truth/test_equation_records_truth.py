@@ -130,14 +130,22 @@ def test_unstable_short_period_is_recovered_from_a_long_record():
 
 
 def covered(make, n_flights):
-    """Share of intervals that hold the truth, over all free parameters and flights."""
-    hits = []
+    """Share of intervals that hold the truth, over all free parameters and flights, in percent.
+
+    The hold is declared: undeclared, bars span what either hold would give and hold too often. A
+    sound flight in a hundred may show none, where a test says by chance that dynamics are missing.
+    """
+    hits, without = [], 0
     for seed in range(n_flights):
         model, record = make(seed)
-        fit = fid.identify(moved(model, 1.05), record, output_bias=False)
+        fit = fid.identify(moved(model, 1.05), record, output_bias=False, hold="first")
+        if fit.parameters[fit.names[0]].interval95 is None:
+            without += 1
+            continue
         for parameter in model.parameters.free:
             low, high = fit.parameters[parameter.name].interval95
             hits.append(low <= parameter.value <= high)
+    assert without <= 0.03 * n_flights
     return 100.0 * np.mean(hits)
 
 
