@@ -101,6 +101,33 @@ def test_windows_alone_call_leakage_coherent() -> None:
     assert "fade out" in found.action
 
 
+def flown_in_a_loop() -> Record:
+    """The fading sweep as command: the loop brings noise of the output into the input."""
+    command, _ = flown(fades=True)
+    noise = 0.02 * np.random.default_rng(9).standard_normal(len(command))
+    ahead = np.zeros(len(DENOMINATOR) - 1)
+    u, y = np.zeros_like(command), np.zeros_like(command)
+    for k, value in enumerate(command):
+        y[k] = ahead[0] + noise[k]  # nothing passes within a sample
+        u[k] = value - 0.2 * y[k]
+        ahead = signal.lfilter(NUMERATOR.ravel(), DENOMINATOR, [u[k]], zi=ahead)[1]
+    t = np.arange(len(u)) * STEP_S
+    return fid.Record.from_arrays(t, inputs={"u": u}, outputs={"y": y}, excitations={"r": command})
+
+
+def test_beyond_its_excitation_a_loop_tells_nothing() -> None:
+    given = fid.estimate_response(flown_in_a_loop(), estimator="instrument")
+    shown, band = given.shown, fid.response_band(given, "u", "y")
+    assert band is not None
+    true = np.abs(truth(band.omega_rad_s))
+    holds = (band.gain[0] <= true) & (true <= band.gain[1])
+    beyond = band.omega_rad_s > 30.0
+    assert np.count_nonzero(beyond) > 5
+    assert np.mean(holds[beyond]) >= 0.9
+    assert np.mean(holds[~beyond]) >= 0.9
+    assert np.all(shown.coherence[0, 0, beyond] < COHERENT)
+
+
 def test_a_sound_sweep_keeps_its_band() -> None:
     given = fid.estimate_response(record(*flown(fades=True)))
     before, after = (

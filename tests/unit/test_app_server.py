@@ -496,7 +496,7 @@ def test_the_page_shows_the_numbers_of_a_run_to_the_last_digit(
     ran = run_study(study, output=tmp_path / "out").identified[0].responses
     assert list(ran) == shown["estimators"] == ["instrument", "composite"]
     for curve, response in zip(shown["curves"], ran.values(), strict=True):
-        pair = response.pair("p", "tau_phi")
+        pair = response.shown.pair("p", "tau_phi")
         assert curve["omega_rad_s"] == pair.omega_rad_s.tolist()
         assert curve["gain"] == [abs(each) for each in pair.response.tolist()]
         assert curve["phase_rad"] == pair.phase_rad.tolist()

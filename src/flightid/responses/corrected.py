@@ -91,9 +91,8 @@ def corrected(
     # Linear in changes of the outputs alone: windows keep the shares that the measured ones gave.
     left = linear.functional()(_residuals(linear, pilots))
     own = np.stack([each.frequency_response(omega)[columns] for each in pilots])
-    return CorrectedResponse(
-        omega, own + left @ spread, _errors(linear, pilots, omega, spread), spread
-    )
+    errors = _errors(linear, pilots, omega, spread)
+    return CorrectedResponse(omega, own + left @ spread, errors, spread)
 
 
 def _refined(omega: Real, pilots: Sequence[Pilot], columns: NDArray[np.intp]) -> Real:
@@ -132,6 +131,19 @@ def _residuals(linear: LinearEstimate, pilots: Sequence[Pilot]) -> list[Real]:
     return [y - model for y, model in zip(linear.output_records, modelled, strict=True)]
 
 
+def _noise(linear: LinearEstimate, pilots: Sequence[Pilot]) -> NoiseSpectrum:
+    """Noise of the outputs: what pilots leave, and no less than what a loop feeds back.
+
+    A pilot is fitted directly: above what was excited it takes the noise in the inputs for cause.
+    """
+    residuals = _residuals(linear, pilots)
+    highest = BEYOND_BAND * linear.pilots.highest_rad_s
+    spent = _stacked([each.spent for each in pilots])
+    noise = mean_spectrum(residuals, linear.sample_time_s, highest, spent)
+    fed_back = linear.weights.fed_back_noise(linear.places[0])
+    return noise if fed_back is None else noise.no_less_than(fed_back)
+
+
 def _errors(
     linear: LinearEstimate,
     pilots: Sequence[Pilot],
@@ -139,11 +151,7 @@ def _errors(
     spread: Real,
 ) -> Real:
     """Covariance of the difference, shaped as by `CovarianceSource.covariance`."""
-    columns = linear.places[1]
-    residuals = _residuals(linear, pilots)
-    highest = BEYOND_BAND * linear.pilots.highest_rad_s
-    spent = _stacked([each.spent for each in pilots])
-    noise = mean_spectrum(residuals, linear.sample_time_s, highest, spent)
+    columns, noise = linear.places[1], _noise(linear, pilots)
     source = linear.errors_with(noise)
     total = source.covariance(*(np.arange(len(each)) for each in linear.places))
     onto = np.kron(np.eye(2 * len(columns)), spread)

@@ -18,6 +18,9 @@ Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 REACH = 0.1
 """Of a frequency, to either side: how far bins count as beside it, where these are enough."""
+WEAK = 0.03
+"""Of its own size squared, the variance of what excitations move of an input from which on nobody
+knows what they move: 17 % of standard error."""
 LEAST_PART = 1e-12
 """Of a direction's power, below which it is rounding."""
 
@@ -43,7 +46,7 @@ def local_spread(
     -------
     ndarray, shape (n_in, n_f)
         Complex variance over the one-sided spectrum of the noise; infinite where records hold too
-        few bins.
+        few bins, and where excitations move too little of the inputs beside what a loop feeds back.
 
     Reference
     ---------
@@ -67,12 +70,17 @@ def local_spread(
         return found
     for at, omega in enumerate(omega_rad_s):
         places = [around(bins, float(omega), _count(bins, omega, needed)) for bins in known]
-        square, crossed = _normal(known, moved, places, float(omega))
+        square, crossed, power = _normal(known, moved, places, float(omega))
         inverse = _inverse(square)
-        spread = inverse[:: ORDER + 1, :: ORDER + 1]
+        spread, gains = inverse[:: ORDER + 1, :: ORDER + 1], inverse @ crossed
         # From instruments to inputs: one where the inputs are their own instruments.
-        turned = np.linalg.pinv((inverse @ crossed)[:: ORDER + 1].T)
+        turned = np.linalg.pinv(gains[:: ORDER + 1].T)
         found[:, at] = np.real(np.diag(turned.T @ spread @ turned.conj()))
+        left = power - np.real(np.einsum("ai,ai->i", crossed.conj(), gains))
+        unknowns = (ORDER + 1) * (n_known + len(known))
+        freedom = sum(place.stop - place.start for place in places) - unknowns
+        left = np.where(left > LEAST_PART * power, left, 0.0) / max(freedom, 1)
+        found[found[:, at] * left > WEAK, at] = np.inf
     return found
 
 
@@ -82,8 +90,8 @@ def _count(bins: Bins, omega: float, needed: int) -> int:
 
 def _normal(
     known: Sequence[Bins], moved: Sequence[Complex], places: Sequence[slice], omega: float
-) -> tuple[Complex, Complex]:
-    """Normal matrix of the response's polynomials, and their products with the inputs."""
+) -> tuple[Complex, Complex, Real]:
+    """Normal matrix of the response's polynomials, products with the inputs, and their power."""
     width = max(
         float(np.max(np.abs(bins.omega[place] - omega)))
         for bins, place in zip(known, places, strict=True)
@@ -91,6 +99,7 @@ def _normal(
     size = len(known[0].values) * (ORDER + 1)
     square = np.zeros((size, size), dtype=np.complex128)
     crossed = np.zeros((size, len(moved[0])), dtype=np.complex128)
+    power = np.zeros(len(moved[0]))
     for bins, inputs, place in zip(known, moved, places, strict=True):
         powers = ((bins.omega[place] - omega) / width)[:, None] ** np.arange(ORDER + 1)
         basis = np.linalg.qr(powers)[0]
@@ -98,8 +107,11 @@ def _normal(
         rows = (values[:, :, None] * powers[:, None, :]).reshape(len(values), -1)
         rows = rows - basis @ (basis.T @ rows)
         square += rows.conj().T @ rows
-        crossed += rows.conj().T @ inputs[:, place].T
-    return square, crossed
+        aside = inputs[:, place].T
+        aside = aside - basis @ (basis.T @ aside)
+        crossed += rows.conj().T @ aside
+        power += np.sum(np.abs(aside) ** 2, axis=0)
+    return square, crossed, power
 
 
 def _inverse(square: Complex) -> Complex:

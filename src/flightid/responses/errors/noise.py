@@ -65,6 +65,13 @@ class NoiseSpectrum:
         coherency[:, places, places] = 1.0
         return cls(omega_rad_s, np.maximum(density, 0.0).T, coherency)
 
+    def of(self, outputs: NDArray[np.intp]) -> NoiseSpectrum:
+        """Of some outputs, in this order."""
+        coherency = self.coherency
+        if coherency is not None:
+            coherency = coherency[:, outputs[:, None], outputs]
+        return NoiseSpectrum(self.omega_rad_s, self.density[outputs], coherency)
+
     def replaced(self, other: NoiseSpectrum, outputs: NDArray[np.intp]) -> NoiseSpectrum:
         """With another noise in some outputs; what these share with the others is left out.
 
