@@ -183,11 +183,26 @@ def _of_two_windows(stage: Stage) -> Iterator[str]:
     page.wait_for_selector("dialog[open]", state="detached")
 
 
+def _printed(page: Any) -> list[object]:
+    """What a sheet shows of a dark page: its colours, px too wide, links of the screens."""
+    page.evaluate("document.documentElement.dataset.theme = 'dark'")
+    page.set_viewport_size({"width": 718, "height": 1000})
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    page.emulate_media(media="print")
+    links = page.locator("nav a:visible").count()
+    seen = [page.evaluate("document.documentElement.dataset.theme"), page.evaluate(CROWDED), links]
+    page.emulate_media(media="screen")
+    page.evaluate("dispatchEvent(new Event('afterprint'))")
+    page.set_viewport_size({"width": 1280, "height": 800})
+    return seen
+
+
 def _of_gains(stage: Stage) -> Iterator[str]:
     page = stage.page
     stage.open(f"gains/{stage.logs['first']}")
     stage.button("Download step 1 of 2").wait_for()
     yield "gains as found"
+    assert _printed(page) == ["light", 0, 0], "colours, what is cut off, links on paper"
     page.locator("input[type=range]").first.press("End")
     page.get_by_text("Nothing to download").wait_for()
     yield "gains that are refused"
@@ -312,8 +327,22 @@ def _of_records(stage: Stage) -> Iterator[str]:
     yield "a study; a file that stays"
 
 
+def _with_study(stage: Stage) -> None:
+    """The study of the rig written, where no state before has done it."""
+    page = stage.page
+    stage.open(f"records/{stage.rig}")
+    write = page.get_by_role("button", name="Write the study").or_(page.locator("#content .box"))
+    write.first.wait_for()
+    if not page.locator("#content .box").count():
+        for name, role in (("drive", "input"), ("swing", "output")):
+            page.select_option(f"select[aria-label='Role of {name}']", role)
+        stage.button("Write the study").press("Enter")
+        page.locator("#content .box").wait_for()
+
+
 def _of_rig_gains(stage: Stage) -> Iterator[str]:
     page = stage.page
+    _with_study(stage)
     stage.open(f"gains/{stage.rig}")
     page.get_by_role("alert").filter(has_text="so no gains are made from it").wait_for()
     yield "a fit that carries no gains"
@@ -337,6 +366,24 @@ def _of_rig_gains(stage: Stage) -> Iterator[str]:
     page.locator("#slider-Kp").press("End")
     page.get_by_text("Nothing to download").wait_for()
     yield "gains of a rig, refused"
+    alone_rig = page.url.rpartition("/")[2]
+    stage.open(f"compare/{alone_rig}/{stage.rig}")
+    page.get_by_role("alert").filter(has_text="was not run yet").wait_for()
+    yield "studies that were not run"
+    for rig in (alone_rig, stage.rig):
+        stage.open(f"verify/{rig}")
+        stage.button("Fit and verify").press("Enter")
+        page.locator("main figure .js-plotly-plot, main table").first.wait_for()
+    page.get_by_role("group", name="Part", exact=True).get_by_role("button", name="Modes").press(
+        "Enter"
+    )
+    page.locator("main table th", has_text="damping").or_(
+        page.locator("main table th", has_text="real")
+    ).first.wait_for()
+    yield "modes of a model without equations"
+    stage.open(f"compare/{alone_rig}/{stage.rig}")
+    page.locator("th", has_text=f"{LONG.removesuffix('.bin')}.csv").first.wait_for()
+    yield "two studies"
 
 
 def _of_fleet(stage: Stage) -> Iterator[str]:

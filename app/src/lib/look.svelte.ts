@@ -1,4 +1,8 @@
+import { flushSync } from "svelte";
 import uPlot from "uplot";
+
+/** Width of what a sheet shows, A4 upright within usual margins, CSS px. */
+const SHEET_PX = 700;
 
 /** Light or dark: what was chosen, else what the system says. */
 class Look {
@@ -10,6 +14,15 @@ class Look {
     const apply = () => this.#apply((kept() ?? (dark.matches ? "dark" : "light")) as "light" | "dark");
     dark.addEventListener("change", apply);
     apply();
+    // Paper is white, and what is drawn is as wide as it was on the screen: all of it is made smaller.
+    addEventListener("beforeprint", () => {
+      const width = document.querySelector("main")?.offsetWidth ?? SHEET_PX;
+      const style = document.documentElement.style;
+      style.setProperty("--drawn", `${width}px`);
+      style.setProperty("--shrunk", String(Math.min(1, SHEET_PX / width)));
+      flushSync(() => this.#apply("light"));
+    });
+    addEventListener("afterprint", apply);
   }
 
   toggle() {
