@@ -5,11 +5,15 @@ from __future__ import annotations
 import asyncio
 import os
 import time
+from concurrent.futures import Future
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
 import pytest
 
 pytest.importorskip("fastapi", reason="the extra app is not installed")
+
+from pebble import ProcessExpired
 
 from flightid.app import jobs
 from flightid.app.jobs import Workers
@@ -56,6 +60,20 @@ def test_results_that_were_taken_last_are_kept() -> None:
         cache[str(k)] = k
         assert cache["0"] == 0
     assert ("1" in cache, "0" in cache, len(cache)) == (False, True, 48)
+
+
+@pytest.mark.parametrize("error", [ProcessExpired("died"), BrokenProcessPool("died")])
+def test_work_whose_process_was_killed_says_what_to_do(error: Exception) -> None:
+    future: Future[tuple[object, str, float]] = Future()
+    future.set_exception(error)
+    workers, heard = Workers.__new__(Workers), list[str]()
+    workers._jobs = {"run": Job(id="run", kind="run", log=LOG, state="waiting")}
+    workers._futures = {"run": future}
+    workers._change = lambda name, state, reason: heard.extend((name, state, reason))
+    workers._ended("run", future)
+    assert heard[:2] == ["run", "failed"]
+    assert "ask again" in heard[2]
+    assert type(error).__name__ not in heard[2]
 
 
 @pytest.mark.slow

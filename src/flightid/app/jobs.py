@@ -236,7 +236,7 @@ class Workers:
         try:
             made: tuple[Any, str, float] = await asyncio.wrap_future(future)
         except (TimeoutError, ProcessExpired, BrokenProcessPool) as error:
-            made = None, f"the work ended early: {type(error).__name__}", 0.0
+            made = None, _why_ended(error), 0.0
         except asyncio.CancelledError:
             if not future.cancelled():
                 raise
@@ -263,7 +263,7 @@ class Workers:
         try:
             _, refusal, _ = future.result()
         except (CancelledError, TimeoutError, ProcessExpired, BrokenProcessPool) as error:
-            refusal = f"the work ended early: {type(error).__name__}"
+            refusal = _why_ended(error)
         except Exception as error:
             refusal = f"a fault in flightid: {type(error).__name__}: {error}"
         self._change(name, "failed" if refusal else "done", refusal)
@@ -303,14 +303,26 @@ async def _awaited(
         future = crew.schedule(work.answered, call, *inputs, timeout_s=patience_s)
         try:
             made: tuple[Any, str, float] = await asyncio.wrap_future(future)
-        except TimeoutError:
-            return None, f"This took more than {patience_s:.0f} s and was ended.", patience_s
-        except ProcessExpired:
-            return None, "The worker ended; the file may need more memory than is allowed.", 0.0
+        except TimeoutError as error:
+            return None, _why_ended(error, patience_s), patience_s
+        except ProcessExpired as error:
+            return None, _why_ended(error), 0.0
         except BrokenProcessPool:
             continue  # a worker was killed while it had no work: another takes this
         return made
     return None, "The worker was ended twice.", 0.0
+
+
+def _why_ended(error: BaseException, patience_s: float = LONGEST_S) -> str:
+    """Why work has no end of its own, in words, and what to do."""
+    if isinstance(error, TimeoutError):
+        return f"This took more than {patience_s:.0f} s and was ended."
+    if isinstance(error, CancelledError):
+        return watched.ENDED
+    return (
+        "The process that worked on this has ended: something else ended it, or it needs more "
+        "memory than is allowed. What was finished before is kept; ask again."
+    )
 
 
 def _interrupted(folder: Path) -> list[Job]:
