@@ -113,7 +113,7 @@ def test_the_envelopes_come_with_a_measured_response() -> None:
     assert json.loads(json.dumps(alone.to_dict()))["mismatch"]["names"] == ["p/u"]
     assert fid.verify(_lag(2.0), _flown()).mismatch is None
     titles = [type(block).__name__ for block in verification_blocks(alone)]
-    assert titles == ["Lights", "TableBlock", "Figure", "Figure", "TableBlock"]
+    assert titles == ["Lights", "TableBlock", "Figure", "Figure", "Figure", "TableBlock"]
 
 
 def test_pictures_show_every_model() -> None:

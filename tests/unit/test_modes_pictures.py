@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 import flightid as fid
+from flightid.errors import DataError
 from flightid.plot.modes import pole_map
+from flightid.plot.participations import participation_bars
 from flightid.report.content import Document, Figure, Lights, TableBlock
 from flightid.report.html import to_html
 from flightid.report.modes import modes_blocks, physics_blocks
@@ -50,6 +52,22 @@ def test_regions_hold_95_percent_and_slow_modes_are_drawn_again() -> None:
     )
 
 
+def test_the_bars_of_a_mode_are_its_participations() -> None:
+    found = fid.modes(fid.load_model("fixed_wing_longitudinal"))
+    made = participation_bars(found)
+    phugoid = {
+        trace.name: trace.x[0] for trace in made.data if list(trace.y) == [found.modes[0].name]
+    }
+    told = {each.state: 100.0 * (each.share.value or 0.0) for each in found.modes[0].participations}
+    assert phugoid == pytest.approx({name: told[name] for name in phugoid})
+    assert sum(phugoid.values()) > 90.0
+    named = [trace.name for trace in made.data if trace.showlegend]
+    assert len(named) == len(set(named)), "one entry of the legend a state"
+    box = fid.PolynomialModel(("u",), "y", 0.1, a=[1.0, 0.5], b=[[1.0]])
+    with pytest.raises(DataError, match="no mode tells"):
+        participation_bars(fid.modes(box))
+
+
 def test_several_models_share_one_map() -> None:
     both = {name: fid.modes(fid.load_model(name)) for name in ("r50_hover", "r50_cruise")}
     made = pole_map(both)
@@ -59,10 +77,11 @@ def test_several_models_share_one_map() -> None:
 
 
 def test_report_blocks() -> None:
-    lights, table, figure, parts = modes_blocks(fid.modes(fid.load_model("ah64_hover")))
+    lights, table, figure, bars, parts = modes_blocks(fid.modes(fid.load_model("ah64_hover")))
     assert isinstance(lights, Lights)
     assert isinstance(table, TableBlock)
     assert isinstance(figure, Figure)
+    assert isinstance(bars, Figure)
     assert isinstance(parts, TableBlock)
     assert parts.folded
     box = fid.PolynomialModel(("u",), "y", 0.1, a=[1.0, 0.5], b=[[1.0]])
@@ -84,10 +103,10 @@ def test_physics_blocks_are_folded_and_may_be_missing() -> None:
     [
         ("fixed_wing_lateral", ["Modes of", "Approximate modes of", "Derivatives of"], []),
         ("quadrotor_yaw", ["Modes of", "Derivatives of"], []),
-        ("rate_first_order", [], ["Modes of"]),
+        ("rate_first_order", ["Modes of"], ["Derivatives of", "Approximate modes"]),
     ],
 )
-def test_studies_show_modes_of_state_space_fits(
+def test_studies_show_modes_of_every_kind_and_derivatives_of_equations(
     name: str, there: list[str], missing: list[str]
 ) -> None:
     truth = fid.load_model(name)

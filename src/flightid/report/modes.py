@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from flightid.dynamics.modes.result import LEAST_SHOWN
 from flightid.plot.modes import pole_map
+from flightid.plot.participations import participation_bars
 from flightid.report.blocks import result_blocks
 from flightid.report.content import Block, TableBlock
 from flightid.report.figures import figure_block
@@ -35,6 +37,11 @@ def modes_blocks(found: Modes) -> tuple[Block, ...]:
         blocks.append(figure_block(pole_map(found), caption))
     parts = found.participation_table()
     if parts.rows:
+        shown_from = f"{100 * LEAST_SHOWN:.0f} %"
+        caption = (
+            f"Participation of the states in each mode; shares below {shown_from} are left out."
+        )
+        blocks.append(figure_block(participation_bars(found), caption))
         blocks.append(TableBlock(parts, folded=True))
     return tuple(blocks)
 

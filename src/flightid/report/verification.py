@@ -36,7 +36,7 @@ def verification_blocks(result: Verification | Comparison) -> tuple[Block, ...]:
     pictures = [
         prediction_picture(result, record) for record in range(len(_first(result).predictions))
     ]
-    return (*result_blocks(result, title=title), *pictures, *_envelopes(result))
+    return (*result_blocks(result, title=title), *pictures, *_errors(result), *_envelopes(result))
 
 
 def verification_sections(result: Verification | Comparison) -> tuple[Section, ...]:
@@ -71,6 +71,15 @@ def prediction_picture(result: Verification | Comparison, record: int) -> Figure
         return figure_block(comparison(result, record), shown, folded=record >= SHOWN)
     shown = f"{name}: measured, and predicted{_from(result)}."
     return figure_block(prediction(result.predictions[record]), shown, folded=record >= SHOWN)
+
+
+def _errors(result: Verification | Comparison) -> tuple[Block, ...]:
+    """Measured minus predicted, of the records whose pictures are open."""
+    shown = _first(result).predictions[:SHOWN]
+    return tuple(
+        figure_block(residuals(each), f"{each.measured.name}: measured minus predicted.")
+        for each in shown
+    )
 
 
 def _from(verification: Verification) -> str:
