@@ -15,34 +15,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.conventions import Light
-from flightid.errors import UnknownNameError
 from flightid.findings import Finding
 from flightid.frozen import dataclass
-from flightid.identification.filter_error.extended_kalman import (
-    ExtendedProblem,
-    along_the_flight,
-    has_free_constants,
-    sizes_of_states,
-)
+from flightid.identification.filter_error.extended_kalman import ExtendedProblem
 from flightid.identification.filter_error.gust_severity import judge_gust
 from flightid.identification.filter_error.gusts import GUST, GUST_UNKNOWNS, Gust
 from flightid.identification.filter_error.innovation_covariance import innovation_covariance
-from flightid.identification.filter_error.innovations import (
-    FilteredData,
-    InnovationsProblem,
-    RecordInnovations,
-)
+from flightid.identification.filter_error.innovations import InnovationsProblem, RecordInnovations
+from flightid.identification.filter_error.problem import innovations_problem
 from flightid.identification.filter_error.search import NEAR, across_jumps, minimise, with_gust
 from flightid.identification.fit import Fit
 from flightid.identification.fitted_record import FittedRecord
 from flightid.identification.innovation_tests import innovation_tests
 from flightid.identification.multistart import DenseEnd, cluster, collect, draw_starts
-from flightid.identification.output_error.distinct import require_distinct
-from flightid.identification.output_error.equation_records import equation_runs
-from flightid.identification.records.held_model import LinearPoint
-from flightid.identification.records.options import RecordOptions
-from flightid.identification.records.setup import prepare_records
-from flightid.identification.records.white_noise import explained_percent, white_levels
+from flightid.identification.records.white_noise import explained_percent
 from flightid.identification.regression.fit import (
     Inner,
     Knowledge,
@@ -60,8 +46,6 @@ from flightid.record import Record, Step
 from flightid.uncertainty.estimate import Estimate
 
 Array = NDArray[np.float64]
-_FIRST_SHARE = 0.1
-_FLOOR = 1e-6
 MISSING = (
     "add the lag or delay that the model lacks, which process noise took for turbulence, "
     "or look for feedback"
@@ -91,7 +75,7 @@ def fit_filter_error(
     """
     require_states(model, "filter error")
     records = check_records(model, data)
-    problem = _problem(model, records, options)
+    problem = innovations_problem(model, records, options)
     tried = options.gust_states and not isinstance(problem, ExtendedProblem) and judged()
     # Ends of several starts are compared with each other: those are searched to the last.
     groups = cluster(_search(problem, options, NEAR if tried and options.starts == 1 else 0.0))
@@ -148,63 +132,6 @@ def fit_filter_error(
         noise=explained_percent(records, model.outputs),
     )
     return fit if tests.is_independent else without_intervals(fit, tests.why_biased)
-
-
-def _problem(
-    model: StateSpaceModel, records: Sequence[Record], options: FilterErrorOptions
-) -> InnovationsProblem:
-    data = tuple(
-        FilteredData(
-            record.matrix(model.inputs), record.matrix(model.outputs), record.sample_time_s
-        )
-        for record in records
-    )
-    p, n = len(model.outputs), len(model.states)
-    blank = InnovationsProblem(
-        model,
-        data,
-        (),
-        np.zeros(0),
-        np.ones(p),
-        options.output_bias,
-        options.input_bias,
-        options.hold,
-    )
-    seen, steps = along_the_flight(model, records)
-    point = LinearPoint.of(seen, model.parameters.independent_values())
-    varies = not model.is_linear or has_free_constants(model, point)
-    if options.process_noise is None:
-        moved = np.any(np.concatenate([point.a[1:], point.b[1:]], axis=2), axis=(0, 2))
-        noisy = tuple(map(int, np.flatnonzero(moved))) or tuple(range(n))
-    else:
-        noisy = _places(options.process_noise, list(model.states))
-    spread = np.sqrt(np.mean([np.var(each.outputs, axis=1) for each in data], axis=0))
-    found = [white_levels(each.outputs) for each in data]
-    level = np.sqrt(np.mean([levels**2 for levels in found], axis=0))
-    reach = sizes_of_states(point, spread)
-    made = replace(
-        blank,
-        noisy=noisy,
-        process_scale=_FIRST_SHARE * reach[list(noisy)],
-        output_scale=np.maximum(level, _FLOOR * spread + 1e-300),
-    )
-    if not varies:
-        return made
-    own = RecordOptions(
-        output_bias=options.output_bias, input_bias=options.input_bias, hold=options.hold
-    )
-    prepared = prepare_records(model, records, own)
-    require_distinct(model, prepared, equation_runs(model, prepared))
-    return ExtendedProblem.along(made, steps, reach)
-
-
-def _places(names: Sequence[str], states: list[str]) -> tuple[int, ...]:
-    for name in names:
-        if name not in states:
-            raise UnknownNameError(
-                "process_noise names an unknown state", found=repr(name), needed=", ".join(states)
-            )
-    return tuple(sorted({states.index(name) for name in names}))
 
 
 def _search(

@@ -37,7 +37,12 @@ STEP = 0.01
 
 
 def contradictions(
-    source: object, way: Predictor, made: Sequence[Prediction], request: Request
+    source: object,
+    way: Predictor,
+    made: Sequence[Prediction],
+    request: Request,
+    *,
+    refuted: bool = False,
 ) -> tuple[Finding, ...]:
     """A warning for each record and output whose error the fit does not allow.
 
@@ -55,6 +60,8 @@ def contradictions(
         What predicts with it.
     made : sequence of Prediction
     request : Request
+    refuted : bool
+        Whether the inputs ask other parameters: then gusts are no excuse.
 
     Assumes
     -------
@@ -76,7 +83,7 @@ def contradictions(
         moved = cache(partial(_by_parameters, source, way, run, request))
         beyond = (_judged(run, name, entry[name], moved) for name in run.outputs if name in entry)
         found += [each for each in beyond if each is not None]
-    return tuple(_as_gusts_may(each) if alone() else each for each in found)
+    return tuple(each if refuted or not alone() else _as_gusts_may(each) for each in found)
 
 
 def _judged(

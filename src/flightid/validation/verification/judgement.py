@@ -32,11 +32,14 @@ def judge(
     mismatch: Mismatch | None,
     own: Mapping[str, float],
     gusts: Mapping[str, float],
+    *,
+    refuted: bool = False,
 ) -> Verification:
     """Numbers by output over all records together, and verdicts against the guides.
 
     `own` are errors of the fitted model in the records of its fit, by output, where it has any, and
-    `gusts` what the process noise that it found makes of these runs.
+    `gusts` what the process noise that it found makes of these runs. Gusts excuse no model that is
+    `refuted` beside them.
     """
     numbers = numbers_of(predictions, compared)
     first = predictions[0].measured
@@ -54,7 +57,9 @@ def judge(
     verdicts = weighed(
         _theil_verdicts(overall, numbers["theil"], predictions), numbers["rms_error"], own
     )
-    verdicts = unless_gusts(weighed(verdicts, numbers["rms_error"], gusts, GUSTS), predictions)
+    if not refuted:
+        excused = weighed(verdicts, numbers["rms_error"], gusts, GUSTS)
+        verdicts = unless_gusts(excused, predictions)
     found = (*verdicts.values(), *_findings(guided, predictions))
     return Verification(
         outputs=compared,

@@ -42,6 +42,10 @@ from flightid.validation.verification.of_the_fit import (
     seen_findings,
 )
 from flightid.validation.verification.pieces import growth_findings
+from flightid.validation.verification.refuted_parameters import (
+    refuted_findings,
+    refuted_parameter,
+)
 from flightid.validation.verification.result import Verification
 
 
@@ -208,12 +212,15 @@ def verify(
         seen = None if responses is None else mismatch(model, responses)
         own = own_errors(each, THEIL_GUIDE[0])
         gusts = gust_errors(each, model, [record.duration_s for record in flown])
-        judged = judge(tuple(made), chosen, request, seen, own, gusts)
+        asked_otherwise = refuted_parameter(each, way, made, request)
+        refuted = asked_otherwise is not None
+        judged = judge(tuple(made), chosen, request, seen, own, gusts, refuted=refuted)
         beside = (
             *baseline_findings(each, made, request),
-            *contradictions(each, way, made, request),
-            *growth_findings(made, partial(run, request)),
+            *contradictions(each, way, made, request, refuted=refuted),
+            *growth_findings(made, partial(run, request), refuted=refuted),
         )
+        beside = (*beside, *refuted_findings(asked_otherwise, (*judged.findings, *beside)))
         in_time = way is predict_continuous
         taken = remembered(each).assumed_hold
         again = partial(run, records=flown)

@@ -1,0 +1,147 @@
+"""A wrong derivative is told in gusts by what inputs ask; a right model in gusts stays."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+import flightid as fid
+from flightid.identification.filter_error.parameter_scores import parameter_scores
+from flightid.identification.regression.options import FilterErrorOptions
+from flightid.validation.verification.pieces import GROWTH
+from flightid.validation.verification.refuted_parameters import CODE
+from tests.strangers.gusts import TRUTH, flight, model
+
+STEP_S = 0.02
+
+
+def _said(which: fid.StateSpaceModel, record: fid.Record) -> dict[str, tuple[str, str]]:
+    found = fid.verify(which, record).findings
+    return {each.code: (each.light.value, each.message) for each in found}
+
+
+def _named(message: str, parameter: str) -> float:
+    return float(message.split(f"{parameter} = ")[1].split(" ", maxsplit=1)[0])
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize("wrong", [None, "Mq", "Md", "Mw"])
+def test_a_derivative_off_by_30_percent_is_red_in_gusts_and_named(
+    wrong: str | None, seed: int
+) -> None:
+    """Dryden's gust of 2 m/s leaves most of the motion unexplained: all had been amber, or most."""
+    values = {} if wrong is None else {wrong: 1.3 * TRUTH[wrong]}
+    said = _said(model(1.0).with_values(values), flight(seed, 2.0, 1.0, 30.0))
+    assert said["verification-theil"][0] != "green"
+    if wrong is None:
+        assert "red" not in {light for light, _ in said.values()}
+        assert CODE not in said
+    else:
+        light, message = said[CODE]
+        assert light == "red"
+        assert "beside any gust" in message
+        if f"as another {wrong} would" not in message:
+            assert _named(message, wrong) == pytest.approx(TRUTH[wrong], rel=0.02)
+
+
+def test_a_little_wrong_in_calm_air_is_amber() -> None:
+    """Within Theil's guide a prediction is of use: what is wrong in it is said, not refused."""
+    record = flight(3, 0.0, 1.0, 30.0)
+    light, message = _said(model(1.0).with_values({"Mq": 1.3 * TRUTH["Mq"]}), record)[CODE]
+    assert light == "amber"
+    assert _named(message, "Mq") == pytest.approx(TRUTH["Mq"], rel=0.02)
+    assert CODE not in _said(model(1.0).with_values({"Mq": 1.05 * TRUTH["Mq"]}), record)
+
+
+def test_scores_of_a_right_model_are_of_unit_variance() -> None:
+    """And a control derivative off by 5 % shows, on the side of the truth."""
+    options = FilterErrorOptions(input_bias=True, output_bias=True, hold="first")
+    shown = []
+    for seed in range(6):
+        record = flight(seed, 2.0, 1.0, 30.0)
+        right = model(1.0)
+        scores = parameter_scores(right, [record], [fid.predict(right, record).predicted], options)
+        assert scores is not None
+        moves, stderr = scores.alone()
+        shown.append(moves / stderr)
+    assert 0.5 < np.std(shown) < 1.5
+    near = right.with_values({"Md": 1.05 * TRUTH["Md"]})
+    scores = parameter_scores(near, [record], [fid.predict(near, record).predicted], options)
+    assert scores is not None
+    place = scores.names.index("Md")
+    move, stderr = (float(each[place]) for each in scores.alone())
+    assert move > 8.0 * stderr
+
+
+def _hover(seed: int, gust: float) -> fid.Record:
+    """A roll axis that grows by itself over a minute, in a loop and in gusts of a second."""
+    random, n = np.random.default_rng(seed), 3000
+    a = np.array([[-3.0, 0.4, -0.2], [1.0, 0.0, 0.0], [0.0, 9.81, -0.1]])
+    b = np.array([[20.0], [0.0], [0.0]])
+    whole = expm(np.block([[a, b, a[:, 2:]], [np.zeros((2, 5))]]) * STEP_S)
+    steps = 0.05 * np.repeat(random.choice([-1.0, 0.0, 1.0], n // 35 + 1), 35)[:n]
+    x, u, y, wind = np.zeros(3), np.zeros(n), np.zeros((3, n)), gust * random.standard_normal()
+    for k in range(n):
+        y[:, k] = x + random.standard_normal(3) * [0.003, 0.002, 0.02]
+        u[k] = steps[k] - (0.1 * y[0, k - 1] + 0.3 * y[1, k - 1] if k else 0.0)
+        x = whole[:3, :3] @ x + whole[:3, 3] * u[k] + whole[:3, 4] * wind
+        wind = 0.98 * wind + gust * 0.2 * random.standard_normal()
+    return fid.Record.from_arrays(
+        np.arange(n) * STEP_S,
+        inputs={"da": u},
+        outputs=dict(zip(("p", "phi", "v"), y, strict=True)),
+        units={"da": "rad", "p": "rad/s", "phi": "rad", "v": "m/s"},
+        hold="zero",
+    )
+
+
+def _roll(**values: float) -> fid.StateSpaceModel:
+    own = {"Lp": -3.0, "Lphi": 0.4, "Lv": -0.2, "Lda": 20.0, "Yv": -0.1, "g": 9.81} | values
+    units = {"Lp": "1/s", "Lphi": "1/s^2", "Lv": "rad/s/m", "Lda": "1/s^2", "Yv": "1/s"}
+    return fid.StateSpaceModel(
+        states={"p": "rad/s", "phi": "rad", "v": "m/s"},
+        input_units={"da": "rad"},
+        measurements={
+            "p": fid.Output("p", "rad/s"),
+            "phi": fid.Output("phi", "rad"),
+            "v": fid.Output("v", "m/s"),
+        },
+        equations={
+            "p'": "Lp*p + Lphi*phi + Lv*v + Lda*da",
+            "phi'": "p",
+            "v'": "g*phi + Yv*v",
+        },
+        parameters=fid.Parameters(
+            [
+                fid.Parameter(name, own[name], units.get(name, "m/s^2"), free=name != "g")
+                for name in own
+            ]
+        ),
+    )
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_right_model_that_grows_is_not_red_for_gusts(seed: int) -> None:
+    """Pieces of its record are poorly predicted too, and had been red for that."""
+    record = _hover(seed, 3.0)
+    said = _said(_roll(), record)
+    light, message = said[GROWTH]
+    assert light == "amber"
+    assert "gusts alone could make it" in message
+    assert "red" not in {each for each, _ in said.values()}
+    wrong = _said(_roll(Lda=28.0), record)
+    assert wrong[GROWTH][0] == wrong[CODE][0] == "red"
+    assert "Lda" in wrong[CODE][1]
+
+
+def test_what_cannot_be_asked_is_not() -> None:
+    """No free parameter, or no noise at all: nothing is said of either."""
+    record = flight(0, 2.0, 1.0, 30.0)
+    wrong = model(1.0).with_values({"Md": 1.3 * TRUTH["Md"]})
+    held = wrong.with_fixed(**{each.name: each.value for each in wrong.parameters.free})
+    assert CODE not in _said(held, record)
+    moved = fid.Record.from_arrays(
+        record.time_s, inputs={"de": record["de"]}, units={"de": "rad"}, hold="first"
+    )
+    assert CODE not in _said(wrong, fid.simulate(model(1.0), moved))
