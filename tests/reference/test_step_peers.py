@@ -77,18 +77,21 @@ def test_two_other_ways_find_the_same_step(samples: LoopSamples) -> None:
     assert np.abs(wiener(r, y) - ours).max() < 0.08
 
 
-@pytest.mark.parametrize(("lag_s", "sticks"), [(HAND_S, "by hand"), (0.0, "jumping")])
-def test_steps_are_not_too_low(lag_s: float, sticks: str) -> None:
+@pytest.mark.parametrize(
+    ("lag_s", "gust", "most"), [(HAND_S, 0.2, 0.004), (0.0, 0.05, 0.002)], ids=["by hand", "jumping"]
+)
+def test_steps_are_not_too_low(lag_s: float, gust: float, most: float) -> None:
     """Lags of half a second forget what an integrator remembers: 7 of 7 levels were too low.
 
-    Of rows that a sample leaves out it does not know when a set-point jumped: half a percent. Means
-    do not know where within a sample it jumped: half a percent too high in calm air.
+    Of rows that a sample leaves out it does not know when a set-point jumped: a quarter of a
+    percent. A minute of gusts makes levels too high by as much as their own scatter, 0.4 % of jumps
+    in gusts of 0.2 rad/s^2, and nothing without gusts: weaker ones tell the rows apart.
     """
-    calm, seeds = replace(CREEPING, gust=0.2, noise=0.005), range(3)
+    calm, seeds = replace(CREEPING, gust=gust, noise=0.005), range(3)
     _, exact = truths(calm, 4, 200)
     off = [
         closed_loop(fly_samples(seed, calm, acro=False, lag_s=lag_s)).step(200)[0, 100:]
         - exact[100:]
         for seed in seeds
     ]
-    assert -0.003 < np.mean(off) < 0.008, sticks
+    assert abs(np.mean(off)) < most
