@@ -219,3 +219,26 @@ def at_least(value: float, decimals: int = 0) -> str:
     """
     scaled = value * 10.0**decimals
     return f"{math.floor(scaled + EXACT * abs(scaled)) / 10.0**decimals:.{decimals}f}"
+
+
+def held(value: float | None, digits: int = 3, *, least: bool = True) -> float | None:
+    """A promised bound at so many significant digits, rounded to the side on which it still holds.
+
+    Parameters
+    ----------
+    value : float or None
+        None stays None.
+    digits : int
+    least : bool
+        Whether the number is at least so much, not at most.
+
+    Example
+    -------
+    >>> held(45.46), held(45.4), held(1.6412, least=False), held(-0.1234), held(0.0)
+    (45.4, 45.4, 1.65, -0.124, 0.0)
+    """
+    if not value or not math.isfinite(value):
+        return value
+    scale = 10.0 ** (digits - 1 - math.floor(math.log10(abs(value))))
+    scaled, near = value * scale, EXACT * abs(value * scale)
+    return (math.floor(scaled + near) if least else math.ceil(scaled - near)) / scale

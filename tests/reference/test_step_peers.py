@@ -78,7 +78,9 @@ def test_two_other_ways_find_the_same_step(samples: LoopSamples) -> None:
 
 
 @pytest.mark.parametrize(
-    ("lag_s", "gust", "most"), [(HAND_S, 0.2, 0.004), (0.0, 0.05, 0.002)], ids=["by hand", "jumping"]
+    ("lag_s", "gust", "most"),
+    [(HAND_S, 0.2, 0.004), (0.0, 0.05, 0.002)],
+    ids=["by hand", "jumping"],
 )
 def test_steps_are_not_too_low(lag_s: float, gust: float, most: float) -> None:
     """Lags of half a second forget what an integrator remembers: 7 of 7 levels were too low.

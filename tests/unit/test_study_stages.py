@@ -12,6 +12,7 @@ import pytest
 import flightid as fid
 from flightid.app.gain_work import _small_moves
 from flightid.control.autopilots import axis_loop
+from flightid.control.tuning.worst_cases import WorstCase
 from flightid.conventions import Light, Role
 from flightid.errors import FlightidError
 from flightid.evidence.evidence import Check, Evidence
@@ -26,6 +27,7 @@ from flightid.study.settings import Segment
 from flightid.study.stage_runner import digest
 from flightid.study.stages import compare_free_run, select_coherent
 from flightid.study.taking import _with_injected
+from flightid.uncertainty.estimate import Estimate
 from tests.unit.test_study_records import OWN, rig
 
 pytestmark = pytest.mark.usefixtures("no_report")
@@ -320,8 +322,8 @@ def test_what_was_left_out_is_no_model_to_use() -> None:
 def test_margins_below_what_is_asked_and_columns_left_out_are_told() -> None:
     """44 deg stood green beside 45 that are required, and a dash was explained that nobody saw."""
     worst = [
-        SimpleNamespace(loop="loop", name="phase margin", worst=44.6, flown_worst=None),
-        SimpleNamespace(loop="loop", name="gain margin", worst=None, flown_worst=None),
+        WorstCase("loop", "phase margin", Estimate("m", 50.0, "deg"), 44.66, None, 60.078),
+        WorstCase("loop", "gain margin", Estimate("m", None, "dB"), None, None, None),
     ]
     asked = SimpleNamespace(phase_margin_deg=45.0, gain_margin_db=6.0, angle_phase_margin_deg=60.0)
     beyond = Finding("margin-beyond-band", Light.GREEN, "read above the band")
@@ -337,6 +339,9 @@ def test_margins_below_what_is_asked_and_columns_left_out_are_told() -> None:
     way = gains_finding(tuning, "study.toml").action  # type: ignore[arg-type]
     assert way.startswith("flightid tune study.toml --write gains.params writes them")
     done = gains_finding(tuning, "study.toml", ["g-1.params"], "out").action  # type: ignore[arg-type]
+    own = gains_finding(tuning, "study.toml", gains_file="up/next.params")  # type: ignore[arg-type]
+    assert own.action.startswith("flightid tune study.toml --write up/next.params writes them")
+    assert "fly up/next.params: " in own.action, "gains.params was advised beside --write"
     moves = "a minute of quick moves of each stick"
     assert done == f"fly g-1.params: {moves}; log, then flightid compare out LOG: kept or not"
     # An amber line of gains had no reason, and "look again" no command.
@@ -353,14 +358,16 @@ def test_margins_below_what_is_asked_and_columns_left_out_are_told() -> None:
     assert told.message.endswith("; but roll the band ends early (1 other reason: report)")
     fly = f"fly gains-1.param, step 1 of 2: {moves}, roll and pitch by no more than 6.8 deg at once"
     assert f"{fly}; log, then flightid compare out LOG" in told.action
+    shown = margin_table((roll,)).shown()  # type: ignore[arg-type]
+    assert shown == [["roll", "loop", "44.6", "60"]], "44.66 is not 44.7, nor 60.078 60.1"
     notes = margin_table((roll,)).notes  # type: ignore[arg-type]
     assert notes[1].startswith("gain margin: not promised")
     flown = axis_loop("arducopter", "roll", loop_rate_hz=400.0)
     angle = SimpleNamespace(axis="roll", flown=flown, loop=flown.with_gains(ATC_ANG_RLL_P=9.0))
     (small,) = small_angles([angle])  # type: ignore[list-item]
     assert "errors up to 6.8 deg in roll (27 as flown)" in small
-    (shown,) = _small_moves(angle)  # type: ignore[arg-type]
-    assert shown.message == small, "the page says what the command says"
+    (page,) = _small_moves(angle)  # type: ignore[arg-type]
+    assert page.message == small, "the page says what the command says"
     free = flown.with_gains(ATC_ACCEL_R_MAX=0.0)
     assert not [*small_angles([SimpleNamespace(axis="roll", flown=free, loop=free)])]  # type: ignore[list-item]
 

@@ -312,9 +312,9 @@ def _margins(moved: MovedGains) -> list[MarginRow]:
                 nominal=each.nominal,
                 low=low,
                 high=high,
-                worst=each.worst,
+                worst=each.shown_worst[0],
                 flown=each.flown,
-                flown_worst=each.flown_worst,
+                flown_worst=each.shown_worst[1],
                 untold=""
                 if each.nominal is None or each.worst is not None
                 else each.estimate.reason,

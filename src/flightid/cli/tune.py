@@ -141,7 +141,10 @@ def command(
             )
         cache: dict[str, Any] = {}
         path, folder = taken_study(files, output, log, data, tune=not own, cache=cache)
-        study = run_study(path, output=folder, log=log, tune=asked, level=level, cache=cache)
+        study = run_study(
+            path, output=folder, log=log, tune=asked, level=level, cache=cache,
+            gains_file="" if target is None else str(target),
+        )  # fmt: skip
         tuning = study.tuning
         refused = [str(each).partition("] ")[2] for each in study.faults]
     if tuning is None:

@@ -70,7 +70,9 @@ def answer_of(
         fault = tuning_fault(study.faults)
         told = [] if fault is None else [_without_verdicts(fault, study.identified)]
         return StudyAnswer(tuple(said_once([*findings, *told])))
-    findings.append(gains_finding(tuning, source, written, results or study.output.name))
+    findings.append(
+        gains_finding(tuning, source, written, results or study.output.name, study.gains_file)
+    )
     if study.gain_flight is not None:
         findings.append(flown_again(study.gain_flight))
     made = tuning.sound or tuple(design for design in tuning.designs if design.exists)

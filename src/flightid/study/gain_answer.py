@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING
 
 from flightid.control.autopilots.angle_law import angle_law
@@ -26,9 +28,16 @@ MARGINS = {"phase margin": "deg", "gain margin": "dB"}
 
 
 def gains_finding(
-    tuning: Tuning, source: str, written: Sequence[str] = (), results: str = ""
+    tuning: Tuning,
+    source: str,
+    written: Sequence[str] = (),
+    results: str = "",
+    gains_file: str = "",
 ) -> Finding:
-    """Whether there are gains, and what they promise or what is in the way."""
+    """Whether there are gains, and what they promise or what is in the way.
+
+    `gains_file` is what the reader calls the file of gains, where it is not the usual name.
+    """
     designs, findings = tuning.sound, tuning.findings
     left = "; ".join(f"{axis}: {why}" for axis, why in tuning.left_out.items())
     red = next((each for each in findings if each.light is Light.RED), None)
@@ -53,10 +62,13 @@ def gains_finding(
         where = f"stand in {written[0]}" if written else f"lie beside the report as {files}"
         way = f"they {where}: close the loop with them, and log"
     else:
-        suffix = parameter_suffix(designs[0].flown.autopilot)
-        first = written[0] if written else f"gains{'-1' if steps > 1 else ''}{suffix}"
+        file = Path(gains_file or f"gains{parameter_suffix(designs[0].flown.autopilot)}")
+        stepped = file.with_name(f"{file.stem}{'-1' if steps > 1 else ''}{file.suffix}")
+        first = written[0] if written else quote(str(stepped))
         step = f", step 1 of {steps}" if steps > 1 else ""
-        way = "" if written else f"flightid tune {source} --write gains{suffix} writes them; "
+        way = ""
+        if not written:
+            way = f"flightid tune {source} --write {quote(str(file))} writes them; "
         way += (
             f"fly {first}{step}: {_moves(designs)}; log, then "
             f"flightid compare {results} LOG: kept or not"
@@ -180,7 +192,7 @@ def margin_table(designs: tuple[PidDesign, ...]) -> Table:
             cells: list[Cell] = []
             for name in MARGINS:
                 found = [e for e in design.worst_cases if (e.loop, e.name) == (loop, name)]
-                cells += [found[0].worst, found[0].flown_worst] if found else [None, None]
+                cells += found[0].shown_worst if found else (None, None)
             if any(cell is not None for cell in cells):
                 rows.append((design.axis, loop, *cells))
     asked = designs[0].requirements

@@ -39,6 +39,7 @@ class StudyResults(
         "carried_out": "of this run",
         "from_cache": "of this run",
         "source": "of this run",
+        "gains_file": "of this run",
     },
 ):
     """Results of every stage of a study.
@@ -83,6 +84,8 @@ class StudyResults(
         Fields of the log that the study shows.
     plan : SweepPlan or None
         Of the next flight, where the study asks for one.
+    gains_file : str
+        File of gains that this run was asked for, as the reader wrote it; empty: the usual name.
     """
 
     settings: Settings
@@ -105,6 +108,7 @@ class StudyResults(
     tried: TriedFilters | None = None
     plots: tuple[FieldPlot, ...] = ()
     plan: SweepPlan | None = None
+    gains_file: str = ""
 
     @property
     def has_equations(self) -> bool:

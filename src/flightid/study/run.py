@@ -59,6 +59,7 @@ def run_study(
     tune: bool | Mapping[str, Any] = False,
     level: float | None = None,
     cache: MutableMapping[str, Any] | None = None,
+    gains_file: str = "",
 ) -> Study:
     """Carry out a study file: log or records, responses, models, verification, report.
 
@@ -83,6 +84,9 @@ def run_study(
     cache : mutable mapping of str to object, optional
         Results of stages by the hash of all that they depend on. Whoever gives the same mapping
         to the next run pays only for the stages behind what has changed.
+    gains_file : str
+        Parameter file to which the gains are to be written after the run, as the report shall name
+        it; default: the usual name.
 
     Raises
     ------
@@ -100,7 +104,7 @@ def run_study(
     >>> study.output / "report.html"                                 # doctest: +SKIP
     """
     with speaking(as_key):
-        return _run(Path(path), output, log, tune, cache, level)
+        return _run(Path(path), output, log, tune, cache, level, gains_file)
 
 
 def _run(
@@ -110,6 +114,7 @@ def _run(
     tune: bool | Mapping[str, Any],
     cache: MutableMapping[str, Any] | None,
     level: float | None,
+    gains_file: str,
 ) -> Study:
     settings = read_settings(source)
     if level is not None:
@@ -178,6 +183,7 @@ def _run(
             tried,
             plots,
             plan,
+            gains_file,
         )
         _write(study, folder)
         advance()

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from flightid.control.margins.margins import Margins
+from flightid.control.tuning.worst_cases import to_the_worse
 from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.frozen import dataclass
@@ -182,7 +183,8 @@ class GainFlight(Result, schema="flightid.gain_flight/1"):
             rows.append(
                 (
                     *(each.axis, each.loop, each.name, each.required, each.before),
-                    *(each.promised.value, low, high, each.worst, each.measured.value),
+                    *(each.promised.value, low, high),
+                    *(to_the_worse(each.name, each.worst), each.measured.value),
                     *(least, most, each.promised.unit, each.agrees),
                 )
             )

@@ -19,7 +19,7 @@ from flightid.control.tuning.worst_cases import WorstCase
 from flightid.conventions import Light
 from flightid.errors import DataError, UnknownNameError
 from flightid.files import as_path
-from flightid.findings import Finding, at_least
+from flightid.findings import Finding, at_least, held
 from flightid.frozen import dataclass
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
@@ -156,7 +156,7 @@ class PidDesign(
             if each.name == "phase margin" and each.worst is not None
         ]
         gains = ", ".join(f"{name} {value:.4g}" for name, value in self.gains.items())
-        return f"PidDesign({self.axis}: {gains}; worst phase margin {min(margins):.3g} deg)"
+        return f"PidDesign({self.axis}: {gains}; worst phase margin {held(min(margins)):.3g} deg)"
 
     def gain_table(self) -> Table:
         """Gains before and after."""
@@ -205,13 +205,9 @@ class PidDesign(
         )
         rows: list[tuple[Cell, ...]] = []
         for each in self.worst_cases:
-            low, high = each.estimate.interval(level) or (None, None)
-            rows.append(
-                (
-                    *(each.loop, each.name, each.required, each.nominal, low, high, each.worst),
-                    *(each.unit, each.flown, each.flown_worst),
-                )
-            )
+            ends, (worst, flown) = each.estimate.interval(level), each.shown_worst
+            told = (each.loop, each.name, each.required, each.nominal, *(ends or (None, None)))
+            rows.append((*told, worst, each.unit, each.flown, flown))
         note = (
             f"Worst: of {self.n_plants} plants drawn from what the data allow; "
             f"{at_least(100.0 * self.content, 1)}% of such plants do at least as well "
@@ -235,7 +231,7 @@ class PidDesign(
         rows = tuple(
             (
                 *(k, *(stage.gains[name] for name in names)),
-                *(stage.phase_margin_deg, stage.gain_margin_db, stage.stable),
+                *(held(stage.phase_margin_deg), held(stage.gain_margin_db), stage.stable),
             )
             for k, stage in enumerate(self.stages, 1)
         )

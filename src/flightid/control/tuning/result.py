@@ -193,7 +193,8 @@ class Tuning(Result, schema="flightid.tuning/1"):
         rows: list[tuple[Cell, ...]] = [
             (
                 *(axis.axis, now.loop, now.name, now.required),
-                *(self[axis.axis].worst_case(now.loop, now.name).nominal, now.nominal, now.worst),
+                *(self[axis.axis].worst_case(now.loop, now.name).nominal, now.nominal),
+                now.shown_worst[0],
                 *(now.unit, now.met if now.required else None),
             )
             for each in self.together

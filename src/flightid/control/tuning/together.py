@@ -136,6 +136,7 @@ class Together:
 
 def _broken(number: WorstCase) -> str:
     """A requirement that is not kept, in words."""
-    worst = "none" if number.worst is None else f"{number.worst:.3g}"
+    least, _ = number.shown_worst
+    worst = "none" if least is None else f"{least:.3g}"
     unit = "" if number.unit == "1" else f" {number.unit}"
     return f"{number.loop}, {number.name} {worst}{unit} at the worst plant ({number.required})"

@@ -13,6 +13,7 @@ from flightid.control.margins.resonance_slack import TAKEN, ResonanceSlack
 from flightid.control.tuning.limits import ANGLE, Limit, limits
 from flightid.control.tuning.loop_problem import LoopAssessment, LoopProblem
 from flightid.control.tuning.margins_beyond import rooms_left
+from flightid.findings import held
 from flightid.frozen import dataclass
 from flightid.uncertainty.estimate import Estimate, Reading
 from flightid.uncertainty.uneven import DrawnEnds, Reaching
@@ -75,6 +76,11 @@ class WorstCase:
         """Value of the estimated plant."""
         return self.estimate.value
 
+    @property
+    def shown_worst(self) -> tuple[float | None, float | None]:
+        """Worst with the new and with the flown gains at three digits, rounded to the worse."""
+        return to_the_worse(self.name, self.worst), to_the_worse(self.name, self.flown_worst)
+
     def to_dict(self) -> dict[str, object]:
         """Plain values."""
         return self.estimate.to_dict() | {
@@ -109,6 +115,18 @@ KINDS = (
     _Kind("disturbance_bandwidth_rad_s", "disturbance bandwidth", "rad/s", True),
     _Kind("disturbance_peak_db", "disturbance peak", "dB", False),
 )
+
+
+def to_the_worse(name: str, value: float | None) -> float | None:
+    """A number of a loop at three digits, rounded to the side on which its promise still holds.
+
+    Example
+    -------
+    >>> to_the_worse("phase margin", 45.46), to_the_worse("sensitivity peak", 1.6412)
+    (45.4, 1.65)
+    """
+    more = next((kind.more for kind in (*KINDS, NOISE) if kind.name == name), True)
+    return held(value, least=more)
 
 
 def worst_cases(
