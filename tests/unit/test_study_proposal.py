@@ -301,6 +301,20 @@ def test_units_and_a_fall_come_first_then_the_commands_that_go_on(tmp_path: Path
     assert sum("flightid plan day.bin" in line for line in todo) == 1, "a command is said once"
     assert any(line == "- fly a sweep" for line in todo)
     assert [line for line in todo if "log faster" in line] == ["- log faster: no card is to blame"]
+    at = {
+        word: k
+        for k, line in enumerate(todo)
+        for word in ("log faster", "plan day")
+        if word in line
+    }
+    assert at["log faster"] < at["plan day"], "sweeps of a log that is too slow are flown in vain"
+    motors = Finding("saturated", Light.AMBER, "C3 at its limit", "straighten motors first")
+    phases = replace(looked.phases, tipped_s=15.0)
+    fallen = replace(found, findings=(*found.findings, motors), phases=phases)
+    todo = Proposal((), (), missed, fallen).refusal().partition("first first\n")[2].splitlines()
+    assert [line.split(":")[0] for line in todo[1:4]] == [
+        "- look for its cause", "- straighten motors first", "- flightid flight day.bin",
+    ]  # fmt: skip
 
 
 def test_records_without_times_take_a_sample_time_into_the_study(tmp_path: Path) -> None:

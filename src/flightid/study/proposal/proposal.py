@@ -8,7 +8,7 @@ from pathlib import Path
 
 from flightid.errors import StudyError
 from flightid.files import write_atomically
-from flightid.findings import FIRST, Finding, in_order
+from flightid.findings import CAUSES, FIRST, Finding, in_order
 from flightid.frozen import dataclass
 from flightid.inspection import Inspection
 from flightid.inspection.carried import carried_sentence
@@ -16,6 +16,8 @@ from flightid.surface import spoken
 from flightid.wrapping import wrapped
 
 WIDTH = 100
+LOGGED = ("rate-too-low", "rate-limited", "gaps", "jitter", "no-command-logged")
+"""Codes of what is set before a flight: sweeps of a log that is too slow are flown in vain."""
 STAMP = "# Written by flightid, which replaces this file as long as nobody changes it: "
 """Begins the last line, with the hash of the lines above it."""
 
@@ -80,10 +82,16 @@ class Proposal:
         actions = [finding.action for finding in self.findings if finding.action]
         if self.inspection is not None:
             noted = self.inspection.findings
-            first = [f.action for f in in_order(noted) if f.code in FIRST]
+            ranked = [f for f in in_order(noted) if f.action]
+            first = [f.action for f in ranked if f.code in FIRST]
+            mended = [f.action for f in ranked if f.code.startswith(CAUSES)]
+            settings = [f.action for f in ranked if f.code in LOGGED]
             found = [*actions, *(each.action for each in noted if each.action)]
             planned = [each for each in found if "flightid plan" in each]
-            actions = [*first, *self._next(planned=bool(planned)), *planned, *found]
+            looked = [*self._next(planned=bool(planned))]
+            # What made a vehicle fall is mended before anything; what is logged, before it flies.
+            early = [*mended, *looked] if self.inspection.phases.fall else [*looked, *mended]
+            actions = [*first, *early, *settings, *planned, *found]
         return [a for a in dict.fromkeys(actions) if not any(_goes_on(b, a) for b in actions)]
 
     def _next(self, *, planned: bool) -> Iterator[str]:
