@@ -5,11 +5,15 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
+from scipy.signal import lfilter
 
+from flightid.cli.output import verdicts_last
 from flightid.cli.program import run
 from flightid.conventions import Light
 from flightid.findings import GRAVITY
+from flightid.table import Column, Table
 from tests.ordinary_log import write_ordinary_log
 
 RULE = re.compile(r"^-{3,}(  +-{3,})*$")
@@ -38,6 +42,37 @@ def logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
             folder / f"day{seed}.bin", seed=seed, duration_s=12.0, parameters=PARAMETERS
         )
     return folder
+
+
+def test_verbs_of_models_and_records_end_with_their_verdicts(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A fit printed amber, green, its light, amber again, then a note; margins notes after red."""
+    said = (
+        "[red] no", "rms 2", "[green] yes", "Light: red.", "[not judged] maybe", "[red] no",
+        "[amber] hm", "One record.",
+    )  # fmt: skip
+    told = verdicts_last(Table("t", (Column("a"),), (), said))
+    assert isinstance(told, Table)
+    assert told.notes == (
+        "rms 2", "One record.", "[green] yes", "[not judged] maybe", "[amber] hm", "[red] no",
+        "Light: red.",
+    )  # fmt: skip
+    random = np.random.default_rng(1)
+    u = np.repeat(random.choice([-1.0, 1.0], 80), 5)
+    y = lfilter([0.2], [1.0, -0.8], u) + 0.01 * random.standard_normal(u.size)
+    rows = "".join(
+        f"{0.1 * k:.1f},{a},{b:.6g}\n" for k, (a, b) in enumerate(zip(u, y, strict=True))
+    )
+    (tmp_path / "rig.csv").write_text(f"time,u,y\n{rows}", encoding="utf-8")
+    named = [str(tmp_path / "rig.csv"), "--inputs", "u", "--outputs", "y"]
+    for verb in (
+        ["advise"],
+        ["polynomial", "--kind", "arx", "--na", "1", "--nb", "1", "--nk", "1"],
+    ):
+        assert run([verb[0], *named, *verb[1:]]) in {0, 1}
+        *_, last = capsys.readouterr().out.rstrip().splitlines()
+        assert JUDGED.match(last) or last.startswith("Light: "), last
 
 
 @pytest.mark.parametrize("verb", VERBS)

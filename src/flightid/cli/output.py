@@ -93,6 +93,28 @@ def in_short(table: object) -> str:
     return str(replace(table, rows=table.rows[:SHORT], notes=(left, *table.notes)))
 
 
+def verdicts_last(table: object) -> object:
+    """A table whose notes end with its verdicts, the worst last, each once, then its light.
+
+    Pages and files keep the order of the result: there eyes are at the top.
+    """
+    from flightid.conventions import Light
+    from flightid.findings import GRAVITY
+    from flightid.table import Table
+
+    if not isinstance(table, Table):
+        return table
+    ranks = {f"[{light.words}] ": -GRAVITY.index(light) for light in Light}
+    ends = {"Light: ": 1}
+
+    def rank(note: str) -> int | None:
+        return next((at for begin, at in (ranks | ends).items() if note.startswith(begin)), None)
+
+    notes = list(dict.fromkeys(table.notes))
+    told = sorted((each for each in notes if rank(each) is not None), key=lambda e: rank(e) or 0)
+    return replace(table, notes=(*(each for each in notes if rank(each) is None), *told))
+
+
 def emit(result: CommandResult, *, as_json: bool, level: float | None = None) -> None:
     """Print a result to standard output.
 
@@ -108,7 +130,10 @@ def emit(result: CommandResult, *, as_json: bool, level: float | None = None) ->
     from flightid.uncertainty.quantiles import showing
 
     with showing(level):
-        emit_values(result.to_dict()) if as_json else click.echo(in_short(result.summary()))
+        if as_json:
+            emit_values(result.to_dict())
+        else:
+            click.echo(in_short(verdicts_last(result.summary())))
 
 
 def emit_values(values: object) -> None:
