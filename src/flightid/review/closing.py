@@ -93,6 +93,8 @@ def _told(review: ReviewedFlight) -> str:
     count = sum(map(len, groups.values()))
     if not count:
         return f"This flight tells no step of its {len(review.loops)} loops."
+    if len(groups.get(Light.GREEN, ())) == len(review.loops):
+        return f"This flight tells the steps of all {count} loops, with nothing against any."
     return (
         f"This flight tells the steps of {count} of {len(review.loops)} loops: {'; '.join(parts)}."
     )
