@@ -30,6 +30,8 @@ def test_a_review_ends_with_what_it_tells_and_what_is_next(review: fid.FlightRev
     end = review.to_text().split("\n\n")[-1]
     assert end.startswith("This flight tells the steps of 2 of 6 loops: ")
     assert "Next: flightid plan flight.bin (sweeps to fly, for models and gains)." in end
+    kinds = [type(each).__name__ for each in flight_document(review).sections[0].blocks]
+    assert kinds[:3] == ["Paragraph", "Figure", "Lights"], "answer, picture, verdicts"
     assert review.answer in to_text(flight_document(review)).replace("\n", " ")
     assert review.to_dict()["answer"] == review.answer
     assert "Next: flightid tune flight.bin" in replace(review, swept=True).answer
@@ -43,7 +45,7 @@ def test_each_step_is_named_by_its_verdict_or_as_not_told(review: fid.FlightRevi
     doubtful = (Finding("step-roll-rate", Light.AMBER, "poor"),)
     none = replace(attitude, step=attitude.step[:0])
     said = replace(review, findings=doubtful, loops=(rate, none)).answer
-    assert said.startswith("This flight tells the steps of 1 of 2 loops: in doubt roll rate.")
+    assert said.startswith("This flight tells the steps of 1 of 2 loops: roll rate is in doubt.")
     untold = replace(review, loops=(replace(rate, step=rate.step[:0]), none)).answer
     assert untold.startswith("This flight tells no step of its 2 loops.")
 

@@ -30,12 +30,13 @@ def flight_blocks(
     glance : bool
         Begin the pictures with throttle and modes.
     """
-    worst_first = tuple(reversed(review.findings))
-    blocks: list[Block] = [Lights(worst_first, repeats=repeats)] if worst_first else []
+    # What a reader came for is the picture: verdicts go on for a screen.
+    told = any(loop.is_told for loop in review.loops)
+    blocks: list[Block] = [figure_block(review.plot(), CAPTION)] if told else []
+    if worst_first := tuple(reversed(review.findings)):
+        blocks.append(Lights(worst_first, repeats=repeats))
     if glance and has_glance(review):
         blocks.append(figure_block(flight_glance(review), GLANCE))
-    if any(loop.is_told for loop in review.loops):
-        blocks.append(figure_block(review.plot(), CAPTION))
     if review.noise.is_told:
         blocks.append(
             figure_block(

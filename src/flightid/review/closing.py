@@ -85,11 +85,15 @@ def _told(review: ReviewedFlight) -> str:
             light = lights.get(f"step-{loop.axis}-{loop.loop}", Light.UNKNOWN)
             groups.setdefault(light, []).append(loop.name)
     words = {
-        Light.GREEN: "nothing against {}",
-        Light.AMBER: "in doubt {}",
-        Light.UNKNOWN: "too uncertain to judge {}",
+        Light.GREEN: "nothing is against {0}",
+        Light.AMBER: "{0} {1} in doubt",
+        Light.UNKNOWN: "{0} {1} too uncertain to judge",
     }
-    parts = [words[light].format(_listed(groups[light])) for light in words if light in groups]
+    parts = [
+        said.format(_listed(groups[light]), "is" if len(groups[light]) == 1 else "are")
+        for light, said in words.items()
+        if light in groups
+    ]
     count = sum(map(len, groups.values()))
     if not count:
         return f"This flight tells no step of its {len(review.loops)} loops."
