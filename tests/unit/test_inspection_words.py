@@ -24,6 +24,7 @@ from flightid.inspection.signals import Signal
 from flightid.inspection.skew import StreamSkew, _skew
 from flightid.inspection.thresholds import LONGEST_WINDOW
 from flightid.inspection.usable_band import AxisBand, _longest_window
+from flightid.logs.dataflash.writer import DataflashWriter
 from flightid.logs.source import Event, Gap
 from flightid.study.proposal import propose_study
 from flightid.study.settings import read_settings
@@ -102,8 +103,15 @@ def test_a_log_that_ends_before_its_messages_says_nothing_of_its_firmware(tmp_pa
     cut.write_bytes(whole[: whole.index(b"MC_ROLL_P")])
     started = fid.read_log(cut)
     assert not started.parameters
-    assert "ends before its first message" in advice.logging(started)
+    assert "ends before its first measurement" in advice.logging(started)
     assert "firmware" not in fid.inspect_log(started).to_text()
+    writer = DataflashWriter()
+    writer.parameter("LOG_BITMASK", 1.0)
+    writer.write(tmp_path / "cut.bin")
+    review = fid.review_flight(tmp_path / "cut.bin")
+    (told,) = (each for each in review.findings if each.code == "flight-unknown")
+    assert told.action == advice.WHOLE_LOG, "CTUN was to be logged, which was cut off"
+    assert review.answer.endswith("whether it flew: the log ends before anything was measured.")
     cut.write_bytes(whole)
     assert "hold no SDLOG_PROFILE" in advice.logging(fid.read_log(cut))
 

@@ -37,12 +37,29 @@ def shortest_flight_s() -> float:
     return INDEPENDENT_WINDOWS.value * CYCLES_IN_WINDOW.value / LOWEST_OF_INTEREST.value
 
 
+DECLARATIONS = {"FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG", "VER"}
+"""Messages of ArduPilot that stand before its first measurement."""
+WHOLE_LOG = "hand in the whole log: what is left of it ends before its first measurement"
+
+
+def is_cut(log: Log) -> bool:
+    """Whether a log ends before anything was measured: nothing tells what its autopilot logs."""
+    return log.kind in ("ardupilot", "px4") and not set(log.messages) - DECLARATIONS
+
+
 def logging(log: Log) -> str:
     """Settings that make the autopilot log fast enough."""
+    if is_cut(log):
+        return WHOLE_LOG
     if log.kind == "px4":
         return _px4_logging(log)
     if log.kind in LOGGING:
         return LOGGING[log.kind]
+    return _ardupilot_logging(log)
+
+
+def _ardupilot_logging(log: Log) -> str:
+    """The bits of LOG_BITMASK that are missing, by what the log tells of it."""
     wanted_bits = LOG_BITS.get(log.vehicle or "")
     present = log.parameters.get("LOG_BITMASK")
     if wanted_bits is None:
@@ -66,9 +83,6 @@ def set_bits(wanted: dict[int, str]) -> str:
 def _px4_logging(log: Log) -> str:
     """The logging profile, where the firmware that flew has one."""
     present = log.parameters.get("SDLOG_PROFILE")
-    if present is None and not log.messages:
-        # Parameters stand before the first message: a file that ends there may lack any of them.
-        return "hand in the whole log: what is left of it ends before its first message"
     if present is None:
         return (
             "log commands and body rates at full rate: the parameters of this firmware hold no "

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from flightid.frozen import dataclass
 from flightid.inspection.actuators import Actuators
+from flightid.inspection.advice import WHOLE_LOG, is_cut
 from flightid.inspection.signals import Signal, Span, find
 from flightid.inspection.stamps import believable, log_span
 from flightid.inspection.thresholds import (
@@ -111,7 +112,9 @@ def _untold(log: Log, ran: bool | None) -> FlightPhases:
     """That flight is not told from ground, why, and what to log for it."""
     reason = "no throttle, motor output, speed or landing detector is logged"
     action = "log the throttle or the motors' outputs as well"
-    if log.kind == "ardupilot":
+    if is_cut(log):
+        reason, action = "the log ends before anything was measured", WHOLE_LOG
+    elif log.kind == "ardupilot":
         action = "log the throttle (CTUN) or the outputs (RCOU) with the parameters (PARM)"
     if "RCOU" in log:
         reason = (

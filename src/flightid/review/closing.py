@@ -67,6 +67,9 @@ def closing_lines(review: ReviewedFlight) -> Iterator[str]:
     if phases.is_known and not phases.airborne:
         yield "This log holds no flight, so it tells nothing of the vehicle in the air."
         return
+    if not phases.is_known and not review.loops:
+        yield f"This log does not tell whether it flew: {phases.evidence}."
+        return
     if phases.fall:
         yield f"{phases.fall[0].upper()}{phases.fall[1:]}."
     yield _told(review)
