@@ -169,7 +169,7 @@ OWN = {
     ),
     "simulation": ("parts of a run; two signals that are compared", "measured n_samples place "
                    "predicted substeps weights"),
-    "study": ("a folder, and a stage to run", "cache output tune"),
+    "study": ("a folder, a stage to run, what is written after it", "cache gains_file output tune"),
     "table": ("a column by number", "index"),
     "uncertainty": ("a function that carries a covariance", "count digits factor function missing "
                     "place reason scale thing"),

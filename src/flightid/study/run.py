@@ -120,14 +120,13 @@ def _run(
     if level is not None:
         settings = replace(settings, level=checked_level(level))
     final = Path(output) if output is not None else output_folder(source)
-    reads = (source, *named_paths(settings), *(() if log is None else (Path(log),)))
-    require_replaceable(final, reads)
-    names = tuple(model.name for model in settings.models)
+    given = () if log is None else (Path(log),)
+    require_replaceable(final, (source, *named_paths(settings), *given))
     collected = ErrorList()
     collected.read(require_files, None, settings.record_files if log is None else (), source)
     if log is None and settings.log is not None:
         collected.read(require_log, None, settings.log, source)
-    tasks = list(collected.each(settings.models, load_task, names))
+    tasks = list(collected.each(settings.models, load_task, [m.name for m in settings.models]))
     collected.finish()
     rated = settings.qualities
     if rated is not None:
