@@ -12,6 +12,7 @@ from flightid.responses.errors.linear_estimate import LinearEstimate
 from flightid.responses.errors.noise import AVERAGED, NoiseSpectrum, mean_spectrum
 from flightid.responses.errors.pilot import Pilot
 from flightid.responses.errors.pilot_search import BEYOND_BAND
+from flightid.responses.errors.random_error import Points, covariances
 from flightid.uncertainty.quantiles import LEVEL, half_width
 
 Complex = NDArray[np.complex128]
@@ -36,8 +37,9 @@ class CorrectedResponse:
     ----------
     omega_rad_s : ndarray, shape (n_f,)
     values : ndarray of complex, shape (n_out, n_in, n_f)
-    errors : ndarray, shape (n_out, 2 n_in n_f, 2 n_in n_f)
-        Covariance, as `CovarianceSource.covariance` has it.
+    errors : ndarray, shape (n_groups, n_out, 2 n_g n_f, 2 n_g n_f)
+        Covariance of each group of n_g inputs, as `CovarianceSource.covariance` has it: of all
+        inputs together, or of each by itself.
     spread : ndarray, shape (n_before, n_f)
         Straight lines over log frequency from the frequencies before to these.
     """
@@ -50,10 +52,12 @@ class CorrectedResponse:
     @property
     def relative(self) -> Real:
         """Standard error of a part over the size of the response, shape (n_out, n_in, n_f)."""
-        shape = (len(self.values), 2, *self.values.shape[1:])
-        variances = np.diagonal(self.errors, axis1=1, axis2=2).reshape(shape)
+        groups, n_out = self.errors.shape[:2]
+        variances = np.diagonal(self.errors, axis1=2, axis2=3)
+        variances = variances.reshape(groups, n_out, 2, -1, self.values.shape[2]).mean(axis=2)
+        variances = variances.transpose(1, 0, 2, 3).reshape(self.values.shape)
         size = np.maximum(np.abs(self.values), np.finfo(float).tiny)
-        return np.asarray(np.minimum(np.sqrt(variances.mean(axis=1)) / size, MOST_RELATIVE))
+        return np.asarray(np.minimum(np.sqrt(variances) / size, MOST_RELATIVE))
 
     def coherence(self, before: Real) -> Real:
         """Coherence γ² of the windows, and no more than these errors allow, (n_out, n_in, n_f).
@@ -70,7 +74,7 @@ class CorrectedResponse:
 
 
 def corrected(
-    linear: LinearEstimate, omega_rad_s: Real, *, refined: bool
+    linear: LinearEstimate, omega_rad_s: Real, *, refined: bool = False, by_input: bool = False
 ) -> CorrectedResponse | None:
     """Take the bias out of an estimate, or None where no pilot can foretell it.
 
@@ -81,6 +85,8 @@ def corrected(
         Its frequencies.
     refined : bool
         Add frequencies where a pilot is no straight line between neighbours.
+    by_input : bool
+        Errors of each input by itself, which are much sooner told than those of all together.
     """
     pilots = linear.pilots_of_outputs()
     if pilots is None:
@@ -91,7 +97,9 @@ def corrected(
     # Linear in changes of the outputs alone: windows keep the shares that the measured ones gave.
     left = linear.functional()(_residuals(linear, pilots))
     own = np.stack([each.frequency_response(omega)[columns] for each in pilots])
-    errors = _errors(linear, pilots, omega, spread)
+    every = np.arange(len(columns))
+    groups = every[:, None] if by_input else every[None]
+    errors = _errors(linear, pilots, omega, spread, groups)
     return CorrectedResponse(omega, own + left @ spread, errors, spread)
 
 
@@ -149,38 +157,41 @@ def _errors(
     pilots: Sequence[Pilot],
     omega: Real,
     spread: Real,
+    groups: NDArray[np.intp],
 ) -> Real:
-    """Covariance of the difference, shaped as by `CovarianceSource.covariance`."""
-    columns, noise = linear.places[1], _noise(linear, pilots)
-    source = linear.errors_with(noise)
-    total = source.covariance(*(np.arange(len(each)) for each in linear.places))
-    onto = np.kron(np.eye(2 * len(columns)), spread)
+    """Covariance of the difference, of each group of inputs: see `CorrectedResponse`."""
+    noise, points = _noise(linear, pilots), np.arange(len(linear.places[2]))
+    wanted = [Points(row, group, points) for group in groups for row in range(len(pilots))]
+    totals = iter(covariances(linear.errors_with(noise), wanted))
+    onto = np.kron(np.eye(2 * groups.shape[1]), spread)
     least = _least_variances(linear, noise, omega, spread)
     found = []
-    for row, pilot in enumerate(pilots):
-        own = _real(pilot.response_slopes(omega)[:, columns])
-        made = _real(linear.of_pilot(row)[:, columns])
-        left = _positive(total[row] - made.T @ pilot.covariance @ made)
-        known = onto.T @ left @ onto + own.T @ pilot.covariance @ own
-        known *= _widened(pilot)
-        if least is not None:
-            longer = np.sqrt(np.maximum(np.tile(least[row], 2) / np.diag(known), 1.0))
-            longer = np.minimum(longer, MOST_RELATIVE)
-            known *= np.outer(longer, longer)
-        found.append(known)
-    return np.stack(found)
+    for group in groups:
+        columns = linear.places[1][group]
+        for row, pilot in enumerate(pilots):
+            own = _real(pilot.response_slopes(omega)[:, columns])
+            made = _real(linear.of_pilot(row)[:, columns])
+            left = _positive(next(totals) - made.T @ pilot.covariance @ made)
+            known = onto.T @ left @ onto + own.T @ pilot.covariance @ own
+            known *= _widened(pilot)
+            if least is not None:
+                needed = np.tile(least[row, group].ravel(), 2)
+                longer = np.sqrt(np.maximum(needed / np.diag(known), 1.0))
+                longer = np.minimum(longer, MOST_RELATIVE)
+                known *= np.outer(longer, longer)
+            found.append(known)
+    return np.stack(found).reshape(len(groups), len(pilots), *found[0].shape)
 
 
 def _least_variances(
     linear: LinearEstimate, noise: NoiseSpectrum, omega: Real, spread: Real
 ) -> Real | None:
-    """Of real and of imaginary parts, by what is told beside each frequency, (n_out, n_in n_f)."""
+    """Of real and of imaginary parts, by what is told beside each frequency, (n_out, n_in, n_f)."""
     alone = linear.local_spread()
     if alone is None:
         return None
     ends = np.exp(np.log(np.minimum(alone, np.finfo(float).max)) @ spread)
-    whole = 0.5 * noise.at(omega)[:, None] * ends / SURER**2
-    return np.asarray(whole.reshape(len(whole), -1))
+    return np.asarray(0.5 * noise.at(omega)[:, None] * ends / SURER**2)
 
 
 def _widened(pilot: Pilot) -> float:

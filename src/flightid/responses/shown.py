@@ -93,7 +93,7 @@ class MeasuredEstimate(Protocol):
 def shown_values(response: MeasuredEstimate) -> dict[str, Any]:
     """Fields in which the estimate that is shown differs from what windows gave, by name.
 
-    Where a pilot foretells the leakage it is taken out, by each input. Where none can be had the
+    Where a pilot foretells the leakage it is taken out. Where none can be had the
     values stay and are coherent nowhere: nobody knows what of them is leakage.
 
     Parameters
@@ -113,18 +113,17 @@ def shown_values(response: MeasuredEstimate) -> dict[str, Any]:
     coherence, n_f = np.zeros_like(relative), len(response.omega_rad_s)
     matrices = np.zeros((*relative.shape[:2], 2 * n_f, 2 * n_f))
     unknown: list[str] = []
-    for column in range(len(response.inputs)):
-        for rows, found in _by_input(linear, response.omega_rad_s, column):
-            before = response.coherence[rows, column : column + 1]
-            if found is None:
-                unknown += [f"{response.outputs[row]}/{response.inputs[column]}" for row in rows]
-                places = rows, np.array([column]), np.arange(n_f)
+    columns = np.arange(len(response.inputs))
+    for rows, found in _by_outputs(linear, response.omega_rad_s):
+        if found is None:
+            unknown += [f"{response.outputs[k]}/{name}" for k in rows for name in response.inputs]
+            for column in columns:
+                places = rows, columns[column : column + 1], np.arange(n_f)
                 matrices[rows, column] = errors.covariance(*places)
-                continue
-            values[rows, column] = found.values[:, 0]
-            relative[rows, column] = found.relative[:, 0]
-            coherence[rows, column] = found.coherence(before)[:, 0]
-            matrices[rows, column] = found.errors
+            continue
+        values[rows], relative[rows] = found.values, found.relative
+        coherence[rows] = found.coherence(response.coherence[rows])
+        matrices[rows] = found.errors.swapaxes(0, 1)
     return {
         "response": values,
         "random_error": relative,
@@ -136,22 +135,20 @@ def shown_values(response: MeasuredEstimate) -> dict[str, Any]:
     }
 
 
-def _by_input(
-    linear: LinearEstimate, omega_rad_s: Real, column: int
+def _by_outputs(
+    linear: LinearEstimate, omega_rad_s: Real
 ) -> list[tuple[NDArray[np.intp], CorrectedResponse | None]]:
-    """Of one input, rows of outputs and what they are without leakage, or None."""
-    frequencies, rows = np.arange(len(omega_rad_s)), np.arange(len(linear.places[0]))
-    at = np.array([column])
-
-    def of(some: NDArray[np.intp]) -> CorrectedResponse | None:
-        part = linear.select(some, at, frequencies)
-        return None if part is None else corrected(part, omega_rad_s, refined=False)
-
-    whole = of(rows)
+    """Rows of outputs and what they are without leakage, or None."""
+    whole = corrected(linear, omega_rad_s, by_input=True)
+    rows, columns, points = (np.arange(len(each)) for each in linear.places)
     if whole is not None or len(rows) == 1:
         return [(rows, whole)]
-    # What one output lacks, others may have.
-    return [(rows[k : k + 1], of(rows[k : k + 1])) for k in rows]
+    found: list[tuple[NDArray[np.intp], CorrectedResponse | None]] = []
+    for row in rows[:, None]:  # what one output lacks, others may have
+        part = linear.select(row, columns, points)
+        own = None if part is None else corrected(part, omega_rad_s, by_input=True)
+        found.append((row, own))
+    return found
 
 
 def _lost(response: MeasuredEstimate, coherence: Real, unknown: list[str]) -> list[Finding]:

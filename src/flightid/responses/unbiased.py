@@ -88,7 +88,7 @@ def unbiased(response: FrequencyResponse, *, refined: bool = False) -> Frequency
         response=found.values,
         coherence=found.coherence(response.coherence),
         random_error=found.relative,
-        errors=StoredCovariance(found.errors, len(found.omega_rad_s)),
+        errors=StoredCovariance(found.errors[0], len(found.omega_rad_s)),
         linear=None,
         estimator=f"{response.estimator}, {WITHOUT_BIAS}",
     )
