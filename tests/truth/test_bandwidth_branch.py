@@ -106,3 +106,20 @@ def test_a_model_shows_its_sign_by_what_lies_below_the_band(low: float) -> None:
     assert not [each for each in found.findings if each.code == "sign-doubtful"]
     with pytest.raises(DataError, match=r"has passed −135° where it begins\.$"):
         attitude_bandwidth(craft, "lon", "theta", band_rad_s=(1.0, 60.0))
+
+
+def test_a_last_point_of_noise_turns_no_phase() -> None:
+    """The gain of noise at the band's end asked for any phase: a bandwidth went missing by it."""
+    omega = np.geomspace(0.6, 16.0, 70)
+    s = 1j * omega
+    values = 20.0 * np.exp(-0.1 * s) / (s * (0.3 * s + 1.0))
+    coherence = np.full(70, 0.95)
+    values[-3:] *= np.array([0.98, 0.85, 0.5]) * np.exp(1j * np.array([0.0, 0.2, 1.0]))
+    coherence[-2:] = 0.5, 0.06
+    measured = fid.FrequencyResponse.from_values(
+        omega, values, inputs=["lat"], outputs=["phi"], units={"phi": "rad"}, coherence=coherence
+    )
+    found = attitude_bandwidth(measured, "lat", "phi", band_rad_s=(0.6, 16.0))
+    assert_close(found.omega_180_rad_s, 5.47161, atol=0.02, why="lines between 70 points")
+    assert_close(found.phase_bandwidth_rad_s, 2.14214, atol=0.02, why="lines between 70 points")
+    assert not [each for each in found.findings if each.code == "reversed"]

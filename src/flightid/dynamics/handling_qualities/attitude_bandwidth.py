@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from flightid.conventions import Light
 from flightid.dynamics.handling_qualities.curve import (
+    COHERENT,
     GRID_POINTS,
     GainPhaseCurve,
     Pair,
@@ -35,7 +36,6 @@ SHORTEST_SLOPE = 1.3
 NONLINEAR = 0.1
 """Difference of both phase delays, over the larger, beyond which the phase is no line."""
 SMALLEST_DELAY_S = 0.002
-COHERENT = 0.6
 NOISY = 0.03
 """Random error at a crossing beyond which intervals of a reading cover less than they say."""
 LATE = "begin the band lower: the phase has passed −135° where it begins"

@@ -11,6 +11,8 @@ from flightid.frozen import dataclass
 
 POINTS = 120
 """Points over log frequency at which the phase is compared with what the gain asks for."""
+ENDS = 12
+"""Of these points, those at either end whose slope goes on beyond the band: one pair is noise."""
 NEAREST = 1e-3
 """Distance in log frequency at which the weight of Bode's relation is cut."""
 WEAK = 0.1
@@ -107,8 +109,8 @@ def _phase_of_gain(logs: Array, gain: Array) -> Array:
     """Bode's relation, rad: the slope of the gain, weighted by ln coth |u/2| about each point."""
     width = logs[1] - logs[0]
     reach = np.arange(1, len(logs) + 1) * width
-    before = gain[0] - (gain[1] - gain[0]) * reach[::-1] / width
-    after = gain[-1] + (gain[-1] - gain[-2]) * reach / width
+    before = gain[0] - (gain[ENDS] - gain[0]) / ENDS * reach[::-1] / width
+    after = gain[-1] + (gain[-1] - gain[-1 - ENDS]) / ENDS * reach / width
     slope = np.diff(np.concatenate([before, gain, after])) / width
     return np.asarray(0.5 * np.pi * _weights(len(logs), float(width)) @ slope)
 

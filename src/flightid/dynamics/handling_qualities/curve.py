@@ -19,6 +19,10 @@ from flightid.responses import FrequencyResponse
 from flightid.responses.shown import WITHOUT_BIAS
 from flightid.scalar_search import root_between
 
+COHERENT = 0.6
+"""Coherence below which the phase of a measured point is a guess."""
+BRANCH_POINTS = 10
+"""Coherent points that a branch is told from; where there are fewer, all points are asked."""
 LOOKED_BELOW = 30.0
 """By which ratio below the band a model is looked at for the branch of its phase."""
 GRID_POINTS = 2000
@@ -109,12 +113,13 @@ class GainPhaseCurve:
         DataError
             Fewer than two points in the band, or a zero among them.
         """
-        exact, first = None, 0
+        exact, first, sound = None, 0, None
         if isinstance(thing, FrequencyResponse):
             measured = thing.pair(pair.output, pair.input)
             inside = (measured.omega_rad_s >= pair.low) & (measured.omega_rad_s <= pair.high)
             omega = measured.omega_rad_s[inside]
             values = pair.attitude(omega, measured.response[inside])
+            sound = _coherent(measured.coherence[inside])
         else:
             respond, high = _evaluator(thing, pair)
             omega = np.geomspace(pair.low, min(pair.high, high), points)
@@ -136,7 +141,8 @@ class GainPhaseCurve:
             )
         decibels = 20.0 * np.log10(np.abs(values))
         degrees = np.degrees(np.unwrap(np.angle(values)))
-        branch = branch_of(omega, decibels, degrees)
+        told = slice(None) if sound is None else sound
+        branch = branch_of(omega[told], decibels[told], degrees[told])
         omega, decibels, degrees = omega[first:], decibels[first:], degrees[first:] + branch.turn
         if smoother is not None:
             decibels, degrees = smoother @ decibels, smoother @ degrees
@@ -203,6 +209,12 @@ class GainPhaseCurve:
         if self.exact is None and ends[0] != ends[1]:  # a straight line over log frequency
             return float(left * (right / left) ** (ends[0] / (ends[0] - ends[1])))
         return root_between(lambda at: self.at(at)[part] - level, left, right, ends=ends)
+
+
+def _coherent(coherence: Array) -> NDArray[np.bool_] | None:
+    """Points that tell a branch; None where few do: gain of noise asks for any phase."""
+    sound = np.asarray(coherence >= COHERENT)
+    return sound if np.count_nonzero(sound) >= BRANCH_POINTS else None
 
 
 def smoother_of(response: FrequencyResponse, pair: Pair) -> Array | None:
