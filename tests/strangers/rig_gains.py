@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import cont2discrete, lfilter, tf2ss
+from scipy.signal import cont2discrete, lfilter
 
 import flightid as fid
 from flightid.conventions import Light
@@ -217,14 +217,19 @@ def broken_promise(design: fid.PidDesign, rig: Rig, seed: int) -> str:
 def swings(rig: Rig, num: Array, den: Array, seed: int) -> bool:
     """Whether the loop, its output limited, still swings long after a push."""
     r = np.random.default_rng([seed, 11])
-    a, b, c, _ = tf2ss(rig.b, np.polymul(rig.a, np.concatenate([[1.0], np.zeros(rig.delay)])))
-    x, u, e = np.zeros(len(a)), np.zeros(3), np.zeros(3)
+    # A difference equation asks nothing of how b is conditioned; a loop begins a sample later.
+    late = np.zeros(rig.delay + len(rig.a) - len(rig.b))
+    b = np.concatenate([late, rig.b])[1:] / rig.a[0]
+    moved, pushed = np.zeros(len(rig.a) - 1), np.zeros(len(b))
+    u, e = np.zeros(3), np.zeros(3)
     stop, seen = 1e-3 * float(np.abs(rig.b).sum()), np.zeros(WATCHED)
     for t in range(WATCHED):
-        y = float((c @ x)[0]) + stop * r.standard_normal() + (0.05 if t < 5 else 0.0)
+        out = float(b @ pushed - rig.a[1:] / rig.a[0] @ moved)
+        moved = np.concatenate([[out], moved[:-1]])
+        y = out + stop * r.standard_normal() + (0.05 if t < 5 else 0.0)
         e = np.concatenate([[-y], e[:2]])
         wanted = (num @ e - den[1:] @ u[:2]) / den[0]
         u = np.concatenate([[float(np.clip(wanted, -LIMIT, LIMIT))], u[:2]])
         seen[t] = u[0]
-        x = a @ x + b[:, 0] * u[0]
+        pushed = np.concatenate([[u[0]], pushed[:-1]])
     return bool(np.mean(np.abs(seen[-WATCHED // 3 :]) >= LIMIT) > 0.02)
