@@ -194,6 +194,7 @@ LINES: dict[str, Callable[[], Work]] = {
     "output error, 60 s, starts and biases": lambda: _linear(6000),
     "subspace with order search, 10⁴": lambda: _orders(10_000),
     "subspace with order search, 10⁵": lambda: _orders(100_000),
+    "subspace with order search, 10⁶": lambda: _orders(1_000_000),
     "pulse response, 10⁴": _pulses,
     "Box–Jenkins, 4000 samples": _box_jenkins,
 }

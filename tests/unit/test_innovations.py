@@ -43,6 +43,11 @@ def test_recursion_by_doubling_is_the_recursion():
         )
 
 
+def test_a_recursion_that_runs_away_is_told_as_far_as_it_is_finite():
+    found = run_recursion(np.array([[1e150]]), np.ones((1, 5)), np.array([1.0]))
+    assert np.isfinite(found[0]).tolist() == [True, True, True, False, False]
+
+
 @pytest.mark.parametrize("method", OPEN)
 @pytest.mark.parametrize("direct", [False, True])
 def test_noise_free_records_give_the_model_back(method, direct):

@@ -140,3 +140,12 @@ def test_lags_of_a_padded_periodogram_are_those_of_the_samples(length: int, ofte
     found = first_lags(power, length, 2, often=often)
     wanted = [float(values[k:] @ values[: 4 - k]) for k in range(3)]
     assert_close(found, np.array(wanted), rtol=1e-12, why="Wiener and Khinchin")
+
+
+@pytest.mark.parametrize("length", [65_536, 70_001])
+def test_first_lags_of_a_long_periodogram_are_those_of_the_samples(length: int) -> None:
+    n = 30_000
+    values = np.cumsum(np.random.default_rng(5).standard_normal(n))
+    power = np.abs(np.fft.rfft(values, length)) ** 2
+    wanted = np.array([float(values[k:] @ values[: n - k]) for k in range(21)])
+    assert_close(first_lags(power, length, 20), wanted, rtol=1e-14, why="Wiener and Khinchin")

@@ -3,13 +3,30 @@
 
 use crate::error::CoreError;
 
+/// States of every run as of `recurse_anyhow`, where none of them diverges.
+///
+/// # Errors
+/// `Shape` where lengths do not fit, `NotFinite` where a run diverges.
+pub fn recurse(
+    transition: &[f64],
+    forcing: &[f64],
+    initial: &[f64],
+    n_samples: usize,
+) -> Result<Vec<f64>, CoreError> {
+    let states = recurse_anyhow(transition, forcing, initial, n_samples)?;
+    match states.iter().position(|value| !value.is_finite()) {
+        Some(index) => Err(CoreError::NotFinite { what: "a linear recursion", index }),
+        None => Ok(states),
+    }
+}
+
 /// States of every run, n_runs × n_samples × n: run after run, time before state.
 ///
 /// `forcing` has that shape too; `initial` is n_runs × n.
 ///
 /// # Errors
-/// `Shape` where lengths do not fit, `NotFinite` where a run diverges.
-pub fn recurse(
+/// `Shape` where lengths do not fit.
+pub fn recurse_anyhow(
     transition: &[f64],
     forcing: &[f64],
     initial: &[f64],
@@ -49,10 +66,7 @@ pub fn recurse(
             }
         }
     }
-    match states.iter().position(|value| !value.is_finite()) {
-        Some(index) => Err(CoreError::NotFinite { what: "a linear recursion", index }),
-        None => Ok(states),
-    }
+    Ok(states)
 }
 
 #[cfg(test)]
@@ -76,6 +90,8 @@ mod tests {
         assert!(matches!(recurse(&[1.0], &[0.0], &[0.0], 3), Err(CoreError::Shape { .. })));
         let found = recurse(&[1e200], &[0.0; 4], &[1.0], 4);
         assert!(matches!(found, Err(CoreError::NotFinite { .. })));
+        let anyhow = recurse_anyhow(&[1e200], &[0.0; 4], &[1.0], 4).unwrap();
+        assert_eq!(anyhow, [1.0, 1e200, f64::INFINITY, f64::INFINITY]);
         assert_eq!(recurse(&[1.0], &[], &[1.0], 0).unwrap(), Vec::<f64>::new());
     }
 }

@@ -16,11 +16,14 @@ fn blocks(of: &RowMajor3<'_, f64>) -> Vec<f64> {
     of.as_array().iter().copied().collect()
 }
 
-/// slope_recursion(transition: NDArray[np.float64], output: NDArray[np.float64], forced: NDArray[np.float64], direct: NDArray[np.float64], signals: NDArray[np.float64]) -> NDArray[np.float64]
+/// slope_recursion(transition: NDArray[np.float64], output: NDArray[np.float64], forced: NDArray[np.float64], direct: NDArray[np.float64], signals: NDArray[np.float64], brief: Sequence[bool] = (), until: int = 0) -> NDArray[np.float64]
 ///
 /// (n_samples, p, n_unknowns) of δe = G s − C δx, δx⁺ = A δx + F s: F (n_unknowns, n, q),
-/// G (n_unknowns, p, q), signals s (q, n_samples).
+/// G (n_unknowns, p, q), signals s (q, n_samples). Of `brief` unknowns nothing is left after
+/// `until` samples: they are zeros from some sample after it on.
 #[pyfunction]
+#[pyo3(signature = (transition, output, forced, direct, signals, brief = vec![], until = 0))]
+#[expect(clippy::too_many_arguments, reason = "a system's own matrices, then what is brief of it")]
 fn slope_recursion<'py>(
     py: Python<'py>,
     transition: RowMajor2<'_, f64>,
@@ -28,6 +31,8 @@ fn slope_recursion<'py>(
     forced: RowMajor3<'_, f64>,
     direct: RowMajor3<'_, f64>,
     signals: RowMajor2<'_, f64>,
+    brief: Vec<bool>,
+    until: usize,
 ) -> PyResult<Bound<'py, PyArray3<f64>>> {
     let ((p, n), (q, n_samples)) = (output.as_array().dim(), signals.as_array().dim());
     let count = forced.as_array().dim().0;
@@ -41,6 +46,8 @@ fn slope_recursion<'py>(
         direct: &direct,
         sizes: [n, p, q],
         count,
+        brief: &brief,
+        until,
     };
     let given = &signals;
     let found = py.detach(|| slopes(of, given, n_samples)).map_err(from_core)?;

@@ -13,12 +13,12 @@ from flightid.frozen import dataclass
 from flightid.models.innovations.structure import SubspaceStructure
 from flightid.models.sampled.channels import SampledChannels, gather_channels
 from flightid.record import Record
-from flightid.uncertainty.triangle import folded_triangle
+from flightid.uncertainty.triangle import triangle_of_parts
 
 Array = NDArray[np.float64]
 USUAL_HORIZON = 15
 BLOCK = 20_000
-"""Columns that are folded into the triangular factor at a time."""
+"""Columns that go into the triangular factor at a time."""
 ROUNDING = 60.0
 """Minus the logarithm of a share of the outputs' power that is rounding."""
 POOR = 1e-9
@@ -91,7 +91,7 @@ class SubspaceData:
         return np.hstack(past), np.hstack(now), np.hstack(driven)
 
     def hankel_factor(self, blocks: int, rows: NDArray[np.int64]) -> Array:
-        """Triangular factor R of the block Hankel matrices of all records, folded bit by bit.
+        """Triangular factor R of the block Hankel matrices of all records, made bit by bit.
 
         Parameters
         ----------
@@ -100,10 +100,11 @@ class SubspaceData:
             Rows in the order of the factor, of u then y at one time, time by time. What is
             constant in a record is taken out.
         """
-        return folded_triangle(self._hankel_parts(blocks, rows), len(rows))
+        return triangle_of_parts(lambda: self._hankel_parts(blocks, rows))
 
     def _hankel_parts(self, blocks: int, rows: NDArray[np.int64]) -> Iterator[Array]:
-        """Columns of the matrix as rows, `BLOCK` at a time."""
+        """Columns of the Hankel matrices some at a time, as rows; of short records none."""
+        yield np.zeros((0, len(rows)))
         for y, u in zip(self.outputs, self.inputs, strict=True):
             joint, columns = np.vstack([u, y]), y.shape[1] - blocks + 1
             means = np.zeros((blocks * len(joint), 1))
@@ -267,7 +268,7 @@ def require_columns(columns: int, needed: int, horizon: int) -> None:
 
 
 def compress(data: SubspaceData, horizon: int) -> RowSpaceFactor:
-    """One QR of the Hankel matrices of all records, folded block by block.
+    """One QR of the Hankel matrices of all records, made block by block.
 
     Raises
     ------

@@ -10,6 +10,7 @@ from flightid import _native
 from flightid.errors import DataError, FitError
 from flightid.identification.subspace.data import SubspaceData
 from flightid.models.sampled.recursion import spectral_radius
+from flightid.uncertainty.triangle import triangle_of_rows
 
 Array = NDArray[np.float64]
 STABLE = 1.0 - 1e-6
@@ -19,8 +20,6 @@ NOISELESS = 1e-16
 """Innovations with less than this share of the outputs' power are rounding."""
 SPENT = 1e-20
 """Largest entry of a transition's power that leaves nothing of a state."""
-ROWS = 20_000
-"""Rows that are folded into a triangular factor at a time."""
 
 
 def kalman_gain(a: Array, c: Array, q: Array, s: Array, r: Array) -> Array:
@@ -109,7 +108,7 @@ def feedthrough(
                 action="choose another order, or look for outliers and unlike scales in the "
                 "records",
             ) from None
-        triangle = folded(made.reshape(y.size, -1))
+        triangle = triangle_of_rows(made.reshape(y.size, -1))
         wide = np.zeros((len(triangle), n_free + own * records + 1))
         wide[:, :n_free], wide[:, -1] = triangle[:, :n_free], triangle[:, -1]
         first = n_free + own * place
@@ -154,14 +153,7 @@ def run_columns(closed: Array, c: Array, columns: tuple[Array, Array], y: Array,
     signals, lasting = np.concatenate([u, y, begun]), _lasting(closed, y.shape[1])
     once = len(signals) - len(begun)
     brief = ~np.any([np.delete(each, once, axis=2).any(axis=(1, 2)) for each in columns], axis=0)
-    if 2 * lasting > y.shape[1] or not brief.any():
-        return _native.slope_recursion(closed, c, *columns, signals)
-    made = np.zeros((y.shape[1], len(c), len(brief)))
-    for chosen, until in ((brief, lasting), (~brief, y.shape[1])):
-        forced, shown = (each[chosen] for each in columns)
-        driven = _native.slope_recursion(closed, c, forced, shown, signals[:, :until])
-        made[:until, :, chosen] = driven
-    return made
+    return _native.slope_recursion(closed, c, *columns, signals, brief.tolist(), lasting)
 
 
 def _lasting(closed: Array, most: int) -> int:
@@ -171,12 +163,3 @@ def _lasting(closed: Array, most: int) -> int:
         while samples < most and not np.abs(power).max(initial=0.0) < SPENT:
             samples, power = 2 * samples, power @ power
     return min(samples, most)
-
-
-def folded(rows: Array) -> Array:
-    """Triangular factor of many rows, some at a time."""
-    triangle: Array = np.zeros((0, rows.shape[1]))
-    for first in range(0, len(rows), ROWS):
-        part = np.concatenate([triangle, rows[first : first + ROWS]])
-        triangle = np.asarray(np.linalg.qr(part, mode="r"))
-    return triangle

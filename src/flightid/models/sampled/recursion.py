@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid import _native
-from flightid.errors import DataError
 
 Array = NDArray[np.float64]
 
@@ -40,17 +39,7 @@ def run_recursion(a: Array, forcing: Array, initial: Array | None = None) -> Arr
     rows = np.asarray(forcing, dtype=np.float64).reshape(-1, n, n_samples).swapaxes(1, 2)
     first = np.zeros(forcing.shape[:-1]) if initial is None else initial
     starts = np.broadcast_to(first, forcing.shape[:-1]).reshape(-1, n)
-    given = (np.ascontiguousarray(each, dtype=np.float64) for each in (a, rows, starts))
-    try:
-        return _native.linear_recursion(*given).swapaxes(1, 2).reshape(forcing.shape)
-    except DataError:
-        # It runs away: what is finite of it is wanted all the same.
-        return _sample_by_sample(a, forcing, first)
-
-
-def _sample_by_sample(a: Array, forcing: Array, initial: Array) -> Array:
-    state = np.empty_like(forcing, dtype=np.float64)
-    state[..., 0] = initial
-    for t in range(1, forcing.shape[-1]):
-        state[..., t] = state[..., t - 1] @ a.T + forcing[..., t - 1]
-    return state
+    matrix, forced, begun = (np.ascontiguousarray(each, float) for each in (a, rows, starts))
+    # One that runs away is wanted as far as it is finite.
+    found = _native.linear_recursion(matrix, forced, begun, anyhow=True)
+    return found.swapaxes(1, 2).reshape(forcing.shape)
