@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
-from copy import copy
+from collections.abc import ItemsView, Iterable, Iterator, KeysView, Mapping, ValuesView
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,6 +67,9 @@ class Parameter:
         require_name(self.name, "a parameter")
 
     def _check_numbers(self) -> None:
+        value = self.value
+        if value is not None and self.minimum <= value <= self.maximum and math.isfinite(value):
+            return  # as nearly all are
         if self.value is None or not math.isfinite(self.value):
             raise ModelError(
                 f"parameter {self.name} has no value",
@@ -95,8 +98,8 @@ class Parameter:
         ModelError
             The value lies outside the bounds.
         """
-        made = copy(self)
-        object.__setattr__(made, "value", value)
+        made = object.__new__(type(self))  # a copy: models are made by the thousand
+        made.__dict__.update(self.__dict__, value=value)
         if self.tie is None:
             made._check_numbers()
         return made
@@ -198,6 +201,21 @@ class Parameters(Mapping[str, Parameter], TableView):
     def __len__(self) -> int:
         return len(self._items)
 
+    def keys(self) -> KeysView[str]:
+        """Names; as of any mapping, without asking for each by name."""
+        return self._items.keys()
+
+    def values(self) -> ValuesView[Parameter]:
+        """Parameters, in order."""
+        return self._items.values()
+
+    def items(self) -> ItemsView[str, Parameter]:
+        """Names and parameters, in order."""
+        return self._items.items()
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._items
+
     def __repr__(self) -> str:
         """Counts on one line."""
         free = sum(parameter.free for parameter in self.values())
@@ -279,8 +297,8 @@ class Parameters(Mapping[str, Parameter], TableView):
         ModelError
             A formula is outside the grammar, names what is unknown, or ties form a circle.
         """
-        names = [parameter.name for parameter in self.independent]
-        return _native.Tape(list(formulas), names, self.definitions)
+        names = tuple(parameter.name for parameter in self.independent)
+        return _compiled(tuple(formulas), names, tuple(self.definitions.items()))
 
     def with_values(self, values: Mapping[str, float]) -> Parameters:
         """Copy with other values of some independent parameters.
@@ -329,3 +347,11 @@ class Parameters(Mapping[str, Parameter], TableView):
     def to_dict(self) -> dict[str, object]:
         """Plain values by name."""
         return {name: parameter.to_dict() for name, parameter in self._items.items()}
+
+
+@lru_cache(maxsize=64)
+def _compiled(
+    formulas: tuple[str, ...], names: tuple[str, ...], definitions: tuple[tuple[str, str], ...]
+) -> _native.Tape:
+    """Formulas compiled once for all models whose parameters have the same names and ties."""
+    return _native.Tape(list(formulas), list(names), dict(definitions))
