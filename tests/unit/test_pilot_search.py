@@ -1,17 +1,67 @@
 """Least squares of pilots: transients eliminated record by record change nothing."""
 
 import numpy as np
+from numpy.typing import NDArray
 
+from flightid.responses.errors.pilot import _taken, acting, fit_pilots
 from flightid.responses.errors.pilot_search import (
     SPARE,
+    PilotBins,
     PilotColumns,
-    columns_of,
-    joined,
     solve,
     spectra_of,
     turns,
 )
 from tests.closeness import assert_close
+
+
+def written_out(data: PilotBins, order: int, target: NDArray[np.complex128]) -> np.ndarray:
+    """Sensitivities times the denominator, all zeros in place: (n_coefficients, n_bins)."""
+    own, n_in, n_records = order + 1 + SPARE, len(data.inputs[0]), len(data.omega)
+    rows = []
+    for place, (omega, u, y) in enumerate(
+        zip(data.omega, data.inputs, data.by_record(target), strict=True)
+    ):
+        powers = turns(omega, 10.0, order + SPARE)
+        basis = powers[: order + 1]
+        part = np.zeros(((order + 1) * n_in + own * n_records + order, len(omega)), complex)
+        part[: (order + 1) * n_in] = np.concatenate([row * basis for row in u])
+        begun = (order + 1) * n_in + own * place
+        part[begun : begun + own] = powers
+        part[-order:] = -y * basis[1:]
+        rows.append(part)
+    return np.concatenate(rows, axis=1)
+
+
+def test_what_a_fit_takes_of_noise_is_that_of_all_columns() -> None:
+    """The diagonal of the projection on all columns, and their covariance, record by record."""
+    random = np.random.default_rng(5)
+    inputs = [random.standard_normal((2, n)) for n in (90, 120)]
+    data = spectra_of(inputs, [np.cumsum(u.sum(0)) for u in inputs], 0.02, 60.0)
+    target, order = np.concatenate(data.output), 2
+    weights = 1.0 / (1.0 + np.abs(target))
+    columns = written_out(data, order, target)
+    places = [acting(6, order + 1 + SPARE, 2, order, record) for record in range(2)]
+    parts = [part[at] for part, at in zip(data.by_record(columns), places, strict=True)]
+    spent, covariance = _taken(parts, places, weights)
+    both = np.concatenate([(columns * weights).real, (columns * weights).imag], axis=1)
+    inverse = np.linalg.inv(both @ both.T)
+    share = 0.5 * np.einsum("ib,ij,jb->b", both, inverse, both).reshape(2, -1).sum(axis=0)
+    assert_close(spent, np.minimum(share, 0.95), rtol=1e-8, why="rounding")
+    assert_close(covariance, inverse, atol=1e-8 * np.max(np.abs(inverse)), why="rounding")
+
+
+def test_slopes_of_a_record_are_those_of_what_acts_in_it() -> None:
+    """Eight records: a pilot keeps no rows of zeros for the transients of the others."""
+    random = np.random.default_rng(6)
+    inputs = [random.standard_normal((1, 200)) for _ in range(8)]
+    outputs = [np.convolve(u[0], [0.0, 0.5, 0.3])[None, :200] for u in inputs]
+    pilot = fit_pilots(inputs, outputs, 0.02, 60.0)[0]
+    assert pilot is not None
+    n_own = pilot.order + 1 + SPARE
+    assert pilot.slopes[7].shape == (2 * pilot.order + 1 + n_own, 200)
+    assert len(pilot.covariance) == 2 * pilot.order + 1 + 8 * n_own
+    assert len(pilot.acting(7)) == len(pilot.slopes[7])
 
 
 def test_eliminated_transients_solve_the_whole_problem() -> None:
@@ -20,12 +70,10 @@ def test_eliminated_transients_solve_the_whole_problem() -> None:
     inputs = [random.standard_normal((2, n)) for n in (300, 180, 240)]
     data = spectra_of(inputs, [np.cumsum(u.sum(0)) for u in inputs], 0.02, 60.0)
     order, target = 3, np.concatenate(data.output)
-    basis = [turns(omega, 10.0, order) for omega in data.omega]
-    ends = [turns(omega, 10.0, order + SPARE) for omega in data.omega]
     weights = 1.0 / (1.0 + np.abs(target))
     made = PilotColumns.of(data, order, 10.0)
     numerators, denominator, transients = solve(made, target, weights, target * weights)
-    columns = joined(columns_of(data, basis, ends, target)) * weights
+    columns = written_out(data, order, target) * weights
     both = np.concatenate([columns.real, columns.imag], axis=1).T
     right = np.concatenate([(target * weights).real, (target * weights).imag])
     whole = np.linalg.lstsq(both, right, rcond=None)[0]

@@ -163,7 +163,6 @@ def _errors(
     noise, points = _noise(linear, pilots), np.arange(len(linear.places[2]))
     wanted = [Points(row, group, points) for group in groups for row in range(len(pilots))]
     totals = iter(covariances(linear.errors_with(noise), wanted))
-    onto = np.kron(np.eye(2 * groups.shape[1]), spread)
     least = _least_variances(linear, noise, omega, spread)
     found = []
     for group in groups:
@@ -172,7 +171,9 @@ def _errors(
             own = _real(pilot.response_slopes(omega)[:, columns])
             made = _real(linear.of_pilot(row)[:, columns])
             left = _positive(next(totals) - made.T @ pilot.covariance @ made)
-            known = onto.T @ left @ onto + own.T @ pilot.covariance @ own
+            moving = np.flatnonzero(np.any(own, axis=1))  # no response has transients
+            slopes, covariance = own[moving], pilot.covariance[np.ix_(moving, moving)]
+            known = _onto(left, spread) + slopes.T @ covariance @ slopes
             known *= _widened(pilot)
             if least is not None:
                 needed = np.tile(least[row, group].ravel(), 2)
@@ -181,6 +182,15 @@ def _errors(
                 known *= np.outer(longer, longer)
             found.append(known)
     return np.stack(found).reshape(len(groups), len(pilots), *found[0].shape)
+
+
+def _onto(covariance: Real, spread: Real) -> Real:
+    """Covariance of some rows of points, carried to other points of each row."""
+    before, after = spread.shape
+    n_rows = len(covariance) // before
+    half = spread.T @ covariance.reshape(n_rows, before, n_rows * before)
+    whole = half.reshape(n_rows * after, n_rows, before) @ spread
+    return np.asarray(whole.reshape(n_rows * after, n_rows * after))
 
 
 def _least_variances(

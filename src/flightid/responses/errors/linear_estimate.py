@@ -98,16 +98,18 @@ class WindowedWeights:
         def apply(changes: Sequence[Real]) -> Complex:
             ahead = changes[0].shape[:-2]
             rows = [each.reshape(-1, each.shape[-1]) for each in changes]
-            moving = [bool(np.any(each)) for each in rows]
+            moving = [np.flatnonzero(np.any(each, axis=1)) for each in rows]
             total = np.zeros((2, *ahead, *shape))
             for place, (basis, turn) in enumerate(zip(bases, turns, strict=True)):
                 moved = np.zeros((len(rows[0]), *shape[1:]), dtype=np.complex128)
                 for each, change, moves in zip(weights, rows, moving, strict=True):
-                    if not (moves and basis.plan.count(change.shape[1])):
+                    if not (moves.size and basis.plan.count(change.shape[1])):
                         continue
-                    real, imaginary = transform(change, basis)
+                    whole = moves.size == len(change)
+                    real, imaginary = transform(change if whole else change[moves], basis)
                     window = (real + 1j * imaginary).transpose(0, 2, 1)
-                    moved += (each[place].transpose(1, 0, 2) @ window).transpose(2, 1, 0)
+                    met = (each[place].transpose(1, 0, 2) @ window).transpose(2, 1, 0)
+                    moved[slice(None) if whole else moves] += met
                 parts = np.stack([moved.real, moved.imag]).reshape(2, *ahead, *shape)
                 total += np.einsum("aboif,b...oif->a...oif", turn, parts)
             return np.asarray(total[0] + 1j * total[1])
@@ -311,7 +313,12 @@ class LinearEstimate:
         if key not in kept and pilot is not None:
             rows = np.full(len(pilot.covariance), place)
             apply = self.weights.functional(rows, np.arange(len(self.inputs)), points)
-            kept[key] = apply(pilot.slopes)
+            changes = []
+            for record, slopes in enumerate(pilot.slopes):
+                # Zeros where a coefficient does not act: these take no memory, and no time below.
+                changes.append(np.zeros((len(rows), slopes.shape[1])))
+                changes[-1][pilot.acting(record)] = slopes
+            kept[key] = apply(changes)
         return kept[key]
 
     def local_spread(self) -> Real | None:

@@ -20,8 +20,6 @@ from flightid.responses.errors.pilot_search import (
     SPARE,
     PilotBins,
     PilotState,
-    columns_of,
-    joined,
     search,
     spectra_of,
     turns,
@@ -30,6 +28,7 @@ from flightid.responses.errors.unseen_peaks import has_unseen_peak
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
+Places = NDArray[np.intp]
 
 ORDERS = (1, 2, 3, 4, 5, 6, 8, 10)
 """Orders that are tried, each started by itself."""
@@ -59,10 +58,11 @@ class Pilot:
         First coefficient one.
     outputs : tuple of ndarray, each shape (n_samples,)
         What it says of the output without noise, of each record, from zero to the band's end.
-    slopes : tuple of ndarray, each shape (n_coefficients, n_samples)
-        Their derivatives by the coefficients: numerators, transients, denominator but its first.
+    slopes : tuple of ndarray, each shape (n_acting, n_samples)
+        Their derivatives by the coefficients that act in a record: numerators, the record's own
+        transient, denominator but its first.
     covariance : ndarray, shape (n_coefficients, n_coefficients)
-        Of the coefficients.
+        Of the coefficients: numerators, transients of all records, denominator but its first.
     spent : tuple of ndarray, each shape (n_bins of the record,)
         Share of each bin's noise that the coefficients took: slow bins are few, and bend the most.
     """
@@ -79,6 +79,11 @@ class Pilot:
     def order(self) -> int:
         """Number of poles."""
         return len(self.denominator) - 1
+
+    def acting(self, record: int) -> Places:
+        """Places of a record's slopes among the coefficients."""
+        n_in, size = self.numerators.shape
+        return acting(n_in * size, size + SPARE, len(self.outputs), size - 1, record)
 
     def frequency_response(self, omega_rad_s: ArrayLike) -> Complex:
         """Response at frequencies in rad/s, shape (n_in, n_f)."""
@@ -174,7 +179,8 @@ def _fit_output(data: PilotBins) -> Pilot | None:
     last, first = max(each[-1] for each in data.omega), min(each[0] for each in data.omega)
     scale = float(np.sqrt(last * first))
     best: PilotState | None = None
-    slopes, taken = np.zeros(0, dtype=np.complex128), (np.zeros(0), np.zeros(0))
+    slopes: list[Complex] = []
+    taken = np.zeros(0), np.zeros(0)
     weights = np.ones(data.size)
     tried: tuple[int, ...] = ORDERS
     for _ in range(PASSES):
@@ -199,46 +205,87 @@ def _fit_output(data: PilotBins) -> Pilot | None:
         if best is not None:
             tried = (len(found.denominator) - 1,)
         best, slopes = found, _slopes(data, found, scale)
-        taken = _taken(slopes, weights)
+        taken = _taken(slopes, [_acting(data, found, place) for place in range(n_records)], weights)
         omega = np.concatenate(data.omega)
         weights = noise_weights(omega, target - found.modelled, target, taken[0])
     return None if best is None else _pilot(data, best, scale, slopes, taken)
 
 
-def _slopes(data: PilotBins, state: PilotState, scale: float) -> Complex:
-    """Derivatives of the modelled bins by the coefficients, shape (n_coefficients, n_bins)."""
+def acting(n_numerators: int, n_own: int, n_records: int, order: int, record: int) -> Places:
+    """Places, among all coefficients, of those that act in a record.
+
+    Example
+    -------
+    >>> acting(2, 3, 2, 1, record=1).tolist()
+    [0, 1, 5, 6, 7, 8]
+    """
+    begun, last = n_numerators + record * n_own, n_numerators + n_records * n_own
+    spans = (0, n_numerators), (begun, begun + n_own), (last, last + order)
+    return np.concatenate([np.arange(*span) for span in spans])
+
+
+def _acting(data: PilotBins, state: PilotState, record: int) -> Places:
+    size = len(state.denominator)
+    return acting(state.numerators.size, size + SPARE, len(data.output), size - 1, record)
+
+
+def _slopes(data: PilotBins, state: PilotState, scale: float) -> list[Complex]:
+    """Derivatives of each record's modelled bins by what acts in it, shape (n_acting, n_f)."""
     order = len(state.denominator) - 1
-    basis = [turns(omega, scale, order) for omega in data.omega]
-    ends = [turns(omega, scale, order + SPARE) for omega in data.omega]
-    under = state.denominator @ np.concatenate(basis, axis=1)
-    return np.asarray(joined(columns_of(data, basis, ends, state.modelled)) / under)
+    found = []
+    for u, y, omega in zip(data.inputs, data.by_record(state.modelled), data.omega, strict=True):
+        ends = turns(omega, scale, order + SPARE)
+        basis = ends[: order + 1]
+        rows = [*(row * basis for row in u), ends, -y * basis[1:]]
+        found.append(np.concatenate(rows) / (state.denominator @ basis))
+    return found
 
 
-def _taken(slopes: Complex, weights: Real) -> tuple[Real, Real]:
-    """Share of each bin's noise that the coefficients took, and their covariance in unit noise."""
-    weighed = slopes * weights
-    left = np.concatenate([weighed.real, weighed.imag], axis=1)
-    norms = np.maximum(np.linalg.norm(left, axis=1), np.finfo(float).tiny)
-    left /= norms[:, None]
-    inverse = np.linalg.pinv(left @ left.T, hermitian=True)
-    taken = 0.5 * np.einsum("ib,ij,jb->b", left, inverse, left, optimize=True)
-    spent = np.minimum(taken.reshape(2, -1).sum(axis=0), MOST_SPENT)
-    return spent, inverse / np.outer(norms, norms)
+def _taken(slopes: Sequence[Complex], places: Sequence[Places], weights: Real) -> tuple[Real, Real]:
+    """Share of each bin's noise that the coefficients took, and their covariance in unit noise.
+
+    A transient acts in the bins of its own record: records are tens, and products of all with all
+    would be zeros for the most part.
+    """
+    ends = np.cumsum([each.shape[1] for each in slopes])[:-1]
+    left = [
+        np.concatenate([weighed.real, weighed.imag], axis=1)
+        for each, weight in zip(slopes, np.split(weights, ends), strict=True)
+        for weighed in [each * weight]
+    ]
+    squares = np.zeros(1 + max(int(each[-1]) for each in places))
+    for rows, at in zip(left, places, strict=True):
+        squares[at] += np.einsum("ib,ib->i", rows, rows)
+    norms = np.maximum(np.sqrt(squares), np.finfo(float).tiny)
+    products = np.zeros((len(norms), len(norms)))
+    left = [rows / norms[at, None] for rows, at in zip(left, places, strict=True)]
+    for rows, at in zip(left, places, strict=True):
+        products[np.ix_(at, at)] += rows @ rows.T
+    inverse = np.linalg.pinv(products, hermitian=True)
+    spent = []
+    for rows, at in zip(left, places, strict=True):
+        taken = 0.5 * np.einsum("ib,ib->b", inverse[np.ix_(at, at)] @ rows, rows)
+        spent.append(np.minimum(taken.reshape(2, -1).sum(axis=0), MOST_SPENT))
+    return np.concatenate(spent), inverse / np.outer(norms, norms)
 
 
 def _pilot(
-    data: PilotBins, state: PilotState, scale: float, slopes: Complex, taken: tuple[Real, Real]
+    data: PilotBins,
+    state: PilotState,
+    scale: float,
+    slopes: Sequence[Complex],
+    taken: tuple[Real, Real],
 ) -> Pilot:
     spent, covariance = taken
-    variance = state.cost * data.size / max(2.0 * data.size - len(slopes), 1.0)
+    variance = state.cost * data.size / max(2.0 * data.size - len(covariance), 1.0)
     return Pilot(
         scale,
         state.numerators,
         state.denominator,
-        data.samples(state.modelled),
+        data.samples(data.by_record(state.modelled)),
         data.samples(slopes),
         variance * covariance,
-        tuple(np.split(spent, np.cumsum([len(each) for each in data.omega])[:-1])),
+        tuple(data.by_record(spent)),
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ from flightid.frozen import dataclass
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
+Kind = TypeVar("Kind", np.float64, np.complex128)
 SPARE = 2
 """Terms of a transient beyond the order: band limits and aliases bend it."""
 BEYOND_BAND = 1.3
@@ -47,16 +49,17 @@ class PilotBins:
         """Number of bins."""
         return sum(len(each) for each in self.omega)
 
-    def samples(self, values: Complex) -> tuple[Real, ...]:
-        """Samples of each record, shape (…, n), from bins in the band, shape (…, n_bins)."""
+    def by_record(self, values: NDArray[Kind]) -> list[NDArray[Kind]]:
+        """Values of all bins as those of each record."""
+        return np.split(values, np.cumsum([len(each) for each in self.omega])[:-1], axis=-1)
+
+    def samples(self, values: Sequence[Complex]) -> tuple[Real, ...]:
+        """Samples of each record, shape (…, n), from its bins in the band, shape (…, n_f)."""
         made: list[Real] = []
-        at = 0
-        for omega, n in zip(self.omega, self.lengths, strict=True):
-            bins = np.zeros((*values.shape[:-1], n // 2 + 1), dtype=np.complex128)
-            scale = np.sqrt(n / (2.0 * self.sample_time_s))
-            bins[..., 1 : len(omega) + 1] = values[..., at : at + len(omega)] * scale
+        for each, n in zip(values, self.lengths, strict=True):
+            bins = np.zeros((*each.shape[:-1], n // 2 + 1), dtype=np.complex128)
+            bins[..., 1 : each.shape[-1] + 1] = each * np.sqrt(n / (2.0 * self.sample_time_s))
             made.append(np.asarray(np.fft.irfft(bins, n), dtype=np.float64))
-            at += len(omega)
         return tuple(made)
 
 
@@ -153,34 +156,6 @@ def search(data: PilotBins, order: int, scale: float, weights: Real) -> PilotSta
         if done:
             break
     return state
-
-
-def columns_of(
-    data: PilotBins, basis: Sequence[Complex], ends: Sequence[Complex], output: Complex
-) -> list[tuple[Complex, Complex]]:
-    """Sensitivities times the denominator of each record: of its transient alone, and of the rest.
-
-    The rest: numerators, then the denominator but its first.
-    """
-    pieces = np.split(output, np.cumsum([phi.shape[1] for phi in basis])[:-1])
-    return [
-        (end, np.concatenate([*(row * phi for row in u), -y * phi[1:]]))
-        for u, y, phi, end in zip(data.inputs, pieces, basis, ends, strict=True)
-    ]
-
-
-def joined(columns: Sequence[tuple[Complex, Complex]]) -> Complex:
-    """Of all records: numerators, transients, denominator but its first."""
-    size = len(columns[0][0])
-    order = size - 1 - SPARE
-    whole = np.concatenate([shared for _, shared in columns], axis=1)
-    own = np.zeros((size * len(columns), whole.shape[1]), dtype=np.complex128)
-    at = 0
-    for place, (transient, _) in enumerate(columns):
-        own[place * size : (place + 1) * size, at : at + transient.shape[1]] = transient
-        at += transient.shape[1]
-    n_shared = len(whole) - order
-    return np.concatenate([whole[:n_shared], own, whole[n_shared:]])
 
 
 def solve(
