@@ -38,7 +38,8 @@ FALSE_ALARMS = 0.001
 """Share of records with noise of sensors alone in which a disturbance is named."""
 TRIED = 2
 """Disturbances whose chance is worked out: those that stand out most."""
-HALVINGS = 25
+HALVINGS, NEAR = 25, 1e-10
+"""Of intervals that hold an exponent; steps so small, over the largest exponent, end the search."""
 
 
 @dataclass(frozen=True)
@@ -245,12 +246,20 @@ def _chance(score: float, size: Array) -> float:
     if score <= 0.0 or not np.any(size > 0.0):
         return 1.0
     low, high = 0.0, _largest(size)
+    tilt, end = 0.5 * high, high
     for _ in range(HALVINGS):
-        tilt = 0.5 * (low + high)
-        low, high = (low, tilt) if _moments(tilt, size)[1] > score else (tilt, high)
-    moments, _, bend = _moments(low, size)
-    bound = float(np.exp(min(moments - low * score, 0.0)))
-    return bound / max(1.0, low * float(np.sqrt(2.0 * np.pi * bend)))
+        moments, slope, bend = _moments(tilt, size)
+        low, high = (tilt, high) if slope <= score else (low, tilt)
+        # Newton's steps where they stay between what is known, as they do near the end.
+        step = (score - slope) / bend if bend > 0.0 else np.inf
+        inside = low < tilt + step < high
+        if inside and abs(step) <= NEAR * end:
+            break
+        tilt = tilt + step if inside else 0.5 * (low + high)
+    else:
+        moments, _, bend = _moments(tilt, size)
+    bound = float(np.exp(min(moments - tilt * score, 0.0)))
+    return float(bound / max(1.0, tilt * float(np.sqrt(2.0 * np.pi * bend))))
 
 
 def _moments(tilt: float, size: Array) -> tuple[float, float, float]:
