@@ -21,7 +21,7 @@ from flightid.report.content import Document
 from flightid.report.text import to_text
 from flightid.study.answer import _models, models_in_short, short_document
 from flightid.study.faults import CODE, FAILED, TUNING
-from flightid.study.gain_answer import gains_finding, margin_table, small_angles
+from flightid.study.gain_answer import gain_table, gains_finding, margin_table, small_angles
 from flightid.study.identified import LEFT_OUT, ModelResults
 from flightid.study.settings import Segment
 from flightid.study.stage_runner import digest
@@ -370,6 +370,19 @@ def test_margins_below_what_is_asked_and_columns_left_out_are_told() -> None:
     assert page.message == small, "the page says what the command says"
     free = flown.with_gains(ATC_ACCEL_R_MAX=0.0)
     assert not [*small_angles([SimpleNamespace(axis="roll", flown=free, loop=free)])]  # type: ignore[list-item]
+
+
+def test_gains_to_fly_next_stand_beside_those_that_flew() -> None:
+    """A phone showed where gains arrive, and not those of the first step."""
+    change = SimpleNamespace(name="P", flown=0.1, new=0.4, ratio=4.0)
+    steps = [SimpleNamespace(gains={"P": gain}) for gain in (0.2, 0.4)]
+    flown = axis_loop("px4_multicopter", "roll", loop_rate_hz=400.0)
+    roll = SimpleNamespace(
+        axis="roll", filters=(), changes=(change,), stages=steps, loop=flown, flown=flown
+    )
+    table = gain_table((roll,), None)  # type: ignore[arg-type]
+    assert [each.name for each in table.columns][2:] == ["flown", "first step", "new", "ratio"]
+    assert table.shown() == [["roll", "P", "0.1", "0.2", "0.4", "4"]]
 
 
 def test_lights_of_models_are_of_what_their_lines_say() -> None:

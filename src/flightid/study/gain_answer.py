@@ -135,21 +135,25 @@ def flown_again(flight: GainFlight) -> Finding:
 
 
 def gain_table(designs: tuple[PidDesign, ...], filters: TunedFilters | None) -> Table:
-    """Each gain and filter as flown, new, and of the first step."""
+    """Each gain and filter as flown, of the first step, and new.
+
+    What is to be flown next stands beside what flew: a phone shows no more columns.
+    """
     columns = (
-        Column("axis"), Column("parameter"), Column("flown"), Column("new"),
-        Column("ratio", digits=3), Column("first step"),
+        Column("axis"), Column("parameter"), Column("flown"), Column("first step"),
+        Column("new"), Column("ratio", digits=3),
     )  # fmt: skip
     named = {each.name: each for design in designs for each in design.filters}
     rows: list[tuple[Cell, ...]] = [
-        ("filter", each.name, each.old, each.value, each.value / each.old if each.old else None,
-         each.value)
+        ("filter", each.name, each.old, each.value, each.value,
+         each.value / each.old if each.old else None)
         for each in named.values()
     ]  # fmt: skip
     rows += [
         (
-            design.axis, change.name, change.flown, change.new, change.ratio,
+            design.axis, change.name, change.flown,
             design.stages[0].gains.get(change.name) if len(design.stages) > 1 else None,
+            change.new, change.ratio,
         )
         for design in designs
         for change in design.changes
