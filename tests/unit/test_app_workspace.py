@@ -157,6 +157,14 @@ def test_an_edit_changes_its_key_and_nothing_else(tmp_path: Path) -> None:
     assert [each.name for each in tmp_path.iterdir()] == ["study.toml"]
 
 
+def test_a_table_that_is_begun_amid_others_stands_apart() -> None:
+    text = "[[model]]\nname = 'Roll' # mine\n\n[[model]]\nname = 'Pitch'\n"
+    first = edited(text, [KeyEdit(("model", 0, "response", "compare"), ["composite"])])
+    again = edited(first, [KeyEdit(("model", 0, "response", "n_omega"), 23)])
+    own = '[model.response]\ncompare = ["composite"]\nn_omega = 23\n\n'
+    assert again == text.replace("\n\n", f"\n\n{own}", 1)
+
+
 def test_undo_goes_back_beyond_a_reload_and_a_kill(tmp_path: Path) -> None:
     """Each step is asked of a server of its own: what it knows lies in the folder."""
     workspace, log = Workspace(tmp_path), "0" * 16

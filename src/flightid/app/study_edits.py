@@ -92,8 +92,9 @@ def edited(text: str, edits: Sequence[KeyEdit]) -> str:
     """
     try:
         document: Any = tomlkit.parse(text)
-        for edit in edits:
-            _apply(document, edit)
+        begun = [made for edit in edits for made in _apply(document, edit)]
+        for table in begun:
+            table.add(tomlkit.nl())
         made = str(tomlkit.dumps(document))
         made.encode()
         return made
@@ -114,8 +115,10 @@ def edited(text: str, edits: Sequence[KeyEdit]) -> str:
         ) from error
 
 
-def _apply(document: Any, edit: KeyEdit) -> None:  # noqa: ANN401 - a parsed document
+def _apply(document: Any, edit: KeyEdit) -> list[Any]:  # noqa: ANN401 - a parsed document
+    """Change one key; tables that were begun amid others, each to end with an empty line."""
     *parents, last = edit.path
+    begun = []
     place = around = document
     for number, key in enumerate(parents):
         following = edit.path[number + 1]
@@ -129,6 +132,8 @@ def _apply(document: Any, edit: KeyEdit) -> None:  # noqa: ANN401 - a parsed doc
             if not number and not str(tomlkit.dumps(document)).endswith("\n\n"):
                 document.add(tomlkit.nl())
             place.append(key, tomlkit.aot() if isinstance(following, int) else made)
+            if number and not inline and not isinstance(following, int):
+                begun.append(place[key])
         elif isinstance(key, int) and key == len(place):
             place.append(tomlkit.table())
         around, place = place, place[key]
@@ -141,6 +146,7 @@ def _apply(document: Any, edit: KeyEdit) -> None:  # noqa: ANN401 - a parsed doc
         place.append(tomlkit.item(edit.value))
     else:
         place[last] = edit.value
+    return begun
 
 
 def _bytes_of(text: str) -> bytes:
