@@ -19,6 +19,9 @@ const SCREEN_OF: Record<string, [string, string]> = {
 /** A command with its files, options and words in capitals; the sentence goes on behind it. */
 const COMMAND = /flightid (tune|plan|inspect|flight|compare|response)\b((?: (?:[^;:()\n]*?\.(?:bin|log|ulg|bbl|bfl|tlog|px4log|toml)\b|--(?:axes|controller|filters) [\w,]+|--[\w-]+|"[^"]*"|[^\s;,:()]*[./][^\s;,:()]*[^\s;,:().]|(?:LOG|STUDY)\b))*)/gi;
 
+/** A table that a button of Records writes: what it bridges is shown there. */
+const BRIDGE = /: write \[\[conditioning\]\] into the study and below it outliers = \{[^}]*\}, which lies between (?:it|them) and all other samples/;
+
 export interface AdvicePart { text: string; href: string | null }
 
 /** Keys of a study by what the page has for them. */
@@ -35,6 +38,11 @@ function onScreen(screen: string, title: string, options: string) {
 export function adviceParts(given: string, log: string, screens: string[]): AdvicePart[] {
   const parts: AdvicePart[] = [];
   const text = inWords(given);
+  const table = here.ofRig && screens.includes("records") ? BRIDGE.exec(text) : null;
+  if (table) {
+    const [before, after] = [text.slice(0, table.index), text.slice(table.index + table[0].length)];
+    return [...adviceParts(`${before}, by a click under `, log, screens), { text: "Records", href: `#/records/${log}` }, ...adviceParts(after, log, screens)];
+  }
   let done = 0;
   for (const found of text.matchAll(COMMAND)) {
     const [all, verb, rest] = found;
