@@ -384,7 +384,8 @@ def _of_rig_gains(stage: Stage) -> Iterator[str]:
     ).first.wait_for()
     yield "modes of a model without equations"
     stage.open(f"compare/{alone_rig}/{stage.rig}")
-    page.locator("th", has_text=f"{LONG.removesuffix('.bin')}.csv").first.wait_for()
+    page.locator(".verdict", has_text=f"{LONG.removesuffix('.bin')}.csv").wait_for()
+    page.locator("th", has_text="after / before").first.wait_for()
     yield "two studies"
 
 

@@ -20,6 +20,9 @@ from flightid.app.workspace import Workspace
 from flightid.models.saved_files import MODELS
 from flightid.study.output import WRITTEN
 
+LONGEST = 24
+"""Letters of a name that heads a column."""
+
 
 def add_study_compare_routes(app: FastAPI, backstage: Backstage) -> None:
     """Answer what the screen Compare asks of two studies."""
@@ -32,8 +35,9 @@ def add_study_compare_routes(app: FastAPI, backstage: Backstage) -> None:
         told = [
             await asyncio.to_thread(_ran, backstage, each) for each in (asked.before, asked.after)
         ]
-        names = _apart(told[0][0], told[1][0])
-        folders = {name: folder for name, (_, folder, _) in zip(names, told, strict=True)}
+        names = (told[0][0], told[1][0])
+        called = column_names(*names)
+        folders = {name: folder for name, (_, folder, _) in zip(called, told, strict=True)}
         changed = [name for name, (_, _, since) in zip(names, told, strict=True) if since]
         answer = await made(workers.compared(make_study_comparison, folders))
         return StudyComparison(names=names, changed=changed, **answer)
@@ -74,6 +78,13 @@ def _name_of(workspace: Workspace, log: str) -> str:
     return rigs.name_of(log)
 
 
-def _apart(before: str, after: str) -> tuple[str, str]:
-    """Both names, told apart where they are the same."""
-    return (before, after) if before != after else (f"{before} (before)", f"{after} (after)")
+def column_names(before: str, after: str) -> tuple[str, str]:
+    """What columns call both: their names, else, of long or equal ones, before and after.
+
+    Example
+    -------
+    >>> column_names("monday.bin", "friday.bin"), column_names("a.csv", "a.csv")
+    (('monday.bin', 'friday.bin'), ('before', 'after'))
+    """
+    told = (before, after)
+    return told if before != after and max(map(len, told)) <= LONGEST else ("before", "after")
