@@ -13,7 +13,7 @@ from flightid.control.autopilots import AxisLoop, axis_loop, read_parameters
 from flightid.control.tuning.sampled_plants import SampledPlants, sample_plants
 from flightid.conventions import Light
 from flightid.errors import DataError, ModelError, OptionError, UnknownNameError
-from flightid.plot.gains import overlaid_steps, promised_margins, steps_caption
+from flightid.plot.gains import margins_caption, overlaid_steps, promised_margins, steps_caption
 from flightid.plot.tuning import gain_map, nichols, time_responses
 from flightid.report.content import Document
 from flightid.report.html import to_html
@@ -324,6 +324,17 @@ def test_pictures_and_report_show_every_loop(tuning: fid.Tuning) -> None:
     words = [text for text in said if text.startswith("no gain margin is promised<br>(")]
     assert bool(words) == has
     assert all(len(line) < 50 for text in words for line in text.split("<br>"))
+    # An empty panel took half of the picture: the caption says what it said.
+    half = tuple(
+        dataclasses.replace(each, worst=None) if each.name == "gain margin" else each
+        for each in design.worst_cases
+    )
+    lone = dataclasses.replace(design, worst_cases=half)
+    one = promised_margins([lone])
+    assert {trace.xaxis for trace in one.data} == {"x"}
+    told = "no gain margin is promised (" if has else "no vehicle's loop has a finite gain margin"
+    assert told in margins_caption([lone])
+    assert "no gain margin" not in margins_caption(tuning.designs)
     drawn = gain_map(design)
     line = next(trace for trace in drawn.data if trace.name == "all requirements met")
     assert np.nanmax(line.z) > 0.0

@@ -19,6 +19,7 @@ STEPS = {
     "angle step": "angle per set-point",
     "step": "output per set-point",
 }
+PANELS = {"phase margin": "deg", "gain margin": "dB"}
 ROW_PX = 26
 TITLE_PX = 22
 
@@ -91,7 +92,7 @@ def promised_margins(designs: Sequence[PidDesign]) -> go.PlotFigure:
     PlotFigure
     """
     asked = designs[0].requirements
-    panels = {"phase margin": "deg", "gain margin": "dB"}
+    panels = PANELS
     found = {
         name: [
             (design, each) for design in designs for each in design.worst_cases if each.name == name
@@ -99,7 +100,12 @@ def promised_margins(designs: Sequence[PidDesign]) -> go.PlotFigure:
         for name in panels
     }
     rows = list(dict.fromkeys(_label(*each) for cases in found.values() for each in cases))
-    made = look.figure(1, 2, shared_x=False, height_px=look.MARGIN_PX + ROW_PX * len(rows))
+    # A panel without a bar took half of the picture, on a phone a screen: its caption says it.
+    panels = {name: unit for name, unit in panels.items() if _is_promised(found[name])} or panels
+    what = _what(designs)
+    made = look.figure(
+        1, len(panels), shared_x=False, height_px=look.MARGIN_PX + ROW_PX * len(rows)
+    )
     named: set[str] = set()
     for column, (name, unit) in enumerate(panels.items(), 1):
         cases = [each for each in found[name] if each[1].worst is not None]
@@ -116,7 +122,7 @@ def promised_margins(designs: Sequence[PidDesign]) -> go.PlotFigure:
             continue
         bars = go.Bar(
             x=[each.worst for _, each in cases], y=labels, orientation="h", width=0.6,
-            name="worst vehicle, new gains", showlegend=column == 1, legendgroup="new",
+            name=f"worst {what}, new gains", showlegend=column == 1, legendgroup="new",
             marker={"color": [look.MODEL if each.met else look.RIVAL for _, each in cases]},
             text=[f"{each.shown_worst[0]:.3g}" for _, each in cases], textposition="inside",
             insidetextanchor="start",
@@ -136,7 +142,7 @@ def promised_margins(designs: Sequence[PidDesign]) -> go.PlotFigure:
             "line": {"width": 2},
         }
         for words, marker, points in (
-            ("worst vehicle, flown gains", open_circle, flown),
+            (f"worst {what}, flown gains", open_circle, flown),
             ("required", upright, list(zip(labels, required, strict=True))),
         ):
             if not points:
@@ -155,9 +161,46 @@ def promised_margins(designs: Sequence[PidDesign]) -> go.PlotFigure:
         categoryorder="array", categoryarray=rows[::-1], automargin=True, type="category",
         range=[-0.5, len(rows) - 0.5],
     )  # fmt: skip
-    made.update_yaxes(showticklabels=False, col=2)
+    if len(panels) > 1:
+        made.update_yaxes(showticklabels=False, col=2)
     made.update_layout(hovermode="closest")
     return made
+
+
+def margins_caption(designs: Sequence[PidDesign]) -> str:
+    """What `promised_margins` shows, and which margin is promised of no loop."""
+    cases = [each for design in designs for each in design.worst_cases]
+    named = {name: [each for each in cases if each.name == name] for name in PANELS}
+    parts = [
+        f"Margins of the worst {_what(designs)} that the data allow; upright: what was required"
+    ]
+    shown = (each for each in cases if each.name in PANELS)
+    if any(each.worst is None and each.estimate.value is not None for each in shown):
+        parts.append("not promised: what lies above the band to which the model was shown")
+    bare = [name for name in named if not any(each.worst is not None for each in named[name])]
+    if len(bare) < len(PANELS):
+        parts += [_without_bars(name, named[name], what=_what(designs)) for name in bare]
+    return "; ".join(parts) + "."
+
+
+def _what(designs: Sequence[PidDesign]) -> str:
+    return "rig" if any(design.plain for design in designs) else "vehicle"
+
+
+def _is_promised(cases: Sequence[tuple[PidDesign, WorstCase]]) -> bool:
+    return any(each.worst is not None for _, each in cases)
+
+
+def _without_bars(
+    name: str, cases: Sequence[WorstCase], line: str = " ", what: str = "vehicle"
+) -> str:
+    """Why a margin has no bar; `line` stands before what the estimate alone has of it."""
+    values = [each.estimate.value for each in cases if each.estimate.value is not None]
+    if not values:
+        return f"no {what}'s loop has a finite {name}"
+    ends = dict.fromkeys(f"{value:.3g}" for value in (min(values), max(values)))
+    unit = next(each.unit for each in cases if each.estimate.value is not None)
+    return f"no {name} is promised{line}({' to '.join(ends)} {unit} of the estimate alone)"
 
 
 def _say_what_is_not_promised(made: go.PlotFigure, column: int, rows: Sequence[str]) -> None:
@@ -178,11 +221,7 @@ def _say_without_limit(
 
     `unread` are loops whose estimate has this margin, which is not promised for every vehicle.
     """
-    said = f"no vehicle's loop has a finite {name}"
-    if values := [each.estimate.value for each in unread if each.estimate.value is not None]:
-        ends = dict.fromkeys(f"{value:.3g}" for value in (min(values), max(values)))
-        unit = unread[0].estimate.unit
-        said = f"no {name} is promised<br>({' to '.join(ends)} {unit} of the estimate alone)"
+    said = _without_bars(name, unread, "<br>")
     unseen = go.Scatter(
         x=[0.0] * len(rows), y=list(rows), mode="markers", showlegend=False, hoverinfo="skip",
         name=name, marker={"opacity": 0.0},

@@ -17,6 +17,7 @@ from flightid.plot.consistency import consistency
 from flightid.plot.fit import EstimateBar, parameter_intervals
 from flightid.plot.gains import (
     has_both,
+    margins_caption,
     measured_and_predicted,
     overlaid_steps,
     promised_margins,
@@ -234,19 +235,13 @@ def _result(study: StudyResults, *, sections: tuple[Section, ...] = ()) -> Itera
     yield from _interval_figure(study)
 
 
-MARGINS = (
-    "Margins of the worst vehicle that the data allow; upright: what was required; not promised: "
-    "what lies above the band to which the model was shown."
-)
-
-
 def _pictures(study: StudyResults) -> Iterator[Figure]:
     """What new gains do and promise, of all axes; without gains, what a model predicts."""
     designs = () if study.tuning is None else study.tuning.designs
     made = [each for each in designs if each.exists]
     if made:
         yield figure_block(overlaid_steps(made), steps_caption(made))
-        yield figure_block(promised_margins(made), MARGINS)
+        yield figure_block(promised_margins(made), margins_caption(made))
         return
     checked = [found for item in study.identified for found in item.verifications.values()]
     yield from (prediction_picture(found, 0) for found in checked[:1])
