@@ -105,6 +105,24 @@ def test_a_slow_pole_outlasts_the_lags():
     assert "outlasts" in found.reason
 
 
+@pytest.mark.parametrize("seed", [95, 164])
+def test_an_end_that_more_lags_do_not_bear_out_is_none(seed):
+    """A light mode of steady size: 80 lags took its tail into the lags before and seemed to end."""
+    record = light_mode(seed)
+    found = fid.impulse_response(record)
+    assert found.fitted_lags > 80
+    assert found.covariance is None
+
+
+def light_mode(seed: int) -> fid.Record:
+    """Output of a mode that keeps .997 of its size a sample, with white noise."""
+    random, t = np.random.default_rng(seed), np.arange(3000) * 0.05
+    u = np.repeat(random.standard_normal(750), 4) + 0.3 * random.standard_normal(3000)
+    y = lfilter([0.0, 1.0], [1.0, -2.0 * 0.997 * np.cos(0.15), 0.997**2], u)
+    y += 0.1 * y.std() * random.standard_normal(3000)
+    return fid.Record.from_arrays(t, inputs={"u": u}, outputs={"y": y})
+
+
 def test_advice_on_a_good_record():
     advice = fid.advise(flown(ARMAX, 2, n=1200, noise=0.3))
     assert advice.excitation_orders == {"u": 50}

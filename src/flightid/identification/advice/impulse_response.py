@@ -280,46 +280,58 @@ def _until_ended(
 
     What a response does after the last lag goes into the lags before, as far as inputs are
     coloured; so lags are doubled until the last of them are zero or the records are used up.
+
+    Where fewer lags were found too few, an end is believed once twice as many say the same: what
+    seems to have ended may be a tail that the lags before it have taken up.
     """
-    first = _lagged(data, n)
+    first, ended, doubled = _lagged(data, n), 0, False
+    before: tuple[Array, Array, int] | None = None
     while True:
         found = _estimate(data, n, kernel, first)
         parts = [slice(i * n, (i + 1) * n) for i in range(count)]
-        if all(_ends(found[0][part], found[1][part, part], count) for part in parts):
+        tails = [(found[0][part], found[1][part, part]) for part in parts]
+        # Of so many lags a sum of squares knows its noise too little: tails of a shape are told.
+        if ended and all(_vanishes(*tail, ended, count, each=False) for tail in tails):
+            assert before is not None
+            return ended, before, True
+        ends = all(_vanishes(*tail, n - max(n // LAST, 1), count) for tail in tails)
+        if ends and not doubled:
             return n, found, True
-        longer = 2 * n
+        longer, doubled = 2 * n, True
         room = sum(max(0, length - longer - WHITENER) for length in data.lengths)
         short = room < SAMPLES_PER_COEFFICIENT * longer * count
         if short or min(data.lengths) <= longer + WHITENER:
-            return n, found, False
+            return n, found, ends
         first = _lagged(data, longer)
         # Inputs may hold fewer frequencies than so many lags need.
         if first.dependent is not None:
-            return n, found, False
-        n = longer
+            return n, found, ends
+        ended, before, n = (n if ends else 0), found, longer
 
 
 def _lagged(data: SampledChannels, n: int) -> LinearRegression:
     return regress_lags(data.output, data.inputs, data.lengths, n, n - 1, levels=data.levels)
 
 
-def _ends(values: Array, covariance: Array, count: int) -> bool:
-    """Whether chance explains the last quarter of the lags: each, as a slow tail, as a mode.
+def _vanishes(
+    values: Array, covariance: Array, start: int, count: int, *, each: bool = True
+) -> bool:
+    """Whether chance explains the lags from `start` on: `each`, as a slow tail, as a mode.
 
     All lags together have no power against a tail that is small everywhere, of one sign or ringing;
     contrasts have (Scheffé, *The Analysis of Variance*, section 3.5): mean and slope, and cosine
-    and sine of the frequency that is strongest in the quarter before, where faster modes have died.
-    Each test has its part of the level.
+    and sine of the frequency that is strongest in as many lags before, where faster modes have
+    died. Each test has its part of the level.
     """
-    last = max(values.size // LAST, 1)
-    tail, spread = values[-last:], covariance[-last:, -last:]
+    tail, spread = values[start:], covariance[start:, start:]
+    last = tail.size
     smooth = np.vander(np.linspace(-1.0, 1.0, last), min(SMOOTH, last))
-    contrasts = [np.eye(last), smooth]
+    contrasts = [np.eye(last), smooth] if each else [smooth]
     if last >= SHORTEST_PERIODOGRAM:
-        angles = _strongest(values[-2 * last : -last]) * np.arange(last)
+        angles = _strongest(values[max(start - last, 0) : start]) * np.arange(last)
         contrasts.append(np.column_stack([np.cos(angles), np.sin(angles)]))
     level = (1.0 - LEVEL) / (len(contrasts) * count)
-    return all(_chance(each.T @ tail, each.T @ spread @ each) >= level for each in contrasts)
+    return all(_chance(row.T @ tail, row.T @ spread @ row) >= level for row in contrasts)
 
 
 def _strongest(values: Array) -> float:
