@@ -9,8 +9,8 @@ from scipy.linalg import expm
 import flightid as fid
 from flightid.identification.filter_error.parameter_scores import parameter_scores
 from flightid.identification.regression.options import FilterErrorOptions
+from flightid.validation.verification.parameter_findings import CODE
 from flightid.validation.verification.pieces import GROWTH
-from flightid.validation.verification.refuted_parameters import CODE
 from tests.strangers.gusts import TRUTH, flight, model
 
 STEP_S = 0.02

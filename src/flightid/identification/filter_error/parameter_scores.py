@@ -62,6 +62,8 @@ class ParameterScores:
         Logarithms of all noises over their first guesses.
     misfit : float
         -2 ln p of the innovations beside a constant, with the colour that is taken off.
+    innovations : tuple of ndarray, shape (n_outputs, n_samples)
+        Of each record, its last samples: what the past of all outputs does not foretell.
     """
 
     names: tuple[str, ...]
@@ -70,6 +72,7 @@ class ParameterScores:
     information: Array
     noises: Array
     misfit: float = 0.0
+    innovations: tuple[Array, ...] = ()
 
     def alone(self, known: Array | None = None) -> tuple[Array, Array]:
         """What each parameter would have to move by if it alone were wrong, and standard errors.
@@ -149,17 +152,20 @@ def parameter_scores(
 
 
 def _scores(
-    free: Sequence[Parameter], point: Array, noises: Array, found: tuple[Array, Array, float]
+    free: Sequence[Parameter], point: Array, noises: Array, found: _Whitened
 ) -> ParameterScores | None:
     """Of the parameters that move anything, by innovations and slopes of unit variance."""
-    left, moves, misfit = found
+    moves = found.moves
     size = np.linalg.norm(moves, axis=0)
     shown = size > RESOLVED * np.max(size, initial=0.0)
     if not np.any(shown):
         return None
     moves = moves[:, shown]
     names = tuple(each.name for each, is_seen in zip(free, shown, strict=True) if is_seen)
-    return ParameterScores(names, point[shown], -(moves.T @ left), moves.T @ moves, noises, misfit)
+    slopes = -(moves.T @ found.left)
+    return ParameterScores(
+        names, point[shown], slopes, moves.T @ moves, noises, found.misfit, found.innovations
+    )
 
 
 def _first(records: Sequence[Record]) -> list[Record]:
@@ -209,13 +215,18 @@ def _is_rounding(problem: InnovationsProblem, unknowns: Array) -> bool:
     return bool(np.any(np.std(left, axis=0) <= NOISE * np.std(whole, axis=1)))
 
 
-def _whitened(
-    problem: InnovationsProblem, residuals: Array, slopes: Array
-) -> tuple[Array, Array, float] | None:
-    """Innovations less what past ones foretell, of unit variance, and slopes so filtered.
+@dataclass(frozen=True, eq=False)
+class _Whitened:
+    """Innovations (rows,) and their slopes (rows, n_free) of unit variance; -2 ln p; by record."""
 
-    Shapes (rows,) and (rows, n_free), and -2 ln p; None where records are too short.
-    """
+    left: Array
+    moves: Array
+    misfit: float
+    innovations: tuple[Array, ...]
+
+
+def _whitened(problem: InnovationsProblem, residuals: Array, slopes: Array) -> _Whitened | None:
+    """Innovations less what past ones foretell, and slopes so filtered; None: too short."""
     p, parts, first = len(problem.model.outputs), [], 0
     for each in problem.data:
         n = each.outputs.shape[1]
@@ -225,8 +236,7 @@ def _whitened(
         parts.append((residuals[rows].reshape(n, p), np.ascontiguousarray(moved)))
     samples = sum(len(e) for e, _ in parts)
     lags = min(LAGS, samples // (SAMPLES_A_NUMBER * p))
-    parts = [part for part in parts if len(part[0]) > 2 * lags]
-    if lags < 1 or not parts:
+    if lags < 1 or any(len(e) <= 2 * lags for e, _ in parts):
         return None
     past = np.concatenate([_lagged(e, lags) for e, _ in parts])
     now = np.concatenate([e[lags:] for e, _ in parts])
@@ -244,7 +254,13 @@ def _whitened(
     whitener = np.linalg.inv(np.linalg.cholesky(spread)).T
     apart = (flat.reshape(moves.shape) @ whitener).swapaxes(1, 2)
     misfit = len(left) * float(np.linalg.slogdet(spread)[1])
-    return (left @ whitener).ravel(), apart.reshape(left.size, -1), misfit
+    ends = np.cumsum([len(e) - lags for e, _ in parts])[:-1]
+    return _Whitened(
+        (left @ whitener).ravel(),
+        apart.reshape(left.size, -1),
+        misfit,
+        tuple(np.split(left.T, ends, axis=1)),
+    )
 
 
 def _lagged(errors: Array, lags: int) -> Array:

@@ -23,6 +23,7 @@ from flightid.identification.uncertain_of import uncertain_of
 from flightid.models.model import model_of
 from flightid.uncertainty.foretold import independent_samples
 from flightid.validation.verification.foretold_error import LEVEL, chances_by_output
+from flightid.validation.verification.refuted_parameters import QuestionedRuns
 
 Array = NDArray[np.float64]
 CODE = "unseen-contradicts"
@@ -41,8 +42,7 @@ def contradictions(
     way: Predictor,
     made: Sequence[Prediction],
     request: Request,
-    *,
-    refuted: bool = False,
+    asked: QuestionedRuns | None = None,
 ) -> tuple[Finding, ...]:
     """A warning for each record and output whose error the fit does not allow.
 
@@ -60,8 +60,8 @@ def contradictions(
         What predicts with it.
     made : sequence of Prediction
     request : Request
-    refuted : bool
-        Whether the inputs ask other parameters: then gusts are no excuse.
+    asked : QuestionedRuns, optional
+        Where inputs ask other parameters, gusts are no excuse.
 
     Assumes
     -------
@@ -77,13 +77,14 @@ def contradictions(
     entry = provenance_entry(source, LEFT)
     if not isinstance(entry, Mapping) or request.horizon != FREE_RUN:
         return ()
-    alone = cache(partial(_no_input_foretells, made))
+    asked = asked or QuestionedRuns()
+    alone = cache(partial(_no_input_foretells, made, asked.innovations))
     found = []
     for run in made:
         moved = cache(partial(_by_parameters, source, way, run, request))
         beyond = (_judged(run, name, entry[name], moved) for name in run.outputs if name in entry)
         found += [each for each in beyond if each is not None]
-    return tuple(each if refuted or not alone() else _as_gusts_may(each) for each in found)
+    return tuple(each if asked.is_refuted or not alone() else _as_gusts_may(each) for each in found)
 
 
 def _judged(
@@ -123,14 +124,14 @@ def _is_beyond(size: float, allowed: float, power: float) -> bool:
     return size > BEYOND**2 * allowed and size - allowed > MATERIAL * power
 
 
-def _no_input_foretells(made: Sequence[Prediction]) -> bool:
+def _no_input_foretells(made: Sequence[Prediction], innovations: Sequence[Array]) -> bool:
     """Whether no output's error is foretold by the inputs, as none of a right model in gusts is.
 
     Gusts move what flies: motions in the units of these alone are asked.
     """
     if all(guide_factor(made[0].measured.unit(name)) is None for name in made[0].outputs):
         return False
-    chances = chances_by_output(made)
+    chances = chances_by_output(made, innovations)
     return bool(chances) and min(chances.values()) >= LEVEL
 
 

@@ -91,7 +91,9 @@ def foretold_chances(errors: Sequence[Array], inputs: Sequence[Array]) -> Array 
 
 
 def unless_gusts(
-    verdicts: Mapping[str | None, Finding], made: Sequence[Prediction]
+    verdicts: Mapping[str | None, Finding],
+    made: Sequence[Prediction],
+    innovations: Sequence[Array] = (),
 ) -> dict[str | None, Finding]:
     """Verdicts on free runs, none red for an error that no input foretells.
 
@@ -103,11 +105,13 @@ def unless_gusts(
     verdicts : mapping of str or None to Finding
         That weigh the error, by output; None: of all together.
     made : sequence of Prediction
+    innovations : sequence of ndarray, optional
+        As in `chances_by_output`.
     """
     whole = all(each.horizon == FREE_RUN and each.diverged_at is None for each in made)
     if not whole or all(each.light is not Light.RED for each in verdicts.values()):
         return dict(verdicts)
-    by_output = chances_by_output(made)
+    by_output = chances_by_output(made, innovations)
     if not by_output:
         return dict(verdicts)
     poor = [
@@ -123,10 +127,24 @@ def unless_gusts(
     }
 
 
-def chances_by_output(made: Sequence[Prediction]) -> dict[str, float]:
-    """`foretold_chances` of free runs, by output; none where records are too short to tell."""
+def chances_by_output(
+    made: Sequence[Prediction], innovations: Sequence[Array] = ()
+) -> dict[str, float]:
+    """`foretold_chances` of free runs, by output; none where records are too short to tell.
+
+    Parameters
+    ----------
+    made : sequence of Prediction
+    innovations : sequence of ndarray, shape (n_outputs, n_samples), optional
+        What a filter leaves of the last samples of each record, asked in place of the run's error:
+        they are new at each sample, where few past samples of an error in noise, or of one that
+        grows, do not foretell all that inputs which answer gusts know.
+    """
     errors = [np.array([each.residual(name) for name in each.outputs]) for each in made]
     inputs = [each.predicted.matrix(each.predicted.inputs) for each in made]
+    if innovations:
+        errors = list(innovations)
+        inputs = [u[:, -e.shape[1] :] for u, e in zip(inputs, errors, strict=True)]
     chances = foretold_chances(errors, inputs)
     if chances is None:
         return {}

@@ -16,6 +16,7 @@ from flightid.validation.verification.beside_noise import BesideNoise, beside_no
 from flightid.validation.verification.foretold_error import unless_gusts
 from flightid.validation.verification.muad import Mismatch
 from flightid.validation.verification.of_the_fit import GUSTS, weighed
+from flightid.validation.verification.refuted_parameters import QuestionedRuns
 from flightid.validation.verification.result import Verification
 
 THEIL_GUIDE = (0.25, 0.30)
@@ -32,14 +33,13 @@ def judge(
     mismatch: Mismatch | None,
     own: Mapping[str, float],
     gusts: Mapping[str, float],
-    *,
-    refuted: bool = False,
+    asked: QuestionedRuns | None = None,
 ) -> Verification:
     """Numbers by output over all records together, and verdicts against the guides.
 
     `own` are errors of the fitted model in the records of its fit, by output, where it has any, and
     `gusts` what the process noise that it found makes of these runs. Gusts excuse no model that is
-    `refuted` beside them.
+    refuted beside them by what was `asked`.
     """
     numbers = numbers_of(predictions, compared)
     first = predictions[0].measured
@@ -57,9 +57,9 @@ def judge(
     verdicts = weighed(
         _theil_verdicts(overall, numbers["theil"], predictions), numbers["rms_error"], own
     )
-    if not refuted:
+    if asked is None or not asked.is_refuted:
         excused = weighed(verdicts, numbers["rms_error"], gusts, GUSTS)
-        verdicts = unless_gusts(excused, predictions)
+        verdicts = unless_gusts(excused, predictions, () if asked is None else asked.innovations)
     found = (*verdicts.values(), *_findings(guided, predictions))
     return Verification(
         outputs=compared,

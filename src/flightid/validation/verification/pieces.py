@@ -14,6 +14,7 @@ from flightid.identification.prediction.result import Prediction
 from flightid.record import Record
 from flightid.validation.verification.foretold_error import unless_gusts
 from flightid.validation.verification.judgement import THEIL_GUIDE, light_of, overall_theil
+from flightid.validation.verification.refuted_parameters import QuestionedRuns
 
 GROWTH = "verification-growth"
 MANY = 10
@@ -23,8 +24,7 @@ MANY = 10
 def growth_findings(
     predictions: Sequence[Prediction],
     run: Callable[[tuple[Record, ...]], Sequence[Prediction]],
-    *,
-    refuted: bool = False,
+    asked: QuestionedRuns | None = None,
 ) -> tuple[Finding, ...]:
     """Judge what a solved start explains over a whole record by runs through pieces of it.
 
@@ -36,8 +36,8 @@ def growth_findings(
         Over whole records.
     run : callable
         Predicts further records with the same model in the same way.
-    refuted : bool
-        Whether the inputs ask other parameters: then gusts are no excuse.
+    asked : QuestionedRuns, optional
+        Where inputs ask other parameters, gusts are no excuse.
     """
     grown = [
         each
@@ -60,7 +60,10 @@ def growth_findings(
         f"coefficient of {theil:.3f}",
         "" if light is Light.GREEN else "look where the prediction parts from the record",
     )
-    return (found if refuted else unless_gusts({None: found}, made)[None],)
+    if asked is not None and asked.is_refuted:
+        return (found,)
+    innovations = () if asked is None else asked.innovations
+    return (unless_gusts({None: found}, predictions if innovations else made, innovations)[None],)
 
 
 def _pieces(whole: Prediction) -> list[Record]:

@@ -15,9 +15,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from flightid.conventions import Light
 from flightid.errors import FlightidError
-from flightid.findings import Finding
 from flightid.frozen import dataclass
 from flightid.identification.filter_error.parameter_scores import ParameterScores, parameter_scores
 from flightid.identification.prediction.predict import Predictor
@@ -31,17 +29,14 @@ from flightid.models.model import model_of
 from flightid.record import Record
 from flightid.uncertainty.estimate import Estimate
 from flightid.uncertainty.several_tests import holm_adjusted
-from flightid.validation.verification.judgement import THEIL
-from flightid.validation.verification.pieces import GROWTH
 
 Array = NDArray[np.float64]
-CODE = "parameter-refuted"
 FALSE_ALARMS = 0.001
 """Share of right models of which inputs seem to ask another parameter."""
 SURE = 2.0
 """Standard errors by which a parameter may differ less than it seems to."""
-MATERIAL, GROSS = 0.02, 0.25
-"""Shares of an output's power, as inputs make it, that other parameters change: amber, red."""
+MATERIAL = 0.02
+"""Share of an output's power, as inputs make it, that other parameters have to change."""
 MOVED = 0.1
 """Share of an output's whole power that inputs have to make of it, to be counted."""
 TRIED, STEPS = 2, 4
@@ -125,10 +120,32 @@ class _VerifiedRuns:
         return [self.way(model, each.measured, each.outputs, self.request) for each in self.made]
 
 
-def refuted_parameter(
+@dataclass(frozen=True, eq=False)
+class QuestionedRuns:
+    """What was asked of free runs beside their gusts.
+
+    Attributes
+    ----------
+    refuted : RefutedParameter or None
+        What inputs ask otherwise, if anything that matters.
+    innovations : tuple of ndarray, shape (n_outputs, n_samples)
+        What a filter with the record's own noises leaves of the last samples of each record, as
+        good as new at each; none where the model cannot be asked.
+    """
+
+    refuted: RefutedParameter | None = None
+    innovations: tuple[Array, ...] = ()
+
+    @property
+    def is_refuted(self) -> bool:
+        """Whether gusts are no excuse."""
+        return self.refuted is not None
+
+
+def questioned(
     source: object, way: Predictor, made: Sequence[Prediction], request: Request
-) -> RefutedParameter | None:
-    """What a free run's inputs ask otherwise, if anything that matters.
+) -> QuestionedRuns:
+    """What a free run's inputs ask otherwise, and what a filter leaves of it.
 
     Parameters
     ----------
@@ -151,14 +168,21 @@ def refuted_parameter(
     model = model_of(source)
     whole = all(each.diverged_at is None for each in made)
     if not isinstance(model, StateSpaceModel) or request.horizon != FREE_RUN or not whole:
-        return None
+        return QuestionedRuns()
     if remembered(source).record_parameters or len(made[0].outputs) < len(model.outputs):
-        return None
+        return QuestionedRuns()
     asked = _VerifiedRuns(source, way, made, request)
     scores = asked.scores(model, made)
     if scores is None:
-        return None
-    known = _known(source, scores.names)
+        return QuestionedRuns()
+    refuted = _refuted(asked, model, scores)
+    return QuestionedRuns(refuted, scores.innovations)
+
+
+def _refuted(
+    asked: _VerifiedRuns, model: StateSpaceModel, scores: ParameterScores
+) -> RefutedParameter | None:
+    known = _known(asked.source, scores.names)
     shown, chances = _shown(scores, known)
     if np.min(chances) >= FALSE_ALARMS:
         return None
@@ -233,29 +257,6 @@ def _followed(
         output,
         least[output],
         is_enough=bool(is_enough),
-    )
-
-
-def refuted_findings(
-    refuted: RefutedParameter | None, beside: Sequence[Finding]
-) -> tuple[Finding, ...]:
-    """Red where what is said `beside` of the runs is poor, or the difference is gross; else amber.
-
-    Within the guide a prediction is of use, whatever is a little wrong in it.
-    """
-    if refuted is None:
-        return ()
-    poor = {Light.AMBER, Light.RED}
-    is_poor = any(each.code in (THEIL, GROWTH) and each.light in poor for each in beside)
-    light = Light.RED if is_poor or refuted.share >= GROSS else Light.AMBER
-    return (
-        Finding(
-            CODE,
-            light,
-            refuted.words,
-            "fit the records together, or look for what the model lacks: an input's gain, a lag, "
-            "a delay, a coupling",
-        ),
     )
 
 

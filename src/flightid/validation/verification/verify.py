@@ -41,11 +41,9 @@ from flightid.validation.verification.of_the_fit import (
     own_errors,
     seen_findings,
 )
+from flightid.validation.verification.parameter_findings import refuted_findings
 from flightid.validation.verification.pieces import growth_findings
-from flightid.validation.verification.refuted_parameters import (
-    refuted_findings,
-    refuted_parameter,
-)
+from flightid.validation.verification.refuted_parameters import questioned
 from flightid.validation.verification.result import Verification
 
 
@@ -191,10 +189,10 @@ def verify(
     holds = [
         chosen_hold(flown, hold, known=HOLDS, fitted=remembered(each).hold) for each in several
     ]
-    asked = Request(horizon, initial_state, settle_s, bool(state_bias), bool(output_bias))
+    wanted = Request(horizon, initial_state, settle_s, bool(state_bias), bool(output_bias))
     told = (state_bias is not None, output_bias is not None)
     requests = [
-        _request(each, model, way, replace(asked, hold=held.hold), told)
+        _request(each, model, way, replace(wanted, hold=held.hold), told)
         for each, (model, way), held in zip(several, models, holds, strict=True)
     ]
     for model, _ in models:
@@ -212,15 +210,14 @@ def verify(
         seen = None if responses is None else mismatch(model, responses)
         own = own_errors(each, THEIL_GUIDE[0])
         gusts = gust_errors(each, model, [record.duration_s for record in flown])
-        asked_otherwise = refuted_parameter(each, way, made, request)
-        refuted = asked_otherwise is not None
-        judged = judge(tuple(made), chosen, request, seen, own, gusts, refuted=refuted)
+        asked = questioned(each, way, made, request)
+        judged = judge(tuple(made), chosen, request, seen, own, gusts, asked)
         beside = (
             *baseline_findings(each, made, request),
-            *contradictions(each, way, made, request, refuted=refuted),
-            *growth_findings(made, partial(run, request), refuted=refuted),
+            *contradictions(each, way, made, request, asked),
+            *growth_findings(made, partial(run, request), asked),
         )
-        beside = (*beside, *refuted_findings(asked_otherwise, (*judged.findings, *beside)))
+        beside = (*beside, *refuted_findings(asked.refuted, (*judged.findings, *beside)))
         in_time = way is predict_continuous
         taken = remembered(each).assumed_hold
         again = partial(run, records=flown)
