@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.errors import FlightidError
 from flightid.evidence import Evidence, gather_evidence
 from flightid.evidence.explained import ExplainedRun
 from flightid.evidence.gather import FitFacts
@@ -15,12 +16,19 @@ from flightid.evidence.parameter_checks import Signed
 from flightid.evidence.spans import Span
 from flightid.identification.fit import Fit
 from flightid.identification.fitted_response import FittedResponse
+from flightid.identification.prediction.continuous import predict_continuous
+from flightid.identification.prediction.remembered import of_record
+from flightid.identification.prediction.request import FREE_RUN, Request
+from flightid.identification.records.options import ESTIMATE
+from flightid.models import StateSpaceModel
 from flightid.models.innovations.model import InnovationsModel
 from flightid.models.parameters import Parameters
 from flightid.models.polynomial.model import PolynomialModel
 from flightid.record.hold import Loop
 from flightid.uncertainty.estimate import Estimate
 
+FILTER_ERROR = "filter_error"
+"""The method whose records hold predictions one sample ahead."""
 NOT_NEGATIVE_BY_NATURE = "s"
 """Delays and time constants: a bound at zero declares no sign."""
 
@@ -57,6 +65,8 @@ def evidence_of(fit: Fit, data: Sequence[Any], loop: Loop | None = None) -> Evid
 
 def _free_runs(fit: Fit) -> list[ExplainedRun]:
     """Runs of equations through records; black boxes are judged by what they foretell."""
+    if fit.details is None and fit.method == FILTER_ERROR:
+        return _unfiltered(fit)
     if fit.details is not None or fit.residual_horizon != "free_run":
         return []
     return [
@@ -68,6 +78,31 @@ def _free_runs(fit: Fit) -> list[ExplainedRun]:
         for each in fit.records
         if tuple(each.outputs) == tuple(fit.model.outputs)
     ]
+
+
+def _unfiltered(fit: Fit) -> list[ExplainedRun]:
+    """Runs that inputs alone drive: what a filter foretells from outputs explains no band."""
+    told = fit.provenance.get("options")
+    told = told if isinstance(told, Mapping) else {}
+    request = Request(
+        FREE_RUN,
+        ESTIMATE,
+        0.0,
+        bool(told.get("input_bias")),
+        bool(told.get("output_bias")),
+        told.get("hold", "first"),
+    )
+    found = []
+    for each in fit.records:
+        try:
+            model, outputs = of_record(fit, fit.model, each.measured), tuple(each.outputs)
+            assert isinstance(model, StateSpaceModel)
+            run = predict_continuous(model, each.measured, outputs, request)
+        except FlightidError:
+            return []
+        measured, modelled = (side.matrix(outputs) for side in (run.measured, run.predicted))
+        found.append(ExplainedRun(measured, modelled, each.measured.sample_time_s))
+    return found
 
 
 def _at_once(model: object) -> tuple[str, ...]:

@@ -24,7 +24,11 @@ from flightid.identification.hold_test import with_hold_tested
 from flightid.identification.left_by_fit import LEFT, left_by_fit
 from flightid.identification.loop_judged import with_loop_judged
 from flightid.identification.methods import flat, method_of
-from flightid.identification.residual_evidence import in_doubt, with_residuals_judged
+from flightid.identification.residual_evidence import (
+    in_doubt,
+    with_minimum_doubted,
+    with_residuals_judged,
+)
 from flightid.identification.training import data_provenance
 from flightid.models import GreyBoxModel
 from flightid.models.innovations.structure import SubspaceStructure
@@ -223,7 +227,7 @@ def identify(
             fit = with_hold_said(*with_hold_tested(fit, chosen, data, given, held, loop))
     if not in_doubt(fit.findings):
         fit = with_residuals_judged(fit)
-    fit = with_loop_judged(fit, loop)
+    fit = with_loop_judged(with_minimum_doubted(fit), loop)
     if closed is not None:
         fit = with_bias_said(fit, closed)
     fit = replace(fit, provenance={**fit.provenance, LEFT: left_by_fit(fit)})

@@ -79,6 +79,8 @@ class InnovationTests:
     slow : float or None
         Independent samples that errors amount to, where they are so few that slow noise alone
         seems to follow the inputs.
+    cause : str
+        Why inputs foretell errors, where they do.
     """
 
     white: float | None
@@ -87,6 +89,7 @@ class InnovationTests:
     past_percent: float | None = None
     excess: tuple[float, float] = (0.0, 0.0)
     slow: float | None = None
+    cause: str = "dynamics are missing"
 
     @property
     def is_white(self) -> bool:
@@ -123,7 +126,7 @@ class InnovationTests:
             size = "" if worth is None else f", worth {worth:.2g} % of the output"
             return (
                 f"inputs still foretell the prediction errors (p = {self.independent:.2g}{size}): "
-                "dynamics are missing, and the estimates are biased"
+                f"{self.cause}, and the estimates are biased"
             )
         if not self.is_white:
             chance = f"(p = {self.white:.2g})"

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from flightid.conventions import Light
+from flightid.evidence.gather import MINIMUM_DOUBTED, PROCESS_NOISE
 from flightid.findings import Finding
 from flightid.identification.fit import Fit
-from flightid.identification.innovation_tests import ROUNDING, InnovationTests
+from flightid.identification.fit_findings import STARTS_FIRST
+from flightid.identification.innovation_tests import INPUTS_IN_ERRORS, ROUNDING, InnovationTests
 from flightid.identification.withheld_intervals import without_intervals
 from flightid.uncertainty.foretold import chance_share, likelihood_gain
 
@@ -19,7 +22,9 @@ MISSING = (
 )
 LEAST_GAIN = 6.0
 """Logarithm of a likelihood, beyond that of chance, that inputs must bring to a fit."""
-DOUBTED = ("hold-contradicted", "hold-unknown")
+CONTRADICTED = "hold-contradicted"
+DOUBTED = (CONTRADICTED, "hold-unknown")
+OUTPUT_ERROR = "output_error"
 NOTHING = "what inputs explain of the outputs is within chance: nothing of the vehicle is told"
 
 
@@ -59,9 +64,47 @@ def with_residuals_judged(fit: Fit) -> Fit:
     return _withheld(fit, tests.why_biased, said)
 
 
+def _is_foretold(found: Finding) -> bool:
+    """Whether inputs foretell errors, as they are held or as they might be."""
+    asked = found.code in (INPUTS_IN_ERRORS, CONTRADICTED)
+    return asked and found.light in (Light.AMBER, Light.RED)
+
+
 def _is_unexplained(found: Finding) -> bool:
     """Whether most of what moves an output is no part of the model: its bars hold nothing."""
     return found.code == "output-unexplained" and found.light is Light.RED
+
+
+def with_minimum_doubted(fit: Fit) -> Fit:
+    """The fit with the word that its minimum may not be the lowest, where one start was made.
+
+    Output error that stopped in a local minimum leaves what a wrong structure or another hold would
+    leave, and is settled. Inputs in its errors, or another hold that they ask, tell none of these
+    from the others: starts are tried before the model is changed. Noise on the states explains the
+    same without.
+
+    Parameters
+    ----------
+    fit : Fit
+    """
+    options = fit.provenance.get("options")
+    starts = options.get("starts", 1) if isinstance(options, Mapping) else 1
+    codes = {each.code for each in fit.findings}
+    poor = [
+        each
+        for each in fit.findings
+        if (
+            each.code in (INPUTS_IN_ERRORS, CONTRADICTED) and each.light in (Light.AMBER, Light.RED)
+        )
+        or _is_unexplained(each)
+    ]
+    if fit.method != OUTPUT_ERROR or starts != 1 or not poor:
+        return fit
+    if codes & {MINIMUM_DOUBTED, PROCESS_NOISE}:
+        return fit
+    said = "one start was made, and a local minimum would leave what this one does"
+    doubt = Finding(MINIMUM_DOUBTED, Light.AMBER, said, STARTS_FIRST)
+    return replace(fit, findings=(*fit.findings, doubt))
 
 
 def least_gain(n_parameters: int) -> float:

@@ -47,10 +47,12 @@ from flightid.uncertainty.estimate import Estimate
 
 Array = NDArray[np.float64]
 MISSING = (
-    "add the lag or delay that the model lacks, which process noise took for turbulence, "
-    "or look for feedback"
+    "name another state in process_noise, add the lag or delay that the model lacks, which "
+    "process noise took for turbulence, or look for feedback"
 )
 """What to do where inputs foretell innovations."""
+CAUSE = "dynamics are missing, or gusts are others than the filter's"
+"""Why they do: derivatives bend to do the work of a gust whose colour or state is another."""
 
 
 @dataclass(frozen=True)
@@ -108,6 +110,7 @@ def fit_filter_error(
         [each.outputs for each in problem.data],
         (0, count),
     ).beside(known.agreement)
+    tests = replace(tests, cause=CAUSE)
     fit = assemble(
         "filter error",
         inner,
