@@ -152,7 +152,7 @@ def parameter_scores(
 
 
 def _scores(
-    free: Sequence[Parameter], point: Array, noises: Array, found: _Whitened
+    free: Sequence[Parameter], point: Array, noises: Array, found: _WhiteRows
 ) -> ParameterScores | None:
     """Of the parameters that move anything, by innovations and slopes of unit variance."""
     moves = found.moves
@@ -216,7 +216,7 @@ def _is_rounding(problem: InnovationsProblem, unknowns: Array) -> bool:
 
 
 @dataclass(frozen=True, eq=False)
-class _Whitened:
+class _WhiteRows:
     """Innovations (rows,) and their slopes (rows, n_free) of unit variance; -2 ln p; by record."""
 
     left: Array
@@ -225,7 +225,7 @@ class _Whitened:
     innovations: tuple[Array, ...]
 
 
-def _whitened(problem: InnovationsProblem, residuals: Array, slopes: Array) -> _Whitened | None:
+def _whitened(problem: InnovationsProblem, residuals: Array, slopes: Array) -> _WhiteRows | None:
     """Innovations less what past ones foretell, and slopes so filtered; None: too short."""
     p, parts, first = len(problem.model.outputs), [], 0
     for each in problem.data:
@@ -255,7 +255,7 @@ def _whitened(problem: InnovationsProblem, residuals: Array, slopes: Array) -> _
     apart = (flat.reshape(moves.shape) @ whitener).swapaxes(1, 2)
     misfit = len(left) * float(np.linalg.slogdet(spread)[1])
     ends = np.cumsum([len(e) - lags for e, _ in parts])[:-1]
-    return _Whitened(
+    return _WhiteRows(
         (left @ whitener).ravel(),
         apart.reshape(left.size, -1),
         misfit,
