@@ -123,7 +123,7 @@ def parameter_scores(
     Returns
     -------
     ParameterScores or None
-        None where there is no free parameter, no noise, no steady filter, or too little to tell.
+        None where there is no free parameter, no state, no noise, no steady filter, or too little.
 
     Reference
     ---------
@@ -132,7 +132,7 @@ def parameter_scores(
     """
     free = model.parameters.free
     point = model.parameters.independent_values()[model.parameters.free_indices]
-    if not point.size:
+    if not point.size or not model.states:
         return None
     try:
         problem = innovations_problem(model, _first(measured), options)
