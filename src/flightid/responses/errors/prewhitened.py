@@ -94,8 +94,11 @@ class NoiseModel:
         lowest_rad_s: float,
         *,
         direct: bool,
+        memory: float = 1.0,
     ) -> NoiseModel:
         """Least squares on the samples of all records, means removed.
+
+        `memory` is the share that is kept of the longest lag that the records allow.
 
         Raises
         ------
@@ -113,6 +116,8 @@ class NoiseModel:
         cycle = int(2.0 * np.pi / (lowest_rad_s * sample_time_s))
         most = size // (SAMPLES_PER_NUMBER * (n_in + n_out)) - direct
         blocks = lag_blocks(max(min(cycle, shortest // SAMPLES_PER_NUMBER), 1), most)
+        if memory < 1.0 and len(blocks) > 2:
+            blocks = lag_blocks(max(int(memory * blocks[-1][1]), 2), most)
         numbers = len(blocks) * (n_in + n_out) + direct * n_in
         if len(blocks) < 2 or size * numbers > MOST_NUMBERS:
             few = len(blocks) < 2
@@ -137,6 +142,11 @@ class NoiseModel:
         left = np.vstack([y - x @ found for x, y in zip(known, targets, strict=True)])
         spread = left.T @ left / (len(left) - numbers)
         return cls(blocks, direct, known, found, inverse, spread, sample_time_s)
+
+    @property
+    def memory_s(self) -> float:
+        """How far its lags reach back, s."""
+        return (self.blocks[-1][1] - 1) * self.sample_time_s
 
     @property
     def n_outputs(self) -> int:
@@ -217,20 +227,35 @@ class PrewhitenedErrors(JointErrors):
     ----------
     model : NoiseModel
     omega_rad_s : ndarray, shape (n_f,)
+    doubt : ndarray, shape (n_out, n_in, n_f), optional
+        Standard deviation of complex points beside that of the noise, each by itself: what a
+        longer memory may move; see `memory_doubt`.
     """
 
     model: NoiseModel
     omega_rad_s: Real
+    doubt: Real | None = None
 
     def covariances(self, wanted: Sequence[Points]) -> list[Real]:
         """See `JointErrors`."""
-        return [root @ root.T for root in map(self._root, wanted)]
+        return [root @ root.T + np.diag(self._beside(at)) for at, root in self._roots(wanted)]
 
     def combined(self, wanted: Sequence[Points], gains: Sequence[Real]) -> Real:
         """See `JointErrors`."""
-        moved = [gain @ self._root(each) for each, gain in zip(wanted, gains, strict=True)]
-        total = np.sum(moved, axis=0)
-        return np.asarray(total @ total.T)
+        pairs = list(zip(gains, self._roots(wanted), strict=True))
+        total = np.sum([gain @ root for gain, (_, root) in pairs], axis=0)
+        beside = sum((gain * self._beside(at)) @ gain.T for gain, (at, _) in pairs)
+        return np.asarray(total @ total.T + beside)
+
+    def _roots(self, wanted: Sequence[Points]) -> list[tuple[Points, Real]]:
+        return [(each, self._root(each)) for each in wanted]
+
+    def _beside(self, wanted: Points) -> Real:
+        """Variances by the doubt, real parts before imaginary ones, shape (2 n_in n_f,)."""
+        if self.doubt is None:
+            return np.zeros(2 * len(wanted.inputs) * len(wanted.frequencies))
+        of_points = self.doubt[wanted.output][np.ix_(wanted.inputs, wanted.frequencies)]
+        return np.tile(0.5 * of_points.ravel() ** 2, 2)
 
     def _root(self, wanted: Points) -> Real:
         """Root of the covariance of some points, shape (2 n_in n_f, n_out · n_numbers)."""

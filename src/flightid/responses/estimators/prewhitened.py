@@ -14,6 +14,7 @@ from flightid.record import Record
 from flightid.record.history import is_of_log
 from flightid.record.hold import common_hold
 from flightid.responses.errors.linear_estimate import LinearEstimate
+from flightid.responses.errors.noise_memory import HALF, memory_doubt, near
 from flightid.responses.errors.prewhitened import (
     NoiseModel,
     PrewhitenedErrors,
@@ -25,6 +26,7 @@ from flightid.responses.windows.defaults import WINDOWS_IN_RECORDS
 from flightid.responses.windows.samples import Samples
 
 PREWHITENED = "prewhitened"
+Real = NDArray[np.float64]
 TINY = float(np.finfo(float).tiny)
 
 
@@ -68,19 +70,14 @@ def estimate_prewhitened(
     omega = windowed.omega_rad_s
     held = common_hold([record.input_shape for record in records]) == "zero"
     held = held or is_of_log(record.history for record in records)
-    model = NoiseModel.of(
-        samples.part("inputs"),
-        samples.part("outputs"),
-        samples.sample_time_s,
-        float(omega[0]),
-        direct=not held,
-    )
-    errors = PrewhitenedErrors(model, omega)
+    asked = (samples.part("inputs"), samples.part("outputs"), samples.sample_time_s)
+    model = NoiseModel.of(*asked, float(omega[0]), direct=not held)
     response = model.response(omega)
+    errors = PrewhitenedErrors(model, omega, _doubt(model, asked, omega))
     variance = _variance(errors, response)
     relative = np.sqrt(0.5 * variance) / np.maximum(np.abs(response), TINY)
-    near = _near(omega)
-    smooth = np.sqrt(0.5 * (variance @ near) / np.maximum(np.abs(response) ** 2 @ near, TINY))
+    around = near(omega)
+    smooth = np.sqrt(0.5 * (variance @ around) / np.maximum(np.abs(response) ** 2 @ around, TINY))
     coherence = coherence_of(smooth, WINDOWS_IN_RECORDS, shifts)
     weights = PrewhitenedWeights(model, omega)
     return replace(
@@ -103,10 +100,16 @@ def _variance(errors: PrewhitenedErrors, response: NDArray[np.complex128]) -> ND
     return np.asarray(both.sum(axis=1))
 
 
-def _near(omega: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Which frequencies lie within half an octave of which, shape (n_f, n_f)."""
-    away = np.abs(np.subtract.outer(np.log2(omega), np.log2(omega)))
-    return np.asarray(away <= 0.5, dtype=np.float64)
+def _doubt(
+    model: NoiseModel,
+    asked: tuple[Sequence[Real], Sequence[Real], float],
+    omega: Real,
+) -> Real:
+    """Of the memory of the model: see `memory_doubt`."""
+    shorter = NoiseModel.of(*asked, float(omega[0]), direct=model.direct, memory=HALF)
+    response = model.response(omega)
+    variances = [_variance(PrewhitenedErrors(each, omega), response) for each in (model, shorter)]
+    return memory_doubt(model, shorter, omega, (variances[0], variances[1]))
 
 
 def _assumption(*, held: bool) -> Finding:
