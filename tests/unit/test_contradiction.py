@@ -55,6 +55,23 @@ def test_nothing_is_said_of_intervals_that_there_are_not() -> None:
     assert "intervals of this model do not hold" not in found.message
 
 
+def test_of_a_right_model_in_gusts_nothing_is_said_of_intervals() -> None:
+    """Errors that no input foretells may be gusts beyond those of the fit: bars hold in these."""
+
+    def in_rad_s(record: fid.Record) -> fid.Record:
+        rows = {name: record[name] for name in ("u", "y")}
+        return fid.Record.from_arrays(
+            TIME_S, inputs={"u": rows["u"]}, outputs={"y": rows["y"]}, units={"y": "rad/s"}
+        )
+
+    fit = fid.identify(STRUCTURES[0], in_rad_s(flown(1, 1.0)))
+    for gain, contradicted in ((1.0, False), (2.5, True)):
+        gusty = in_rad_s(flown(2, gain, noise=0.3))
+        (found,) = (each for each in fid.verify(fit, gusty).findings if each.code == CODE)
+        assert ("intervals of this model do not hold" in found.message) is contradicted
+        assert ("inputs foretell none of the errors" in found.message) is not contradicted
+
+
 def test_bars_of_the_parameters_allow_for_what_the_fit_could_not_tell() -> None:
     short = flown(3, 1.0, noise=3.0)
     fit = fid.identify(STRUCTURES[0], short.segment(0.0, 10.0))

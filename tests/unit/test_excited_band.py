@@ -47,3 +47,19 @@ def test_the_usable_band_of_a_closed_loop_ends_with_its_sweep(loop: str) -> None
     assert row[4] == excited_to(response, "u")
     assert "a closed loop feeds back" in said[0].message
     assert {each["x0"] for each in boxes} == {excited_to(response, "u")}
+
+
+def test_a_pair_that_holds_nothing_is_said_so_in_words() -> None:
+    """Coherences of a millionth made "1.124e+06 %" of a table: no number, and the reason below."""
+    omega = np.geomspace(1.0, 20.0, 40)
+    error = np.full((2, 1, 40), 0.03)
+    error[1, 0, 10:] = 1e4
+    response = fid.FrequencyResponse.from_values(
+        omega, np.ones((2, 1, 40), complex), inputs=["u"], outputs=["p", "q"], random_error=error
+    )
+    table = response.summary()
+    assert [row[-1] for row in table.rows] == [pytest.approx(3.0), None]
+    (note,) = (each for each in table.notes if "median random error" in each)
+    assert "q/u" in note
+    assert "p/u" not in note
+    assert "as large as the response" in note

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+import flightid as fid
 from flightid.conventions import Light
 from flightid.evidence.evidence import GUIDELINES
-from flightid.evidence.gather import FitFacts, gather_evidence
+from flightid.evidence.gather import OF_PARAMETERS, FitFacts, gather_evidence
 from flightid.findings import Finding
 from flightid.identification.fit_findings import DETERMINED, judge_correlation, judge_parameters
+from flightid.identification.rival_holds import OtherHold
+from flightid.identification.told_hold import widened
 from flightid.uncertainty.estimate import Estimate
+from tests.strangers import holds
 
 HALF_WIDTH = 1.96
 
@@ -50,3 +56,22 @@ def test_without_an_interval_the_guides_stand() -> None:
     bare = {"tau": _parameter("tau", None)}
     assert [each.light for each in judge_parameters(bare)] == [Light.AMBER]
     assert _guidelines() == (Light.GREEN, "every guideline is met")
+
+
+def test_what_is_said_of_parameters_is_of_the_intervals_that_are_shown() -> None:
+    """A hold in doubt makes bars longer after the verdicts: these tell the longer ones."""
+    fit = fid.identify(holds.model(), holds.flight(0, "steps", told=True), method="equation_error")
+    guided = {
+        name: replace(each, insensitivity_percent=21.0) for name, each in fit.parameters.items()
+    }
+    tight = np.full_like(fit.correlation, 0.99)
+    said = (*judge_parameters(guided), *judge_correlation(fit.names, tight, guided))
+    assert {each.light for each in said} == {Light.GREEN}
+    fit = replace(fit, parameters=guided, correlation=tight, findings=(*fit.findings, *said))
+    shift = tuple(0.5 * abs(fit.parameters[name].value) for name in fit.names)
+    wide = widened(fit, [OtherHold("zero", "tau", 9.0, None, shift)])
+    assert np.all(np.sqrt(np.diag(wide.covariance)) >= shift)
+    now = [each for each in wide.findings if each.code in OF_PARAMETERS]
+    assert len(now) == len(said)
+    assert {each.light for each in now} == {Light.AMBER}
+    assert not any("is known to" in each.message for each in now)

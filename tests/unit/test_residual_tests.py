@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.signal import lfilter
 
 import flightid as fid
 from flightid.errors import DataError, OptionError, ShapeError, UnknownNameError
@@ -424,3 +425,20 @@ def test_in_a_loop_the_residual_is_tested_against_what_was_injected() -> None:
         fid.residual_tests(fid.verify(truth, flown), ["u"]).test("uε", "y", "u").verdict == "fail"
     )
     assert fid.residual_tests(fid.verify(truth, flown), loop="open").inputs == ("u",)
+
+
+@pytest.mark.parametrize(("pole", "square"), [(0.97, 0.0), (0.95, 0.2)])
+def test_no_nonlinearity_is_asked_for_while_the_linear_part_is_wrong(
+    pole: float, square: float
+) -> None:
+    """A 3-2-1-1 answered by a wrong pole is no less correlated with its square than a true u²."""
+    random = np.random.default_rng(0)
+    u = np.repeat([0.0, 1.0, -1.0, 1.0, -1.0, 0.0], [60, 90, 60, 30, 30, 130])
+    u = np.tile(u, 3) if square == 0.0 else random.uniform(-1.0, 1.0, u.size)
+    linear = lfilter([0.0, 0.05], [1.0, -pole], u) - lfilter([0.0, 0.05], [1.0, -0.95], u)
+    left = linear + square * np.roll(u, 1) ** 2 + 0.01 * random.standard_normal(u.size)
+    found = fid.residual_tests(left, u, horizon="free run", loop="open").findings
+    asked = [each.action for each in found if each.code == "residuals-follow-input-squared"]
+    assert len(asked) == 1
+    assert ("an even nonlinearity is missing" in asked[0]) is (square > 0.0)
+    assert asked[0].startswith("mend the linear part first") is (square == 0.0)

@@ -88,6 +88,9 @@ def _asked(fit: Fit, held: ChosenHold, rivals: Rivals) -> tuple[Fit, ChosenHold]
     fit = noted(fit, known)
     if finding.light is not Light.GREEN and not rivals.logged:
         fit = widened(fit, known)
+        furthest = max(known, key=lambda each: each.moved)
+        if finding.code == "hold-unknown" and furthest.is_likely:
+            finding = replace(finding, message=f"{finding.message}; the intervals reach that")
     return fit, replace(held, findings=(*said, finding))
 
 

@@ -18,6 +18,7 @@ from flightid.conventions import Light
 from flightid.evidence.gather import ON_A_WORD
 from flightid.findings import Finding
 from flightid.identification.fit import Fit
+from flightid.identification.judged_again import parameters_judged_again
 from flightid.identification.rival_holds import CHANCE, DOUBTFUL, NEGLIGIBLE, OtherHold, Rivals
 from flightid.record.chosen_hold import DECLARED, RECORDED, SEEN, ChosenHold
 from flightid.record.history import FLOWN
@@ -254,7 +255,10 @@ def contradicted(best: OtherHold, taken: InputHold, whose: str) -> Finding:
 
 
 def widened(fit: Fit, others: Sequence[OtherHold]) -> Fit:
-    """The fit whose bars reach what likely other holds would make of the estimates."""
+    """The fit whose bars reach what likely other holds would make of the estimates.
+
+    What was said of its parameters is said again of these bars.
+    """
     if fit.covariance is None:
         return fit
     shifts = np.array([each.shift for each in others if each.is_likely])
@@ -264,4 +268,4 @@ def widened(fit: Fit, others: Sequence[OtherHold]) -> Fit:
         name: replace(each, stderr=float(errors[name])) if name in errors else each
         for name, each in fit.parameters.items()
     }
-    return replace(fit, covariance=covariance, parameters=known)
+    return parameters_judged_again(replace(fit, covariance=covariance, parameters=known))

@@ -43,6 +43,10 @@ class ExcitedResponse(Protocol):
         """By output, input and frequency."""
 
     @property
+    def random_error(self) -> NDArray[np.float64]:
+        """By output, input and frequency, as a share of the magnitude."""
+
+    @property
     def input_spectrum(self) -> NDArray[np.complex128] | None:
         """By two inputs and frequency."""
 
@@ -128,4 +132,37 @@ def no_band(response: ExcitedResponse) -> list[Finding]:
             f"more (the largest is {np.max(response.coherence):.2g})",
             "excite more strongly or for longer, inside the band that is asked for",
         )
+    ]
+
+
+def median_percent(random_error: NDArray[np.float64]) -> float | None:
+    """Median random error of a pair, %; None where it is as large as the response itself.
+
+    Parameters
+    ----------
+    random_error : ndarray, shape (n_frequencies,)
+        One standard deviation, as a share of the magnitude.
+
+    Example
+    -------
+    >>> median_percent(np.array([0.02, 0.04, 0.9])), median_percent(np.array([0.1, 7e3, 1e4]))
+    (4.0, None)
+    """
+    middle = float(np.median(random_error))
+    return 100.0 * middle if middle < 1.0 else None
+
+
+def hollow(response: ExcitedResponse) -> list[str]:
+    """Words on the pairs that have no `median_percent`; none where all have one."""
+    pairs = [
+        f"{output}/{name}"
+        for row, output in enumerate(response.outputs)
+        for column, name in enumerate(response.inputs)
+        if median_percent(response.random_error[row, column]) is None
+    ]
+    if not pairs:
+        return []
+    return [
+        f"No median random error of {', '.join(pairs)}: at half of the frequencies or more the "
+        "error is as large as the response, and nothing is known of it there."
     ]

@@ -19,7 +19,7 @@ from flightid.record.hold import InputShape
 from flightid.responses.bands import choose_frequencies, nearest
 from flightid.responses.errors.linear_estimate import LinearEstimate
 from flightid.responses.errors.random_error import CovarianceSource, ErrorSelection
-from flightid.responses.excited_band import excited_band, no_band
+from flightid.responses.excited_band import excited_band, hollow, median_percent, no_band
 from flightid.responses.pair import PairResponse, quotient_unit
 from flightid.responses.shown import shown_values
 from flightid.result import Result
@@ -359,10 +359,10 @@ class FrequencyResponse(
                         if band is None
                         else f"{band[0] / math.tau:.3g} to {band[1] / math.tau:.3g}",
                         float(np.mean(pair.coherence)),
-                        100.0 * float(np.median(pair.random_error)),
+                        median_percent(pair.random_error),
                     )
                 )
-        notes = tuple(map(str, (*known.findings, *no_band(known))))
+        notes = (*map(str, (*known.findings, *no_band(known))), *hollow(known))
         return Table(repr(known), columns, tuple(rows), notes)
 
     def _computed(self) -> dict[str, object]:

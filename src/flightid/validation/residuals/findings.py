@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 from flightid.conventions import Light
 from flightid.evidence.gather import LEADS
@@ -29,6 +30,12 @@ _ACTIONS = {
     Kind.CROSS: "the outputs share noise or dynamics: give the other output as an input, or fit a "
     "state space with both",
 }
+_OF_PRODUCTS = frozenset({Kind.EVEN, Kind.EVEN_SQUARED, Kind.BILINEAR})
+"""What a wrong linear model fails too: the square of one given input follows the input itself."""
+_LINEAR_FIRST = (
+    "mend the linear part first: {} fails too, and what that leaves of one given input follows its "
+    "square and products as well, so that no nonlinearity is shown yet"
+)
 _BEFORE = (
     "the residual comes before the input, as feedback makes it: declare loop='closed' where a "
     "controller moved the input; else dynamics from it are missing"
@@ -40,6 +47,7 @@ def residual_findings(tests: tuple[CorrelationTest, ...]) -> tuple[Finding, ...]
 
     Notes where chance does it, of as many tests as were made, or where the part that is missed
     lies below `NEGLIGIBLE_PERCENT` of an output that is known; amber below `MATERIAL_PERCENT`.
+    Beside a linear test that fails those of squares and products show no nonlinearity.
 
     Example
     -------
@@ -49,6 +57,7 @@ def residual_findings(tests: tuple[CorrelationTest, ...]) -> tuple[Finding, ...]
     made = [test for test in tests if test.counts and test.verdict is not Verdict.NOT_TESTABLE]
     failed = [test for test in made if test.verdict is Verdict.FAIL]
     found = [_failure(test, len(made)) for test in failed]
+    found = _linear_first(failed, found)
     if made and not failed:
         found.append(
             Finding(
@@ -70,6 +79,23 @@ def residual_findings(tests: tuple[CorrelationTest, ...]) -> tuple[Finding, ...]
     if not tests:
         found.append(Finding("residuals-not-testable", Light.UNKNOWN, "there are no tests"))
     return tuple(found)
+
+
+def _linear_first(failed: Sequence[CorrelationTest], found: Sequence[Finding]) -> list[Finding]:
+    """Findings whose actions ask for no nonlinear term while the linear part is wrong."""
+    pairs = list(zip(failed, found, strict=True))
+    linear = [
+        test.name
+        for test, said in pairs
+        if test.kind is Kind.INDEPENDENCE and said.light is not Light.GREEN
+    ]
+    if not linear:
+        return list(found)
+    action = _LINEAR_FIRST.format("; ".join(linear))
+    return [
+        replace(said, action=action) if test.kind in _OF_PRODUCTS and said.action else said
+        for test, said in pairs
+    ]
 
 
 def _failure(test: CorrelationTest, n_tests: int) -> Finding:
