@@ -7,6 +7,8 @@ import pytest
 import scipy
 
 import flightid as fid
+from flightid.conventions import Light
+from flightid.findings import worst
 from flightid.models import Parameter, Parameters
 from flightid.validation.verification.contradiction import CODE
 
@@ -143,3 +145,32 @@ def test_white_noise_of_the_measurement_is_no_misfit(times: float, light: str) -
     (said,) = (each for each in found.findings if each.message.startswith("v: "))
     assert said.light.value == light
     assert "white noise of the measurement makes" in said.message
+
+
+def _sampled(damping: float) -> tuple[np.ndarray, np.ndarray]:
+    above, below, _ = scipy.signal.cont2discrete(([9.0], [1.0, damping, 9.0]), 0.04)
+    return above.ravel(), below
+
+
+def _calm(seed: int, damping: float) -> fid.Record:
+    """A second order moved by a 3-2-1-1 in calm air, with 1 % of noise."""
+    random = np.random.default_rng(seed)
+    u = np.repeat([0.0, 1.0, -1.0, 1.0, -1.0, 0.0], [50, 70, 50, 25, 25, 180])
+    rows = scipy.signal.lfilter(*_sampled(damping), u)
+    rows = rows + 0.01 * np.std(rows) * random.standard_normal(u.size)
+    return fid.Record.from_arrays(
+        np.arange(u.size) * 0.04, inputs={"u": u}, outputs={"q": rows}, hold="zero"
+    )
+
+
+def test_what_inputs_foretell_in_calm_air_is_never_green_within_the_guide() -> None:
+    """A derivative off by a third hid below the coefficient's guide; a right one is green."""
+    for damping, light in ((3.0, Light.GREEN), (2.2, Light.AMBER)):
+        model = fid.LinearSystem(
+            [[0.0, 1.0], [-9.0, -damping]], [[0.0], [9.0]], [[1.0, 0.0]], [[0.0]], ("u",), ("q",)
+        )
+        result = fid.verify(model, _calm(1, 3.0))
+        assert result.theil["q"] < 0.25
+        assert worst(result.findings) is light
+        said = [each for each in result.findings if each.code == "verification-foretold"]
+        assert len(said) == (light is Light.AMBER)

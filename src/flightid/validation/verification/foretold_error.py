@@ -207,7 +207,9 @@ def _chances(pairs: Sequence[tuple[Array, Array]], past: int) -> Array | None:
     if not further.shape[1] or free < further.shape[1]:
         return None
     gain = np.sum((left @ further) ** 2, axis=1)
-    rest = np.maximum(np.sum(left**2, axis=1) - gain, np.finfo(float).tiny)
+    # What rounding leaves of an error that is foretold whole: no number overflows over it.
+    least = np.maximum(np.finfo(float).eps * gain, np.finfo(float).tiny)
+    rest = np.maximum(np.sum(left**2, axis=1) - gain, least)
     f = gain / further.shape[1] / (rest / free)
     quiet = np.sum(left**2, axis=1) < NO_NOISE * np.sum(aims**2, axis=1)
     found = np.asarray(scipy.special.fdtrc(further.shape[1], free, f))

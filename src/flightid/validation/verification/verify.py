@@ -31,6 +31,7 @@ from flightid.record.several import as_records
 from flightid.responses import FrequencyResponse
 from flightid.threads import on_one_thread
 from flightid.validation.verification.baseline import baseline_findings
+from flightid.validation.verification.beyond_noise import foretold_findings
 from flightid.validation.verification.comparison import Comparison, compared
 from flightid.validation.verification.contradiction import contradictions
 from flightid.validation.verification.held_otherwise import hold_findings
@@ -218,6 +219,8 @@ def verify(
             *growth_findings(made, partial(run, request), asked),
         )
         beside = (*beside, *refuted_findings(asked.refuted, (*judged.findings, *beside)))
+        if all(each.light is Light.GREEN for each in (*judged.findings, *beside)):
+            beside = (*beside, *foretold_findings(made, chosen, asked.innovations))
         in_time = way is predict_continuous
         taken = remembered(each).assumed_hold
         again = partial(run, records=flown)
