@@ -24,6 +24,9 @@ class Live {
   #since = performance.now();
   #waiting: Record<string, Waiting> = {};
   #news = new Set<(job: Job) => void>();
+  /** Jobs that the socket has told of since the list was asked for: the list is older than they are. */
+  #heard = new Set<string>();
+  #counts = 0;
 
   open() {
     const socket = new WebSocket(`ws://${location.host}/api/live`);
@@ -43,8 +46,8 @@ class Live {
     socket.onmessage = (event) => {
       const told = JSON.parse(event.data);
       if (told.job) {
-        this.jobs[told.job.id] = told.job;
-        for (const hear of this.#news) hear(told.job);
+        this.#heard.add(told.job.id);
+        this.#put(told.job);
         return;
       }
       const waiting = Object.values(this.#waiting).find((each) => each.question.request === told.request);
@@ -84,16 +87,27 @@ class Live {
     }
   }
 
+  /** End a job; one that has ended meanwhile is none that the server knows. */
+  async cancel(id: string) {
+    await api.cancel(id).catch(() => {});
+    await this.#recount();
+  }
+
   /** Jobs that the server knows; what it does not know any more has ended unheard. */
   async #recount() {
+    const mine = ++this.#counts;
+    this.#heard.clear();
     const told = await api.jobs().catch(() => null);
-    if (!told) return;
+    if (!told || mine !== this.#counts) return;
     const known = new Set(told.map((job) => job.id));
     const ended = Object.values(this.jobs).filter((job) => job.state === "waiting" && !known.has(job.id));
-    for (const job of [...told, ...ended.map((each) => ({ ...each, state: "done" as const }))]) {
-      this.jobs[job.id] = job;
-      for (const hear of this.#news) hear(job);
-    }
+    for (const job of [...told, ...ended.map((each) => ({ ...each, state: "done" as const }))]) if (!this.#heard.has(job.id)) this.#put(job);
+  }
+
+  /** The one place where a job comes in: what a screen was told with its results is older than news. */
+  #put(job: Job) {
+    this.jobs[job.id] = job;
+    for (const hear of this.#news) hear(job);
   }
 
   /** Hear of jobs; returns what ends it. */
