@@ -24,6 +24,7 @@ from flightid.inspection.signals import Signal
 from flightid.inspection.skew import StreamSkew, _skew
 from flightid.inspection.thresholds import LONGEST_WINDOW
 from flightid.inspection.usable_band import AxisBand, _longest_window
+from flightid.inspection.verdicts import _logging
 from flightid.logs.dataflash.writer import DataflashWriter
 from flightid.logs.source import Event, Gap
 from flightid.study.proposal import propose_study
@@ -180,6 +181,21 @@ def test_a_table_tells_the_band_that_the_verdict_tells() -> None:
     seen = Inspection("a", "px4", "", "copter", 9.0, (), phases, (), (), (), (), ())
     rows = [row[4:8] for row in replace(seen, bands=(roll, yaw))._axes().rows]
     assert rows == [(11.7, 26.5, 0.66, "too narrow for more than a gain"), (2.5, 7.3, 0.77, None)]
+
+
+def test_each_rate_is_said_of_the_signal_that_has_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A command by every motor status at 9.62 Hz: the rate beside it was said to be as slow."""
+    rates = (9.62, 31.25)
+    band = AxisBand("roll", "motors", "rollspeed", 9.62, None, None, rates_hz=rates)
+    phases = FlightPhases(((0.0, 9.0),), True, None, "")
+    seen = Inspection("a", "px4", "", "copter", 9.0, (), phases, (), (), (), (band,))
+    monkeypatch.setattr(advice, "logging", lambda _: "log faster")
+    log: Any = None
+    (found,) = _logging(log, seen)
+    assert found.message.startswith("motors is logged at 9.62 Hz and rollspeed at 31.25 Hz: ")
+    alike = replace(band, rates_hz=(9.63, 9.62))
+    (found,) = _logging(log, replace(seen, bands=(alike,)))
+    assert found.message.startswith("motors and rollspeed are logged at 9.62 Hz: ")
 
 
 def test_evidence_of_an_axis_is_not_that_of_another() -> None:

@@ -10,6 +10,7 @@ from scipy import signal
 
 from flightid import FrequencyResponse, Record, estimate_response
 from flightid.errors import DataError, OptionError, ShapeError, UnitError, UnknownNameError
+from flightid.responses.cautions import band_findings
 from flightid.responses.estimators.conditioned import random_error
 from flightid.responses.windows.defaults import (
     automatic_windows,
@@ -181,6 +182,18 @@ def test_findings_say_what_to_trust() -> None:
     )
     codes = {finding.code for finding in response.findings}
     assert codes == {"below-two-cycles", "above-a-fifth-of-the-rate", "inputs-correlated"}
+
+
+@pytest.mark.parametrize("digits", [3, 4])
+def test_bands_as_they_are_written_are_within_their_limits(digits: int) -> None:
+    """Two cycles in 7.2 s are 1.7453 rad/s, a fifth of 25 Hz 31.416: rounded either way, both."""
+    edge = 2.0 * 2.0 * np.pi / 7.2, 2.0 * np.pi / (5.0 * 0.04)
+    low, high = (float(f"{each:.{digits}g}") for each in edge)
+    assert band_findings(np.array([low, high]), 7.2, 0.04) == []
+    below, above = band_findings(np.array([1.73, 31.6]), 7.2, 0.04)
+    assert "from 1.73 rad/s" in below.message
+    assert "from 1.75 rad/s" in below.action
+    assert "reach 31.6 rad/s; a fifth of the sampling rate is 31.4" in above.message
 
 
 def test_select_and_pair() -> None:

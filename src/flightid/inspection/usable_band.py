@@ -38,6 +38,8 @@ N_OMEGA = 60
 SHORTENED = 6
 """Lengths of windows that are tried until enough of them are independent."""
 ROUNDING = 1e-9
+SAME_RATE = 1.01
+"""Rates nearer to each other than this ratio are one: medians of stamps scatter so much."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +69,8 @@ class AxisBand:
     coherent_rad_s : tuple of float, or None
         Widest band in which the partial coherence reaches 0.6 with at least five independent
         windows and ten samples a cycle, and that ends where the power of the sweeps does, rad/s.
+    rates_hz : tuple of float, or None
+        Rates of input and output, Hz; None where one is missing.
     """
 
     axis: str
@@ -79,6 +83,23 @@ class AxisBand:
     largest_coherence: float | None = None
     excited_to_rad_s: float = math.inf
     coherent_rad_s: tuple[float, float] | None = None
+    rates_hz: tuple[float, float] | None = None
+
+    @property
+    def logged(self) -> str:
+        """What is logged how fast, the slower of the two first; empty where one is missing.
+
+        Example
+        -------
+        >>> AxisBand("roll", "RATE.ROut", "RATE.R", 9.62, None, None, rates_hz=(9.62, 31.25)).logged
+        'RATE.ROut is logged at 9.62 Hz and RATE.R at 31.25 Hz'
+        """
+        if self.rates_hz is None:
+            return ""
+        slow, fast = sorted(zip(self.rates_hz, (self.input, self.output), strict=True))
+        if fast[0] < SAME_RATE * slow[0]:
+            return f"{self.input} and {self.output} are logged at {slow[0]:.4g} Hz"
+        return f"{slow[1]} is logged at {slow[0]:.4g} Hz and {fast[1]} at {fast[0]:.4g} Hz"
 
     @property
     def words(self) -> str:
@@ -188,7 +209,7 @@ def axis_bands(
         band = None if coherent is None else _fitted(coherent)
         if coherent is not None and band is None:
             why = f"coherence reaches 0.6 from {hertz_words(coherent)} alone: too narrow for a fit"
-        told = band, coherence, why, largest, highest, coherent
+        told = band, coherence, why, largest, highest, coherent, (command.rate_hz, motion.rate_hz)
         found.append(AxisBand(axis, labels[0], labels[1], slowest, *told))
     return tuple(found)
 

@@ -137,14 +137,14 @@ def _logging(log: Log, found: Inspection) -> list[Finding]:
             )
         ]
     slowest = min(logged, key=lambda band: band.rate_hz)
-    rate, what = slowest.rate_hz, f"{slowest.input} and {slowest.output}"
+    rate, what = slowest.rate_hz, slowest.logged
     reach = f"{rate / 10:.2g} Hz at ten samples a cycle ({rate / 5:.2g} Hz at the very most)"
     if rate < RATE_LEAST.value:
         return [
             Finding(
                 "rate-too-low",
                 Light.RED,
-                f"{what} are logged at {rate:.3g} Hz: no model above {reach}",
+                f"{what}: no model above {reach}",
                 advice.logging(log),
             )
         ]
@@ -153,11 +153,11 @@ def _logging(log: Log, found: Inspection) -> list[Finding]:
             Finding(
                 "rate-limited",
                 Light.AMBER,
-                f"{what} are logged at {rate:.3g} Hz: the model ends at {reach}",
+                f"{what}: the model ends at {reach}",
                 advice.logging(log),
             )
         ]
-    return [Finding("rate-good", Light.GREEN, f"{what} are logged at {rate:.4g} Hz: up to {reach}")]
+    return [Finding("rate-good", Light.GREEN, f"{what}: up to {reach}")]
 
 
 def _excitation(log: Log, found: Inspection, scales: list[Finding]) -> list[Finding]:

@@ -13,6 +13,8 @@ from flightid.responses.windows.defaults import CYCLES_AT_LOWEST, HIGHEST_FRACTI
 
 HIGH_INPUT_COHERENCE = 0.5
 """Coherence between two inputs, averaged over the band, above which conditioning is doubtful."""
+PRINTED = 5e-3
+"""Most that a number to three digits, as bands are written and findings say them, is off by."""
 
 
 def band_findings(
@@ -21,7 +23,7 @@ def band_findings(
     """Frequencies below two cycles in the longest window or above a fifth of the rate."""
     found = []
     lowest = CYCLES_AT_LOWEST * 2.0 * math.pi / longest_s
-    if omega[0] < lowest * (1.0 - 1e-6):
+    if omega[0] < lowest * (1.0 - PRINTED):
         found.append(
             Finding(
                 "below-two-cycles",
@@ -32,7 +34,7 @@ def band_findings(
             )
         )
     highest = HIGHEST_FRACTION * 2.0 * math.pi / sample_time_s
-    if omega[-1] > highest * (1.0 + 1e-6):
+    if omega[-1] > highest * (1.0 + PRINTED):
         found.append(
             Finding(
                 "above-a-fifth-of-the-rate",
