@@ -79,3 +79,32 @@ def test_what_lies_beyond_the_band_is_not_drawn_across_it(desk: Desk, tmp_path: 
     assert any(end < high for _, end in drawn)  # the left of the band is drawn, to its edge
     assert not [each for each in drawn if each[0] > low + 5.0 and each[1] < high - 5.0]
     page.close()
+
+
+def test_what_was_typed_and_not_saved_is_given_back(desk: Desk, tmp_path: Path) -> None:
+    path = SweepFlight(sweep_s=25.0, rate_hz=100.0).write(tmp_path)
+    page = desk.open().page
+    page.set_input_files("input[type=file]", path)
+    page.locator(".cards").wait_for()
+    page.click("nav >> text=Model")
+    page.get_by_role("button", name="Edit", exact=True).click()
+    study = page.get_by_label("Study file, to be written")
+    before = study.input_value()
+    study.press("Control+End")
+    study.press_sequentially("# a thought")
+    page.locator("summary", has_text="A model of your own").click()
+    page.get_by_label("Model file").fill("# half a model")
+    page.click("nav >> text=Verify")
+    page.get_by_text("Typed before, and not saved yet").wait_for()
+    page.reload()
+    assert study.input_value() == f"{before}# a thought"
+    page.click("nav >> text=Model")
+    page.get_by_text("Typed before, and not used yet").wait_for()
+    assert page.get_by_label("Model file").input_value() == "# half a model"
+    page.get_by_role("button", name="Save", exact=True).click()
+    page.locator("pre .changed", has_text="# a thought").wait_for()
+    page.get_by_label("Own model").get_by_role("button", name="Discard").click()
+    page.reload()
+    page.get_by_role("button", name="Edit", exact=True).wait_for()
+    assert page.get_by_text("Typed before").count() == 0
+    page.close()

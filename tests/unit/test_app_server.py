@@ -33,7 +33,7 @@ from flightid.app.guard import POLICY, SANDBOXED, Session
 from flightid.app.jobs import Workers
 from flightid.app.schemas import Job
 from flightid.app.server import make_server
-from flightid.app.serving import bound_socket, server_of
+from flightid.app.serving import bound_again, bound_socket, server_of
 from flightid.app.study_edits import KeyEdit, edited
 from flightid.app.workspace import Workspace
 from flightid.errors import OptionError
@@ -247,6 +247,21 @@ def test_a_log_off_the_list_is_where_it_was_and_comes_back(browser: Browser, flo
     assert "letter.txt holds no table of numbers" in told["error"]
     assert browser.ask("/api/removed", "POST", {"id": "0" * 16, "removed": True})[0] == 404
     assert sorted(each for each in flown.folder.rglob("*.bin")) == held
+
+
+def test_a_folder_has_the_port_that_it_had(tmp_path: Path) -> None:
+    """What was typed and not saved is kept by address: another port lost it."""
+    with bound_again(tmp_path) as bound:
+        port = bound.getsockname()[1]
+        with bound_again(tmp_path) as beside:  # taken: another one
+            other = beside.getsockname()[1]
+    assert other != port
+    with bound_again(tmp_path) as bound:
+        assert bound.getsockname()[1] == other
+    for words in ("no port", "80", "9" * 40, "70000"):
+        (tmp_path / ".flightid" / "port").write_text(words)
+        with bound_again(tmp_path) as bound:
+            assert bound.getsockname()[1] >= 1024
 
 
 def test_requests_that_a_stranger_makes_on_the_wire(browser: Browser, flown: Flown) -> None:

@@ -12,12 +12,15 @@ from pathlib import Path
 import uvicorn
 
 from flightid.app.guard import DOCUMENT_BYTES, Guard, Session
+from flightid.app.own_folders import own_folder, read_plain
 from flightid.app.page import page_files
 from flightid.app.server import make_server
 from flightid.app.workspace import Workspace
 from flightid.errors import OptionError
+from flightid.files import write_atomically
 
 LOOPBACK = "127.0.0.1"
+PORT_BYTES = 16
 
 
 def serve(folder: Path, port: int, *, say: Callable[[str], None], opens: bool) -> None:
@@ -28,7 +31,8 @@ def serve(folder: Path, port: int, *, say: Callable[[str], None], opens: bool) -
     folder : Path
         Workspace.
     port : int
-        0: a free one.
+        0: the one that this folder had before, where it is free: a browser keeps by address what
+        was typed and not saved, layouts and colours. Else any free one.
     say : callable
         Takes the address.
     opens : bool
@@ -41,7 +45,7 @@ def serve(folder: Path, port: int, *, say: Callable[[str], None], opens: bool) -
     """
     page = page_files()
     workspace = Workspace(folder)
-    bound = bound_socket(port)
+    bound = bound_socket(port) if port else bound_again(workspace.folder)
     session = Session(bound.getsockname()[1])
     server = server_of(workspace, page, session)
     say(f"flightid serves {workspace.folder} to this machine alone; Ctrl-C ends it.")
@@ -67,6 +71,27 @@ def server_of(
         timeout_graceful_shutdown=3,
     )
     return uvicorn.Server(config)
+
+
+def bound_again(folder: Path) -> socket.socket:
+    """A socket on the loopback, of the port that the page of a folder had before if it is free.
+
+    Raises
+    ------
+    OptionError
+        No port is free, or the folder that the page keeps for itself is a link.
+    """
+    note = own_folder(folder, ".flightid") / "port"
+    try:
+        known = int(read_plain(note, PORT_BYTES))
+    except (OSError, ValueError):
+        known = 0
+    try:
+        bound = bound_socket(known if 1024 <= known <= 65535 else 0)
+    except OptionError:
+        bound = bound_socket(0)
+    write_atomically(note, str(bound.getsockname()[1]))
+    return bound
 
 
 def bound_socket(port: int) -> socket.socket:

@@ -15,7 +15,9 @@ from flightid.cli.output import note
     default=".",
     type=click.Path(exists=True, file_okay=False, path_type=Path),
 )
-@click.option("--port", type=click.IntRange(0, 65535), default=0, help="Default: a free one.")
+@click.option(
+    "--port", type=click.IntRange(0, 65535), default=0, help="Default: that of before, if free."
+)
 @click.option("--no-browser", is_flag=True, help="Print the address and open nothing.")
 def command(folder: Path, port: int, no_browser: bool) -> None:
     """Open the local page on FOLDER, whose logs it lists; Ctrl-C ends it.
