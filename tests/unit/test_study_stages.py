@@ -336,6 +336,15 @@ def test_margins_below_what_is_asked_and_columns_left_out_are_told() -> None:
     said = gains_finding(tuning, "study.toml").message  # type: ignore[arg-type]
     assert "at least 44°" in said, "44.6 are not 45"
     assert said.endswith("(98.4 % of them or more keep 45° and all else asked)")
+    # "none to fly, they stay as flown: pitch" was read of roll, whose gains were written.
+    for left, kept in (
+        ({"pitch": "red"}, "pitch stays as flown: red"),
+        ({"pitch": "red", "yaw": "narrow"}, "pitch, yaw stay as flown: pitch: red; yaw: narrow"),
+    ):
+        parted = SimpleNamespace(**{**vars(tuning), "left_out": left})
+        said = gains_finding(parted, "study.toml").message  # type: ignore[arg-type]
+        assert said.startswith("gains of roll keep at least 44°"), said
+        assert said.endswith(f", and are to be flown; {kept}"), said
     way = gains_finding(tuning, "study.toml").action  # type: ignore[arg-type]
     assert way.startswith("flightid tune study.toml --write gains.params writes them")
     done = gains_finding(tuning, "study.toml", ["g-1.params"], "out").action  # type: ignore[arg-type]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING
@@ -39,7 +39,7 @@ def gains_finding(
     `gains_file` is what the reader calls the file of gains, where it is not the usual name.
     """
     designs, findings = tuning.sound, tuning.findings
-    left = "; ".join(f"{axis}: {why}" for axis, why in tuning.left_out.items())
+    left = _each_left(tuning.left_out)
     red = next((each for each in findings if each.light is Light.RED), None)
     if not designs:
         action = red.action if red else "relax what cannot be met, or identify better"
@@ -83,10 +83,24 @@ def gains_finding(
             f" ({at_least(100.0 * share, 1)} % of them or more keep {asked:g}° and all else asked)"
         )
     if left:
-        message += f"; none to fly, they stay as flown: {left}"
+        message += _kept(tuning.left_out, plain=plain)
     else:
         message += _doubt(tuning, light)
     return Finding("gains", light, message, way)
+
+
+def _each_left(left: Mapping[str, str]) -> str:
+    return "; ".join(f"{axis}: {why}" for axis, why in left.items())
+
+
+def _kept(left: Mapping[str, str], *, plain: bool) -> str:
+    """What becomes of the other axes, whose reasons speak of none of the gains that are made."""
+    if plain:
+        return f"; none are made of {_each_left(left)}"
+    if len(left) == 1:
+        ((axis, why),) = left.items()
+        return f", and are to be flown; {axis} stays as flown: {why}"
+    return f", and are to be flown; {', '.join(left)} stay as flown: {_each_left(left)}"
 
 
 def _moves(designs: Iterable[PidDesign]) -> str:
