@@ -97,6 +97,24 @@ def test_what_a_user_wrote_is_no_option() -> None:
     assert as_key("'gyro=rate', declare hold='zero'") == "'gyro=rate', declare hold = \"zero\""
 
 
+def test_keys_of_a_study_are_options_where_records_are_given() -> None:
+    """``declare --time-unit = "ms"`` was printed of a run of records: typed, it fails."""
+    command = program.get_command(click.Context(program), "run")
+    assert command is not None
+    command.get_params(click.Context(command))
+    key = 'declare time_unit = "ms", or units = { t = "ms" }; kind = "own"'
+    context = click.Context(command, parent=click.Context(program))
+    place = next(each.name for each in command.params if isinstance(each, click.Argument))
+    assert place is not None
+    for name, said in (
+        ("rig.csv", 'declare --time-unit ms, or --units t=ms; kind = "own"'),
+        ("study.toml", key),
+    ):
+        context.params = {place: (Path(name),)}
+        with context:
+            assert as_typed(key) == said
+
+
 def test_each_surface_has_its_spelling() -> None:
     text = "declare hold='zero' and covariance=False"
     assert as_key(text) == 'declare hold = "zero" and covariance = false'

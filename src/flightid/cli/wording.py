@@ -13,7 +13,12 @@ import click
 from flightid.cli.option_fields import NONE, OptionsCommand
 from flightid.surface import ANY, GIVEN, PAIR, held_in, replaced
 
-NAME = re.compile(r"(?<![\w.\-/\[])[a-z][a-z0-9]*(?:_[a-z0-9]+)+(?![\w(=.])")
+NAME = re.compile(r"(?<![\w.\-/\[])[a-z][a-z0-9]*(?:_[a-z0-9]+)+(?![\w(=.])(?! = )")
+KEYED = re.compile(
+    r"(?<![\w.\-\[])(?P<name>[a-z][a-z0-9_]*) = "
+    r"(?:(?P<yes>true\b)|\"(?P<word>[^\"\s]+)\"|\{ (?P<key>[^\s=]+) = \"(?P<own>[^\"]*)\" \})"
+)
+"""An option as the key of a study has it, which what a study found says."""
 VERB = re.compile(r"\b(?:flightid|fid)\.([a-z_]+)\b(?:\([^)]*\))?")
 
 
@@ -32,6 +37,8 @@ def as_typed(text: str) -> str:
     known, program = _flags(here.command), here.find_root().command
     text = held_in(text, "the model's file")
     made = replaced(GIVEN, lambda found: _given(found, known, program), text)
+    if not _is_of_study(here):
+        made = KEYED.sub(lambda found: _keyed(found, known), made)
     made = replaced(NAME, lambda found: known.get(found[0], [found[0]])[-1], made)
     return _reachable(VERB.sub(lambda found: _verb(found, program), made), here)
 
@@ -66,6 +73,28 @@ def _given(found: re.Match[str], known: dict[str, list[str]], program: click.Com
         return f"{told[-1]} {pair['key']}={pair['value']}{of}"
     plain = NONE if value == "None" else value.strip("'\"")
     return f"{told[-1]} {plain if ' ' not in plain else repr(plain)}{of}"
+
+
+def _is_of_study(here: click.Context) -> bool:
+    """Whether a file of keys was given: there keys are what the reader writes."""
+    given = [here.params.get(each.name or "") for each in here.command.params if _is_place(each)]
+    several = [each if isinstance(each, tuple) else (each,) for each in given]
+    return any(isinstance(e, Path) and e.suffix == ".toml" for each in several for e in each)
+
+
+def _is_place(parameter: click.Parameter) -> bool:
+    return isinstance(parameter, click.Argument)
+
+
+def _keyed(found: re.Match[str], known: dict[str, list[str]]) -> str:
+    """A key as an option of this command; as it is where the command has none of its name."""
+    told = [flag for flag in known.get(found["name"], ()) if not flag.startswith("--no-")]
+    if not told:
+        return found[0]
+    if found["yes"]:
+        return told[-1]
+    word = found["word"]
+    return f"{told[-1]} {word}" if word else f"{told[-1]} {found['key']}={found['own']}"
 
 
 def _verb(found: re.Match[str], program: click.Command) -> str:
