@@ -82,6 +82,23 @@ def test_it_is_taken_where_it_runs_better_beyond_chance(
     assert again.said.startswith("NARX not taken")
 
 
+def test_none_is_tried_along_a_loop_and_one_that_answers_at_once_is_red() -> None:
+    """Bent residuals of a loop asked for NARX models, which found the controller turned round."""
+    scans = Scans(0.6)
+    scans.records = [each.declare(loop="closed") for each in scans.records]
+    scan = fid.scan_orders(*scans.records, kind="arx", na=2, nb=2, nk=range(2))
+    found = nonlinear_choice(scans, scan.best, scan.trials[0], 0, scan.settle_s)
+    assert found is not None
+    assert (found.trial, found.is_better, found.lines) == (None, False, [])
+    assert found.said.startswith("NARX not tried (")
+    assert found.said.endswith("loop closed, as declared")
+    for delay, light in ((0, "red"), (1, "amber")):
+        asked = fid.NarxStructure(("u",), "y", 2, 2, delay, kernel=None, degree=2)
+        loop = fid.identify(asked, scans.records[0]).evidence.check("loop")
+        assert loop is not None
+        assert loop.light == light, loop
+
+
 def test_a_narx_model_gives_no_gains_and_says_what_would() -> None:
     scans = Scans(0.6)
     asked = fid.NarxStructure(("u",), "y", 2, 2, kernel=None, degree=2, focus="simulation")

@@ -277,7 +277,8 @@ def _promised(**fits: float) -> SimpleNamespace:
     """A model of one run that no fit has seen, by how well each channel is predicted there."""
     verdict = Finding("evidence", Light.GREEN, "holds")
     fit = SimpleNamespace(
-        evidence=SimpleNamespace(verdict=verdict), average_cost=1.0, covariance=np.eye(1),
+        evidence=SimpleNamespace(verdict=verdict, check={}.get), average_cost=1.0,
+        covariance=np.eye(1),
         responses=(), model=SimpleNamespace(inputs=("u",), outputs=("y",)),
     )  # fmt: skip
     run = SimpleNamespace(fit_percent=fits)
@@ -317,6 +318,37 @@ def test_what_was_left_out_is_no_model_to_use() -> None:
     said = _models(study, "study.toml").message  # type: ignore[arg-type]
     assert said.startswith("1 of 2 models to use: it predicts 93 %"), said
     assert said.endswith("none of p/da, for the reason that is named")
+
+
+@pytest.mark.parametrize(
+    ("light", "covariance", "is_held"),
+    [
+        (Light.UNKNOWN, np.eye(1), True),
+        (Light.AMBER, None, True),
+        (Light.AMBER, np.eye(1), False),
+        (Light.GREEN, None, False),
+    ],
+    ids=["unknown", "closed, no bars", "closed, in its bars", "open"],
+)
+def test_no_kind_of_model_is_to_use_in_a_loop_that_may_bias_it(
+    light: Light, covariance: object, *, is_held: bool
+) -> None:
+    """A controller turned round was "1 of 2 models to use: it predicts 98.1 %" of its own loop."""
+    looped, free = _promised(p=98.1), _promised(p=60.0)
+    loop = Check("loop", light, "whether a loop is closed cannot be told", "declare it")
+    looped.name, looped.fit.covariance = "Turned", covariance
+    looped.fit.evidence.check = {"loop": loop}.get
+    study = SimpleNamespace(identified=[looped], faults=(), files=(), tuning=None, inspection=None)
+    said = _models(study, "study.toml")  # type: ignore[arg-type]
+    held = "not to be used, for the loop: Turned: whether a loop is closed cannot be told"
+    if not is_held:
+        assert said.message.startswith("1 model to use: it predicts 98.1 %")
+        return
+    assert (said.message, said.action) == (held, "declare it")
+    study.identified.append(free)
+    both = _models(study, "study.toml").message  # type: ignore[arg-type]
+    assert both.startswith("1 of 2 models to use: it predicts 60 %"), both
+    assert both.endswith(f"; {held}")
 
 
 def test_margins_below_what_is_asked_and_columns_left_out_are_told() -> None:
@@ -469,8 +501,9 @@ def test_the_answer_says_nothing_twice() -> None:
     do = "declare loop = open"
     verdict = Finding("evidence", Light.RED, "whether a loop is closed cannot be told", do)
     fit = SimpleNamespace(
-        evidence=SimpleNamespace(verdict=verdict), average_cost=1.0, covariance=None, details=None
-    )
+        evidence=SimpleNamespace(verdict=verdict, check={}.get), average_cost=1.0,
+        covariance=None, details=None,
+    )  # fmt: skip
     item = SimpleNamespace(
         name="p", fit=fit, findings=(), on_unseen={}, settings=SimpleNamespace(structure=None)
     )

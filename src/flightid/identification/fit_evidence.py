@@ -22,6 +22,7 @@ from flightid.identification.prediction.request import FREE_RUN, Request
 from flightid.identification.records.options import ESTIMATE
 from flightid.models import StateSpaceModel
 from flightid.models.innovations.model import InnovationsModel
+from flightid.models.narx.model import NarxModel
 from flightid.models.parameters import Parameters
 from flightid.models.polynomial.model import PolynomialModel
 from flightid.record.hold import Loop
@@ -109,6 +110,8 @@ def _at_once(model: object) -> tuple[str, ...]:
     """Inputs of a sampled model that its outputs answer within the same sample."""
     if isinstance(model, PolynomialModel):
         return tuple(name for name, k in zip(model.inputs, model.nk, strict=True) if k == 0)
+    if isinstance(model, NarxModel):
+        return tuple(dict.fromkeys(lag.channel for lag in model.structure.lags if lag.lag == 0))
     if isinstance(model, InnovationsModel):
         return tuple(np.asarray(model.inputs)[np.any(model.d != 0.0, axis=0)].tolist())
     return ()

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from flightid.conventions import Light
 from flightid.errors import FlightidError
-from flightid.evidence.evidence import GUIDELINES, PREDICTION
+from flightid.evidence.evidence import GUIDELINES, LOOP, PREDICTION, Check
 from flightid.findings import Finding, counted, said_once, worst
 from flightid.frozen import dataclass
 from flightid.models import NarxModel
@@ -184,20 +184,44 @@ def _models(study: StudyResults, source: str) -> Finding:
     light = worst(lights)
     pairs = list(zip(lights, study.identified, strict=True))
     none = [item.name for each, item in pairs if item.fit is None and each.light is not Light.RED]
-    good = [item for each, item in pairs if each.light is not Light.RED and item.fit is not None]
+    sound = [item for each, item in pairs if each.light is not Light.RED and item.fit is not None]
+    looped = [(check, item) for item in sound if (check := _doubted_loop(item.fit)) is not None]
+    held = [item for _, item in looped]
+    good = [item for item in sound if item not in held]
     bad = [(each, item) for each, item in pairs if each.light is Light.RED]
     several = f"{len(good)} of {counted(len(pairs), 'model')}"
-    said = f"{several if bad or none else counted(len(good), 'model')} to use" if good else ""
+    whole = not (bad or none or held)
+    said = f"{counted(len(good), 'model') if whole else several} to use" if good else ""
     said += _promise(good)
     if any(each.light is Light.AMBER for each in lights):
         said += "; what is to be doubted is said of each" if good else ""
     if none:
         said += f"{'; ' if said else ''}none of {', '.join(none)}, for the reason that is named"
+    for what in dict.fromkeys(check.what for check, _ in looped):
+        names = ", ".join(item.name for check, item in looped if check.what == what)
+        said += f"{'; ' if said else ''}not to be used, for the loop: {names}: {what}"
     if bad:
         why = f"not to be used, for what is said of {'it' if len(bad) == 1 else 'each'}"
         said += f"{'; ' if said else ''}{why}: {', '.join(item.name for _, item in bad)}"
-    action = _next(study, source, good) if good else bad[0][0].action
+    if good:
+        action = _next(study, source, good)
+    else:
+        action = looped[0][0].action if looped else bad[0][0].action
     return Finding("answer", light, said, action)
+
+
+def _doubted_loop(fit: Fit | None) -> Check | None:
+    """What evidence says of a loop that no kind of model is to be used in; None elsewhere.
+
+    Along a loop a model may be the controller turned round, and predicts unseen records of the same
+    loop all the same. That a loop is closed alone leaves a model whose bars hold what it biases.
+    """
+    loop = None if fit is None else fit.evidence.check(LOOP)
+    if fit is None or loop is None:
+        return None
+    if loop.light is Light.UNKNOWN:
+        return loop
+    return loop if loop.light is Light.AMBER and fit.covariance is None else None
 
 
 def _promise(items: Sequence[ModelResults]) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError
+from flightid.evidence.feedback import loop_seen
 from flightid.frozen import dataclass
 from flightid.identification import Fit
 from flightid.models import NarxStructure
@@ -97,7 +98,7 @@ def nonlinear_choice(
     Returns
     -------
     NonlinearChoice or None
-        None where nothing asks for it, or it would take minutes.
+        None where nothing asks for it, or it would take minutes. None is tried in a closed loop.
     """
     try:
         why = what_inputs_foretell(linear)
@@ -107,7 +108,12 @@ def nonlinear_choice(
     if why is None:
         return None
     (output,), inputs = linear.model.outputs, tuple(linear.model.inputs)
-    n_samples = scans.flown(output, inputs).n_samples
+    flown = scans.flown(output, inputs)
+    loop = loop_seen((flown,), inputs, (output,))
+    if loop.is_closed:
+        # What outputs move of the inputs foretells them as well as a bent vehicle would.
+        return NonlinearChoice(None, False, f"NARX not tried ({why}): {loop}")
+    n_samples = flown.n_samples
     asked = [*_structures(inputs, output, delay, n_samples)]
     if not asked:
         return None
