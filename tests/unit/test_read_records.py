@@ -109,6 +109,28 @@ def test_jittered_stamps_need_a_stated_grid(tmp_path: Path) -> None:
     assert record.history[-1].operation == "conditioning.to_uniform"
 
 
+@pytest.mark.parametrize(
+    ("scale", "said"),
+    [
+        (1.0, "read, resample_to_s=0.02, or by"),
+        (1e3, "resample_to_s=0.02 time_unit='ms' where stamps are in ms (20 s"),
+        (1e6, "resample_to_s=0.02 time_unit='us' where stamps are in us (20000 s"),
+    ],
+)
+def test_jittered_milliseconds_are_asked_about(tmp_path: Path, scale: float, said: str) -> None:
+    """Stamps 20 ms apart with jitter were to be resampled to a base of 20 s."""
+    stamps = np.arange(200) / 50 + np.random.default_rng(1).uniform(-2e-3, 2e-3, 200)
+    rows = "\n".join(f"{scale * t!r},{k % 7}" for k, t in enumerate(stamps.tolist()))
+    path = _csv(tmp_path, f"time,p\n{rows}")
+    with pytest.raises(DataError) as refused:
+        read_records(path, outputs=["p"])
+    assert said in str(refused.value)
+    if scale > 1.0:
+        unit = "ms" if scale < 1e6 else "us"
+        (record,) = read_records(path, outputs=["p"], resample_to_s=0.02, time_unit=unit)
+        assert record.sample_time_s == 0.02
+
+
 def _staircase(folder: Path) -> Path:
     """A PRBS of steps each half second with its ramp, logged at stamps that jitter, in ms."""
     random = np.random.default_rng(3)

@@ -16,6 +16,10 @@ GAP_FACTOR = 2.5
 UNIFORM_TOLERANCE = 1e-3
 """Largest departure from a uniform grid, in sample times, that counts as rounding of stamps."""
 
+SLOWEST_S = 1.0
+"""Samples further apart are rare in dynamics, and usual in files whose time is in ms."""
+IN_MS_S = 1000.0
+"""Whole numbers further apart than this look like microseconds rather than milliseconds."""
 WALK = 0.25
 """Part of a sample time by which a rounded grid may walk off the stamps over a record."""
 
@@ -39,6 +43,17 @@ def rounded_step_s(stamps: NDArray[np.float64]) -> float:
     step = mean_spacing_s(stamps)
     rounded = (float(f"{step:.{digits}g}") for digits in range(1, 10))
     return next((each for each in rounded if abs(each - step) * stamps.size <= WALK * step), step)
+
+
+def finer_unit(step_s: float) -> tuple[str, float]:
+    """The unit that stamps so far apart are likely in, were they not seconds, and its length, s.
+
+    Example
+    -------
+    >>> finer_unit(20.0), finer_unit(20_000.0)
+    (('ms', 0.001), ('us', 1e-06))
+    """
+    return ("ms", 1e-3) if step_s < IN_MS_S else ("us", 1e-6)
 
 
 class StampPolicy(StrEnum):

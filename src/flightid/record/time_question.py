@@ -5,15 +5,12 @@ from __future__ import annotations
 from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.record.record import Record
+from flightid.record.stamps import SLOWEST_S, finer_unit
 from flightid.record.time_columns import USUAL
 
 READ = "read_records"
-SLOWEST_S = 1.0
-"""Samples further apart are rare in dynamics, and usual in files whose time is in ms."""
 SLOW_S, LONG_S = 0.1, 600.0
 """Samples as far apart as this over so long a record are asked about too: 2 kHz in ms has 0.5."""
-IN_MS_S = 1000.0
-"""Whole numbers further apart than this look like microseconds rather than milliseconds."""
 
 
 def time_column(record: Record) -> str:
@@ -77,7 +74,7 @@ def slow_stamps(file: str, column: str, spacing_s: float, length_s: float) -> Fi
     """
     if spacing_s < (SLOW_S if length_s >= LONG_S else SLOWEST_S):
         return None
-    guess = "ms" if spacing_s < IN_MS_S else "us"
+    guess, _ = finer_unit(spacing_s)
     return Finding(
         "time-unit-not-stated",
         Light.AMBER,

@@ -10,7 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 from flightid.conventions import Role
 from flightid.errors import DataError, OptionError, ShapeError, UnknownNameError
 from flightid.record.channel import Channel
-from flightid.record.stamps import UNIFORM_TOLERANCE, rounded_step_s
+from flightid.record.stamps import (
+    SLOWEST_S,
+    UNIFORM_TOLERANCE,
+    finer_unit,
+    rounded_step_s,
+)
 from flightid.units import DIMENSIONLESS
 
 REPEATING = 0.5
@@ -164,7 +169,17 @@ def uniform_sample_time(time_s: NDArray[np.float64]) -> float:
             found=f"a stamp {100 * worst:.3g} % of a sample time off the grid",
             needed=f"at most {100 * UNIFORM_TOLERANCE:g} %",
             action="bring the channels to one time base where they are read, "
-            f"resample_to_s={f'{step:.9g}' if step > 0 else '…'}, or by conditioning.to_uniform "
-            "in Python",
+            f"{_one_base(step)}, or by conditioning.to_uniform in Python",
         )
     return sample_time_s
+
+
+def _one_base(step_s: float) -> str:
+    """The option that brings stamps so far apart to one base; seconds are rare, and asked about."""
+    as_they_are = f"resample_to_s={f'{step_s:.9g}' if step_s > 0 else '…'}"
+    if step_s < SLOWEST_S:
+        return as_they_are
+    unit, length_s = finer_unit(step_s)
+    finer = f"resample_to_s={step_s * length_s:.9g} time_unit={unit!r}"
+    rare = f"where stamps are in {unit} ({step_s:.6g} s between rows are rare)"
+    return f"{finer} {rare}, else {as_they_are}"
