@@ -356,6 +356,21 @@ def test_a_folder_for_gains_is_asked_for_before_the_work(
     assert not (tmp_path / "rig-study.toml").exists()
 
 
+@pytest.mark.parametrize("taken", ["gains.toml", "gains-1.toml"])
+def test_files_of_gains_are_not_replaced_after_the_work(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], taken: str
+) -> None:
+    """The whole run went by, and its answer with it: the file was refused at the end."""
+    (tmp_path / taken).write_text("# of another day")
+    target = str(tmp_path / "gains.toml")
+    assert run(["tune", str(_rig(tmp_path)), "--controller", "pi", "--write", target]) == 2
+    said = capsys.readouterr().err
+    assert "there already" in said
+    assert f"found {tmp_path / taken}" in said
+    assert "or --overwrite" in said
+    assert not (tmp_path / "rig-study.toml").exists()
+
+
 def test_an_injected_channel_is_the_instrument_of_a_closed_loop(tmp_path: Path) -> None:
     """SciPy's loop: direct fits of it are biased, the injected signal finds it again."""
     random, rate_hz, n = np.random.default_rng(5), 50.0, 6000

@@ -21,6 +21,7 @@ from flightid.cli.output import (
 )
 from flightid.cli.proposals import is_study, of_data, show_answer, taken_study
 from flightid.cli.records import FILES
+from flightid.errors import OptionError
 
 if TYPE_CHECKING:
     from flightid.control.tuning.result import Tuning
@@ -118,6 +119,7 @@ def command(
 
     if target is not None and not target.parent.is_dir():
         raise click.UsageError(f"--write: there is no folder {target.parent}: make it first")
+    _require_free(target, overwrite)
     study = None
     *parts, data = parted(options, _fields())
     asked = {name: each for part in parts for name, each in part.items()}
@@ -167,6 +169,20 @@ def command(
     if study is not None and not as_json:
         show_answer(study, written)
     leave_by_verdict(tuning.findings)
+
+
+def _require_free(target: Path | None, overwrite: bool) -> None:
+    """Refuse to replace files of gains before minutes go by, rather than after."""
+    if target is None or overwrite:
+        return
+    first = target.with_name(f"{target.stem}-1{target.suffix}")
+    taken = next((each for each in (target, first) if each.exists()), None)
+    if taken is not None:
+        raise OptionError(
+            "a file of gains is there already",
+            found=str(taken),
+            needed="another name, or overwrite=True",
+        )
 
 
 def _write(tuning: Tuning, target: Path, overwrite: bool, *, accept_red: bool) -> Sequence[Path]:
