@@ -22,6 +22,8 @@ BENT = 0.02
 HALVINGS = 4
 MOST_POINTS = 250
 MOST_RELATIVE = 1e6
+LARGEST = float(np.log(np.finfo(float).max)) - 1.0
+"""Logarithm of a variance that is as good as none told."""
 SURER = 1.5
 """How many times as sure as the bins beside a frequency a pilot may be: windows are 1 to 1.2 times.
 
@@ -177,8 +179,7 @@ def _errors(
             known *= _widened(pilot)
             if least is not None:
                 needed = np.tile(least[row, group].ravel(), 2)
-                longer = np.sqrt(np.maximum(needed / np.diag(known), 1.0))
-                longer = np.minimum(longer, MOST_RELATIVE)
+                longer = _longer(needed, np.diag(known))
                 known *= np.outer(longer, longer)
             found.append(known)
     return np.stack(found).reshape(len(groups), len(pilots), *found[0].shape)
@@ -200,8 +201,17 @@ def _least_variances(
     alone = linear.local_spread()
     if alone is None:
         return None
-    ends = np.exp(np.log(np.minimum(alone, np.finfo(float).max)) @ spread)
-    return np.asarray(0.5 * noise.at(omega)[:, None] * ends / SURER**2)
+    # In logarithms: nothing told, times noise of an output that runs away, is beyond all numbers.
+    ends = np.log(np.minimum(alone, np.finfo(float).max)) @ spread
+    made = np.log(np.maximum(noise.at(omega), np.finfo(float).tiny))[:, None]
+    return np.asarray(np.exp(np.minimum(made + ends + np.log(0.5 / SURER**2), LARGEST)))
+
+
+def _longer(needed: Real, known: Real) -> Real:
+    """How many times as long errors become where variances are to be as large as is needed."""
+    most = np.minimum(needed, MOST_RELATIVE**2 * known)
+    ratio = np.divide(most, known, out=np.ones_like(known), where=known > 0.0)
+    return np.asarray(np.sqrt(np.maximum(ratio, 1.0)))
 
 
 def _widened(pilot: Pilot) -> float:
