@@ -7,12 +7,12 @@ from dataclasses import field, replace
 from functools import cached_property
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from flightid.errors import DataError, OptionError
 from flightid.frozen import dataclass
 from flightid.identification.advice.delays import InputDelay, find_delays
+from flightid.identification.advice.vanishing_tail import vanishes
 from flightid.identification.prediction_error.kernel_regression import kernel_estimate
 from flightid.identification.prediction_error.linear_regression import (
     LinearRegression,
@@ -30,15 +30,10 @@ from flightid.table import Column, Table
 from flightid.uncertainty.quantiles import half_width
 
 Array = NDArray[np.float64]
-LEVEL = 0.95
 WHITENER = 20
 SAMPLES_PER_COEFFICIENT = 3
 LAST = 4
 """One over the share of the lags, at their end, that has to be zero."""
-SMOOTH = 2
-"""Powers of the lag, from zero, that a slow tail is tested for."""
-SHORTEST_PERIODOGRAM = 8
-"""Fewer lags hold no period that mean and slope would miss."""
 OUTLASTS = (
     "the response outlasts {} lags, the most that the records allow, which bends all of them: no "
     "intervals; give longer records, or fit a model with poles (output error)"
@@ -291,10 +286,10 @@ def _until_ended(
         parts = [slice(i * n, (i + 1) * n) for i in range(count)]
         tails = [(found[0][part], found[1][part, part]) for part in parts]
         # Of so many lags a sum of squares knows its noise too little: tails of a shape are told.
-        if ended and all(_vanishes(*tail, ended, count, each=False) for tail in tails):
+        if ended and all(vanishes(*tail, ended, count, each=False) for tail in tails):
             assert before is not None
             return ended, before, True
-        ends = all(_vanishes(*tail, n - max(n // LAST, 1), count) for tail in tails)
+        ends = all(vanishes(*tail, n - max(n // LAST, 1), count) for tail in tails)
         if ends and not doubled:
             return n, found, True
         longer, doubled = 2 * n, True
@@ -311,40 +306,6 @@ def _until_ended(
 
 def _lagged(data: SampledChannels, n: int) -> LinearRegression:
     return regress_lags(data.output, data.inputs, data.lengths, n, n - 1, levels=data.levels)
-
-
-def _vanishes(
-    values: Array, covariance: Array, start: int, count: int, *, each: bool = True
-) -> bool:
-    """Whether chance explains the lags from `start` on: `each`, as a slow tail, as a mode.
-
-    All lags together have no power against a tail that is small everywhere, of one sign or ringing;
-    contrasts have (Scheffé, *The Analysis of Variance*, section 3.5): mean and slope, and cosine
-    and sine of the frequency that is strongest in as many lags before, where faster modes have
-    died. Each test has its part of the level.
-    """
-    tail, spread = values[start:], covariance[start:, start:]
-    last = tail.size
-    smooth = np.vander(np.linspace(-1.0, 1.0, last), min(SMOOTH, last))
-    contrasts = [np.eye(last), smooth] if each else [smooth]
-    if last >= SHORTEST_PERIODOGRAM:
-        angles = _strongest(values[max(start - last, 0) : start]) * np.arange(last)
-        contrasts.append(np.column_stack([np.cos(angles), np.sin(angles)]))
-    level = (1.0 - LEVEL) / (len(contrasts) * count)
-    return all(_chance(row.T @ tail, row.T @ spread @ row) >= level for row in contrasts)
-
-
-def _strongest(values: Array) -> float:
-    """Frequency of the largest ordinate of the periodogram but the mean's, in rad a sample."""
-    padded = 4 * values.size
-    power = np.abs(np.fft.rfft(values - values.mean(), padded)) ** 2
-    return 2.0 * np.pi * int(np.argmax(power)) / padded
-
-
-def _chance(values: Array, covariance: Array) -> float:
-    """Probability of values as large, if they are zero."""
-    inverse = np.linalg.pinv(covariance, hermitian=True)
-    return float(scipy.special.chdtrc(values.size, float(values @ inverse @ values)))
 
 
 def _require(names: tuple[str, ...], n_lags: int, negative_lags: int, kernel: str | None) -> None:
