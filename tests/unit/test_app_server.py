@@ -12,7 +12,7 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import AsyncIterator, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -247,6 +247,24 @@ def test_a_log_off_the_list_is_where_it_was_and_comes_back(browser: Browser, flo
     assert "letter.txt holds no table of numbers" in told["error"]
     assert browser.ask("/api/removed", "POST", {"id": "0" * 16, "removed": True})[0] == 404
     assert sorted(each for each in flown.folder.rglob("*.bin")) == held
+
+
+def test_a_log_keeps_its_date(tmp_path: Path) -> None:
+    """The list said of a dropped log when it was dropped, as the date of the file."""
+    body = SweepFlight(sweep_s=2.0, rate_hz=50.0).write(tmp_path).read_bytes()
+
+    async def pieces() -> AsyncIterator[bytes]:
+        yield body
+
+    was = 1_600_000_000_000
+    for modified_ms, kept in ((was, True), (0, False), (10 * was, False)):
+        (tmp_path / str(modified_ms)).mkdir()
+        workspace = Workspace(tmp_path / str(modified_ms))
+        asyncio.run(workspace.take("old.bin", pieces(), modified_ms))
+        (entry,) = workspace.index.entries()
+        assert (entry.mtime_ns == was * 1_000_000) == kept
+        assert kept or entry.mtime_ns > was * 1_000_000
+        workspace.index.close()
 
 
 def test_a_folder_has_the_port_that_it_had(tmp_path: Path) -> None:

@@ -72,7 +72,7 @@ export const step = (log: string, etag: string, back: boolean) =>
 
 /** Send a file as it lies on the disk; `seen` hears how much of it has gone. */
 export const upload = (file: File, seen: (share: number) => void) =>
-  put<LogItem>(`/api/logs?name=${encodeURIComponent(file.name)}`, file, seen);
+  put<LogItem>(`/api/logs?name=${encodeURIComponent(file.name)}&modified_ms=${file.lastModified}`, file, seen);
 /** The same for a file of columns; `rig` names the set that it joins. */
 export const uploadRecords = (file: File, rig: string, seen: (share: number) => void) =>
   put<RigItem>(`/api/records?name=${encodeURIComponent(file.name)}&rig=${rig}`, file, seen);

@@ -22,6 +22,8 @@ from flightid.version import VERSION
 
 MOST_LOOKED_AT = 200
 """Logs that a listing has inspected, one after the other; others when they are opened."""
+LATEST_MS = 253_370_764_800_000
+"""First instant of the year 9999: no file is younger."""
 OF_FLIGHT = ("overview", "review")
 """Jobs that the screen of a flight needs."""
 
@@ -41,11 +43,15 @@ def add_log_routes(app: FastAPI, backstage: Backstage) -> None:
         return made
 
     @app.put("/api/logs")
-    async def upload(request: Request, name: Annotated[str, Query(max_length=300)]) -> LogItem:
+    async def upload(
+        request: Request,
+        name: Annotated[str, Query(max_length=300)],
+        modified_ms: Annotated[int, Query(ge=0, le=LATEST_MS)] = 0,
+    ) -> LogItem:
         length = int(request.headers.get("content-length", 0))
         if length > UPLOAD_BYTES:
             raise HTTPException(413)
-        log = await workspace.take(name, request.stream())
+        log = await workspace.take(name, request.stream(), modified_ms)
         await asyncio.to_thread(removed.put_back, log)
         path = known_log(workspace, log)
         workers.ensure("overview", log, path)

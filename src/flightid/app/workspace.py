@@ -11,8 +11,10 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import re
 import shutil
+import time
 from collections.abc import AsyncIterator, Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -117,7 +119,7 @@ class Workspace:
                     return path
         return None
 
-    async def take(self, name: str, chunks: AsyncIterator[bytes]) -> str:
+    async def take(self, name: str, chunks: AsyncIterator[bytes], modified_ms: int = 0) -> str:
         """Write a log that comes in pieces, and return its hash.
 
         Parameters
@@ -125,6 +127,9 @@ class Workspace:
         name : str
             As the page calls it; of a path the last part alone is taken.
         chunks : async iterator of bytes
+        modified_ms : int
+            When the file that is sent was changed last, ms since 1970, so that it keeps its date;
+            0 where nobody knows: that of now.
 
         Raises
         ------
@@ -145,6 +150,8 @@ class Workspace:
                     found=plain,
                     needed="a log of ArduPilot, PX4, Betaflight or INAV",
                 )
+            if 0 < modified_ms < 1000 * time.time():
+                os.utime(temporary, ns=(modified_ms * 1_000_000,) * 2)
             flush(temporary)
             return self._keep(temporary, digest.hexdigest()[:16], plain)
 
