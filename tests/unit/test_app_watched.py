@@ -109,6 +109,37 @@ def test_work_on_a_newer_version_takes_the_place_of_the_older(
     assert not list((tmp_path / ".flightid" / "progress").iterdir())
 
 
+@pytest.mark.slow
+def test_plants_outlive_work_that_is_silent_when_it_is_asked_to_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A second move of a slider ended the first one's work, and with its process all plants."""
+    place = tmp_path / "pids"
+    monkeypatch.setitem(jobs.WORK, "gains", lambda *_: (silent, place))
+    monkeypatch.setattr(jobs, "END_S", 0.1)
+
+    async def asked() -> None:
+        workers = Workers(Workspace(tmp_path))
+        workers.start()
+        for move in range(1, 4):
+            workers.ensure("gains", LOG, tmp_path, of=str(move))
+            await _until(lambda n=move: place.is_file() and len(place.read_text().split()) == n)
+        await asyncio.to_thread(workers.stop)
+
+    asyncio.run(asked())
+    assert len(set(place.read_text().split())) == 1, "one process did all"
+
+
+def silent(place: Path) -> None:
+    with place.open("a") as stream:
+        stream.write(f"{os.getpid()}\n")
+    time.sleep(1.0)
+    with progress(1000, "silent") as advance:
+        for _ in range(1000):
+            advance()
+            time.sleep(0.01)
+
+
 def slow(place: Path) -> None:
     with place.open("a") as stream:
         stream.write(f"{os.getpid()}\n")

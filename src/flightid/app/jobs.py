@@ -39,6 +39,8 @@ PATIENCE_S = 60.0
 NOTE_BYTES = 1 << 16
 LOOK_S, END_S = 0.5, 3.0
 """Between looks at the progress of jobs; how long one that was cancelled may take to end itself."""
+LONGER_END_S = {"gains": 20.0}
+"""The same of kinds whose process holds what a hand waits for: plants take longer to draw again."""
 Listener = Callable[[Job], None]
 
 
@@ -197,7 +199,8 @@ class Workers:
             return
         watched.ask_to_end(place)
         self._ending.add(place)
-        kill = self._loop.call_later(END_S, future.cancel)
+        patience_s = LONGER_END_S.get(name.partition("-")[0], END_S)
+        kill = self._loop.call_later(patience_s, future.cancel)
 
         def ended(_: Future[Any]) -> None:
             watched.forget(place)
