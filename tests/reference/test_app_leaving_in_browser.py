@@ -94,8 +94,10 @@ def test_what_was_typed_and_not_saved_is_given_back(desk: Desk, tmp_path: Path) 
     study.press_sequentially("# a thought")
     page.locator("summary", has_text="A model of your own").click()
     page.get_by_label("Model file").fill("# half a model")
+    page.evaluate("window.scrollTo(0, 9999)")
     page.click("nav >> text=Verify")
     page.get_by_text("Typed before, and not saved yet").wait_for()
+    assert page.evaluate("scrollY") == 0  # another screen begins at its head
     page.reload()
     assert study.input_value() == f"{before}# a thought"
     page.click("nav >> text=Model")

@@ -17,7 +17,7 @@ const SCREEN_OF: Record<string, [string, string]> = {
   compare: ["compare", "Compare"], response: ["response", "Response"],
 };
 /** A command with its files, options and words in capitals; the sentence goes on behind it. */
-const COMMAND = /flightid (tune|plan|inspect|flight|compare|response)\b((?: (?:[^;:()\n]*?\.(?:bin|log|ulg|bbl|bfl|tlog|px4log|toml)\b|--(?:axes|controller|filters) [\w,]+|--[\w-]+|"[^"]*"|[^\s;,:()]*[./][^\s;,:()]*[^\s;,:().]|(?:LOG|STUDY)\b))*)/gi;
+const COMMAND = /flightid (tune|plan|inspect|flight|compare|response)\b((?: (?:[^;:()\n]*?\.(?:bin|log|ulg|bbl|bfl|tlog|px4log|toml)\b|--(?:axes|controller|filters) [\w,]+|--[\w-]+|"[^"]*"|[^\s;,:()]*[./][^\s;,:()]*[^\s;,:().]|[^\s;,:()]+(?= LOG\b)|(?:LOG|STUDY)\b))*)/gi;
 
 /** A table that a button of Records writes: what it bridges is shown there. */
 const BRIDGE = /: write \[\[conditioning\]\] into the study and below it outliers = \{[^}]*\}, which lies between (?:it|them) and all other samples/;
