@@ -253,7 +253,7 @@ def test_one_axis_has_one_band_wherever_it_is_said(tmp_path: Path) -> None:
     settings = read_settings(proposed.write(tmp_path / "study.toml"))
     for band, model in zip(found.bands, settings.models, strict=True):
         assert model.band_rad_s == band.band_rad_s
-        assert f"# {band.words}: " in proposed.text
+        assert f"# The log carries {band.words}: " in proposed.text
         said = next(f.message for f in found.findings if f.code == f"band-{band.axis}")
         assert f"usable from {band.words} (" in said
 

@@ -50,7 +50,8 @@ class _Axis:
             yield f"verify = {toml_value([each.name for each in self.parts.unseen])}"
         else:
             yield "# Nothing else moved this axis: fly a doublet, and name its span for verify."
-        yield f"# {hertz_words(self.band_rad_s)}: {self.found}"
+        # Of the log, not of the band below, which a hand may move.
+        yield f"# The log carries {hertz_words(self.band_rad_s)}: {self.found}"
         yield f"band_rad_s = {toml_value(list(self.band_rad_s))}"
         if self.template == "rate_motor_lag":
             yield "parameters.T_m = { maximum = 0.15 } # the motor is the faster of the two lags"
