@@ -14,6 +14,7 @@ from flightid.identification.frequency_domain.bias_objective import Objective
 from flightid.identification.frequency_domain.bias_search import SearchOutcome, search
 from flightid.identification.frequency_domain.estimator_bias import Correction, resonant_up_to
 from flightid.identification.frequency_domain.model_residuals import ModelResiduals
+from flightid.identification.frequency_domain.unknown_motion import MotionBasis
 from flightid.responses.errors.noise import NoiseSpectrum, noise_of_residuals
 from flightid.responses.errors.random_error import ErrorSelection
 from flightid.responses.windows.transform import FoldedBasis
@@ -215,3 +216,12 @@ def test_noise_through_a_growing_mode_is_as_strong_as_its_peak() -> None:
     kept = coarse.replaced(found, np.array([0]))
     assert_close(kept.at(at), found.at(at), rtol=1e-9, why="on its own frequencies")
     assert_close(found.at(np.array([4.0])), smooth.at(np.array([4.0])), rtol=1e-9, why="above")
+
+
+def test_a_motion_that_stands_still_has_no_direction() -> None:
+    """An integrator stays where it began; divided by nothing it overflowed in slopes."""
+    free = np.stack([np.ones((1, 50)), np.linspace(0.0, 1.0, 50)[None]])
+    found = MotionBasis.of(free)
+    assert np.isinf(found.lengths[0])
+    assert not np.any(found.motions[0])
+    assert not np.any(1e300 * np.ones(2) / found.lengths == np.inf)

@@ -12,6 +12,8 @@ from flightid.frozen import dataclass
 Array = NDArray[np.float64]
 Places = NDArray[np.intp]
 _RANK = 1e-9
+STILL = 1e-12
+"""Of a motion, the share about its mean up to which it stands still."""
 TINY = float(np.finfo(float).tiny)
 
 
@@ -49,7 +51,7 @@ class MotionBasis:
     motions : ndarray, shape (n_unknowns, n_outputs, n)
         Means removed, of length one.
     lengths : ndarray, shape (n_unknowns,)
-        By which they were divided.
+        By which they were divided; infinite for a motion that stands still, which is then none.
     bases : ndarray, shape (n_outputs, n, k)
         Orthonormal in each output.
     triangles : ndarray, shape (n_outputs, k, n_unknowns)
@@ -64,8 +66,11 @@ class MotionBasis:
     @classmethod
     def of(cls, free: Array) -> MotionBasis:
         """Of motions, shape (n_unknowns, n_outputs, n)."""
+        whole = np.linalg.norm(free, axis=(1, 2))
         free = free - free.mean(axis=2, keepdims=True)
-        lengths = np.maximum(np.linalg.norm(free, axis=(1, 2)), TINY)
+        lengths = np.linalg.norm(free, axis=(1, 2))
+        # An integrator stays where it began: rounding of its mean is no direction.
+        lengths = np.where(lengths > np.maximum(STILL * whole, TINY), lengths, np.inf)
         free = free / lengths[:, None, None]
         bases, triangles = np.linalg.qr(free.transpose(1, 2, 0))
         return cls(free, lengths, bases, triangles)
