@@ -182,7 +182,7 @@ def test_gains_of_a_rig_by_hand(desk: Desk, tmp_path: Path) -> None:
     typed.press("Tab")
     page.locator("#range-Ki").wait_for(state="detached")
     slider.press("End")
-    page.get_by_text("Nothing to download: the gains set by hand do not").wait_for()
+    page.get_by_text("Nothing to download: the reason stands above.").wait_for()
     # What to do is a button of the page, no key of a study.
     assert "press As found" in page.inner_text("main")
     assert "leave out by_hand" not in page.inner_text("main")

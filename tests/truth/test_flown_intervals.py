@@ -40,6 +40,7 @@ def test_intervals_of_flown_sweeps_cover_the_truth() -> None:
             inputs={"tau_phi": sweep},
             outputs={"p": output + noise[500:]},
             units={"p": "rad/s"},
+            hold="band_limited",  # undeclared, bars span what any hold would give
         )
         response = fid.estimate_response(
             record, band_rad_s=(1.5, 50.0), n_omega=120, estimator="local_polynomial"
