@@ -27,6 +27,7 @@ from flightid.inspection.rate_chirps import chirps
 from flightid.inspection.saturation import saturations
 from flightid.inspection.verdicts import _at_limit
 from flightid.logs.blackbox.settings import settings_of
+from flightid.plot.tuning import gain_map
 from flightid.review.loops import loop_responses
 from tests import betaflight_flight as betaflight
 from tests.blackbox_builder import SETTINGS, blackbox
@@ -281,6 +282,12 @@ def test_gains_are_whole_numbers_that_keep_their_margins() -> None:
     far = whole_gains(design.problem, paths, found)
     assert not far.exists
     assert far.binding == (ROUNDED,)
+    # The map is drawn in counts and judged by what they are worth: the new gains lie inside.
+    drawn = gain_map(design)
+    line = next(trace for trace in drawn.data if trace.name == "all requirements met")
+    star = next(trace for trace in drawn.data if trace.name == "new gains")
+    place = [np.abs(side - at[0]).argmin() for side, at in ((line.y, star.y), (line.x, star.x))]
+    assert line.z[place[0], place[1]] > -0.05
 
 
 def test_a_log_of_every_loop_tells_its_hold(tmp_path: Path) -> None:

@@ -142,7 +142,8 @@ def gain_map(design: PidDesign, across: str = "P", up: str = "D") -> go.PlotFigu
                 "there is no such gain", found=kind, needed=", ".join(problem.kinds)
             )
     x, y = problem.kinds.index(across), problem.kinds.index(up)
-    best = _gains(design, "new gains")
+    worth = _worth(design)
+    best = _gains(design, "new gains") * worth
     sides = [np.linspace(1 / WIDEST, WIDEST, GRID) * _scale(best, problem.high, k) for k in (x, y)]
     table = np.repeat(best[None], GRID * GRID, axis=0)
     table[:, x], table[:, y] = (each.ravel() for each in np.meshgrid(*sides))
@@ -156,6 +157,7 @@ def gain_map(design: PidDesign, across: str = "P", up: str = "D") -> go.PlotFigu
     parts = [problem.judge(part) for part in np.array_split(table, 12)]
     slack = np.concatenate([each.slack.min(axis=(0, 2)) for each in parts]).reshape(GRID, GRID)
     merit = np.concatenate([each.objective.min(axis=1) for each in parts]).reshape(GRID, GRID)
+    sides = [side / worth[place] for side, place in zip(sides, (x, y), strict=True)]
     return _map_figure(design, sides, (x, y), slack, merit)
 
 
@@ -214,6 +216,12 @@ def _gains(design: PidDesign, label: str) -> Array:
     if "angle_tc" in loop.names and "A" in design.problem.kinds:
         gains[-1] = 1.0 / gains[-1]
     return gains
+
+
+def _worth(design: PidDesign) -> Array:
+    """What one of each gain is worth to the loops: a firmware's parameters may be counts."""
+    roles = [kind.lower() for kind in design.problem.kinds]
+    return np.array([design.loop.unit_of(role) if role in "pid" else 1.0 for role in roles])
 
 
 def _nichols_curve(loop: NDArray[np.complex128]) -> Array:
