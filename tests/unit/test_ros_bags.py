@@ -184,3 +184,17 @@ def test_other_databases_and_huge_chunks_are_refused(tmp_path: Path) -> None:
     path.write_bytes(bytes(content))
     with pytest.raises(FileFormatError, match="more than is read into memory"):
         fid.read_records(path)
+
+
+@pytest.mark.parametrize(
+    "words", [["response"], ["identify", "--kind", "arx"], ["polynomial", "--kind", "arx"]]
+)
+def test_every_verb_takes_columns_by_their_names_in_a_bag(
+    words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = write_mcap(tmp_path / "a.mcap")
+    named = [words[0], str(path), *words[1:], "--inputs", "/cmd/data", "--outputs", RATE]
+    run(named)
+    said = capsys.readouterr()
+    assert "no such channel" not in said.err
+    assert "imu.rate.x" in said.out

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from flightid.cli.option_fields import parted
-from flightid.cli.records import read_files, reading
+from flightid.cli.records import as_channels, read_files, reading
 
 if TYPE_CHECKING:
     from flightid.models import NarxStructure, SubspaceStructure
@@ -59,7 +59,7 @@ def channels_of(
             f"name the channels with --inputs and --outputs; {files[0].name} holds "
             f"{', '.join(records[0].channels)}"
         )
-    return records, tuple(inputs), tuple(outputs)
+    return records, as_channels(records[0], inputs), as_channels(records[0], outputs)
 
 
 def structure_of(

@@ -76,7 +76,8 @@ def command(
     kind = orders.pop("kind", "armax")
     records, inputs, outputs = channels_of(files, named, of_files)
     output = only(outputs)
-    unseen = read_files(validation, *of_files, inputs=inputs, outputs=outputs)
+    columns = {"inputs": inputs, "outputs": outputs} | named
+    unseen = read_files(validation, *of_files, **columns)
     if scan:
         if not unseen:
             raise click.UsageError("--scan ranks by free run: name unseen records by --validation")

@@ -95,6 +95,14 @@ def read_files(
     return [in_units(record, units or {}) for record in found]
 
 
+def as_channels(record: Record, names: Iterable[str]) -> tuple[str, ...]:
+    """Channels by the names of the columns that they were, such as ``/imu/rate.x`` of a bag."""
+    from flightid.record.formats.columns import channel_name
+
+    own = {name: channel_name(name) for name in names}
+    return tuple(own[name] if name not in record and own[name] in record else name for name in own)
+
+
 def _refuse_renaming(file: Path, *roles: Sequence[str] | Mapping[str, str] | None) -> None:
     """Refuse columns of other names for a log, whose channels have names of their own."""
     given = [name for role in roles if isinstance(role, dict) for name in role.items()]

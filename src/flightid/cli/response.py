@@ -19,7 +19,7 @@ from flightid.cli.output import (
     note,
 )
 from flightid.cli.pages import html_option
-from flightid.cli.records import FILES, read_files, reading
+from flightid.cli.records import FILES, as_channels, read_files, reading
 
 if TYPE_CHECKING:
     from flightid.options import Options
@@ -70,6 +70,9 @@ def command(
     channels, of_response, known, *of_files = parted(options, _fields())
     injected = of_response.get("excitations")
     records = read_files(files, *of_files, **channels, excitations=injected, take="flown")
+    channels = {role: as_channels(records[0], names) for role, names in channels.items()}
+    if injected:
+        of_response = of_response | {"excitations": as_channels(records[0], injected)}
     if known:
         records = [record.declare(**known) for record in records]
     of_response = with_instrument(of_response, files, records, channels.get("inputs") or ())
