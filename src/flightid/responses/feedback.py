@@ -23,6 +23,8 @@ from flightid.uncertainty.feedback_result import (
     unless_spread,
 )
 
+HELD = 0.5
+"""Share of the samples at which an input that is held by a clock changes at most."""
 SAMPLES_A_CYCLE = 8.0
 """Samples kept in a cycle of the highest frequency of interest."""
 SAMPLES_FOR_BIAS = 16.0
@@ -53,6 +55,7 @@ def feedback_of(
     if known is not None:
         return declared_loop(known)
     step, most = _thinning(len(samples.records), omega_max, samples.sample_time_s)
+    step = _in_clock(step, samples.part("inputs"))
     # Another band asks the same of the same samples; their first ones tell whether means are off.
     begun = tuple(rows[:, 0].tobytes() for rows in samples.records)
     key = ("feedback", *records[1:], samples.inputs, samples.outputs, begun, step, most)
@@ -81,6 +84,21 @@ def _thinning(
     """Samples to a step, and most of them in a record."""
     step = max(1, int(2.0 * np.pi / (kept * omega_max * sample_time_s)))
     return step, MAXIMUM_SAMPLES // n_records
+
+
+def _in_clock(step: int, inputs: Sequence[NDArray[np.float64]]) -> int:
+    """The longest step up to one that no change of a held input falls between.
+
+    Where a clock of five samples is thinned by two, what it does between kept samples tells when it
+    will change next: outputs foretold inputs, and a loop was seen where there was none.
+    """
+    clock = 0
+    for rows in inputs:
+        for row in rows:
+            changes = np.flatnonzero(np.diff(row))
+            if len(changes) < HELD * row.size:
+                clock = int(np.gcd.reduce(np.append(np.diff(changes), clock)))
+    return next(each for each in range(step, 0, -1) if clock % each == 0)
 
 
 def feedback_bias(
