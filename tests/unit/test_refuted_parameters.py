@@ -9,6 +9,7 @@ from scipy.linalg import expm
 import flightid as fid
 from flightid.identification.filter_error.parameter_scores import parameter_scores
 from flightid.identification.regression.options import FilterErrorOptions
+from flightid.models import Output, Parameter, Parameters
 from flightid.validation.verification.parameter_findings import CODE
 from flightid.validation.verification.pieces import GROWTH
 from tests.strangers.gusts import TRUTH, flight, model
@@ -52,6 +53,45 @@ def test_a_little_wrong_in_calm_air_is_amber() -> None:
     assert light == "amber"
     assert _named(message, "Mq") == pytest.approx(TRUTH["Mq"], rel=0.02)
     assert CODE not in _said(model(1.0).with_values({"Mq": 1.05 * TRUTH["Mq"]}), record)
+
+
+def _doublet(hold: str | None) -> tuple[fid.StateSpaceModel, fid.Record]:
+    """A short period by SciPy, its elevator stepped between samples, its noise white."""
+    a, b = np.array([[-1.4, 1.0], [-6.2, -2.1]]), np.array([[0.0], [-11.0]])
+    both = expm(np.block([[a, b], [np.zeros((1, 3))]]) * STEP_S)
+    u = np.repeat([0.0, 0.06, -0.06, 0.0], [50, 50, 50, 450])
+    states = np.zeros((len(u), 2))
+    for k, each in enumerate(u[:-1]):
+        states[k + 1] = both[:2, :2] @ states[k] + both[:2, 2] * each
+    noisy = states + [0.002, 0.004] * np.random.default_rng(0).standard_normal(states.shape)
+    units = {"elevator": "rad", "alpha": "rad", "q": "rad/s"}
+    record = fid.Record.from_arrays(
+        STEP_S * np.arange(len(u)), inputs={"elevator": u},
+        outputs={"alpha": noisy[:, 0], "q": noisy[:, 1]}, units=units, hold=hold,
+    )  # fmt: skip
+    return _short_period(-0.7 * 6.2), record
+
+
+def _short_period(of_alpha: float) -> fid.StateSpaceModel:
+    values = {"Za": -1.4, "Ma": of_alpha, "Mq": -2.1, "Me": -11.0}
+    units = {"Za": "1/s", "Ma": "1/s^2", "Mq": "1/s", "Me": "1/s^2"}
+    return fid.StateSpaceModel(
+        states={"alpha": "rad", "q": "rad/s"},
+        input_units={"elevator": "rad"},
+        measurements={"alpha": Output("alpha", "rad"), "q": Output("q", "rad/s")},
+        equations={"alpha'": "Za*alpha + q", "q'": "Ma*alpha + Mq*q + Me*elevator"},
+        parameters=Parameters([Parameter(name, values[name], units[name]) for name in values]),
+    )
+
+
+def test_no_interval_where_nobody_says_how_inputs_move_between_samples() -> None:
+    """Steps taken as lines moved what is asked by more than its noise: 0 of 10 intervals held."""
+    told = _said(*_doublet("zero"))[CODE][1]
+    low, high = told.split("(")[2].split(")")[0].split(" to ")
+    assert float(low) <= -6.2 <= float(high)
+    untold = _said(*_doublet(None))[CODE][1]
+    assert "Ma about -" in untold
+    assert " to -" not in untold
 
 
 def test_scores_of_a_right_model_are_of_unit_variance() -> None:

@@ -50,8 +50,8 @@ def memory_doubt(
 
     Assumes
     -------
-    A bias that shrinks with the memory. Of 30 helicopter flights in gusts (eight states, a pilot
-    in the loop) it made 82 of 100 intervals that hold 95.
+    A bias that shrinks with the memory: low in short stretches some intervals still miss
+    (docs/responses.md has the counts).
     """
     response = model.response(omega_rad_s)
     square = np.maximum(np.abs(response) ** 2, TINY)

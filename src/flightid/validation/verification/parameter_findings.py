@@ -16,7 +16,7 @@ GROSS = 0.25
 
 
 def refuted_findings(
-    refuted: RefutedParameter | None, beside: Sequence[Finding]
+    refuted: RefutedParameter | None, beside: Sequence[Finding], *, hold_known: bool
 ) -> tuple[Finding, ...]:
     """Red where what is said `beside` of the runs is poor, or the difference is gross; else amber.
 
@@ -31,7 +31,7 @@ def refuted_findings(
         Finding(
             CODE,
             light,
-            refuted.words,
+            refuted.words(hold_known=hold_known),
             "fit the records together, or look for what the model lacks: an input's gain, a lag, "
             "a delay, a coupling",
         ),

@@ -79,20 +79,23 @@ class RefutedParameter:
     is_enough: bool
     others: tuple[str, ...] = ()
 
-    @property
-    def words(self) -> str:
-        """What is said of it."""
+    def words(self, *, hold_known: bool = True) -> str:
+        """What is said of it: without interval where nobody says how inputs move between samples.
+
+        Steps taken as lines move a value by more than its noise: no such interval of ten held.
+        """
         said = (
             f"inputs ask other parameters than the model's (p = {self.chance:.1g}), beside any gust"
         )
         if not self.is_enough:
             return f"{said}: more than one, or dynamics that it lacks, most in {self.output}"
-        interval = self.asked.interval()
+        interval = self.asked.interval() if hold_known else None
         between = f" ({interval[0]:.4g} to {interval[1]:.4g})" if interval else ""
+        about = "=" if hold_known else "about"
         unit = f" {self.asked.unit}" if self.asked.unit else ""
         alike = f" (as another {' or '.join(self.others)} would)" if self.others else ""
         return (
-            f"{said}: {self.asked.name} = {self.asked.value:.4g}{between}{unit} instead of "
+            f"{said}: {self.asked.name} {about} {self.asked.value:.4g}{between}{unit} instead of "
             f"{self.value:.4g} would do{alike}, which changes at least "
             f"{100.0 * np.sqrt(self.share):.2g} % of the motion of {self.output}"
         )

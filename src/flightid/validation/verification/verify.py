@@ -25,7 +25,7 @@ from flightid.identification.prediction.request import FREE_RUN, Request
 from flightid.identification.prediction.result import Prediction
 from flightid.identification.records.options import InitialState
 from flightid.record import Record
-from flightid.record.chosen_hold import chosen_hold
+from flightid.record.chosen_hold import ASSUMED, chosen_hold
 from flightid.record.hold import HOLDS, InputHold
 from flightid.record.several import as_records
 from flightid.responses import FrequencyResponse
@@ -218,7 +218,12 @@ def verify(
             *contradictions(each, way, made, request, asked),
             *growth_findings(made, partial(run, request), asked),
         )
-        beside = (*beside, *refuted_findings(asked.refuted, (*judged.findings, *beside)))
+        beside = (
+            *beside,
+            *refuted_findings(
+                asked.refuted, (*judged.findings, *beside), hold_known=held.source != ASSUMED
+            ),
+        )
         if all(each.light is Light.GREEN for each in (*judged.findings, *beside)):
             beside = (*beside, *foretold_findings(made, chosen, asked.innovations))
         in_time = way is predict_continuous
