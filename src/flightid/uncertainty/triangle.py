@@ -123,32 +123,3 @@ def triangle_of_parts(parts: Callable[[], Iterable[Array]], products: Array | No
     if found is None:
         found = _by_blocks(np.concatenate([_by_blocks(part) for part in parts()]))
     return found
-
-
-def folded_triangle(parts: Iterable[Array], n_columns: int) -> Array:
-    """The same of rows that come once, part by part, by reflections alone: no digits are lost.
-
-    Parameters
-    ----------
-    parts : iterable of ndarray, shape (n, n_columns)
-        Each is let go before the next comes.
-    n_columns : int
-
-    Returns
-    -------
-    ndarray, shape (min(rows, n_columns), n_columns)
-
-    Reference
-    ---------
-    Golub & Van Loan, *Matrix Computations*, 4th ed., section 5.2.
-
-    Example
-    -------
-    >>> np.abs(folded_triangle([np.array([[3.0]]), np.array([[4.0]])], 1))
-    array([[5.]])
-    """
-    found = np.zeros((0, n_columns))
-    for part in parts:
-        stacked = np.vstack([found, part]) if len(found) else part
-        found = np.asarray(np.linalg.qr(stacked, mode="r"))
-    return found

@@ -5,12 +5,13 @@ By pieces of samples: of long records nothing but a triangle is kept.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.uncertainty.triangle import folded_triangle
+from flightid.uncertainty.triangle import triangle_of_parts
 
 Array = NDArray[np.float64]
 LAGS = 12
@@ -48,9 +49,10 @@ def unforetold(rows: Sequence[Array], inputs: Sequence[Array]) -> list[Array]:
             for part in parts(each.shape[1]):
                 yield k, part, _lagged(padded[k], part, reach + 2)
 
-    beside = (np.concatenate([lags, rows[k][:, part]]) for k, part, lags in pieces())
-    count = len(moved) * (reach + 2)
-    weights, _ = _regressed(beside, count, count + len(rows[0]), ROUNDING)
+    def beside() -> Iterator[Array]:
+        return (np.concatenate([lags, rows[k][:, part]]) for k, part, lags in pieces())
+
+    weights, _ = _regressed(beside, len(moved) * (reach + 2), ROUNDING)
     left = [each.copy() for each in rows]
     for k, part, lags in pieces():
         left[k][:, part] -= weights @ lags
@@ -66,8 +68,7 @@ def colour_filters(rows: Sequence[Array]) -> list[Array] | None:
     found = []
     for output in range(rows[0].shape[0]):
         own = [each[output : output + 1] for each in rows]
-        pieces = (_lagged(e, part, LAGS + 1) for e in own for part in parts(e.shape[1] - LAGS))
-        weights, left = _regressed(pieces, LAGS, LAGS + 1, None)
+        weights, left = _regressed(partial(_pasts, own), LAGS, None)
         if not np.all(np.isfinite(weights)) or left[0] <= 0.0:
             return None
         found.append(np.concatenate([[1.0], -weights[0, ::-1]]))
@@ -95,13 +96,20 @@ def _lagged(rows: Array, part: slice, count: int) -> Array:
     return np.concatenate([rows[:, part.start + k : part.stop + k] for k in range(count)])
 
 
+def _pasts(outputs: Sequence[Array]) -> Iterator[Array]:
+    """Each sample of one output of all records below those before it, by pieces."""
+    for each in outputs:
+        for part in parts(each.shape[1] - LAGS):
+            yield _lagged(each, part, LAGS + 1)
+
+
 def _regressed(
-    pieces: Iterable[Array], count: int, width: int, rounding: float | None
+    pieces: Callable[[], Iterable[Array]], count: int, rounding: float | None
 ) -> tuple[Array, Array]:
     """Weights in the first `count` of so many rows that foretell the others, and squares left.
 
-    Rows come by pieces of samples; weights (width - count, count).
+    Rows come by pieces of samples; weights (rows - count, count).
     """
-    root = folded_triangle((piece.T for piece in pieces), width)
+    root = triangle_of_parts(lambda: (piece.T for piece in pieces()))
     weights = np.linalg.lstsq(root[:count, :count], root[:count, count:], rcond=rounding)[0]
     return np.asarray(weights.T), np.asarray(np.sum(root[count:, count:] ** 2, axis=0))
