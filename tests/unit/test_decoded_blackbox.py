@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import flightid as fid
+from flightid.conventions import Light
 from flightid.errors import DataError, LogFormatError
 from flightid.logs import is_log
 from tests.blackbox_builder import FIELDS, SETTINGS, blackbox
@@ -125,3 +127,75 @@ def test_broken_ones_are_refused(tmp_path: Path, text: str, said: str) -> None:
     path.write_text(text)
     with pytest.raises(LogFormatError, match=said):
         fid.read_log(path)
+
+
+FINE = (*(f"{name}[{axis}]" for name in ("gyroADC", "rcCommand", "setpoint") for axis in range(3)),
+        "rcCommand[3]", "setpoint[3]")  # fmt: skip
+
+
+def _turning(*, fine: bool, without: tuple[str, ...] = ()) -> dict[str, np.ndarray]:
+    """Rates that follow their set-points, of up to some 150 deg/s: none beyond a limit."""
+    made = _columns()
+    moved = np.round(100.0 * np.sin(0.1 * np.arange(300)[:, None] + np.arange(3)))
+    for axis in range(3):
+        made[f"setpoint[{axis}]"] = made[f"gyroADC[{axis}]"] = moved[:, axis]
+        made[f"rcCommand[{axis}]"] = np.round(0.3 * moved[:, axis])
+    made["rcCommand[3]"], made["setpoint[3]"] = np.full(300, 1400), np.full(300, 380)
+    scaled = {name: (10 if fine and name in FINE else 1) * each for name, each in made.items()}
+    return {name: each for name, each in scaled.items() if not name.startswith(without or ("-",))}
+
+
+def _written(columns: dict[str, np.ndarray], path: Path, unit: str = "") -> Path:
+    heads = [f"{name} ({unit})" if unit and name.startswith("gyro") else name for name in columns]
+    heads = [
+        "loopIteration",
+        "time (us)",
+        *(h for h in heads if h not in ("loopIteration", "time")),
+    ]
+    rest = [each for name, each in columns.items() if name not in ("loopIteration", "time")]
+    rows = np.stack([columns["loopIteration"], columns["time"], *rest], axis=1)
+    lines = [", ".join(heads), *(", ".join(f"{cell:g}" for cell in row) for row in rows)]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+@pytest.mark.parametrize("fine", [False, True])
+@pytest.mark.parametrize(
+    ("without", "sign"),
+    [
+        ((), "the throttle stick counts from"),
+        (("rcCommand",), r"setpoint\[3\] counts to"),
+    ],
+)
+def test_counts_tell_their_resolution_without_a_header(
+    tmp_path: Path, fine: bool, without: tuple[str, ...], sign: str
+) -> None:
+    columns = _turning(fine=fine, without=without)
+    log = fid.read_log(_written(columns, tmp_path / "a.csv"))
+    size = 10.0 if fine else 1.0
+    for name in ("gyroADC[1]", "setpoint[0]"):
+        np.testing.assert_allclose(log.table("main")[name], columns[name] / size)
+    said = {finding.code: finding for finding in log.findings}
+    assert "unit-assumed" not in said
+    assert re.search(sign, said["unit-of-counts"].message)
+
+
+def test_rates_whose_counts_nothing_tells_are_said_to_be_assumed(tmp_path: Path) -> None:
+    columns = _turning(fine=True, without=("rcCommand", "setpoint[3]"))
+    path = _written(columns, tmp_path / "a.csv")
+    for findings in (fid.read_log(path).findings, fid.review_flight(path).findings):
+        said = {finding.code: finding for finding in findings}
+        assert said["unit-assumed"].light is Light.AMBER
+        assert "ten times too large if it was" in said["unit-assumed"].message
+        assert "--unit-rotation" not in said["unit-assumed"].action
+
+
+@pytest.mark.parametrize("divided", [False, True])
+def test_a_decoder_s_deg_s_may_be_ten_times_too_large(tmp_path: Path, divided: bool) -> None:
+    columns = _turning(fine=True)
+    truth = columns["gyroADC[0]"] / 10.0
+    if divided:
+        for axis in range(3):
+            columns[f"gyroADC[{axis}]"] = columns[f"gyroADC[{axis}]"] / 10.0
+    log = fid.read_log(_written(columns, tmp_path / "a.csv", "deg/s"))
+    np.testing.assert_allclose(log.table("main")["gyroADC[0]"], truth)

@@ -92,4 +92,4 @@ def review_flight(
         swept=bool(injected_spans(opened)),
         ranges=flown_ranges(opened, loops),
     )
-    return replace(found, findings=judge_flight(found))
+    return replace(found, findings=judge_flight(found, opened.findings))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 from flightid.conventions import Light
@@ -28,10 +28,22 @@ FAST_GYRO = {
 SHAKEN = "balance propellers, damp the autopilot's mount, look for loose parts"
 
 
-def judge_flight(review: FlightReview) -> tuple[Finding, ...]:
-    """All verdicts, the worst and then a fall last, where eyes are on a terminal."""
+OF_SIZES = ("unit-assumed", "unit-of-counts", "settings-unknown")
+"""Codes of findings of a log that say what its numbers, and so those of its flight, are worth."""
+
+
+def judge_flight(review: FlightReview, of_log: Iterable[Finding] = ()) -> tuple[Finding, ...]:
+    """All verdicts, the worst and then a fall last, where eyes are on a terminal.
+
+    Parameters
+    ----------
+    review : FlightReview
+    of_log : iterable of Finding
+        What its log was found to be.
+    """
+    sizes = (each for each in of_log if each.code in OF_SIZES)
     # Of equals the first stays ahead of the others: it leads to them.
-    return worst_last(_all(review))
+    return worst_last((*sizes, *_all(review)))
 
 
 def _all(review: FlightReview) -> Iterator[Finding]:

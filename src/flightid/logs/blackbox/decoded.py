@@ -20,9 +20,15 @@ from flightid.errors import LogFormatError
 from flightid.findings import Finding
 from flightid.frozen import dataclass
 from flightid.logs.blackbox.firmware import BETAFLIGHT, INAV, REVISION, firmware_of
-from flightid.logs.blackbox.loop_rows import LOOP, gaps_of, with_set_points
+from flightid.logs.blackbox.loop_rows import LOOP, SET_POINTS, gaps_of, with_set_points
 from flightid.logs.blackbox.reader import WING
-from flightid.logs.blackbox.scales import FORCES, GRAVITY, RATES, scales_of
+from flightid.logs.blackbox.resolution import (
+    FLAG,
+    Resolution,
+    rates_count_as_set_points,
+    resolution_of,
+)
+from flightid.logs.blackbox.scales import FORCES, GRAVITY, HIGH_RESOLUTION, RATES, scales_of
 from flightid.logs.blackbox.settings import settings_of
 from flightid.logs.source import Event
 from flightid.logs.table_source import Array, MessageRows, TableSource
@@ -88,7 +94,8 @@ def open_decoded(path: Path) -> TableSource:
     names = {each.name for each in columns}
     firmware = firmware_of(header.get(REVISION, ""))
     is_inav = firmware.is_inav or (not firmware.name and not names.isdisjoint(OF_INAV))
-    known = {GYRO_SCALE: DEGREES, **header}
+    resolution = Resolution(is_fine=False) if is_inav else resolution_of(header, read)
+    known = {GYRO_SCALE: DEGREES, **header, FLAG: str(int(bool(resolution.is_fine)))}
     scales, untold = scales_of(known, is_inav=is_inav)
     time_s = read["time"] / A_SECOND.get(_unit_of(columns, "time"), 1e6)
     values = {
@@ -96,6 +103,7 @@ def open_decoded(path: Path) -> TableSource:
         for each in columns
         if each.name in read and (scale := _worth(each, scales, untold)) is not None
     }
+    _without_ten(values, read, columns, resolution)
     order = np.flatnonzero(np.isfinite(time_s))
     units = {name: "µs" if name == "time" else "1" for name in values}
     rows = MessageRows(
@@ -111,7 +119,11 @@ def open_decoded(path: Path) -> TableSource:
         settings_of(header),
         events=_modes(rows),
         gaps=gaps_of(rows.time_s),
-        findings=(*_findings(header, columns, values), *sticks),
+        findings=(
+            *_findings(header, columns, values),
+            *_rate_findings(header, columns, resolution, is_inav=is_inav),
+            *sticks,
+        ),
     )
 
 
@@ -226,19 +238,63 @@ def _findings(
             "a decoded blackbox without its header: gains, filters and battery are not known",
             "hand in the log itself (.bbl, .bfl, .TXT), or decode it with --save-headers",
         )
-    rated = [each for each in columns if each.name.startswith(RATES)]
-    if GYRO_SCALE not in header and any(each.unit not in WORTH for each in rated):
-        yield Finding(
-            "unit-assumed",
-            Light.AMBER,
-            "the file tells no gyro_scale: rates are taken as deg/s a count, as firmware logs them "
-            "since 2017 but with blackbox_high_resolution, ten times finer",
-            "decode with --unit-rotation deg/s, or hand in the log itself",
-        )
     if any(each.name.startswith(FORCES) for each in columns) and f"{FORCES}2]" not in values:
         yield Finding(
             "unit-unknown",
             Light.AMBER,
             f"the file tells no {GRAVITY}: accelerations are counts of unknown size, and left out",
             "decode with --unit-acceleration g, or hand in the log itself",
+        )
+
+
+def _without_ten(
+    values: dict[str, Array],
+    read: Mapping[str, Array],
+    columns: Sequence[_Heading],
+    resolution: Resolution,
+) -> None:
+    """Take the ten of a high resolution off rates that a decoder gave a unit."""
+    rated = [each for each in columns if each.name.startswith(RATES) and each.unit in WORTH]
+    if not resolution.is_fine or not rated:
+        return
+    if rates_count_as_set_points(read, WORTH[rated[0].unit]):
+        for each in rated:
+            values[each.name] = values[each.name] / HIGH_RESOLUTION
+
+
+def _rate_findings(
+    header: Mapping[str, str],
+    columns: Sequence[_Heading],
+    resolution: Resolution,
+    *,
+    is_inav: bool,
+) -> Iterator[Finding]:
+    """What rates are taken as, where the header does not tell it."""
+    rated = [each for each in columns if each.name.startswith(RATES)]
+    # Firmware that logs set-points counts in deg/s; a unit behind the name holds the scale.
+    scaled = is_inav or any(each.name == SET_POINTS[0] for each in columns)
+    scaled = scaled or GYRO_SCALE in header or all(each.unit in WORTH for each in rated)
+    if not rated:
+        return
+    said = ""
+    if resolution.is_fine is None:
+        said = (
+            f"neither header nor sticks nor throttle tell whether the log was made with {FLAG}: "
+            "rates are taken as deg/s a count, ten times too large if it was"
+        )
+    elif not scaled:
+        said = (
+            f"the file tells no {GYRO_SCALE}: rates are taken as deg/s a count, some 16 times too "
+            "large if the firmware is from before 2017"
+        )
+    if said:
+        action = "hand in the log itself (.bbl, .bfl, .TXT), or decode it with --save-headers"
+        yield Finding("unit-assumed", Light.AMBER, said, action)
+    elif resolution.sign and (resolution.is_fine or REVISION not in header):
+        times = "a tenth of a deg/s" if resolution.is_fine else "deg/s"
+        yield Finding(
+            "unit-of-counts",
+            Light.GREEN,
+            f"no header tells {FLAG}, but the counts do ({resolution.sign}): one of the rates and "
+            f"set-points is {times}",
         )
