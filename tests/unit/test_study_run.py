@@ -288,3 +288,18 @@ def test_no_loop_is_picked_around_a_vehicle_that_grows(rate: float, told: str) -
     )
     study = SimpleNamespace(tuning=None, faults=(), inspection=None)
     assert told in answer._next(study, "h.toml", [SimpleNamespace(fit=fit)])
+
+
+def test_the_answer_tells_what_all_models_predict_of_one_channel() -> None:
+    """Two models of one output, seen on one record: the later one's figure stood for both."""
+    of_one, of_other = (
+        SimpleNamespace(
+            name=name, on_unseen={"doublet": SimpleNamespace(fit_percent={"y1": percent})}
+        )
+        for name, percent in (("noise", 91.3), ("centres", 49.9))
+    )
+    assert "they predict 49.9 to 91.3 %" in answer._promise([of_one, of_other])
+    of_other.on_unseen["doublet"].fit_percent["y1"] = -3.0
+    assert "1 no better than a constant would, y1 of “doublet” by centres least" in (
+        answer._promise([of_one, of_other])
+    )

@@ -225,16 +225,17 @@ def _doubted_loop(fit: Fit | None) -> Check | None:
 
 
 def _promise(items: Sequence[ModelResults]) -> str:
-    """How much of what no fit has seen the models predict, channel by channel."""
+    """How much of what no fit has seen the models predict, channel by channel of each."""
+    alone = len(items) == 1
     fits = {
-        f"{name} of “{record}”": value
+        f"{name} of “{record}”{'' if alone else f' by {item.name}'}": value
         for item in items
         for record, run in item.on_unseen.items()
         for name, value in run.fit_percent.items()
     }
     if not fits:
         return ""
-    they = "it predicts" if len(items) == 1 else "they predict"
+    they = "it predicts" if alone else "they predict"
     values = sorted(fits.values())
     unseen = "of motion that no fit has seen"
     missed = sum(value <= 0.0 for value in values)
