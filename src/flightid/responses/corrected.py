@@ -136,9 +136,25 @@ def _stacked(outputs: Sequence[tuple[Real, ...]]) -> list[Real]:
 
 
 def _residuals(linear: LinearEstimate, pilots: Sequence[Pilot]) -> list[Real]:
-    """Of each record, what the pilots leave of all outputs."""
+    """Of each record, what the pilots leave of all outputs, in the bins that they were fitted to.
+
+    Bins beyond say nothing of the response in its band, and whatever rises there, of the inputs or
+    of noise, windows leak into it: no covariance of the noise inside holds that.
+    """
     modelled = _stacked([each.outputs for each in pilots])
-    return [y - model for y, model in zip(linear.output_records, modelled, strict=True)]
+    n_bins = map(len, pilots[0].spent)
+    return [
+        _inside(y, last) - model
+        for y, model, last in zip(linear.output_records, modelled, n_bins, strict=True)
+    ]
+
+
+def _inside(outputs: Real, last: int) -> Real:
+    """Samples, shape (n_out, n), of the first Fourier bins above zero alone."""
+    bins = np.fft.rfft(outputs, axis=1)
+    bins[:, 0] = 0.0
+    bins[:, last + 1 :] = 0.0
+    return np.fft.irfft(bins, outputs.shape[1], axis=1)
 
 
 def _noise(linear: LinearEstimate, pilots: Sequence[Pilot]) -> NoiseSpectrum:
