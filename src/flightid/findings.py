@@ -12,11 +12,10 @@ from flightid.frozen import dataclass
 from flightid.surface import spoken
 
 GRAVITY = (Light.RED, Light.AMBER, Light.UNKNOWN, Light.GREEN)
-FIRST = ("scale-contradicted", "tipped-over")
+FALL, DIVERGES = "tipped-over", "diverges"
+"""Code of a fall; beginning of codes of what grows, unasked, until a flight ends."""
+FIRST = ("scale-contradicted", FALL, *(f"{DIVERGES}-{axis}" for axis in ("roll", "pitch", "yaw")))
 """Codes of what comes before all advice on a log: another flight would meet it again."""
-
-
-FALL = "tipped-over"
 CAUSES = (
     "saturated", "motor-at", "motors-unbalanced", "yaw-trimmed", "vibration", "accelerometer-clips",
 )  # fmt: skip

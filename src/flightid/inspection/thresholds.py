@@ -83,3 +83,8 @@ TIPPING_TILT = Threshold(0.35, "rad", "20 deg: the fall is counted from the last
 GYRO_RANGE = Threshold(34.2, "rad/s", "98 % of the 2000 deg/s at which common gyroscopes clip")
 SKEW = Threshold(0.004, "s", "14 deg of phase at 10 Hz")
 SKEW_CORRELATION = Threshold(0.9, "1", "below it two streams do not show the same motion")
+GROWTH = Threshold(
+    8, "1", "three doublings within one piece of steady growth: gusts and sticks come and go"
+)
+DIVERGED_RATE = Threshold(0.5, "rad/s", "29 deg/s rms beside the set-point: no loop that flies")
+DIVERGED_ANGLE = Threshold(0.35, "rad", "20 deg rms beside the set-point: no loop that flies")

@@ -8,6 +8,7 @@ from flightid.conventions import Light
 from flightid.findings import Finding, counted, in_order
 from flightid.inspection import advice
 from flightid.inspection.carried import carried_axes, is_swept
+from flightid.inspection.divergence import divergence_findings
 from flightid.inspection.gap_findings import gap_findings
 from flightid.inspection.saturation import Saturation
 from flightid.inspection.signals import map_of
@@ -34,6 +35,7 @@ def judge(log: Log, found: Inspection) -> tuple[Finding, ...]:
     scales = _scales(log, found)
     findings = [*scales, *log.findings, *_flight(log, found)]
     if found.phases.airborne:
+        findings += divergence_findings(log, found.phases.airborne)
         findings += [*_length(found), *_bands(log, found), *_loop(log, found)]
     findings += [*_logging(log, found), *_excitation(log, found, scales)]
     findings += _quality(log, found)

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Protocol
 
 from flightid.conventions import Light
-from flightid.findings import CAUSES, Finding
+from flightid.findings import CAUSES, DIVERGES, Finding
 from flightid.inspection.flight_phases import FlightPhases
 from flightid.review.loop_response import LoopResponse
 from flightid.surface import spoken
@@ -72,6 +72,8 @@ def closing_lines(review: ReviewedFlight) -> Iterator[str]:
         return
     if phases.fall:
         yield f"{phases.fall[0].upper()}{phases.fall[1:]}."
+    if growing := _diverging(review):
+        yield f"It diverges in {_listed(growing)}: do not fly these settings again."
     yield _told(review)
     if way := _next(review):
         yield spoken(f"Next: {way}.")
@@ -107,10 +109,18 @@ def _told(review: ReviewedFlight) -> str:
     )
 
 
+def _diverging(review: ReviewedFlight) -> list[str]:
+    """Axes that grow until the flight ends."""
+    codes = (each.code for each in review.findings)
+    return [code.rsplit("-", 1)[1] for code in codes if code.startswith(DIVERGES)]
+
+
 def _next(review: ReviewedFlight) -> str:
     """What goes on from here: the cause of a fall, sweeps that were flown, or sweeps to fly."""
     if review.phases.fall:
         return "find the cause of the fall; sweeps, filters and gains come after it"
+    if _diverging(review):
+        return "mend what diverges; sweeps, filters and gains come after it"
     if review.swept:
         return f"flightid tune {review.name} (models of its sweeps, then gains)"
     mended = any(f.light in AMISS and f.code.startswith(CAUSES) for f in review.findings)

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from flightid.inspection.actuators import find_actuators
+from flightid.inspection.divergence import divergence_findings
 from flightid.inspection.excitation_found import injected_spans
 from flightid.inspection.flight_phases import flight_phases
 from flightid.inspection.signals import find
@@ -92,4 +93,5 @@ def review_flight(
         swept=bool(injected_spans(opened)),
         ranges=flown_ranges(opened, loops),
     )
-    return replace(found, findings=judge_flight(found, opened.findings))
+    of_log = (*opened.findings, *divergence_findings(opened, phases.airborne))
+    return replace(found, findings=judge_flight(found, of_log))

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 from flightid.conventions import Light
-from flightid.findings import Finding, worst_last
+from flightid.findings import DIVERGES, Finding, worst_last
 from flightid.inspection.advice import LOGGING
 from flightid.review.filter_findings import filter_findings
 from flightid.review.loop_response import LoopResponse
@@ -41,9 +41,9 @@ def judge_flight(review: FlightReview, of_log: Iterable[Finding] = ()) -> tuple[
     of_log : iterable of Finding
         What its log was found to be.
     """
-    sizes = (each for each in of_log if each.code in OF_SIZES)
+    own = (each for each in of_log if each.code in OF_SIZES or each.code.startswith(DIVERGES))
     # Of equals the first stays ahead of the others: it leads to them.
-    return worst_last((*sizes, *_all(review)))
+    return worst_last((*own, *_all(review)))
 
 
 def _all(review: FlightReview) -> Iterator[Finding]:
