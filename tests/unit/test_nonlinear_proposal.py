@@ -34,13 +34,14 @@ def moved(seed: int, curvature: float, n: int) -> tuple[np.ndarray, np.ndarray]:
 class Scans:
     """Parts of a flown rig, as a proposal has them."""
 
-    def __init__(self, curvature: float) -> None:
+    def __init__(self, curvature: float, loop: str | None = "open") -> None:
         self.records = []
         for seed in range(2):
             u, y = moved(seed, curvature, 800)
             time_s = np.arange(u.size) * STEP_S
             channels = {"inputs": {"u": u}, "outputs": {"y": y}}
-            self.records.append(fid.Record.from_arrays(time_s, **channels, hold="zero"))
+            made = fid.Record.from_arrays(time_s, **channels, hold="zero")
+            self.records.append(made if loop is None else made.declare(loop=loop))
 
     def flown(self, *_: object) -> fid.Record:
         return self.records[0]
@@ -84,8 +85,7 @@ def test_it_is_taken_where_it_runs_better_beyond_chance(
 
 def test_none_is_tried_along_a_loop_and_one_that_answers_at_once_is_red() -> None:
     """Bent residuals of a loop asked for NARX models, which found the controller turned round."""
-    scans = Scans(0.6)
-    scans.records = [each.declare(loop="closed") for each in scans.records]
+    scans = Scans(0.6, "closed")
     scan = fid.scan_orders(*scans.records, kind="arx", na=2, nb=2, nk=range(2))
     found = nonlinear_choice(scans, scan.best, scan.trials[0], 0, scan.settle_s)
     assert found is not None
@@ -97,6 +97,17 @@ def test_none_is_tried_along_a_loop_and_one_that_answers_at_once_is_red() -> Non
         loop = fid.identify(asked, scans.records[0]).evidence.check("loop")
         assert loop is not None
         assert loop.light == light, loop
+
+
+def test_none_is_tried_where_a_loop_may_be_and_what_would_have_it_tried_is_said() -> None:
+    """An unknown loop's best NARX model was the controller's inverse, for all that runs tell."""
+    scans = Scans(0.6, None)
+    scan = fid.scan_orders(*scans.records, kind="arx", na=2, nb=2, nk=range(2))
+    found = nonlinear_choice(scans, scan.best, scan.trials[0], 0, scan.settle_s)
+    assert found is not None
+    assert (found.trial, found.is_better) == (None, False)
+    assert "whether a loop is closed cannot be told" in found.said
+    assert "declare --loop open" in found.said
 
 
 def test_a_narx_model_gives_no_gains_and_says_what_would() -> None:

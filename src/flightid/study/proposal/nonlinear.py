@@ -36,6 +36,10 @@ ROUNDING = 1e-9
 """Of a cube: what is left of two levels, which bend nothing that is seen."""
 OF_INPUTS = (Kind.INDEPENDENCE, Kind.EVEN, Kind.EVEN_SQUARED, Kind.BILINEAR)
 """Tests of what an input still tells of residuals, by itself, squared, or times them."""
+DECLARE = (
+    "it may be the controller's inverse that bends; declare --loop open where no output moved an "
+    "input, and it is tried"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +102,8 @@ def nonlinear_choice(
     Returns
     -------
     NonlinearChoice or None
-        None where nothing asks for it, or it would take minutes. None is tried in a closed loop.
+        None where nothing asks for it, or it would take minutes. None is tried in a loop that is
+        closed or may be.
     """
     try:
         why = what_inputs_foretell(linear)
@@ -110,9 +115,11 @@ def nonlinear_choice(
     (output,), inputs = linear.model.outputs, tuple(linear.model.inputs)
     flown = scans.flown(output, inputs)
     loop = loop_seen((flown,), inputs, (output,))
-    if loop.is_closed:
-        # What outputs move of the inputs foretells them as well as a bent vehicle would.
-        return NonlinearChoice(None, False, f"NARX not tried ({why}): {loop}")
+    if loop.is_closed or not loop.is_known:
+        # What outputs move of the inputs foretells them as well as a bent vehicle would, and a
+        # controller's inverse runs freely on its loop's data.
+        unless = "" if loop.is_known else f"; {DECLARE}"
+        return NonlinearChoice(None, False, f"NARX not tried ({why}): {loop}{unless}")
     n_samples = flown.n_samples
     asked = [*_structures(inputs, output, delay, n_samples)]
     if not asked:
