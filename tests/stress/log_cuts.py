@@ -19,6 +19,7 @@ from pathlib import Path
 import flightid as fid
 from flightid.errors import FlightidError
 
+NONE = {"nan", "inf", "None"}
 LOST = "no span holds"
 """Of an axis whose channels and flight are there and still share no span."""
 
@@ -157,7 +158,7 @@ def _inspect(copy: Path, cut: Cut) -> None:
             "a band, and none that could be measured",
         ),
         ("coherence 0.00" in findings + review, "a coherence of 0.00, which none has"),
-        ("nan" in re.findall(r"\w+", findings + review), "a number that is none"),
+        (not NONE.isdisjoint(re.findall(r"\w+", findings + review)), "a number that is none"),
     )
     cut.contradictions += [what for wrong, what in denied if wrong]
 

@@ -16,6 +16,7 @@ from flightid.report.flight import flight_document
 from flightid.report.text import to_text
 from flightid.review.sticks_to_fly import mode_to_fly, what_to_fly
 from flightid.review.verdicts import judge_flight
+from flightid.uncertainty.estimate import Estimate
 from tests.ordinary_log import write_ordinary_log
 
 
@@ -48,6 +49,21 @@ def test_each_step_is_named_by_its_verdict_or_as_not_told(review: fid.FlightRevi
     assert said.startswith("This flight tells the steps of 1 of 2 loops: roll rate is in doubt.")
     untold = replace(review, loops=(replace(rate, step=rate.step[:0]), none)).answer
     assert untold.startswith("This flight tells no step of its 2 loops.")
+
+
+def test_what_a_step_does_not_tell_is_not_said_as_none(review: fid.FlightReview) -> None:
+    """\"Overshoots by None %\" stood in the review of a real flight."""
+    rate = review["roll rate"]
+    for name in ("overshoot", "delay to half"):
+        without = [
+            Estimate(each.name, None, each.unit, reason="no step rises") if each.name == name
+            else each
+            for each in rate.readings
+        ]  # fmt: skip
+        doubtful = replace(review, loops=(replace(rate, readings=tuple(without)),))
+        (said,) = (e.message for e in judge_flight(doubtful) if e.code == "step-roll-rate")
+        assert "None" not in said
+        assert "not told (no step rises)" in said
 
 
 def test_a_fall_comes_first_and_proposes_no_filters(review: fid.FlightReview) -> None:

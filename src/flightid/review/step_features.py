@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from flightid.review.deconvolution import LoopDraws
 from flightid.uncertainty.estimate import Estimate, Reading
 from flightid.uncertainty.quantiles import LEVEL, tails
-from flightid.uncertainty.uneven import DrawnEnds
+from flightid.uncertainty.uneven import DrawnEnds, Reaching
 
 Array = NDArray[np.float64]
 END = 0.2
@@ -126,8 +126,7 @@ def window_features(
         _reading("level", level, "1"),
         _reading("delay to half", half, "s"),
         _reading("rise time", rise, "s"),
-        # Of draws whose level lies on the other side of the limit each goes by its own.
-        _reading("overshoot", np.where(asked, _overshoots(steps), _overshoots(shares)), "%"),
+        _overshoot(np.where(asked, _overshoots(steps), _overshoots(shares))),
         _reading("settling time", _settling(shares, time_s), "s"),
     )
 
@@ -218,6 +217,19 @@ def _settling(shares: Array, time_s: Array) -> Array:
     found = time_s[last] + np.clip(way, 0.0, 1.0) * (time_s[after] - time_s[last])
     found = np.where(outside.any(axis=1), found, time_s[0])
     return np.where(last >= shares.shape[1] - 2, np.nan, found)
+
+
+def _overshoot(values: Array) -> Reading:
+    """Of draws whose level lies on the other side of the limit each goes by its own.
+
+    Where those are most, the estimate by its own level may lie beyond them: ends reach it.
+    """
+    found = _reading("overshoot", values, "%")
+    told = np.isfinite(values)
+    if found.value is not None or not told[0] or np.mean(told) < TOLD:
+        return found
+    ends = Reaching(DrawnEnds(values[1:][told[1:]]), float(values[0]))
+    return Estimate("overshoot", float(values[0]), "%", ends=ends)
 
 
 def _reading(name: str, values: Array, unit: str, why: str = UNTOLD) -> Reading:

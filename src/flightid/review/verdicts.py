@@ -132,14 +132,20 @@ def _step_words(loop: LoopResponse) -> str:
     """What a step does, and whether that is all of it."""
     half, over = cell(loop["delay to half"], 1e3), cell(loop["overshoot"])
     level, creeps = f"{cell(loop['level'])} of what is asked", loop.creeps
-    said = f"{loop.name}: half way after {half} ms, "
+    late = f"half way after {half} ms" if half else f"half way {_untold(loop, 'delay to half')}"
+    said = f"{loop.name}: {late}, "
     if not creeps:
-        return f"{said}ends at {level}, overshoots by {over} %"
+        beyond = f"overshoots by {over} %" if over else f"overshoot {_untold(loop, 'overshoot')}"
+        return f"{said}ends at {level}, {beyond}"
     beyond = f" after an overshoot of {over} %" if over else ""
     return (
         f"{said}reaches {level} in {loop.time_s[-1]:.2g} s{beyond} and {creeps} there: settling is "
         "not seen"
     )
+
+
+def _untold(loop: LoopResponse, name: str) -> str:
+    return f"not told ({loop[name].reason})"
 
 
 LESS_FED = "feed less of the set-point's rate forward"
