@@ -42,6 +42,7 @@ def log(**fields: object) -> Any:
         "gaps": (),
         "findings": (),
         "messages": ("vehicle_attitude",),
+        "duration_s": 60.0,  # seconds, beyond which nothing was to come
     }
     known["path"] = Path("flown.bin")
     return SimpleNamespace(**{**known, **fields})
@@ -104,17 +105,33 @@ def test_a_log_that_ends_before_its_messages_says_nothing_of_its_firmware(tmp_pa
     cut.write_bytes(whole[: whole.index(b"MC_ROLL_P")])
     started = fid.read_log(cut)
     assert not started.parameters
-    assert "ends before its first measurement" in advice.logging(started)
+    assert "ends before anything was measured" in advice.logging(started)
     assert "firmware" not in fid.inspect_log(started).to_text()
     writer = DataflashWriter()
     writer.parameter("LOG_BITMASK", 1.0)
     writer.write(tmp_path / "cut.bin")
     review = fid.review_flight(tmp_path / "cut.bin")
     (told,) = (each for each in review.findings if each.code == "flight-unknown")
-    assert told.action == advice.WHOLE_LOG, "CTUN was to be logged, which was cut off"
+    assert told.action.startswith("hand in the whole log"), (
+        "CTUN was to be logged, which was cut off"
+    )
     assert review.answer.endswith("whether it flew: the log ends before anything was measured.")
     cut.write_bytes(whole)
     assert "hold no SDLOG_PROFILE" in advice.logging(fid.read_log(cut))
+
+
+def test_a_log_cut_soon_after_its_first_rows_is_not_said_to_lack_what_came_later(
+    tmp_path: Path,
+) -> None:
+    """Its outputs' functions were still to come: "keep the beginning of the log" was said of it."""
+    writer = DataflashWriter()
+    writer.parameter("LOG_BITMASK", 1.0)
+    writer.add("RCOU", np.array([1_000_000, 1_100_000]), {"C1": 1500.0, "C2": 1500.0})
+    writer.write(tmp_path / "cut.bin")
+    review = fid.review_flight(tmp_path / "cut.bin")
+    (told,) = (each for each in review.findings if each.code == "flight-unknown")
+    assert told.message == "the log ends 0.1 s after its first stamp"
+    assert told.action.startswith("hand in the whole log")
 
 
 def test_bits_of_the_logging_mask_are_those_of_the_vehicle() -> None:

@@ -39,18 +39,30 @@ def shortest_flight_s() -> float:
 
 DECLARATIONS = {"FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG", "VER"}
 """Messages of ArduPilot that stand before its first measurement."""
-WHOLE_LOG = "hand in the whole log: what is left of it ends before its first measurement"
+TOO_SHORT_S = 1.0
+"""Of an ArduPilot log: it writes parameters between rows, so more may have been to come (ours)."""
 
 
-def is_cut(log: Log) -> bool:
-    """Whether a log ends before anything was measured: nothing tells what its autopilot logs."""
-    return log.kind in ("ardupilot", "px4") and not set(log.messages) - DECLARATIONS
+def cut_short(log: Log) -> str:
+    """Where a log ends before it tells what its autopilot logs, in words; empty: it does not."""
+    if log.kind not in ("ardupilot", "px4"):
+        return ""
+    if not set(log.messages) - DECLARATIONS:
+        return "before anything was measured"
+    if log.kind == "ardupilot" and log.duration_s < TOO_SHORT_S:
+        return f"{log.duration_s:.2g} s after its first stamp"
+    return ""
+
+
+def whole_log(end: str) -> str:
+    """What to do about a log that ends there."""
+    return f"hand in the whole log: what is left of it ends {end}"
 
 
 def logging(log: Log) -> str:
     """Settings that make the autopilot log fast enough."""
-    if is_cut(log):
-        return WHOLE_LOG
+    if end := cut_short(log):
+        return whole_log(end)
     if log.kind == "px4":
         return _px4_logging(log)
     if log.kind in LOGGING:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from flightid.frozen import dataclass
 from flightid.inspection.actuators import Actuators
-from flightid.inspection.advice import WHOLE_LOG, is_cut
+from flightid.inspection.advice import cut_short, whole_log
 from flightid.inspection.signals import Signal, Span, find
 from flightid.inspection.stamps import believable, log_span
 from flightid.inspection.thresholds import (
@@ -110,11 +110,12 @@ def flight_phases(log: Log, actuators: Actuators | None) -> FlightPhases:
 
 def _untold(log: Log, ran: bool | None) -> FlightPhases:
     """That flight is not told from ground, why, and what to log for it."""
+    if end := cut_short(log):
+        reason, action = f"the log ends {end}", whole_log(end)
+        return FlightPhases((), ran, None, reason, is_known=False, action=action)
     reason = "no throttle, motor output, speed or landing detector is logged"
     action = "log the throttle or the motors' outputs as well"
-    if is_cut(log):
-        reason, action = "the log ends before anything was measured", WHOLE_LOG
-    elif log.kind == "ardupilot":
+    if log.kind == "ardupilot":
         action = "log the throttle (CTUN) or the outputs (RCOU) with the parameters (PARM)"
     if "RCOU" in log:
         reason = (
