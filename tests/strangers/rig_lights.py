@@ -13,6 +13,7 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
@@ -25,6 +26,7 @@ from flightid.conventions import Light
 from flightid.errors import FlightidError
 from flightid.evidence import Evidence
 from flightid.findings import Finding
+from flightid.study.identified import ModelResults
 from flightid.study.pipeline import identify_models
 from flightid.study.proposal.propose import propose_study
 from flightid.study.settings import read_settings
@@ -147,8 +149,17 @@ MEASURES = {
 """What is said of quantities that thresholds weigh."""
 
 
-def found_by_run(columns: Columns) -> tuple[Light, tuple[Finding, ...], dict[str, float]]:
-    """Light of the one model of `flightid run rig.csv`, what is not green of it, and measures."""
+@dataclass(frozen=True)
+class Judged:
+    """One model of a run: its light, what is not green of it, and what that measures."""
+
+    light: Light
+    findings: tuple[Finding, ...] = ()
+    measured: dict[str, float] = field(default_factory=dict)
+
+
+def found_by_run(columns: Columns) -> tuple[Judged, ...]:
+    """Every model of `flightid run rig.csv`: a linear one may stand beside a NARX model."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         table = np.column_stack([np.arange(columns["y"].size) * STEP_S, columns["u"], columns["y"]])
@@ -156,16 +167,19 @@ def found_by_run(columns: Columns) -> tuple[Light, tuple[Finding, ...], dict[str
         np.savetxt(path, table, "%.7g", ",", header="time [s],u,y", comments="")
         made = propose_study([path], folder=folder, inputs=["u"], outputs=["y"])
         if not made.models:
-            return Light.RED, made.findings, {}
+            return (Judged(Light.RED, made.findings),)
         settings = read_settings(made.write(folder / "study.toml"))
         tasks, runner = [load_task(each) for each in settings.models], StageRunner(None)
         records = take(settings, tasks, None, folder, runner).records
-        (staged,) = identify_models(tasks, records, None, settings.reduce, runner, lambda *_: None)
-    item = staged.value
+        staged = identify_models(tasks, records, None, settings.reduce, runner, lambda *_: None)
+    return tuple(_judged(each.value) for each in staged)
+
+
+def _judged(item: ModelResults) -> Judged:
     if item.fit is None:
-        return Light.RED, item.findings, {}
+        return Judged(Light.RED, item.findings)
     evidence = item.fit.evidence
-    return (
+    return Judged(
         evidence.light,
         tuple(each for each in evidence.findings if each.light is not Light.GREEN),
         measures(evidence, item.findings),
@@ -184,11 +198,14 @@ def measures(evidence: Evidence, findings: Iterable[Finding]) -> dict[str, float
     return found | {"BAND_LEAST": 1.0 if band is None else band[1] / band[0]}
 
 
-def flown(seed: int, *, columns: Callable[[np.random.Generator], Columns]) -> Trial:
-    """One record through `run`."""
+def flown(
+    seed: int, *, columns: Callable[[np.random.Generator], Columns], barren: bool = False
+) -> Trial:
+    """One record through `run`: its worst light, of a barren one the best that any model has."""
     begun = time.perf_counter()
     try:
-        light, *_ = found_by_run(columns(np.random.default_rng([seed, 1212])))
+        judged = found_by_run(columns(np.random.default_rng([seed, 1212])))
+        light = (min if barren else max)((each.light for each in judged), key=[*Light].index)
     except FlightidError as error:
         return Trial(refusal=str(error), seconds=time.perf_counter() - begun)
     return Trial((), str(light), time.perf_counter() - begun)
@@ -220,7 +237,7 @@ BARREN: dict[str, Callable[[np.random.Generator], Columns]] = {
     },
 }
 LIGHTS = tuple(
-    Case(f"{group}, run, {name}", partial(flown, columns=made))
+    Case(f"{group}, run, {name}", partial(flown, columns=made, barren=group == "barren"))
     for group, rows in (("sound", SOUND), ("barren", BARREN))
     for name, made in rows.items()
 )
@@ -241,14 +258,15 @@ def main() -> None:
     for seed in range(asked.first_seed, asked.first_seed + asked.runs):
         name = names[seed % len(names)]
         try:
-            light, said, told = found_by_run(rows[name](np.random.default_rng([seed, 1212])))
+            models = found_by_run(rows[name](np.random.default_rng([seed, 1212])))
         except FlightidError as error:
-            light, said, told = Light.RED, (Finding("refused", Light.RED, str(error)),), {}
-        lights[str(light)] += 1
-        reasons.update(f"{each.light} {each.code}" for each in said)
-        print(f"{seed:4d} {name:28s} {light} {told}", flush=True)
-        for each in said:
-            print(f"      [{each.light}] {each.code}: {each.message}", flush=True)
+            models = (Judged(Light.RED, (Finding("refused", Light.RED, str(error)),)),)
+        for model in models:
+            lights[str(model.light)] += 1
+            reasons.update(f"{each.light} {each.code}" for each in model.findings)
+            print(f"{seed:4d} {name:28s} {model.light} {model.measured}", flush=True)
+            for each in model.findings:
+                print(f"      [{each.light}] {each.code}: {each.message}", flush=True)
     print(dict(lights))
     for reason, count in reasons.most_common():
         print(f"{count:4d} {reason}")
