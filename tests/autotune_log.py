@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 import numpy as np
 
 from flightid.logs.dataflash.layout import MessageLayout
 from flightid.logs.dataflash.writer import DataflashWriter
+from tests.strangers.noises import ar1
 from tests.strangers.ordinary_flights import Axis, Flown, _biquad, fly
 from tests.ulog_builder import UlogBuilder
 
 TARGET_DEG_S, TARGET_DEG, AGGRESSIVENESS, MIN_D = 90.0, 20.0, 0.1, 0.001
+WAIT_S = 0.5
+"""Of the loop's own run before a twitch; the slowest gust's memory is 0.4 s."""
 RATE_D_UP, RATE_D_DOWN, RATE_P_UP = 0, 1, 2
 LAYOUTS = (
     MessageLayout("ATUN", 221, "QBBfffffff", "TimeUS,Axis,TuneStep,Targ,Min,Max,RP,RD,SP,ddt",
@@ -40,11 +43,21 @@ class Tuned:
 def _twitch(
     axis: Axis, random: np.random.Generator, sign: float
 ) -> tuple[Flown, int, float, float]:
-    """One rate twitch until the vehicle leans 20°, with what it measures, deg/s."""
-    n = 400
-    wanted = np.full(n, sign * np.radians(TARGET_DEG_S))
-    noise = axis.noise * random.standard_normal(n)
-    flown = fly(axis, None, wanted, np.zeros(n), noise)
+    """One rate twitch until the vehicle leans 20°, with what it measures, deg/s.
+
+    The loop, its gyro noise and the air run before it, as they do in flight: what the twitch begins
+    with is nowhere in the log.
+    """
+    before, n = round(WAIT_S * axis.loop_hz), 400
+    wanted = np.zeros(before + n)
+    wanted[before:] = sign * np.radians(TARGET_DEG_S)
+    noise = axis.noise * random.standard_normal(before + n)
+    air = axis.gust * ar1(random, before + n, np.exp(-1.0 / (axis.loop_hz * axis.gust_s)))
+    whole = fly(axis, None, wanted, air, noise)
+    flown = Flown(*(getattr(whole, each.name)[before:] for each in fields(whole)))
+    flown = replace(
+        flown, time_s=flown.time_s - flown.time_s[0], angle=flown.angle - flown.angle[0]
+    )
     leaned = np.flatnonzero(np.abs(flown.angle) >= np.radians(TARGET_DEG))
     stop = int(leaned[0]) if leaned.size else n
     rate = sign * np.degrees(flown.rate[:stop])
@@ -126,15 +139,18 @@ def write_px4(
     *,
     states: tuple[int, ...] = (2, 11),
     seed: int = 5,
+    log_hz: float = 100.0,
 ) -> None:
     """PX4's steps on roll for ten seconds; the last state follows them."""
     random, rate_hz, n = np.random.default_rng(seed), axis.loop_hz, int(10 * axis.loop_hz)
-    every = int(rate_hz // 100)
+    every = int(rate_hz // log_hz)
     wanted, at, sign, count = np.zeros(n), 0, 1.0, 5
     while at < n:
         wanted[at : at + int(0.04 * count * rate_hz)] = 0.7 * sign
         at, sign, count = at + int(0.04 * count * rate_hz), -sign, count - 1 or 10
-    flown = fly(axis, None, wanted, np.zeros(n), axis.noise * random.standard_normal(n))
+    noise = axis.noise * random.standard_normal(n)
+    air = axis.gust * ar1(random, n, np.exp(-1.0 / (rate_hz * axis.gust_s)))
+    flown = fly(axis, None, wanted, air, noise)
     builder = UlogBuilder()
     for name, value in (
         ("IMU_GYRO_CUTOFF", axis.gyro_hz), ("IMU_DGYRO_CUTOFF", axis.derivative_hz),
@@ -164,7 +180,7 @@ def write_px4(
         stamp = 2_000_000 + int(1e6 * flown.time_s[k])
         builder.sample(0, "QQ3f", stamp, stamp, float(flown.rate[k]), 0.0, 0.0)
         builder.sample(1, "QQ3f", stamp, stamp, float(flown.command[k]), 0.0, 0.0)
-        if k % (every * 10) == 0:
+        if k % int(rate_hz // 10) == 0:
             builder.sample(2, "Q9fB", stamp, *[3.0] * 5, *tuned, 5.0, states[0])
     end = 2_000_000 + int(1e6 * n / rate_hz) + 100_000
     for place, state in enumerate(states[1:]):

@@ -1,7 +1,7 @@
 """Margins that a second opinion on an autotune gives: do their intervals hold those of the vehicle.
 
-Twitches and steps of `tests/autotune_log.py`, whose loops share nothing with flightid's. Counted,
-not asserted: margins hold always, for they are wide, and crossovers seven times in eight.
+Twitches and steps of `tests/autotune_log.py`, whose loops share nothing with flightid's, with noise
+of the gyro that the loop feeds back (rad/s at the gyro, a tick) and gusts (rad/s²).
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ def by_twitches(path: Path, seed: int, axis: Axis) -> Axis:
     return replace(axis, p=gains.p, i=gains.p, d=gains.d)
 
 
-def by_steps(path: Path, seed: int, axis: Axis) -> Axis:
+def by_steps(path: Path, seed: int, axis: Axis, *, log_hz: float = 100.0) -> Axis:
     """PX4's."""
-    write_px4(path, axis, (0.15, 1.5, 0.02), seed=seed)
+    write_px4(path, axis, (0.15, 1.5, 0.02), seed=seed, log_hz=log_hz)
     return replace(axis, p=0.15, i=0.225, d=0.003)
 
 
@@ -67,11 +67,28 @@ def _read(which: str, found: Margins, axis: Axis) -> list[Reading]:
     ]
 
 
-LIGHTS = tuple(
-    Case(f"autotune, {name}", partial(fly, axis=axis, tuned=tuned, suffix=suffix))
-    for name, axis, tuned, suffix in (
-        ("ArduCopter's twitches", CALM, by_twitches, ".bin"),
-        ("ArduCopter's twitches, heavy vehicle", HEAVY, by_twitches, ".bin"),
-        ("PX4's steps", PX4, by_steps, ".ulg"),
-    )
+AIR = ((0.02, 0.0), (0.05, 0.0), (0.1, 0.0), (0.2, 0.0), (0.02, 0.3), (0.1, 0.3), (0.2, 0.3))
+"""Gyro noise and gusts. Gains by twitches are small where noise is: D goes to its least."""
+
+
+def _cases(
+    name: str, axis: Axis, tuned: Callable[[Path, int, Axis], Axis], suffix: str
+) -> list[Case]:
+    return [
+        Case(
+            f"autotune, {name}, noise {noise:g}" + (f", gusts {gust:g}" if gust else ""),
+            partial(fly, axis=replace(axis, noise=noise, gust=gust), tuned=tuned, suffix=suffix),
+        )
+        for noise, gust in AIR
+    ]
+
+
+LIGHTS = (
+    *_cases("ArduCopter's twitches", CALM, by_twitches, ".bin"),
+    *_cases("heavy vehicle", HEAVY, by_twitches, ".bin"),
+    *_cases("PX4's steps at the loop's rate", PX4, partial(by_steps, log_hz=400.0), ".ulg"),
+    Case(
+        "autotune, PX4's steps at a quarter of it",
+        partial(fly, axis=PX4, tuned=by_steps, suffix=".ulg"),
+    ),
 )

@@ -28,9 +28,10 @@ ORDER = (Light.GREEN, Light.UNKNOWN, Light.AMBER, Light.RED)
 def review_autotune(log: Log | str | Path) -> AutotuneReview:
     """Say what an autotune did, why it failed, and what margins its gains have.
 
-    A model of each axis (rate damping, motor lag, delay) is fitted by output error to the twitches
-    of ArduCopter or the steps of PX4; autotune's gains and those before are closed around it with
-    the autopilot's own filters, and their margins carry the covariance of the fit.
+    A model of each axis (rate damping, motor lag, delay) is fitted to the twitches of ArduCopter or
+    the steps of PX4, beside the noise of the gyro and of the air, by the likelihood of what each
+    sample adds to the past; autotune's gains and those before are closed around it with the
+    autopilot's own filters, and their margins carry the covariance of the fit.
 
     Parameters
     ----------
@@ -49,13 +50,14 @@ def review_autotune(log: Log | str | Path) -> AutotuneReview:
     Assumes
     -------
     Small signals, as everywhere in margins: a twitch that drives motors to their limits looks like
-    a slower vehicle. Noise that the loop feeds back into the output biases output error: twitches
-    are far above it.
+    a slower vehicle. Disturbances are Gaussian: gyro noise of a low order behind its filter, and
+    accelerations that are white or steady for a twitch.
 
     Reference
     ---------
     ArduPilot, libraries/AC_AutoTune; PX4, src/modules/mc_autotune_attitude_control; Klein &
-    Morelli, *Aircraft System Identification*, §6.1 (output error); SAE AS94900 (margins).
+    Morelli, *Aircraft System Identification*, §5.4 (maximum likelihood); Ljung, *System
+    Identification*, 2nd ed., §13.4 (closed loops); SAE AS94900 (margins).
 
     Example
     -------

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,14 +16,13 @@ from flightid.conventions import Light
 from flightid.errors import FlightidError
 from flightid.frozen import dataclass
 from flightid.identification import Fit
-from flightid.identification.identify import identify
 from flightid.identification.withheld_intervals import without_intervals
 from flightid.inspection.signals import Signal, Span, find, inside, records
 from flightid.inspection.stamps import believable
 from flightid.logs import Log
 from flightid.models.transfer.description import transfer_from_table
 from flightid.models.transfer.model import TransferFunctionModel
-from flightid.record import Record
+from flightid.review.autotune.twitch_fit import TwitchRecord, fit_stretches
 
 Complex = NDArray[np.complex128]
 PID = {"roll": "PIDR", "pitch": "PIDP", "yaw": "PIDY"}
@@ -33,6 +34,8 @@ LOWEST_RAD_S, BELOW_NYQUIST = 0.5, 0.95
 """Where margins are looked for: a sampled controller has no crossing above half of its rate."""
 PAST_S = 0.08
 """Longer than the delays and most of the lag of a vehicle's motors."""
+LONGEST_S = 0.5
+"""Of a stretch: what is drawn of it (rate, slow gusts) is drawn once."""
 SLOWEST_HZ = 40.0
 """Below it a twitch of a fifth of a second has too few samples."""
 AT_LOOP = 0.75
@@ -90,16 +93,16 @@ def second_opinion(
         What autotune found.
     """
     try:
-        found = _records(log, axis, spans)
+        found = _stretches(log, axis, spans)
         if isinstance(found, str):
             return SecondOpinion(axis, reason=found)
         loop = axis_loop_of(log, axis, at_s=spans[0][0])
-        model = template(axis, loop.gains.get(loop.names.get("gyro_filter", ""), 0.0))
-        fit = identify(model, found, method="output_error", loop="closed", input_bias=True)
+        filter_hz = loop.gains.get(loop.names.get("gyro_filter", ""), 0.0)
+        fit = fit_stretches(template(axis, filter_hz), found, filter_hz)
     except FlightidError as error:
         return SecondOpinion(axis, reason=str(error))
-    used = sum(record.duration_s for record in found)
-    rate = 1.0 / found[0].sample_time_s
+    used = sum(each.record.duration_s for each in found)
+    rate = 1.0 / found[0].record.sample_time_s
     if fit.covariance is not None and rate < AT_LOOP * loop.loop_rate_hz:
         fit = without_intervals(
             fit,
@@ -171,8 +174,8 @@ def _controller(loop: AxisLoop) -> Callable[[Complex], Complex]:
     return response
 
 
-def _records(log: Log, axis: str, spans: Sequence[Span]) -> list[Record] | str:
-    """Records from the fastest stream of output and rate; in words why there are none."""
+def _stretches(log: Log, axis: str, spans: Sequence[Span]) -> list[TwitchRecord] | str:
+    """Stretches of the fastest stream of output and rate; in words why there are none."""
     pairs = [pair for pair in (_of_rate(log, axis), _of_pid(log, axis)) if pair is not None]
     if not pairs:
         return "the log does not hold the axis' output with its rate"
@@ -183,46 +186,59 @@ def _records(log: Log, axis: str, spans: Sequence[Span]) -> list[Record] | str:
             f"output and rate are logged at {speeds[fastest]:.3g} Hz while it twitches: "
             f"{SLOWEST_HZ:g} Hz are needed"
         )
-    command, rate, still = pairs[fastest]
     made = [
-        record
-        for start, stop in spans
-        for record in _with_past(command, rate, still, start, stop)
-        if record.n_samples >= LEAST_SAMPLES
+        stretch
+        for span in spans
+        for start, stop in _parts(*span)
+        for stretch in _with_past(*pairs[fastest], start, stop)
+        if stretch.record.n_samples - stretch.lead >= LEAST_SAMPLES
     ]
     return made[-MOST_RECORDS:] or "no test is logged without gaps"
 
 
+def _parts(start: float, stop: float) -> list[Span]:
+    """A span in parts of one length, none longer than `LONGEST_S`."""
+    edges = np.linspace(start, stop, max(1, int(np.ceil((stop - start) / LONGEST_S))) + 1)
+    return [(float(a), float(b)) for a, b in itertools.pairwise(edges)]
+
+
 def _with_past(
     command: Signal, rate: Signal, still: NDArray[np.float64], start: float, stop: float
-) -> list[Record]:
-    """Records of one span with what was before it, which is still in the vehicle's delays.
+) -> list[TwitchRecord]:
+    """Stretches of one span with the output before it, which is still in motors and delays.
 
     ArduPilot logs its PIDs at full rate from the twitch on alone. It begins one when the vehicle is
-    level and quiet: then the output is the integrator's, and the rate what it is at first.
+    level and quiet: then the output is the integrator's. Elsewhere the past is in the log.
     """
     step = 1.0 / min(_rate_in(each, [(start, stop)]) for each in (command, rate))
-    earlier = (start - PAST_S, stop)
-    if (
-        np.count_nonzero(inside(command.time_s, [(start - PAST_S, start - step)]))
-        > 0.5 * PAST_S / step
-    ):
-        return records([_cut(command, earlier), _cut(rate, earlier)], {command.name}, [earlier])
+    logged = inside(command.time_s, [(start - PAST_S, start - step)])
+    if np.count_nonzero(logged) > 0.5 * PAST_S / step:
+        earlier = (start - PAST_S, stop)
+        about = float(np.mean(command.values[inside(command.time_s, [earlier])]))
+        cut = [_cut(_less(command, about), earlier), _cut(rate, earlier)]
+        return [
+            TwitchRecord(record, int(np.count_nonzero(record.time_s < start - 0.5 * step)))
+            for record in records(cut, {command.name}, [earlier])
+        ]
     past = start - step * np.arange(round(PAST_S / step), 0, -1)
-    first = int(np.searchsorted(command.time_s, start))
-    begun = [_cut(each, (start, stop)) for each in (command, rate)]
-    before = (float(still[min(first, still.size - 1)]), float(begun[1].values[0]))
+    first = min(int(np.searchsorted(command.time_s, start)), still.size - 1)
+    level = float(still[first])
     whole = [
-        Signal(
-            each.name,
-            np.concatenate([past, each.time_s]),
-            np.concatenate([np.full(past.size, value), each.values]),
-            each.unit,
-            each.label,
+        replace(
+            each,
+            time_s=np.concatenate([past, each.time_s]),
+            values=np.concatenate([np.zeros(past.size), each.values]),
         )
-        for each, value in zip(begun, before, strict=True)
+        for each in (_cut(_less(command, level), (start, stop)), _cut(rate, (start, stop)))
     ]
-    return records(whole, {command.name}, [(float(past[0]), stop)])
+    return [
+        TwitchRecord(record, past.size)
+        for record in records(whole, {command.name}, [(float(past[0]), stop)])
+    ]
+
+
+def _less(signal: Signal, level: float) -> Signal:
+    return replace(signal, values=signal.values - level)
 
 
 def _cut(signal: Signal, span: Span) -> Signal:

@@ -1,0 +1,241 @@
+"""A fit to short stretches of one axis in its rate loop, whose noise the loop feeds back."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.frozen import dataclass
+from flightid.identification import Fit
+from flightid.identification.damaged_samples import with_damage_judged
+from flightid.identification.fit_evidence import evidence_of
+from flightid.identification.fitted_record import FittedRecord
+from flightid.identification.innovation_tests import InnovationTests, innovation_tests
+from flightid.identification.multistart import DenseEnd
+from flightid.identification.output_error.search import searched
+from flightid.identification.records.options import RecordOptions
+from flightid.identification.records.setup import RecordSet, prepare_records
+from flightid.identification.regression.fit import Inner, Knowledge, assemble, require_seen
+from flightid.identification.regression.options import RegressionOptions
+from flightid.identification.withheld_intervals import without_intervals
+from flightid.models.transfer.model import TransferFunctionModel
+from flightid.record import Record, Step
+from flightid.review.autotune.twitch_noise import SOURCES, TICKS
+from flightid.review.autotune.twitch_search import TwitchEnd, TwitchSearch
+from flightid.uncertainty.blocks import RecordBlock
+from flightid.uncertainty.coloured_residuals import residual_covariance
+from flightid.uncertainty.foretold import is_material
+
+Array = NDArray[np.float64]
+HOLD = "first"
+ORDERS = (0, 2, 4)
+"""Of the colour of a gyro's noise before its filter; the first that leaves innovations white."""
+
+
+@dataclass(frozen=True)
+class TwitchRecord:
+    """A record whose first samples are the inputs' past alone.
+
+    Attributes
+    ----------
+    record : Record
+        Inputs as departures from those that hold the vehicle still.
+    lead : int
+        Samples before the first measured rate.
+    """
+
+    record: Record
+    lead: int
+
+
+def fit_stretches(
+    model: TransferFunctionModel, stretches: Sequence[TwitchRecord], gyro_filter_hz: float
+) -> Fit:
+    """Fit a rate's answer to its command where the loop feeds the gyro's noise back.
+
+    Parameters
+    ----------
+    model : TransferFunctionModel
+        From `template`: K, L, T_m and tau.
+    stretches : sequence of TwitchRecord
+    gyro_filter_hz : float
+        Hz; 0 where the rate is not filtered.
+
+    Returns
+    -------
+    Fit
+        Records hold predictions one sample ahead. Without intervals where innovations are foretold
+        by more than bars can hold.
+
+    Raises
+    ------
+    FitError
+        The stretches cannot tell parameters apart.
+
+    Assumes
+    -------
+    Gaussian disturbances: noise before the gyro's filter, of any colour of low order, and white
+    and steady accelerations. Inputs that answer measured rates of the past alone, and no faster
+    than the vehicle's delay of a sample.
+
+    Reference
+    ---------
+    Ljung, *System Identification*, 2nd ed., §13.4 (direct identification in a closed loop with a
+    noise model that holds the truth); Nickell (1981), Econometrica 49 (what numbers of each short
+    stretch do to those that all share); Pinheiro & Bates, *Mixed-Effects Models in S and S-PLUS*,
+    ch. 2 (numbers that are drawn instead).
+    """
+    options = RecordOptions(initial_state="trim", output_bias=False, input_bias=False, hold=HOLD)
+    prepared = prepare_records(model, [each.record for each in stretches], options)
+    # Where the search begins: as if nothing were fed back.
+    found = searched(model, prepared, options)
+    begun = model.with_values({p.name: p.value or 0.0 for p in found.fitted.parameters.free})
+    search = TwitchSearch(prepared, [each.lead for each in stretches], gyro_filter_hz)
+    end, tests = _searched(search, begun, prepared, stretches)
+    return _fit(model, search, end, tests, stretches)
+
+
+def _searched(
+    search: TwitchSearch,
+    begun: TransferFunctionModel,
+    prepared: RecordSet,
+    stretches: Sequence[TwitchRecord],
+) -> tuple[TwitchEnd, InnovationTests]:
+    """The likelier form of the filter, and the first colour that leaves innovations white."""
+    best = search.search(begun, ticks=TICKS[0], order=0, start=None)
+    other = search.search(best.model, ticks=TICKS[1], order=0, start=best)
+    if other.cost < best.cost:
+        best = other
+    tests = _tested(search, best, prepared, stretches)
+    for order in ORDERS[1:]:
+        if tests.is_white:
+            break
+        best = search.search(best.model, ticks=best.noise.shape.ticks, order=order, start=best)
+        tests = _tested(search, best, prepared, stretches)
+    return best, tests
+
+
+def _tested(
+    search: TwitchSearch, end: TwitchEnd, prepared: RecordSet, stretches: Sequence[TwitchRecord]
+) -> InnovationTests:
+    outputs = [y[:, s.lead :] for (_, y, _), s in zip(prepared.arrays, stretches, strict=True)]
+    return innovation_tests(
+        _rows(search, end.innovations),
+        _past(search, stretches),
+        outputs,
+        (len(end.noise.partial), 0),
+    )
+
+
+def _past(search: TwitchSearch, stretches: Sequence[TwitchRecord]) -> list[Array]:
+    """Inputs of the sample before: one of this tick holds the rate of this tick already."""
+    return [
+        inputs[:, each.lead - 1 : -1]
+        for (inputs, _, _), each in zip(search.prepared.arrays, stretches, strict=True)
+    ]
+
+
+def _rows(search: TwitchSearch, padded: Array) -> list[Array]:
+    return [row[None, :n] for row, n in zip(padded, search.lengths, strict=True)]
+
+
+def _fit(
+    structure: TransferFunctionModel,
+    search: TwitchSearch,
+    end: TwitchEnd,
+    tests: InnovationTests,
+    stretches: Sequence[TwitchRecord],
+) -> Fit:
+    model = end.model
+    free = model.parameters.free
+    values = np.array([float(p.value or 0.0) for p in free])
+    inner = Inner.of(model, values)
+    slopes = [
+        np.ascontiguousarray(end.slopes[inner.mask, k, :n].T) for k, n in enumerate(search.lengths)
+    ]
+    jacobian = np.concatenate(slopes)
+    require_seen(inner, jacobian)
+    blocks = [
+        RecordBlock.of(each[None], np.ones((1, len(each), 0)), row)
+        for each, row in zip(slopes, _rows(search, end.white), strict=True)
+    ]
+    found = residual_covariance(blocks, inputs=_past(search, stretches))
+    ratio = np.sqrt(np.sum(end.innovations**2) / np.sum(search.measured**2))
+    tests = tests.fitted(found.correlations, [float(ratio)])
+    times = _longer(tests)
+    known = Knowledge(
+        jacobian,
+        found.covariance * (times or 1.0) ** 2,
+        found.freedom,
+        "innovations",
+        found.colour,
+        found.agreement,
+    )
+    residuals = np.concatenate([row[0] for row in _rows(search, end.white)])
+    ended = DenseEnd(
+        values, end.cost, end.turns, "cost" if end.is_converged else "iterations",
+        residuals, jacobian,
+    )  # fmt: skip
+    records = [_measured(each) for each in stretches]
+    predictions = [
+        _predicted(record, model.outputs[0], row[0])
+        for record, row in zip(records, _rows(search, end.innovations), strict=True)
+    ]
+    fit = assemble(
+        "maximum likelihood of stretches in a loop", inner, [[ended]], known,
+        _costs(model.outputs[0], records, predictions), records,
+        [
+            FittedRecord(record, each, model.outputs)
+            for record, each in zip(records, predictions, strict=True)
+        ],
+        RegressionOptions(hold=HOLD),
+        findings=[*tests.findings(biased=True, times=times)],
+        extra={"noise": _described(end)},
+        residual_horizon=1,
+    )  # fmt: skip
+    fit = with_damage_judged(replace(fit, structure=structure, method="output_error"), records)
+    if times is None:
+        fit = without_intervals(fit, tests.why_biased)
+    return replace(fit, evidence=evidence_of(fit, records, "closed"))
+
+
+def _longer(tests: InnovationTests) -> float | None:
+    """Times by which bars hold what the tests say is missing; None: it shows in the rate.
+
+    A step of a fifth of a second is far above its noise: filters that run by ticks, taken as smooth
+    ones, are foretold long before they matter. What is missing bends no estimate by more of its
+    standard errors than all that is missing has itself.
+    """
+    if tests.is_independent or is_material(tests.worth_percent):
+        return tests.widening(biased=True)
+    return replace(tests, worth_percent=0.0).widening(biased=True)
+
+
+def _described(end: TwitchEnd) -> dict[str, object]:
+    sizes = dict(zip(SOURCES, map(float, np.exp(end.noise.sizes)), strict=True))
+    return {**sizes, "colour": np.tanh(end.noise.partial).tolist()}
+
+
+def _measured(stretch: TwitchRecord) -> Record:
+    """The stretch without the inputs' past."""
+    time_s = stretch.record.time_s
+    return stretch.record.segment(float(time_s[stretch.lead]), float(time_s[-1]) + 1.0)
+
+
+def _predicted(record: Record, output: str, innovations: Array) -> Record:
+    step = Step("identify", {"method": "maximum likelihood, one-step predictions"})
+    return record.replace({output: record[output] - innovations}, step=step)
+
+
+def _costs(
+    output: str, measured: Sequence[Record], predicted: Sequence[Record]
+) -> dict[str, float]:
+    """Percent of the rate's variance, about zero, that predictions leave."""
+    left = sum(
+        float(np.sum((m[output] - p[output]) ** 2))
+        for m, p in zip(measured, predicted, strict=True)
+    )
+    return {output: 100.0 * left / sum(float(np.sum(m[output] ** 2)) for m in measured)}

@@ -1,0 +1,228 @@
+"""Maximum likelihood of short stretches in a loop: the vehicle and what disturbs it, in turns.
+
+Errors of the free run are whitened by the triangular root of their covariance, which looks back
+alone: what a loop feeds back is known to a prediction from the past, so it does not bend estimates
+as it bends a free run's. Steps of Gauss and Newton move the vehicle, of Fisher's scores the noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from flightid.frozen import dataclass
+from flightid.identification.output_error.distinct import run_with_slopes
+from flightid.identification.records.setup import RecordSet
+from flightid.models.transfer.model import TransferFunctionModel
+from flightid.review.autotune.twitch_noise import SOURCES, NoiseShape, TwitchNoise
+
+Array = NDArray[np.float64]
+TURNS, ENOUGH = 60, 1e-3
+"""Most turns, and the gain in log-likelihood below which they end."""
+SHARES = (1.0, 0.5, 0.2, 0.05, 0.01)
+LARGEST_STEP = 1.0
+"""Of a logarithm or a partial correlation in one turn."""
+FLOOR, CEILING = 1e-5, 1e3
+"""Of sizes, over the deviation of the errors that the search begins with."""
+FIRST_SHARES = (0.3, 0.03, 0.1, 0.1, 0.3)
+"""Sizes where the search begins, over that deviation."""
+FOLLOWED = 10
+"""Turns in which the shape of the noise follows the damping; then it stands, so that turns end."""
+RIDGE = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class TwitchEnd:
+    """Where the search ended.
+
+    Attributes
+    ----------
+    model : TransferFunctionModel
+    noise : TwitchNoise
+    white : ndarray, shape (n_stretches, count)
+        Innovations of unit variance; zero behind the end of a stretch.
+    slopes : ndarray, shape (n_free, n_stretches, count)
+        Derivatives of the model's outputs, whitened.
+    deviations : ndarray, shape (count,)
+        Of the innovations, rad/s.
+    cost : float
+        Negative logarithm of the likelihood, without its constant.
+    turns : int
+    is_converged : bool
+    """
+
+    model: TransferFunctionModel
+    noise: TwitchNoise
+    white: Array
+    slopes: Array
+    deviations: Array
+    cost: float
+    turns: int
+    is_converged: bool
+
+    @property
+    def innovations(self) -> Array:
+        """Errors of predictions one sample ahead, rad/s."""
+        return self.white * self.deviations
+
+
+class TwitchSearch:
+    """Stretches of one axis, which hold inputs from before their first measured rate on.
+
+    Parameters
+    ----------
+    prepared : RecordSet
+    leads : sequence of int
+        Samples of each record before its first measured rate.
+    gyro_filter_hz : float
+    """
+
+    def __init__(self, prepared: RecordSet, leads: Sequence[int], gyro_filter_hz: float) -> None:
+        self.prepared, self.leads, self.gyro_filter_hz = prepared, leads, gyro_filter_hz
+        measured = [
+            outputs[0, lead:] for (_, outputs, _), lead in zip(prepared.arrays, leads, strict=True)
+        ]
+        self.lengths = np.array([len(each) for each in measured])
+        self.count = int(self.lengths.max())
+        self.measured = np.array([self._padded(each) for each in measured])
+        self.inside = np.arange(self.count) < self.lengths[:, None]
+        self.sample_time_s = float(np.median([dt for _, _, dt in prepared.arrays]))
+
+    def _padded(self, row: Array) -> Array:
+        return np.pad(row, (0, self.count - len(row)))
+
+    def runs(self, model: TransferFunctionModel, *, sloped: bool) -> tuple[Array, Array]:
+        """Errors (n_stretches, count) of free runs from rest, and slopes of the runs."""
+        errors, slopes = [], []
+        for place, (own, lead) in enumerate(zip(self.prepared.own, self.leads, strict=True)):
+            run, slope = run_with_slopes(model, self.prepared, None, place, own, sloped=sloped)
+            errors.append(self.measured[place] - self._padded(run[0, lead:]))
+            slopes.append([self._padded(each) for each in slope[0, lead:].T])
+        return np.array(errors), np.array(slopes).reshape(len(errors), -1, self.count).swapaxes(
+            0, 1
+        )
+
+    def whitened(self, root: Array, rows: Array) -> Array:
+        """Rows without their covariance, by what lies before each sample alone."""
+        flat = rows.reshape(-1, self.count).T
+        found = scipy.linalg.solve_triangular(root, flat, lower=True, check_finite=False)
+        return np.asarray(found.T.reshape(rows.shape) * self.inside)
+
+    def cost(self, root: Array, white: Array) -> float:
+        """Negative log-likelihood without its constant."""
+        level = np.cumsum(np.log(np.diag(root)))[self.lengths - 1]
+        return float(level.sum() + 0.5 * np.sum(white**2))
+
+    def search(
+        self, model: TransferFunctionModel, *, ticks: int, order: int, start: TwitchEnd | None
+    ) -> TwitchEnd:
+        """The likeliest vehicle and noise whose gyro's colour has that order.
+
+        `start` is an end of a lower order, else the noise begins at shares of the errors.
+        """
+        errors, slopes = self.runs(model, sloped=True)
+        deviation = float(np.sqrt(np.mean(errors[self.inside] ** 2)))
+        limits = np.log(deviation * FLOOR), np.log(deviation * CEILING)
+        damping = float(model.parameters["L"].value or 0.0)
+        shape = NoiseShape(self.count, self.sample_time_s, self.gyro_filter_hz, damping, ticks)
+        sizes = np.log(deviation * np.array(FIRST_SHARES)) if start is None else start.noise.sizes
+        known = np.zeros(0) if start is None else start.noise.partial
+        noise = TwitchNoise(shape, sizes, np.pad(known, (0, order - len(known))))
+        root = _root(noise)
+        cost, turn, settled = np.inf, 0, False
+        for turn in range(1, TURNS + 1):
+            before = cost
+            model, errors, slopes = self._vehicle(model, root, errors, slopes)
+            if turn <= FOLLOWED:
+                damping = float(model.parameters["L"].value or 0.0)
+                noise = replace(noise, shape=replace(noise.shape, damping=damping))
+            noise, root, cost = self._disturbance(noise, errors, limits)
+            settled = turn > FOLLOWED // 2 and abs(before - cost) < ENOUGH
+            if settled:
+                break
+        white = self.whitened(root, errors)
+        return TwitchEnd(
+            model, noise, white, self.whitened(root, slopes), np.diag(root), cost, turn, settled
+        )
+
+    def _vehicle(
+        self, model: TransferFunctionModel, root: Array, errors: Array, slopes: Array
+    ) -> tuple[TransferFunctionModel, Array, Array]:
+        """One step of Gauss and Newton, inside the bounds."""
+        free = model.parameters.free
+        now = np.array([float(p.value or 0.0) for p in free])
+        low, high = (np.array([getattr(p, end) for p in free]) for end in ("minimum", "maximum"))
+        white = self.whitened(root, errors)
+        columns = self.whitened(root, slopes).reshape(len(free), -1).T
+        size = np.linalg.norm(columns, axis=0)
+        size = np.where(size > 0.0, size, 1.0)
+        step = np.linalg.lstsq(columns / size, white.ravel(), rcond=RIDGE)[0] / size
+        level = float(np.sum(white**2))
+        for share in SHARES:
+            values = np.clip(now + share * step, low, high)
+            names = (p.name for p in free)
+            tried = model.with_values(dict(zip(names, map(float, values), strict=True)))
+            fresh, slope = self.runs(tried, sloped=True)
+            if float(np.sum(self.whitened(root, fresh) ** 2)) < level:
+                return tried, fresh, slope
+        return model, errors, slopes
+
+    def _disturbance(
+        self, noise: TwitchNoise, errors: Array, limits: tuple[float, float]
+    ) -> tuple[TwitchNoise, Array, float]:
+        """One step of Fisher's scores."""
+        root = _root(noise)
+        white = self.whitened(root, errors)
+        cost = self.cost(root, white)
+        score, information = self._scores(root, white, noise.slopes())
+        scale = np.sqrt(np.diag(information)) + np.finfo(float).tiny
+        unit = information / np.outer(scale, scale) + RIDGE * np.eye(len(scale))
+        step = np.linalg.solve(unit, score / scale) / scale
+        # Each by itself: a size that goes to nothing has no bottom, and would shorten all others.
+        step = np.clip(step, -LARGEST_STEP, LARGEST_STEP)
+        for share in SHARES:
+            numbers = noise.numbers - share * step
+            numbers[: len(SOURCES)] = np.clip(numbers[: len(SOURCES)], *limits)
+            tried = noise.at(numbers)
+            try:
+                fresh = _root(tried)
+            except np.linalg.LinAlgError:
+                continue
+            found = self.cost(fresh, self.whitened(fresh, errors))
+            if found < cost:
+                return tried, fresh, found
+        return noise, root, cost
+
+    def _scores(self, root: Array, white: Array, slopes: Sequence[Array]) -> tuple[Array, Array]:
+        """Slopes of the cost by the noise's numbers, and Fisher's information on them.
+
+        That of a stretch is of the leading block of what the longest has.
+        """
+        turned = []
+        for slope in slopes:
+            half = scipy.linalg.solve_triangular(root, slope, lower=True, check_finite=False)
+            turned.append(
+                scipy.linalg.solve_triangular(root, half.T, lower=True, check_finite=False)
+            )
+        ends = self.lengths - 1
+        score = [
+            0.5 * float(np.cumsum(np.diag(t))[ends].sum() - np.sum((white @ t) * white))
+            for t in turned
+        ]
+        information = np.zeros((len(turned), len(turned)))
+        for i, one in enumerate(turned):
+            for j, other in enumerate(turned[: i + 1]):
+                both = one * other
+                # Row by row what each sample adds to the leading block.
+                added = 2.0 * np.tril(both, -1).sum(axis=1) + np.diag(both)
+                information[i, j] = information[j, i] = 0.5 * np.cumsum(added)[ends].sum()
+        return np.array(score), information
+
+
+def _root(noise: TwitchNoise) -> Array:
+    covariance = noise.covariance()
+    return np.asarray(scipy.linalg.cholesky(covariance, lower=True, check_finite=False))

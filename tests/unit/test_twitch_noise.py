@@ -1,0 +1,77 @@
+"""Noise of short stretches in a loop against formulas, and estimates that it no longer bends."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy
+
+import flightid as fid
+from flightid.review.autotune.twitch_noise import NoiseShape, TwitchNoise
+from tests.autotune_log import true_margins, write_ardupilot
+from tests.closeness import assert_close
+from tests.strangers.ordinary_flights import Axis
+
+NOISY = Axis(gust=0.3, noise=0.2, p=0.08, i=0.08, d=0.002)
+SHAPE = NoiseShape(count=40, sample_time_s=0.0025, gyro_filter_hz=30.0, damping=-3.0)
+
+
+def test_noise_behind_a_fast_filter_has_the_covariance_of_a_butterworth_filter() -> None:
+    found = replace(SHAPE, ticks=8).gyro(np.zeros(0))[0]
+    lag = np.sqrt(2.0) * np.pi * 30.0 * 0.0025 * np.arange(40)
+    assert_close(found, np.exp(-lag) * (np.cos(lag) + np.sin(lag)), atol=3e-3, why="by eighths")
+
+
+def test_covariances_are_those_of_noise_that_is_drawn() -> None:
+    """White noise through the filter of every tick and a colour of its own; and a white gust."""
+    random, partial = np.random.default_rng(3), np.array([0.4, -0.2])
+    first, second = np.tanh(partial)
+    colour = [1.0, -(first - second * first), -second]
+    b, a = scipy.signal.butter(2, 30.0, fs=400.0)
+    drawn = random.standard_normal((4000, 440))
+    seen = scipy.signal.lfilter(b, a, scipy.signal.lfilter([1.0], colour, drawn))[:, 400:]
+    expected = SHAPE.gyro(partial)
+    assert_close(seen.T @ seen / 4000 / np.var(seen), expected, atol=0.06, why="4,000 draws")
+    air = SHAPE.fixed[1]
+    steps = np.sqrt(0.0025) * drawn[:, :40]
+    rate = scipy.signal.lfilter(b, a, scipy.signal.lfilter([1.0], [1.0, -np.exp(-0.0075)], steps))
+    assert_close(rate.T @ rate / 4000, air, atol=0.06 * air.max(), why="4,000 draws")
+
+
+def test_slopes_of_a_covariance_are_its_difference_quotients() -> None:
+    noise = TwitchNoise(SHAPE, np.log([0.1, 0.02, 0.3, 0.2, 0.4]), np.array([0.3, -0.1]))
+    for place, slope in enumerate(noise.slopes()):
+        ends = []
+        for side in (1e-4, -1e-4):
+            numbers = noise.numbers.copy()
+            numbers[place] += side
+            ends.append(noise.at(numbers).covariance())
+        assert_close(slope, (ends[0] - ends[1]) / 2e-4, atol=1e-6, why="central differences")
+
+
+@pytest.fixture(scope="module")
+def opinion(tmp_path_factory: pytest.TempPathFactory) -> tuple[fid.AutotuneReview, Axis]:
+    path = tmp_path_factory.mktemp("noisy") / "autotune.bin"
+    gains = write_ardupilot(path, NOISY, seed=2)
+    return fid.review_autotune(path), replace(NOISY, p=gains.p, i=gains.p, d=gains.d)
+
+
+def test_gyro_noise_that_the_loop_feeds_back_bends_no_margin(
+    opinion: tuple[fid.AutotuneReview, Axis],
+) -> None:
+    """By output error K was 12 % too large here, and the phase margin 5 deg too small."""
+    (roll,) = opinion[0].opinions
+    assert roll.fit is not None
+    assert roll.tuned is not None
+    crossover, phase, gain = true_margins(opinion[1])
+    told = ((roll.tuned.crossover, 2 * np.pi * crossover), (roll.tuned.phase_margin, phase))
+    for found, exact in (*told, (roll.tuned.gain_margin, gain)):
+        assert found.interval95 is not None
+        assert found.interval95[0] <= exact <= found.interval95[1]
+    low, high = roll.tuned.phase_margin.interval95 or (0.0, 90.0)
+    assert high - low < 4.0
+    for name, exact in (("K", NOISY.effectiveness), ("T_m", NOISY.motor_s), ("L", -3.0)):
+        low, high = roll.fit.parameters[name].interval95 or (np.inf, -np.inf)
+        assert low <= exact <= high
