@@ -64,6 +64,24 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.parametrize(
+    ("start", "first"),
+    [
+        (STUDY, [KeyEdit(("tune", "controller"), "pi_d")]),
+        ('[study]\ntitle = "A flight"\n[log]\npath = "a.bin"\n', []),
+    ],
+)
+def test_the_first_slider_that_is_moved_keeps_the_plants(
+    start: str, first: list[KeyEdit]
+) -> None:
+    """It writes the table [tune]; plants were worked out anew for that."""
+    moved = edited(start, [*first, KeyEdit(("tune", "by_hand"), {"Kp": 1.0})])
+    back = edited(moved, [KeyEdit(("tune", "by_hand"), None)])
+    assert gain_work._key(start) == gain_work._key(moved) == gain_work._key(back)
+    for other in (KeyEdit(("tune", "preset"), "firm"), KeyEdit(("tune", "controller"), "pi")):
+        assert gain_work._key(edited(moved, [other])) != gain_work._key(moved)
+
+
 @pytest.mark.slow
 def test_a_rig_has_the_controller_that_the_command_gives_it(study: Path, tmp_path: Path) -> None:
     gain_work.make_gains(study, tmp_path)

@@ -2,7 +2,7 @@ import { onDestroy } from "svelte";
 import { live } from "./live.svelte";
 import type { AxisGains, GainsAnswer, GainsQuestion } from "./types";
 
-/** How long an answer may take before the page says that plants are worked out once more. */
+/** How long an answer may take before the page says that it is waited for. */
 const LATE_MS = 900;
 /** Rest of a hand after which time responses follow the margins. */
 const REST_MS = 80;

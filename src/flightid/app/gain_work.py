@@ -199,10 +199,20 @@ def _hand_gains(text: str) -> Mapping[str, float]:
 
 
 def _key(text: str) -> str:
-    """What plants rest on: all of the study but the gains by hand."""
+    """What plants rest on: all of the study but the gains by hand.
+
+    What nobody has said is as it is where it is said: the first click writes that too.
+    """
     document = _asked_of_models(text)
-    if isinstance(document.get("tune"), dict):
-        document["tune"].pop("by_hand", None)
+    table = document.get("tune", {})
+    if isinstance(table, dict):
+        said = {key: value for key, value in table.items() if key != "by_hand"}
+        usual = _asked(text)
+        if "log" in document:
+            del usual["form"]  # an autopilot's own, where none is named
+        document["tune"] = {
+            "preset": usual["preset"], "controller": usual.get("form"), **said
+        }  # fmt: skip
     return "tuning of " + hashlib.sha256(repr(document).encode()).hexdigest()
 
 
