@@ -30,7 +30,7 @@ def band_findings(
                 Light.AMBER,
                 f"frequencies from {omega[0]:.3g} rad/s have less than two cycles in the longest "
                 f"window ({longest_s:.3g} s)",
-                f"trust the response from {lowest:.3g} rad/s, or use longer windows",
+                f"begin the band at {lowest:.3g} rad/s, or use longer windows",
             )
         )
     highest = HIGHEST_FRACTION * 2.0 * math.pi / sample_time_s
