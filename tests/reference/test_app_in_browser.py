@@ -130,13 +130,22 @@ def opened_desk(folder: Path) -> Iterator[Desk]:
         thread.join()
 
 
+def coloured(page: Any, theme: str) -> None:
+    """Light or dark as a press of the button has it: charts take their ink from that too."""
+    page.evaluate(
+        "theme => document.documentElement.dataset.theme === theme"
+        " || document.querySelector('button[aria-label$=colours]').click()",
+        theme,
+    )
+
+
 def _findings(page: Any) -> list[str]:
     """Serious findings of axe-core on what is shown; in the dark, of colours alone."""
     found = []
     if not page.evaluate("'axe' in window"):
         page.evaluate(AXE.read_text(encoding="utf-8"))
     for theme, rules in (("dark", ", runOnly: ['color-contrast']"), ("light", "")):
-        page.evaluate(f"document.documentElement.dataset.theme = '{theme}'")
+        coloured(page, theme)
         told = page.evaluate(f"axe.run(document, {{resultTypes: ['violations']{rules}}})")
         found += [
             f"{theme}: {each['id']}: {each['nodes'][0]['html'][:120]}"

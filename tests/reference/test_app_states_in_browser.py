@@ -16,7 +16,7 @@ import pytest
 pytest.importorskip("duckdb", reason="the extra fleet is not installed")
 
 from tests.app_stage import LONG, MANY, PLANTED, Stage, furnish
-from tests.reference.test_app_in_browser import AXE, SERIOUS, Desk, desk
+from tests.reference.test_app_in_browser import AXE, SERIOUS, Desk, coloured, desk
 from tests.reference.test_app_screens_in_browser import CLIPPED, CROWDED
 
 __all__ = ["desk"]
@@ -38,7 +38,7 @@ def looked_at(page: Any, state: str) -> list[str]:
             said.append(f"{state}, {width}: {more} px too wide")
         said += [f"{state}, {width}: clipped {each}" for each in page.evaluate(CLIPPED)]
         for theme in THEMES:
-            page.evaluate(f"document.documentElement.dataset.theme = '{theme}'")
+            coloured(page, theme)
             said += [
                 f"{state}, {width}, {theme}: {each['id']}: {each['nodes'][0]['html'][:160]}"
                 for each in page.evaluate(FOUND)["violations"]
@@ -185,7 +185,7 @@ def _of_two_windows(stage: Stage) -> Iterator[str]:
 
 def _printed(page: Any) -> list[object]:
     """What a sheet shows of a dark page: its colours, px too wide, links of the screens."""
-    page.evaluate("document.documentElement.dataset.theme = 'dark'")
+    coloured(page, "dark")
     page.set_viewport_size({"width": 718, "height": 1000})
     page.evaluate("dispatchEvent(new Event('beforeprint'))")
     page.emulate_media(media="print")
@@ -193,6 +193,7 @@ def _printed(page: Any) -> list[object]:
     seen = [page.evaluate("document.documentElement.dataset.theme"), page.evaluate(CROWDED), links]
     page.emulate_media(media="screen")
     page.evaluate("dispatchEvent(new Event('afterprint'))")
+    coloured(page, "light")
     page.set_viewport_size({"width": 1280, "height": 800})
     return seen
 

@@ -71,9 +71,7 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ('[study]\ntitle = "A flight"\n[log]\npath = "a.bin"\n', []),
     ],
 )
-def test_the_first_slider_that_is_moved_keeps_the_plants(
-    start: str, first: list[KeyEdit]
-) -> None:
+def test_the_first_slider_that_is_moved_keeps_the_plants(start: str, first: list[KeyEdit]) -> None:
     """It writes the table [tune]; plants were worked out anew for that."""
     moved = edited(start, [*first, KeyEdit(("tune", "by_hand"), {"Kp": 1.0})])
     back = edited(moved, [KeyEdit(("tune", "by_hand"), None)])

@@ -410,7 +410,7 @@ def test_a_renamed_log_counts_under_its_new_name_and_a_deleted_one_is_told(
         assert found[0].action == "flightid fleet run takes the new ones"
         assert found[1].message.startswith("1 record of a log that is gone from the places")
     # The record follows though no log is read for it: of a part as of loose files.
-    monkeypatch.setattr("flightid.fleet.identity._gps_start", never)
+    monkeypatch.setattr("flightid.fleet.identity.log_start", never)
     done = run_fleet(fleet, workers=1)
     assert (done.found, done.kept, done.outcomes) == (3, 3, {})
     assert [each.code for each in done.findings][:2] == ["renamed-logs", "gone-logs"]

@@ -1,4 +1,4 @@
-import type { RemovedItem, CompareRequest, ComparisonPart, Edit, FieldGroup, FilterScreen, FlightScreen, FormulaUnit, GainsScreen, Job, Listing, LogItem, ModelAnswer, OwnModelAnswer, OwnModel, PlanPart, PlanRequest, PlotLayout, ProposedStudy, RigItem, RigScreen, RunScreen, ShownModel, StudyComparison, StudyText, UseEdits } from "./types";
+import type { Drafts, PlacedDraft, RemovedItem, CompareRequest, ComparisonPart, Edit, FieldGroup, FilterScreen, FlightScreen, FormulaUnit, GainsScreen, Job, Listing, LogItem, ModelAnswer, OwnModelAnswer, OwnModel, PlanPart, PlanRequest, PlotLayout, ProposedStudy, RigItem, RigScreen, RunScreen, ShownModel, StudyComparison, StudyText, UseEdits } from "./types";
 
 /** A refusal of the server, in its own words. */
 export class Refusal extends Error {
@@ -70,9 +70,11 @@ export const replace = (log: string, etag: string, text: string) =>
 export const step = (log: string, etag: string, back: boolean) =>
   json<StudyText>(`/api/studies/${log}/step`, sent("POST", { back }, { "if-match": etag }));
 
-/** Send a file as it lies on the disk; `seen` hears how much of it has gone. */
-export const upload = (file: File, seen: (share: number) => void) =>
-  put<LogItem>(`/api/logs?name=${encodeURIComponent(file.name)}&modified_ms=${file.lastModified}`, file, seen);
+/** A file without a date has that of the moment in which the browser was handed it. */
+const DATED_MS = 2000;
+/** Send a file as it lies on the disk, dropped at some time, ms; `seen` hears how much of it has gone. */
+export const upload = (file: File, at: number, seen: (share: number) => void) =>
+  put<LogItem>(`/api/logs?name=${encodeURIComponent(file.name)}&modified_ms=${at - file.lastModified > DATED_MS ? file.lastModified : 0}`, file, seen);
 /** The same for a file of columns; `rig` names the set that it joins. */
 export const uploadRecords = (file: File, rig: string, seen: (share: number) => void) =>
   put<RigItem>(`/api/records?name=${encodeURIComponent(file.name)}&rig=${rig}`, file, seen);
@@ -119,6 +121,8 @@ export async function rigView(id: string, file: string, manoeuvre: string, serie
 
 /** Series over a span: time, then a row each; NaN breaks a line, infinity says "no sample here". */
 export const filters = (log: string, values: Record<string, number>) => json<FilterScreen>(`/api/filters/${log}`, sent("POST", { values }));
+export const drafts = () => json<Drafts>("/api/drafts");
+export const keepDraft = (typed: PlacedDraft) => json<PlacedDraft>("/api/drafts", sent("POST", typed));
 export const layouts = () => json<PlotLayout[]>("/api/layouts");
 export const keepLayout = (layout: PlotLayout) => json<PlotLayout[]>("/api/layouts", sent("POST", layout));
 export const removeLayout = (name: string) => json<PlotLayout[]>(`/api/layouts/${encodeURIComponent(name)}`, { method: "DELETE" });

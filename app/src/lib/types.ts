@@ -90,6 +90,19 @@ export interface CooperHarperRating {
   comment: string;
 }
 
+/** Words as they are typed. */
+export interface Draft {
+  text: string;
+  name: string;
+  before: string;
+}
+
+/** All drafts of a folder. */
+export interface Drafts {
+  folder: string;
+  drafts: PlacedDraft[];
+}
+
 /** One key and its value; None takes it out. */
 export interface Edit {
   path: (string | number)[];
@@ -541,6 +554,7 @@ export interface LogItem {
   path: string;
   size: number;
   changed: string;
+  flown: string | null;
   vehicle: string | null;
   firmware: string | null;
   duration_s: number | null;
@@ -610,6 +624,7 @@ export interface Overview {
   name: string;
   vehicle: string;
   firmware: string;
+  flown: string;
   duration_s: number;
   airborne: string;
   light: "green" | "amber" | "red" | "unknown";
@@ -642,6 +657,12 @@ export interface OwnModelAnswer {
 export interface OwnVehicles {
   vehicles: FlyChoice[];
   left_out: Record<string, string>;
+}
+
+/** A draft and where it is typed, such as ``study:`` and the hash of a log. */
+export interface PlacedDraft {
+  place: string;
+  draft: Draft | null;
 }
 
 /** A plan of the next flight. */

@@ -16,7 +16,7 @@ from flightid.app.kept_parts import kept_overview, kept_review
 from flightid.app.own_folders import shown_name
 from flightid.app.removed import RemovedList
 from flightid.app.schemas import FlightScreen, LeftOut, Listing, LogItem
-from flightid.app.workspace import Workspace
+from flightid.app.workspace import UNDATED_NS, Workspace
 from flightid.findings import unsaid
 from flightid.version import VERSION
 
@@ -24,6 +24,7 @@ MOST_LOOKED_AT = 200
 """Logs that a listing has inspected, one after the other; others when they are opened."""
 LATEST_MS = 253_370_764_800_000
 """First instant of the year 9999: no file is younger."""
+LAST_DATE = "9999"
 OF_FLIGHT = ("overview", "review")
 """Jobs that the screen of a flight needs."""
 
@@ -97,10 +98,12 @@ def _listing(workspace: Workspace, removed: Sequence[str] = ()) -> Listing:
             told = {
                 "vehicle": shown.vehicle,
                 "firmware": shown.firmware,
+                "flown": shown.flown,
                 "duration_s": shown.duration_s,
                 "sweeps": len(swept),
                 "light": shown.light,
             }
+        known = entry.mtime_ns > UNDATED_NS
         changed = time.strftime("%Y-%m-%d %H:%M", time.localtime(entry.mtime_ns / 1e9))
         logs.append(
             LogItem(
@@ -108,10 +111,12 @@ def _listing(workspace: Workspace, removed: Sequence[str] = ()) -> Listing:
                 name=Path(entry.path).name,
                 path=entry.path,
                 size=entry.size,
-                changed=changed,
+                changed=changed if known else "",
                 **told,
             )
         )
+    # What has no date at all was dropped, most of it just now.
+    logs.sort(key=lambda each: each.flown or each.changed or LAST_DATE, reverse=True)
     left = [LeftOut(path=path, reason=why) for path, why in workspace.left_out.items()]
     return Listing(
         folder=_folder_words(workspace.folder), version=VERSION, logs=logs, left_out=left

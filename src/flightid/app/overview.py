@@ -25,6 +25,7 @@ from flightid.inspection import Inspection
 from flightid.inspection.carried import carried_sentence
 from flightid.inspection.usable_band import hertz_words
 from flightid.logs import Log
+from flightid.logs.first_fix import log_start
 from flightid.review import FlightReview
 from flightid.review.loop_response import LoopResponse
 from flightid.review.step_features import BANDWIDTH
@@ -68,10 +69,12 @@ def overview_of(
         The study that the log asks for.
     """
     cards = [_card(axis, inspection, missed, settings) for axis in AXES]
+    began = log_start(log)
     return Overview(
         name=inspection.name,
         vehicle=" ".join(filter(None, (inspection.kind, inspection.vehicle))),
         firmware=inspection.firmware,
+        flown="" if began is None else f"{began:%Y-%m-%d %H:%M}",
         duration_s=inspection.duration_s,
         airborne=inspection.phases.airborne_words,
         light=light_of(inspection.verdict),

@@ -94,6 +94,8 @@ class Overview(Message):
     name: str
     vehicle: str
     firmware: str
+    flown: str
+    """When the log began, by its own clock of satellites, UTC; empty where it has none."""
     duration_s: float
     airborne: str
     light: Light
@@ -142,6 +144,8 @@ class LogItem(Message):
     path: str
     size: int
     changed: str
+    """When the file was changed last; empty where nobody knows that of one that was dropped."""
+    flown: str | None = None
     vehicle: str | None = None
     firmware: str | None = None
     duration_s: float | None = None

@@ -12,6 +12,7 @@ from fastapi.exceptions import RequestValidationError
 
 from flightid.app.backstage import Backstage
 from flightid.app.compare_routes import add_compare_routes
+from flightid.app.draft_routes import add_draft_routes
 from flightid.app.field_routes import add_field_routes
 from flightid.app.fleet_routes import add_fleet_routes
 from flightid.app.fly_routes import add_fly_routes
@@ -40,6 +41,7 @@ ROUTES: tuple[Callable[[FastAPI, Backstage], None], ...] = (
     add_plot_routes,
     add_job_routes,
     add_study_routes,
+    add_draft_routes,
     add_gain_routes,
     add_compare_routes,
     add_study_compare_routes,

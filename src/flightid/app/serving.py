@@ -31,8 +31,8 @@ def serve(folder: Path, port: int, *, say: Callable[[str], None], opens: bool) -
     folder : Path
         Workspace.
     port : int
-        0: the one that this folder had before, where it is free: a browser keeps by address what
-        was typed and not saved, layouts and colours. Else any free one.
+        0: the one that this folder had before, where it is free: a browser keeps by address
+        layouts and colours. Else any free one.
     say : callable
         Takes the address.
     opens : bool

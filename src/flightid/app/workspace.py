@@ -37,6 +37,8 @@ from flightid.version import VERSION
 
 HIDDEN = ".flightid"
 ID = re.compile(r"[0-9a-f]{16}")
+UNDATED_NS = 0
+"""Time of the last change of a file of which nobody knows it, ns since 1970."""
 NAME_BYTES = 120
 """Of a log's name; file systems end at 255."""
 DEEPEST = 6
@@ -129,7 +131,8 @@ class Workspace:
         chunks : async iterator of bytes
         modified_ms : int
             When the file that is sent was changed last, ms since 1970, so that it keeps its date;
-            0 where nobody knows: that of now.
+            0 where nobody knows, and a date to come, are kept as `UNDATED_NS`: the hour of a drop
+            is no date of a flight.
 
         Raises
         ------
@@ -150,8 +153,8 @@ class Workspace:
                     found=plain,
                     needed="a log of ArduPilot, PX4, Betaflight or INAV",
                 )
-            if 0 < modified_ms < 1000 * time.time():
-                os.utime(temporary, ns=(modified_ms * 1_000_000,) * 2)
+            known = 0 < modified_ms < 1000 * time.time()
+            os.utime(temporary, ns=(modified_ms * 1_000_000 if known else UNDATED_NS,) * 2)
             flush(temporary)
             return self._keep(temporary, digest.hexdigest()[:16], plain)
 

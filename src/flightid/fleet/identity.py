@@ -10,21 +10,15 @@ from collections.abc import Mapping
 from dataclasses import field
 from pathlib import Path, PurePosixPath
 
-import numpy as np
-
-from flightid.errors import FlightidError, StudyError
+from flightid.errors import StudyError
 from flightid.fleet.settings import FleetSettings, VehicleRules, instant_of
 from flightid.frozen import dataclass
 from flightid.logs import Log
+from flightid.logs.first_fix import log_start
 from flightid.reading import DOCUMENT_BYTES
-from flightid.units import DIMENSIONLESS, convert
 
 SERIAL = "BRD_SERIAL_NUM"
-GPS_EPOCH = datetime.datetime(1980, 1, 6)
-LEAP_S = 18
-"""GPS time before UTC since 2017, s."""
 DATES = re.compile(r"(20\d\d)[-_]?(0[1-9]|1[0-2])[-_]?(0[1-9]|[12]\d|3[01])")
-UNIX_GPS = (("vehicle_gps_position", "time_utc_usec"), ("sensor_gps", "time_utc_usec"))
 OWN = {"id", "vehicle", "type", "log", "flown_at"}
 TABLE_CELLS = 20_000_000
 """Of a table: what a line lacks counts, for its reader fills it in."""
@@ -176,7 +170,7 @@ class LogWitness:
         if log is None:
             return cls()
         own = _id_in(log, rules.parameter) if rules.by == "log" else None
-        return cls(own, " ".join(filter(None, (log.kind, log.vehicle))), _gps_start(log))
+        return cls(own, " ".join(filter(None, (log.kind, log.vehicle))), log_start(log))
 
 
 def identify_log(
@@ -249,40 +243,7 @@ def _flown_at(
             return datetime.datetime(year, month, day), "name"
         except ValueError:
             pass
-    if changed_s is None:
+    if not changed_s:  # 1970: the page knew no date of a file that was dropped
         return None, None
     at = datetime.datetime.fromtimestamp(changed_s, datetime.UTC)
     return at.replace(tzinfo=None, microsecond=0), "file"
-
-
-def _gps_start(log: Log) -> datetime.datetime | None:
-    """Start of the log by its first fix with a date."""
-    try:
-        at_s, fix = _fix(log)
-    except (FlightidError, IndexError):
-        return None
-    if fix is None or log.first_s is None:
-        return None
-    return (fix - datetime.timedelta(seconds=at_s - log.first_s)).replace(microsecond=0)
-
-
-def _fix(log: Log) -> tuple[float, datetime.datetime | None]:
-    if "GPS" in log and {"GWk", "GMS"} <= set(log.messages["GPS"].fields):
-        table = log.table("GPS")
-        row = int(np.argmax(table["GWk"] > 0))
-        # Milliseconds of the week, with a multiplier where the log declares one.
-        unit = "ms" if table.unit("GMS") == DIMENSIONLESS else table.unit("GMS")
-        of_week_s = float(convert(table["GMS"][row], unit, "s"))
-        week = float(table["GWk"][row])
-        since = datetime.timedelta(weeks=week, seconds=of_week_s - LEAP_S)
-        return float(table.time_s[row]), GPS_EPOCH + since if 0 < week < 1e5 else None
-    for topic, column in UNIX_GPS:
-        if topic in log and column in log.messages[topic].fields:
-            table = log.table(topic)
-            row = int(np.argmax(table[column] > 0))
-            at = float(table[column][row])
-            begin = datetime.datetime(1970, 1, 1)
-            good = 0 < at < 1e17
-            fix = begin + datetime.timedelta(microseconds=at) if good else None
-            return float(table.time_s[row]), fix
-    return 0.0, None

@@ -1,0 +1,81 @@
+"""What is typed on the page and not stored: there at another port, in another browser."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.fleet_workspace import write_fleet
+from tests.reference.test_app_in_browser import REQUIRED, _missing, opened_desk, until
+from tests.sweep_log import SweepFlight
+
+pytestmark = pytest.mark.slow
+KEPT = "fetch('/api/drafts').then((told) => told.json()).then((told) => told.drafts.length)"
+FLOWN = "20261130-010203-abcd"
+FLIGHT = '{"vehicle": "ah64_hover", "columns": [], "sample_time_s": 0.01}'
+
+
+def test_what_was_typed_is_there_for_another_port_and_browser(tmp_path: Path) -> None:
+    """A browser keeps by address: the folder keeps what nobody has saved."""
+    if missing := _missing():
+        pytest.fail(missing) if REQUIRED else pytest.skip(missing)
+    folder = tmp_path / "workspace"
+    with opened_desk(folder) as desk:
+        page = desk.open().page
+        page.set_input_files(
+            "input[type=file]", SweepFlight(sweep_s=25.0, rate_hz=100.0).write(tmp_path)
+        )
+        page.locator(".cards").wait_for()
+        log = page.url.rpartition("/")[2]
+        _typed_over_an_own_model(page)
+        write_fleet(folder, flights=2)
+        (folder / "flights" / FLOWN).mkdir(parents=True)
+        (folder / "flights" / FLOWN / "flight.json").write_text(FLIGHT)
+        (folder / "flights" / FLOWN / "journal.csv").write_text("time\n")
+        page.goto(page.url.partition("#")[0] + "#/fleet")
+        page.get_by_role("link", name="fleet.toml").click()
+        page.get_by_label("SELECT").fill("select 6 * 7")
+        page.get_by_label("Example").select_option("Newest flights")
+        page.get_by_role("button", name="Back to what was typed").wait_for()
+        page.get_by_label("What was done").fill("a new motor, per")
+        page.goto(page.url.partition("#")[0] + "#/fly")
+        page.get_by_role("button", name=FLOWN, exact=True).click()
+        page.get_by_label("Comment").fill("overcontrolled in r")
+        until(page, lambda: page.evaluate(KEPT) == 4)
+    with opened_desk(folder) as desk:
+        page = desk.open(f"#/model/{log}").page
+        page.get_by_role("button", name="Back to what was typed").click()
+        assert page.get_by_label("Model file").input_value() == "# half a model"
+        page.goto(page.url.partition("#")[0] + "#/fleet")
+        page.get_by_role("link", name="fleet.toml").click()
+        page.get_by_role("button", name="Back to what was typed").click()
+        assert page.get_by_label("SELECT").input_value() == "select 6 * 7"
+        assert page.get_by_label("What was done").input_value() == "a new motor, per"
+        page.goto(page.url.partition("#")[0] + "#/fly")
+        page.get_by_role("button", name=FLOWN, exact=True).click()
+        page.get_by_text("Typed before, and not kept beside the flight yet").wait_for()
+        assert page.get_by_label("Comment").input_value() == "overcontrolled in r"
+        page.get_by_role("group", name="Was it controllable?").get_by_text("No").click()
+        page.get_by_role("button", name="Keep the rating").click()
+        page.get_by_text("Kept beside the flight.").wait_for()
+        rating = json.loads((folder / "flights" / FLOWN / "rating.json").read_text())
+        assert rating["comment"] == "overcontrolled in r"
+        until(page, lambda: page.evaluate(KEPT) == 3)
+
+
+def _typed_over_an_own_model(page: Any) -> None:
+    """A model of one's own taken, another one half typed, and the first opened in its place."""
+    page.click("nav >> text=Model")
+    page.locator("summary", has_text="A model of your own").click()
+    page.get_by_role("button", name="Use it for").click()
+    opens = page.get_by_role("button", name="Open own")
+    opens.wait_for()
+    text = page.get_by_label("Model file")
+    whole = text.input_value()
+    text.fill("# half a model")
+    opens.click()
+    page.get_by_role("button", name="Back to what was typed").wait_for()
+    assert text.input_value() == whole
