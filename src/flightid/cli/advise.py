@@ -11,7 +11,7 @@ from flightid.cli.black_boxes import channels_of, only
 from flightid.cli.option_fields import OptionsCommand, parted
 from flightid.cli.output import all_option, json_option
 from flightid.cli.pages import html_option, show
-from flightid.cli.records import FILES, reading
+from flightid.cli.records import FILES, FilesArgument, reading
 
 if TYPE_CHECKING:
     from flightid.options import Options
@@ -26,7 +26,7 @@ def _fields() -> dict[str, type[Options]]:
 @click.command(
     cls=OptionsCommand, fields_of=_fields, short_help="What records can support: delays, orders."
 )
-@click.argument("files", type=FILES, nargs=-1, required=True)
+@click.argument("files", cls=FilesArgument, type=FILES, nargs=-1, required=True)
 @html_option
 @all_option
 @json_option

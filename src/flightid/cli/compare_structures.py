@@ -10,10 +10,10 @@ import click
 from flightid.cli.equations import equations, fits_of
 from flightid.cli.log_parts import inspections_of, with_inspections
 from flightid.cli.option_fields import OptionsCommand
-from flightid.cli.output import all_option, json_option
-from flightid.cli.pages import show
-from flightid.cli.records import FILES, reading
-from flightid.cli.sources import AXES, known_models
+from flightid.cli.output import all_option, json_option, note
+from flightid.cli.pages import html_option, show, write_page
+from flightid.cli.records import FILES, FilesArgument, reading
+from flightid.cli.sources import AXES, known_methods, known_models
 
 if TYPE_CHECKING:
     from flightid.options import Options
@@ -28,7 +28,7 @@ def _fields() -> dict[str, type[Options]]:
 @click.command(
     cls=OptionsCommand, fields_of=_fields, short_help="Fit several structures to the same data."
 )
-@click.argument("files", type=FILES, nargs=-1, required=True)
+@click.argument("files", cls=FilesArgument, type=FILES, nargs=-1, required=True)
 @click.option(
     "--model",
     "models",
@@ -38,7 +38,12 @@ def _fields() -> dict[str, type[Options]]:
     help="Library name or .toml file of a model's equations; repeat it for each structure.",
 )
 @click.option("--axis", type=AXES, help="Of a library model.")
-@click.option("--method", help="How each is fitted; default: frequency_domain.")
+@click.option(
+    "--method",
+    shell_complete=known_methods,
+    help="How each is fitted; default: frequency_domain.",
+)
+@html_option
 @all_option
 @json_option
 def command(
@@ -46,6 +51,7 @@ def command(
     models: tuple[str, ...],
     axis: str | None,
     method: str | None,
+    html: Path | None,
     as_json: bool,
     **options: Any,  # noqa: ANN401 — read from the fields of the method's options
 ) -> None:
@@ -62,4 +68,7 @@ def command(
         fits, _ = fits_of(models, axis, method, files, options)
         seen = inspections_of(files)
         fits = {name: with_inspections(fit, seen) for name, fit in fits.items()}
-    show(compare_structures(fits), "Structures", as_json=as_json)
+    compared = compare_structures(fits)
+    if html is not None:
+        note(f"Wrote {write_page(compared, 'Structures', html, *fits.values())}")
+    show(compared, "Structures", as_json=as_json)

@@ -18,7 +18,7 @@ from flightid.cli.output import (
     note,
 )
 from flightid.cli.pages import html_option, write_page
-from flightid.cli.records import FILES, in_units, read_files, reading
+from flightid.cli.records import FILES, FilesArgument, in_units, read_files, reading
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -32,7 +32,7 @@ def _fields() -> dict[str, type[Options]]:
 
 
 @click.command(cls=OptionsCommand, fields_of=_fields, short_help="Check data compatibility.")
-@click.argument("files", type=FILES, nargs=-1, required=True)
+@click.argument("files", cls=FilesArgument, type=FILES, nargs=-1, required=True)
 @click.option("--rename", help="Columns of kinematic channels, with commas: p=roll_rate,phi=bank.")
 @click.option("--estimate", help="Instrument errors, with commas: bias_p,scale_q,delay_phi.")
 @click.option(

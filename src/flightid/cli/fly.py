@@ -10,6 +10,7 @@ import click
 
 from flightid.cli.option_fields import OptionsCommand, parted
 from flightid.cli.output import WRITTEN, emit, json_option, note
+from flightid.cli.pages import html_option, write_page
 from flightid.cli.records import FILES
 from flightid.cli.sources import load_source, model_argument, model_options
 
@@ -58,6 +59,7 @@ def _fields() -> dict[str, type[Options]]:
     type=WRITTEN,
     help="Write the flight: .parquet or .nc.",
 )
+@html_option
 @json_option
 def command(
     model: str,
@@ -67,6 +69,7 @@ def command(
     blocks: Path | None,
     law: str | None,
     target: Path | None,
+    html: Path | None,
     as_json: bool,
     **options: Any,  # noqa: ANN401 — read from the fields
 ) -> None:
@@ -98,7 +101,7 @@ def command(
     if said is not None:
         if any((axis, values, gains, blocks, law, noise)):
             raise click.UsageError(f"{model} says what is flown, under [pilot]: change it there")
-        _fly(lambda: fly_study(said, asked, say=note), target, as_json=as_json)
+        _fly(lambda: fly_study(said, asked, say=note), target, html, as_json=as_json)
         return
     source = load_source(model, axis, values)
     around: GainController | BlockController | None = None
@@ -115,6 +118,7 @@ def command(
     _fly(
         lambda: fly_model(source, asked, controller=around, noise=noise, say=note),
         target,
+        html,
         as_json=as_json,
     )
 
@@ -126,7 +130,9 @@ def _piloted(model: str) -> PilotSettings | None:
     return pilot_of(model) if model.endswith(".toml") and Path(model).is_file() else None
 
 
-def _fly(flown: Callable[[], FlownSession], target: Path | None, *, as_json: bool) -> None:
+def _fly(
+    flown: Callable[[], FlownSession], target: Path | None, html: Path | None, *, as_json: bool
+) -> None:
     """Fly; who ends the flight by a signal keeps it, as Ctrl-C does."""
     from flightid import write_records
 
@@ -137,6 +143,8 @@ def _fly(flown: Callable[[], FlownSession], target: Path | None, *, as_json: boo
         signal.signal(signal.SIGTERM, before)
     if target is not None:
         note(f"Wrote {write_records(session.record, target)}")
+    if html is not None:
+        note(f"Wrote {write_page(session, 'Flight', html)}")
     emit(session, as_json=as_json)
 
 

@@ -17,8 +17,8 @@ from flightid.cli.log_parts import inspections_of, with_inspections
 from flightid.cli.option_fields import OptionsCommand
 from flightid.cli.output import all_option, emit, json_option, leave_by_verdict, level_option, note
 from flightid.cli.pages import html_option, model_file_option, write_page
-from flightid.cli.records import FILES, reading
-from flightid.cli.sources import AXES, known_models
+from flightid.cli.records import FILES, FilesArgument, reading
+from flightid.cli.sources import AXES, known_methods, known_models
 
 if TYPE_CHECKING:
     from flightid.identification import Fit, Reduction
@@ -31,7 +31,7 @@ def _fields() -> dict[str, type[Options]]:
 
 
 @click.command(cls=OptionsCommand, fields_of=_fields)
-@click.argument("files", type=FILES, nargs=-1, required=True)
+@click.argument("files", cls=FilesArgument, type=FILES, nargs=-1, required=True)
 @click.option(
     "--model",
     "model_name",
@@ -42,6 +42,7 @@ def _fields() -> dict[str, type[Options]]:
 @click.option("--axis", type=AXES, help="Of a library model.")
 @click.option(
     "--method",
+    shell_complete=known_methods,
     help="How the model is fitted. With --model: frequency_domain (default) to an estimated "
     "response; output_error, filter_error and others straight to the records; joint to both. "
     "With --kind: its own, for example iv4 of arx, n4sid of subspace.",

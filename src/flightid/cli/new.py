@@ -10,7 +10,7 @@ import click
 from flightid.cli.option_fields import OptionsCommand, parted
 from flightid.cli.output import WRITTEN, note
 from flightid.cli.proposals import end_without_model, note_of, of_data, propose, study_path
-from flightid.cli.records import FILES
+from flightid.cli.records import FILES, FilesArgument
 
 
 @click.command(
@@ -18,7 +18,9 @@ from flightid.cli.records import FILES
     fields_of=of_data,
     short_help="Write the study file that a log or records ask for.",
 )
-@click.argument("files", nargs=-1, required=True, metavar="LOG | RECORDS...", type=FILES)
+@click.argument(
+    "files", nargs=-1, required=True, metavar="LOG | RECORDS...", type=FILES, cls=FilesArgument
+)
 @click.option("--tune", is_flag=True, help="Let it end in gains of the autopilot that flew.")
 @click.option(
     "--write",

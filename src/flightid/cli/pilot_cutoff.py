@@ -10,7 +10,7 @@ import click
 from flightid.cli.option_fields import OptionsCommand, parted
 from flightid.cli.output import json_option, level_option
 from flightid.cli.pages import html_option, show
-from flightid.cli.records import FILES, read_files, reading
+from flightid.cli.records import FILES, FilesArgument, read_files, reading
 
 if TYPE_CHECKING:
     from flightid.options import Options
@@ -23,7 +23,7 @@ def _fields() -> dict[str, type[Options]]:
 
 
 @click.command(cls=OptionsCommand, fields_of=_fields, short_help="Say how tightly a pilot flew.")
-@click.argument("records", nargs=-1, required=True, type=FILES)
+@click.argument("records", nargs=-1, required=True, type=FILES, cls=FilesArgument)
 @level_option
 @html_option
 @json_option

@@ -12,7 +12,7 @@ from flightid.cli.lists import ListOption
 from flightid.cli.option_fields import OptionsCommand, parted
 from flightid.cli.output import all_option, emit, json_option, leave_by_verdict, level_option, note
 from flightid.cli.pages import html_option, model_file_option, write_page
-from flightid.cli.records import FILES, read_files, reading
+from flightid.cli.records import FILES, FilesArgument, read_files, reading
 
 if TYPE_CHECKING:
     from flightid.options import Options
@@ -34,7 +34,7 @@ def _fields() -> dict[str, type[Options]]:
 
 
 @click.command(cls=OptionsCommand, fields_of=_fields)
-@click.argument("files", type=FILES, nargs=-1, required=True)
+@click.argument("files", cls=FilesArgument, type=FILES, nargs=-1, required=True)
 @click.option(
     "--scan",
     is_flag=True,

@@ -10,7 +10,7 @@ import click
 from flightid.cli.option_fields import OptionsCommand, parted
 from flightid.cli.output import WRITTEN, all_option, json_option, note
 from flightid.cli.pages import html_option, show
-from flightid.cli.records import FILES, read_files, reading, write_out
+from flightid.cli.records import FILES, FilesArgument, read_files, reading, write_out
 from flightid.cli.sources import load_source, model_argument, model_options
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ def _fields() -> dict[str, type[Options]]:
     cls=OptionsCommand, fields_of=_fields, short_help="Predict records, and write what comes out."
 )
 @model_argument
-@click.argument("records", nargs=-1, required=True, type=FILES)
+@click.argument("records", nargs=-1, required=True, type=FILES, cls=FilesArgument)
 @model_options
 @click.option(
     "--write",

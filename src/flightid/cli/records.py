@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
+from glob import glob
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +19,32 @@ if TYPE_CHECKING:
     from flightid.record import Record
 
 
+WILD = re.compile(r"[*?[]")
+
+
+def expanded(text: str) -> list[str]:
+    """Files that a pattern names, sorted, where no file has that very name and no shell saw it.
+
+    Example
+    -------
+    >>> expanded("no such file *.csv"), expanded("plain.csv")
+    (['no such file *.csv'], ['plain.csv'])
+    """
+    if not WILD.search(text) or Path(text).exists():
+        return [text]
+    return sorted(glob(text)) or [text]
+
+
+class FilesArgument(click.Argument):
+    """An argument of several files, which quoted patterns may name."""
+
+    def type_cast_value(self, ctx: click.Context, value: Any) -> Any:  # noqa: ANN401 — as click has it
+        """Put the files of each pattern in its place, then look at each."""
+        listed = isinstance(value, list | tuple)
+        texts = [each for text in value for each in expanded(str(text))] if listed else value
+        return super().type_cast_value(ctx, texts)
+
+
 class _DataPath(click.Path):
     """A file, or the folder of a ROS 2 bag."""
 
@@ -27,6 +55,10 @@ class _DataPath(click.Path):
         ctx: click.Context | None,
     ) -> Any:  # noqa: ANN401
         """A path that is there; a folder has to hold files of a bag."""
+        found = expanded(str(value))
+        if len(found) > 1:
+            self.fail(f"{value} names {len(found)} files, and one is taken here", param, ctx)
+        value = found[0]
         path = Path(str(super().convert(value, param, ctx)))
         if path.is_dir() and not any(path.glob("*.mcap")) and not any(path.glob("*.db3*")):
             self.fail(f"{path} is a folder, and no ROS 2 bag: it holds no .mcap and no .db3")

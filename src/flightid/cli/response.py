@@ -19,7 +19,7 @@ from flightid.cli.output import (
     note,
 )
 from flightid.cli.pages import html_option
-from flightid.cli.records import FILES, as_channels, read_files, reading
+from flightid.cli.records import FILES, FilesArgument, as_channels, read_files, reading
 
 if TYPE_CHECKING:
     from flightid.options import Options
@@ -46,7 +46,7 @@ def _fields() -> dict[str, type[Options]]:
 
 
 @click.command(cls=OptionsCommand, fields_of=_fields)
-@click.argument("files", type=FILES, nargs=-1, required=True)
+@click.argument("files", cls=FilesArgument, type=FILES, nargs=-1, required=True)
 @write_option
 @level_option
 @html_option

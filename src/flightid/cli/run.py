@@ -10,7 +10,7 @@ import click
 from flightid.cli.option_fields import OptionsCommand, parted
 from flightid.cli.output import json_option, leave_by_verdict, level_option
 from flightid.cli.proposals import of_data, show_study, taken_study
-from flightid.cli.records import FILES
+from flightid.cli.records import FILES, FilesArgument
 
 
 @click.command(
@@ -18,7 +18,14 @@ from flightid.cli.records import FILES
     fields_of=of_data,
     short_help="From a log, records or a study file to models and a report.",
 )
-@click.argument("files", nargs=-1, required=True, metavar="LOG | RECORDS... | STUDY", type=FILES)
+@click.argument(
+    "files",
+    nargs=-1,
+    required=True,
+    metavar="LOG | RECORDS... | STUDY",
+    type=FILES,
+    cls=FilesArgument,
+)
 @click.option(
     "--output",
     type=click.Path(file_okay=False, path_type=Path),

@@ -10,7 +10,7 @@ import click
 from flightid.cli.figures import QuotientRange
 from flightid.cli.option_fields import OptionsCommand, flags_of, parted
 from flightid.cli.output import WRITTEN, emit, json_option, note
-from flightid.cli.records import FILES, read_files, reading, write_out
+from flightid.cli.records import FILES, FilesArgument, read_files, reading, write_out
 from flightid.cli.sources import load_source, model_argument, model_options
 
 if TYPE_CHECKING:
@@ -96,7 +96,7 @@ def _fields() -> dict[str, type[Options]]:
 
 @command.command(cls=OptionsCommand, fields_of=_fields)
 @model_argument
-@click.argument("records", nargs=-1, type=FILES)
+@click.argument("records", nargs=-1, type=FILES, cls=FilesArgument)
 @model_options
 @click.option("--write", "target", type=WRITTEN, help="Write .csv, .parquet or .nc.")
 @click.option("--html", type=WRITTEN, help="Write a page with time histories.")

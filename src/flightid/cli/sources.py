@@ -39,6 +39,28 @@ def known_models(
     return [CompletionItem(name) for name in (*files, *names)]
 
 
+def known_methods(
+    ctx: click.Context, param: click.Parameter, incomplete: str
+) -> list[CompletionItem]:
+    """Methods that begin so: of the ``--kind`` that was given, else of models with equations."""
+    del param
+    from click.shell_completion import CompletionItem
+
+    from flightid.cli.black_boxes import POLYNOMIALS, SUBSPACE
+    from flightid.cli.equations import methods
+    from flightid.models import SubspaceStructure
+    from flightid.models.polynomial.structure import PolynomialStructure
+    from flightid.options import options_of
+
+    kind = ctx.params.get("kind")
+    of_kind = {SUBSPACE: SubspaceStructure, **dict.fromkeys(POLYNOMIALS, PolynomialStructure)}
+    names: Iterable[object] = methods() if kind is None else ()
+    if kind in of_kind:
+        known = {each.name: each for each in options_of(of_kind[kind])}
+        names = known["method"].choices
+    return [CompletionItem(str(name)) for name in names if str(name).startswith(incomplete)]
+
+
 def model_argument(function: Function) -> Function:
     """Add the argument ``MODEL`` to a command, its names completed by the shell."""
     return click.argument("model", shell_complete=known_models)(function)

@@ -20,7 +20,7 @@ from flightid.cli.output import (
     note,
 )
 from flightid.cli.proposals import is_study, of_data, show_answer, taken_study
-from flightid.cli.records import FILES
+from flightid.cli.records import FILES, FilesArgument
 from flightid.errors import OptionError
 
 if TYPE_CHECKING:
@@ -53,6 +53,7 @@ def _fields() -> dict[str, type[Options]]:
     required=True,
     metavar="LOG | RECORDS... | STUDY | MODEL... | FLEET",
     type=click.Path(exists=True, path_type=Path),
+    cls=FilesArgument,
 )
 @click.option(
     "--log",

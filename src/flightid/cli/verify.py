@@ -11,7 +11,7 @@ import click
 from flightid.cli.option_fields import OptionsCommand, parted
 from flightid.cli.output import all_option, emit, emit_values, json_option, leave_by_verdict, note
 from flightid.cli.pages import html_option
-from flightid.cli.records import FILES, read_files, reading
+from flightid.cli.records import FILES, FilesArgument, read_files, reading
 from flightid.cli.sources import load_source, model_argument, model_options
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def _fields() -> dict[str, type[Options]]:
 
 @click.command(cls=OptionsCommand, fields_of=_fields)
 @model_argument
-@click.argument("records", nargs=-1, required=True, type=FILES)
+@click.argument("records", nargs=-1, required=True, type=FILES, cls=FilesArgument)
 @model_options
 @click.option(
     "--against",

@@ -123,6 +123,8 @@ def _empty(
         colorway=list(SERIES),
     )
     box: dict[str, Any] = {"showline": True, "linecolor": LINE, "mirror": True, "gridcolor": GRID}
+    # Units stand in the titles: a letter for micro behind a number would be a second one.
+    box["exponentformat"] = "power"
     made.update_xaxes(zeroline=False, ticks="outside", tickcolor=LINE, **box)
     made.update_yaxes(zeroline=False, ticks="outside", tickcolor=LINE, title_standoff=6, **box)
     return made

@@ -20,6 +20,8 @@ CIRCLES = 5
 SLOW = 0.15
 """Eigenvalues below this share of the largest have a plot of their own beside the whole."""
 MARGIN = 0.12
+ROOM = (0.15, 0.08)
+"""Of a frame: how far labels stand apart, so that none covers another on a phone."""
 MARKERS = ("x", "circle-open", "diamond-open", "square-open", "triangle-up-open")
 
 Points = NDArray[np.complex128]
@@ -56,7 +58,8 @@ def pole_map(found: Modes | Mapping[str, Modes]) -> go.PlotFigure:
     made.update_layout(hovermode="closest")
     panels = [shown, slow] if zoomed else [shown]
     for column, visible in enumerate(panels, start=1):
-        _frame(made, visible, column, "slow modes: " if column > 1 else "")
+        words = "slow modes: " if column > 1 else ""
+        _frame(made, visible, column, words, len(panels) * ROOM[0])
         for number, (name, modes) in enumerate(several.items()):
             there = [m for m in modes if m in visible]
             _modes(made, name, there, number, column)
@@ -115,7 +118,7 @@ def _region(mode: Mode) -> Points | None:
     return np.asarray(mode.eigenvalue + x + 1j * y)
 
 
-def _frame(made: go.PlotFigure, visible: list[Mode], column: int, words: str) -> None:
+def _frame(made: go.PlotFigure, visible: list[Mode], column: int, words: str, room: float) -> None:
     """Range of the axes, lines of equal damping, circles of equal natural frequency."""
     corners = [np.array([m.eigenvalue or 0.0]) for m in visible]
     corners += [outline for m in visible if (outline := _region(m)) is not None and len(outline)]
@@ -125,15 +128,18 @@ def _frame(made: go.PlotFigure, visible: list[Mode], column: int, words: str) ->
     x = (left - MARGIN * size, max(right, 0.0) + MARGIN * size)
     y = (-MARGIN * size / 2.0, max(top, size / 3.0) + MARGIN * size)
     reach = math.hypot(max(-x[0], x[1]), y[1])
+    labels: list[tuple[complex, str]] = []
     for damping in DAMPING_LINES:
         end = reach * complex(-damping, math.sqrt(1.0 - damping**2))
         _thin(made, np.array([0j, end]), column)
-        _label(made, _inside(end, x, y), f"ζ {damping:g}", column)
+        labels.append((_inside(end, x, y), f"ζ {damping:g}"))
     for radius in _rounds(max(-x[0], y[1])):
         turn = np.linspace(0.0, np.pi, 91)
         _thin(made, radius * np.exp(1j * turn), column)
         if radius < 0.85 * y[1]:
-            _label(made, complex(0.0, radius), f"{radius:g} rad/s", column)
+            labels.append((complex(0.0, radius), f"{radius:g} rad/s"))
+    for place, text in _apart(labels, room * (x[1] - x[0]), ROOM[1] * (y[1] - y[0])):
+        _label(made, place, text, column)
     _thin(made, np.array([complex(0.0, y[0]), complex(0.0, y[1])]), column, 1.4)
     axis = {"showgrid": False, "row": 1, "col": column}
     made.update_xaxes(range=x, title_text=words + look.axis_title("real part", "rad/s"), **axis)
@@ -145,6 +151,18 @@ def _frame(made: go.PlotFigure, visible: list[Mode], column: int, words: str) ->
         **axis,
     )
     made.update_xaxes(constrain="domain", row=1, col=column)
+
+
+def _apart(
+    labels: Iterable[tuple[complex, str]], across: float, along: float
+) -> list[tuple[complex, str]]:
+    """Labels that stand apart from all before them."""
+    kept: list[tuple[complex, str]] = []
+    for place, text in labels:
+        gaps = (place - other for other, _ in kept)
+        if all(abs(gap.real) >= across or abs(gap.imag) >= along for gap in gaps):
+            kept.append((place, text))
+    return kept
 
 
 def _inside(end: complex, x: tuple[float, float], y: tuple[float, float]) -> complex:

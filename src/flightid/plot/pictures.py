@@ -38,6 +38,7 @@ from flightid.plot.subspace import singular_values
 from flightid.plot.tuning import time_responses
 from flightid.plot.verification import comparison, mismatch_envelopes, prediction
 from flightid.record import Record
+from flightid.simulation.realtime import FlownSession
 from flightid.validation import ResidualSpectra, ResidualTests, Verification
 from flightid.vehicles import GainFlight
 
@@ -111,6 +112,10 @@ def record_history(record: Record) -> go.PlotFigure:
     return made
 
 
+def _flown_session(result: FlownSession) -> go.PlotFigure:
+    return record_history(result.record)
+
+
 def _verification(result: Verification, *, record: int = 0) -> go.PlotFigure:
     return prediction(result.predictions[record])
 
@@ -159,6 +164,7 @@ PICTURES: Mapping[str, Callable[..., Any]] = {
     "AxisLoop": controller,
     "ClosedLoop": _closed_loop,
     "FieldPlot": field_history,
+    "FlownSession": _flown_session,
     "FlightComparison": compared_steps,
     "FlightReview": flight_steps,
     "GyroNoise": gyro_spectrum,

@@ -11,6 +11,10 @@ from flightid.validation import (
     SpectrumComparison,
     Verdict,
 )
+from flightid.wrapping import wrapped
+
+PHONE = 42
+"""Letters of a line that a panel on a phone holds."""
 
 
 def correlations(tests: ResidualTests, output: str, input: str | None = None) -> go.PlotFigure:
@@ -36,7 +40,12 @@ def correlations(tests: ResidualTests, output: str, input: str | None = None) ->
     for row, test in enumerate(shown, start=1):
         if test.verdict is Verdict.NOT_TESTABLE:
             made.add_annotation(
-                text=f"not testable: {test.reason}", x=0.0, y=0.0, showarrow=False, row=row, col=1
+                text="<br>".join(wrapped(f"not testable: {test.reason}", PHONE)),
+                x=0.0,
+                y=0.0,
+                showarrow=False,
+                row=row,
+                col=1,
             )
             # Axes without a trace have no place, and paths on them no numbers.
             unseen = go.Scatter(

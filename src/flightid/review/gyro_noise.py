@@ -23,6 +23,8 @@ from flightid.uncertainty.quantiles import chi_squared_quantile, shown, tails
 Array = NDArray[np.float64]
 BINS = 8
 FEWEST_IN_BIN = 3
+LEAST_THROTTLE = 0.03
+"""Range, share of full, below which there is nothing to see across throttle."""
 LOWEST_HZ = 20.0
 """Peaks below it are motion of the vehicle and its loops."""
 HIGHEST = 0.45
@@ -33,6 +35,9 @@ FALSE_PEAKS = 0.01
 STANDING_OUT = 2.0
 """A peak is at least so many times its floor: less is a slope of it."""
 MOST_PEAKS = 6
+NO_THROTTLE = (
+    "Not shown by throttle: it is not logged, moved by less than 3 %, or too few windows are known."
+)
 WHERE = {"raw": "ahead of the autopilot's filters", "filtered": "behind the autopilot's filters"}
 MOVES = "moves up with throttle: motors or propellers"
 FALLS = "moves down as throttle goes up: motors, folded at half of the logging rate"
@@ -162,8 +167,9 @@ class GyroNoise(Result, schema="flightid.gyro_noise/1"):
             f"{1.0 / self.resolution_hz:.2g} s at {self.rate_hz:.4g} Hz."
             + (folded if self.rate_hz < 1000.0 else "")
         )
+        level = "" if self.throttle.size > 1 else NO_THROTTLE
         none = "" if self.peaks else f"No peak stands out of the floor above {LOWEST_HZ:g} Hz."
-        return tuple(filter(None, (what, none)))
+        return tuple(filter(None, (what, level, none)))
 
     def __repr__(self) -> str:
         """Stream, windows and peaks on one line."""
@@ -226,7 +232,7 @@ def _throttle_of(windows: GyroWindows, throttle: Signal | None) -> Array:
 def _by_throttle(throttle: Array, powers: Array) -> tuple[Array, Array]:
     """Mean power in bins of equally many windows, from little to much throttle."""
     count = min(BINS, throttle.size // FEWEST_IN_BIN)
-    if count < 2:
+    if count < 2 or np.ptp(throttle) < LEAST_THROTTLE:
         return np.zeros(0), np.zeros((0, powers.shape[1]))
     parts = np.array_split(np.argsort(throttle, kind="stable"), count)
     return (

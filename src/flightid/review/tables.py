@@ -147,7 +147,9 @@ def frequencies(loops: Iterable[LoopResponse]) -> Table:
     title = "Closed loops by frequency, and tracking"
     why = untold_notes((loop.name, each) for loop in used for each in loop.all_readings[READ:])
     read_any = any(loop.is_told for loop in used)
-    untold = [f"–: {loop.name}: no step, see below." for loop in used if not loop.is_told]
+    untold = [
+        f"–: {loop.name}: no step; its verdict says why." for loop in used if not loop.is_told
+    ]
     # Where no loop shows a step no column of these is there, and no dash.
     notes = (note, *why, *untold) if read_any else ()
     return Table(title, columns, tuple(rows), notes)

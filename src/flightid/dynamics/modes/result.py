@@ -281,6 +281,7 @@ class Modes(Result, schema="flightid.modes/1"):
             Column("ω_n", "rad/s"),
             Column("±", "rad/s", 2),
             Column("f_n", "Hz", 4),
+            Column("corner", "Hz", 4),
             Column("ζ", digits=3),
             Column("±", digits=2),
             Column("period", "s"),
@@ -301,6 +302,8 @@ class Modes(Result, schema="flightid.modes/1"):
         if len(delays) > 1:
             notes[-1] = f"{len(delays)} {ORIGIN}: {EACH_ONE_SAMPLE}."
         notes.append("One line for a complex pair.")
+        if any(_corner_hz(mode) is not None for mode in moving):
+            notes.append("Corner: where a real pole's gain bends, its size over 2π.")
         if self.reason:
             notes.append(f"No intervals: {self.reason}.")
         else:
@@ -380,6 +383,12 @@ def _percent(share: float | None) -> float | None:
     return None if share is None else 100.0 * share
 
 
+def _corner_hz(mode: Mode) -> float | None:
+    """Corner frequency of a real pole, Hz; None of a pair and of an integrator."""
+    value = mode.real.value
+    return abs(value) / math.tau if value and not mode.is_pair else None
+
+
 def _row(mode: Mode, level: float) -> tuple[Cell, ...]:
     pair = mode.is_pair
     last = mode.time_to_half if mode.time_to_half.value is not None else mode.time_to_double
@@ -392,6 +401,7 @@ def _row(mode: Mode, level: float) -> tuple[Cell, ...]:
         (mode.damping_ratio, pair),
     ):
         numbers += [each.value, each.half(level)] if there else [None, None]
-    numbers.insert(-2, omega / math.tau if pair and omega is not None else None)
+    hertz = omega / math.tau if pair and omega is not None else None
+    numbers[-2:-2] = [hertz, _corner_hz(mode)]
     times = (mode.period, mode.time_constant, mode.time_to_half, mode.time_to_double)
     return (mode.name, *numbers, *(each.value for each in times), interval)
