@@ -32,7 +32,6 @@ WITHOUT_PICTURE = {
     "FleetOutliers": "the page of the fleet draws vehicles beside their type",
     "Flight": "a simulated log, drawn from its records",
     "FilterChoice": "a table; the spectrum behind it is drawn by the flight review",
-    "FlownSession": "its record draws itself",
     "Inspection": "tables and lights",
     "Interpretation": "sentences; `pole_zero` draws the roots",
     "Log": "raw messages; its records draw themselves",

@@ -24,12 +24,13 @@ FREQUENCIES = 40
 LONGEST, SHORTEST = 1.0 / 3.0, 1.0 / 15.0
 """Windows of the quick response: shares of the longest record, if all together are as long."""
 CLOSED_ACTION = (
-    "use the injected excitation as instrument, a method with a noise model, or fly with the loop "
-    "open; loop='open' overrides where you know it"
+    "use the injected excitation as instrument (steps or a sweep that is added to the set-point or "
+    "the input, recorded as a column), a method with a noise model, or fly with the loop open; "
+    "loop='open' overrides where you know it"
 )
 UNKNOWN_ACTION = (
     "declare loop='open' where no controller moved the inputs; with one, loop='closed', and use "
-    "the injected excitation as instrument"
+    "the injected excitation as instrument (recorded as a column)"
 )
 
 

@@ -302,7 +302,7 @@ class Modes(Result, schema="flightid.modes/1"):
         if len(delays) > 1:
             notes[-1] = f"{len(delays)} {ORIGIN}: {EACH_ONE_SAMPLE}."
         notes.append("One line for a complex pair.")
-        if any(_corner_hz(mode) is not None for mode in moving):
+        if not all(mode.is_pair for mode in moving):
             notes.append("Corner: where a real pole's gain bends, its size over 2π.")
         if self.reason:
             notes.append(f"No intervals: {self.reason}.")
@@ -383,25 +383,18 @@ def _percent(share: float | None) -> float | None:
     return None if share is None else 100.0 * share
 
 
-def _corner_hz(mode: Mode) -> float | None:
-    """Corner frequency of a real pole, Hz; None of a pair and of an integrator."""
-    value = mode.real.value
-    return abs(value) / math.tau if value and not mode.is_pair else None
-
-
 def _row(mode: Mode, level: float) -> tuple[Cell, ...]:
     pair = mode.is_pair
     last = mode.time_to_half if mode.time_to_half.value is not None else mode.time_to_double
     interval = last.range_words(level, 3)
     numbers: list[Cell] = []
-    omega = mode.natural_frequency.value
     for each, there in (
         (mode.real, True),
         (mode.natural_frequency, pair),
         (mode.damping_ratio, pair),
     ):
         numbers += [each.value, each.half(level)] if there else [None, None]
-    hertz = omega / math.tau if pair and omega is not None else None
-    numbers[-2:-2] = [hertz, _corner_hz(mode)]
+    hertz = (mode.natural_frequency.value or 0.0) / math.tau or None
+    numbers[-2:-2] = [hertz, None] if pair else [None, hertz]
     times = (mode.period, mode.time_constant, mode.time_to_half, mode.time_to_double)
     return (mode.name, *numbers, *(each.value for each in times), interval)

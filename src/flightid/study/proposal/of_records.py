@@ -38,6 +38,8 @@ from flightid.study.proposal.unit_steps import unit_steps
 from flightid.study.stage_runner import StageRunner
 from flightid.surface import as_key, speaking
 
+POLES = 2
+"""Of the model that a loop's rig is advised to begin with."""
 SHORTEST = 0.1
 """Part of the longest manoeuvre's samples below which another is a rag between gaps."""
 
@@ -166,8 +168,11 @@ def _needs_equations(
         f"{', '.join(columns.inputs)} moves free runs, which would choose a biased one",
         found=f"{', '.join(injected)} injected, and no equations to fit by way of it",
         needed="model='rate_first_order', another of the library, or a file of equations",
-        action=f"name it; what the loop tells without one: flightid response {files} {named} "
-        "--estimator instrument",
+        action=f"name it; a PID without one: flightid identify {files} {named} --kind oe "
+        f"--method riv --nb {POLES} --nf {POLES} --nk 1 --write model.toml ({POLES} poles, by way "
+        "of what was injected; more where it is red), then flightid tune model.toml "
+        f"--controller pi_d; the response alone: flightid response {files} {named} --estimator "
+        "instrument",
     )
 
 
