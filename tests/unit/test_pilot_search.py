@@ -3,7 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.responses.errors.pilot import _taken, acting, fit_pilots
+from flightid.responses.errors.pilot import fit_pilots
+from flightid.responses.errors.pilot_errors import acting, taken_by
 from flightid.responses.errors.pilot_search import (
     SPARE,
     PilotBins,
@@ -43,7 +44,7 @@ def test_what_a_fit_takes_of_noise_is_that_of_all_columns() -> None:
     columns = written_out(data, order, target)
     places = [acting(6, order + 1 + SPARE, 2, order, record) for record in range(2)]
     parts = [part[at] for part, at in zip(data.by_record(columns), places, strict=True)]
-    spent, covariance = _taken(parts, places, weights)
+    spent, covariance = taken_by(parts, places, weights)
     both = np.concatenate([(columns * weights).real, (columns * weights).imag], axis=1)
     inverse = np.linalg.inv(both @ both.T)
     share = 0.5 * np.einsum("ib,ij,jb->b", both, inverse, both).reshape(2, -1).sum(axis=0)

@@ -158,9 +158,9 @@ def _inside(outputs: Real, last: int) -> Real:
 
 
 def _noise(linear: LinearEstimate, pilots: Sequence[Pilot]) -> NoiseSpectrum:
-    """Noise of the outputs: what pilots leave, and no less than what a loop feeds back.
+    """Noise of the outputs: what pilots leave, and no less than what excitations leave.
 
-    A pilot is fitted directly: above what was excited it takes the noise in the inputs for cause.
+    Where excitations move little, a pilot by way of them has few bins to tell noise by.
     """
     residuals = _residuals(linear, pilots)
     highest = BEYOND_BAND * linear.pilots.highest_rad_s

@@ -250,7 +250,13 @@ class LinearEstimate:
             outputs,
             step,
             (places[0], places[1], places[2]),
-            Pilots(inputs, outputs, step, float(omega_rad_s[-1])),
+            Pilots(
+                inputs,
+                outputs,
+                step,
+                float(omega_rad_s[-1]),
+                tuple(samples.part("excitations")) if samples.excitations else (),
+            ),
         )
 
     def select(self, outputs: Places, inputs: Places, frequencies: Places) -> LinearEstimate | None:

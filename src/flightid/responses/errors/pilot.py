@@ -16,6 +16,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flightid.frozen import dataclass
+from flightid.responses.errors.instrumented_pilot import instrumented
+from flightid.responses.errors.pilot_errors import (
+    LEAST,
+    acting,
+    acting_in,
+    noise_weights,
+    slopes_of,
+    taken_by,
+)
 from flightid.responses.errors.pilot_search import (
     SPARE,
     PilotBins,
@@ -32,11 +41,6 @@ Places = NDArray[np.intp]
 
 ORDERS = (1, 2, 3, 4, 5, 6, 8, 10)
 """Orders that are tried, each started by itself."""
-SMOOTHED = 15
-"""Bins over which squared residuals are averaged to a noise spectrum."""
-LEAST = 1e-10
-"""Share of an output's power below which noise is rounding."""
-MOST_SPENT = 0.95  # of a bin's noise, that a fit is held to have taken
 SPENT = 3.0
 """Equations for each unknown that a fit needs."""
 PASSES = 3
@@ -114,6 +118,8 @@ class Pilots:
     sample_time_s : float
     highest_rad_s : float
         Highest frequency of the response.
+    excitations : tuple of ndarray, each shape (n_exc, n)
+        Of a closed loop, where the estimate goes by way of them.
     seen : dict
         The estimate of a pilot's slopes, by output and frequencies: see `LinearEstimate`.
     told : list
@@ -124,17 +130,30 @@ class Pilots:
     outputs: tuple[Real, ...]
     sample_time_s: float
     highest_rad_s: float
+    excitations: tuple[Real, ...] = ()
     seen: dict[tuple[int, bytes], Complex] = field(default_factory=dict, repr=False)
     told: list[Real | None] = field(default_factory=list, repr=False)
 
     @cached_property
     def found(self) -> list[Pilot | None]:
         """One for each output."""
-        return fit_pilots(self.inputs, self.outputs, self.sample_time_s, self.highest_rad_s)
+        limits = self.sample_time_s, self.highest_rad_s
+        if not self.excitations:
+            return fit_pilots(self.inputs, self.outputs, *limits)
+        moved = fit_pilots(self.excitations, self.inputs, *limits)
+        modelled = [each.outputs for each in moved if each is not None]
+        if len(modelled) < len(moved):
+            return [None] * len(self.outputs[0])
+        excited = tuple(np.stack(each) for each in zip(*modelled, strict=True))
+        return fit_pilots(self.inputs, self.outputs, *limits, excited=excited)
 
 
 def fit_pilots(
-    inputs: Sequence[Real], outputs: Sequence[Real], sample_time_s: float, highest_rad_s: float
+    inputs: Sequence[Real],
+    outputs: Sequence[Real],
+    sample_time_s: float,
+    highest_rad_s: float,
+    excited: Sequence[Real] = (),
 ) -> list[Pilot | None]:
     """Pilot models of all outputs, by maximum likelihood over the bins of whole records.
 
@@ -145,6 +164,8 @@ def fit_pilots(
     sample_time_s : float
     highest_rad_s : float
         Highest frequency of the response.
+    excited : sequence of ndarray, each shape (n_in, n), optional
+        The inputs as excitations alone would have moved them: instruments of a closed loop.
 
     Returns
     -------
@@ -153,8 +174,7 @@ def fit_pilots(
 
     Assumes
     -------
-    Noise at the outputs alone. Biased by feedback, as direct estimates are: of second order in a
-    bias that is computed from it.
+    Noise at the outputs alone. Without instruments biased by feedback, as direct estimates are.
 
     Reference
     ---------
@@ -163,15 +183,16 @@ def fit_pilots(
     Akaike's criterion for few data (Hurvich & Tsai, *Biometrika* 76, 1989): an order too low would
     be a bias that no covariance holds.
     """
-    return [
-        _fit_output(
-            spectra_of(inputs, [each[row] for each in outputs], sample_time_s, highest_rad_s)
-        )
-        for row in range(len(outputs[0]))
-    ]
+    found = []
+    for row in range(len(outputs[0])):
+        limits = [each[row] for each in outputs], sample_time_s, highest_rad_s
+        known = spectra_of(inputs, *limits)
+        found.append(_fit_output(known, spectra_of(excited, *limits) if excited else known))
+    return found
 
 
-def _fit_output(data: PilotBins) -> Pilot | None:
+def _fit_output(measured: PilotBins, data: PilotBins) -> Pilot | None:
+    """A pilot by the measured inputs, or by their excited part as instruments."""
     n_in, n_records = len(data.inputs[0]), len(data.output)
     target = np.concatenate(data.output)
     if not data.size or not np.any(target):
@@ -204,69 +225,17 @@ def _fit_output(data: PilotBins) -> Pilot | None:
             break
         if best is not None:
             tried = (len(found.denominator) - 1,)
-        best, slopes = found, _slopes(data, found, scale)
-        taken = _taken(slopes, [_acting(data, found, place) for place in range(n_records)], weights)
+        best, slopes = found, slopes_of(data, found, scale)
+        taken = taken_by(
+            slopes, [acting_in(data, found, place) for place in range(n_records)], weights
+        )
         omega = np.concatenate(data.omega)
         weights = noise_weights(omega, target - found.modelled, target, taken[0])
-    return None if best is None else _pilot(data, best, scale, slopes, taken)
-
-
-def acting(n_numerators: int, n_own: int, n_records: int, order: int, record: int) -> Places:
-    """Places, among all coefficients, of those that act in a record.
-
-    Example
-    -------
-    >>> acting(2, 3, 2, 1, record=1).tolist()
-    [0, 1, 5, 6, 7, 8]
-    """
-    begun, last = n_numerators + record * n_own, n_numerators + n_records * n_own
-    spans = (0, n_numerators), (begun, begun + n_own), (last, last + order)
-    return np.concatenate([np.arange(*span) for span in spans])
-
-
-def _acting(data: PilotBins, state: PilotState, record: int) -> Places:
-    size = len(state.denominator)
-    return acting(state.numerators.size, size + SPARE, len(data.output), size - 1, record)
-
-
-def _slopes(data: PilotBins, state: PilotState, scale: float) -> list[Complex]:
-    """Derivatives of each record's modelled bins by what acts in it, shape (n_acting, n_f)."""
-    order = len(state.denominator) - 1
-    found = []
-    for u, y, omega in zip(data.inputs, data.by_record(state.modelled), data.omega, strict=True):
-        ends = turns(omega, scale, order + SPARE)
-        basis = ends[: order + 1]
-        rows = [*(row * basis for row in u), ends, -y * basis[1:]]
-        found.append(np.concatenate(rows) / (state.denominator @ basis))
-    return found
-
-
-def _taken(slopes: Sequence[Complex], places: Sequence[Places], weights: Real) -> tuple[Real, Real]:
-    """Share of each bin's noise that the coefficients took, and their covariance in unit noise.
-
-    A transient acts in the bins of its own record: records are tens, and products of all with all
-    would be zeros for the most part.
-    """
-    ends = np.cumsum([each.shape[1] for each in slopes])[:-1]
-    left = [
-        np.concatenate([weighed.real, weighed.imag], axis=1)
-        for each, weight in zip(slopes, np.split(weights, ends), strict=True)
-        for weighed in [each * weight]
-    ]
-    squares = np.zeros(1 + max(int(each[-1]) for each in places))
-    for rows, at in zip(left, places, strict=True):
-        squares[at] += np.einsum("ib,ib->i", rows, rows)
-    norms = np.maximum(np.sqrt(squares), np.finfo(float).tiny)
-    products = np.zeros((len(norms), len(norms)))
-    left = [rows / norms[at, None] for rows, at in zip(left, places, strict=True)]
-    for rows, at in zip(left, places, strict=True):
-        products[np.ix_(at, at)] += rows @ rows.T
-    inverse = np.linalg.pinv(products, hermitian=True)
-    spent = []
-    for rows, at in zip(left, places, strict=True):
-        taken = 0.5 * np.einsum("ib,ib->b", inverse[np.ix_(at, at)] @ rows, rows)
-        spent.append(np.minimum(taken.reshape(2, -1).sum(axis=0), MOST_SPENT))
-    return np.concatenate(spent), inverse / np.outer(norms, norms)
+    if best is None:
+        return None
+    if data is not measured:
+        best, slopes, taken = instrumented(measured, data, best, scale, weights)
+    return _pilot(data, best, scale, slopes, taken)
 
 
 def _pilot(
@@ -287,35 +256,3 @@ def _pilot(
         variance * covariance,
         tuple(data.by_record(spent)),
     )
-
-
-def noise_weights(omega_rad_s: Real, residual: Complex, target: Complex, spent: Real) -> Real:
-    """One over the root of the noise's spectrum: that of the residuals with what a fit spent.
-
-    Averaged over neighbours in frequency, of whichever record: gusts that pass a slow mode rise and
-    fall within fifteen bins of one record, and noise that is taken to be less than it is there
-    gives a pilot errors that are too small.
-
-    Parameters
-    ----------
-    omega_rad_s : ndarray, shape (n_bins,)
-        Bins of all records, one record after the other.
-    residual, target : ndarray of complex, shape (n_bins,)
-    spent : ndarray, shape (n_bins,)
-
-    Example
-    -------
-    >>> two = np.tile(np.arange(1.0, 41.0), 2)
-    >>> noise = np.where(two < 8.0, 2.0, 1.0) + 0j
-    >>> weights = noise_weights(two, noise, noise, np.zeros(80))
-    >>> bool(np.all(weights[[0, 40]] == 0.5)), bool(np.all(weights[[20, 79]] == 1.0))
-    (True, True)
-    """
-    order = np.argsort(omega_rad_s, kind="stable")
-    window = np.ones(min(SMOOTHED, len(residual)))
-    power = np.convolve(np.abs(residual[order]) ** 2, window, "same")
-    power /= np.convolve(1.0 - spent[order], window, "same")
-    least = LEAST * float(np.mean(np.abs(target) ** 2))
-    weights = np.empty(len(residual))
-    weights[order] = 1.0 / np.sqrt(np.maximum(power, least))
-    return weights

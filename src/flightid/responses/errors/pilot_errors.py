@@ -1,0 +1,113 @@
+"""What coefficients of a pilot move, what of the noise they take, and how well they are known."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.responses.errors.pilot_search import SPARE, PilotBins, PilotState, turns
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+Places = NDArray[np.intp]
+
+SMOOTHED = 15
+"""Bins over which squared residuals are averaged to a noise spectrum."""
+LEAST = 1e-10
+"""Share of an output's power below which noise is rounding."""
+MOST_SPENT = 0.95  # of a bin's noise, that a fit is held to have taken
+
+
+def acting(n_numerators: int, n_own: int, n_records: int, order: int, record: int) -> Places:
+    """Places, among all coefficients, of those that act in a record.
+
+    Example
+    -------
+    >>> acting(2, 3, 2, 1, record=1).tolist()
+    [0, 1, 5, 6, 7, 8]
+    """
+    begun, last = n_numerators + record * n_own, n_numerators + n_records * n_own
+    spans = (0, n_numerators), (begun, begun + n_own), (last, last + order)
+    return np.concatenate([np.arange(*span) for span in spans])
+
+
+def acting_in(data: PilotBins, state: PilotState, record: int) -> Places:
+    """As `acting`, of a state."""
+    size = len(state.denominator)
+    return acting(state.numerators.size, size + SPARE, len(data.output), size - 1, record)
+
+
+def slopes_of(data: PilotBins, state: PilotState, scale: float) -> list[Complex]:
+    """Derivatives of each record's modelled bins by what acts in it, shape (n_acting, n_f)."""
+    order = len(state.denominator) - 1
+    found = []
+    for u, y, omega in zip(data.inputs, data.by_record(state.modelled), data.omega, strict=True):
+        ends = turns(omega, scale, order + SPARE)
+        basis = ends[: order + 1]
+        rows = [*(row * basis for row in u), ends, -y * basis[1:]]
+        found.append(np.concatenate(rows) / (state.denominator @ basis))
+    return found
+
+
+def taken_by(
+    slopes: Sequence[Complex], places: Sequence[Places], weights: Real
+) -> tuple[Real, Real]:
+    """Share of each bin's noise that the coefficients took, and their covariance in unit noise.
+
+    A transient acts in the bins of its own record: records are tens, and products of all with all
+    would be zeros for the most part.
+    """
+    ends = np.cumsum([each.shape[1] for each in slopes])[:-1]
+    left = [
+        np.concatenate([weighed.real, weighed.imag], axis=1)
+        for each, weight in zip(slopes, np.split(weights, ends), strict=True)
+        for weighed in [each * weight]
+    ]
+    squares = np.zeros(1 + max(int(each[-1]) for each in places))
+    for rows, at in zip(left, places, strict=True):
+        squares[at] += np.einsum("ib,ib->i", rows, rows)
+    norms = np.maximum(np.sqrt(squares), np.finfo(float).tiny)
+    products = np.zeros((len(norms), len(norms)))
+    left = [rows / norms[at, None] for rows, at in zip(left, places, strict=True)]
+    for rows, at in zip(left, places, strict=True):
+        products[np.ix_(at, at)] += rows @ rows.T
+    inverse = np.linalg.pinv(products, hermitian=True)
+    spent = []
+    for rows, at in zip(left, places, strict=True):
+        taken = 0.5 * np.einsum("ib,ib->b", inverse[np.ix_(at, at)] @ rows, rows)
+        spent.append(np.minimum(taken.reshape(2, -1).sum(axis=0), MOST_SPENT))
+    return np.concatenate(spent), inverse / np.outer(norms, norms)
+
+
+def noise_weights(omega_rad_s: Real, residual: Complex, target: Complex, spent: Real) -> Real:
+    """One over the root of the noise's spectrum: that of the residuals with what a fit spent.
+
+    Averaged over neighbours in frequency, of whichever record: gusts that pass a slow mode rise and
+    fall within fifteen bins of one record, and noise that is taken to be less than it is there
+    gives a pilot errors that are too small.
+
+    Parameters
+    ----------
+    omega_rad_s : ndarray, shape (n_bins,)
+        Bins of all records, one record after the other.
+    residual, target : ndarray of complex, shape (n_bins,)
+    spent : ndarray, shape (n_bins,)
+
+    Example
+    -------
+    >>> two = np.tile(np.arange(1.0, 41.0), 2)
+    >>> noise = np.where(two < 8.0, 2.0, 1.0) + 0j
+    >>> weights = noise_weights(two, noise, noise, np.zeros(80))
+    >>> bool(np.all(weights[[0, 40]] == 0.5)), bool(np.all(weights[[20, 79]] == 1.0))
+    (True, True)
+    """
+    order = np.argsort(omega_rad_s, kind="stable")
+    window = np.ones(min(SMOOTHED, len(residual)))
+    power = np.convolve(np.abs(residual[order]) ** 2, window, "same")
+    power /= np.convolve(1.0 - spent[order], window, "same")
+    least = LEAST * float(np.mean(np.abs(target) ** 2))
+    weights = np.empty(len(residual))
+    weights[order] = 1.0 / np.sqrt(np.maximum(power, least))
+    return weights
