@@ -215,7 +215,9 @@ def test_files_lose_nothing(tmp_path: Path) -> None:
     record = Record.from_arrays(
         np.arange(1500) * 0.02, inputs={"a": u[0], "b": u[1]}, outputs={"y": y}, units={"y": "deg"}
     )
-    response = estimate_response(record, band_rad_s=(3.0, 100.0), n_omega=9, window_s=[4.0, 2.0])
+    response = estimate_response(
+        record, band_rad_s=(3.0, 100.0), n_omega=9, window_s=np.array([4.0, 2.0])
+    )
     back = read_response(write_response(response, tmp_path / "h.nc"))
     assert back.to_dict() == response.to_dict()
     assert np.array_equal(back.covariance, response.covariance)

@@ -152,7 +152,8 @@ def estimate_response(
             needed="a channel with the role excitation, or excitations=…",
             action="log the injected signal, or use estimator='composite' and mind its bias",
         )
-    free = window_s == "auto" and detrend == "mean" and omega_rad_s is None
+    planned = isinstance(window_s, str) and window_s == "auto"
+    free = planned and detrend == "mean" and omega_rad_s is None
     omega = plan_frequencies(omega_rad_s, band_rad_s, n_omega, samples)
     options: dict[str, Cell] = {"estimator": estimator, "detrend": detrend}
     if estimator in ("local_polynomial", "periodic") or (estimator == "auto" and free):
