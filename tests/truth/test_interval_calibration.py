@@ -53,8 +53,10 @@ def fit_flight(axis: str, seed: int) -> fid.Fit:
     sweep = next(run for run in plan.sweep if run.axis == 10 + AXES.index(axis))
     flown = replace(plan, sweep=(replace(sweep, start_s=START_S),), doublet=(), seed=seed).fly()
     # One second after the mode is entered the chirp starts; the log's segment is the chirp.
-    # As of a log: what moves at the loop's rate is nearly straight between logged samples.
-    record = flown.record((START_S + 1.0, START_S + 1.0 + sweep.record_s)).declare(hold="first")
+    # As logs are read: what moves at the rate of the loop is smooth beside slower samples.
+    record = flown.record((START_S + 1.0, START_S + 1.0 + sweep.record_s)).declare(
+        hold="band_limited"
+    )
     asked, model = task.settings, task.model
     assert asked.band_rad_s is not None
     response = estimate(

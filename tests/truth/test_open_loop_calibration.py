@@ -52,7 +52,7 @@ def augmented(flown: fid.Record) -> fid.Record:
     return fid.Record.from_arrays(
         flown.time_s, inputs={"lat": flown["sweep_lat"]}, outputs={"p": flown["p"]},
         units={"lat": "in", "p": "rad/s"},
-    )  # fmt: skip
+    ).declare(hold="first")  # fmt: skip
 
 
 def test_the_controller_flown_again_gives_the_actuators_commands() -> None:

@@ -10,6 +10,7 @@ from tests.polynomial_records import ARMAX, flown
 
 P = fid.PolynomialModel
 RUNS = 500
+MOST_UNTOLD = 0.04
 BOX = P(("u",), "y", 0.1, b=[[1.0, 0.5]], f=[[1, -1.5, 0.7]], c=[1, 0.4], d=[1, -0.8])
 OUTPUT_ERROR = P(("u",), "y", 0.1, b=[[1.0, 0.5]], f=[[1, -1.5, 0.7]])
 REGRESSION = P(("u",), "y", 0.1, a=[1, -1.5, 0.7], b=[[1.0, 0.5]])
@@ -31,10 +32,14 @@ def coverage(case: str, runs: int, n: int = 600) -> dict[str, float]:
     plant = structure.method == "iv4"
     theta = np.array([-1.5, 0.7, 1.0, 0.5]) if plant else truth.theta
     inside: dict[str, list[bool]] = {"coefficients": [], "frequency": [], "damping": [], "gain": []}
+    untold = 0
     for seed in range(runs):
         warm_up = 0 if structure.backcast else 300
         record = flown(truth, seed, n=n, noise=0.5, warm_up=warm_up)
         fit = fid.identify(structure, record)
+        if any(each.interval95 is None for each in fit.parameters.values()):
+            untold += 1  # by a test of residuals that was a false alarm, or a root that may be one
+            continue
         for parameter, wanted in zip(fit.parameters.values(), theta, strict=True):
             low, high = parameter.interval95
             inside["coefficients"].append(low < wanted < high)
@@ -46,6 +51,7 @@ def coverage(case: str, runs: int, n: int = 600) -> dict[str, float]:
         ):
             low, high = item.interval95
             inside[key].append(low < wanted < high)
+    assert untold <= MOST_UNTOLD * runs
     return {key: float(np.mean(values)) for key, values in inside.items()}
 
 

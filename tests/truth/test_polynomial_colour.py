@@ -127,10 +127,13 @@ def test_a_root_of_d_that_may_be_one_has_no_interval(colour: float, *, told: boo
 @pytest.mark.parametrize("colour", [-0.5, 0.0, 0.5, 0.9])
 def test_intervals_cover(colour: float) -> None:
     """With white residuals assumed 84.6 % at 0.9: 73 to 93 % by coefficient."""
-    inside, apart = [], []
+    inside, apart, untold = [], [], 0
     for seed in range(250):
         parameters = _fit(seed, colour).parameters
-        ends = [parameters[name].interval95 or (0.0, 0.0) for name in TRUTH]
+        if any(parameters[name].interval95 is None for name in TRUTH):
+            untold += 1  # residuals that a test of 1 % accuses by chance
+            continue
+        ends = [parameters[name].interval95 for name in TRUTH]
         values = np.array(list(TRUTH.values()))
         inside.append(
             [low <= value <= high for (low, high), value in zip(ends, values, strict=True)]
@@ -138,6 +141,7 @@ def test_intervals_cover(colour: float) -> None:
         apart.append(
             [(parameters[n].value - value) / parameters[n].stderr for n, value in TRUTH.items()]
         )
+    assert untold <= 10
     assert 0.93 < np.mean(inside) < 0.985
     assert_close(np.sqrt(np.mean(np.square(apart))), 1.0, rtol=0.08, why="1000 scores")
 
