@@ -10,6 +10,33 @@ from flightid.errors import DataError
 COHERENT = 0.6
 """Coherence γ² from which a frequency counts."""
 
+FEWEST_WINDOWS = 5.0
+"""Independent windows that a coherence is worth at least: 0.6 of so many is an error of 26 %, and
+intervals of 95 % reach ±50 % in gain and ±30° in phase."""
+
+
+def allowed_coherence(random_error: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Most coherence γ² that random errors allow: that of five independent windows with them.
+
+    Coherence alone says nothing of how many windows it was averaged over; what is usable by its
+    coherence is to be usable by its bar too.
+
+    Parameters
+    ----------
+    random_error : ndarray
+        Standard error of a part over the size of the response.
+
+    Reference
+    ---------
+    Bendat & Piersol, *Random Data*, 4th ed., section 9.1: ε² = (1 − γ²)/(2 n γ²).
+
+    Example
+    -------
+    >>> allowed_coherence(np.array([0.0, 0.1, 0.3])).round(2)
+    array([1.  , 0.91, 0.53])
+    """
+    return np.asarray(1.0 / (1.0 + 2.0 * FEWEST_WINDOWS * np.square(random_error)))
+
 
 def usable_band(
     omega_rad_s: NDArray[np.float64], coherence: NDArray[np.float64], minimum: float = COHERENT

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.frozen import dataclass
+from flightid.responses.bands import allowed_coherence
 from flightid.responses.errors.linear_estimate import LinearEstimate
 from flightid.responses.errors.noise import AVERAGED, NoiseSpectrum, mean_spectrum
 from flightid.responses.errors.pilot import Pilot
@@ -64,15 +65,14 @@ class CorrectedResponse:
     def coherence(self, before: Real) -> Real:
         """Coherence γ² of the windows, and no more than these errors allow, (n_out, n_in, n_f).
 
-        An estimate of coherence γ² from one independent window, the fewest there are, has a
-        relative error of √((1 − γ²)/(2 γ²)) (Bendat & Piersol, section 9.1); a larger error is
-        leakage that is coherent with leakage.
+        See `allowed_coherence`: a larger error is leakage that is coherent with leakage, or of
+        windows too few to be used.
 
         Parameters
         ----------
         before : ndarray, shape (n_out, n_in, n_before)
         """
-        return np.minimum(before @ self.spread, 1.0 / (1.0 + 2.0 * self.relative**2))
+        return np.minimum(before @ self.spread, allowed_coherence(self.relative))
 
 
 def corrected(

@@ -54,6 +54,10 @@ class ExcitedResponse(Protocol):
     def loop(self) -> FeedbackTest | None:
         """Whether one was closed."""
 
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What to know."""
+
 
 def excited_to(response: ExcitedResponse, input: str) -> float:
     """Highest frequency that excited an input in a closed loop, rad/s.
@@ -68,7 +72,8 @@ def excited_to(response: ExcitedResponse, input: str) -> float:
     -------
     float
         Above it ω·S(ω) of the input stays 20 dB below its most; infinite where no loop was closed,
-        where nobody knows, or without spectra.
+        or without spectra. A loop that nobody declared and no test could rule out counts as closed:
+        above the excitation it would be all that is seen.
 
     Example
     -------
@@ -81,7 +86,8 @@ def excited_to(response: ExcitedResponse, input: str) -> float:
     loop = response.loop
     if response.input_spectrum is None or loop is None:
         return math.inf
-    if loop.loop != "closed" and not loop.is_taken_care_of:
+    # Outputs without noise feed none back inside the excited band; above it a loop is as strong.
+    if loop.loop == "open" and loop.source != "no noise":
         return math.inf
     place = response.inputs.index(input)
     level = response.omega_rad_s * np.real(response.input_spectrum[place, place])
@@ -101,7 +107,15 @@ def excited_band(
 
 def end_findings(response: ExcitedResponse) -> list[Finding]:
     """A word for each input above whose power its outputs are coherent still."""
-    found = []
+    found, loop = [], response.loop
+    closed = loop is not None and (loop.loop == "closed" or loop.is_taken_care_of)
+    seen = "a closed loop feeds back, and is no response of the vehicle"
+    action = "sweep further where the response is wanted there"
+    if not closed:
+        seen = (
+            "a loop, which no test could rule out, may feed back in place of the vehicle's response"
+        )
+        action += ", or declare loop='open' if nothing moved the inputs after the outputs"
     for place, name in enumerate(response.inputs):
         end = excited_to(response, name)
         above = response.omega_rad_s > end
@@ -112,8 +126,8 @@ def end_findings(response: ExcitedResponse) -> list[Finding]:
                     "excitation-ends",
                     Light.GREEN,
                     f"{name} has power to {end:.3g} rad/s ({end / math.tau:.3g} Hz): what is "
-                    "coherent above it a closed loop feeds back, and is no response of the vehicle",
-                    "sweep further where the response is wanted there",
+                    f"coherent above it {seen}",
+                    action,
                 )
             )
     return found
@@ -150,6 +164,25 @@ def median_percent(random_error: NDArray[np.float64]) -> float | None:
     """
     middle = float(np.median(random_error))
     return 100.0 * middle if middle < 1.0 else None
+
+
+def summary_notes(response: ExcitedResponse) -> tuple[str, ...]:
+    """What stands below a table of pairs: findings, and words on what it leaves open."""
+    lights = map(str, (*response.findings, *no_band(response)))
+    return (*lights, *hollow(response), *untold_loop(response))
+
+
+def untold_loop(response: ExcitedResponse) -> list[str]:
+    """Words on a direct estimate of which nobody knows whether a loop bends it."""
+    loop = response.loop
+    if loop is None or loop.is_known or loop.is_taken_care_of:
+        return []
+    said = str(loop)
+    return [
+        f"{said[0].upper()}{said[1:]}. Where one was closed, noise that it fed back bends this "
+        "direct estimate, and its bars do not hold that: declare the loop, or take "
+        "estimator='instrument' with what was injected."
+    ]
 
 
 def hollow(response: ExcitedResponse) -> list[str]:

@@ -19,7 +19,7 @@ from flightid.record.hold import InputShape
 from flightid.responses.bands import choose_frequencies, nearest
 from flightid.responses.errors.linear_estimate import LinearEstimate
 from flightid.responses.errors.random_error import CovarianceSource, ErrorSelection
-from flightid.responses.excited_band import excited_band, hollow, median_percent, no_band
+from flightid.responses.excited_band import excited_band, median_percent, summary_notes
 from flightid.responses.pair import PairResponse, quotient_unit
 from flightid.responses.shown import shown_values
 from flightid.result import Result
@@ -362,8 +362,7 @@ class FrequencyResponse(
                         median_percent(pair.random_error),
                     )
                 )
-        notes = (*map(str, (*known.findings, *no_band(known))), *hollow(known))
-        return Table(repr(known), columns, tuple(rows), notes)
+        return Table(repr(known), columns, tuple(rows), summary_notes(known))
 
     def _computed(self) -> dict[str, object]:
         return {"history": [str(step) for step in self.history]}

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.frozen import dataclass
-from flightid.responses.bands import COHERENT, coherent_parts, usable_band
+from flightid.responses.bands import COHERENT, allowed_coherence, coherent_parts, usable_band
 from flightid.responses.corrected import CorrectedResponse, corrected
 from flightid.responses.errors.linear_estimate import LinearEstimate
 from flightid.responses.errors.random_error import CovarianceSource
@@ -104,11 +104,13 @@ def shown_values(response: MeasuredEstimate) -> dict[str, Any]:
     Returns
     -------
     dict of str to object
-        Empty where the estimate has no windows that leak, or where its records are gone.
+        Coherence alone, or none, where the estimate has no windows that leak, or where its records
+        are gone.
     """
     linear, errors = response.linear, response.errors
     if linear is None or errors is None or not linear.weights.tells_parts:
-        return {}
+        least = np.minimum(response.coherence, allowed_coherence(response.random_error))
+        return {} if np.array_equal(least, response.coherence) else {"coherence": least}
     values, relative = np.array(response.response), np.array(response.random_error)
     coherence, n_f = np.zeros_like(relative), len(response.omega_rad_s)
     matrices = np.zeros((*relative.shape[:2], 2 * n_f, 2 * n_f))
