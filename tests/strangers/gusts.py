@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
 
 import numpy as np
@@ -38,7 +39,13 @@ def model(factor: float = 0.8) -> fid.StateSpaceModel:
     )
 
 
-def flight(seed: int, gust_m_s: float, time_s: float, duration_s: float = 60.0) -> fid.Record:
+def flight(
+    seed: int,
+    gust_m_s: float,
+    time_s: float,
+    duration_s: float = 60.0,
+    t: Mapping[str, float] = TRUTH,
+) -> fid.Record:
     """Rounded random steps in a gust of that deviation and L / V, sampled with white noise."""
     random = np.random.default_rng(seed)
     n = round(duration_s / STEP_S)
@@ -47,7 +54,6 @@ def flight(seed: int, gust_m_s: float, time_s: float, duration_s: float = 60.0) 
     steps = np.repeat(random.choice([-1.0, 0.0, 1.0], many // hold + 1), hold)[:many]
     elevator = 0.04 * gaussian_filter1d(steps, 0.06 / dt)
     gust = noises.dryden_vertical(random, many, dt, gust_m_s, time_s)
-    t = TRUTH
     a = np.array([[t["Zw"], SPEED], [t["Mw"], t["Mq"]]])
     b = np.array([[t["Zw"], t["Zd"]], [t["Mw"], t["Md"]]])
     phi = expm(np.block([[a, b], [np.zeros((2, 4))]]) * dt)

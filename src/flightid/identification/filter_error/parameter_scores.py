@@ -99,6 +99,35 @@ class ParameterScores:
             spread = spread + spread @ known @ spread
         return self.slopes / own, np.sqrt(np.diag(spread)) / own
 
+    def value_errors(self, known: Array | None = None) -> Array:
+        """Standard errors of what each parameter is where it alone was wrong.
+
+        Its own error in the model goes with what it has to move by; those of all others do not,
+        and errors that a record does not see, as of all derivatives by one factor, stay in it.
+
+        Parameters
+        ----------
+        known : ndarray, shape (n, n), optional
+            Covariance of `values`; none: the others are right.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+
+        Example
+        -------
+        >>> one = np.ones(1)
+        >>> found = ParameterScores(("a",), one, 8.0 * one, 4.0 * np.eye(1), one)
+        >>> found.value_errors(np.array([[0.75]]))
+        array([0.5])
+        """
+        own = np.diag(self.information)
+        variance = 1.0 / own
+        if known is not None:
+            others = self.information / own[:, None] - np.eye(len(own))
+            variance = variance + np.einsum("ij,jk,ik->i", others, known, others)
+        return np.sqrt(variance)
+
 
 def parameter_scores(
     model: StateSpaceModel,

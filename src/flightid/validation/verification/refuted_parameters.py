@@ -69,6 +69,9 @@ class RefutedParameter:
         Whether inputs ask nothing else beside it.
     others : tuple of str
         Parameters that would do as well.
+    errors_known : bool
+        Whether those of the model's other parameters are, or it came without any; of a fit that
+        has no intervals they are not.
     """
 
     asked: Estimate
@@ -78,20 +81,23 @@ class RefutedParameter:
     share: float
     is_enough: bool
     others: tuple[str, ...] = ()
+    errors_known: bool = True
 
     def words(self, *, hold_known: bool = True) -> str:
         """What is said of it: without interval where nobody says how inputs move between samples.
 
-        Steps taken as lines move a value by more than its noise: no such interval of ten held.
+        Steps taken as lines move a value by more than its noise: no such interval of ten held. Nor
+        is there one where nobody knows how far the fit's other parameters are off.
         """
+        is_sure = hold_known and self.errors_known
         said = (
             f"inputs ask other parameters than the model's (p = {self.chance:.1g}), beside any gust"
         )
         if not self.is_enough:
             return f"{said}: more than one, or dynamics that it lacks, most in {self.output}"
-        interval = self.asked.interval() if hold_known else None
+        interval = self.asked.interval() if is_sure else None
         between = f" ({interval[0]:.4g} to {interval[1]:.4g})" if interval else ""
-        about = "=" if hold_known else "about"
+        about = "=" if is_sure else "about"
         unit = f" {self.asked.unit}" if self.asked.unit else ""
         alike = f" (as another {' or '.join(self.others)} would)" if self.others else ""
         return (
@@ -202,7 +208,8 @@ def _refuted(
     others = tuple(
         other.asked.name for far, other in rest if other.is_enough and far < misfit + ALIKE
     )
-    return replace(best, chance=float(np.min(chances)), others=others)
+    errors_known = known is not None or asked.source is model
+    return replace(best, chance=float(np.min(chances)), others=others, errors_known=errors_known)
 
 
 def _shown(scores: ParameterScores, known: Array | None) -> tuple[Array, Array]:
@@ -254,7 +261,7 @@ def _followed(
         np.max(left) < EXPLAINED * np.max(_shown(first, known)[0])
     )
     return now.misfit, RefutedParameter(
-        Estimate(name, value, model.parameters[name].unit, float(stderr[place])),
+        Estimate(name, value, model.parameters[name].unit, float(now.value_errors(known)[place])),
         float(first.values[place]),
         0.0,
         output,
@@ -279,7 +286,10 @@ def _known(source: object, names: Sequence[str]) -> Array | None:
     """Covariance of parameters over repeated flights; None where none is known."""
     moved = []
     try:
-        for ends in uncertain_of(source).steps(STEP):
+        uncertain = uncertain_of(source)
+        if uncertain.covariance is None:
+            return None
+        for ends in uncertain.steps(STEP):
             up, down = (_values(model_of(each), names) for each in ends)
             moved.append(up - down)
     except FlightidError:
