@@ -12,8 +12,10 @@ import flightid as fid
 from flightid.identification.filter_error.parameter_scores import ParameterScores, parameter_scores
 from flightid.identification.regression.options import FilterErrorOptions
 from flightid.models import Output, Parameter, Parameters
-from flightid.validation.verification.parameter_findings import CODE
+from flightid.uncertainty.estimate import Estimate
+from flightid.validation.verification.parameter_findings import CODE, refuted_findings
 from flightid.validation.verification.pieces import GROWTH
+from flightid.validation.verification.refuted_parameters import QuestionedRuns, RefutedParameter
 from tests.strangers.gusts import TRUTH, flight, model
 
 STEP_S = 0.02
@@ -55,6 +57,21 @@ def test_a_little_wrong_in_calm_air_is_amber() -> None:
     assert light == "amber"
     assert _named(message, "Mq") == pytest.approx(TRUTH["Mq"], rel=0.02)
     assert CODE not in _said(model(1.0).with_values({"Mq": 1.05 * TRUTH["Mq"]}), record)
+
+
+def test_a_derivative_a_quarter_off_in_calm_air_is_amber_though_little_moves() -> None:
+    """It explains 98 % of the motion and was green: a model is asked for derivatives too."""
+    record, wrong = flight(23, 0.0, 1.0, 30.0), model(1.0).with_values({"Mq": TRUTH["Mq"] / 1.3})
+    light, message = _said(wrong, record)[CODE]
+    assert light == "amber"
+    assert _named(message, "Mq") == pytest.approx(TRUTH["Mq"], rel=0.02)
+    small = model(1.0).with_values({"Mq": TRUTH["Mq"] / 1.09})
+    assert CODE not in _said(small, record)
+    asked = Estimate("Mq", -2.0, "1/s", 0.01)
+    off = RefutedParameter(asked, -1.54, 1e-9, "q", share=0.016, off=0.2, is_enough=True)
+    assert [each.light.value for each in refuted_findings(off, (), hold_known=True)] == ["amber"]
+    assert not refuted_findings(off, (), hold_known=False), "a hold in doubt moves it by as much"
+    assert not QuestionedRuns(off).is_refuted, "gusts may excuse what else there is"
 
 
 def test_errors_of_a_model_s_other_parameters_are_in_what_is_asked_of_one() -> None:

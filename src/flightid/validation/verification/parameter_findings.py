@@ -20,13 +20,15 @@ def refuted_findings(
 ) -> tuple[Finding, ...]:
     """Red where what is said `beside` of the runs is poor, or the difference is gross; else amber.
 
-    Within the guide a prediction is of use, whatever is a little wrong in it.
+    Within the guide a prediction is of use, whatever is a little wrong in it. A parameter that is
+    another one but changes little is amber, where the inputs between samples are known.
     """
-    if refuted is None:
+    if refuted is None or not (refuted.is_material or hold_known):
         return ()
     poor = {Light.AMBER, Light.RED}
     is_poor = any(each.code in (THEIL, GROWTH) and each.light in poor for each in beside)
-    light = Light.RED if is_poor or refuted.share >= GROSS else Light.AMBER
+    is_red = refuted.is_material and (is_poor or refuted.share >= GROSS)
+    light = Light.RED if is_red else Light.AMBER
     return (
         Finding(
             CODE,

@@ -37,6 +37,9 @@ SURE = 2.0
 """Standard errors by which a parameter may differ less than it seems to."""
 MATERIAL = 0.02
 """Share of an output's power, as inputs make it, that other parameters have to change."""
+OFF, SEEN = 0.1, 0.0025
+"""Of a parameter itself, the share by which it surely differs, and the smaller share of an output's
+power that it has to change then: models are asked for derivatives too, not for motion alone."""
 MOVED = 0.1
 """Share of an output's whole power that inputs have to make of it, to be counted."""
 TRIED, STEPS = 2, 4
@@ -65,6 +68,8 @@ class RefutedParameter:
         That the difference changes most.
     share : float
         Of that output's power, as inputs make it, that it changes at least.
+    off : float
+        Share of the larger of both values by which they surely differ.
     is_enough : bool
         Whether inputs ask nothing else beside it.
     others : tuple of str
@@ -79,9 +84,20 @@ class RefutedParameter:
     chance: float
     output: str
     share: float
+    off: float
     is_enough: bool
     others: tuple[str, ...] = ()
     errors_known: bool = True
+
+    @property
+    def is_material(self) -> bool:
+        """Whether it matters to the motion, whatever the parameter is for."""
+        return self.share >= MATERIAL
+
+    @property
+    def is_off(self) -> bool:
+        """Whether one parameter is surely another one, though it changes little."""
+        return self.is_enough and self.errors_known and self.off >= OFF and self.share >= SEEN
 
     def words(self, *, hold_known: bool = True) -> str:
         """What is said of it: without interval where nobody says how inputs move between samples.
@@ -148,7 +164,7 @@ class QuestionedRuns:
     @property
     def is_refuted(self) -> bool:
         """Whether gusts are no excuse."""
-        return self.refuted is not None
+        return self.refuted is not None and self.refuted.is_material
 
 
 def questioned(
@@ -202,14 +218,13 @@ def _refuted(
         and (each := _followed(asked, model, (scores, known), int(place))) is not None
     ]
     found.sort(key=lambda each: each[0])
-    if not found or found[0][1].share < MATERIAL:
+    if not found or not (found[0][1].is_material or found[0][1].is_off):
         return None
     (misfit, best), *rest = found
     others = tuple(
         other.asked.name for far, other in rest if other.is_enough and far < misfit + ALIKE
     )
-    errors_known = known is not None or asked.source is model
-    return replace(best, chance=float(np.min(chances)), others=others, errors_known=errors_known)
+    return replace(best, chance=float(np.min(chances)), others=others)
 
 
 def _shown(scores: ParameterScores, known: Array | None) -> tuple[Array, Array]:
@@ -250,11 +265,12 @@ def _followed(
             break
         step *= move / (before - move)
     moves, stderr = now.alone(known)
-    far = abs(value - float(first.values[place]))
-    sure = max(1.0 - SURE * float(stderr[place]) / max(far, np.finfo(float).tiny), 0.0) ** 2
+    had, tiny = float(first.values[place]), np.finfo(float).tiny
+    far = abs(value - had)
+    sure = max(1.0 - SURE * float(stderr[place]) / max(far, tiny), 0.0)
     shares = _changed(asked.made, made)
     # What is wrong makes a part of the error, whatever one parameter would have to change.
-    least = {output: min(sure * moved, error) for output, (moved, error) in shares.items()}
+    least = {output: min(sure**2 * moved, error) for output, (moved, error) in shares.items()}
     output = max(least, key=lambda each: least[each])
     left, chances = _shown(now, known)
     is_enough = np.min(chances) >= FALSE_ALARMS or (
@@ -262,11 +278,13 @@ def _followed(
     )
     return now.misfit, RefutedParameter(
         Estimate(name, value, model.parameters[name].unit, float(now.value_errors(known)[place])),
-        float(first.values[place]),
+        had,
         0.0,
         output,
         least[output],
+        sure * far / max(abs(value), abs(had), tiny),
         is_enough=bool(is_enough),
+        errors_known=known is not None or asked.source is model,
     )
 
 
