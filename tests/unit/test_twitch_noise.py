@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 import scipy
 
 import flightid as fid
-from flightid.review.autotune.twitch_noise import NoiseShape, TwitchNoise
+from flightid.conventions import Light
+from flightid.review.autotune.twitch_noise import NoiseShape, TwitchNoise, partial_of
 from tests.autotune_log import true_margins, write_ardupilot
 from tests.closeness import assert_close
 from tests.strangers.ordinary_flights import Axis
@@ -40,8 +42,15 @@ def test_covariances_are_those_of_noise_that_is_drawn() -> None:
     assert_close(rate.T @ rate / 4000, air, atol=0.06 * air.max(), why="4,000 draws")
 
 
+def test_partial_correlations_are_those_of_an_autoregression() -> None:
+    """Its own covariance gives back what made it."""
+    partial = np.array([0.5, -0.3, 0.2])
+    lags = NoiseShape(40, 0.0025, 0.0, -3.0).gyro(partial)[0]
+    assert_close(partial_of(lags[:5]), np.append(partial, 0.0), atol=1e-9, why="Levinson's steps")
+
+
 def test_slopes_of_a_covariance_are_its_difference_quotients() -> None:
-    noise = TwitchNoise(SHAPE, np.log([0.1, 0.02, 0.3, 0.2, 0.4]), np.array([0.3, -0.1]))
+    noise = TwitchNoise(SHAPE, np.log([0.1, 0.02, 0.3, 0.2, 0.4, 0.5]), np.array([0.3, -0.1]))
     for place, slope in enumerate(noise.slopes()):
         ends = []
         for side in (1e-4, -1e-4):
@@ -75,3 +84,17 @@ def test_gyro_noise_that_the_loop_feeds_back_bends_no_margin(
     for name, exact in (("K", NOISY.effectiveness), ("T_m", NOISY.motor_s), ("L", -3.0)):
         low, high = roll.fit.parameters[name].interval95 or (np.inf, -np.inf)
         assert low <= exact <= high
+
+
+def test_twitches_that_noise_drowns_give_no_interval_and_say_why(tmp_path: Path) -> None:
+    path = tmp_path / "few.bin"
+    write_ardupilot(path, replace(NOISY, noise=0.4), most=6, seed=1)
+    review = fid.review_autotune(path)
+    (roll,) = review.opinions
+    assert roll.tuned is not None
+    assert roll.tuned.phase_margin.interval95 is None
+    (said,) = (each for each in review.findings if each.code == "autotune-margins-roll")
+    assert said.light is Light.AMBER
+    assert "without intervals (T_m is told to" in said.message
+    assert "rad/s behind the gyro's filter" in said.message
+    assert "flightid plan" in said.action

@@ -117,7 +117,8 @@ def _of_opinion(opinion: SecondOpinion, log: str) -> Iterator[Finding]:
         return
     light, words = _words(opinion.tuned)
     if opinion.tuned.is_stable and opinion.tuned.phase_margin.interval95 is None:
-        light, words = max(light, Light.AMBER, key=ORDER.index), f"{words}, without intervals"
+        light = max(light, Light.AMBER, key=ORDER.index)
+        words = f"{words}, without intervals{opinion.why and f' ({opinion.why})'}"
     flown = "" if opinion.flown is None else f"; before: {_words(opinion.flown)[1]}"
     action = {
         Light.GREEN: "",

@@ -70,12 +70,17 @@ class SecondOpinion:
     reason: str = ""
 
     @property
-    def doubt(self) -> str:
+    def why(self) -> str:
         """Why the model has no intervals; empty where it has them."""
         if self.fit is None:
             return ""
-        why = (p.reason for p in self.fit.parameters.values() if p.status == "free")
-        return next((f"{self.axis}: no intervals, {each}" for each in why if each), "")
+        reasons = (p.reason for p in self.fit.parameters.values() if p.stderr is None)
+        return next((each for each in reasons if each and each != "fixed"), "")
+
+    @property
+    def doubt(self) -> str:
+        """The same with the axis, as a note."""
+        return self.why and f"{self.axis}: no intervals, {self.why}"
 
 
 def second_opinion(

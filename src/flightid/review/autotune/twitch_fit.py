@@ -15,7 +15,6 @@ from flightid.identification.fit_evidence import evidence_of
 from flightid.identification.fitted_record import FittedRecord
 from flightid.identification.innovation_tests import InnovationTests, innovation_tests
 from flightid.identification.multistart import DenseEnd
-from flightid.identification.output_error.search import searched
 from flightid.identification.records.options import RecordOptions
 from flightid.identification.records.setup import RecordSet, prepare_records
 from flightid.identification.regression.fit import Inner, Knowledge, assemble, require_seen
@@ -31,8 +30,13 @@ from flightid.uncertainty.foretold import is_material
 
 Array = NDArray[np.float64]
 HOLD = "first"
-ORDERS = (0, 2, 4)
+ORDERS = (0, 4, 8)
 """Of the colour of a gyro's noise before its filter; the first that leaves innovations white."""
+
+
+SIZES, WIDEST = ("K", "T_m"), 0.5
+"""Numbers that have no other sign, and the half of an interval, over the number, up to which what
+follows from it is as good as linear."""
 
 
 @dataclass(frozen=True)
@@ -90,11 +94,8 @@ def fit_stretches(
     """
     options = RecordOptions(initial_state="trim", output_bias=False, input_bias=False, hold=HOLD)
     prepared = prepare_records(model, [each.record for each in stretches], options)
-    # Where the search begins: as if nothing were fed back.
-    found = searched(model, prepared, options)
-    begun = model.with_values({p.name: p.value or 0.0 for p in found.fitted.parameters.free})
     search = TwitchSearch(prepared, [each.lead for each in stretches], gyro_filter_hz)
-    end, tests = _searched(search, begun, prepared, stretches)
+    end, tests = _searched(search, model, prepared, stretches)
     return _fit(model, search, end, tests, stretches)
 
 
@@ -110,10 +111,11 @@ def _searched(
     if other.cost < best.cost:
         best = other
     tests = _tested(search, best, prepared, stretches)
+    plain = best
     for order in ORDERS[1:]:
         if tests.is_white:
             break
-        best = search.search(best.model, ticks=best.noise.shape.ticks, order=order, start=best)
+        best = search.search(plain.model, ticks=plain.noise.shape.ticks, order=order, start=plain)
         tests = _tested(search, best, prepared, stretches)
     return best, tests
 
@@ -197,8 +199,9 @@ def _fit(
         residual_horizon=1,
     )  # fmt: skip
     fit = with_damage_judged(replace(fit, structure=structure, method="output_error"), records)
-    if times is None:
-        fit = without_intervals(fit, tests.why_biased)
+    why = tests.why_biased if times is None else _untold(fit, end)
+    if why:
+        fit = without_intervals(fit, why)
     return replace(fit, evidence=evidence_of(fit, records, "closed"))
 
 
@@ -212,6 +215,24 @@ def _longer(tests: InnovationTests) -> float | None:
     if tests.is_independent or is_material(tests.worth_percent):
         return tests.widening(biased=True)
     return replace(tests, worth_percent=0.0).widening(biased=True)
+
+
+def _untold(fit: Fit, end: TwitchEnd) -> str:
+    """Why the stretches tell too little for bars about a linear point; empty where they do not."""
+    noise = f"under noise of {np.exp(end.noise.sizes[0]):.2g} rad/s behind the gyro's filter"
+    for name, each in fit.parameters.items():
+        value, ends = float(each.value or 0.0), each.interval95
+        if each.status == "at bound":
+            return (
+                f"{name} stands at its bound, {value:.3g} {each.unit}: {noise} the "
+                "tests do not tell it, and bars of the others leave that out"
+            )
+        if name in SIZES and ends is not None and ends[1] - value > WIDEST * value:
+            return (
+                f"{name} is told to {100.0 * (ends[1] / value - 1.0):.3g} %: bars take "
+                f"{100 * WIDEST:.0f} % or better, and {noise} the tests are too few or too small"
+            )
+    return ""
 
 
 def _described(end: TwitchEnd) -> dict[str, object]:

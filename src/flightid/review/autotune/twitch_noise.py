@@ -18,12 +18,17 @@ from numpy.typing import NDArray
 from flightid.frozen import dataclass
 
 Array = NDArray[np.float64]
-SOURCES = ("gyro", "reading", "air", "rate", "push")
-"""Gyro noise behind the filter, noise of reading; acceleration: white; first rate; steady one."""
+SOURCES = ("gyro", "reading", "air", "rate", "push", "drift")
+"""Gyro noise behind the filter, noise of reading, white acceleration, first rate, and of slow gusts
+the acceleration that they begin with and its random walk."""
 BELOW_NYQUIST = 0.9
 """Of half of the rate of the ticks, up to which a corner can be a filter's."""
 TAIL = 4096
 """Samples of an impulse response, twice: its spectrum is that of the noise."""
+STEP = 1e-5
+"""Of a difference quotient by a partial correlation."""
+LARGEST_PARTIAL = 0.98
+"""Where a search begins."""
 TICKS = (1, 8)
 """Of the gyro's filter in a sample: it runs with the loop, or in the driver, far above it."""
 
@@ -95,7 +100,9 @@ class NoiseShape:
         # What acts within a sample acts at its middle.
         air = scipy.signal.lfilter(*self._filter, decay)[self.ticks // 2 :: self.ticks]
         steps = np.sqrt(self.sample_time_s) * scipy.linalg.toeplitz(air, np.zeros(self.count))
-        return np.eye(self.count), steps @ steps.T, np.outer(rate, rate), np.outer(push, push)
+        walks = np.sqrt(self.sample_time_s) * scipy.linalg.toeplitz(push, np.zeros(self.count))
+        white, walked = steps @ steps.T, walks @ walks.T
+        return np.eye(self.count), white, np.outer(rate, rate), np.outer(push, push), walked
 
 
 @dataclass(frozen=True)
@@ -105,8 +112,9 @@ class TwitchNoise:
     Attributes
     ----------
     shape : NoiseShape
-    sizes : ndarray, shape (5,)
-        Logarithms of the deviations of `SOURCES`: rad/s, rad/s, rad/s^1.5, rad/s, rad/s².
+    sizes : ndarray, shape (6,)
+        Logarithms of the deviations of `SOURCES`: rad/s, rad/s, rad/s^1.5, rad/s, rad/s²,
+        rad/s^2.5.
     partial : ndarray
         Colour of the gyro's noise before its filter.
     """
@@ -144,13 +152,26 @@ class TwitchNoise:
         return found
 
 
-STEP = 1e-5
-"""Of a difference quotient by a partial correlation."""
-
-
 def _weights(partial: Array) -> Array:
     """Autoregression of partial correlations, which is stable wherever they are below one."""
     weights = np.zeros(0)
     for each in np.tanh(partial):
         weights = np.concatenate([weights - each * weights[::-1], [each]])
     return weights
+
+
+def partial_of(lags: Array) -> Array:
+    """Partial correlations, by their inverse hyperbolic tangents, of autocovariances from lag 0 on.
+
+    Reference
+    ---------
+    Durbin (1960), Review of the International Statistical Institute 28.
+    """
+    weights, found = np.zeros(0), []
+    left = lags[0]
+    for order in range(1, len(lags)):
+        each = (lags[order] - weights @ lags[order - 1 : 0 : -1]) / left
+        found.append(float(np.clip(each, -LARGEST_PARTIAL, LARGEST_PARTIAL)))
+        weights = np.concatenate([weights - found[-1] * weights[::-1], found[-1:]])
+        left *= 1.0 - found[-1] ** 2
+    return np.arctanh(found)

@@ -18,7 +18,7 @@ from flightid.frozen import dataclass
 from flightid.identification.output_error.distinct import run_with_slopes
 from flightid.identification.records.setup import RecordSet
 from flightid.models.transfer.model import TransferFunctionModel
-from flightid.review.autotune.twitch_noise import SOURCES, NoiseShape, TwitchNoise
+from flightid.review.autotune.twitch_noise import SOURCES, NoiseShape, TwitchNoise, partial_of
 
 Array = NDArray[np.float64]
 TURNS, ENOUGH = 60, 1e-3
@@ -28,7 +28,7 @@ LARGEST_STEP = 1.0
 """Of a logarithm or a partial correlation in one turn."""
 FLOOR, CEILING = 1e-5, 1e3
 """Of sizes, over the deviation of the errors that the search begins with."""
-FIRST_SHARES = (0.3, 0.03, 0.1, 0.1, 0.3)
+FIRST_SHARES = (0.3, 0.03, 0.1, 0.1, 0.3, 0.3)
 """Sizes where the search begins, over that deviation."""
 FOLLOWED = 10
 """Turns in which the shape of the noise follows the damping; then it stands, so that turns end."""
@@ -122,7 +122,7 @@ class TwitchSearch:
     ) -> TwitchEnd:
         """The likeliest vehicle and noise whose gyro's colour has that order.
 
-        `start` is an end of a lower order, else the noise begins at shares of the errors.
+        `start` is an end without colour, else the noise begins at shares of the errors.
         """
         errors, slopes = self.runs(model, sloped=True)
         deviation = float(np.sqrt(np.mean(errors[self.inside] ** 2)))
@@ -130,8 +130,9 @@ class TwitchSearch:
         damping = float(model.parameters["L"].value or 0.0)
         shape = NoiseShape(self.count, self.sample_time_s, self.gyro_filter_hz, damping, ticks)
         sizes = np.log(deviation * np.array(FIRST_SHARES)) if start is None else start.noise.sizes
-        known = np.zeros(0) if start is None else start.noise.partial
-        noise = TwitchNoise(shape, sizes, np.pad(known, (0, order - len(known))))
+        # Innovations of noise that was taken for white have the colour that it had.
+        known = np.zeros(order) if start is None else partial_of(self._lags(start.white, order))
+        noise = TwitchNoise(shape, sizes, known)
         root = _root(noise)
         cost, turn, settled = np.inf, 0, False
         for turn in range(1, TURNS + 1):
@@ -147,6 +148,12 @@ class TwitchSearch:
         white = self.whitened(root, errors)
         return TwitchEnd(
             model, noise, white, self.whitened(root, slopes), np.diag(root), cost, turn, settled
+        )
+
+    def _lags(self, white: Array, order: int) -> Array:
+        """Autocovariances of innovations."""
+        return np.array(
+            [np.sum(white[:, lag:] * white[:, : self.count - lag]) for lag in range(order + 1)]
         )
 
     def _vehicle(
