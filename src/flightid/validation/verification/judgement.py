@@ -13,6 +13,10 @@ from flightid.identification.prediction.result import Prediction
 from flightid.identification.prediction.weights import guide_factor, guide_weights, is_vehicle
 from flightid.simulation import metrics
 from flightid.validation.verification.beside_noise import BesideNoise, beside_noise
+from flightid.validation.verification.by_excitation import (
+    followed_parts,
+    weighed_by_excitation,
+)
 from flightid.validation.verification.foretold_error import unless_gusts
 from flightid.validation.verification.muad import Mismatch
 from flightid.validation.verification.of_the_fit import GUSTS, weighed
@@ -60,6 +64,7 @@ def judge(
     if asked is None or not asked.is_refuted:
         excused = weighed(verdicts, numbers["rms_error"], gusts, GUSTS)
         verdicts = unless_gusts(excused, predictions, () if asked is None else asked.innovations)
+        verdicts = weighed_by_excitation(verdicts, followed_parts(predictions))
     found = (*verdicts.values(), *_findings(guided, predictions))
     return Verification(
         outputs=compared,

@@ -32,6 +32,7 @@ from flightid.responses import FrequencyResponse
 from flightid.threads import on_one_thread
 from flightid.validation.verification.baseline import baseline_findings
 from flightid.validation.verification.beyond_noise import foretold_findings
+from flightid.validation.verification.by_excitation import unexcused
 from flightid.validation.verification.comparison import Comparison, compared
 from flightid.validation.verification.contradiction import contradictions
 from flightid.validation.verification.held_otherwise import hold_findings
@@ -225,7 +226,7 @@ def verify(
             ),
         )
         if all(each.light is Light.GREEN for each in (*judged.findings, *beside)):
-            beside = (*beside, *foretold_findings(made, chosen, asked.innovations))
+            beside = (*beside, *foretold_findings(made, unexcused(made, chosen), asked.innovations))
         in_time = way is predict_continuous
         taken = remembered(each).assumed_hold
         again = partial(run, records=flown)
