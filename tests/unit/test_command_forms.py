@@ -13,6 +13,8 @@ from flightid.cli.program import program, run
 from flightid.cli.records import expanded
 from flightid.cli.sources import known_methods
 from flightid.review.gyro_noise import _by_throttle
+from flightid.simulation.fly_options import FlyOptions
+from flightid.simulation.realtime import fly_model
 from tests.ordinary_log import write_ordinary_log
 
 
@@ -94,3 +96,9 @@ def test_labels_of_damping_cover_none_another() -> None:
         for other in labels[:place]:
             across = abs(one["x"] - other["x"]) / width
             assert across >= 0.15 or abs(one["y"] - other["y"]) / height >= 0.08
+
+
+def test_a_flown_record_has_the_model_s_units() -> None:
+    flown = fly_model(fid.load_model("rate_first_order"), FlyOptions(duration_s=0.1))
+    assert flown.record.unit("p") == "rad/s"
+    assert flown.summary().title == f"Flight of {flown.record.n_samples} frames"

@@ -76,8 +76,9 @@ def command(
     chosen = load_source(model, axis, values)
     models = [chosen, *(load_source(rival, axis) for rival in rivals)]
     channels, given, of_tests, *of_files = parted(options, _fields())
-    if of_tests and not with_residuals:
-        raise click.UsageError("--excitation, --loop and --maximum-lag are of --residual-tests")
+    # What was injected tells a run's gusts from its misses, tests or none.
+    if of_tests.keys() - {"excitations"} and not with_residuals:
+        raise click.UsageError("--loop and --maximum-lag are of --residual-tests")
     shared = [name for name in chosen.outputs if all(name in m.outputs for m in models)]
     compared = channels.get("outputs") or shared
     flown = read_files(

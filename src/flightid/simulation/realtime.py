@@ -93,7 +93,8 @@ class FlownSession(Result, schema="flightid.flown_session/1", untold={"record": 
             ("late frames", float(self.late_frames), ""),
             ("worst delay", 1e3 * self.worst_late_s, "ms"),
         )
-        return Table(repr(self), (Column("what"), Column("value"), Column("unit")), rows)
+        title = f"Flight of {self.record.n_samples} frames"
+        return Table(title, (Column("what"), Column("value"), Column("unit")), rows)
 
     def _computed(self) -> dict[str, object]:
         return {"frames": self.record.n_samples}
@@ -106,6 +107,7 @@ def fly_in_real_time(
     duration_s: float,
     show: Callable[[float, Mapping[str, float]], None] | None = None,
     clock: Clock | None = None,
+    units: Mapping[str, str] | None = None,
 ) -> FlownSession:
     """Step a model beside a clock; frames that come late are counted, none is left out.
 
@@ -123,6 +125,8 @@ def fly_in_real_time(
         Takes the time and the outputs, each frame.
     clock : Clock, optional
         Left out: the machine's.
+    units : mapping of str to str, optional
+        Of channels, for the record.
 
     Raises
     ------
@@ -172,10 +176,13 @@ def fly_in_real_time(
     except (KeyboardInterrupt, EndOfFlight):
         if flown < FEWEST_FRAMES:
             raise
+    known = {name: unit for name, unit in (units or {}).items()
+             if name in (*stepper.inputs, *stepper.outputs)}  # fmt: skip
     record = Record.from_arrays(
         np.arange(flown) * step,
         inputs=dict(zip(stepper.inputs, given[:, :flown], strict=True)),
         outputs=dict(zip(stepper.outputs, found[:, :flown], strict=True)),
+        units=known,
         name="flown",
     )
     return FlownSession(record, late_frames, worst, flown < count)
@@ -225,8 +232,9 @@ def fly_model(
         if say is not None and heard is not None:
             say(f"Listening at {options.host}:{link.port} for {', '.join(stepper.inputs)}")
         session = fly_in_real_time(
-            stepper, link.pilot, duration_s=options.duration_s, show=link.show
-        )
+            stepper, link.pilot, duration_s=options.duration_s, show=link.show,
+            units=getattr(model, "units", None),
+        )  # fmt: skip
         if say is not None and link.rejected:
             say(f"{link.rejected} datagrams were damaged or not delivered.")
         if say is not None and link.strangers:
