@@ -104,18 +104,21 @@ def find_delays(data: SampledChannels, largest: int) -> list[InputDelay]:
 
     Assumes
     -------
-    Few poles: a response whose first samples drown in noise is said to begin later.
+    Few poles; where they leave more than noise, as of modes that stiffen, ranges are as much wider,
+    and a delay may still be told wrong. A response whose first samples drown in noise is said to
+    begin later.
 
     Reference
     ---------
     Björklund & Ljung, "A review of time-delay estimation techniques", *IEEE CDC* 2003 (section 4.2,
-    explicit one-parameter methods in the time domain); Steiglitz & McBride (1965), IEEE Trans. AC
-    10.
+    explicit one-parameter methods in the time domain); McCullagh & Nelder, *Generalized Linear
+    Models*, 2nd ed., section 4.5 (what is more than noise); Steiglitz & McBride (1965),
+    IEEE Trans. AC 10.
     """
     scan = _ArxScan.of(data, largest)
     acts = [scan.acts(place) for place in range(len(data.inputs))]
     first = [scan.best(place) for place in range(len(data.inputs))]
-    whitened = _whitened(_shortened(data))
+    whitened, noise = _whitened(_shortened(data))
     for place in (i for i, seen in enumerate(acts) if seen):
         costs = _costs(whitened, first, place, {*range(0, scan.largest + 1, COARSE), first[place]})
         first[place] = min(costs, key=lambda delay: costs[delay])
@@ -128,7 +131,10 @@ def find_delays(data: SampledChannels, largest: int) -> list[InputDelay]:
         costs = _costs(whitened, first, place, range(low, high + 1))
         least = min(costs.values())
         first[place] = min(costs, key=lambda delay: costs[delay])
-        alike = [delay for delay, cost in costs.items() if cost <= least + UNCERTAIN]
+        # Likelihoods count for as much less as few poles leave more than noise (quasi-likelihood).
+        more = float(np.exp(least / sum(whitened.lengths))) / noise
+        near = least + UNCERTAIN * max(more, 1.0)
+        alike = [delay for delay, cost in costs.items() if cost <= near]
         found.append(InputDelay.of(first[place], alike))
     return found
 
@@ -280,8 +286,11 @@ def _shortened(data: SampledChannels) -> DelayedSignals:
     return DelayedSignals(np.vstack([data.output, data.inputs])[:, :n], tuple(lengths), data.levels)
 
 
-def _whitened(data: DelayedSignals) -> DelayedSignals:
-    """Signals filtered so that what a long model leaves of the output is white, starts cut off."""
+def _whitened(data: DelayedSignals) -> tuple[DelayedSignals, float]:
+    """Signals filtered so that what a long model leaves of the output is white, and its variance.
+
+    Starts are cut off.
+    """
     output, inputs = data.rows[0], data.rows[1:]
     m, n = inputs.shape
     long = max(1, min(LONG, n // (8 * (m + 1)), min(data.lengths) // 4))
@@ -293,4 +302,6 @@ def _whitened(data: DelayedSignals) -> DelayedSignals:
     # A pulse at the start of each record answers as whatever state it began in.
     pulses = np.zeros(kept.size)
     pulses[np.cumsum((0, *lengths[:-1]))] = 1.0
-    return DelayedSignals(np.vstack([white[:, kept], pulses]), lengths, data.levels)
+    free = max(made.n_rows - len(made.triangle) + 1, 1)
+    noise = max(float(made.triangle[-1, -1] ** 2) / free, np.finfo(float).tiny)
+    return DelayedSignals(np.vstack([white[:, kept], pulses]), lengths, data.levels), noise
