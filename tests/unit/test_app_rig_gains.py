@@ -75,9 +75,9 @@ def test_the_first_slider_that_is_moved_keeps_the_plants(start: str, first: list
     """It writes the table [tune]; plants were worked out anew for that."""
     moved = edited(start, [*first, KeyEdit(("tune", "by_hand"), {"Kp": 1.0})])
     back = edited(moved, [KeyEdit(("tune", "by_hand"), None)])
-    assert gain_work._key(start) == gain_work._key(moved) == gain_work._key(back)
+    assert gain_work.plants_key(start) == gain_work.plants_key(moved) == gain_work.plants_key(back)
     for other in (KeyEdit(("tune", "preset"), "firm"), KeyEdit(("tune", "controller"), "pi")):
-        assert gain_work._key(edited(moved, [other])) != gain_work._key(moved)
+        assert gain_work.plants_key(edited(moved, [other])) != gain_work.plants_key(moved)
 
 
 @pytest.mark.slow

@@ -130,6 +130,30 @@ def test_plants_outlive_work_that_is_silent_when_it_is_asked_to_end(
     assert len(set(place.read_text().split())) == 1, "one process did all"
 
 
+@pytest.mark.slow
+def test_what_a_hand_will_wait_for_is_made_once_and_before_it(tmp_path: Path) -> None:
+    """A server that was started anew drew the plants of known gains at the first slider's move."""
+    place = tmp_path / "pids"
+
+    async def asked() -> None:
+        workers = Workers(Workspace(tmp_path))
+        workers.start()
+        for _ in range(3):
+            workers.prepare("plants", noted, place)
+        await workers.tuned(noted, place)
+        assert workers.all() == [], "nobody is told"
+        await asyncio.to_thread(workers.stop)
+
+    asyncio.run(asked())
+    first, moved = place.read_text().split()
+    assert first == moved, "in the process that the hand asks"
+
+
+def noted(place: Path) -> None:
+    with place.open("a") as stream:
+        stream.write(f"{os.getpid()}\n")
+
+
 def silent(place: Path) -> None:
     with place.open("a") as stream:
         stream.write(f"{os.getpid()}\n")

@@ -67,5 +67,9 @@ def add_gain_routes(app: FastAPI, backstage: Backstage) -> None:
             raise HTTPException(404, "This log has no study.")
         etag, version, part = await asyncio.to_thread(kept_gains, backstage, log)
         backstage.workers.ensure("gains", log, path, again=again, of=version)
+        if part is not None:
+            text = path.read_text(encoding="utf-8")
+            key = f"{log} {gain_work.plants_key(text)}"
+            backstage.workers.prepare(key, gain_work.prepare_plants, path, text)
         jobs = [job for job in backstage.workers.of_log(log) if job.kind == "gains"]
         return GainsScreen(etag=etag, gains=part, jobs=jobs)

@@ -101,7 +101,7 @@ def gains_of(study: Path, text: str) -> GainsPart:
     found = tuning
     if by_hand:
         found = _tuned(study, edited(text, [KeyEdit(("tune", "by_hand"), None)]))
-    KEPT[_key(text)] = tuning
+    KEPT[plants_key(text)] = tuning
     axes = [
         _axis(each, move_gains(each, {}), _searched(found, each.axis), by_hand)
         for each in tuning.designs
@@ -149,9 +149,7 @@ def move_axis(
 ) -> Mapping[str, Any]:
     """One axis with other gains, judged by the plants that are kept."""
     whole = edited(text, edits) if edits else text
-    key = _key(whole)
-    tuning = KEPT.get(key) or _tuned(study, whole)
-    KEPT[key] = tuning
+    tuning = hold_plants(study, whole)
     for design in tuning.designs:
         if design.axis == axis:
             moved = move_gains(design, values, responses=responses)
@@ -159,6 +157,19 @@ def move_axis(
     raise UnknownNameError(
         "no gains of this axis", found=axis, needed=", ".join(d.axis for d in tuning.designs)
     )
+
+
+def hold_plants(study: Path, text: str) -> Tuning:
+    """Plants of a study as this process keeps them; worked out where it does not yet."""
+    key = plants_key(text)
+    tuning = KEPT.get(key) or _tuned(study, text)
+    KEPT[key] = tuning
+    return tuning
+
+
+def prepare_plants(study: Path, text: str) -> None:
+    """Have the plants ready for the first slider that is moved."""
+    hold_plants(study, text)
 
 
 def make_files(study: Path, text: str) -> list[dict[str, str]]:
@@ -198,7 +209,7 @@ def _hand_gains(text: str) -> Mapping[str, float]:
     return given if isinstance(given, dict) else {}
 
 
-def _key(text: str) -> str:
+def plants_key(text: str) -> str:
     """What plants rest on: all of the study but the gains by hand.
 
     What nobody has said is as it is where it is said: the first click writes that too.

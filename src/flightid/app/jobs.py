@@ -96,6 +96,7 @@ class Workers:
         self._futures: dict[str, Future[Any]] = {}
         self._places: dict[str, Path] = {}
         self._ending: set[Path] = set()
+        self._prepared: set[str] = set()
         self._look: asyncio.Task[None] | None = None
         self._listeners: list[Listener] = []
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -216,6 +217,12 @@ class Workers:
     async def tuned(self, call: Callable[..., Any], *inputs: object) -> tuple[Any, str, float]:
         """The same in the process that keeps plants of tunings, where seconds hold up no drag."""
         return await _awaited(self._tuning, LONGEST_S, call, *inputs)
+
+    def prepare(self, key: str, call: Callable[..., Any], *inputs: object) -> None:
+        """Have that process make what a hand will wait for, once for each key; nobody is told."""
+        if key not in self._prepared:
+            self._prepared.add(key)
+            self._tuning.schedule(work.answered, call, *inputs, timeout_s=LONGEST_S)
 
     async def compared(self, call: Callable[..., Any], *inputs: object) -> tuple[Any, str, float]:
         """The same for comparisons: no tuning holds them up."""
