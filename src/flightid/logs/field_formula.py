@@ -116,8 +116,7 @@ def _compiled(formula: str) -> tuple[str, dict[str, str], _native.Tape]:
         compiled = _native.Tape([words], names, {})
     except ModelError as fault:
         raise OptionError(
-            f"this is no formula of fields: {formula[:LONGEST]!r}",
-            found=str(fault),
+            f"this is no formula of fields: {formula[:LONGEST]!r} {fault}",
             needed="MESSAGE.FIELD, numbers, + - * / ^ and functions such as abs or where",
         ) from fault
     bare = [name for name in names if name not in columns]

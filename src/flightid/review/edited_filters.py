@@ -254,8 +254,7 @@ def filter_bench(log: Log) -> FilterBench:
     review = filter_review(log, spans, noise, loops)
     if review.reason or not (noise.is_told and spans):
         raise DataError(
-            "no filters can be tried on this log",
-            found=review.reason or noise.reason or "no flight",
+            f"no filters can be tried on this log: {review.reason or noise.reason or 'no flight'}",
             needed="a spectrum of the gyro in the air, and the parameters of the controller",
             action="log the gyro faster: raw batches (ArduPilot), the high rate (PX4)",
         )
