@@ -304,6 +304,11 @@ def _of_a_run(stage: Stage) -> Iterator[str]:
             page.locator("main figure .js-plotly-plot, main table").first.wait_for()
             yield f"{screen}: {parts.nth(k).inner_text()}"
         yield f"{screen}: a run"
+    # Gains were tuned: what comes after the next flight is a screen as well.
+    compare = page.locator("main").get_by_role("link", name="Compare")
+    assert compare.get_attribute("href") == f"#/compare/{stage.logs['first']}"
+    compare.press("Enter")
+    page.locator("select[aria-label='Flight after']").wait_for()
 
 
 def _of_records(stage: Stage) -> Iterator[str]:
