@@ -19,6 +19,8 @@ CIRCLES = 5
 """At most so many circles of natural frequency."""
 SLOW = 0.15
 """Eigenvalues below this share of the largest have a plot of their own beside the whole."""
+WIDEST = 1.2
+"""Least width of a frame in its heights: both axes have one scale, and labels need room."""
 MARGIN = 0.12
 ROOM = (0.15, 0.08)
 """Of a frame: how far labels stand apart, so that none covers another on a phone."""
@@ -127,6 +129,7 @@ def _frame(made: go.PlotFigure, visible: list[Mode], column: int, words: str, ro
     size = max(right - left, top, 1e-9)
     x = (left - MARGIN * size, max(right, 0.0) + MARGIN * size)
     y = (-MARGIN * size / 2.0, max(top, size / 3.0) + MARGIN * size)
+    x = (min(x[0], x[1] - WIDEST * (y[1] - y[0])), x[1])
     reach = math.hypot(max(-x[0], x[1]), y[1])
     labels: list[tuple[complex, str]] = []
     for damping in DAMPING_LINES:

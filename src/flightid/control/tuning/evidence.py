@@ -319,8 +319,7 @@ def _first_red(what: str, result: object) -> Iterator[DataError]:
 
 def _red(what: str, finding: Finding) -> DataError:
     return DataError(
-        f"{what} is red, so no gains are made from it",
-        found=finding.message,
+        f"{what} is red, so no gains are made from it: {finding.message}",
         needed="a model that its data support",
         action=finding.action or None,
     )
