@@ -28,7 +28,7 @@ async function ask(path: string, options: RequestInit = {}): Promise<Response> {
   try {
     answer = await fetch(path, { credentials: "same-origin", ...options });
   } catch {
-    throw new Refusal(0, "flightid did not answer: see that `flightid app` runs, and ask again.");
+    throw new Refusal(0, "flightid did not answer: see on the terminal that it runs, and ask again.");
   }
   return answer.ok ? answer : refused(answer);
 }
