@@ -37,8 +37,8 @@ def memory_doubt(
 
     A bias that falls as memory grows moves at least as much at its next halving as it still is.
     What chance moves between nested models, the difference of their variances, is taken off, and
-    the square is averaged over an octave. Where a cycle is longer than twice the memory it grows
-    as the square of that ratio.
+    the square is averaged over an octave. Where a cycle is longer than the memory it grows as the
+    square of that ratio.
 
     Parameters
     ----------
@@ -59,5 +59,5 @@ def memory_doubt(
     beyond = np.maximum(moved - np.maximum(variances[0] - variances[1], 0.0), 0.0)
     share = np.minimum(beyond / square, MOST)
     around = near(omega_rad_s)
-    short = np.maximum(np.pi / (model.memory_s * omega_rad_s), 1.0)
+    short = np.maximum(2.0 * np.pi / (model.memory_s * omega_rad_s), 1.0)
     return np.asarray(np.sqrt(square * (share @ around) / around.sum(axis=0)) * short)
