@@ -192,7 +192,7 @@ def test_bands_as_they_are_written_are_within_their_limits(digits: int) -> None:
     assert band_findings(np.array([low, high]), 7.2, 0.04) == []
     below, above = band_findings(np.array([1.73, 31.6]), 7.2, 0.04)
     assert "from 1.73 rad/s" in below.message
-    assert "from 1.75 rad/s" in below.action
+    assert "at 1.75 rad/s" in below.action
     assert "reach 31.6 rad/s; a fifth of the sampling rate is 31.4" in above.message
 
 
