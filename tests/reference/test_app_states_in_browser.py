@@ -179,7 +179,7 @@ def _of_two_windows(stage: Stage) -> Iterator[str]:
     page.press("#least", "Tab")
     page.wait_for_selector("dialog[open]")
     yield "both have changed the study"
-    stage.button("Take theirs alone").press("Enter")
+    stage.button("Keep theirs alone").press("Enter")
     page.wait_for_selector("dialog[open]", state="detached")
 
 

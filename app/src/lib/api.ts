@@ -1,4 +1,4 @@
-import type { Drafts, PlacedDraft, RemovedItem, CompareRequest, ComparisonPart, Edit, FieldGroup, FilterScreen, FlightScreen, FormulaUnit, GainsScreen, Job, Listing, LogItem, ModelAnswer, OwnModelAnswer, OwnModel, PlanPart, PlanRequest, PlotLayout, ProposedStudy, RigItem, RigScreen, RunScreen, ShownModel, StudyComparison, StudyText, UseEdits } from "./types";
+import type { Drafts, PlacedDraft, RemovedItem, CompareRequest, ComparisonPart, Edit, FieldGroup, FilterScreen, FlightScreen, FormulaUnit, GainsScreen, Job, Listing, LogItem, MergedStudy, ModelAnswer, OwnModelAnswer, OwnModel, PlanPart, PlanRequest, PlotLayout, ProposedStudy, RigItem, RigScreen, RunScreen, ShownModel, StudyComparison, StudyText, TwoStudies, UseEdits } from "./types";
 
 /** A refusal of the server, in its own words. */
 export class Refusal extends Error {
@@ -66,6 +66,8 @@ export const change = (log: string, etag: string, edits: Edit[]) =>
   json<StudyText>(`/api/studies/${log}`, sent("PATCH", { edits }, { "if-match": etag }));
 export const replace = (log: string, etag: string, text: string) =>
   json<StudyText>(`/api/studies/${log}`, sent("POST", { text }, { "if-match": etag }));
+/** Lay two versions of a study side by side; nothing is written. */
+export const merge = (log: string, two: TwoStudies) => json<MergedStudy>(`/api/studies/${log}/merge`, sent("POST", two));
 /** To the version before, or to the next again. */
 export const step = (log: string, etag: string, back: boolean) =>
   json<StudyText>(`/api/studies/${log}/step`, sent("POST", { back }, { "if-match": etag }));

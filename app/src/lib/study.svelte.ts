@@ -1,5 +1,6 @@
 import * as api from "./api";
-import type { Edit, StudyText } from "./types";
+import { drafts } from "./drafts";
+import type { Edit, MergedStudy, StudyText } from "./types";
 
 export interface ModelTable {
   name: string;
@@ -9,6 +10,27 @@ export interface ModelTable {
   band_rad_s?: [number, number];
   response?: Record<string, unknown>;
 }
+
+/** Two versions that began as one: what was meant here, and what stands in the file meanwhile. */
+export interface Conflict extends MergedStudy {
+  base: string;
+  theirs: string;
+  /** Of what stands in the file. */
+  etag: string;
+  /** Whether a whole text was meant: its editor closes when the other text is taken. */
+  typed: boolean;
+  /** Hears whether the change, or the editor of it, is done with. */
+  settled: (done: boolean) => void;
+}
+export type Choice = "mine" | "theirs" | "both" | "later";
+/** What a change was to make of the study: a text, which was made of `base`, or keys. */
+interface Meant {
+  text?: string;
+  base?: string;
+  edits?: Edit[];
+}
+/** What became of a change: stored or not, or a question that stands on the page until it is answered. */
+type Stored = boolean | { asked: Promise<boolean> };
 
 /** Edits that wait for their turn; whoever changes the same keys meanwhile puts newer values in. */
 interface Waiting {
@@ -23,7 +45,7 @@ const keysOf = (edits: Edit[]) => JSON.stringify(edits.map((each) => each.path))
 export class Study {
   file: StudyText | null = $state(null);
   error = $state("");
-  conflict: { mine: Edit[]; text: string; etag: string } | null = $state(null);
+  conflict: Conflict | null = $state.raw(null);
   changed: string[] = $state([]);
   /** Whether the server was asked once: before that nobody knows whether there is a study. */
   known = $state(false);
@@ -71,9 +93,9 @@ export class Study {
       return behind.stored;
     }
     const waiting: Waiting = { edits, stored: Promise.resolve(false) };
-    waiting.stored = this.#inTurn(() => {
+    waiting.stored = this.#heard(() => {
       if (this.#waiting === waiting) this.#waiting = null;
-      return this.#store(waiting.edits, (etag) => api.change(this.log, etag, waiting.edits));
+      return this.#store((etag) => api.change(this.log, etag, waiting.edits), { edits: waiting.edits });
     });
     this.#waiting = waiting;
     return waiting.stored;
@@ -81,24 +103,29 @@ export class Study {
 
   /** Change keys whose places hang on what stands there when the turn comes. */
   editThen(make: () => Edit[]): Promise<boolean> {
-    return this.#inTurn(() => {
+    return this.#heard(() => {
       const edits = make();
-      return this.#store(edits, (etag) => api.change(this.log, etag, edits));
+      return this.#store((etag) => api.change(this.log, etag, edits), { edits });
     });
   }
 
-  /** Put a whole text in place, as a proposal made anew; it can be taken back. */
-  replace(text: string): Promise<boolean> {
-    return this.#inTurn(() => this.#store([], (etag) => api.replace(this.log, etag, text)));
+  /** Put a whole text in place, which was made of `base`; it can be taken back. */
+  replace(text: string, base?: string): Promise<boolean> {
+    return this.#heard(async () => {
+      const file = this.file;
+      const meant = { text, base: base ?? file?.text };
+      if (file && meant.base !== file.text) return this.#ask(meant, file);
+      return this.#store((etag) => api.replace(this.log, etag, text), meant);
+    });
   }
 
   /** Versions are the server's: a reload, and the next window, go back as far. */
   undo(): Promise<boolean> {
-    return this.#inTurn(async () => !!this.file?.undoable && this.#store([], (etag) => api.step(this.log, etag, true)));
+    return this.#heard(async () => !!this.file?.undoable && this.#store((etag) => api.step(this.log, etag, true)));
   }
 
   redo(): Promise<boolean> {
-    return this.#inTurn(async () => !!this.file?.redoable && this.#store([], (etag) => api.step(this.log, etag, false)));
+    return this.#heard(async () => !!this.file?.redoable && this.#store((etag) => api.step(this.log, etag, false)));
   }
 
   /** One after the other: a request that went beside another would name a version that is gone. */
@@ -114,35 +141,91 @@ export class Study {
     }
   }
 
-  /** Keep what the other window wrote, or put these edits over it. */
-  async settle(keepTheirs: boolean) {
-    const mine = this.conflict?.mine ?? [];
-    this.conflict = null;
-    await this.load();
-    if (!keepTheirs && mine.length) await this.edit(mine);
+  /** The turn ends with the question, not with its answer: whatever is asked next would wait for that. */
+  async #heard(task: () => Promise<Stored>): Promise<boolean> {
+    const stored = await this.#inTurn(task);
+    return typeof stored === "object" && "asked" in stored ? stored.asked : stored;
   }
 
-  async #store(edits: Edit[], store: (etag: string) => Promise<StudyText>): Promise<boolean> {
-    if (!this.file && !this.known) return false;
-    if (this.conflict) {
-      this.conflict.mine.push(...edits);
+  /** One of both versions, both together, or neither yet: what was meant here waits as typed text. */
+  async settle(choice: Choice) {
+    const asked = this.conflict;
+    if (!asked) return;
+    this.conflict = null;
+    if (choice === "later") this.#later(asked);
+    if (choice === "later" || choice === "theirs") {
+      await this.load();
+      if (choice === "later" && !asked.typed && drafts.kept(this.place)?.text !== asked.mine) this.error = "Your change was not made: the study had changed meanwhile, and text that is not saved stands here.";
+      return asked.settled(choice === "theirs" && asked.typed);
+    }
+    const text = choice === "both" ? asked.merged! : asked.mine;
+    const stored = await this.#heard(() => this.#store(() => api.replace(this.log, asked.etag, text), { text, base: choice === "both" ? asked.theirs : asked.base }));
+    if (!stored && this.error) {
+      const said = this.error;
+      this.#later(asked);
+      await this.load();
+      this.error = said;
+    }
+    asked.settled(stored);
+  }
+
+  /** Nothing is lost with the question: Lines takes it up, as it does what was typed there. */
+  #later(asked: Conflict) {
+    if (!drafts.kept(this.place)) drafts.keep(this.place, { text: asked.mine, name: "", before: asked.base });
+  }
+
+  /** Of its text, among what is typed and not saved. */
+  get place() {
+    return `study:${this.log}`;
+  }
+
+  async #ask(meant: Meant, now: { text: string; etag: string }): Promise<Stored> {
+    const base = meant.base ?? this.file?.text ?? "";
+    try {
+      const told = await api.merge(this.log, { base, mine: meant.text ?? base, theirs: now.text, edits: meant.edits ?? [] });
+      let settled: (done: boolean) => void = () => {};
+      const asked = new Promise<boolean>((give) => (settled = give));
+      this.conflict = { ...told, base, theirs: now.text, etag: now.etag, typed: meant.text !== undefined, settled };
+      return { asked };
+    } catch (error) {
+      this.error = (error as Error).message;
       return false;
     }
+  }
+
+  async #store(store: (etag: string) => Promise<StudyText>, meant: Meant | null = null): Promise<Stored> {
+    if (!this.file && !this.known) return false;
+    if (this.conflict) return this.#besides(this.conflict, meant);
     const before = this.file?.text ?? "";
     try {
       this.file = await store(this.file?.etag ?? UNWRITTEN);
       this.error = "";
     } catch (error) {
       const refusal = error as api.Refusal;
-      if (refusal.status === 409) {
-        this.conflict = { mine: edits, ...(refusal.detail as { text: string; etag: string }) };
-      } else {
+      if (refusal.status !== 409) {
         this.error = refusal.message;
+        return false;
       }
+      const now = refusal.detail as { text: string; etag: string };
+      if (meant) return this.#ask(meant, now);
+      this.file = await api.study(this.log);
+      this.error = "The study was changed elsewhere meanwhile, and stands below as it is now: no version was taken back or made again.";
       return false;
     }
     const old = new Set(before.split("\n"));
     this.changed = this.file.text.split("\n").filter((line) => !old.has(line));
     return true;
+  }
+
+  /** Keys that were changed before the question stood there are of what is asked about. */
+  async #besides(asked: Conflict, meant: Meant | null): Promise<boolean> {
+    if (!meant?.edits) return false;
+    try {
+      const mine = await api.merge(this.log, { base: asked.base, mine: asked.mine, theirs: asked.theirs, edits: meant.edits });
+      if (this.conflict === asked) this.conflict = { ...asked, ...mine };
+    } catch (error) {
+      this.error = (error as Error).message;
+    }
+    return false;
   }
 }

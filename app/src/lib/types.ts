@@ -585,6 +585,20 @@ export interface MarginRow {
   untold: string;
 }
 
+/** A line of two versions: of both, of one of them, or a mark for equal lines left out. */
+export interface MergeLine {
+  side: "same" | "theirs" | "mine" | "gap";
+  text: string;
+}
+
+/** Two versions of a study side by side, and both together where they allow it. */
+export interface MergedStudy {
+  mine: string;
+  merged: string | null;
+  why: string;
+  lines: MergeLine[];
+}
+
 /** A model of a study, or why there is none; both empty where it has no equations. */
 export interface ModelAnswer {
   model: ShownModel | null;
@@ -1124,6 +1138,14 @@ export interface TimeCurve {
   low: number[];
   high: number[];
   flown: number[] | null;
+}
+
+/** A study as it was begun from, as it was meant here, and as it stands in the file now. */
+export interface TwoStudies {
+  base: string;
+  mine: string;
+  theirs: string;
+  edits: Edit[];
 }
 
 /** The keys of a study that put a model into it. */

@@ -256,6 +256,34 @@ class WholeText(Message):
     text: str
 
 
+class TwoStudies(Message):
+    """A study as it was begun from, as it was meant here, and as it stands in the file now."""
+
+    base: str
+    mine: str
+    theirs: str
+    edits: list[Edit] = Field(default=[], max_length=256)
+    """Keys that were to change in `mine` besides."""
+
+
+class MergeLine(Message):
+    """A line of two versions: of both, of one of them, or a mark for equal lines left out."""
+
+    side: Literal["same", "theirs", "mine", "gap"]
+    text: str
+
+
+class MergedStudy(Message):
+    """Two versions of a study side by side, and both together where they allow it."""
+
+    mine: str
+    """With its edits made."""
+    merged: str | None
+    why: str
+    """Why they cannot be taken together."""
+    lines: list[MergeLine]
+
+
 class ResponseCurve(Message):
     """One response of one estimator."""
 

@@ -9,7 +9,9 @@ from typing import Annotated
 from fastapi import FastAPI, Header, HTTPException, Response
 
 from flightid.app.backstage import Backstage, LogName
-from flightid.app.schemas import Edits, StudyStep, StudyText, WholeText
+from flightid.app.schemas import Edits, MergedStudy, StudyStep, StudyText, TwoStudies, WholeText
+from flightid.app.study_edits import KeyEdit
+from flightid.app.study_merge import merge_studies
 
 
 def add_study_routes(app: FastAPI, backstage: Backstage) -> None:
@@ -47,6 +49,14 @@ def add_study_routes(app: FastAPI, backstage: Backstage) -> None:
         if_match: Annotated[str | None, Header()] = None,
     ) -> StudyText:
         return await _stored(studies.step, log, steps, if_match, response)
+
+    @app.post("/api/studies/{log}/merge")
+    async def merge(log: LogName, two: TwoStudies) -> MergedStudy:
+        """Compare two versions; nothing is written."""
+        if studies.path(log) is None:
+            raise HTTPException(404, "This log has no study.")
+        edits = [KeyEdit(tuple(each.path), each.value) for each in two.edits]
+        return await asyncio.to_thread(merge_studies, two.base, two.mine, two.theirs, edits)
 
 
 async def _stored(
