@@ -351,6 +351,18 @@ def test_no_kind_of_model_is_to_use_in_a_loop_that_may_bias_it(
     assert both.endswith(f"; {held}")
 
 
+def test_a_worst_is_never_shown_better_than_it_is() -> None:
+    """Noise went by names that no kind has and was rounded down: 0.552, worst 0.551."""
+    for name, value, worst, shown in (
+        ("noise, rms", 0.5516, 0.5519, 0.552),
+        ("noise over gyro noise", 0.5519, 0.5519, 0.552),
+        ("phase margin", 47.36, 47.36, 47.3),
+        ("crossover", 20.13, 21.31, 21.4),  # a limit from above binds
+    ):
+        case = WorstCase("output", name, Estimate("m", value, "1"), worst, value, worst)
+        assert case.shown_worst == (shown, shown), name
+
+
 def test_margins_below_what_is_asked_and_columns_left_out_are_told() -> None:
     """44 deg stood green beside 45 that are required, and a dash was explained that nobody saw."""
     worst = [

@@ -79,7 +79,10 @@ class WorstCase:
     @property
     def shown_worst(self) -> tuple[float | None, float | None]:
         """Worst with the new and with the flown gains at three digits, rounded to the worse."""
-        return to_the_worse(self.name, self.worst), to_the_worse(self.name, self.flown_worst)
+        return (
+            to_the_worse(self.name, self.worst, self.nominal),
+            to_the_worse(self.name, self.flown_worst, self.flown),
+        )
 
     def to_dict(self) -> dict[str, object]:
         """Plain values."""
@@ -117,15 +120,29 @@ KINDS = (
 )
 
 
-def to_the_worse(name: str, value: float | None) -> float | None:
+def to_the_worse(name: str, value: float | None, estimate: float | None = None) -> float | None:
     """A number of a loop at three digits, rounded to the side on which its promise still holds.
+
+    Parameters
+    ----------
+    name : str
+        What the number is; noise is called by what it is of, such as ``"noise, rms"``.
+    value : float or None
+        Of the worst plant.
+    estimate : float or None
+        Of the estimated one: the worst lies on the bad side of it, whichever that is.
 
     Example
     -------
     >>> to_the_worse("phase margin", 45.46), to_the_worse("sensitivity peak", 1.6412)
     (45.4, 1.65)
+    >>> to_the_worse("noise, rms", 0.5517), to_the_worse("crossover", 21.32, 20.1)
+    (0.552, 21.4)
     """
-    more = next((kind.more for kind in (*KINDS, NOISE) if kind.name == name), True)
+    if value is not None and estimate is not None and value != estimate:
+        return held(value, least=value < estimate)
+    kind = name.partition(" over ")[0].partition(",")[0]
+    more = next((each.more for each in (*KINDS, NOISE) if each.name == kind), True)
     return held(value, least=more)
 
 
