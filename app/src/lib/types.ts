@@ -67,6 +67,7 @@ export interface ComparisonPart {
   settings: [string, string, string][];
   steps: LoopSteps[];
   findings: ShownFinding[];
+  notes: string[];
   following: GainFile | null;
   back: GainFile | null;
 }

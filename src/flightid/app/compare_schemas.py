@@ -58,6 +58,8 @@ class ComparisonPart(Message):
     settings: list[tuple[str, str, str]]
     steps: list[LoopSteps]
     findings: list[ShownFinding]
+    notes: list[str]
+    """On loops that one side alone tells, and why."""
     following: GainFile | None
     back: GainFile | None
 

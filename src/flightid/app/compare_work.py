@@ -122,6 +122,7 @@ def _part(made: FlightComparison, step: FlownStep | None) -> ComparisonPart:
             if a.is_told
         ],
         findings=[shown_finding(each) for each in made.findings],
+        notes=list(made.left_out),
         following=_file(None if step is None else step.following),
         back=_file(None if step is None else step.back),
     )

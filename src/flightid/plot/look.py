@@ -45,10 +45,11 @@ def axis_title(quantity: str, unit: str = "") -> str:
 
     Example
     -------
-    >>> axis_title("roll rate", "rad/s"), axis_title("coherence")
-    ('roll rate [rad/s]', 'coherence')
+    >>> axis_title("roll rate", "rad/s"), axis_title("az", "m/s^2"), axis_title("coherence")
+    ('roll rate [rad/s]', 'az [m/s²]', 'coherence')
     """
-    return f"{quantity} [{unit}]" if unit and unit != "1" else quantity
+    shown = unit.replace("^2", "²").replace("^3", "³")
+    return f"{quantity} [{shown}]" if unit and unit != "1" else quantity
 
 
 def figure(

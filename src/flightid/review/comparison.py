@@ -143,15 +143,19 @@ class FlightComparison(Result, schema="flightid.flight_comparison/1"):
             yield f"{STEPS} ({'; '.join(cut)}){alone}."
         if moving := [a.name for a, b in pairs if _unsettled(a, b, min(ends[a.name]))]:
             yield f"Not settled in that time: {', '.join(moving)}; {REACHED}."
-        yield from self._left_out()
+        yield from self.left_out
         if any(each.name == TRACKING for each in self.changes):
             yield (
                 "Tracking error: rms of the error over that of the set-point; it depends on how "
                 "fast the sticks moved too."
             )
 
-    def _left_out(self) -> Iterator[str]:
-        """Loops that one of both alone tells, and why."""
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """Sentences on loops that one of both alone tells, and why the other does not."""
+        return tuple(self._alone())
+
+    def _alone(self) -> Iterator[str]:
         compared = {each.loop for each in self.changes}
         names = dict.fromkeys(each.name for each in (*self.before, *self.after))
         for place, loops in enumerate((self.before, self.after)):
