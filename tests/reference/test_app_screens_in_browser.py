@@ -6,6 +6,7 @@ nothing is wider than the screen.
 
 from __future__ import annotations
 
+import re
 import tomllib
 import zipfile
 from pathlib import Path
@@ -200,7 +201,11 @@ def _compared(page: Any, second: Path, folder: Path) -> list[str]:
     page.locator("select[aria-label='Flight after']").wait_for()
     page.set_input_files("input[type=file]", second)
     page.locator("section[aria-label=Verdict]").wait_for()
-    assert page.locator("section[aria-label=Numbers] tbody tr").count() >= 4
+    numbers = page.locator("section[aria-label=Numbers]")
+    assert numbers.locator("tbody tr").count() >= 4
+    ends = re.findall(r"\((\S+) to (\S+)\)", numbers.inner_text())
+    assert ends
+    assert not [each for each in ends if each[0] == each[1]], "an interval without a width"
     assert "ATC_RAT_RLL_P" in _saved(page, "Download the way back", folder).read_text("utf-8")
     _zoomed(page, "Step of the roll rate loop", "Whole of roll rate")
     said = looked_at(page)

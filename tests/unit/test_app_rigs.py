@@ -105,11 +105,24 @@ def test_a_file_without_time_says_so_and_reads_with_a_sample_time(tmp_path: Path
     path = tmp_path / "a.csv"
     path.write_text("u,y\n" + "".join(f"{k % 2},{k}\n" for k in range(40)), encoding="utf-8")
     told = make_rig([path], {})
-    assert "sample_time_s" in told["files"][0]["error"]
+    assert "Sample time" in told["files"][0]["error"]
     assert not told["files"][0]["manoeuvres"]
     told = make_rig([path], {"sample_time_s": 0.5})
     assert told["files"][0]["manoeuvres"][0]["stop_s"] == 19.5
     assert (told["inputs"], told["outputs"]) == (["u"], ["y"])
+
+
+def test_a_refusal_of_many_columns_counts_them_in_words_of_the_page(tmp_path: Path) -> None:
+    """Forty names filled the screen, and ``time_column=…`` is no field of it."""
+    path = tmp_path / "wide.csv"
+    names = [f"channel{k}" for k in range(40)]
+    rows = [",".join(str(k + row) for k in range(40)) for row in range(3)]
+    path.write_text("\n".join([",".join(names), *rows]) + "\n")
+    (told,) = make_rig([path], {})["files"]
+    assert "40 columns, channel0, " in told["error"]
+    assert "channel39" not in told["error"]
+    assert "=" not in told["error"]
+    assert "the role “time” of a column or Sample time" in told["error"]
 
 
 def test_what_is_untold_is_told_without_flags_of_the_command_line(tmp_path: Path) -> None:
@@ -178,7 +191,7 @@ def test_stamps_that_are_not_uniform_get_a_grid_on_the_page(tmp_path: Path) -> N
         assert (told["time"], told["time_unit"]) == ("t_ms", "ms")
     (told,) = make_rig([path], {})["files"]
     assert "time stamps are not uniform" in told["error"]
-    assert "resample_to_s=0.02," in told["error"]
+    assert "Resample to = 0.02," in told["error"]
     assert (told["grid_s"], told["manoeuvres"]) == (0.02, [])
     (told,) = make_rig([path], {"resample_to_s": 0.02})["files"]
     assert (told["error"], told["grid_s"]) == ("", 0.02)

@@ -12,6 +12,7 @@ from flightid.app.overview import light_of, shown_finding
 from flightid.app.own_folders import is_link
 from flightid.app.pyramid import Pyramid
 from flightid.app.rig_schemas import ProposedStudy, RigColumn, RigFault, RigFile, RigManoeuvre
+from flightid.app.rig_words import as_laid
 from flightid.app.work import KEPT
 from flightid.conventions import Light
 from flightid.errors import FlightidError, UnknownNameError
@@ -25,6 +26,7 @@ from flightid.record.tables import read_table
 from flightid.study.proposal import propose_study
 from flightid.study.proposal.columns import columns_of
 from flightid.study.stage_runner import StageRunner
+from flightid.surface import speaking
 
 SHOWN = 200
 """Faults of a manoeuvre that are told."""
@@ -129,7 +131,8 @@ def _file(path: Path, reading: Mapping[str, Any]) -> RigFile:
         columns = [_column(row) for row in table.rows]
         # What is said of columns holds for tables; a file of records has none.
         notes = [each for each in table.notes if columns and not each.startswith("Next:")]
-        records = _records(path, reading)
+        with speaking(as_laid):
+            records = _records(path, reading)
         manoeuvres = [_manoeuvre(each) for each in records]
         columns += _unlisted(records, {each.name for each in columns})
     except FlightidError as error:

@@ -39,6 +39,8 @@ ALONE = frozenset(
     {*SPELLED, "sec", "secs", "second", "seconds", "ms", "msec", "us", "usec", "ns", "nsec"}
 )
 """Units that are the name of a time without another word."""
+MOST_NAMES = 12
+"""Of columns that a refusal lists; of more their count says what kind of file it is."""
 SAME = 0.05
 """Part of the spacing to which stamps of two columns agree that tell one time."""
 
@@ -217,7 +219,7 @@ def row_stamps(
     if sample_time_s is None:
         raise OptionError(
             f"{table.path.name} has no time column {time_column!r}",
-            found="columns " + ", ".join(table.lengths),
+            found=_columns(table),
             needed=needed,
             action=near_times(table)
             or table.advice
@@ -227,6 +229,14 @@ def row_stamps(
         raise OptionError("sample time is not positive", found=sample_time_s, needed="above 0 s")
     longest = max(table.lengths.values(), default=0)
     return np.asarray(sample_time_s * np.arange(longest), dtype=np.float64)
+
+
+def _columns(table: ColumnTable) -> str:
+    """Names of columns; of many their count and the first ones."""
+    names = list(table.lengths)
+    if len(names) <= MOST_NAMES:
+        return "columns " + ", ".join(names)
+    return f"{len(names)} columns, {', '.join(names[: MOST_NAMES // 2])}, …"
 
 
 def with_time_unit(
