@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -250,6 +251,10 @@ def test_the_next_step_names_the_study_as_it_was_given(
     asked = str(study.output.with_name("study.toml"))
     assert asked in re.sub(r"\s", "", to_text(answer.short_document(study, study.document)))
     assert answer.answer_of(study).findings[0].message == "study.toml"
+    # The page keeps studies in one folder and results in another: a bare name lay in neither.
+    held = study.output.parent / "studies" / "0123.toml"
+    apart = replace(study, source=held, files={"0123.toml": ""})
+    assert answer.answer_of(apart).findings[0].message == "studies/0123.toml"
 
 
 def test_the_next_step_of_a_model_with_two_inputs_can_be_taken(

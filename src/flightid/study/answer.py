@@ -56,14 +56,15 @@ def answer_of(
     ----------
     study : StudyResults
     source : str, optional
-        Study file as the reader has to write it; default: its name, which holds in any folder.
+        Study file as the reader has to write it; default: its name, or where results lie beside
+        its folder that and the name.
     written : sequence of str
         Files of the gains, the first to fly first, where they have been written.
     results : str
         Folder of the results as the reader has to write it; default: its name.
     """
     if source is None:
-        source = next((name for name in study.files if name.endswith(".toml")), "STUDY")
+        source = _place(study)
     findings = [_models(study, source)]
     tuning = study.tuning
     if tuning is None:
@@ -168,6 +169,16 @@ def _without_actions(lights: Lights, others: Iterable[Finding]) -> Lights:
     given = {each.action for each in others}
     kept = (replace(e, action="") if e.action in given else e for e in lights.findings)
     return replace(lights, findings=tuple(kept))
+
+
+def _place(study: StudyResults) -> str:
+    """A study as seen from the folder that holds it and its results: the page has one for each."""
+    name = next((name for name in study.files if name.endswith(".toml")), "STUDY")
+    if study.source is None:
+        return name
+    folder, output = study.source.absolute().parent, study.output.absolute()
+    apart = output.is_relative_to(folder.parent) and not output.is_relative_to(folder)
+    return quote(f"{folder.name}/{name}") if apart and folder.parent.name else name
 
 
 def _models(study: StudyResults, source: str) -> Finding:
