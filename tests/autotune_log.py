@@ -66,9 +66,20 @@ def _twitch(
 
 
 def write_ardupilot(
-    path: Path, axis: Axis, *, events: tuple[int, ...] = (33, 37), most: int = 60, seed: int = 1
+    path: Path,
+    axis: Axis,
+    *,
+    events: tuple[int, ...] = (33, 37),
+    most: int = 60,
+    seed: int = 1,
+    trim: float = 0.0,
+    jitter_s: float = 0.0,
 ) -> Tuned:
-    """Tune P and D of roll as AC_AutoTune_Multi does, and log it as the firmware would."""
+    """Tune P and D of roll as AC_AutoTune_Multi does, and log it as the firmware would.
+
+    `trim` holds the vehicle still; stamps scatter by `jitter_s` about the ticks of the loop.
+    """
+    stamping = np.random.default_rng([seed, 1])
     random, writer = np.random.default_rng(seed), DataflashWriter()
     for layout in LAYOUTS:
         writer.define(layout)
@@ -83,7 +94,8 @@ def write_ardupilot(
     while step <= RATE_P_UP and tests < most:
         trial = replace(axis, p=p, d=d, i=0.01 * p, target_hz=0.0)
         flown, stop, top, least = _twitch(trial, random, (-1.0) ** tests)
-        _log_twitch(writer, at_us, flown, stop, trial)
+        stamps = flown.time_s[:stop] + jitter_s * stamping.standard_normal(stop)
+        _log_twitch(writer, at_us + (1e6 * stamps).astype(np.int64), flown, trim)
         p, d, counter = _update(step, p, d, counter, top, least)
         at_us += int(2.5e3 * stop)
         writer.add("ATUN", [at_us], {
@@ -121,14 +133,15 @@ def _update(
     return p * 1.05, d, max(counter - 1, 0)
 
 
-def _log_twitch(writer: DataflashWriter, at_us: int, flown: Flown, stop: int, axis: Axis) -> None:
-    stamps = at_us + (1e6 * flown.time_s[:stop]).astype(np.int64)
+def _log_twitch(writer: DataflashWriter, stamps: np.ndarray, flown: Flown, trim: float) -> None:
+    stop = len(stamps)
     writer.add("ATDE", stamps, {
         "Angle": np.degrees(flown.angle[:stop]), "Rate": np.degrees(flown.rate[:stop])
     })  # fmt: skip
-    # Only the sum of the terms counts here: P holds it.
+    # Only the sum of the terms counts here: P holds it, and I what holds the vehicle still.
     writer.add("PIDR", stamps, {
-        "Tar": flown.rate_wanted[:stop], "Act": flown.rate[:stop], "P": flown.command[:stop]
+        "Tar": flown.rate_wanted[:stop], "Act": flown.rate[:stop], "P": flown.command[:stop],
+        "I": np.full(stop, trim),
     })  # fmt: skip
 
 

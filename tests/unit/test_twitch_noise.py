@@ -98,3 +98,18 @@ def test_twitches_that_noise_drowns_give_no_interval_and_say_why(tmp_path: Path)
     assert "without intervals (T_m is told to" in said.message
     assert "rad/s behind the gyro's filter" in said.message
     assert "flightid plan" in said.action
+
+
+def test_what_holds_the_vehicle_still_is_no_input_of_its_motion(tmp_path: Path) -> None:
+    """A trim of 0.05 made 133 deg of 92; stamps that scatter gave each twitch a sample time."""
+    axis, found = replace(NOISY, gust=0.0, noise=0.02), []
+    for trim, jitter_s in ((0.0, 0.0), (-0.05, 4e-5)):
+        path = tmp_path / f"{trim}.bin"
+        write_ardupilot(path, axis, seed=2, most=10, trim=trim, jitter_s=jitter_s)
+        (roll,) = fid.review_autotune(path).opinions
+        assert roll.fit is not None
+        assert roll.flown is not None
+        found.append((roll.fit.parameters["K"].value, roll.flown.phase_margin.value))
+        words = [each.message for each in roll.fit.evidence.findings]
+        assert not any("sample times" in each for each in words), words
+    assert_close(found[1], found[0], rtol=2e-3, why="the same flight but for trim and stamps")

@@ -23,13 +23,14 @@ from flightid.logs import Log
 from flightid.models.transfer.description import transfer_from_table
 from flightid.models.transfer.model import TransferFunctionModel
 from flightid.review.autotune.twitch_fit import TwitchRecord, fit_stretches
+from flightid.review.autotune.twitch_ticks import on_ticks
 
 Complex = NDArray[np.complex128]
 PID = {"roll": "PIDR", "pitch": "PIDP", "yaw": "PIDY"}
 PID_TERMS = ("P", "I", "D", "FF", "DFF")
 BUTTERWORTH = float(np.sqrt(0.5))
-Stream = tuple[Signal, Signal, NDArray[np.float64]]
-"""Output and rate of an axis, and the integrator's part of the output."""
+Stream = tuple[Signal, Signal]
+"""Output and rate of an axis."""
 LOWEST_RAD_S, BELOW_NYQUIST = 0.5, 0.95
 """Where margins are looked for: a sampled controller has no crossing above half of its rate."""
 PAST_S = 0.08
@@ -184,18 +185,20 @@ def _stretches(log: Log, axis: str, spans: Sequence[Span]) -> list[TwitchRecord]
     pairs = [pair for pair in (_of_rate(log, axis), _of_pid(log, axis)) if pair is not None]
     if not pairs:
         return "the log does not hold the axis' output with its rate"
-    speeds = [min(_rate_in(signal, spans) for signal in pair[:2]) for pair in pairs]
+    speeds = [min(_rate_in(signal, spans) for signal in pair) for pair in pairs]
     fastest = int(np.argmax(speeds))
     if speeds[fastest] < SLOWEST_HZ:
         return (
             f"output and rate are logged at {speeds[fastest]:.3g} Hz while it twitches: "
             f"{SLOWEST_HZ:g} Hz are needed"
         )
+    pair, spans = on_ticks(pairs[fastest], spans, PAST_S)
+    step = 1.0 / min(_rate_in(signal, spans) for signal in pair)
     made = [
         stretch
         for span in spans
         for start, stop in _parts(*span)
-        for stretch in _with_past(*pairs[fastest], start, stop)
+        for stretch in _with_past(*pair, start, stop, step)
         if stretch.record.n_samples - stretch.lead >= LEAST_SAMPLES
     ]
     return made[-MOST_RECORDS:] or "no test is logged without gaps"
@@ -208,14 +211,15 @@ def _parts(start: float, stop: float) -> list[Span]:
 
 
 def _with_past(
-    command: Signal, rate: Signal, still: NDArray[np.float64], start: float, stop: float
+    command: Signal, rate: Signal, start: float, stop: float, step: float
 ) -> list[TwitchRecord]:
     """Stretches of one span with the output before it, which is still in motors and delays.
 
     ArduPilot logs its PIDs at full rate from the twitch on alone. It begins one when the vehicle is
-    level and quiet: then the output is the integrator's. Elsewhere the past is in the log.
+    level and quiet: then the output is what holds it still, one number of all tests, which the fit
+    finds: the integrator comes near it, on a side that the test before has. Elsewhere the past is
+    in the log.
     """
-    step = 1.0 / min(_rate_in(each, [(start, stop)]) for each in (command, rate))
     logged = inside(command.time_s, [(start - PAST_S, start - step)])
     if np.count_nonzero(logged) > 0.5 * PAST_S / step:
         earlier = (start - PAST_S, stop)
@@ -223,22 +227,20 @@ def _with_past(
         cut = [_cut(_less(command, about), earlier), _cut(rate, earlier)]
         return [
             TwitchRecord(record, int(np.count_nonzero(record.time_s < start - 0.5 * step)))
-            for record in records(cut, {command.name}, [earlier])
+            for record in records(cut, {command.name}, [earlier], step)
         ]
     past = start - step * np.arange(round(PAST_S / step), 0, -1)
-    first = min(int(np.searchsorted(command.time_s, start)), still.size - 1)
-    level = float(still[first])
     whole = [
         replace(
             each,
             time_s=np.concatenate([past, each.time_s]),
             values=np.concatenate([np.zeros(past.size), each.values]),
         )
-        for each in (_cut(_less(command, level), (start, stop)), _cut(rate, (start, stop)))
+        for each in (_cut(command, (start, stop)), _cut(rate, (start, stop)))
     ]
     return [
-        TwitchRecord(record, past.size)
-        for record in records(whole, {command.name}, [(float(past[0]), stop)])
+        TwitchRecord(record, past.size, past.size)
+        for record in records(whole, {command.name}, [(float(past[0]), stop)], step)
     ]
 
 
@@ -261,7 +263,7 @@ def _of_rate(log: Log, axis: str) -> Stream | None:
     command, rate = (find(log, name) for name in CHANNELS[axis])
     if command is None or rate is None:
         return None
-    return command, rate, np.zeros(command.values.size)
+    return command, rate
 
 
 def _of_pid(log: Log, axis: str) -> Stream | None:
@@ -280,5 +282,4 @@ def _of_pid(log: Log, axis: str) -> Stream | None:
     return (
         Signal(command, stamps, output, "1", f"{message} terms"),
         Signal(rate, stamps, table["Act"][good], "rad/s", f"{message}.Act"),
-        table["I"][good],
     )

@@ -49,10 +49,14 @@ class TwitchRecord:
         Inputs as departures from those that hold the vehicle still.
     lead : int
         Samples before the first measured rate.
+    begun : int or None
+        Sample at which measured inputs begin; those before are supposed to hold the vehicle still.
+        None where all are measured.
     """
 
     record: Record
     lead: int
+    begun: int | None = None
 
 
 def fit_stretches(
@@ -94,9 +98,29 @@ def fit_stretches(
     """
     options = RecordOptions(initial_state="trim", output_bias=False, input_bias=False, hold=HOLD)
     prepared = prepare_records(model, [each.record for each in stretches], options)
-    search = TwitchSearch(prepared, [each.lead for each in stretches], gyro_filter_hz)
+    search = TwitchSearch(
+        prepared,
+        [each.lead for each in stretches],
+        gyro_filter_hz,
+        prepare_records(model, [_stepped(model, stretches)], options),
+        [each.begun for each in stretches],
+    )
     end, tests = _searched(search, model, prepared, stretches)
     return _fit(model, search, end, tests, stretches)
+
+
+def _stepped(model: TransferFunctionModel, stretches: Sequence[TwitchRecord]) -> Record:
+    """A step of the input at the second sample, longer than any of the stretches."""
+    longest = max((each.record for each in stretches), key=lambda record: record.n_samples)
+    step = np.ones(longest.n_samples + 2)
+    step[0] = 0.0
+    channels = (*model.inputs, *model.outputs)
+    return Record.from_arrays(
+        longest.sample_time_s * np.arange(len(step)),
+        inputs=dict.fromkeys(model.inputs, step),
+        outputs=dict.fromkeys(model.outputs, np.zeros(len(step))),
+        units={name: longest.unit(name) for name in channels},
+    )
 
 
 def _searched(

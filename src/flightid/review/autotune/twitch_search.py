@@ -43,10 +43,12 @@ class TwitchEnd:
     ----------
     model : TransferFunctionModel
     noise : TwitchNoise
+    level : ndarray, shape (2,)
+        What the output that holds the vehicle still is off, at the middle, and half of its drift.
     white : ndarray, shape (n_stretches, count)
         Innovations of unit variance; zero behind the end of a stretch.
     slopes : ndarray, shape (n_free, n_stretches, count)
-        Derivatives of the model's outputs, whitened.
+        Derivatives of the model's outputs, whitened, less what the level takes of them.
     deviations : ndarray, shape (count,)
         Of the innovations, rad/s.
     cost : float
@@ -57,6 +59,7 @@ class TwitchEnd:
 
     model: TransferFunctionModel
     noise: TwitchNoise
+    level: Array
     white: Array
     slopes: Array
     deviations: Array
@@ -79,10 +82,26 @@ class TwitchSearch:
     leads : sequence of int
         Samples of each record before its first measured rate.
     gyro_filter_hz : float
+    stepped : RecordSet
+        One record, in which the input steps to one at its second sample, no shorter than any other.
+    begun : sequence of int or None
+        Sample of each record at which its inputs stop to be what holds the vehicle still by
+        supposition; None where the level is not asked for.
     """
 
-    def __init__(self, prepared: RecordSet, leads: Sequence[int], gyro_filter_hz: float) -> None:
+    def __init__(
+        self,
+        prepared: RecordSet,
+        leads: Sequence[int],
+        gyro_filter_hz: float,
+        stepped: RecordSet,
+        begun: Sequence[int | None],
+    ) -> None:
         self.prepared, self.leads, self.gyro_filter_hz = prepared, leads, gyro_filter_hz
+        self.stepped, self.begun = stepped, begun
+        drift = np.linspace(-1.0, 1.0, len(leads)) if len(leads) > 1 else np.zeros(1)
+        asked = np.array([each is not None for each in begun])
+        self.weights = np.where(asked, np.stack([np.ones(len(leads)), drift]), 0.0)
         measured = [
             outputs[0, lead:] for (_, outputs, _), lead in zip(prepared.arrays, leads, strict=True)
         ]
@@ -95,16 +114,34 @@ class TwitchSearch:
     def _padded(self, row: Array) -> Array:
         return np.pad(row, (0, self.count - len(row)))
 
-    def runs(self, model: TransferFunctionModel, *, sloped: bool) -> tuple[Array, Array]:
-        """Errors (n_stretches, count) of free runs from rest, and slopes of the runs."""
+    def runs(self, model: TransferFunctionModel, level: Array) -> tuple[Array, Array]:
+        """Errors (n_stretches, count) of free runs from rest, and slopes of the runs.
+
+        Slopes by the two numbers of the level come last.
+        """
         errors, slopes = [], []
         for place, (own, lead) in enumerate(zip(self.prepared.own, self.leads, strict=True)):
-            run, slope = run_with_slopes(model, self.prepared, None, place, own, sloped=sloped)
+            run, slope = run_with_slopes(model, self.prepared, None, place, own)
             errors.append(self.measured[place] - self._padded(run[0, lead:]))
             slopes.append([self._padded(each) for each in slope[0, lead:].T])
-        return np.array(errors), np.array(slopes).reshape(len(errors), -1, self.count).swapaxes(
-            0, 1
+        moved = np.array(slopes).reshape(len(errors), -1, self.count).swapaxes(0, 1)
+        steps, by_step = self._steps(model)
+        off = (level @ self.weights)[:, None]
+        return (
+            (np.array(errors) - off * steps) * self.inside,
+            np.concatenate([moved + off * by_step, self.weights[:, :, None] * steps]),
         )
+
+    def _steps(self, model: TransferFunctionModel) -> tuple[Array, Array]:
+        """What an input that is off by one from where it is measured does, and its slopes."""
+        run, slope = run_with_slopes(model, self.stepped, None, 0, self.stepped.own[0])
+        rows = np.concatenate([run, slope[0].T])
+        taken = [
+            rows[:, 1 + lead - (begun or 0) :][:, : self.count]
+            for lead, begun in zip(self.leads, self.begun, strict=True)
+        ]
+        every = np.stack(taken, axis=1) * self.inside
+        return every[0], every[1:]
 
     def whitened(self, root: Array, rows: Array) -> Array:
         """Rows without their covariance, by what lies before each sample alone."""
@@ -124,7 +161,8 @@ class TwitchSearch:
 
         `start` is an end without colour, else the noise begins at shares of the errors.
         """
-        errors, slopes = self.runs(model, sloped=True)
+        level = np.zeros(2) if start is None else start.level
+        errors, slopes = self.runs(model, level)
         deviation = float(np.sqrt(np.mean(errors[self.inside] ** 2)))
         limits = np.log(deviation * FLOOR), np.log(deviation * CEILING)
         damping = float(model.parameters["L"].value or 0.0)
@@ -137,7 +175,7 @@ class TwitchSearch:
         cost, turn, settled = np.inf, 0, False
         for turn in range(1, TURNS + 1):
             before = cost
-            model, errors, slopes = self._vehicle(model, root, errors, slopes)
+            model, level, errors, slopes = self._vehicle(model, level, root, errors, slopes)
             if turn <= FOLLOWED:
                 damping = float(model.parameters["L"].value or 0.0)
                 noise = replace(noise, shape=replace(noise.shape, damping=damping))
@@ -146,9 +184,8 @@ class TwitchSearch:
             if settled:
                 break
         white = self.whitened(root, errors)
-        return TwitchEnd(
-            model, noise, white, self.whitened(root, slopes), np.diag(root), cost, turn, settled
-        )
+        told = _without_level(self.whitened(root, slopes))
+        return TwitchEnd(model, noise, level, white, told, np.diag(root), cost, turn, settled)
 
     def _lags(self, white: Array, order: int) -> Array:
         """Autocovariances of innovations."""
@@ -157,26 +194,32 @@ class TwitchSearch:
         )
 
     def _vehicle(
-        self, model: TransferFunctionModel, root: Array, errors: Array, slopes: Array
-    ) -> tuple[TransferFunctionModel, Array, Array]:
+        self,
+        model: TransferFunctionModel,
+        level: Array,
+        root: Array,
+        errors: Array,
+        slopes: Array,
+    ) -> tuple[TransferFunctionModel, Array, Array, Array]:
         """One step of Gauss and Newton, inside the bounds."""
         free = model.parameters.free
         now = np.array([float(p.value or 0.0) for p in free])
         low, high = (np.array([getattr(p, end) for p in free]) for end in ("minimum", "maximum"))
         white = self.whitened(root, errors)
-        columns = self.whitened(root, slopes).reshape(len(free), -1).T
+        columns = self.whitened(root, slopes).reshape(len(slopes), -1).T
         size = np.linalg.norm(columns, axis=0)
         size = np.where(size > 0.0, size, 1.0)
         step = np.linalg.lstsq(columns / size, white.ravel(), rcond=RIDGE)[0] / size
-        level = float(np.sum(white**2))
+        before, split = float(np.sum(white**2)), len(free)
         for share in SHARES:
-            values = np.clip(now + share * step, low, high)
+            values = np.clip(now + share * step[:split], low, high)
+            off = level + share * step[split:]
             names = (p.name for p in free)
             tried = model.with_values(dict(zip(names, map(float, values), strict=True)))
-            fresh, slope = self.runs(tried, sloped=True)
-            if float(np.sum(self.whitened(root, fresh) ** 2)) < level:
-                return tried, fresh, slope
-        return model, errors, slopes
+            fresh, slope = self.runs(tried, off)
+            if float(np.sum(self.whitened(root, fresh) ** 2)) < before:
+                return tried, off, fresh, slope
+        return model, level, errors, slopes
 
     def _disturbance(
         self, noise: TwitchNoise, errors: Array, limits: tuple[float, float]
@@ -233,3 +276,11 @@ class TwitchSearch:
 def _root(noise: TwitchNoise) -> Array:
     covariance = noise.covariance()
     return np.asarray(scipy.linalg.cholesky(covariance, lower=True, check_finite=False))
+
+
+def _without_level(slopes: Array) -> Array:
+    """Slopes by what the vehicle has, less what the two of the level take of them."""
+    rows = slopes.reshape(len(slopes), -1)
+    own, level = rows[:-2], rows[-2:]
+    shares = np.linalg.lstsq(level.T, own.T, rcond=RIDGE)[0]
+    return np.asarray((own - shares.T @ level).reshape(len(own), *slopes.shape[1:]))
