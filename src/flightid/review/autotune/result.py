@@ -109,9 +109,12 @@ class AutotuneReview(Result, schema="flightid.autotune_review/1"):
                 for word, found in (("before", opinion.flown), ("autotune", opinion.tuned)):
                     if found is not None:
                         rows.append((opinion.axis, word, *_margin_cells(found)))
+        told = any("(" in str(each) for row in rows for each in row[2:])
         notes = (
-            f"In brackets: {interval_words(level)} intervals, from the covariance of the model "
-            "that was fitted to autotune's own excitation.",
+            *[
+                f"In brackets: {interval_words(level)} intervals, from the covariance of the model "
+                "that was fitted to autotune's own excitation."
+            ][: int(told)],
             "Rate loops alone, with the autopilot's filters.",
             *dict.fromkeys(filter(None, (opinion.doubt for opinion in self.opinions))),
         )

@@ -22,6 +22,8 @@ from flightid.review.tables import cell
 
 PHASE_GUIDE_DEG, GAIN_GUIDE_DB = 45.0, 6.0
 """SAE AS94900."""
+WIDEST_DEG = 10.0
+"""Of a phase margin's half interval: a guide that a wider one keeps is kept by next to nothing."""
 ORDER = (Light.GREEN, Light.UNKNOWN, Light.AMBER, Light.RED)
 
 
@@ -119,6 +121,10 @@ def _of_opinion(opinion: SecondOpinion, log: str) -> Iterator[Finding]:
     if opinion.tuned.is_stable and opinion.tuned.phase_margin.interval95 is None:
         light = max(light, Light.AMBER, key=ORDER.index)
         words = f"{words}, without intervals{opinion.why and f' ({opinion.why})'}"
+    half = opinion.tuned.phase_margin.half_width95 if opinion.tuned.is_stable else None
+    if light is Light.GREEN and half is not None and half > WIDEST_DEG:
+        light = Light.AMBER
+        words = f"{words}, told to {half:.2g} deg alone"
     flown = "" if opinion.flown is None else f"; before: {_words(opinion.flown)[1]}"
     action = {
         Light.GREEN: "",

@@ -22,6 +22,7 @@ from flightid.inspection.stamps import believable
 from flightid.logs import Log
 from flightid.models.transfer.description import transfer_from_table
 from flightid.models.transfer.model import TransferFunctionModel
+from flightid.review.autotune.possible_margins import possible
 from flightid.review.autotune.twitch_fit import TwitchRecord, fit_stretches
 from flightid.review.autotune.twitch_ticks import on_ticks
 
@@ -169,7 +170,7 @@ def template(axis: str, gyro_filter_hz: float) -> TransferFunctionModel:
 def _margins(fit: Fit, loop: AxisLoop) -> Margins:
     """Of the rate loop around a model from output to filtered rate, which holds the hold."""
     band = (LOWEST_RAD_S, BELOW_NYQUIST * np.pi * loop.loop_rate_hz)
-    return margins(fit, controller=_controller(loop), band_rad_s=band)
+    return possible(margins(fit, controller=_controller(loop), band_rad_s=band))
 
 
 def _controller(loop: AxisLoop) -> Callable[[Complex], Complex]:

@@ -34,6 +34,10 @@ ORDERS = (0, 4, 8)
 """Of the colour of a gyro's noise before its filter; the first that leaves innovations white."""
 
 
+UNSEEN = 2.0
+"""Times by which bars are longer where the loop before the tests is not logged: what it answered to
+noise is on its way in motors and delays, and goes with what inputs hold of that noise. Counted with
+two simulators: errors were 1.6 standard errors, with noise of .02 as with .2 rad/s."""
 SIZES, WIDEST = ("K", "T_m"), 0.5
 """Numbers that have no other sign, and the half of an interval, over the number, up to which what
 follows from it is as good as linear."""
@@ -192,9 +196,10 @@ def _fit(
     ratio = np.sqrt(np.sum(end.innovations**2) / np.sum(search.measured**2))
     tests = tests.fitted(found.correlations, [float(ratio)])
     times = _longer(tests)
+    unseen = UNSEEN if any(each.begun is not None for each in stretches) else 1.0
     known = Knowledge(
         jacobian,
-        found.covariance * (times or 1.0) ** 2,
+        found.covariance * (unseen * (times or 1.0)) ** 2,
         found.freedom,
         "innovations",
         found.colour,
