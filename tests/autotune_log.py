@@ -41,19 +41,20 @@ class Tuned:
 
 
 def _twitch(
-    axis: Axis, random: np.random.Generator, sign: float
+    axis: Axis, random: np.random.Generator, sign: float, *, held: bool
 ) -> tuple[Flown, int, float, float]:
     """One rate twitch until the vehicle leans 20°, with what it measures, deg/s.
 
     The loop, its gyro noise and the air run before it, as they do in flight: what the twitch begins
-    with is nowhere in the log.
+    with is nowhere in the log. Held level, it starts from the rate that was seen.
     """
     before, n = round(WAIT_S * axis.loop_hz), 400
     wanted = np.zeros(before + n)
     wanted[before:] = sign * np.radians(TARGET_DEG_S)
     noise = axis.noise * random.standard_normal(before + n)
     air = axis.gust * ar1(random, before + n, np.exp(-1.0 / (axis.loop_hz * axis.gust_s)))
-    whole = fly(axis, None, wanted, air, noise)
+    level, at = (np.zeros(before + n), before) if held else (None, None)
+    whole = fly(axis, level, wanted, air, noise, twitch_at=at)
     flown = Flown(*(getattr(whole, each.name)[before:] for each in fields(whole)))
     flown = replace(
         flown, time_s=flown.time_s - flown.time_s[0], angle=flown.angle - flown.angle[0]
@@ -74,10 +75,12 @@ def write_ardupilot(
     seed: int = 1,
     trim: float = 0.0,
     jitter_s: float = 0.0,
+    held: bool = False,
 ) -> Tuned:
     """Tune P and D of roll as AC_AutoTune_Multi does, and log it as the firmware would.
 
-    `trim` holds the vehicle still; stamps scatter by `jitter_s` about the ticks of the loop.
+    `trim` holds the vehicle still; stamps scatter by `jitter_s` about the ticks of the loop. Where
+    it is held, attitude is until a twitch, which starts from the rate that is seen then.
     """
     stamping = np.random.default_rng([seed, 1])
     random, writer = np.random.default_rng(seed), DataflashWriter()
@@ -85,7 +88,7 @@ def write_ardupilot(
         writer.define(layout)
     writer.message(1_000_000, "ArduCopter V4.6.0 (test)")
     gains = {"P": axis.p, "I": axis.i, "D": axis.d}
-    for name, value in PARAMETERS.items():
+    for name, value in {**PARAMETERS, "INS_GYRO_FILTER": axis.gyro_hz}.items():
         writer.parameter(name, value)
     for letters in ("RLL", "PIT", "YAW"):
         for name, value in gains.items():
@@ -93,7 +96,7 @@ def write_ardupilot(
     p, d, counter, step, at_us, tests = axis.p, axis.d, 0, RATE_D_UP, 20_000_000, 0
     while step <= RATE_P_UP and tests < most:
         trial = replace(axis, p=p, d=d, i=0.01 * p, target_hz=0.0)
-        flown, stop, top, least = _twitch(trial, random, (-1.0) ** tests)
+        flown, stop, top, least = _twitch(trial, random, (-1.0) ** tests, held=held)
         stamps = flown.time_s[:stop] + jitter_s * stamping.standard_normal(stop)
         _log_twitch(writer, at_us + (1e6 * stamps).astype(np.int64), flown, trim)
         p, d, counter = _update(step, p, d, counter, top, least)

@@ -24,12 +24,20 @@ from tests.strangers.ordinary_flights import Axis
 
 CALM = Axis(gust=0.0, noise=0.02, p=0.08, i=0.08, d=0.002)
 HEAVY = replace(CALM, effectiveness=60.0, motor_s=0.08, p=0.15, i=0.15, d=0.004)
+TRIM, JITTER_S, FILTERS_HZ = 0.02, 4e-5, (20.0, 80.0)
 PX4 = Axis(form="px4", gust=0.0, noise=0.02, p=0.1, i=0.15, d=0.002, derivative_hz=30.0)
 
 
 def by_twitches(path: Path, seed: int, axis: Axis) -> Axis:
     """ArduCopter's; the axis with the gains that came out."""
     gains = write_ardupilot(path, axis, seed=seed)
+    return replace(axis, p=gains.p, i=gains.p, d=gains.d)
+
+
+def as_flown(path: Path, seed: int, axis: Axis) -> Axis:
+    """With a trim, level until each twitch, from the rate that it has, by stamps that scatter."""
+    trim = float(TRIM * np.random.default_rng([seed, 2]).standard_normal())
+    gains = write_ardupilot(path, axis, seed=seed, trim=trim, jitter_s=JITTER_S, held=True)
     return replace(axis, p=gains.p, i=gains.p, d=gains.d)
 
 
@@ -86,6 +94,13 @@ def _cases(
 LIGHTS = (
     *_cases("ArduCopter's twitches", CALM, by_twitches, ".bin"),
     *_cases("heavy vehicle", HEAVY, by_twitches, ".bin"),
+    *(
+        case
+        for hz in FILTERS_HZ
+        for case in _cases(
+            f"twitches as flown, gyro filter {hz:g} Hz", replace(CALM, gyro_hz=hz), as_flown, ".bin"
+        )
+    ),
     *_cases("PX4's steps at the loop's rate", PX4, partial(by_steps, log_hz=400.0), ".ulg"),
     Case(
         "autotune, PX4's steps at a quarter of it",

@@ -74,9 +74,18 @@ def sticks(random: np.random.Generator, n: int, tick_s: float, size: float, lag_
 
 
 def fly(
-    axis: Axis, angle_wanted: Array | None, rate_wanted: Array | None, gust: Array, noise: Array
+    axis: Axis,
+    angle_wanted: Array | None,
+    rate_wanted: Array | None,
+    gust: Array,
+    noise: Array,
+    *,
+    twitch_at: int | None = None,
 ) -> Flown:
-    """Run the loops: from attitudes wanted, or from rates wanted where attitude is left alone."""
+    """Run the loops: from attitudes wanted, or from rates wanted where attitude is left alone.
+
+    From the tick of a twitch on, rates are wanted in place of attitudes, beyond what was seen then.
+    """
     n, h = gust.size, 1.0 / axis.loop_hz
     out = []
     wanted = rate_wanted.tolist() if rate_wanted is not None else [0.0] * n
@@ -92,12 +101,14 @@ def fly(
     motor = 1.0 - np.exp(-h / axis.motor_s)
     queue = [0.0] * max(axis.delay_ticks, 1)
     target = total = slope = before = lag = rate = angle = pushed = last = 0.0
-    z1 = z2 = 0.0
+    z1 = z2 = seen = start = 0.0
     for k in range(n):
+        if k == twitch_at:
+            angles, start = None, seen
         raw = rate + noisy[k]
         seen = b[0] * raw + z1
         z1, z2 = b[1] * raw - a[1] * seen + z2, b[2] * raw - a[2] * seen
-        asked = _turned(axis, angles[k] - angle) if angles is not None else wanted[k]
+        asked = _turned(axis, angles[k] - angle) if angles is not None else wanted[k] + start
         target += at * (asked - target)
         error = target - seen
         total += axis.i * error * h
