@@ -131,6 +131,9 @@ def test_paper_shows_all_plots_and_columns_at_its_own_width(tmp_path: Path) -> N
         apology = page.locator("#plain").is_visible()
         # The last line stands close below what is above it, or it takes a page of its own.
         page.emulate_media(media="print")
+        # Paper is light, whatever the screen was.
+        ground = page.evaluate("getComputedStyle(document.body).backgroundColor")
+        assert ground == "rgb(255, 255, 255)"
         left_empty = page.evaluate(
             """document.querySelector("footer").getBoundingClientRect().top
                - document.querySelector("main > section").getBoundingClientRect().bottom"""

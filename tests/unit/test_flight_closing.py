@@ -14,7 +14,9 @@ from flightid.findings import Finding
 from flightid.inspection.flight_phases import FlightPhases
 from flightid.report.flight import flight_document
 from flightid.report.text import to_text
+from flightid.review.identity import Battery
 from flightid.review.sticks_to_fly import mode_to_fly, what_to_fly
+from flightid.review.tables import battery
 from flightid.review.verdicts import judge_flight
 from flightid.uncertainty.estimate import Estimate
 from tests.ordinary_log import write_ordinary_log
@@ -49,6 +51,16 @@ def test_each_step_is_named_by_its_verdict_or_as_not_told(review: fid.FlightRevi
     assert said.startswith("This flight tells the steps of 1 of 2 loops: roll rate is in doubt.")
     untold = replace(review, loops=(replace(rate, step=rate.step[:0]), none)).answer
     assert untold.startswith("This flight tells no step of its 2 loops.")
+    lone = replace(review, loops=(none,)).answer
+    assert lone.startswith("This flight tells no step of its one loop.")
+
+
+def test_a_battery_on_the_ground_is_not_said_to_be_in_the_air() -> None:
+    found = Battery(16.4, 15.9, 16.1, 4, 2.0, 3.0, 40.0)
+    for flown, where in ((True, "in the air"), (False, "while logged")):
+        told = dict(battery(found, flown=flown))
+        assert f"15.9 V least {where}, " in str(told["battery"])
+        assert f"2 A mean {where}" in str(told["current"])
 
 
 def test_what_a_step_does_not_tell_is_not_said_as_none(review: fid.FlightReview) -> None:

@@ -101,7 +101,8 @@ def _told(review: ReviewedFlight) -> str:
     ]
     count = sum(map(len, groups.values()))
     if not count:
-        return f"This flight tells no step of its {len(review.loops)} loops."
+        loops = "one loop" if len(review.loops) == 1 else f"{len(review.loops)} loops"
+        return f"This flight tells no step of its {loops}."
     if len(groups.get(Light.GREEN, ())) == len(review.loops):
         return f"This flight tells the steps of all {count} loops, with nothing against any."
     return (

@@ -123,13 +123,14 @@ class FlightReview(
 
     def flight(self) -> Table:
         """Vehicle, firmware, frame, time in the air, battery."""
+        flown = self.phases.is_known and bool(self.phases.airborne)
         rows: list[tuple[Cell, ...]] = [
             ("vehicle", " ".join(filter(None, (KINDS.get(self.kind, self.kind), self.vehicle)))),
             ("firmware", self.firmware or None),
             ("frame", self.identity.frame or None),
             ("logged", logged_words(self.start_s, self.duration_s)),
             ("in the air", self.phases.airborne_words),
-            *tables.battery(self.identity.battery),
+            *tables.battery(self.identity.battery, flown=flown),
         ]
         told = tuple(row for row in rows if row[1] is not None)
         return Table(f"Flight {self.name}", (Column("what"), Column("value")), told)

@@ -19,16 +19,17 @@ READ = 5
 MOST_DIGITS = 6
 
 
-def battery(found: Battery | None) -> Iterable[tuple[Cell, ...]]:
-    """Rows of voltage, current and charge."""
+def battery(found: Battery | None, *, flown: bool) -> Iterable[tuple[Cell, ...]]:
+    """Rows of voltage, current and charge: in the air where it flew, else of the whole log."""
     if found is None:
         return
-    volts = f"{found.start_v:.4g} V at first, {found.least_v:.4g} V least in the air, "
+    where = "in the air" if flown else "while logged"
+    volts = f"{found.start_v:.4g} V at first, {found.least_v:.4g} V least {where}, "
     yield "battery", f"{volts}{found.end_v:.4g} V at the end"
     if found.cells:
         yield "a cell", f"{found.least_v / found.cells:.3g} V least of {found.cells} in series"
     if found.mean_a is not None and found.most_a is not None:
-        yield "current", f"{found.mean_a:.3g} A mean in the air, {found.most_a:.3g} A most"
+        yield "current", f"{found.mean_a:.3g} A mean {where}, {found.most_a:.3g} A most"
     if found.used_mah is not None:
         yield "drawn", f"{found.used_mah:.4g} mAh while logged"
 
