@@ -164,7 +164,10 @@ def test_seed_000_linear_models_of_the_rig(desk: Desk, tmp_path: Path) -> None:
 
 
 def _controlled(desk: Desk, page: Any, folder: Path) -> None:
-    """A PID around each loop: keys of the study, numbers and code to take along."""
+    """A PI around each loop: keys of the study, numbers and code to take along.
+
+    The pitch of 72 s by ARMAX allows plants that no PI holds: its gains stay out, and it is said.
+    """
     _opened(page, "Gains")
     page.get_by_role("button", name="gains.toml").wait_for(timeout=RUN_MS)
     page.get_by_label("Form").select_option("pi")
@@ -173,13 +176,14 @@ def _controlled(desk: Desk, page: Any, folder: Path) -> None:
     page.get_by_role("button", name="gains.toml").wait_for(timeout=RUN_MS)
     assert _study(desk, page)["tune"] == {"controller": "pi"}
     assert not _findings(page)
-    for name in ("gains.toml", "gains_y1.c"):
+    page.get_by_text("y1 is not in the files: no gains were found").first.wait_for()
+    for name in ("gains.toml", "gains_y2.c"):
         with page.expect_download() as told:
             page.get_by_role("button", name=name).press("Enter")
         told.value.save_as(folder / name)
     numbers = tomllib.loads((folder / "gains.toml").read_text(encoding="utf-8"))["controller"]
-    assert [each["output"] for each in numbers] == ["y1", "y2"]
-    assert "double" in (folder / "gains_y1.c").read_text(encoding="utf-8")
+    assert [each["output"] for each in numbers] == ["y2"]
+    assert "double" in (folder / "gains_y2.c").read_text(encoding="utf-8")
 
 
 @pytest.mark.nightly

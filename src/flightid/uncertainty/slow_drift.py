@@ -132,7 +132,9 @@ def apart(
     Dempster, Laird & Rubin (1977), J. Royal Statistical Society B 39(1), section 2; Whittle (1953),
     Estimation and information in stationary time series, Arkiv foer Matematik 2(23).
     """
-    level = np.maximum(plain.spectrum(), np.finfo(float).tiny)
+    # A spectrum of nothing stands beside the negative power of errors less than their known noise.
+    least = np.finfo(float).eps ** 2 * float(np.max(np.abs(power), initial=0.0))
+    level = np.maximum(plain.spectrum(), max(np.finfo(float).tiny, least))
     if not is_slow(power / level, n, length):
         return plain, None
     whole = np.maximum(power, 0.0)
