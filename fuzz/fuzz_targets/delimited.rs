@@ -1,4 +1,5 @@
-//! Delimited text from a stranger: columns of one length, the same ones however the bytes arrive.
+//! Delimited text from a stranger: columns of one length, the same ones however the bytes arrive, and
+//! every number the one that the standard library reads in its cell.
 #![no_main]
 
 use std::io::{Read, Result};
@@ -30,6 +31,23 @@ fn same(one: &Column, other: &Column) -> bool {
     }
 }
 
+/// Numbers of unquoted cells are read by another library, to the last bit.
+fn numbers_are_those_of_the_standard_library(text: &[u8], layout: &Layout, columns: &[Column]) {
+    let Some(text) = std::str::from_utf8(text).ok().filter(|text| !text.contains('"')) else {
+        return;
+    };
+    let text = text.replace("\r\n", "\n").replace('\r', "\n");
+    let lines = text.split('\n').skip(layout.skipped_lines).filter(|line| !line.is_empty());
+    for (row, line) in lines.enumerate() {
+        for (cell, column) in line.split(char::from(layout.delimiter)).zip(columns) {
+            if let (Column::Numbers(read), Ok(told)) = (column, cell.trim_ascii().parse::<f64>()) {
+                let is_same = read[row].to_bits() == told.to_bits();
+                assert!(is_same || read[row].is_nan() && told.is_nan(), "{cell:?} {}", read[row]);
+            }
+        }
+    }
+}
+
 fuzz_target!(|data: &[u8]| {
     let Some((&[chosen, lines], text)) = data.split_first_chunk() else {
         return;
@@ -49,6 +67,9 @@ fuzz_target!(|data: &[u8]| {
         return;
     };
     assert_eq!(columns.len(), layout.n_columns);
+    if !layout.is_utf16 {
+        numbers_are_those_of_the_standard_library(text, &layout, columns);
+    }
     assert!(columns.iter().zip(again).all(|(one, other)| same(one, other)));
     let rows = columns.iter().map(|column| match column {
         Column::Numbers(values) => values.len(),

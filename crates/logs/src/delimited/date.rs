@@ -24,8 +24,9 @@ pub fn seconds(stamps: &[i64]) -> Vec<f64> {
         if stamp == i64::MIN || first == i64::MIN {
             f64::NAN
         } else {
-            // Exact in integers; a double of seconds since 1970 would round to 0.2 µs.
-            (stamp - first) as f64 / SECOND as f64
+            // Exact in integers; a double of seconds since 1970 would round to 0.2 µs. Stamps further
+            // apart than 292 years, such as a clock that was not set, take more than 64 bits.
+            (i128::from(stamp) - i128::from(first)) as f64 / SECOND as f64
         }
     };
     stamps.iter().map(of).collect()
@@ -109,5 +110,13 @@ mod tests {
         ] {
             assert_eq!(nanoseconds(text.as_bytes()), None, "{text}");
         }
+    }
+
+    #[test]
+    fn stamps_may_be_centuries_apart() {
+        let stamps =
+            ["1700-01-01", "2100-01-01T00:00:00.5"].map(|text| nanoseconds(text.as_bytes()));
+        // 400 years of the Gregorian calendar are 146,097 days.
+        assert_eq!(seconds(&stamps.map(Option::unwrap)), [0.0, 146_097.0 * 86_400.0 + 0.5]);
     }
 }
