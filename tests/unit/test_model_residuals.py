@@ -9,7 +9,7 @@ import pytest
 import scipy
 
 import flightid as fid
-from flightid.identification.frequency_domain import without_bias
+from flightid.identification.frequency_domain import model_residuals, without_bias
 from flightid.identification.frequency_domain.bias_objective import Objective
 from flightid.identification.frequency_domain.bias_search import SearchOutcome, search
 from flightid.identification.frequency_domain.estimator_bias import Correction, resonant_up_to
@@ -140,6 +140,41 @@ def test_slopes_of_what_a_growing_model_leaves_are_its_differences() -> None:
         ends = [followed.of(model.with_values({name: value * (1.0 + s)}))[0] for s in (-1e-4, 1e-4)]
         wanted = (ends[0] - ends[1]) / (2e-4 * value)
         assert np.linalg.norm(slope - wanted) < 0.01 * np.linalg.norm(wanted), name
+
+
+def test_records_of_any_lengths_are_followed_as_each_alone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Those of one length are worked on together, as many as memory allows."""
+    rng, model = np.random.default_rng(4), hovering()
+    records = []
+    for n in (300, 260, 300, 300, 260):
+        lon, lat, *noise = rng.standard_normal((6, n))
+        record = fid.Record.from_arrays(
+            np.arange(n) / 10.0,
+            inputs={"lat": 1e-3 * lat, "lon": 1e-3 * lon},
+            outputs=dict(zip(MEASURED, noise, strict=True)),
+            units={"lon": "rad", "lat": "rad", **MEASURED},
+        )
+        records.append(record)
+    moved = [(model.with_values({"Mq": -1.2001}), -1e-4), (model.with_values({"Lp": -2.9}), 0.1)]
+    response = fid.estimate_response(records, band_rad_s=(2.0, 8.0), n_omega=4)
+    assert response.linear is not None
+    linear = response.linear
+    for hold in ("zero", "band_limited"):
+        found = []
+        for at_once in (model_residuals.AT_ONCE, 1):
+            monkeypatch.setattr(model_residuals, "AT_ONCE", at_once)
+            followed = ModelResiduals(linear, response.outputs, hold)
+            groups = sorted(each for some in followed._alike.values() for each in some)
+            assert groups == ([(0, 2, 3), (1, 4)] if at_once > 1 else [(k,) for k in range(5)])
+            found.append((followed.of(model), followed.slopes(model, moved)))
+        for together, alone in zip(*found, strict=True):
+            for one, other, record in zip(together, alone, records, strict=True):
+                assert one.shape == other.shape
+                assert one.shape[-1] == record.n_samples
+                assert_close(one, other, rtol=1e-6, atol=1e-7, why="differences of a step of 1e-4")
+        monkeypatch.undo()
 
 
 def test_a_fit_that_cannot_be_followed_begins_from_the_model(

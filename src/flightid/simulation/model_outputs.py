@@ -205,15 +205,15 @@ def driven_outputs(
     Parameters
     ----------
     modes : list of ModeSubset
-    between : ndarray
-        The measured inputs from `between_samples`.
+    between : ndarray, shape (..., m, n)
+        The measured inputs from `between_samples`, of one record or of some of one length.
     sample_time_s : float
     hold : {"band_limited", "first", "zero"}
         What the inputs do between their samples.
 
     Returns
     -------
-    ndarray, shape (p, n_samples)
+    ndarray, shape (..., p, n_samples)
     """
     if hold != "band_limited":
         return np.asarray(sum(_driven(each, between, sample_time_s, hold) for each in modes))
@@ -269,11 +269,12 @@ def _driven(
     # last on, that what is left of the lead is a delay again; it starts from a free state anyway.
     extra = int(np.ceil(np.max(modes.delays_s, initial=0.0) / sample_time_s - 1e-9))
     rest = np.maximum(extra * sample_time_s - modes.delays_s, 0.0)
-    turned = np.pad(values[:, ::-1], ((0, 0), (0, extra + 1)), mode="edge")
+    still = [(0, 0)] * (values.ndim - 1)
+    turned = np.pad(values[..., ::-1], (*still, (0, extra + 1)), mode="edge")
     # A step held after its sample is held before it when time runs backwards.
-    turned = turned[:, :-1] if first else turned[:, 1:]
+    turned = turned[..., :-1] if first else turned[..., 1:]
     found = _run(modes, turned, rest, sample_time_s, first=first)
-    return np.asarray(found[:, extra:][:, ::-1][:, ::every])
+    return np.asarray(found[..., extra:][..., ::-1][..., ::every])
 
 
 def _run(
@@ -289,6 +290,8 @@ def _run(
     a, b, c, d = (np.ascontiguousarray(each, dtype=np.float64) for each in modes.matrices)
     driven = np.ascontiguousarray(values, dtype=np.float64)
     late, at_rest = np.ascontiguousarray(delays_s), np.zeros(len(a))
-    return _native.linear_outputs(
-        sign * a, sign * b, c, d, late, driven, at_rest, sample_time_s, first, every
+    runs = driven.reshape(-1, *driven.shape[-2:])
+    found = _native.linear_outputs(
+        sign * a, sign * b, c, d, late, runs, at_rest, sample_time_s, first, every
     )
+    return found.reshape(*driven.shape[:-2], *found.shape[1:])

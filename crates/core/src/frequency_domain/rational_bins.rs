@@ -18,7 +18,7 @@ const LANES: usize = 8;
 const ABREAST: usize = 4;
 /// Share of the unknowns that a correction may move; a larger one finds the equations unsound.
 const MOST_MOVED: f64 = 1e-2;
-/// Share from which on a correction is followed by another.
+/// Share that a solution may still be off.
 const SETTLED: f64 = 1e-10;
 const CORRECTIONS: usize = 3;
 
@@ -116,7 +116,7 @@ impl RationalBins {
         let records = widest(|| self.products(wanted));
         let Some(normal) = BorderedNormal::of(self.unknowns(), &records) else { return Ok(None) };
         let right: Vec<&[f64]> = records.iter().map(|each| each.right.as_slice()).collect();
-        let mut solved = normal.solve(&right);
+        let (mut solved, mut off) = (normal.solve(&right), 1.0);
         for turn in 0..CORRECTIONS {
             let left = widest(|| self.pulled_rest(wanted, &solved));
             let rows: Vec<&[f64]> = left.iter().map(Vec::as_slice).collect();
@@ -128,9 +128,11 @@ impl RationalBins {
             for (value, more) in solved.iter_mut().zip(&change) {
                 *value += more;
             }
-            if moved < SETTLED {
+            // A correction finds how far the one before was off, and leaves that share of it.
+            if moved * moved / off < SETTLED {
                 break;
             }
+            off = moved;
         }
         Ok(Some(solved))
     }
@@ -162,7 +164,7 @@ impl RationalBins {
 
     #[inline(always)]
     fn each_chunk(&self, output: &[Complex64], mut work: impl FnMut(usize, &Chunk)) {
-        let rows = self.n_own.next_multiple_of(ABREAST);
+        let rows = self.powers_of(0);
         let wide = || [vec![0.0; rows * CHUNK], vec![0.0; rows * CHUNK]];
         let sources = || vec![0.0; (self.n_inputs + 2) * CHUNK];
         let mut chunk =
@@ -215,10 +217,16 @@ impl RationalBins {
         }
     }
 
+    /// Powers of a channel's columns, and of differences to channels behind it: a transient has more.
+    fn powers_of(&self, channel: usize) -> usize {
+        let count = if channel == 0 { self.n_own } else { self.order + 1 };
+        count.next_multiple_of(ABREAST)
+    }
+
     /// Products of all pairs of columns, and of each with the target, by record.
     #[inline(always)]
     fn products(&self, wanted: Wanted<'_>) -> Vec<Record> {
-        let (n_channels, rows) = (self.n_inputs + 2, self.n_own.next_multiple_of(ABREAST));
+        let (n_channels, rows) = (self.n_inputs + 2, self.powers_of(0));
         let n_pairs = n_channels * (n_channels + 1) / 2;
         let mut sums = vec![[0.0; LANES]; self.lengths.len() * (2 * n_pairs + n_channels) * rows];
         let size = (2 * n_pairs + n_channels) * rows;
@@ -234,14 +242,15 @@ impl RationalBins {
                     let Some(place) = places.next() else { continue };
                     let (re, im) = chunk.weighed_product(a, b, &power);
                     let (first, second) = place.split_at_mut(rows);
-                    add_products(&re, &chunk.powers[0], first);
+                    let apart = self.powers_of(a);
+                    add_products(&re, &chunk.powers[0], &mut first[..apart]);
                     if a != b {
-                        add_products(&im, &chunk.powers[1], second);
+                        add_products(&im, &chunk.powers[1], &mut second[..apart]);
                     }
                 }
             }
             let pulled = apart(&wanted.pulled[chunk.from..chunk.from + chunk.count]);
-            chunk.pull(&pulled, right, rows);
+            chunk.pull(&pulled, right, rows, self.powers_of(1));
         });
         let whole =
             |part: &[Sums]| part.iter().map(|lanes| lanes.iter().sum()).collect::<Vec<f64>>();
@@ -256,7 +265,7 @@ impl RationalBins {
     /// Products of the columns with what coefficients leave of the target, by record.
     #[inline(always)]
     fn pulled_rest(&self, wanted: Wanted<'_>, coefficients: &[f64]) -> Vec<Vec<f64>> {
-        let rows = self.n_own.next_multiple_of(ABREAST);
+        let rows = self.powers_of(0);
         let size = (self.n_inputs + 2) * rows;
         let mut sums = vec![[0.0; LANES]; self.lengths.len() * size];
         self.each_chunk(wanted.output, |record, chunk| {
@@ -269,7 +278,8 @@ impl RationalBins {
             }
             re[chunk.count..].fill(0.0);
             im[chunk.count..].fill(0.0);
-            chunk.pull(&[re, im], &mut sums[record * size..(record + 1) * size], rows);
+            let into = &mut sums[record * size..(record + 1) * size];
+            chunk.pull(&[re, im], into, rows, self.powers_of(1));
         });
         sums.chunks_exact(size)
             .map(|each| {
@@ -281,12 +291,8 @@ impl RationalBins {
 
     /// Sums by channel and power as sums by column: of the transient, the inputs, the output.
     fn by_column(&self, sums: &[f64]) -> Vec<f64> {
-        let rows = self.n_own.next_multiple_of(ABREAST);
-        self.unknowns()
-            .columns()
-            .iter()
-            .map(|&(channel, power)| sums[channel * rows + power])
-            .collect()
+        let (rows, columns) = (self.powers_of(0), self.unknowns().columns());
+        columns.iter().map(|&(channel, power)| sums[channel * rows + power]).collect()
     }
 
     /// Columns times coefficients at the bins of a chunk.
@@ -340,9 +346,9 @@ impl Chunk {
         found
     }
 
-    /// Add the products of each channel's columns with values.
+    /// Add the products of each channel's columns with values: `rows` of the first, `further` of others.
     #[inline(always)]
-    fn pull(&self, values: &[[f64; CHUNK]; 2], sums: &mut [Sums], rows: usize) {
+    fn pull(&self, values: &[[f64; CHUNK]; 2], sums: &mut [Sums], rows: usize, further: usize) {
         for (channel, sums) in sums.chunks_exact_mut(rows).enumerate() {
             let (re, im) =
                 (&self.channels[0][channel * CHUNK..], &self.channels[1][channel * CHUNK..]);
@@ -351,8 +357,9 @@ impl Chunk {
                 made.0[k] = re[k] * values[0][k] + im[k] * values[1][k];
                 made.1[k] = re[k] * values[1][k] - im[k] * values[0][k];
             }
-            add_products(&made.0, &self.powers[0], sums);
-            add_products(&made.1, &self.powers[1], sums);
+            let held = if channel == 0 { rows } else { further };
+            add_products(&made.0, &self.powers[0], &mut sums[..held]);
+            add_products(&made.1, &self.powers[1], &mut sums[..held]);
         }
     }
 }

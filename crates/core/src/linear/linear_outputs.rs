@@ -1,11 +1,12 @@
 //! Outputs alone of a linear system over sampled inputs, at every sample or at some.
 //! (Python side: simulation/model_outputs.py)
 //!
-//! A step is one product of a matrix with states and inputs together, four rows at a time; outputs are
-//! taken block by block of samples. No state is kept: `linear_simulation` keeps them.
+//! A step is one product of a matrix with states and inputs together, four rows at a time, and goes from
+//! one sample that is asked for to the next; outputs are taken block by block of those samples. No state
+//! is kept: `linear_simulation` keeps them.
 
 use crate::error::CoreError;
-use crate::linear::discretisation::Sampled;
+use crate::linear::discretisation::{Sampled, Tap};
 use crate::linear::linear_simulation::sample;
 use crate::numerics::householder::dot;
 use crate::numerics::widest::widest;
@@ -16,9 +17,9 @@ const LANES: usize = 4;
 /// Groups of rows up to which a step stays in registers; larger systems go row by row.
 const MOST_GROUPS: usize = 8;
 
-/// A discretised system and what it is driven by.
+/// A discretised system, from one wanted sample to the next, and what it is driven by.
 struct Driven<'a> {
-    sampled: &'a Sampled,
+    sampled: Sampled,
     c: &'a [f64],
     inputs: &'a [f64],
     n_samples: usize,
@@ -27,8 +28,9 @@ struct Driven<'a> {
     p: usize,
 }
 
-/// States and tapped inputs at up to `BLOCK` samples, row by row, and the outputs made of them.
+/// States and tapped inputs that outputs are made of at up to `BLOCK` samples, and the outputs.
 struct Lines {
+    places: Vec<usize>,
     sources: Vec<[f64; BLOCK]>,
     filled: usize,
     begun: usize,
@@ -63,7 +65,15 @@ pub fn outputs(
         let (found, needed) = (inputs.len(), m * n_samples);
         return Err(CoreError::Shape { what: "inputs of the simulation", found, needed });
     }
-    let driven = Driven { sampled, c, inputs, n_samples, every, n, p };
+    let driven = Driven {
+        sampled: several_steps(sampled, n, every.min(n_samples)),
+        c,
+        inputs,
+        n_samples,
+        every,
+        n,
+        p,
+    };
     let found = widest(|| match n.div_ceil(LANES) {
         0 | 1 => driven.run::<1>(initial),
         2 => driven.run::<2>(initial),
@@ -88,9 +98,9 @@ impl Driven<'_> {
         let mut sources = vec![0.0; columns.len()];
         sources[..self.n].copy_from_slice(initial);
         let mut lines = self.lines();
-        for k in 0..self.n_samples {
+        for k in (0..self.n_samples).step_by(self.every) {
             self.tap(k, &mut sources[self.n..]);
-            self.keep(k, &sources, &mut lines);
+            self.keep(&sources, &mut lines);
             let next = product(&columns, &sources);
             let values = next.as_flattened();
             sources[..self.n].copy_from_slice(&values[..self.n]);
@@ -105,9 +115,9 @@ impl Driven<'_> {
         let mut sources = vec![0.0; n + self.sampled.taps.len()];
         sources[..n].copy_from_slice(initial);
         let (mut lines, mut next) = (self.lines(), vec![0.0; n]);
-        for k in 0..self.n_samples {
+        for k in (0..self.n_samples).step_by(self.every) {
             self.tap(k, &mut sources[n..]);
-            self.keep(k, &sources, &mut lines);
+            self.keep(&sources, &mut lines);
             for (value, row) in next.iter_mut().zip(&rows) {
                 *value = dot(row, &sources);
             }
@@ -135,9 +145,21 @@ impl Driven<'_> {
     }
 
     fn lines(&self) -> Lines {
-        let sources = vec![[0.0; BLOCK]; self.n + self.sampled.taps.len()];
+        let count = self.n + self.sampled.taps.len();
+        let is_seen = |&place: &usize| (0..self.p).any(|row| self.factor(row, place) != 0.0);
+        let places: Vec<usize> = (0..count).filter(is_seen).collect();
+        let sources = vec![[0.0; BLOCK]; places.len()];
         let outputs = vec![0.0; self.p * self.n_samples.div_ceil(self.every)];
-        Lines { sources, filled: 0, begun: 0, outputs }
+        Lines { places, sources, filled: 0, begun: 0, outputs }
+    }
+
+    /// By which a state or tapped input enters an output.
+    #[inline(always)]
+    fn factor(&self, row: usize, place: usize) -> f64 {
+        match place.checked_sub(self.n) {
+            Some(tap) => self.sampled.taps[tap].output[row],
+            None => self.c[row * self.n + place],
+        }
     }
 
     #[inline(always)]
@@ -148,14 +170,11 @@ impl Driven<'_> {
         }
     }
 
-    /// Keep what outputs are made of, at samples that are asked for.
+    /// Keep what outputs are made of.
     #[inline(always)]
-    fn keep(&self, k: usize, sources: &[f64], lines: &mut Lines) {
-        if !k.is_multiple_of(self.every) {
-            return;
-        }
-        for (line, value) in lines.sources.iter_mut().zip(sources) {
-            line[lines.filled] = *value;
+    fn keep(&self, sources: &[f64], lines: &mut Lines) {
+        for (line, &place) in lines.sources.iter_mut().zip(&lines.places) {
+            line[lines.filled] = sources[place];
         }
         lines.filled += 1;
         if lines.filled == BLOCK {
@@ -166,12 +185,10 @@ impl Driven<'_> {
     #[inline(always)]
     fn flush(&self, lines: &mut Lines) {
         let count = self.n_samples.div_ceil(self.every);
-        let taps = &self.sampled.taps;
         for row in 0..self.p {
             let mut sums = [0.0; BLOCK];
-            let states = self.c[row * self.n..(row + 1) * self.n].iter().copied();
-            let factors = states.chain(taps.iter().map(|tap| tap.output[row]));
-            for (factor, line) in factors.zip(&lines.sources) {
+            for (&place, line) in lines.places.iter().zip(&lines.sources) {
+                let factor = self.factor(row, place);
                 if factor != 0.0 {
                     for k in 0..BLOCK {
                         sums[k] += factor * line[k];
@@ -190,6 +207,49 @@ impl Driven<'_> {
         self.flush(&mut lines);
         lines.outputs
     }
+}
+
+/// A system that takes several steps at once: x⁺ = Φˢ x + Σ Φˢ⁻¹⁻ⁱ taps, outputs at the first of them.
+fn several_steps(sampled: &Sampled, n: usize, steps: usize) -> Sampled {
+    let mut found = sampled.clone();
+    for later in 1..steps {
+        // What was gathered goes one step on, and the next step's inputs join it.
+        found.transition = times(&sampled.transition, &found.transition, n);
+        for tap in &mut found.taps {
+            tap.state = times(&sampled.transition, &tap.state, n);
+        }
+        for tap in &sampled.taps {
+            let ahead = tap.ahead.saturating_add_unsigned(later);
+            let is_same = |each: &&mut Tap| each.input == tap.input && each.ahead == ahead;
+            match found.taps.iter_mut().find(is_same) {
+                Some(known) => {
+                    for (sum, value) in known.state.iter_mut().zip(&tap.state) {
+                        *sum += value;
+                    }
+                }
+                None => found.taps.push(Tap {
+                    ahead,
+                    output: vec![0.0; tap.output.len()],
+                    ..tap.clone()
+                }),
+            }
+        }
+    }
+    found
+}
+
+/// A square matrix times another of as many rows, both row by row.
+fn times(square: &[f64], other: &[f64], n: usize) -> Vec<f64> {
+    let columns = other.len().checked_div(n).unwrap_or(0);
+    let mut found = vec![0.0; other.len()];
+    for (row, into) in found.chunks_exact_mut(columns.max(1)).enumerate() {
+        for (factor, from) in square[row * n..].iter().zip(other.chunks_exact(columns)) {
+            for (sum, value) in into.iter_mut().zip(from) {
+                *sum += factor * value;
+            }
+        }
+    }
+    found
 }
 
 /// A matrix by columns times a vector: even and odd columns in sums of their own, which need not wait.

@@ -3,6 +3,7 @@
 use crate::error::from_core;
 use crate::fits::output_error::hold as named;
 use crate::row_major::{RowMajor1, RowMajor2, RowMajor3};
+use flightid_core::error::CoreError;
 use flightid_core::linear::discretisation::discretise;
 use flightid_core::linear::discretisation::{Hold, StateSpace};
 use flightid_core::linear::linear_outputs::outputs;
@@ -10,7 +11,7 @@ use flightid_core::linear::linear_response::responses;
 use flightid_core::linear::linear_simulation::Discrete;
 use flightid_core::numerics::matrix_exponential::exponential;
 use num_complex::Complex64;
-use numpy::ndarray::Array2;
+use numpy::ndarray::{Array2, Array3};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
@@ -78,7 +79,8 @@ fn simulate_linear<'py>(
 
 /// linear_outputs(a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64], d: NDArray[np.float64], delays_s: NDArray[np.float64], inputs: NDArray[np.float64], initial_state: NDArray[np.float64], sample_time_s: float, first_order_hold: bool, every: int) -> NDArray[np.float64]
 ///
-/// Outputs alone of such a simulation, at every so many samples from the first on.
+/// Outputs alone of such simulations, at every so many samples from the first on: inputs of some runs
+/// of one length, (n_runs, m, n_samples), to (n_runs, p, ⌈n_samples / every⌉).
 #[pyfunction]
 #[allow(clippy::too_many_arguments)]
 fn linear_outputs<'py>(
@@ -88,23 +90,28 @@ fn linear_outputs<'py>(
     c: RowMajor2<'py, f64>,
     d: RowMajor2<'py, f64>,
     delays_s: RowMajor1<'py, f64>,
-    inputs: RowMajor2<'py, f64>,
+    inputs: RowMajor3<'py, f64>,
     initial_state: RowMajor1<'py, f64>,
     sample_time_s: f64,
     first_order_hold: bool,
     every: usize,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
+) -> PyResult<Bound<'py, PyArray3<f64>>> {
     let system = system_of(&a, &b, &c, &d, &delays_s)?;
-    let (n_outputs, n_samples) = (system.n_outputs, inputs.as_array().ncols());
+    let (n_outputs, (n_runs, m, n_samples)) = (system.n_outputs, inputs.as_array().dim());
     let (u, x0) = (inputs.as_slice()?, initial_state.as_slice()?);
     let hold = between_samples(first_order_hold);
     let found = py
         .detach(|| {
             let (sampled, _) = discretise(&system, &[], sample_time_s, hold)?;
-            outputs(&sampled, (system.c, n_outputs), u, n_samples, x0, every)
+            let run = |u| outputs(&sampled, (system.c, n_outputs), u, n_samples, x0, every);
+            let runs = (0..n_runs).map(|k| run(&u[k * m * n_samples..(k + 1) * m * n_samples]));
+            runs.collect::<Result<Vec<_>, CoreError>>()
         })
         .map_err(from_core)?;
-    matrix(py, found, n_outputs, n_samples.div_ceil(every.max(1)))
+    let shape = (n_runs, n_outputs, n_samples.div_ceil(every.max(1)));
+    let array = Array3::from_shape_vec(shape, found.concat())
+        .map_err(|error| pyo3::exceptions::PyRuntimeError::new_err(error.to_string()))?;
+    Ok(array.into_pyarray(py))
 }
 
 /// linear_response(a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64], d: NDArray[np.float64], points: NDArray[np.complex128]) -> NDArray[np.complex128]

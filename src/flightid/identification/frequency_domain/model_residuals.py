@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 from flightid.errors import DataError
 from flightid.frozen import dataclass
 from flightid.identification.frequency_domain.unknown_motion import (
-    FollowedRun,
+    FollowedRuns,
     MotionBasis,
     MotionFitter,
 )
 from flightid.models import GreyBoxModel
 from flightid.responses.errors.linear_estimate import LinearEstimate
 from flightid.simulation.model_outputs import (
+    FINER,
     ModeSubset,
     between_samples,
     driven_outputs,
@@ -58,8 +59,26 @@ class _SystemRun:
     places: list[int]
 
 
-_Followed = tuple[list[FollowedRun], dict[int, tuple[list[_SystemRun], Array, MotionBasis]]]
-"""Runs beside records, and what they have in common by the length of records."""
+@dataclass(frozen=True)
+class _Motion:
+    """What records of one length have in common beside a model.
+
+    Attributes
+    ----------
+    systems : list of _SystemRun
+    free : ndarray, shape (n_unknowns, n_fitted, n)
+        Motion by each unknown.
+    basis : MotionBasis
+        The same, ready for least squares.
+    """
+
+    systems: list[_SystemRun]
+    free: Array
+    basis: MotionBasis
+
+
+_Followed = dict[int, tuple[_Motion, list[FollowedRuns]]]
+"""By the length of records: what they have in common, and their runs."""
 
 
 def _are_same(one: GreyBoxModel, other: GreyBoxModel) -> bool:
@@ -100,7 +119,12 @@ class ModelResiduals:
         DataError
             The model diverges on the records.
         """
-        return [each.rest for each in self._followed(model)[0]]
+        found = list(self.linear.output_records)
+        for _, groups in self._followed(model).values():
+            for runs in groups:
+                for place, rest in zip(runs.places, runs.rest, strict=True):
+                    found[place] = rest
+        return found
 
     def slopes(
         self, model: GreyBoxModel, moved: Sequence[tuple[GreyBoxModel, float]]
@@ -121,36 +145,24 @@ class ModelResiduals:
         Golub & Pereyra, "The differentiation of pseudo-inverses and nonlinear least squares
         problems whose variables separate", *SIAM J. Numerical Analysis* 10 (1973).
         """
-        followed, known = self._followed(model)
         kept = self._kept(model)
-        changes = [np.zeros((len(moved), *each.shape)) for each in self.linear.output_records]
-        turns = [np.zeros((len(moved), len(each.start))) for each in followed]
-        for n, (_, free, unknown) in known.items():
-            alike = [place for place, change in enumerate(changes) if change.shape[2] == n]
-            runs = [followed[each] for each in alike]
-            starts = np.array([one.start for one in runs])
-            left = np.array([one.weighed(kept).ravel() for one in runs])
-            alone = np.array([one.fitter.left_alone for one in runs]).transpose(1, 0, 2)
-            pulls = [one.pulls(kept, unknown) for one in runs]
+        found = [np.zeros(0)] * len(self.linear.output_records)
+        for n, (motion, groups) in self._followed(model).items():
+            shape = len(moved), len(self.outputs), n
+            wholes = [np.zeros((len(runs.places), *shape)) for runs in groups]
+            sides = [_Side.of(runs, kept, motion) for runs in groups]
             for place, (other, step) in enumerate(moved):
-                motions, beyond = self._motion(other, kept, n, known[n][0])
-                turned = (beyond - free) / step
-                flat = turned.reshape(len(free), -1)
-                by_start = (starts @ flat).reshape(len(alike), len(kept), n)
-                # What is left of the outputs turns with the space that was taken out of them.
-                turning = left @ flat.T / unknown.lengths
-                answered = alone @ turned.transpose(1, 2, 0)
-                for row, (each, one) in enumerate(zip(alike, runs, strict=True)):
-                    driven = self._driven(motions, kept, self._between[each], n)
-                    pushed = (driven - one.driven) / step
-                    change = pushed + by_start[row]
-                    changes[each][place, kept] = change - change.mean(axis=1, keepdims=True)
-                    turns[each][place] = turning[row] + one.reweighing(
-                        pulls[row], pushed, answered[:, row], unknown.lengths
-                    )
-        for change, turn, one in zip(changes, turns, followed, strict=True):
-            _take_motion_out(change, kept, one.fitter, known[change.shape[2]][2], turn)
-        return changes
+                systems, beyond = self._motion(other, kept, n, motion.systems)
+                turned = (beyond - motion.free) / step
+                for whole, side in zip(wholes, sides, strict=True):
+                    driven = self._driven(systems, kept, side.runs.places)
+                    whole[:, place, kept] = side.moved(driven, step, turned)
+            for whole, side in zip(wholes, sides, strict=True):
+                turns = np.stack(side.turns, axis=1)
+                _take_motion_out(whole, kept, side.runs.fitter, motion.basis, turns)
+                for place, change in zip(side.runs.places, whole, strict=True):
+                    found[place] = change
+        return found
 
     def _kept(self, model: GreyBoxModel) -> Places:
         fitted = {each.output for each in model.responses}
@@ -168,40 +180,64 @@ class ModelResiduals:
 
     def _follow(self, model: GreyBoxModel) -> _Followed:
         kept = self._kept(model)
-        known: dict[int, tuple[list[_SystemRun], Array, MotionBasis]] = {}
-        found = []
-        for measured, between in zip(self.linear.output_records, self._between, strict=True):
-            n = measured.shape[1]
-            if n not in known:
-                motions, free = self._motion(model, kept, n)
-                known[n] = motions, free, MotionBasis.of(free)
-            motions, _, unknown = known[n]
-            driven = self._driven(motions, kept, between, n)
-            rest = measured[kept] - driven
-            if not np.all(np.isfinite(rest)):
-                raise self._diverges(kept, "a simulation without bounds")
-            rest = rest - rest.mean(axis=1, keepdims=True)
-            fitter = unknown.fitter(rest)
-            start = unknown.coefficients(fitter, rest) / unknown.lengths
-            left = measured.copy()
-            left[kept] = unknown.less(fitter, rest)
-            self._check(kept, left)
-            found.append(FollowedRun(left, driven, fitter, start))
-        return found, known
+        found: _Followed = {}
+        for n, groups in self._alike.items():
+            systems, free = self._motion(model, kept, n)
+            motion = _Motion(systems, free, MotionBasis.of(free))
+            found[n] = motion, [self._beside(kept, motion, places) for places in groups]
+        return found
 
-    def _driven(self, motions: list[_SystemRun], kept: Places, between: Array, n: int) -> Array:
-        found = np.zeros((len(kept), n))
-        for each in motions:
-            outputs = driven_outputs(
-                each.modes, between[each.inputs], self.linear.sample_time_s, self.hold
-            )
-            found[np.searchsorted(kept, each.rows)] += outputs[each.places]
+    def _beside(self, kept: Places, motion: _Motion, places: tuple[int, ...]) -> FollowedRuns:
+        """Records of one length beside a model."""
+        left = np.array([self.linear.output_records[place] for place in places])
+        driven = self._driven(motion.systems, kept, places)
+        rest = left[:, kept] - driven
+        if not np.all(np.isfinite(rest)):
+            raise self._diverges(kept, "a simulation without bounds")
+        rest -= rest.mean(axis=2, keepdims=True)
+        unknown = motion.basis
+        fitter = unknown.fitter(rest)
+        start = unknown.coefficients(fitter, rest[:, None])[:, 0]
+        left[:, kept] = rest - unknown.moved(start)
+        self._check(kept, left)
+        return FollowedRuns(places, left, driven, fitter, start / unknown.lengths)
+
+    @cached_property
+    def _alike(self) -> dict[int, list[tuple[int, ...]]]:
+        """Places of records by their length, in groups of so many samples as are worked on."""
+        found: dict[int, list[tuple[int, ...]]] = {}
+        for place, each in enumerate(self.linear.output_records):
+            groups = found.setdefault(each.shape[1], [])
+            most = AT_ONCE // (max(each.shape[0], FINER * len(self.linear.inputs)) * each.shape[1])
+            if groups and len(groups[-1]) < most:
+                groups[-1] = (*groups[-1], place)
+            else:
+                groups.append((place,))
+        return found
+
+    def _driven(
+        self, systems: Sequence[_SystemRun], kept: Places, places: tuple[int, ...]
+    ) -> Array:
+        """What the inputs of records of one length drive, shape (n_records, n_fitted, n)."""
+        between = self._between[places]
+        n = self.linear.output_records[places[0]].shape[1]
+        found = np.zeros((len(places), len(kept), n))
+        for each in systems:
+            is_all = each.inputs == list(range(between.shape[1]))
+            inputs = between if is_all else between[:, each.inputs]
+            outputs = driven_outputs(each.modes, inputs, self.linear.sample_time_s, self.hold)
+            found[:, np.searchsorted(kept, each.rows)] += outputs[:, each.places]
         return found
 
     @cached_property
-    def _between(self) -> list[Array]:
-        """Inputs of each record, with what they do between their samples."""
-        return [between_samples(each, self.hold) for each in self.linear.input_records]
+    def _between(self) -> dict[tuple[int, ...], Array]:
+        """Inputs of each group, with what they do between their samples."""
+        inputs = self.linear.input_records
+        return {
+            places: np.array([between_samples(inputs[place], self.hold) for place in places])
+            for groups in self._alike.values()
+            for places in groups
+        }
 
     def _motion(
         self, model: GreyBoxModel, kept: Places, n: int, like: Sequence[_SystemRun] = ()
@@ -249,9 +285,10 @@ class ModelResiduals:
         return np.asarray(np.max(sizes, axis=0))
 
     def _check(self, kept: Places, left: Array) -> None:
-        for row in kept:
-            if np.std(left[row]) > LARGEST_RESIDUAL * self._sizes[row]:
-                ratio = float(np.std(left[row]) / max(self._sizes[row], TINY))
+        deviations = np.max(np.std(left[:, kept], axis=2), axis=0)
+        for row, deviation in zip(kept, deviations, strict=True):
+            if deviation > LARGEST_RESIDUAL * self._sizes[row]:
+                ratio = float(deviation / max(self._sizes[row], TINY))
                 found = f"a residual {ratio:.0f} times the measured output"
                 raise self._diverges(np.array([row]), found)
 
@@ -265,15 +302,58 @@ class ModelResiduals:
         )
 
 
+@dataclass(frozen=True)
+class _Side:
+    """Records of one length, and what each moved model is compared with.
+
+    Attributes
+    ----------
+    runs : FollowedRuns
+    unknown : MotionBasis
+    weighed : ndarray, shape (n_records, n_fitted n)
+        What is left, by the squares of the outputs' weights.
+    pulls : ndarray, shape (n_records, n_unknowns, n_fitted)
+    turns : list of ndarray, shape (n_records, n_unknowns)
+        How the residuals see the motions of each moved model turn.
+    """
+
+    runs: FollowedRuns
+    unknown: MotionBasis
+    weighed: Array
+    pulls: Array
+    turns: list[Array]
+
+    @classmethod
+    def of(cls, runs: FollowedRuns, kept: Places, motion: _Motion) -> _Side:
+        """Of some records beside a model."""
+        weighed = runs.weighed(kept).reshape(len(runs.places), -1)
+        return cls(runs, motion.basis, weighed, runs.pulls(kept, motion.basis), [])
+
+    def moved(self, driven: Array, step: float, turned: Array) -> Array:
+        """Derivatives by one parameter, means removed, shape (n_records, n_fitted, n)."""
+        runs, lengths = self.runs, self.unknown.lengths
+        pushed = (driven - runs.driven) / step
+        flat = turned.reshape(len(turned), -1)
+        # What is left of the outputs turns with the space that was taken out of them.
+        turning = self.weighed @ flat.T / lengths
+        alone = runs.fitter.left_alone.transpose(1, 0, 2)
+        answered = (alone @ turned.transpose(1, 2, 0)).transpose(1, 0, 2)
+        self.turns.append(turning + runs.reweighing(self.pulls, pushed, answered, lengths))
+        change = pushed + (runs.start @ flat).reshape(pushed.shape)
+        return np.asarray(change - change.mean(axis=2, keepdims=True))
+
+
 def _take_motion_out(
-    change: Array, kept: Places, fitter: MotionFitter, unknown: MotionBasis, turn: Array
+    changes: Array, kept: Places, fitter: MotionFitter, unknown: MotionBasis, turns: Array
 ) -> None:
     """Take initial states and trims out of derivatives, and add what their own turning leaves.
 
-    `turn`, shape (n_moved, n_unknowns), says how the residual sees the turning motions.
+    `changes`, shape (n_records, n_moved, n_out, n), are derivatives; `turns`, shape (n_records,
+    n_moved, n_unknowns), says how the residuals see the turning motions.
     """
-    at_once = max(1, AT_ONCE // max(change[0].size, 1))
-    for begin in range(0, len(change), at_once):
+    at_once = max(1, AT_ONCE // max(changes[:, 0].size, 1))
+    for begin in range(0, changes.shape[1], at_once):
         part = slice(begin, begin + at_once)
-        again = np.tensordot(turn[part] @ fitter.normal, unknown.motions, axes=1)
-        change[part, kept] = unknown.less(fitter, change[part, kept]) + again
+        rest = changes[:, part, kept]
+        again = turns[:, part] @ fitter.normal - unknown.coefficients(fitter, rest)
+        changes[:, part, kept] = rest + unknown.moved(again)

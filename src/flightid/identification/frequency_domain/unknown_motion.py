@@ -1,4 +1,7 @@
-"""Motion of unknown initial states and trims beside a record, fitted to what a model leaves."""
+"""Motion of unknown initial states and trims beside records, fitted to what a model leaves.
+
+Records of one length have their motions in common: their products are worked out together.
+"""
 
 from __future__ import annotations
 
@@ -19,19 +22,19 @@ TINY = float(np.finfo(float).tiny)
 
 @dataclass(frozen=True)
 class MotionFitter:
-    """Least squares for unknown motion, with each output's weight.
+    """Least squares for unknown motion, with each output's weight, by record.
 
     Attributes
     ----------
-    gain : ndarray, shape (n_unknowns, n_outputs, k)
+    gain : ndarray, shape (n_records, n_unknowns, n_outputs, k)
         From parts inside each output's basis to coefficients.
-    normal : ndarray, shape (n_unknowns, n_unknowns)
+    normal : ndarray, shape (n_records, n_unknowns, n_unknowns)
         Inverse of the normal equations.
-    scale : ndarray, shape (n_outputs,)
+    scale : ndarray, shape (n_records, n_outputs)
         By which outputs were divided.
-    alone : ndarray, shape (n_outputs, n_unknowns)
+    alone : ndarray, shape (n_records, n_outputs, n_unknowns)
         Coefficients of a fit of each output by itself.
-    left_alone : ndarray, shape (n_outputs, n)
+    left_alone : ndarray, shape (n_records, n_outputs, n)
         What those leave: `scale` is its deviation.
     """
 
@@ -85,43 +88,57 @@ class MotionBasis:
 
         Fitted to each output by itself, so many unknowns would take what little a record says of
         its lowest frequencies with them. Outputs count by what they leave of `rest`, shape
-        (n_outputs, n), in such a fit of their own.
+        (n_records, n_outputs, n), in such a fit of their own.
         """
-        inside = np.einsum("ynk,yn->yk", self.bases, rest, optimize=True)
-        alone = np.einsum("yuk,yk->yu", self.apart, inside)
-        left = rest - np.einsum("ynk,yku,yu->yn", self.bases, self.triangles, alone, optimize=True)
-        scale = np.maximum(np.std(left, axis=1), TINY)
-        stacked = (self.triangles / scale[:, None, None]).reshape(-1, self.triangles.shape[2])
+        inside = rest.transpose(1, 0, 2) @ self.bases
+        alone = inside @ self.apart.transpose(0, 2, 1)
+        met = alone @ self.triangles.transpose(0, 2, 1) @ self.bases.transpose(0, 2, 1)
+        left = rest - met.transpose(1, 0, 2)
+        scale = np.maximum(np.std(left, axis=2), TINY)
+        n_outputs, k, n_unknowns = self.triangles.shape
+        stacked = (self.triangles / scale[:, :, None, None]).reshape(-1, n_outputs * k, n_unknowns)
         inverse = np.linalg.pinv(stacked, rcond=_RANK)
-        gain = inverse.reshape(-1, *self.triangles.shape[:2]) / scale[:, None]
-        return MotionFitter(gain, inverse @ inverse.T, scale, alone, left)
+        gain = inverse.reshape(-1, n_unknowns, n_outputs, k) / scale[:, None, :, None]
+        normal = inverse @ inverse.transpose(0, 2, 1)
+        return MotionFitter(gain, normal, scale, alone.transpose(1, 0, 2), left)
 
     def coefficients(self, fitter: MotionFitter, rest: Array) -> Array:
-        """Of the motions that fit best, shape (…, n_unknowns), for rests of shape (…, n_out, n)."""
-        inside = np.einsum("ynk,...yn->...yk", self.bases, rest, optimize=True)
-        return np.asarray(np.einsum("uyk,...yk->...u", fitter.gain, inside, optimize=True))
+        """Of the motions that fit best, (n_records, n_each, n_unknowns).
 
-    def less(self, fitter: MotionFitter, rest: Array) -> Array:
-        """Take these motions out."""
-        moved = np.tensordot(self.coefficients(fitter, rest), self.motions, axes=1)
-        return np.asarray(rest - moved)
+        `rest` has shape (n_records, n_each, n_outputs, n): some of each record.
+        """
+        n_records, n_each, n_outputs, n = rest.shape
+        rows = rest.transpose(2, 0, 1, 3).reshape(n_outputs, -1, n)
+        inside = (rows @ self.bases).reshape(n_outputs, n_records, n_each, -1)
+        flat = inside.transpose(1, 2, 0, 3).reshape(n_records, n_each, -1)
+        gain = fitter.gain.reshape(*fitter.gain.shape[:2], -1)
+        return np.asarray(flat @ gain.transpose(0, 2, 1))
+
+    def moved(self, coefficients: Array) -> Array:
+        """Motions by their coefficients, shape (..., n_unknowns), as (..., n_outputs, n)."""
+        flat = self.motions.reshape(len(self.motions), -1)
+        found = coefficients.reshape(-1, len(flat)) @ flat
+        return found.reshape(*coefficients.shape[:-1], *self.motions.shape[1:])
 
 
 @dataclass(frozen=True)
-class FollowedRun:
-    """One record with a model beside it.
+class FollowedRuns:
+    """Records of one length with a model beside them.
 
     Attributes
     ----------
-    rest : ndarray, shape (n_out, n)
+    places : tuple of int
+        Of these records among all.
+    rest : ndarray, shape (n_records, n_out, n)
         Measured less modelled.
-    driven : ndarray, shape (n_fitted, n)
+    driven : ndarray, shape (n_records, n_fitted, n)
         Modelled, without unknown motion.
     fitter : MotionFitter
-    start : ndarray, shape (n_unknowns,)
+    start : ndarray, shape (n_records, n_unknowns)
         Initial states and trims.
     """
 
+    places: tuple[int, ...]
     rest: Array
     driven: Array
     fitter: MotionFitter
@@ -129,14 +146,15 @@ class FollowedRun:
 
     def weighed(self, kept: Places) -> Array:
         """What is left of the fitted outputs, by the squares of their weights."""
-        return np.asarray(self.rest[kept] / self.fitter.scale[:, None] ** 2)
+        return np.asarray(self.rest[:, kept] / self.fitter.scale[:, :, None] ** 2)
 
     def pulls(self, kept: Places, unknown: MotionBasis) -> Array:
-        """What each output's weight asks of the unknowns, shape (n_unknowns, n_fitted)."""
-        return np.asarray(np.einsum("uyn,yn->uy", unknown.motions, self.rest[kept], optimize=True))
+        """What each output's weight asks of the unknowns, (n_records, n_unknowns, n_fitted)."""
+        found = self.rest[:, kept].transpose(1, 0, 2) @ unknown.motions.transpose(1, 2, 0)
+        return np.asarray(found.transpose(1, 2, 0))
 
     def reweighing(self, pulls: Array, pushed: Array, answered: Array, lengths: Array) -> Array:
-        """What the unknowns are asked for by weights that move with a model, shape (n_unknowns,).
+        """What the unknowns are asked for by weights that move with a model, by record.
 
         Weights are what a fit of each output alone leaves, so they answer to the model as well;
         its own coefficients, where it stands, move what it leaves by nothing.
@@ -144,13 +162,18 @@ class FollowedRun:
         Parameters
         ----------
         pulls : ndarray
-        pushed : ndarray, shape (n_fitted, n)
+        pushed : ndarray, shape (n_records, n_fitted, n)
             By how much the model moves what is driven.
-        answered : ndarray, shape (n_fitted, n_unknowns)
+        answered : ndarray, shape (n_records, n_fitted, n_unknowns)
             What is left alone times by how much it moves the unknown motions.
         lengths : ndarray, shape (n_unknowns,)
+
+        Returns
+        -------
+        ndarray, shape (n_records, n_unknowns)
         """
         fitter = self.fitter
-        along = np.einsum("yn,yn->y", fitter.left_alone, pushed)
-        along += np.einsum("yu,yu->y", fitter.alone / lengths, answered)
-        return np.asarray(pulls @ (2.0 * along / (pushed.shape[1] * fitter.scale**4)))
+        along = np.vecdot(fitter.left_alone, pushed)
+        along += np.vecdot(fitter.alone / lengths, answered)
+        asked = 2.0 * along / (pushed.shape[2] * fitter.scale**4)
+        return np.asarray((pulls @ asked[:, :, None])[:, :, 0])
