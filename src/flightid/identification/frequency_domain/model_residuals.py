@@ -60,7 +60,7 @@ class _SystemRun:
 
 
 @dataclass(frozen=True)
-class _Motion:
+class _CommonBasis:
     """What records of one length have in common beside a model.
 
     Attributes
@@ -77,7 +77,7 @@ class _Motion:
     basis: MotionBasis
 
 
-_Followed = dict[int, tuple[_Motion, list[FollowedRuns]]]
+_Followed = dict[int, tuple[_CommonBasis, list[FollowedRuns]]]
 """By the length of records: what they have in common, and their runs."""
 
 
@@ -183,11 +183,11 @@ class ModelResiduals:
         found: _Followed = {}
         for n, groups in self._alike.items():
             systems, free = self._motion(model, kept, n)
-            motion = _Motion(systems, free, MotionBasis.of(free))
+            motion = _CommonBasis(systems, free, MotionBasis.of(free))
             found[n] = motion, [self._beside(kept, motion, places) for places in groups]
         return found
 
-    def _beside(self, kept: Places, motion: _Motion, places: tuple[int, ...]) -> FollowedRuns:
+    def _beside(self, kept: Places, motion: _CommonBasis, places: tuple[int, ...]) -> FollowedRuns:
         """Records of one length beside a model."""
         left = np.array([self.linear.output_records[place] for place in places])
         driven = self._driven(motion.systems, kept, places)
@@ -324,7 +324,7 @@ class _Side:
     turns: list[Array]
 
     @classmethod
-    def of(cls, runs: FollowedRuns, kept: Places, motion: _Motion) -> _Side:
+    def of(cls, runs: FollowedRuns, kept: Places, motion: _CommonBasis) -> _Side:
         """Of some records beside a model."""
         weighed = runs.weighed(kept).reshape(len(runs.places), -1)
         return cls(runs, motion.basis, weighed, runs.pulls(kept, motion.basis), [])
