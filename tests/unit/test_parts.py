@@ -10,7 +10,7 @@ from scipy import stats
 from flightid.conventions import Light
 from flightid.evidence import Check, Evidence
 from flightid.evidence.part_checks import agreement_check
-from flightid.uncertainty.agreement import Agreement, compare_parts
+from flightid.uncertainty.agreement import Agreement, _in_doubt, compare_parts
 from flightid.uncertainty.blocks import RecordBlock, flights_of, noise_heard
 from flightid.uncertainty.parts import RecordParts, _freedom, chance_alike, larger, scatter
 from flightid.uncertainty.residual_noise import Autoregression
@@ -229,3 +229,9 @@ def test_rounding_below_zero_is_no_noise_of_a_parameter() -> None:
     part = RecordParts(np.zeros((2, 2)), np.stack([np.diag([1.0, 0.0])] * 2), noise)
     with np.errstate(all="raise"):
         assert chance_alike([part], np.inf) is not None
+
+
+def test_doubt_of_a_pair_beside_noise_that_is_known_warns_of_nothing() -> None:
+    """Freedom without end met a share of none: NumPy's warning stood on the screen."""
+    found = _in_doubt(np.array([1.0, 1.0, 5.0]), np.array([np.inf, 9.0, np.inf]))
+    assert found.tolist() == [np.inf, 9.0, 5.0]

@@ -233,7 +233,8 @@ def _in_doubt(student: Array, freedom: Array) -> Array:
     change nothing at once.
     """
     share = np.clip((student - 1.0) / (TELLING - 1.0), 0.0, 1.0)
-    eased = 1.0 / (share / TELLING + (1.0 - share) / freedom)
+    with np.errstate(divide="ignore"):  # Noise that is known has freedom without end.
+        eased = 1.0 / (share / TELLING + (1.0 - share) / freedom)
     return np.where(student < TELLING, np.maximum(student, eased), student)
 
 
