@@ -104,3 +104,18 @@ def test_lines_that_both_changed_are_not_taken_together(desk: Desk, place: str) 
     page.get_by_role("button", name="Discard").click()
     assert path.read_text().startswith("# seed = 2")
     page.close()
+
+
+def test_what_two_windows_type_is_kept_for_each(desk: Desk, place: str) -> None:
+    """The folder keeps one text of a study: *Discard* in one window took the other's away."""
+    mine, other = desk.open(place).page, desk.open(place).page
+    for page, line in ((mine, "# typed first"), (other, "# typed second")):
+        _typed(page, line)
+        page.wait_for_timeout(600)  # it is sent when a hand rests
+    other.get_by_role("button", name="Discard", exact=True).click()
+    other.wait_for_timeout(600)
+    mine.reload()
+    assert "# typed first" in mine.get_by_label(BOX).input_value()
+    mine.get_by_role("button", name="Discard", exact=True).click()
+    for page in (mine, other):
+        page.close()

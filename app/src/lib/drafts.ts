@@ -12,6 +12,8 @@ const LOCAL = "flightid-draft:";
  */
 class Drafts {
   #typed: Record<string, Draft> = {};
+  /** What this window has typed: another window's text takes its place in the folder alone. */
+  #mine: Record<string, Draft> = {};
   #unsent = new Map<string, Draft | null>();
   /** Places that nothing but this page knows: the browser's store is full, or shut. */
   #held = new Set<string>();
@@ -24,6 +26,8 @@ class Drafts {
     addEventListener("beforeunload", (event) => {
       if (this.#held.size) event.preventDefault();
     });
+    // A reload gives this window's own text back, whatever another one has typed or stored.
+    addEventListener("pagehide", () => Object.entries(this.#mine).forEach(([place, draft]) => this.#leave(place, draft)));
     // Another window has typed meanwhile.
     addEventListener("focus", () => void this.load());
   }
@@ -45,11 +49,13 @@ class Drafts {
   }
 
   keep(place: string, draft: Draft) {
+    this.#mine[place] = draft;
     if (JSON.stringify(draft) !== JSON.stringify(this.kept(place))) this.#put(place, draft);
   }
 
   /** It is stored, or thrown away. */
   drop(place: string) {
+    delete this.#mine[place];
     if (this.kept(place) || this.#unsent.get(place)) this.#put(place, null);
   }
 
@@ -57,13 +63,17 @@ class Drafts {
     if (draft) this.#typed[place] = draft;
     else delete this.#typed[place];
     this.#unsent.set(place, draft);
+    this.#leave(place, draft);
+    this.#later(REST_MS);
+  }
+
+  #leave(place: string, draft: Draft | null) {
     try {
       localStorage.setItem(this.#key(place), JSON.stringify(draft));
       this.#held.delete(place);
     } catch {
       this.#held.add(place);
     }
-    this.#later(REST_MS);
   }
 
   #later(wait: number) {

@@ -13,6 +13,10 @@ export class Hand {
   values = $state.raw<Record<string, number>>({});
   refused = $state("");
   late = $state(false);
+  /** Whether a slider is pressed: what is found anew does not move it under the hand. */
+  pressed = false;
+  /** Gains that `moved` is of. */
+  #of = $state.raw<Record<string, number>>({});
   #rest = 0;
   #slow = 0;
   /** Counts what takes the place of moved gains: answers to what was asked before come too late. */
@@ -33,6 +37,19 @@ export class Hand {
   /** Every gain of the axis, those that were moved among them. */
   get now(): Record<string, number> {
     return { ...Object.fromEntries((this.still()?.sliders ?? []).map((each) => [each.name, each.value])), ...this.values };
+  }
+
+  /** Whether what is shown is of the sliders as they stand. */
+  get holds(): boolean {
+    const now = this.now;
+    return this.moved !== null && this.moved === this.shown && Object.keys(now).every((name) => now[name] === this.#of[name]);
+  }
+
+  /** Gains are there anew: a slider that is pressed, or is ahead of them, stays and is judged beside them. */
+  anew(stale: boolean) {
+    if ((!this.pressed && !stale) || !Object.keys(this.values).length) return this.forget();
+    this.#turn += 1;
+    this.move(...(Object.entries(this.values).at(-1)!));
   }
 
   /** Gains that were found anew take the place of what a hand has moved. */
@@ -67,6 +84,7 @@ export class Hand {
       this.late = false;
       this.refused = answer.error ?? "";
       if (!answer.moved) return;
+      this.#of = values;
       const earlier = this.moved?.axis === answer.moved.axis ? this.moved : still;
       this.moved = responses ? answer.moved : { ...answer.moved, curves: answer.moved.is_stable ? (earlier?.curves ?? []) : [] };
       if (!responses) this.#rest = setTimeout(() => this.still()?.axis === answer.moved!.axis && this.#judge(values, true), REST_MS) as unknown as number;
