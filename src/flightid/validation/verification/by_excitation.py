@@ -23,7 +23,8 @@ from flightid.identification.prediction.result import Prediction
 from flightid.uncertainty.several_tests import holm_adjusted
 from flightid.validation.verification.injected_bands import (
     SURE,
-    Power,
+    InjectedBands,
+    Powers,
     injected_bands,
     smooth_miss,
 )
@@ -115,17 +116,18 @@ def unexcused(made: Sequence[Prediction], outputs: Sequence[str]) -> tuple[str, 
 def _of_output(
     made: Sequence[Prediction], name: str, excitations: Sequence[str]
 ) -> FollowedPart | None:
-    bands = [band for each in made for band in injected_bands(each, name, excitations)]
-    if not bands:
+    runs = [injected_bands(each, name, excitations) for each in made]
+    told = [each for each in runs if each is not None]
+    if not told:
         return None
-    strongest = max(band.injected for band in bands)
-    heard = [band for band in bands if band.injected >= EXCITED * strongest]
-    if len(heard) < FEWEST_BANDS:
+    bands = InjectedBands.joined(told)
+    heard = bands.where(bands.injected >= EXCITED * np.max(bands.injected, initial=0.0))
+    if len(heard.injected) < FEWEST_BANDS:
         return None
-    chances = np.array([max(band.chance, np.finfo(float).tiny) for band in heard])
-    anyhow = float(scipy.special.chdtrc(2 * len(heard), -2.0 * np.sum(np.log(chances))))
-    weighed = _ends([(band.missed, band.answer) for band in heard])
-    plain = _ends([(band.missed.times(band.back), band.answer.times(band.back)) for band in heard])
+    logs = np.log(np.maximum(heard.chance, np.finfo(float).tiny))
+    anyhow = float(scipy.special.chdtrc(2 * len(logs), -2.0 * np.sum(logs)))
+    weighed = _ends(heard.missed, heard.answer)
+    plain = _ends(heard.missed.times(heard.back), heard.answer.times(heard.back))
     if weighed is None:
         return None
     *smooth, directed = smooth_miss(heard)
@@ -134,18 +136,13 @@ def _of_output(
     return FollowedPart(max(least, *smooth), most, np.inf if plain is None else plain[1], chance)
 
 
-def _ends(bands: Sequence[tuple[Power, Power]]) -> tuple[float, float] | None:
+def _ends(missed: Powers, answer: Powers) -> tuple[float, float] | None:
     """Least and most of a miss over its answer, rms; None where no answer stands out."""
-    missed, answer = (
-        Power(sum(each.value for each in side), sum(each.variance for each in side))
-        for side in zip(*bands, strict=True)
-    )
-    if answer.value <= SURE * np.sqrt(answer.variance):
+    (miss, variance), (power, of_power) = missed.total, answer.total
+    if power <= SURE * np.sqrt(of_power):
         return None
-    scatter = SURE * float(np.sqrt(missed.variance))
-    least, most = (
-        float(np.sqrt(max(missed.value + end, 0.0) / answer.value)) for end in (-scatter, scatter)
-    )
+    scatter = SURE * float(np.sqrt(variance))
+    least, most = (float(np.sqrt(max(miss + end, 0.0) / power)) for end in (-scatter, scatter))
     return least, most
 
 

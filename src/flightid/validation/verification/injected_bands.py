@@ -7,7 +7,7 @@ with it (a damping); along these a small miss is told that is lost among all tha
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import scipy
@@ -31,51 +31,82 @@ RANK = 1e-6
 TINY = float(np.finfo(float).tiny)
 
 
-@dataclass(frozen=True)
-class Power:
-    """A power without what noise makes of it, and the variance of that number."""
+@dataclass(frozen=True, eq=False)
+class Powers:
+    """Powers by band without what noise makes of them, and the variances of those numbers."""
 
-    value: float
-    variance: float
+    value: Array
+    variance: Array
 
-    def times(self, factor: float) -> Power:
-        """In another unit."""
-        return Power(factor * self.value, factor**2 * self.variance)
+    def times(self, factor: Array) -> Powers:
+        """In other units."""
+        return Powers(factor * self.value, factor**2 * self.variance)
+
+    @property
+    def total(self) -> tuple[float, float]:
+        """Of all bands, and its variance."""
+        return float(np.sum(self.value)), float(np.sum(self.variance))
 
 
 @dataclass(frozen=True, eq=False)
-class InjectedBand:
-    """Neighbouring frequencies of one record, whitened by what the error holds.
+class InjectedBands:
+    """Bands of neighbouring frequencies, whitened by what the error holds; of one record or more.
 
     Attributes
     ----------
-    injected : float
+    injected : ndarray, shape (n,)
         Power of the excitations, as they were.
-    missed, answer : Power
+    missed, answer : Powers
         What of the error and of the output follows them.
-    back : float
-        Factor to powers as they were.
-    chance : float
+    back : ndarray, shape (n,)
+        Factors to powers as they were.
+    chance : ndarray, shape (n,)
         That noise makes as much of a miss (Fisher's F).
-    noise : float
+    noise : ndarray, shape (n,)
         Power of the error at a frequency that does not follow.
-    grams : (ndarray, ndarray), shape (n_ways, n_ways)
+    grams : (ndarray, ndarray), shape (n, n_ways, n_ways)
         Products of the ways in which a model is wrong: of what follows, and of chance beside it.
-    along : ndarray, shape (n_ways,)
+    along : ndarray, shape (n, n_ways)
         Their products with the error, less what chance makes.
     """
 
-    injected: float
-    missed: Power
-    answer: Power
-    back: float
-    chance: float
-    noise: float
+    injected: Array
+    missed: Powers
+    answer: Powers
+    back: Array
+    chance: Array
+    noise: Array
     grams: tuple[Array, Array]
     along: Array
 
+    @staticmethod
+    def joined(parts: Sequence[InjectedBands]) -> InjectedBands:
+        """Bands of records, one after the other."""
+        return _each(np.concatenate, parts)
 
-def injected_bands(run: Prediction, name: str, excitations: Sequence[str]) -> list[InjectedBand]:
+    def where(self, kept: NDArray[np.bool_]) -> InjectedBands:
+        """Some of the bands."""
+        return _each(lambda rows: rows[0][kept], [self])
+
+
+def _each(made: Callable[[list[Array]], Array], parts: Sequence[InjectedBands]) -> InjectedBands:
+    missed, answer = (
+        Powers(made([each.value for each in side]), made([each.variance for each in side]))
+        for side in ([each.missed for each in parts], [each.answer for each in parts])
+    )
+    return InjectedBands(
+        made([each.injected for each in parts]),
+        missed,
+        answer,
+        made([each.back for each in parts]),
+        made([each.chance for each in parts]),
+        made([each.noise for each in parts]),
+        (made([each.grams[0] for each in parts]), made([each.grams[1] for each in parts])),
+        made([each.along for each in parts]),
+    )
+
+
+def injected_bands(run: Prediction, name: str, excitations: Sequence[str]) -> InjectedBands | None:
     """Bands of an output of a free run, lowest frequency first; none of a run without error.
 
     Parameters
@@ -89,7 +120,7 @@ def injected_bands(run: Prediction, name: str, excitations: Sequence[str]) -> li
     injected = np.array([run.measured[each][run.start :] for each in excitations])
     weights = _whitening(y - y_hat)
     if weights is None or not np.all(np.ptp(injected, axis=1) > 0.0):
-        return []
+        return None
     # One filter for all leaves each answer to the excitations what it is.
     rows = np.vstack([y, y - y_hat, y_hat, injected - injected.mean(axis=1, keepdims=True)])
     white = scipy.signal.lfilter(weights, [1.0], rows)[:, weights.size :]
@@ -98,41 +129,66 @@ def injected_bands(run: Prediction, name: str, excitations: Sequence[str]) -> li
     shape = np.abs(np.fft.rfft(weights, n)) ** 2
     turn = np.arange(spectra.shape[1]) / n
     count = (spectra.shape[1] - 1) // BINS
-    parts = (slice(at, at + BINS) for at in range(1, 1 + count * BINS, BINS))
-    return [_band(spectra[:, part], shape[part], turn[part]) for part in parts]
 
-
-def _band(spectra: Spectra, shape: Array, turn: Array) -> InjectedBand:
-    output, error, said, injected = spectra[0], spectra[1], spectra[2], spectra[3:]
-    directions, sizes, _ = np.linalg.svd(injected.T, full_matrices=False)
-    basis = directions[:, sizes > RANK * max(sizes[0], TINY)]
-    told, free = basis.shape[1], injected.shape[1] - basis.shape[1]
-    back = 1.0 / float(np.mean(shape))
-    (missed, noise), (answer, _) = (_power(basis, each, free) for each in (error, output))
-    found = float(np.sum(np.abs(basis.conj().T @ error) ** 2))
-    chance = 1.0
-    if told:
-        f = found / told / max(noise, TINY)
-        chance = float(scipy.special.fdtrc(2 * told, 2 * free, f))
-    ways = np.array([said, 1j * turn * said, said / (1j * turn)])
-    follows = (ways @ basis.conj()) @ basis.T
-    beside = ways - follows
-    grams = tuple(np.real(each.conj() @ each.T) for each in (follows, beside))
-    along = np.real(follows.conj() @ error) - told / free * np.real(beside.conj() @ error)
-    power = float(np.sum(np.abs(injected) ** 2)) * back
-    return InjectedBand(
-        power, missed, answer, back, chance, noise, (grams[0], told / free * grams[1]), along
+    used = slice(1, 1 + count * BINS)
+    return _bands(
+        spectra[:, used].reshape(-1, count, BINS),
+        shape[used].reshape(count, BINS),
+        turn[used].reshape(count, BINS),
     )
 
 
-def _power(basis: Spectra, row: Spectra, free: int) -> tuple[Power, float]:
+def _bands(spectra: Spectra, shape: Array, turn: Array) -> InjectedBands:
+    output, error, said = spectra[:3]
+    injected = np.moveaxis(spectra[3:], 0, -1)
+    directions, sizes, _ = np.linalg.svd(injected, full_matrices=False)
+    kept = sizes > RANK * np.maximum(sizes[:, :1], TINY)
+    basis = directions * kept[:, None, :]
+    told = kept.sum(axis=1)
+    free = BINS - told
+    back = 1.0 / np.mean(shape, axis=1)
+    (missed, noise), (answer, _) = (_powers(basis, each, told) for each in (error, output))
+    found = _squares(_onto(basis, error))
+    f = found / np.maximum(told, 1) / np.maximum(noise, TINY)
+    chance = np.where(told > 0, scipy.special.fdtrc(2 * np.maximum(told, 1), 2 * free, f), 1.0)
+    ways = np.stack([said, 1j * turn * said, said / (1j * turn)], axis=1)
+    follows = (ways @ basis.conj()) @ np.swapaxes(basis, 1, 2)
+    beside = ways - follows
+    grams = [np.real(each.conj() @ np.swapaxes(each, 1, 2)) for each in (follows, beside)]
+    by_chance = told / free
+    along = np.real(_products(follows, error) - by_chance[:, None] * _products(beside, error))
+    return InjectedBands(
+        np.sum(_squares(np.swapaxes(injected, 1, 2)), axis=1) * back,
+        missed,
+        answer,
+        back,
+        chance,
+        noise,
+        (grams[0], by_chance[:, None, None] * grams[1]),
+        along,
+    )
+
+
+def _powers(basis: Spectra, row: Spectra, told: Array) -> tuple[Powers, Array]:
     """What of a row follows the excitations, and the power at a frequency of what does not."""
-    told = basis.shape[1]
-    along = float(np.sum(np.abs(basis.conj().T @ row) ** 2))
-    noise = max(float(np.sum(np.abs(row) ** 2)) - along, 0.0) / free
+    free = BINS - told
+    along = _squares(_onto(basis, row))
+    noise = np.maximum(_squares(row) - along, 0.0) / free
     clean = along - told * noise
-    scatter = told * noise**2 + 2.0 * noise * max(clean, 0.0) + (told * noise) ** 2 / free
-    return Power(clean, scatter), noise
+    scatter = told * noise**2 + 2.0 * noise * np.maximum(clean, 0.0) + (told * noise) ** 2 / free
+    return Powers(clean, scatter), noise
+
+
+def _onto(basis: Spectra, row: Spectra) -> Spectra:
+    return np.asarray(np.einsum("bfk,bf->bk", basis.conj(), row))
+
+
+def _products(ways: Spectra, row: Spectra) -> Spectra:
+    return np.asarray(np.einsum("bwf,bf->bw", ways.conj(), row))
+
+
+def _squares(rows: Spectra) -> Array:
+    return np.asarray(np.sum(np.abs(rows) ** 2, axis=-1), dtype=np.float64)
 
 
 def _whitening(error: Array) -> Array | None:
@@ -145,12 +201,12 @@ def _whitening(error: Array) -> Array | None:
     return np.concatenate([[1.0], -weights])
 
 
-def smooth_miss(bands: Sequence[InjectedBand]) -> tuple[float, float, float]:
+def smooth_miss(bands: InjectedBands) -> tuple[float, float, float]:
     """Miss along the smooth ways: weighed by noise, as it is, and the chance of as much by noise.
 
     Parameters
     ----------
-    bands : sequence of InjectedBand
+    bands : InjectedBands
         Those that hold injected power.
 
     Returns
@@ -158,27 +214,24 @@ def smooth_miss(bands: Sequence[InjectedBand]) -> tuple[float, float, float]:
     tuple of float
         Least misses over the answer, rms, and the chance (chi-square of as many ways).
     """
-    noise = scipy.ndimage.uniform_filter1d([band.noise for band in bands], SMOOTHED, mode="nearest")
+    noise = scipy.ndimage.uniform_filter1d(bands.noise, SMOOTHED, mode="nearest")
     weights = 1.0 / np.maximum(noise, TINY)
-    scale = np.sqrt(sum(w * np.diag(b.grams[0]) for w, b in zip(weights, bands, strict=True)))
+    followed, beside = bands.grams
+    scale = np.sqrt(weights @ np.diagonal(followed, axis1=1, axis2=2))
     scale = np.where(scale > 0.0, scale, 1.0)
     both = np.outer(scale, scale)
 
     def total(factors: Array, second: float) -> Array:
-        made = np.zeros_like(both)
-        for factor, band in zip(factors, bands, strict=True):
-            made += factor * (band.grams[0] + second * band.grams[1])
-        return np.asarray(made / both, dtype=np.float64)
+        return np.asarray(np.einsum("b,bij->ij", factors, followed + second * beside) / both)
 
-    b = sum(w * band.along for w, band in zip(weights, bands, strict=True)) / scale
+    b = weights @ bands.along / scale
     scatter = 0.5 * total(weights, 1.0)
     statistic = float(b @ np.linalg.pinv(scatter, rcond=RANK, hermitian=True) @ b)
     moves = np.linalg.pinv(total(weights, -1.0), rcond=RANK, hermitian=True) @ b
     sure = max(0.0, 1.0 - SURE / np.sqrt(max(statistic, TINY)))
-    back = np.array([band.back for band in bands])
     misses = []
-    for factors in (weights, back):
-        answer = sum(f * band.answer.value for f, band in zip(factors, bands, strict=True))
+    for factors in (weights, bands.back):
+        answer = float(factors @ bands.answer.value)
         miss = float(moves @ total(factors, -1.0) @ moves)
         misses.append(float(sure * np.sqrt(max(miss, 0.0) / answer)) if answer > 0.0 else 0.0)
     return misses[0], misses[1], float(scipy.special.chdtrc(len(b), statistic))
