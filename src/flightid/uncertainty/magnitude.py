@@ -6,6 +6,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from flightid.uncertainty.quadrature import gauss_legendre
 from flightid.uncertainty.quantiles import LEVEL, half_width, tails
 
 Real = NDArray[np.float64]
@@ -75,7 +76,7 @@ def chance_within(radius: Real, size: Real, along: Real, across: Real) -> Real:
     >>> bool(abs(found[0] - (1.0 - np.exp(-2.0))) < 1e-9)
     True
     """
-    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    nodes, weights = gauss_legendre(NODES)
     turn = 0.5 * np.pi * nodes[:, None]
     # A sine of the angle: the chord's root has no finite slope at the radius.
     reach = np.minimum(radius, REACH * across)

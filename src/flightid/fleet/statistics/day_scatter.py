@@ -11,6 +11,7 @@ from scipy.optimize import brentq
 
 from flightid.fleet.statistics.step_chances import largest_step_chance
 from flightid.frozen import dataclass
+from flightid.uncertainty.quadrature import gauss_legendre
 
 Array = NDArray[np.float64]
 FEWEST_FREE = 3
@@ -134,7 +135,7 @@ def left_of_normal(n: int) -> tuple[float, float]:
     """
     before = np.arange(1.0, n - 1.0)
     correlations = np.sqrt(before * (n - 1.0 - before) / ((before + 1.0) * (n - before)))
-    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    nodes, weights = gauss_legendre(NODES)
     sizes, weights = 0.5 * LARGEST * (nodes + 1.0), 0.5 * LARGEST * weights
     chances = np.array([largest_step_chance(float(each**2), correlations) for each in sizes])
     first, second = (float(weights @ (p * sizes ** (p - 1.0) * chances)) for p in (2.0, 4.0))

@@ -7,11 +7,11 @@ integrals: no simulation, and exact in the tail where thousands of series are co
 
 from __future__ import annotations
 
-from functools import cache
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
+
+from flightid.uncertainty.quadrature import gauss_legendre
 
 Array = NDArray[np.float64]
 NODES = 24
@@ -53,7 +53,7 @@ def largest_step_chance(statistic: float, correlations: Array) -> float:
     moves = np.sqrt(np.maximum(1.0 - correlations**2, 1e-12))
     least = float(moves.min(initial=1.0))
     count = int(min(max(NODES, NODES_A_STEP * limit / least), MOST_NODES))
-    nodes, weights = _nodes(count + -count % NODES_APART)
+    nodes, weights = gauss_legendre(count + -count % NODES_APART)
     nodes, weights = 0.5 * limit * (nodes + 1.0), 0.5 * limit * weights
     # Of the absolute value: what goes to −x comes from x as what goes to x comes from −x.
     density = 2.0 * _normal(nodes)
@@ -68,12 +68,6 @@ def largest_step_chance(statistic: float, correlations: Array) -> float:
         kernel += _normal((nodes[:, None] + shifted) / move)
         density = kernel @ mass / move
     return float(min(outside, 1.0))
-
-
-@cache
-def _nodes(count: int) -> tuple[Array, Array]:
-    """Of an integral from -1 to 1, and their weights (Gauss and Legendre)."""
-    return np.polynomial.legendre.leggauss(count)
 
 
 def _normal(x: Array) -> Array:
