@@ -37,6 +37,8 @@ SEPARATIONS = 20
 RESTORATIONS = 2
 SHARPEST = 1e6
 """Power of one line over the whole power that no sound model reaches."""
+CUT = 1e-6
+"""Of the mean power, to which a power that is negative is cut: below it rounding decides."""
 VALLEY = 0.02
 """Share of the mean power below which a spectrum is not believed."""
 AT_ONCE = 8192
@@ -226,13 +228,15 @@ def _fitted(power: Array, n: int, length: int, *, often: bool = False) -> Autore
 
     A periodogram that a fit's share was given back to can be negative somewhere: then it is no
     power, its autocovariance is no autocovariance, and the recursion meets a reflection above one.
-    What is negative is cut off there; of a power all reflections are below one.
+    What is negative is cut off there; of a power all reflections are below one, and of one without
+    valleys of nothing no rounding takes a pole over the circle.
     """
     largest = min(LARGEST_ORDER, n // 20)
     lags = first_lags(power, length, largest, often=often)
     weights, sound = autoregression_weights(lags, n)
     if not sound:
-        lags = first_lags(np.maximum(power, 0.0), length, largest)
+        least = CUT * float(np.mean(np.maximum(power, 0.0)))
+        lags = first_lags(np.maximum(power, least), length, largest)
         weights, _ = autoregression_weights(lags, n)
     return Autoregression(lags, weights, n, length)
 
