@@ -50,6 +50,39 @@ def test_a_parameter_goes_and_the_path_is_told(
     assert [step["name"] for step in plain["path"] if step["accepted"]] == ["Lp"]
 
 
+def test_an_output_that_files_do_not_hold_is_left_out(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """An aeroplane without an accelerometer: neither the error nor --outputs helped."""
+    truth = fid.load_model("fixed_wing_lateral")
+    time_s = np.arange(600) * 0.02
+    moved = {
+        name: 0.05 * np.sign(np.sin(rate * time_s))
+        for name, rate in (("aileron", 2.1), ("rudder", 1.3))
+    }
+    driven = fid.Record.from_arrays(
+        time_s, inputs=moved, units=dict.fromkeys(moved, "rad"), hold="zero"
+    )
+    units = {"beta": "rad", "p": "rad/s", "r": "rad/s", "phi": "rad", "ay": "m/s^2"}
+    flown = fid.simulate(truth, driven, units=units)
+    noise = 1e-3 * np.random.default_rng(5).standard_normal((600, 4))
+    names = [*moved, "beta", "p", "r", "phi"]
+    table = np.column_stack([time_s, *(flown[name] for name in names)])
+    table[:, 3:] += noise
+    path = tmp_path / "flown.csv"
+    head = "time [s],aileron [rad],rudder [rad],beta [rad],p [rad/s],r [rad/s],phi [rad]"
+    np.savetxt(path, table, delimiter=",", header=head, comments="")
+    words = ["identify", str(path), "--model", "fixed_wing_lateral", "--hold", "zero"]
+    words += ["--method", "output_error"]
+    assert run(words) == 2
+    told = " ".join(capsys.readouterr().err.split())
+    assert "found ay" in told
+    assert "leave it out: --outputs beta,p,r,phi" in told
+    assert run([*words, "--outputs", "beta,p,r,phi", "--json"]) in {0, 1}
+    found = json.loads(capsys.readouterr().out)
+    assert list(found["model"]["outputs"]) == ["beta", "p", "r", "phi"]
+
+
 def test_columns_stand_for_the_channels_of_equations(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

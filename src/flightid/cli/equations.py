@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,10 +13,11 @@ import click
 from flightid.cli.log_parts import with_instrument
 from flightid.cli.option_fields import parted
 from flightid.cli.records import read_files, reading
+from flightid.errors import UnknownNameError
 
 if TYPE_CHECKING:
     from flightid.identification import Fit
-    from flightid.models import Model
+    from flightid.models import GreyBoxModel, Model
     from flightid.options import Options
     from flightid.record import Record
 
@@ -84,8 +86,9 @@ def fits_of(
         () if way in methods() and _on_responses(way) else options.pop("excitations", ())
     )
     of_response, of_method, *of_files = _divided(way, options)
-    models = {name: load_structure(name, axis=axis) for name in names}
-    _require_same_channels(models)
+    loaded = {name: load_structure(name, axis=axis) for name in names}
+    _require_same_channels(loaded)
+    models, columns["outputs"] = _measured(loaded, columns["outputs"])
     (first, *_) = models.values()
     channels: dict[str, Any] = {"inputs": first.inputs, "outputs": first.outputs}
     named: dict[str, Any] = {
@@ -97,9 +100,10 @@ def fits_of(
             "the records stand beside it"
         )
     injected = beside_inputs or of_response.get("excitations")
-    read = read_files(
-        files, *of_files, **named, units=first.units, excitations=injected, take="flown"
-    )
+    with _said_to_leave_out(channels["outputs"]):
+        read = read_files(
+            files, *of_files, **named, units=first.units, excitations=injected, take="flown"
+        )
     more: list[Record] = []
     if way == JOINT:
         span = {} if beside_span_s is None else {"span_s": beside_span_s}
@@ -128,6 +132,37 @@ def fits_of(
         lambda longer: fitted(longer.estimate(estimate, of_response)),
         banded="band_rad_s" in of_response,
     )
+
+
+def _measured(
+    models: Mapping[str, GreyBoxModel], named: Sequence[str]
+) -> tuple[Mapping[str, GreyBoxModel], Sequence[str]]:
+    """Models that measure some of their outputs where those alone are named, and no column then."""
+    from flightid.models import StateSpaceModel
+
+    wide = {name: each for name, each in models.items() if isinstance(each, StateSpaceModel)}
+    few = all(set(named) < set(each.outputs) for each in wide.values())
+    if not named or len(wide) < len(models) or not few:
+        return models, named
+    return {name: each.with_outputs(*named) for name, each in wide.items()}, ()
+
+
+@contextmanager
+def _said_to_leave_out(outputs: Sequence[str]) -> Iterator[None]:
+    """Tell how an output that files do not hold is left out of the equations."""
+    try:
+        yield
+    except UnknownNameError as error:
+        others = [name for name in outputs if name != error.found]
+        if error.action or not others or len(others) == len(outputs):
+            raise
+        raise UnknownNameError(
+            error.problem,
+            found=error.found,
+            needed=error.needed,
+            action=f"name its column with --outputs, in the order {', '.join(outputs)}, or leave "
+            f"it out: --outputs {','.join(others)}",
+        ) from error
 
 
 def _columns_of(
