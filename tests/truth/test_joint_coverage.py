@@ -1,4 +1,4 @@
-"""95 % intervals of joint fits cover 92 to 97 of 100 pairs of flights."""
+"""95 % intervals of joint fits cover 93 to 97 of 100 pairs of flights."""
 
 from __future__ import annotations
 
@@ -12,6 +12,10 @@ FLIGHTS = 200
 
 
 @pytest.mark.slow
+@pytest.mark.xfail(
+    strict=True,
+    reason="bars by likelihood are 5 % too short: 93.3 % of 1,800 in 600 sweeps, 92 to 93 in these",
+)
 @pytest.mark.parametrize("window_s", [[10.0], "auto"])
 def test_joint_intervals_cover_the_truth(window_s: str | list[float]) -> None:
     truth = lag()
@@ -31,6 +35,5 @@ def test_joint_intervals_cover_the_truth(window_s: str | list[float]) -> None:
             shares.append(narrow / wide)
     share = float(np.mean(inside))
     assert untold <= 0.03 * FLIGHTS
-    # Bars by likelihood are 5 % too short: 93.3 % of 1,800 in 600 sweeps, more by other costs.
-    assert 0.915 <= share <= 0.97, (share, np.mean(shares))
+    assert 0.93 <= share <= 0.97, (share, np.mean(shares))
     assert np.mean(shares) < 0.9
