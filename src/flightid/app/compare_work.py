@@ -30,7 +30,7 @@ from flightid.planning.plan import plan_flight
 from flightid.planning.result import DEGREES, AxisSweep, SweepPlan
 from flightid.report.flight_card import card_html
 from flightid.review.before_after import compare_flights, compare_with_promise
-from flightid.review.changes import LoopChange
+from flightid.review.changes import LoopChange, dashes
 from flightid.review.comparison import FlightComparison, unheld
 from flightid.review.flight import review_flight
 from flightid.review.flight_state import FlightState
@@ -107,6 +107,7 @@ def _reviewed(path: Path, side: ComparedSide) -> Any:  # noqa: ANN401 - a review
 def _part(made: FlightComparison, step: FlownStep | None) -> ComparisonPart:
     later = {each.name: each for each in made.after if each.is_told}
     pairs = [(each, later[each.name]) for each in made.before if each.name in later]
+    columns = ("promised", "flown") if made.promised else ("before", "after")
     return ComparisonPart(
         names=made.names,
         promised=made.promised,
@@ -122,7 +123,7 @@ def _part(made: FlightComparison, step: FlownStep | None) -> ComparisonPart:
             if a.is_told
         ],
         findings=[shown_finding(each) for each in made.findings],
-        notes=list(made.left_out),
+        notes=[*dashes(columns, made.changes), *made.left_out],
         following=_file(None if step is None else step.following),
         back=_file(None if step is None else step.back),
     )

@@ -171,11 +171,19 @@ def change_table(
         f"In brackets: {interval_words(chosen)} intervals. Changed: beyond chance, one false "
         "“yes” in 20 such tables."
     )
-    return Table(title, columns, tuple(rows), (brackets, *_untold(names, changes), *notes))
+    return Table(title, columns, tuple(rows), (brackets, *dashes(names, changes), *notes))
 
 
-def _untold(names: tuple[str, str], changes: Iterable[LoopChange]) -> Iterator[str]:
-    """Why cells are dashes: a number that one side does not tell, a difference without a chance."""
+def dashes(names: tuple[str, str], changes: Iterable[LoopChange]) -> Iterator[str]:
+    """Why cells are dashes: a number that one side does not tell, a difference without a chance.
+
+    Parameters
+    ----------
+    names : tuple of str
+        What the columns before and after are called.
+    changes : iterable of LoopChange
+    """
+    changes = tuple(changes)
     for place, name in enumerate(names):
         sides = ((c.loop, (c.before, c.after)[place]) for c in changes)
         yield from (said.replace("–:", f"– of {name}:", 1) for said in untold_notes(sides))
