@@ -1,4 +1,4 @@
-"""A slider that is held while the tuning of the one before ends stays where the hand has it."""
+"""A slider stays where the hand has it: no tuning that ends and no line that comes moves it."""
 
 from __future__ import annotations
 
@@ -38,10 +38,12 @@ def test_a_tuning_that_ends_moves_no_slider_under_the_hand(desk: Desk, tmp_path:
     sliders = page.locator("input[type=range]")
     first, last = sliders.nth(0), sliders.nth(2)
     first.scroll_into_view_if_needed()
+    places = [first.bounding_box()["y"], last.bounding_box()["y"]]
     with page.expect_response(lambda told: f"/api/studies/{log}" in told.url):
         _pressed(page, first, -0.05)
         page.mouse.up()
     page.get_by_text("of the study before its last change").first.wait_for()
+    assert [first.bounding_box()["y"], last.bounding_box()["y"]] == places, "sliders moved"
     held = _pressed(page, last, -0.12)
     page.get_by_text("of the study before its last change").first.wait_for(state="detached")
     page.wait_for_timeout(500)
@@ -51,6 +53,7 @@ def test_a_tuning_that_ends_moves_no_slider_under_the_hand(desk: Desk, tmp_path:
         page.mouse.up()
     page.wait_for_timeout(500)
     assert int(last.input_value()) == held
+    assert [first.bounding_box()["y"], last.bounding_box()["y"]] == places, "sliders moved"
     (study,) = (desk.folder / "studies").glob("[!.]*.toml")
     kept = tomllib.loads(study.read_text(encoding="utf-8"))["tune"]["by_hand"][name]
     assert kept < float(last.get_attribute("aria-valuetext").split()[0]) * 1.01

@@ -7,3 +7,22 @@ export const noFiles = (refusal: string, reasons: ShownFinding[]) =>
 /** When files come: not by themselves where their tuning was cancelled or failed. */
 export const filesFollow = (work: Job | null | undefined) =>
   work?.state === "cancelled" ? "No files of these gains: their tuning was cancelled." : work?.state === "failed" ? "No files: see above." : "The files follow when the gains have settled.";
+
+/** What gains were asked for: how firm, and of a rig the form of its controller. */
+interface Asked { preset: string; form: string }
+
+/**
+ * Whose numbers a screen shows while those of its study are not there; names stand in back-quotes.
+ *
+ * `hand` is the axis whose numbers are already of the gains that its sliders show; empty where none is.
+ */
+export function oldNumbers(shown: Asked, wanted: Asked, hand: string, forms: Record<string, string> = {}): string {
+  const form = wanted.form !== "" && shown.form !== wanted.form;
+  const named = (each: Asked) => [each.preset, ...(form ? [forms[each.form] ?? each.form] : [])].join(", ");
+  if (named(shown) !== named(wanted)) return `The numbers shown are still those of \`${named(shown)}\`; \`${named(wanted)}\` has none yet.`;
+  if (hand) return `The numbers of ${hand} are of its sliders as they stand; files and other axes are still of the study before its last change.`;
+  return "The numbers shown are of the study before its last change.";
+}
+
+/** Where gains come from and what they promise, in a sentence. */
+export const promised = (byHand: boolean, preset: string, sentence: string) => `${byHand ? "Set by hand" : `Found by the search, ${preset}`}: ${sentence}`;
