@@ -3,9 +3,12 @@
 `python -m tests.stress.mutants --sample 200 --keep FILE`, with the extra `mutants`: `make mutants`.
 
 Drawn by chance from all mutants of the packages that tell users what to believe, with annotations
-left out. Each meets the tests that reach its line, by a run with coverage that comes first; the
-tree is a copy. A mutant that no test notices is printed with its line: mend the test, or argue that
-the line does the same without it. Kept mutants are not tried again.
+left out. Each meets the tests that reach its line, by a run with coverage that comes first and is
+kept by groups of files, and the examples of its file; then, where none of them notices, the other
+tests of their files, which may take what a fixture made of that line for another. The tree is a
+copy. A mutant that no test notices is printed with its line: mend the test, or argue that the line
+does the same without it. Kept mutants are not tried again. The share is told by package, each with
+the interval of Clopper and Pearson, *Biometrika* 26 (1934), 404-413.
 """
 
 from __future__ import annotations
@@ -15,6 +18,7 @@ import ast
 import json
 import os
 import random
+import re
 import resource
 import shutil
 import subprocess
@@ -25,6 +29,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
+
+from scipy.stats import beta
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("logs", "inspection", "evidence", "uncertainty", "control/tuning")
@@ -40,13 +46,15 @@ OPERATORS = (
     *("ReplaceComparisonOperator_Eq_NotEq", "ReplaceComparisonOperator_NotEq_Eq"),
     *("ReplaceUnaryOperator_USub_UAdd", "ReplaceBreakWithContinue", "ZeroIterationForLoop"),
 )
-MOST_TESTS, LONGEST_S = 60, 300
+MOST_TESTS, MOST_FILES, LONGEST_S = 60, 8, 150
+FILES_AT_ONCE = 24
+"""Test files of one run with coverage: what is lost where it is stopped."""
 WAITING = 10
 """Wall time a processor's second may take: a busy machine is not a loop without end."""
-PASSED = 0
+PASSED, NO_TESTS = 0, 5
 ENDS = {PASSED: "survived", 1: "killed", 2: "killed"}
 """By pytest's code: 1, a test failed; 2, the tree cannot be imported."""
-UNNOTICED = ("survived", "not reached", "not run")
+UNNOTICED = ("survived", "not reached", "not run", "too long")
 Reached = Mapping[str, Mapping[int, Sequence[str]]]
 
 
@@ -75,7 +83,7 @@ def copied(folder: Path) -> Path:
     return folder
 
 
-def tested(tree: Path, words: Sequence[str], longest_s: int | None) -> int | None:
+def tested(tree: Path, words: Sequence[str], longest_s: int | None, told: list[str]) -> int | None:
     """How pytest ends in that tree; below zero or None where its processor's time is not enough."""
     first = (str(tree), str(tree / "src"), *filter(None, [os.environ.get("PYTHONPATH")]))
     given = os.environ | {"PYTHONPATH": os.pathsep.join(first)}
@@ -83,38 +91,71 @@ def tested(tree: Path, words: Sequence[str], longest_s: int | None) -> int | Non
     for threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "RAYON_NUM_THREADS"):
         given[threads] = "1"
     try:
-        return subprocess.run(
-            [sys.executable, "-m", "pytest", "-q", "--no-header", *words],
-            cwd=tree, env=given, timeout=longest_s and WAITING * longest_s, check=False,
+        ended = subprocess.run(
+            [sys.executable, "-m", "pytest", "-q", "--no-header", "--tb=no", "-rfE", *words],
+            cwd=tree, env=given, timeout=longest_s and WAITING * longest_s, check=False, text=True,
             preexec_fn=limit if longest_s else None,
-            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-        ).returncode  # fmt: skip
+            stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+        )  # fmt: skip
     except subprocess.TimeoutExpired:
         return None
+    told += re.findall(r"^(?:FAILED|ERROR) (\S+::.+?)(?: - .*)?$", ended.stdout, re.MULTILINE)
+    return ended.returncode
 
 
-def reached(tree: Path, data: Path, packages: Sequence[str], tests: Sequence[str]) -> Reached:
-    """Tests by file and line that they run; made once, for minutes, and read from `data` again."""
+def reached(
+    tree: Path, kept: Path, packages: Sequence[str], tests: Sequence[str], workers: int
+) -> Reached:
+    """Tests by file and line that they run; made once, for minutes, and read from `kept` again."""
     from coverage import CoverageData
 
-    if not data.exists():
-        settings = tree / "coverage.rc"
-        sources = "\n    ".join(str(tree / "src/flightid" / each) for each in packages)
-        settings.write_text(f"[run]\nrelative_files = true\nsource =\n    {sources}\n")
-        words = ["--cov", f"--cov-config={settings}", "--cov-context=test", "--cov-report=", "-n2"]
-        left_out = [f"--ignore-glob=*{each}*" for each in SLOW]
-        if tested(tree, [*words, *left_out, *tests], None) != PASSED:
-            raise SystemExit("tests fail before anything is changed: they would notice everything")
-        shutil.copy(tree / ".coverage", data)
-    known = CoverageData(str(data))
-    known.read()
+    kept.mkdir(parents=True, exist_ok=True)
+    files = [
+        str(path.relative_to(tree))
+        for each in tests
+        for path in sorted(
+            (tree / each).rglob("test_*.py") if each[-3:] != ".py" else [tree / each]
+        )
+        if not path.name.startswith(SLOW)
+    ]
+    found: dict[str, dict[int, set[str]]] = {}
+    for start in range(0, len(files), FILES_AT_ONCE):
+        data = kept / f"{start:04d}"
+        if not data.exists():
+            _cover(tree, data, packages, files[start : start + FILES_AT_ONCE], workers)
+            print(f"{min(start + FILES_AT_ONCE, len(files))}/{len(files)} test files", flush=True)
+        known = CoverageData(str(data))
+        known.read()
+        for file in known.measured_files():
+            lines = found.setdefault(str(Path(file)), {})
+            for line, names in known.contexts_by_lineno(file).items():
+                # Names of examples hold bars of their own: the last one is the coverage's.
+                lines.setdefault(line, set()).update(each.rpartition("|")[0] for each in names)
     return {
-        str(Path(file)): {
-            line: sorted({each.partition("|")[0] for each in names if each})
-            for line, names in known.contexts_by_lineno(file).items()
-        }
-        for file in known.measured_files()
+        file: {line: sorted(names - {""}) for line, names in lines.items()}
+        for file, lines in found.items()
     }
+
+
+def _cover(
+    tree: Path, data: Path, packages: Sequence[str], files: Sequence[str], workers: int
+) -> None:
+    """Run those test files with coverage; those that fail would notice everything: left out."""
+    settings = tree / "coverage.rc"
+    sources = "\n    ".join(str(tree / "src/flightid" / each) for each in packages)
+    settings.write_text(f"[run]\nrelative_files = true\nsource =\n    {sources}\n")
+    words = ["--cov", f"--cov-config={settings}", "--cov-context=test", "--cov-report="]
+    failed: list[str] = []
+    while True:
+        left_out = [f"--deselect={each}" for each in failed]
+        before = len(failed)
+        code = tested(tree, [*words, f"-n{workers}", *left_out, *files], None, failed)
+        if code in (PASSED, NO_TESTS):
+            break
+        if len(failed) == before:
+            raise SystemExit(f"pytest ends with {code} before anything is changed: {files}")
+        print(f"fail unchanged, left out: {failed[before:]}", flush=True)
+    shutil.copy(tree / ".coverage", data)
 
 
 def mutants(tree: Path, packages: Sequence[str]) -> Iterator[Mutant]:
@@ -149,24 +190,57 @@ def end_of(tree: Path, mutant: Mutant, names: Reached) -> str:
     from cosmic_ray.mutating import mutate_code
     from cosmic_ray.plugins import get_operator
 
-    lines = names.get(mutant.path, {})
-    # What runs on import belongs to no test: those of the whole file stand for it.
-    tests = lines.get(mutant.line) or sorted({each for found in lines.values() for each in found})
-    if not tests:
-        return "not reached"
-    stem = Path(mutant.path).stem.rstrip("s")
-    tests = sorted(tests, key=lambda each: (stem not in each, each.count("["), each))[:MOST_TESTS]
+    tests = near(mutant, names)
     place = tree / mutant.path
     text = place.read_text(encoding="utf-8")
     changed = mutate_code(text, get_operator(f"core/{mutant.operator}")(), mutant.occurrence)
     if changed is None or changed == text:
         return "no change"
-    try:
-        place.write_text(changed, encoding="utf-8")
-        code = tested(tree, ["-x", *tests], LONGEST_S)
-        return ENDS.get(code, "endless" if code is None or code < 0 else "not run")
-    finally:
-        place.write_text(text, encoding="utf-8")
+    files = list(dict.fromkeys(each.partition("::")[0] for each in tests))[:MOST_FILES]
+    examples = ["--doctest-modules", mutant.path]
+    for words in ([*tests[:MOST_TESTS], *examples], *([each] for each in files)):
+        try:
+            place.write_text(changed, encoding="utf-8")
+            code = tested(tree, ["-x", *words], LONGEST_S, [])
+        finally:
+            place.write_text(text, encoding="utf-8")
+        if code is None or code < 0:
+            unchanged = tested(tree, ["-x", *words], LONGEST_S // 2, [])
+            return "endless" if unchanged == PASSED else "too long"
+        if code not in (PASSED, NO_TESTS):
+            return ENDS.get(code, "not run")
+    return ENDS[PASSED] if tests else "not reached"
+
+
+def near(mutant: Mutant, names: Reached) -> list[str]:
+    """Tests that reach a mutant's line: those of its module first, then those that reach little."""
+    lines = names.get(mutant.path, {})
+    # What runs on import belongs to no test: those of the whole file stand for it.
+    tests = lines.get(mutant.line) or {each for found in lines.values() for each in found}
+    stem = Path(mutant.path).stem.rstrip("s")
+    breadth = Counter(each for found in lines.values() for each in found)
+    return sorted(tests, key=lambda each: (stem not in each, breadth[each], each))
+
+
+def share(missed: int, tried: int) -> str:
+    """So many of so many in percent, with its interval."""
+    low = beta.ppf(0.025, missed, tried - missed + 1) if missed else 0.0
+    high = beta.ppf(0.975, missed + 1, tried - missed) if missed < tried else 1.0
+    return f"{100 * missed / tried:.1f} % ({100 * low:.1f} to {100 * high:.1f}) of {tried}"
+
+
+def counts(drawn: Sequence[Mutant], ends: Mapping[str, str], packages: Sequence[str]) -> list[str]:
+    """A line of each package, and of all."""
+    lines = []
+    for package in (*packages, ""):
+        found = Counter(
+            ends[each.name] for each in drawn if each.path.startswith(f"src/flightid/{package}")
+        )
+        tried = found.total() - found["no change"]
+        missed = sum(found[each] for each in UNNOTICED)
+        if tried:
+            lines.append(f"{package or 'all'}: unnoticed {share(missed, tried)}; {dict(found)}")
+    return lines
 
 
 def main() -> None:
@@ -176,6 +250,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--packages", nargs="+", default=PACKAGES)
     parser.add_argument("--tests", nargs="+", default=TESTS)
+    parser.add_argument("--workers", type=int, default=2, help="of the run with coverage")
     parser.add_argument("--keep", type=Path, required=True, help="file of what was found")
     asked = parser.parse_args()
     kept = [json.loads(line) for line in asked.keep.open()] if asked.keep.exists() else []
@@ -183,7 +258,8 @@ def main() -> None:
     asked.keep.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
         tree = copied(Path(folder))
-        names = reached(tree, asked.keep.with_suffix(".coverage"), asked.packages, asked.tests)
+        kept_lines = asked.keep.with_suffix(".coverage")
+        names = reached(tree, kept_lines, asked.packages, asked.tests, asked.workers)
         drawn = random.Random(asked.seed).sample(list(mutants(tree, asked.packages)), asked.sample)
         for k, mutant in enumerate(drawn):
             if mutant.name not in ends:
@@ -193,10 +269,7 @@ def main() -> None:
                     file.write(json.dumps(found) + "\n")
             if ends[mutant.name] in UNNOTICED:
                 print(f"{k + 1}/{asked.sample} {ends[mutant.name]}: {mutant.name}", flush=True)
-    counted = Counter(ends[each.name] for each in drawn)
-    tried = counted.total() - counted["no change"]
-    missed = sum(counted[each] for each in UNNOTICED)
-    print(f"{dict(counted)}; unnoticed {100 * missed / tried:.1f} % of {tried}")
+    print("\n".join(counts(drawn, ends, asked.packages)))
 
 
 if __name__ == "__main__":

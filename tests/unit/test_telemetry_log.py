@@ -9,6 +9,7 @@ import pytest
 import flightid as fid
 from flightid.errors import LogFormatError
 from flightid.logs.mavlink.messages import telemetry_messages
+from flightid.logs.mavlink.reader import ARDUPILOT, ARMED, AUTOPILOTS, NO_AUTOPILOT, VEHICLES
 from flightid.logs.ulog.names import AIRFRAMES
 
 mavlink = pytest.importorskip("pymavlink.dialects.v20.ardupilotmega")
@@ -135,9 +136,19 @@ def test_table_agrees_with_the_definitions(message: object) -> None:
     assert message.layout.itemsize == peer.unpacker.size
 
 
-def test_airframes_of_ulog_are_those_of_mavlink() -> None:
+def test_numbers_are_those_of_mavlink() -> None:
     kinds = {
         "FIXED_WING": "plane", "HELICOPTER": "heli", "GROUND_ROVER": "rover", "QUADROTOR": "copter",
         "COAXIAL": "copter", "HEXAROTOR": "copter", "OCTOROTOR": "copter", "TRICOPTER": "copter",
     }  # fmt: skip
     assert {getattr(mavlink, f"MAV_TYPE_{name}"): kind for name, kind in kinds.items()} == AIRFRAMES
+    telemetry = kinds | {"HELICOPTER": "copter", "DODECAROTOR": "copter"}
+    assert {
+        getattr(mavlink, f"MAV_TYPE_{name}"): each for name, each in telemetry.items()
+    } == VEHICLES
+    assert (ARDUPILOT, ARMED, NO_AUTOPILOT) == (
+        mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA,
+        mavlink.MAV_MODE_FLAG_SAFETY_ARMED,
+        mavlink.MAV_AUTOPILOT_INVALID,
+    )
+    assert AUTOPILOTS == {ARDUPILOT: "ArduPilot", mavlink.MAV_AUTOPILOT_PX4: "PX4"}
