@@ -74,6 +74,25 @@ def test_a_derivative_a_quarter_off_in_calm_air_is_amber_though_little_moves() -
     assert not QuestionedRuns(off).is_refuted, "gusts may excuse what else there is"
 
 
+@pytest.mark.parametrize("seed", [20033, 20083, 20183])
+def test_a_derivative_of_little_motion_is_amber_where_light_gusts_leave_it_known(seed: int) -> None:
+    """A third off and 1 % of the motion: inputs surely ask it (p = 1e-17), and it was green."""
+    record = flight(seed, 0.5, 1.0, 30.0)
+    light, message = _said(model(1.0).with_values({"Zd": TRUTH["Zd"] / 1.3}), record)[CODE]
+    assert light == "amber"
+    assert _named(message, "Zd") == pytest.approx(TRUTH["Zd"], rel=0.06)
+    assert CODE not in _said(model(1.0), record)
+
+
+def test_accounts_are_compared_beside_the_errors_of_the_fit() -> None:
+    """A second account that meets the records by chance of the fit's errors is no better one."""
+    same = np.eye(2)
+    chance = ParameterScores(("a", "b"), np.ones(2), np.array([0.0, 6.0]), same, same, 50.0)
+    assert chance.misfit_beside() == 50.0
+    assert chance.misfit_beside(np.diag([0.0, 100.0])) == pytest.approx(50.0 - 36.0 * 100 / 101)
+    assert chance.misfit_beside(np.diag([100.0, 0.0])) == pytest.approx(50.0)
+
+
 def test_errors_of_a_model_s_other_parameters_are_in_what_is_asked_of_one() -> None:
     """What gusts leave open is one factor of all derivatives: ±.04 stood there, where ±.7 is."""
     same = np.array([[4.0, -2.0], [-2.0, 1.0]])

@@ -128,6 +128,29 @@ class ParameterScores:
             variance = variance + np.einsum("ij,jk,ik->i", others, known, others)
         return np.sqrt(variance)
 
+    def misfit_beside(self, known: Array | None = None) -> float:
+        """-2 ln p where errors of the values, as large as they may well be, explain what they can.
+
+        Accounts of a record are to be compared so: a wrong one may fit better beside the errors
+        that a fit happens to have than the true one does.
+
+        Parameters
+        ----------
+        known : ndarray, shape (n, n), optional
+            Covariance of `values`; none: they are right, and it is `misfit`.
+
+        Example
+        -------
+        >>> one = np.ones(1)
+        >>> found = ParameterScores(("a",), one, 8.0 * one, 4.0 * np.eye(1), one, 100.0)
+        >>> found.misfit_beside(), found.misfit_beside(np.array([[0.75]]))
+        (100.0, 88.0)
+        """
+        if known is None:
+            return self.misfit
+        moved = np.linalg.solve(np.eye(len(known)) + known @ self.information, known @ self.slopes)
+        return self.misfit - float(self.slopes @ moved)
+
 
 def parameter_scores(
     model: StateSpaceModel,

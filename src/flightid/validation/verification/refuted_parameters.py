@@ -37,7 +37,7 @@ SURE = 2.0
 """Standard errors by which a parameter may differ less than it seems to."""
 MATERIAL = 0.02
 """Share of an output's power, as inputs make it, that other parameters have to change."""
-OFF, SEEN = 0.1, 0.0025
+OFF, SEEN = 0.1, 2.5e-5
 """Of a parameter itself, the share by which it surely differs, and the smaller share of an output's
 power that it has to change then: models are asked for derivatives too, not for motion alone."""
 MOVED = 0.1
@@ -218,13 +218,14 @@ def _refuted(
         and (each := _followed(asked, model, (scores, known), int(place))) is not None
     ]
     found.sort(key=lambda each: each[0])
-    if not found or not (found[0][1].is_material or found[0][1].is_off):
+    best = [each for _, each in found[:1]]
+    alike = [each for far, each in found[1:] if each.is_enough and far < found[0][0] + ALIKE]
+    # Gusts leave open whether one is a hundredth off or another a third: what matters is said.
+    said = next((each for each in best + alike if each.is_material or each.is_off), None)
+    if said is None:
         return None
-    (misfit, best), *rest = found
-    others = tuple(
-        other.asked.name for far, other in rest if other.is_enough and far < misfit + ALIKE
-    )
-    return replace(best, chance=float(np.min(chances)), others=others)
+    others = tuple(each.asked.name for each in best + alike if each is not said and each.is_enough)
+    return replace(said, chance=float(np.min(chances)), others=others)
 
 
 def _shown(scores: ParameterScores, known: Array | None) -> tuple[Array, Array]:
@@ -276,7 +277,7 @@ def _followed(
     is_enough = np.min(chances) >= FALSE_ALARMS or (
         np.max(left) < EXPLAINED * np.max(_shown(first, known)[0])
     )
-    return now.misfit, RefutedParameter(
+    return now.misfit_beside(known), RefutedParameter(
         Estimate(name, value, model.parameters[name].unit, float(now.value_errors(known)[place])),
         had,
         0.0,
