@@ -53,6 +53,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     models::expression::register(module)?;
     fits::lagged_forms::register(module)?;
     fits::least_squares::register(module)?;
+    fits::shown_disturbances::register(module)?;
     models::narx_models::register(module)?;
     models::polynomial_models::register(module)?;
     models::rational_bins::register(module)?;

@@ -63,9 +63,48 @@ impl Pencil {
     }
 }
 
+/// A system at many points, eight of them at a time, from the side, inputs or outputs, that has fewer.
+pub struct Eights<'a> {
+    system: &'a StateSpace<'a>,
+    n_inputs: usize,
+    points: &'a [Complex64],
+    pencil: Pencil,
+    plan: Option<Plan>,
+}
+
+impl<'a> Eights<'a> {
+    /// Plan the pivots for all points.
+    pub fn new(system: &'a StateSpace<'a>, n_inputs: usize, points: &'a [Complex64]) -> Self {
+        let pencil = Pencil::of(system.a, system.a.len().isqrt());
+        let plan = pencil.plan(points);
+        Self { system, n_inputs, points, pencil, plan }
+    }
+
+    /// Hand C (sI − A)⁻¹ B + D at up to eight points from `first` on to `keep`, pair by pair: output,
+    /// input, values. Lanes beyond the last point repeat it.
+    ///
+    /// # Errors
+    /// `Singular` where a point is an eigenvalue of A.
+    pub fn around(
+        &self,
+        first: usize,
+        keep: &mut impl FnMut(usize, usize, &Lanes),
+    ) -> Result<(), CoreError> {
+        let (system, n_inputs) = (self.system, self.n_inputs);
+        let here = &self.points[first..self.points.len().min(first + LANES)];
+        let mut whole = |output: usize, input: usize, value: &Lanes| {
+            let mut value = *value;
+            let through = system.d[output * n_inputs + input];
+            value.re.iter_mut().for_each(|part| *part += through);
+            keep(output, input, &value);
+        };
+        let block = self.pencil.factor(self.plan.as_ref(), here)?;
+        widest(|| around(system, n_inputs, self.plan.as_ref(), &block, &mut whole));
+        Ok(())
+    }
+}
+
 /// Responses at the points, (`n_outputs`, `n_inputs`, `n_points`); the delays take no part.
-///
-/// Eight points are worked on at a time, from the side, inputs or outputs, that has fewer.
 ///
 /// # Errors
 /// `Singular` where a point is an eigenvalue of A.
@@ -74,19 +113,15 @@ pub fn responses(
     n_inputs: usize,
     points: &[Complex64],
 ) -> Result<Vec<Complex64>, CoreError> {
-    let pencil = Pencil::of(system.a, system.a.len().isqrt());
-    let plan = pencil.plan(points);
+    let eights = Eights::new(system, n_inputs, points);
     let mut found = vec![Complex64::default(); system.n_outputs * n_inputs * points.len()];
     for first in (0..points.len()).step_by(LANES) {
-        let here = &points[first..points.len().min(first + LANES)];
-        let mut keep = |output: usize, input: usize, value: &Lanes| {
+        let count = LANES.min(points.len() - first);
+        eights.around(first, &mut |output, input, value| {
             let at = (output * n_inputs + input) * points.len() + first;
-            let through = system.d[output * n_inputs + input];
-            let lanes = found[at..at + here.len()].iter_mut().enumerate();
-            lanes.for_each(|(lane, to)| *to = value.get(lane) + through);
-        };
-        let block = pencil.factor(plan.as_ref(), here)?;
-        widest(|| around(system, n_inputs, plan.as_ref(), &block, &mut keep));
+            let lanes = found[at..at + count].iter_mut().enumerate();
+            lanes.for_each(|(lane, to)| *to = value.get(lane));
+        })?;
     }
     Ok(found)
 }

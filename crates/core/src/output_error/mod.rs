@@ -12,5 +12,6 @@ pub mod output_error_weights;
 pub mod output_sums;
 pub mod record_data;
 pub mod record_pass;
+pub mod shown_disturbances;
 pub mod state_space_family;
 pub mod transfer_family;

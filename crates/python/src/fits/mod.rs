@@ -4,3 +4,4 @@ pub mod frequency_fit;
 pub mod lagged_forms;
 pub mod least_squares;
 pub mod output_error;
+pub mod shown_disturbances;

@@ -4,22 +4,23 @@ A gust disturbs few states, and from there goes into every output by the model's
 the residuals of one output it may hide below the noise; outputs tell it together. Of independent
 sensors, whatever their colour, products of different outputs at a frequency average to nothing. So
 these alone are weighed, as each disturbance would make them: the locally most powerful test of that
-disturbance beside noise of known colour, with products of one output left out.
+disturbance beside noise of known colour, with products of one output left out (native:
+`shown_disturbances.rs`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid import _native
 from flightid.frozen import dataclass
 from flightid.identification.output_error.whitened_residuals import (
     LAGS,
     apart,
     colour_filters,
-    parts,
     unforetold,
 )
 from flightid.identification.records.held_model import LinearPoint
@@ -28,18 +29,19 @@ from flightid.recursive_filter import filtered
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+_System = tuple[Array, Array, Array, Array]
+_Seen = tuple[Array, Complex, Array]
+_Whitening = tuple[Array, Array, float]
 SMOOTH = 8
 """Frequencies to each side over which a whitened output's power is averaged."""
 FEWEST = 100
 """Samples of a record that is looked at."""
-MEMORIES_S = (0.3, 2.0)
-"""Of gusts, s, beside disturbances without memory."""
+MEMORIES_S = (0.0, 0.3, 2.0)
+"""Of disturbances, s: gusts have one."""
 FALSE_ALARMS = 0.001
 """Share of records with noise of sensors alone in which a disturbance is named."""
 TRIED = 2
 """Disturbances whose chance is worked out: those that stand out most."""
-HALVINGS, NEAR = 25, 1e-10
-"""Of intervals that hold an exponent; steps so small, over the largest exponent, end the search."""
 
 
 @dataclass(frozen=True)
@@ -164,19 +166,16 @@ def moved_together(
         for each, k in zip(white, kept, strict=True)
     ]
     n_ways = systems[0].pushes.shape[1]
-    every = np.arange(n_ways * (1 + len(MEMORIES_S)))
-    score, spread = np.zeros(len(every)), np.zeros(len(every))
-    for weights, told in (piece for each in looked for piece in each.pieces(every)):
-        size = np.abs(weights) ** 2
-        together = np.abs(np.sum(np.conj(weights) * told, axis=1)) ** 2
-        score += np.sum(together - np.sum(size * np.abs(told) ** 2, axis=1), axis=-1)
-        spread += np.sum(np.sum(size, axis=1) ** 2 - np.sum(size**2, axis=1), axis=-1)
-    spread = np.sqrt(spread)
+    pairs = [each.scores() for each in looked]
+    score = np.sum([found for found, _ in pairs], axis=0)
+    spread = np.sqrt(np.sum([variance for _, variance in pairs], axis=0))
     shown = score / np.where(spread > 0.0, spread, np.inf)
     best = np.argsort(-shown)[:TRIED]
-    found = [np.abs(weights) ** 2 for each in looked for weights, _ in each.pieces(best)]
-    sizes = np.concatenate(found, axis=-1)
-    chances = [_chance(score[way], size) for way, size in zip(best, sizes, strict=True)]
+    sizes = np.concatenate([each.sizes(best) for each in looked], axis=-1)
+    chances = [
+        _native.disturbance_chance(float(score[way]), size)
+        for way, size in zip(best, sizes, strict=True)
+    ]
     place = int(np.argmin(chances))
     return ShownDisturbance(int(best[place]) % n_ways, min(len(shown) * chances[place], 1.0))
 
@@ -208,23 +207,22 @@ class _LookedAt:
         told = spectra / np.sqrt(power)
         return cls(told, power, omega, np.array(filters), turned, system, step_s)
 
-    def pieces(self, ways: NDArray[np.intp]) -> Iterator[tuple[Complex, Complex]]:
-        """Weights (n_ways, n_outputs, some omega) of disturbances and memories, and `told`."""
+    def scores(self) -> tuple[Array, Array]:
+        """Of all disturbances with each memory, memory by memory, and their variances by chance."""
+        return _native.disturbance_scores(*self._asked(slice(None)), np.array(MEMORIES_S))
+
+    def sizes(self, ways: NDArray[np.intp]) -> Array:
+        """Squared weights of disturbances and memories, (n_ways, n_outputs, n_omega)."""
         memory, way = np.divmod(ways, self.system.pushes.shape[1])
-        needed, place = np.unique(way, return_inverse=True)
-        pushes, seen = self.system.pushes[:, needed], self.system.seen[:, needed]
-        for part in parts(len(self.omega)):
-            omega = self.omega[part]
-            through = self.filters @ np.exp(
-                -1j * np.outer(np.arange(LAGS + 1), omega * self.step_s)
-            )
-            grid = 1j * omega[:, None, None] * np.eye(len(self.system.a))
-            states = np.linalg.solve(grid - self.system.a, pushes[None])
-            moved = (self.system.c @ states + seen).transpose(2, 1, 0) * through
-            moved = (self.turned @ moved) / np.sqrt(self.power[:, part])
-            slow = [1.0 / np.abs(1j * omega * t + 1.0) for t in MEMORIES_S]
-            memories = np.array([np.ones_like(omega), *slow])
-            yield moved[place] * memories[memory][:, None, :], self.told[:, part]
+        return _native.disturbance_sizes(*self._asked(way), np.array(MEMORIES_S)[memory])
+
+    def _asked(self, ways: slice | NDArray[np.intp]) -> tuple[_System, _Seen, _Whitening]:
+        a, c = self.system.a, self.system.c
+        return (
+            (a, self.system.pushes[:, ways], c, self.system.seen[:, ways]),
+            (self.omega, self.told, self.power),
+            (self.filters, self.turned, self.step_s),
+        )
 
 
 def _smoothed(power: Array) -> Array:
@@ -235,53 +233,3 @@ def _smoothed(power: Array) -> Array:
     high = np.minimum(place + SMOOTH + 1, power.shape[1])
     means = (sums[:, high] - sums[:, low]) / (high - low)
     return np.asarray(np.maximum(means, np.finfo(float).tiny))
-
-
-def _chance(score: float, size: Array) -> float:
-    """Probability of so large a sum over frequencies, size (n_outputs, n_omega), by saddlepoint.
-
-    v* (w w* - diag |w|²) v of complex normal v has the logarithm of its moments
-    K(s) = -Σ ln(1 + s |w|²) - ln(1 - s Σ |w|²/(1 + s |w|²)).
-    """
-    if score <= 0.0 or not np.any(size > 0.0):
-        return 1.0
-    low, high = 0.0, _largest(size)
-    tilt, end = 0.5 * high, high
-    for _ in range(HALVINGS):
-        moments, slope, bend = _moments(tilt, size)
-        low, high = (tilt, high) if slope <= score else (low, tilt)
-        # Newton's steps where they stay between what is known, as they do near the end.
-        step = (score - slope) / bend if bend > 0.0 else np.inf
-        inside = low < tilt + step < high
-        if inside and abs(step) <= NEAR * end:
-            break
-        tilt = tilt + step if inside else 0.5 * (low + high)
-    else:
-        moments, _, bend = _moments(tilt, size)
-    bound = float(np.exp(min(moments - tilt * score, 0.0)))
-    return float(bound / max(1.0, tilt * float(np.sqrt(2.0 * np.pi * bend))))
-
-
-def _moments(tilt: float, size: Array) -> tuple[float, float, float]:
-    """K, its slope and its bend at an exponent, summed over frequencies."""
-    near = 1.0 / (1.0 + tilt * size)
-    share = size * near
-    first, second = np.sum(share, axis=0), np.sum(share * near, axis=0)
-    left = 1.0 - tilt * first
-    bend = np.sum(share**2, axis=0) - 2.0 * np.sum(share**2 * near, axis=0) / left
-    return (
-        float(np.sum(np.log(near)) - np.sum(np.log(left))),
-        float(np.sum(second / left - first)),
-        float(np.sum(bend + (second / left) ** 2)),
-    )
-
-
-def _largest(size: Array) -> float:
-    """Exponent below which the moments of all frequencies are finite, by bisection."""
-    others = float(np.max(np.sum(size, axis=0) - np.max(size, axis=0)))
-    low, high = 0.0, 1.0 / max(others, np.finfo(float).tiny)
-    for _ in range(HALVINGS):
-        tried = 0.5 * (low + high)
-        finite = np.all(tried * np.sum(size / (1.0 + tried * size), axis=0) < 1.0)
-        low, high = (tried, high) if finite else (low, tried)
-    return low
