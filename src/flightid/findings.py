@@ -241,3 +241,68 @@ def held(value: float | None, digits: int = 3, *, least: bool = True) -> float |
     scale = 10.0 ** (digits - 1 - math.floor(math.log10(abs(value))))
     scaled, near = value * scale, EXACT * abs(value * scale)
     return (math.floor(scaled + near) if least else math.ceil(scaled - near)) / scale
+
+
+SHOWN_DIGITS, MOST_DIGITS = 3, 9
+"""Of a promised number: usually, and where fewer would tell it on the other side of its limit."""
+
+
+def digits_apart(
+    value: float, limit: float, *, least: bool, of_limit: int = 4, promised: bool = True
+) -> int:
+    """Fewest significant digits at which a number and its limit stand as they do, 3 to 9.
+
+    Parameters
+    ----------
+    value, limit : float
+        The number, and what is asked of it.
+    least : bool
+        Whether the number is to be at least so much as the limit, not at most.
+    of_limit : int
+        Fewest digits of the limit, which is rounded to the nearest.
+    promised : bool
+        Whether the number is rounded as `held` does, not to the nearest.
+
+    Example
+    -------
+    >>> digits_apart(18.79, 18.83, least=False), digits_apart(18.8305, 18.8316, least=False)
+    (3, 5)
+    >>> digits_apart(44.9996, 45.0, least=True)
+    3
+    >>> digits_apart(44.9996, 45.0, least=True, promised=False)
+    6
+    """
+    for count in range(SHOWN_DIGITS, MOST_DIGITS):
+        near = float(f"{value:.{count}g}")
+        shown = held(value, count, least=least) if promised else near
+        told = float(f"{limit:.{max(count, of_limit)}g}")
+        if shown is None or _meets(shown, told, least) == _meets(value, limit, least):
+            return count
+    return MOST_DIGITS
+
+
+def told_apart(value: float, *limits: float, decimals: int = 0) -> str:
+    """A number in words that has limits beside it: as many decimals as tell it from each.
+
+    Parameters
+    ----------
+    value : float
+    limits : float
+        As they are printed, all their digits.
+    decimals : int
+        Fewest.
+
+    Example
+    -------
+    >>> told_apart(10.3, 10.0), told_apart(34.2, 10.0), told_apart(0.2503, 0.25, decimals=3)
+    ('10.3', '34', '0.2503')
+    """
+    for count in range(decimals, MOST_DIGITS):
+        told = f"{value:.{count}f}"
+        if all((float(told) > each) == (value > each) for each in limits):
+            return told
+    return f"{value:.{MOST_DIGITS}f}"
+
+
+def _meets(value: float, limit: float, least: bool) -> bool:
+    return value >= limit if least else value <= limit

@@ -11,6 +11,7 @@ import flightid as fid
 from flightid.control.tuning.findings import verdict
 from flightid.control.tuning.gain_search_result import GainSearchResult
 from flightid.control.tuning.moved_gains import move_gains
+from flightid.control.tuning.worst_cases import WorstCase
 from flightid.conventions import Light
 from flightid.errors import DataError, OptionError
 from tests.unit.test_tuning import FLOWN, NEED, _fit
@@ -64,15 +65,41 @@ def test_a_slider_shows_the_numbers_of_the_tuning(fit: fid.Fit, found: fid.PidDe
     assert phase - 180.0 == pytest.approx(margin, abs=0.3)
 
 
+def _shown_as_judged(case: WorstCase) -> bool:
+    """Whether the worst, as it is shown, stands to what is asked, as that is shown, as it is."""
+    shown = case.shown_worst[0]
+    if shown is None or not case.required:
+        return True
+    sides = [each.split() for each in case.required.split(" and ")]
+    kept = [shown >= float(b) if sign == "≥" else shown <= float(b) for sign, b in sides]
+    return all(kept) == case.met
+
+
+def _edge(found: fid.PidDesign, gain: str) -> tuple[float, float]:
+    """The largest of a gain that every plant stands, and the least that one does not."""
+    low, high = found.gains[gain], 4.0 * found.gains[gain]
+    for _ in range(14):
+        middle = (low * high) ** 0.5
+        short = (~move_gains(found, {gain: middle}, responses=False).met).sum()
+        low, high = (middle, high) if short < 1 else (low, middle)
+    return low, high
+
+
+@pytest.mark.parametrize("gain", ["ATC_RAT_RLL_P", "ATC_RAT_RLL_D"])
+def test_numbers_are_shown_on_the_side_of_their_limit_on_which_they_are_judged(
+    found: fid.PidDesign, gain: str
+) -> None:
+    """Noise of 1.1238, rounded to the worse, stood as 1.13 beside ≤ 1.124 and had passed."""
+    for value in _edge(found, gain):
+        for case in move_gains(found, {gain: value}, responses=False).worst_cases:
+            assert _shown_as_judged(case), (case, case.required, case.shown_worst)
+
+
 def test_one_plant_short_is_one_light_on_the_slider_in_the_tuning_and_in_the_files(
     fit: fid.Fit, found: fid.PidDesign
 ) -> None:
     # The largest P that one plant of 21 does not stand: amber, for so few were drawn, and written.
-    low, high = found.gains["ATC_RAT_RLL_P"], 0.5
-    for _ in range(14):
-        middle = (low * high) ** 0.5
-        short = (~move_gains(found, {"ATC_RAT_RLL_P": middle}, responses=False).met).sum()
-        low, high = (middle, high) if short < 1 else (low, middle)
+    _, high = _edge(found, "ATC_RAT_RLL_P")
     bold = {**found.gains, "ATC_RAT_RLL_P": float(f"{1.0005 * high:.6g}")}
     moved = move_gains(found, bold, responses=False)
     held = fid.tune_pid(fit, gains=FLOWN, requirements=NEED, draws=20, by_hand=bold)
@@ -94,8 +121,8 @@ def test_gains_by_hand_that_break_a_requirement_are_red_and_not_written(
     assert "set by hand do not meet" in made.findings[0].message
     # Which margin, by how much: the number of the worst plant beside what is asked of it.
     case = made.worst_case("rate loop", "phase margin")
-    least = float(case.required.removeprefix("≥ "))
-    said = f"rate loop: phase margin {case.worst:.3g} deg, {least - (case.worst or 0.0):.3g} deg "
+    least, shown = float(case.required.removeprefix("≥ ")), case.shown_worst[0] or 0.0
+    said = f"rate loop: phase margin {shown:.3g} deg, {least - shown:.3g} deg "
     with pytest.raises(DataError, match=r"gains of roll do not .* found the gains set") as no:
         made.write(folder / "gains.param")
     assert f"{said}short of {case.required} (" in str(no.value)

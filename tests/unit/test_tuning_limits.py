@@ -5,10 +5,12 @@ from __future__ import annotations
 import re
 
 import numpy as np
+import pytest
 
-from flightid.control.tuning.limits import ANGLE, WHOLE, limits
+from flightid.control.tuning.limits import ANGLE, WHOLE, limits, noise_limit
 from flightid.control.tuning.requirements import TuningRequirements
 from flightid.control.tuning.shortfalls import NAMES
+from flightid.findings import held
 
 RATE = "rate loop"
 ASKED = TuningRequirements(
@@ -33,6 +35,19 @@ def test_the_limit_in_words_is_the_limit_in_figures() -> None:
         assert met > 0.0 > missed, limit.name
         assert limit.name.startswith(f"{limit.loop}: {NAMES[limit.field]}")
     assert len({limit.name for limit in made}) == len(made)
+
+
+@pytest.mark.parametrize("value", [18.83162, 18.831599, 18.825, 18.84, 18.7999999, 3.0, 1e9])
+def test_a_number_is_shown_on_the_side_of_its_limit_that_it_is_on(value: float) -> None:
+    """18.9 stood beside ≤ 18.83 and had passed: 18.826, rounded to the worse."""
+    most = noise_limit(18.8316)
+    digits = most.digits_beside(value)
+    shown, limit = held(value, digits, least=False), float(most.told(digits).split()[1])
+    assert shown is not None
+    assert (shown <= limit) == (value <= most.bound)
+    assert digits == 3 or not (held(value, 3, least=False) or 0.0) <= 18.83
+    near = most.digits_beside(value, promised=False)
+    assert (float(f"{value:.{near}g}") <= most.shown(near)) == (value <= most.bound)
 
 
 def test_every_requirement_on_a_loop_is_a_limit() -> None:

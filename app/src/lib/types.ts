@@ -577,6 +577,7 @@ export interface MarginRow {
   unit: string;
   required: string;
   met: boolean;
+  digits: number;
   nominal: number | null;
   low: number | null;
   high: number | null;

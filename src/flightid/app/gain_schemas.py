@@ -29,6 +29,8 @@ class MarginRow(Message):
     unit: str
     required: str
     met: bool
+    digits: int
+    """How many its numbers are shown with: as many as tell them from what is required."""
     nominal: float | None
     low: float | None
     high: float | None

@@ -330,6 +330,7 @@ def _margins(moved: MovedGains) -> list[MarginRow]:
                 unit=each.unit,
                 required=each.required,
                 met=each.met,
+                digits=each.digits,
                 nominal=each.nominal,
                 low=low,
                 high=high,

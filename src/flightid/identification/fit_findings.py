@@ -18,7 +18,7 @@ from flightid.evidence.gather import (
     MINIMUM_DOUBTED,
     MORE_STEPS,
 )
-from flightid.findings import Finding
+from flightid.findings import Finding, told_apart
 from flightid.frozen import dataclass
 from flightid.identification.multistart import End
 from flightid.uncertainty.estimate import Estimate
@@ -164,7 +164,7 @@ def _judge_average(average: float, noise: NoiseCost | None, *, withheld: bool) -
         return Finding(
             "cost",
             Light.RED,
-            f"average cost {average:.0f} is above the guide of 100",
+            f"average cost {told_apart(average, AVERAGE_COST_GUIDE)} is above the guide of 100",
             "do not use its numbers, whose intervals assume that the structure holds: "
             f"{STARTS_FIRST}; then add missing dynamics, narrow the band, or look for a wrong sign "
             "or unit",
@@ -211,10 +211,12 @@ def judge_parameters(parameters: Mapping[str, Estimate]) -> list[Finding]:
 def _judge_guides(p: Estimate) -> list[Finding]:
     insensitive, bounded = p.insensitivity_percent, p.cramer_rao_percent
     if insensitive is not None and insensitive > INSENSITIVITY_GUIDE_PERCENT:
-        code, what = INSENSITIVE, f"insensitivity {insensitive:.0f} % is above the guide of 10 %"
+        seen = told_apart(insensitive, INSENSITIVITY_GUIDE_PERCENT)
+        code, what = INSENSITIVE, f"insensitivity {seen} % is above the guide of 10 %"
         action = "fix it or drop it from the model: the data hardly see it"
     elif bounded is not None and bounded > CRAMER_RAO_GUIDE_PERCENT:
-        code, what = CRAMER_RAO, f"Cramér–Rao bound {bounded:.0f} % is above the guide of 20 %"
+        seen = told_apart(bounded, CRAMER_RAO_GUIDE_PERCENT)
+        code, what = CRAMER_RAO, f"Cramér–Rao bound {seen} % is above the guide of 20 %"
         action = "it is correlated with others: fix or tie one of them, or widen the band"
     else:
         return []
@@ -243,7 +245,9 @@ def judge_correlation(
     found = []
     for i, j in pairs:
         shares = [_half_width_share(parameters[names[k]]) for k in (i, j)]
-        size = f"correlated by {correlation[i, j]:+.3f}, above the guide of 0.98"
+        told = told_apart(abs(correlation[i, j]), CORRELATION_GUIDE, decimals=3)
+        sign = "−" if correlation[i, j] < 0.0 else "+"
+        size = f"correlated by {sign}{told}, above the guide of 0.98"
         if all(share is not None and share < DETERMINED for share in shares):
             known = " and ".join(f"±{100 * (share or 0.0):.2g} %" for share in shares)
             what = f"{names[i]} and {names[j]} are known to {known} (95 %), though {size}"

@@ -124,8 +124,8 @@ def promised_margins(designs: Sequence[PidDesign]) -> go.PlotFigure:
             x=[each.worst for _, each in cases], y=labels, orientation="h", width=0.6,
             name=f"worst {what}, new gains", showlegend=column == 1, legendgroup="new",
             marker={"color": [look.MODEL if each.met else look.RIVAL for _, each in cases]},
-            text=[f"{each.shown_worst[0]:.3g}" for _, each in cases], textposition="inside",
-            insidetextanchor="start",
+            text=[f"{each.shown_worst[0]:.{each.digits}g}" for _, each in cases],
+            textposition="inside", insidetextanchor="start",
         )  # fmt: skip
         made.add_trace(bars, 1, column)
         flown = [

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.conventions import Light
-from flightid.findings import Finding
+from flightid.findings import Finding, told_apart
 from flightid.responses.windows.defaults import CYCLES_AT_LOWEST, HIGHEST_FRACTION
 
 HIGH_INPUT_COHERENCE = 0.5
@@ -67,7 +67,8 @@ def correlation_findings(names: tuple[str, ...], spectrum: NDArray[np.complex128
                         "inputs-correlated",
                         Light.AMBER,
                         f"inputs {names[first]} and {names[second]} are correlated: coherence "
-                        f"{mean:.2f} on average, {HIGH_INPUT_COHERENCE} is the limit",
+                        f"{told_apart(mean, HIGH_INPUT_COHERENCE, decimals=2)} on average, "
+                        f"{HIGH_INPUT_COHERENCE} is the limit",
                         "excite them one at a time or by independent signals",
                     )
                 )

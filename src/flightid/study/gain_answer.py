@@ -13,7 +13,7 @@ from flightid.control.autopilots.parameter_files import parameter_suffix
 from flightid.control.autopilots.pid_loop import PidLoop
 from flightid.control.tuning.limits import ANGLE
 from flightid.conventions import Light
-from flightid.findings import Finding, at_least, counted, worst
+from flightid.findings import MOST_DIGITS, Finding, at_least, counted, worst
 from flightid.table import Cell, Column, Table
 
 if TYPE_CHECKING:
@@ -143,7 +143,7 @@ def flown_again(flight: GainFlight) -> Finding:
         for each in flight.margins
         if each.name == "phase margin" and each.measured.value is not None
     ]
-    said += f", least phase margin {min(least):.0f}°" if least else ""
+    said += f", least phase margin {at_least(min(least))}°" if least else ""
     told = f"flown again in the simulated vehicle: {first.message if first else said}"
     return Finding("flown-again", worst(flight.findings), told, first.action if first else "")
 
@@ -203,7 +203,7 @@ def margin_table(designs: tuple[PidDesign, ...]) -> Table:
     """Least margins of each loop beside those of the flown gains."""
     columns = [Column("axis"), Column("loop")]
     for name, unit in MARGINS.items():
-        columns += [Column(name, unit, 3), Column(f"{name} as flown", unit, 3)]
+        columns += [Column(each, unit, MOST_DIGITS) for each in (name, f"{name} as flown")]
     rows: list[tuple[Cell, ...]] = []
     for design in designs:
         for loop in dict.fromkeys(each.loop for each in design.worst_cases):

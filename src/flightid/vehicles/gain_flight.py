@@ -196,7 +196,7 @@ def _beside(tuning: Tuning, design: PidDesign, loop: str, found: Margins) -> Ite
         of_it = [limit for limit in asked if limit.name == f"{loop}: {name}"]
         yield FlownMargin(
             design.axis, loop, name, number.estimate, number.worst, number.flown, measured,
-            number.required, _slack(of_it, measured),
+            number.required, _slack(of_it, measured), number.digits,
         )  # fmt: skip
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from flightid.control.margins.margins import Margins
 from flightid.control.tuning.worst_cases import to_the_worse
 from flightid.conventions import Light
-from flightid.findings import Finding
+from flightid.findings import MOST_DIGITS, SHOWN_DIGITS, Finding
 from flightid.frozen import dataclass
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
@@ -40,6 +40,8 @@ class FlownMargin:
     slack : float or None
         Of the requirement, at the end of the measured interval that meets it best; below 0 it is
         broken.
+    digits : int
+        How many show the worst on the side of what is required that it is on.
     """
 
     axis: str
@@ -51,6 +53,7 @@ class FlownMargin:
     measured: Reading
     required: str = ""
     slack: float | None = None
+    digits: int = SHOWN_DIGITS
 
     @property
     def agrees(self) -> bool | None:
@@ -59,6 +62,11 @@ class FlownMargin:
         if ends[0] is None or ends[1] is None:
             return None
         return ends[1][0] <= ends[0][1] and ends[0][0] <= ends[1][1]
+
+    @property
+    def shown_worst(self) -> float | None:
+        """The worst at its digits, rounded to the worse."""
+        return to_the_worse(self.name, self.worst, self.promised.value, self.digits)
 
     @property
     def words(self) -> str:
@@ -172,7 +180,7 @@ class GainFlight(Result, schema="flightid.gain_flight/1"):
             *(Column("axis"), Column("loop"), Column("quantity"), Column("required")),
             *(Column("old gains", digits=3), Column("promised", digits=3)),
             *(Column(f"{words} low", digits=3), Column(f"{words} high", digits=3)),
-            *(Column("worst", digits=3), Column("flown", digits=3)),
+            *(Column("worst", digits=MOST_DIGITS), Column("flown", digits=3)),
             *(Column("flown, low", digits=3), Column("flown, high", digits=3)),
             *(Column("unit"), Column("agree")),
         )
@@ -184,7 +192,7 @@ class GainFlight(Result, schema="flightid.gain_flight/1"):
                 (
                     *(each.axis, each.loop, each.name, each.required, each.before),
                     *(each.promised.value, low, high),
-                    *(to_the_worse(each.name, each.worst), each.measured.value),
+                    *(each.shown_worst, each.measured.value),
                     *(least, most, each.promised.unit, each.agrees),
                 )
             )

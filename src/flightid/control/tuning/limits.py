@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.control.tuning.requirements import TuningRequirements
+from flightid.findings import MOST_DIGITS, digits_apart
 from flightid.frozen import dataclass
 
 Array = NDArray[np.float64]
@@ -55,7 +56,26 @@ class Limit:
     @property
     def text(self) -> str:
         """In words, as the tables print it."""
-        return f"≤ {self.bound:.4g}" if self.most else f"≥ {self.bound:g}"
+        return self.told(0)
+
+    @property
+    def digits(self) -> int:
+        """Of its bound: what was asked for is told as it was, what follows from data by four."""
+        return 4 if self.most else 6
+
+    def told(self, digits: int) -> str:
+        """In words beside a number of so many digits."""
+        return f"{'≤' if self.most else '≥'} {self.shown(digits):.{MOST_DIGITS}g}"
+
+    def shown(self, digits: int) -> float:
+        """The bound beside a number of so many digits."""
+        return float(f"{self.bound:.{max(digits, self.digits)}g}")
+
+    def digits_beside(self, value: float, *, promised: bool = True) -> int:
+        """How many digits tell a number from the bound; see `flightid.findings.digits_apart`."""
+        return digits_apart(
+            value, self.bound, least=not self.most, of_limit=self.digits, promised=promised
+        )
 
 
 def limits(
@@ -79,6 +99,11 @@ def limits(
         told = (name, names[0], "crossover_rad_s", most, _below(most))
         made.append(Limit(*told, highest=True, most=True))
     return (*made, *(limit for limit in _targets(need, names[0]) if limit.loop in names))
+
+
+def noise_limit(most: float) -> Limit:
+    """What noise the output of the innermost loop may hold at most."""
+    return Limit("output noise", "output", "noise", most, _no_more(most), most=True)
 
 
 def present(values: Array) -> Array:
@@ -133,5 +158,10 @@ def _below(most: float) -> Callable[[Array], Array]:
     return lambda values: np.log(most / values)
 
 
+def _no_more(most: float) -> Callable[[Array], Array]:
+    return lambda values: np.log(most / np.maximum(values, TINY))
+
+
 def _peak(most: float) -> Callable[[Array], Array]:
-    return lambda values: np.log(most / values) / np.log(most)
+    # The interval of a measured peak may reach below zero: there it is met.
+    return lambda values: np.log(most / np.maximum(values, TINY)) / np.log(most)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from flightid.control.margins.loop_metrics import LoopMetrics, loop_metrics
 from flightid.control.margins.stability_count import unstable_poles
-from flightid.control.tuning.limits import ANGLE, TINY, WHOLE, limits, present
+from flightid.control.tuning.limits import ANGLE, WHOLE, limits, noise_limit, present
 from flightid.control.tuning.requirements import TuningRequirements
 from flightid.frozen import dataclass
 
@@ -282,7 +282,8 @@ class LoopProblem:
             values = highest if limit.highest else getattr(metrics[limit.loop], limit.field)
             parts[limit.name] = limit.slack(np.asarray(values))
         if self.noise_limit is not None:
-            parts["output noise"] = np.log(self.noise_limit / np.maximum(noise, TINY))
+            limit = noise_limit(self.noise_limit)
+            parts[limit.name] = limit.slack(noise)
         bounded = {
             name: np.clip(np.where(np.isnan(slack), FULL, slack), NONE, FULL)
             for name, slack in parts.items()

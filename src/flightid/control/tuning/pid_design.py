@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import field
+from functools import partial
 from itertools import chain
 from pathlib import Path
 
@@ -19,7 +20,7 @@ from flightid.control.tuning.worst_cases import WorstCase
 from flightid.conventions import Light
 from flightid.errors import DataError, UnknownNameError
 from flightid.files import as_path
-from flightid.findings import Finding, at_least, held
+from flightid.findings import MOST_DIGITS, Finding, at_least, held
 from flightid.frozen import dataclass
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
@@ -190,24 +191,20 @@ class PidDesign(
             Of the intervals; what the worst plant promises has its own confidence.
         """
         level = shown(level)
-        words = interval_words(level)
+        words, told = interval_words(level), partial(Column, digits=MOST_DIGITS)
         columns = (
             Column("loop"),
             Column("quantity"),
             Column("required"),
-            Column("nominal", digits=3),
-            Column(f"{words} low", digits=3),
-            Column(f"{words} high", digits=3),
-            Column("worst", digits=3),
-            Column("unit"),
-            Column("flown", digits=3),
-            Column("flown, worst", digits=3),
+            *(told("nominal"), told(f"{words} low"), told(f"{words} high"), told("worst")),
+            *(Column("unit"), told("flown"), told("flown, worst")),
         )
         rows: list[tuple[Cell, ...]] = []
         for each in self.worst_cases:
             ends, (worst, flown) = each.estimate.interval(level), each.shown_worst
-            told = (each.loop, each.name, each.required, each.nominal, *(ends or (None, None)))
-            rows.append((*told, worst, each.unit, each.flown, flown))
+            spread = map(each.shown, (each.nominal, *(ends or (None, None))))
+            asked = (each.loop, each.name, each.required)
+            rows.append((*asked, *spread, worst, each.unit, each.shown(each.flown), flown))
         note = (
             f"Worst: of {self.n_plants} plants drawn from what the data allow; "
             f"{at_least(100.0 * self.content, 1)}% of such plants do at least as well "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 from flightid.control.tuning.gain_search_result import without_gains
@@ -10,7 +11,7 @@ from flightid.control.tuning.together import Together
 from flightid.control.tuning.tuned_filters import TunedFilters
 from flightid.conventions import Light
 from flightid.errors import FlightidError, UnknownNameError
-from flightid.findings import Finding
+from flightid.findings import MOST_DIGITS, Finding
 from flightid.frozen import dataclass
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
@@ -185,15 +186,17 @@ class Tuning(Result, schema="flightid.tuning/1"):
 
     def closed_table(self) -> Table:
         """What axes that were designed alone promised, and what is left with all loops closed."""
+        told = partial(Column, digits=MOST_DIGITS)
         columns = (
             *(Column("axis"), Column("loop"), Column("quantity"), Column("required")),
-            *(Column("designed alone", digits=3), Column("all loops closed", digits=3)),
-            *(Column("worst", digits=3), Column("unit"), Column("kept")),
+            *(told("designed alone"), told("all loops closed"), told("worst")),
+            *(Column("unit"), Column("kept")),
         )
         rows: list[tuple[Cell, ...]] = [
             (
                 *(axis.axis, now.loop, now.name, now.required),
-                *(self[axis.axis].worst_case(now.loop, now.name).nominal, now.nominal),
+                now.shown(self[axis.axis].worst_case(now.loop, now.name).nominal),
+                now.shown(now.nominal),
                 now.shown_worst[0],
                 *(now.unit, now.met if now.required else None),
             )

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.control.tuning.limits import limits
+from flightid.control.tuning.limits import Limit, limits, noise_limit
 from flightid.control.tuning.loop_problem import LoopAssessment, LoopProblem
 from flightid.control.tuning.worst_cases import KINDS
+from flightid.findings import held
 
 UNITS = {each.field: "" if each.unit == "1" else f" {each.unit}" for each in KINDS}
 NAMES = {each.field: each.name for each in KINDS}
@@ -39,17 +40,18 @@ def shortfalls(problem: LoopProblem, judged: LoopAssessment) -> tuple[str, ...]:
         else:
             value = float(getattr(judged.metrics[limit.loop], limit.field)[0][worst])
         name, unit = f"{limit.loop}: {NAMES[limit.field]}", UNITS[limit.field]
-        told.append(_short(name, value, unit, limit.text, limit.bound, least))
+        told.append(_short(name, value, unit, limit, least))
     if problem.noise_limit is not None and (least := slack["output noise"]).min() < 0.0:
-        noise, most = float(judged.noise[0].max()), problem.noise_limit
-        told.append(_short("output noise", noise, "", f"≤ {most:.4g}", most, least))
+        noise, most = float(judged.noise[0].max()), noise_limit(problem.noise_limit)
+        told.append(_short(most.name, noise, "", most, least))
     return tuple(told)
 
 
-def _short(
-    name: str, value: float, unit: str, required: str, bound: float, slack: NDArray[np.float64]
-) -> str:
-    missing, by = int((slack < 0.0).sum()), f"{abs(value - bound):.3g}{unit}"
-    beyond = "above" if value > bound else "short of"
+def _short(name: str, value: float, unit: str, limit: Limit, slack: NDArray[np.float64]) -> str:
+    """The worst plant as tables show it, and what is between that and the limit."""
+    digits = limit.digits_beside(value)
+    shown = held(value, digits, least=not limit.most) or 0.0
+    missing, by = int((slack < 0.0).sum()), f"{abs(shown - limit.shown(digits)):.3g}{unit}"
+    beyond = "above" if value > limit.bound else "short of"
     plants = f"{missing} of {len(slack)} plants" if len(slack) > 1 else "the model"
-    return f"{name} {value:.3g}{unit}, {by} {beyond} {required} ({plants})"
+    return f"{name} {shown:.{digits}g}{unit}, {by} {beyond} {limit.told(digits)} ({plants})"

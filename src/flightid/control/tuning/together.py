@@ -137,6 +137,6 @@ class Together:
 def _broken(number: WorstCase) -> str:
     """A requirement that is not kept, in words."""
     least, _ = number.shown_worst
-    worst = "none" if least is None else f"{least:.3g}"
+    worst = "none" if least is None else f"{least:.{number.digits}g}"
     unit = "" if number.unit == "1" else f" {number.unit}"
     return f"{number.loop}, {number.name} {worst}{unit} at the worst plant ({number.required})"

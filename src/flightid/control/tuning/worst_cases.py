@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from flightid.control.autopilots import AxisLoop
 from flightid.control.margins.resonance_slack import TAKEN, ResonanceSlack
-from flightid.control.tuning.limits import ANGLE, Limit, limits
-from flightid.control.tuning.loop_problem import LoopAssessment, LoopProblem
+from flightid.control.tuning.limits import ANGLE, Limit, limits, noise_limit
+from flightid.control.tuning.loop_problem import FULL, LoopAssessment, LoopProblem
 from flightid.control.tuning.margins_beyond import rooms_left
+from flightid.findings import SHOWN_DIGITS as DIGITS
 from flightid.findings import held
 from flightid.frozen import dataclass
 from flightid.uncertainty.estimate import Estimate, Reading
@@ -43,6 +44,8 @@ class WorstCase:
         What was asked for; empty where nothing was.
     met : bool
         Whether every plant meets it.
+    digits : int
+        How many its numbers are shown with: as many as tell them from what was asked for.
 
     Example
     -------
@@ -59,6 +62,7 @@ class WorstCase:
     flown_worst: float | None
     required: str = ""
     met: bool = True
+    digits: int = DIGITS
 
     def __repr__(self) -> str:
         """Loop, name and numbers on one line."""
@@ -78,11 +82,15 @@ class WorstCase:
 
     @property
     def shown_worst(self) -> tuple[float | None, float | None]:
-        """Worst with the new and with the flown gains at three digits, rounded to the worse."""
+        """Worst with the new and with the flown gains at its digits, rounded to the worse."""
         return (
-            to_the_worse(self.name, self.worst, self.nominal),
-            to_the_worse(self.name, self.flown_worst, self.flown),
+            to_the_worse(self.name, self.worst, self.nominal, self.digits),
+            to_the_worse(self.name, self.flown_worst, self.flown, self.digits),
         )
+
+    def shown(self, value: float | None) -> float | None:
+        """Another number of it, such as the estimate or an end of its interval, at its digits."""
+        return None if value is None else float(f"{value:.{self.digits}g}")
 
     def to_dict(self) -> dict[str, object]:
         """Plain values."""
@@ -120,8 +128,10 @@ KINDS = (
 )
 
 
-def to_the_worse(name: str, value: float | None, estimate: float | None = None) -> float | None:
-    """A number of a loop at three digits, rounded to the side on which its promise still holds.
+def to_the_worse(
+    name: str, value: float | None, estimate: float | None = None, digits: int = DIGITS
+) -> float | None:
+    """A number of a loop at few digits, rounded to the side on which its promise still holds.
 
     Parameters
     ----------
@@ -131,6 +141,7 @@ def to_the_worse(name: str, value: float | None, estimate: float | None = None) 
         Of the worst plant.
     estimate : float or None
         Of the estimated one: the worst lies on the bad side of it, whichever that is.
+    digits : int
 
     Example
     -------
@@ -140,10 +151,10 @@ def to_the_worse(name: str, value: float | None, estimate: float | None = None) 
     (0.552, 21.4)
     """
     if value is not None and estimate is not None and value != estimate:
-        return held(value, least=value < estimate)
+        return held(value, digits, least=value < estimate)
     kind = name.partition(" over ")[0].partition(",")[0]
     more = next((each.more for each in (*KINDS, NOISE) if each.name == kind), True)
-    return held(value, least=more)
+    return held(value, digits, least=more)
 
 
 def worst_cases(
@@ -187,17 +198,20 @@ def worst_cases(
         bound = (np.inf if kind.more else -np.inf) if edge is None else edge
         if room.takes(kind.field, problem.requirements.gain_margin_db):
             unknown = unknown or TAKEN
+        worst = (
+            None if unknown else _worst(np.append(_asked_of(new, asked, values), bound), kind.more)
+        )
         made.append(
             WorstCase(
                 loop,
                 kind.name,
                 _estimate(f"{loop}: {kind.name}", kind, values, unknown, bound),
-                None if unknown else _worst(np.append(values, bound), kind.more),
+                worst,
                 _number(before[0]) if steady and before is not None else None,
                 _worst(before, kind.more)
                 if before is not None and old is not None and bool(old.stable.all())
                 else None,
-                *_requirement(new, asked),
+                *_requirement(new, asked, worst, _number(values[0])),
             )
         )
     made.append(_noise(problem, new, old))
@@ -231,29 +245,50 @@ def _more_is_better(judged: LoopAssessment, asked: list[Limit], kind: _Kind) -> 
     return not min(asked, key=lambda limit: float(_slack(judged, limit).min())).most
 
 
-def _requirement(judged: LoopAssessment, asked: list[Limit]) -> tuple[str, bool]:
-    """What was asked of a number, in words, and whether all plants meet it."""
+def _asked_of(judged: LoopAssessment, asked: list[Limit], values: Array) -> Array:
+    """Values that a verdict is on: the highest of several crossovers, where that has a limit."""
+    for limit in asked:
+        if limit.highest:
+            slack = _slack(judged, limit)
+            highest = np.where(slack < FULL, limit.bound * np.exp(-slack), -np.inf)
+            return np.asarray(np.fmax(values, highest))
+    return values
+
+
+def _requirement(
+    judged: LoopAssessment, asked: list[Limit], worst: float | None, nominal: float | None
+) -> tuple[str, bool, int]:
+    """What was asked of a number, in words, whether all plants meet it, and digits that show it."""
     met = all(bool((_slack(judged, limit) >= 0.0).all()) for limit in asked)
-    return " and ".join(limit.text for limit in asked), met
+    digits = max((_digits(limit, worst, nominal) for limit in asked), default=DIGITS)
+    return " and ".join(limit.told(digits) for limit in asked), met, digits
+
+
+def _digits(limit: Limit, worst: float | None, nominal: float | None) -> int:
+    """How many tell the worst plant and the estimate from a limit."""
+    of_worst = DIGITS if worst is None else limit.digits_beside(worst)
+    of_nominal = DIGITS if nominal is None else limit.digits_beside(nominal, promised=False)
+    return max(of_worst, of_nominal)
 
 
 def _noise(problem: LoopProblem, new: LoopAssessment, old: LoopAssessment | None) -> WorstCase:
     known = problem.noise_psd is not None
     values = new.noise[0]
-    limit = problem.noise_limit
+    most = problem.noise_limit
+    asked = [] if most is None else [noise_limit(most)]
     before = None if old is None or not old.stable[0, 0] else old.noise[0]
     rate = problem.inner == AxisLoop.inner
     sensor, unit = "gyro" if rate else "measurement", "1/(rad/s)" if rate and not known else "1"
     name = "noise, rms" if known else f"noise over {sensor} noise"
+    worst = _worst(values, False)
     return WorstCase(
         "output",
         name,
         _estimate(f"output: {name}", replace(NOISE, unit=unit), values),
-        _worst(values, False),
+        worst,
         None if before is None else _number(before[0]),
         None if before is None or old is None or not old.stable.all() else _worst(before, False),
-        "" if limit is None else f"≤ {limit:.4g}",
-        limit is None or bool((values <= limit).all()),
+        *_requirement(new, asked, worst, _number(values[0])),
     )
 
 

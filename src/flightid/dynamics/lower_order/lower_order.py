@@ -14,7 +14,7 @@ from flightid.dynamics.lower_order.result import LowerOrder
 from flightid.dynamics.lower_order.start import best_starts
 from flightid.dynamics.lower_order.structures import DELAY, GAIN, equivalent_model, structure_of
 from flightid.errors import DataError, FitError, OptionError, UnknownNameError
-from flightid.findings import Finding
+from flightid.findings import Finding, told_apart
 from flightid.frozen import dataclass
 from flightid.identification import Fit, identify
 from flightid.identification.uncertain_of import source_findings, uncertain_of
@@ -316,7 +316,8 @@ def _judge(found: LowerOrder) -> tuple[Finding, ...]:
             Finding(
                 "equivalent-system-mismatch",
                 Light.AMBER,
-                f"{found.name}: the mismatch cost is {found.mismatch_cost:.1f}, above "
+                f"{found.name}: the mismatch cost is "
+                f"{told_apart(found.mismatch_cost, GOOD_COST, decimals=1)}, above "
                 f"{GOOD_COST:g}: the structure lacks something in the band",
                 "narrow the band, or take a kind with another mode; do not rate its numbers",
             )

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from flightid.conventions import Light
-from flightid.findings import Finding
+from flightid.findings import Finding, told_apart
 from flightid.identification.prediction.request import FREE_RUN, Request
 from flightid.identification.prediction.result import Prediction
 from flightid.identification.prediction.weights import guide_factor, guide_weights, is_vehicle
@@ -147,7 +147,8 @@ def _theil_verdicts(
         found[name] = Finding(
             THEIL,
             light,
-            f"{name or TOGETHER}: Theil coefficient {value:.3f}, guide at most "
+            f"{name or TOGETHER}: Theil coefficient "
+            f"{told_apart(value, *THEIL_GUIDE, decimals=3)}, guide at most "
             f"{THEIL_GUIDE[0]:g} to {THEIL_GUIDE[1]:g}{said}",
             action,
         )
@@ -163,7 +164,11 @@ def _with_noise(light: Light, beside: BesideNoise, action: str) -> tuple[Light, 
     if beside.most <= THEIL_GUIDE[0]:
         return Light.GREEN, f"{said}, without it at most {beside.most:.2g}", ""
     if beside.least > THEIL_GUIDE[0]:
-        return light, f"{said}, without it at least {beside.least:.2g}", action
+        return (
+            light,
+            f"{said}, without it at least {told_apart(beside.least, THEIL_GUIDE[0], decimals=2)}",
+            action,
+        )
     return Light.UNKNOWN, f"{said} and hides whether the rest is within it", MOVE_MORE
 
 
