@@ -90,7 +90,7 @@ def test_every_fit_leaves_as_a_file_with_its_covariance(study: fid.Study) -> Non
     roll = study.identified[0].fit
     assert roll is not None
     again = fid.load_model(study.output / "models" / "roll_slow.toml")
-    assert np.array_equal(again.estimated.covariance, roll.covariance)
+    assert np.array_equal(again.estimated.covariance, roll.carried)
 
 
 def test_commands_take_the_files(

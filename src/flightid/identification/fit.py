@@ -243,15 +243,15 @@ class Fit(
     def carried(self) -> NDArray[np.float64] | None:
         """Covariance as it goes on to other numbers, whose intervals are normal: shape (n, n).
 
-        Where few records tell how far vehicles lie apart, it is larger than `covariance` by what
-        Student's distribution adds to a 95 % interval. None where some numbers of the vehicle have
-        no errors: taken for exact they would make what is computed look known.
+        Where records, or noise that was estimated, tell errors by few degrees of freedom, it is
+        larger than `covariance` by what Student's distribution adds to a 95 % interval. None where
+        some numbers of the vehicle have no errors: taken for exact they would make what is computed
+        look known.
         """
         if self.details is not None and self.details.undetermined:
             return None
-        apart = self.agreement is not None and self.agreement.freedom is not None
-        if self.covariance is None or not apart:
-            return self.covariance
+        if self.covariance is None:
+            return None
         widths = [half_width(LEVEL, self.parameters[name].freedom) for name in self.names]
         share = np.array(widths) / half_width(LEVEL)
         return np.asarray(self.covariance * np.outer(share, share))

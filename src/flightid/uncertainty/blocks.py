@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.frozen import dataclass
+from flightid.uncertainty.estimated_levels import EstimatedLevels
 from flightid.uncertainty.fitted_directions import FittedDirections
 from flightid.uncertainty.parts import LEAST_INFORMATION, RecordParts
 from flightid.uncertainty.residual_noise import Autoregression
@@ -105,20 +106,25 @@ class JointResiduals:
         Whether the residuals are of data; else they bring curvature alone.
     bias : ndarray, shape (n_residuals,), optional
         Of the residuals.
+    levels : EstimatedLevels, optional
+        Of the noise that their unit variance was estimated from.
     """
 
     slopes: Array
     total: Array
     measured: bool = True
     bias: Array | None = None
+    levels: EstimatedLevels | None = None
 
     def along(self, directions: Array) -> JointResiduals:
         """The same by combinations of the parameters, one a column."""
-        return replace(self, slopes=self.slopes @ directions, total=self.total @ directions)
+        levels = None if self.levels is None else self.levels.along(directions)
+        slopes, total = self.slopes @ directions, self.total @ directions
+        return replace(self, slopes=slopes, total=total, levels=levels)
 
     def of(self, parameters: NDArray[np.bool_]) -> JointResiduals:
         """Columns of some parameters."""
-        return replace(self, slopes=self.slopes[:, parameters], total=self.total[:, parameters])
+        return self.along(np.eye(len(parameters))[:, parameters])
 
 
 def flights_of(apart: Sequence[Array], blocks: Sequence[RecordBlock]) -> list[RecordParts]:
@@ -274,6 +280,7 @@ def freedom_of(
     models: Sequence[Autoregression],
     blocks: Sequence[RecordBlock],
     half: Array,
+    beside: EstimatedLevels | None = None,
 ) -> Array:
     """Degrees of freedom of each estimate's variance: noise models are themselves estimates.
 
@@ -288,13 +295,15 @@ def freedom_of(
     blocks : sequence of RecordBlock
     half : ndarray, shape (n, n)
         From scores of the blocks to changes of the estimates.
+    beside : EstimatedLevels, optional
+        Of what was fitted beside the blocks, as the same scores hear it.
 
     Reference
     ---------
     Satterthwaite (1946), Biometrics Bulletin 2(6), eq. 17.
     """
     diagonals = np.diagonal(variances, axis1=1, axis2=2)
-    doubt = np.zeros(len(half))
+    doubt = np.zeros(len(half)) if beside is None else beside.doubt(half)
     for output, (variance, model) in enumerate(zip(diagonals, models, strict=True)):
         levels = None
         if model.drift is not None:

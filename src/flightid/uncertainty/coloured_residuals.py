@@ -241,7 +241,11 @@ def residual_covariance(
         crossed.append(direct.T @ heard_here @ gain - through @ others)
     plain = half
     white = np.asarray(root @ root.T) if blocks[0].answering is None else plain @ plain.T
-    freedom = freedom_of(shared, variances, models, whitened, half)
+    freedom = freedom_of(
+        shared, variances, models, whitened, half, None if slopes is None else slopes.levels
+    )
+    if slopes is not None and slopes.levels is not None:
+        shared = shared + half @ slopes.levels.added(np.eye(len(half))) @ half.T
     # Random walks from noise of inputs join whatever parts a record is cut into.
     compared = []
     if noise is None:

@@ -18,11 +18,13 @@ from flightid.responses import FrequencyResponse
 from flightid.responses.errors.random_error import (
     CovarianceSource,
     Points,
+    by_level,
     combined,
     covariances,
     knows_between_outputs,
 )
 from flightid.uncertainty import decibel_phase_sensitivity, window_covariance
+from flightid.uncertainty.estimated_levels import EstimatedLevels
 from flightid.uncertainty.response_errors import PolarSensitivity
 
 Array = NDArray[np.float64]
@@ -50,6 +52,13 @@ class Run:
     count: int
     points: Points
     kept: NDArray[np.intp]
+
+    def widened(self, gain: Array) -> Array:
+        """A gain on the fitted parts as one on all of `points`, zero on the others."""
+        size = 2 * len(self.points.inputs) * len(self.points.frequencies)
+        wide = np.zeros((len(gain), size))
+        wide[:, self.kept] = gain
+        return wide
 
 
 @dataclass(frozen=True)
@@ -110,14 +119,42 @@ class ErrorModel:
         if self.known is None:
             blocks = zip(parts, self.approximate, strict=True)
             return np.asarray(sum(part @ block @ part.T for part, block in blocks))
-        wide = []
-        for run, part in zip(self.runs, parts, strict=True):
-            size = 2 * len(run.points.inputs) * len(run.points.frequencies)
-            one = np.zeros((len(gain), size))
-            one[:, run.kept] = part
-            wide.append(one)
+        wide = [run.widened(part) for run, part in zip(self.runs, parts, strict=True)]
         found = combined(self.known, [run.points for run in self.runs], wide)
         return np.asarray(0.5 * (found + found.T))
+
+    def levels(self, gain: Array, *, weigh: bool) -> EstimatedLevels | None:
+        """How a gain times the errors of all points hangs on levels of noise that were estimated.
+
+        Outputs are taken one by one. None where no errors know from how much noise they are.
+
+        Parameters
+        ----------
+        gain : ndarray, shape (n_rows, n_points)
+            As `propagated` takes it.
+        weigh : bool
+            Whether the fit weighs the points by these errors, as `whitening` does.
+        """
+        if self.known is None:
+            return None
+        sizes = [len(run.kept) for run in self.runs]
+        parts = np.split(gain, np.cumsum(sizes)[:-1], axis=1)
+        weights = [matrix for *_, matrix in whitening(self)] if weigh else [None] * len(sizes)
+        found = []
+        for run, part, matrix in zip(self.runs, parts, weights, strict=True):
+            met = by_level(self.known, run.points, run.widened(part))
+            if met is None:
+                continue
+            products = met.products[:, run.kept]
+            white = None if matrix is None else matrix @ products
+            found.append(
+                EstimatedLevels(
+                    part @ products,
+                    None if white is None else white.transpose(0, 2, 1) @ white,
+                    met.freedom,
+                )
+            )
+        return EstimatedLevels.joined(found)
 
 
 def error_model(data: FrequencyResponse, selected: Sequence[SelectedResponse]) -> ErrorModel:

@@ -30,7 +30,8 @@ from flightid.uncertainty.response_errors import DECIBEL, DEGREE, Sensitivity
 from flightid.uncertainty.triangle import triangle_of_rows
 
 Array = NDArray[np.float64]
-Compare = Callable[[Array, NDArray[np.bool_]], AgreementTest]
+Compare = Callable[[Array, NDArray[np.bool_], Array, Array], AgreementTest]
+"""By gain, free parameters that count, what adds to the covariance, and degrees of freedom."""
 _AT_BOUND = 1e-9
 _SHARE = 0.1
 UNSEEN = "no influence on what was fitted: its value is where it started"
@@ -78,13 +79,15 @@ def statistics(
     *,
     sensitivity: Sensitivity | None,
     weighs_coherence: bool,
+    weighs_errors: bool = False,
     withheld: str = "",
     compare: Compare | None = None,
     bias: Array | None = None,
 ) -> Statistics:
     """Standard errors, bounds and correlations at the end of a search.
 
-    `weighs_coherence` tells that the Jacobian of the end is that of `coherence_jacobian`.
+    `weighs_coherence` tells that the Jacobian of the end is that of `coherence_jacobian`,
+    `weighs_errors` that the fit weighs points by the errors that are known of them.
 
     `withheld` says why there shall be no intervals, though errors of the data are known; `compare`
     looks at parts of them. `bias` of the points, in the order of `ErrorModel.propagated`, moves the
@@ -107,12 +110,12 @@ def statistics(
     covariance, freedom, agreement, moved = None, None, None, None
     if sensitivity is not None and names and not withheld:
         gain = estimator_gain(triangle, basis.T @ sensitivity)
+        added, freedom = _by_levels(errors, gain, triangle, weighs_errors=weighs_errors)
         if compare is None:
-            covariance = errors.propagated(gain)
+            covariance = errors.propagated(gain) + added
         else:
-            agreed = compare(gain, inner)
-            covariance, agreement = agreed.covariance, agreed.agreement
-            freedom = agreed.freedom if agreement.freedom is not None else None
+            agreed = compare(gain, inner, added, freedom)
+            covariance, agreement, freedom = agreed.covariance, agreed.agreement, agreed.freedom
         if bias is not None:
             moved = -gain @ bias
             covariance = covariance + np.outer(moved, moved)
@@ -132,6 +135,21 @@ def statistics(
         agreement,
         moved,
     )
+
+
+def _by_levels(
+    errors: ErrorModel, gain: Array, triangle: Array, *, weighs_errors: bool
+) -> tuple[Array, Array]:
+    """What estimated noise adds to the covariance, and the degrees of freedom it leaves."""
+    n = len(gain)
+    levels = errors.levels(gain, weigh=weighs_errors)
+    if levels is None:
+        return np.zeros((n, n)), np.full(n, np.inf)
+    doubt = levels.doubt(np.eye(n))
+    variances = np.diag(errors.propagated(gain))
+    known = doubt > 0.0
+    freedom = np.where(known, variances**2 / np.where(known, doubt, 1.0), np.inf)
+    return levels.added(triangle.T @ triangle), freedom
 
 
 def at_bound(parameter: Parameter) -> bool:

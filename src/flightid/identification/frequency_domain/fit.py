@@ -126,6 +126,7 @@ def _fit_selected(
         groups[0][0],
         sensitivity=sensitivity,
         weighs_coherence=options.cost == "coherence" and curves is None,
+        weighs_errors=options.cost == "likelihood",
         withheld=withheld,
         compare=compare,
         bias=bias_of_points(fitted, data, errors, options.hold) if judged() else None,

@@ -51,7 +51,9 @@ class PartComparison:
     errors: ErrorModel
     slopes: Array
 
-    def compare(self, gain: Array, inner: NDArray[np.bool_]) -> AgreementTest:
+    def compare(
+        self, gain: Array, inner: NDArray[np.bool_], added: Array, freedom: Array
+    ) -> AgreementTest:
         """Covariance of the estimates, halves and records compared.
 
         Parameters
@@ -60,6 +62,10 @@ class PartComparison:
             How the estimates move with the points, but for the sign.
         inner : ndarray of bool, shape (n_free,)
             Free parameters that are not at a bound.
+        added : ndarray, shape (n, n)
+            Covariance of the estimates beyond that of the points' errors.
+        freedom : ndarray, shape (n,)
+            Degrees of freedom of their variances.
 
         Assumes
         -------
@@ -100,7 +106,7 @@ class PartComparison:
             both = slice(2 * k, 2 * k + 2)
             part = np.array(information[both]) @ np.linalg.inv(total)
             flights.append(RecordParts(np.array(scores[both]), part, noise))
-        return compared(flights, np.eye(n), known[0, :, 0], np.full(n, np.inf))
+        return compared(flights, np.eye(n), known[0, :, 0] + added, freedom)
 
     def _each_input_fair(self, shares: Array) -> bool:
         """Whether every part makes a fair share of most points of each input.

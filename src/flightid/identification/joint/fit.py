@@ -67,6 +67,7 @@ from flightid.models import GreyBoxModel
 from flightid.record import Record
 from flightid.responses import FrequencyResponse
 from flightid.uncertainty.blocks import JointResiduals
+from flightid.uncertainty.response_errors import PointSensitivity
 
 Array = NDArray[np.float64]
 MARGIN, MOST_RIVALS = 50.0, 4
@@ -98,8 +99,11 @@ class ChosenPoints:
         slopes = [slope.T for slope in slopes_of(fitted, [e.omega_rad_s for e in self.selected])]
         if extra is not None:
             slopes = [own + more for own, more in zip(slopes, extra, strict=True)]
-        rows = whitened(slopes, whitening(self.errors)).T
-        return JointResiduals(rows, rows)
+        weights = whitening(self.errors)
+        rows = whitened(slopes, weights).T
+        gain = rows.T @ PointSensitivity.of([matrix for *_, matrix in weights])
+        levels = self.errors.levels(gain, weigh=True) if judged() else None
+        return JointResiduals(rows, rows, levels=levels)
 
     def whitened_bias(
         self, fitted: GreyBoxModel, response: FrequencyResponse, hold: str

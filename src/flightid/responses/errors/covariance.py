@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from flightid.frozen import dataclass
 from flightid.responses.errors.noise import NoiseOfRecords, NoiseSpectrum
+from flightid.responses.errors.noise_levels import LevelProducts
 from flightid.responses.errors.random_error import JointErrors, Points, union
 from flightid.responses.windows.window_weights import WindowWeights
 
@@ -96,6 +97,23 @@ class WindowedErrors(JointErrors):
                     total += block if part is other else block + block.T
         return total
 
+    def by_level(self, wanted: Points, gain: Real) -> LevelProducts | None:
+        """See `LevelledErrors`: the same sum over bins, each with its share in the levels."""
+        levels = self.noise.levels_of(wanted.output)
+        if levels is None:
+            return None
+        part = self._part(wanted, *union([wanted]))
+        found = np.zeros((len(levels.freedom), gain.shape[1], len(gain)))
+        for noise, kernels, near in self._kernels(*union([wanted])):
+            rows, points = part.weighted(kernels, near, noise.level[part.output])
+            turned = (gain[:, points] @ rows).conj()
+            shares = levels.shares(noise.omega_rad_s)
+            for level in np.flatnonzero(np.any(shares > 0.0, axis=1)):
+                bins = np.flatnonzero(shares[level])
+                some = (rows[:, bins] * shares[level, bins]) @ turned[:, bins].T
+                found[level, points] += np.real(some)
+        return LevelProducts(found, levels.freedom)
+
     def _kernels(
         self, inputs: Places, frequencies: Places
     ) -> Iterator[tuple[_BinNoise, Complex, Places]]:
@@ -169,7 +187,7 @@ class WindowedErrors(JointErrors):
         omega: Real = np.asarray(2.0 * np.pi * columns / (length * self.sample_time_s))
         density = self.noise.at(omega) / (2.0 * self.sample_time_s)
         twice = np.where((columns == 0) | (2 * columns == length), 1.0, 2.0) / length
-        return _BinNoise(np.sqrt(twice * density), self.noise.coherency_at(omega))
+        return _BinNoise(omega, np.sqrt(twice * density), self.noise.coherency_at(omega))
 
 
 @dataclass(frozen=True)
@@ -178,12 +196,14 @@ class _BinNoise:
 
     Attributes
     ----------
+    omega_rad_s : ndarray, shape (n_bins,)
     level : ndarray, shape (n_out, n_bins)
         Root of the noise power at each bin.
     coherency : ndarray of complex, shape (n_bins, n_out, n_out)
         Conjugate on the first index.
     """
 
+    omega_rad_s: Real
     level: Real
     coherency: Complex
 
@@ -230,12 +250,18 @@ class _Part:
 
     def add(self, kernels: Complex, near: Places, level: Real, total: Real) -> None:
         """Add the Gram matrix of the weighted kernels of all points to `total`."""
+        rows, places = self.weighted(kernels, near, level)
+        flat = rows.view(np.float64)
+        total[places[:, None], places] += flat @ flat.T
+
+    def weighted(self, kernels: Complex, near: Places, level: Real) -> tuple[Complex, Places]:
+        """Kernels of all points at the noise's level, (n, n_bins), and the places of these rows."""
         here, mine = self._mine(kernels, near)
         mixed = self.mixing[:, here] @ mine.view(np.float64)
         both = np.repeat(level, 2)
         flat = (mixed.transpose(2, 0, 1, 3) * both).reshape(-1, len(both))
         places = np.add.outer(np.arange(2 * len(self.inputs)) * len(self.frequencies), here).ravel()
-        total[places[:, None], places] += flat @ flat.T
+        return flat.view(np.complex128), places
 
     def _mine(self, kernels: Complex, near: Places) -> tuple[Places, Complex]:
         """Which of the frequencies the kernels reach, and the kernels there."""

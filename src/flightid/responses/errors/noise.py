@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 
 from flightid.errors import DataError
 from flightid.frozen import dataclass
+from flightid.responses.errors.noise_levels import NoiseLevels
 from flightid.responses.windows.local_fit import (
+    ORDER,
     Bins,
     around,
     bins_needed,
@@ -49,28 +51,43 @@ class NoiseSpectrum:
     coherency : ndarray of complex, shape (n, n_out, n_out), optional
         Cross-spectra over the roots of both densities, conjugate on the first index, with ones on
         the diagonal; without it the noises are independent.
+    levels : tuple of NoiseLevels or None, length n_out
+        What each density was estimated from; empty where that is not known.
     """
 
     omega_rad_s: Real
     density: Real
     coherency: Complex | None = None
+    levels: tuple[NoiseLevels | None, ...] = ()
 
     @classmethod
-    def of_matrices(cls, omega_rad_s: Real, matrices: Complex) -> NoiseSpectrum:
-        """From spectral matrices, shape (n, n_out, n_out), conjugate on the first index."""
+    def of_matrices(
+        cls, omega_rad_s: Real, matrices: Complex, freedom: Real | None = None
+    ) -> NoiseSpectrum:
+        """From spectral matrices, shape (n, n_out, n_out), conjugate on the first index.
+
+        `freedom`, shape (n,), tells how many independent real numbers each matrix was made of,
+        where no two share any.
+        """
         density = np.real(np.einsum("nii->ni", matrices))
         root = np.sqrt(np.maximum(density, np.finfo(float).tiny))
         coherency = matrices / (root[:, :, None] * root[:, None, :])
         places = np.arange(density.shape[1])
         coherency[:, places, places] = 1.0
-        return cls(omega_rad_s, np.maximum(density, 0.0).T, coherency)
+        known = () if freedom is None else (NoiseLevels(omega_rad_s, freedom),) * len(places)
+        return cls(omega_rad_s, np.maximum(density, 0.0).T, coherency, known)
+
+    def levels_of(self, output: int) -> NoiseLevels | None:
+        """What an output's density was estimated from; None where that is not known."""
+        return self.levels[output] if self.levels else None
 
     def of(self, outputs: NDArray[np.intp]) -> NoiseSpectrum:
         """Of some outputs, in this order."""
         coherency = self.coherency
         if coherency is not None:
             coherency = coherency[:, outputs[:, None], outputs]
-        return NoiseSpectrum(self.omega_rad_s, self.density[outputs], coherency)
+        levels = tuple(self.levels_of(int(output)) for output in outputs)
+        return NoiseSpectrum(self.omega_rad_s, self.density[outputs], coherency, levels)
 
     def replaced(self, other: NoiseSpectrum, outputs: NDArray[np.intp]) -> NoiseSpectrum:
         """With another noise in some outputs; what these share with the others is left out.
@@ -83,7 +100,10 @@ class NoiseSpectrum:
         density[outputs] = np.maximum(other.at(omega), least)
         coherency = np.tile(np.eye(len(density), dtype=np.complex128), (density.shape[1], 1, 1))
         coherency[:, outputs[:, None], outputs] = other.coherency_at(omega)
-        return NoiseSpectrum(omega, density, coherency)
+        levels = [self.levels_of(place) for place in range(len(density))]
+        for place, output in enumerate(outputs.tolist()):
+            levels[output] = other.levels_of(place)
+        return NoiseSpectrum(omega, density, coherency, tuple(levels))
 
     def no_less_than(self, other: NoiseSpectrum) -> NoiseSpectrum:
         """The larger density up to where another one ends, with its coherency there."""
@@ -92,7 +112,7 @@ class NoiseSpectrum:
         low = omega <= other.omega_rad_s[-1]
         density[:, low] = np.maximum(density[:, low], other.at(omega[low]))
         coherency[low] = other.coherency_at(omega[low])
-        return NoiseSpectrum(omega, density, coherency)
+        return NoiseSpectrum(omega, density, coherency, self.levels)
 
     def at(self, omega_rad_s: Real) -> Real:
         """Density between the grid's frequencies, log-linear; held beyond its ends."""
@@ -183,10 +203,10 @@ def estimate_noise(samples: Samples, omega: Real, response: Complex) -> NoiseSpe
     n_regressors = len(samples.excitations if joint else samples.inputs)
     records = [Bins.of(record[rows], samples.sample_time_s) for record in samples.records]
     found = [
-        (centre, _of_outputs(residual, joint, centre, omega, response))
-        for centre, residual in _groups(records, n_regressors, float(omega[-1]))
+        (centre, _of_outputs(residual, joint, centre, omega, response), freedom)
+        for centre, residual, freedom in _groups(records, n_regressors, float(omega[-1]))
     ]
-    return _gather(found)
+    return _of_groups(found)
 
 
 def noise_of_residuals(
@@ -219,7 +239,7 @@ def noise_of_residuals(
         Bins.of(np.concatenate([given, left]), sample_time_s)
         for given, left in zip(regressors, residuals, strict=True)
     ]
-    smooth = _gather(list(_groups(records, len(regressors[0]), highest_rad_s)))
+    smooth = _of_groups(list(_groups(records, len(regressors[0]), highest_rad_s)))
     if not resonant_rad_s:
         return smooth
     bins = [Bins.of(left, sample_time_s) for left in residuals]
@@ -283,10 +303,16 @@ def _gather(found: Sequence[tuple[float, Complex]]) -> NoiseSpectrum:
     return NoiseSpectrum.of_matrices(np.array([centre for centre, _ in found]), matrices)
 
 
+def _of_groups(found: Sequence[tuple[float, Complex, float]]) -> NoiseSpectrum:
+    """Of groups that share no bin; a complex number of freedom is two real ones."""
+    centres, matrices, freedom = (np.array(part) for part in zip(*found, strict=True))
+    return NoiseSpectrum.of_matrices(centres, matrices, 2.0 * freedom)
+
+
 def _groups(
     records: Sequence[Bins], n_regressors: int, highest_rad_s: float
-) -> Iterator[tuple[float, Complex]]:
-    """Centre of each group of neighbouring bins, and the residual of its local fit."""
+) -> Iterator[tuple[float, Complex, float]]:
+    """Centre of each group of neighbouring bins, residual and freedom of its local fit."""
     count = bins_needed(n_regressors, len(records))
     size = min(len(bins.omega) for bins in records)
     _require(size, count)
@@ -309,13 +335,16 @@ def _groups(
     if len(cuts) > 1:
         alike = []
     at_once = dict(enumerate(local_residuals(records, alike, n_regressors)))
+    unknowns = (ORDER + 1) * (n_regressors + len(records))
     for number, places in enumerate(groups):
         inside = longest.omega[places[at_longest]]
         centre = float(0.5 * (inside[0] + inside[-1]))
         residual = at_once.get(number)
+        freedom = max(sum(place.stop - place.start for place in places) - unknowns, 1)
         if residual is None:
-            residual = fit_locally(records, places, centre, n_regressors).residual
-        yield centre, residual
+            fitted = fit_locally(records, places, centre, n_regressors)
+            residual, freedom = fitted.residual, fitted.freedom
+        yield centre, residual, float(freedom)
 
 
 def _of_outputs(

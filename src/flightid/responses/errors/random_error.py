@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.frozen import dataclass
+from flightid.responses.errors.noise_levels import LevelProducts
 
 
 class CovarianceSource(Protocol):
@@ -58,6 +59,29 @@ class JointErrors(CovarianceSource, Protocol):
     ) -> NDArray[np.float64]:
         """Covariance of the sum of the gains times the errors of all points."""
         ...
+
+
+@runtime_checkable
+class LevelledErrors(Protocol):
+    """A source that knows from how much noise its covariance was estimated."""
+
+    def by_level(self, wanted: Points, gain: NDArray[np.float64]) -> LevelProducts | None:
+        """How the covariance hangs on each level of the noise; None where that is not known.
+
+        Parameters
+        ----------
+        wanted : Points
+        gain : ndarray, shape (n_rows, 2 n_in n_f)
+            Columns ordered as the rows of `CovarianceSource.covariance`.
+        """
+        ...
+
+
+def by_level(
+    errors: CovarianceSource, wanted: Points, gain: NDArray[np.float64]
+) -> LevelProducts | None:
+    """See `LevelledErrors`; None of a source that does not know."""
+    return errors.by_level(wanted, gain) if isinstance(errors, LevelledErrors) else None
 
 
 def covariances(errors: CovarianceSource, wanted: Sequence[Points]) -> list[NDArray[np.float64]]:
@@ -149,6 +173,10 @@ class ErrorSelection:
     ) -> NDArray[np.float64]:
         """See `JointErrors`."""
         return combined(self.errors, self._there(wanted), gains)
+
+    def by_level(self, wanted: Points, gain: NDArray[np.float64]) -> LevelProducts | None:
+        """See `LevelledErrors`."""
+        return by_level(self.errors, self._there([wanted])[0], gain)
 
     def _there(self, wanted: Sequence[Points]) -> list[Points]:
         return [
