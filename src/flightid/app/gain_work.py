@@ -269,8 +269,8 @@ def _axis(
                 flown=each.flown,
                 found=found.get(each.name),
                 value=moved.values[each.name],
-                low=each.low,
-                high=each.high,
+                low=each.ends[0],
+                high=each.ends[1],
             )
             for each in design.changes
         ],

@@ -209,7 +209,7 @@ def tune_axis(
     advance : callable
         Told of steps done.
     """
-    paths = ControllerPaths(loops[place], setting.gyro, setting.with_angle)
+    paths = ControllerPaths(loops[place], setting.gyro, setting.with_angle, flown[place])
     limit = _noise_limit(setting, paths, flown, place)
     given = {name: setting.by_hand[name] for name in paths.names if name in setting.by_hand}
     if given:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from flightid.control.autopilots import AxisLoop
 from flightid.control.gyro import Gyro
+from flightid.control.tuning.gain_steps import reached
 from flightid.control.tuning.sampled_plants import SampledPlants
 from flightid.errors import OptionError
 from flightid.frozen import dataclass
@@ -34,11 +35,14 @@ class ControllerPaths:
         Which rate the plant ends at.
     with_angle : bool
         Whether the angle loop is part of it.
+    flown : AxisLoop or None
+        Whose gains the ranges reach where `loop` does not stand as flown any more.
     """
 
     loop: AxisLoop
     gyro: Gyro
     with_angle: bool
+    flown: AxisLoop | None = None
 
     @property
     def roles(self) -> tuple[str, ...]:
@@ -63,19 +67,23 @@ class ControllerPaths:
     def ranges(self) -> tuple[Array, Array]:
         """Lowest and highest value of each gain; an angle time constant as its inverse, 1/s.
 
+        The autopilot's documentation gives them for usual vehicles: they reach what flew.
+
         Raises
         ------
         OptionError
             The autopilot gives no range for a gain.
         """
         low, high = [], []
-        known = self.loop.ranges
+        known, flown = self.loop.ranges, self.flown or self.loop
         for role, name in zip(self.roles, self.names, strict=True):
             if name not in known:
                 raise OptionError(
                     "a gain has no range to move in", found=name, needed=f"one of {[*known]}"
                 )
             least, most = known[name].low, known[name].high
+            if flown.has_flown:
+                least, most = reached(least, most, flown.gains.get(name))
             if role == "angle_tc":
                 least, most = 1.0 / most, 1.0 / max(least, LEAST_SHARE * most)
             one = self.loop.unit_of(role)

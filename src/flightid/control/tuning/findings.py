@@ -159,7 +159,9 @@ def remarks(
     outside = [c.name for c in changes if c.flown is not None and not c.low <= c.flown <= c.high]
     if outside:
         yield Finding(
-            "outside-range", Light.GREEN, f"flown outside its range: {', '.join(outside)}"
+            "outside-range",
+            Light.GREEN,
+            f"flown outside its range, which reaches what flew: {', '.join(outside)}",
         )
     shaky = [k for k, stage in enumerate(stages, 1) if not stage.stable]
     if shaky:

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 
 from flightid.control.autopilots import AxisLoop, axis_loop, axis_loop_of
+from flightid.control.tuning.gain_steps import reached
 from flightid.errors import DataError, OptionError
 from flightid.logs import Log
 
@@ -67,14 +68,16 @@ def require_known(values: Mapping[str, float], loops: Sequence[AxisLoop]) -> Non
             found=", ".join(unknown),
             needed="among " + ", ".join(sorted(known & ranges.keys())),
         )
+    flown = {n: value for loop in loops if loop.has_flown for n, value in loop.gains.items()}
+    ends = {n: reached(each.low, each.high, flown.get(n)) for n, each in ranges.items()}
     outside = [
-        f"{name} = {value:g} ({ranges[name].low:g} to {ranges[name].high:g})"
+        f"{name} = {value:g} ({ends[name][0]:g} to {ends[name][1]:g})"
         for name, value in values.items()
-        if name in ranges and not ranges[name].low <= value <= ranges[name].high
+        if name in ends and not ends[name][0] <= value <= ends[name][1]
     ]
     if outside:
         raise OptionError(
             "a gain by hand lies outside its range",
             found=", ".join(outside),
-            needed="values inside the range that the autopilot's documentation gives",
+            needed="values inside the range that the autopilot's documentation gives, or as flown",
         )

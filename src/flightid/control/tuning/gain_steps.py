@@ -45,8 +45,24 @@ class TunedGain:
     @property
     def at_limit(self) -> bool:
         """Whether the new value stands at an end of the range."""
-        near = AT_LIMIT * self.high
-        return self.new >= self.high - near or self.new <= self.low + near
+        (low, high), near = self.ends, AT_LIMIT * self.high
+        return self.new >= high - near or self.new <= low + near
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Of its range, which reaches what flew."""
+        return reached(self.low, self.high, self.flown)
+
+
+def reached(low: float, high: float, flown: float | None) -> tuple[float, float]:
+    """A range of the autopilot's documentation, made as wide as to hold what flew.
+
+    Example
+    -------
+    >>> reached(3.0, 12.0, 2.2), reached(3.0, 12.0, None)
+    ((2.2, 12.0), (3.0, 12.0))
+    """
+    return (low, high) if flown is None else (min(low, flown), max(high, flown))
 
 
 @dataclass(frozen=True)
