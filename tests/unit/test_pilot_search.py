@@ -44,12 +44,30 @@ def test_what_a_fit_takes_of_noise_is_that_of_all_columns() -> None:
     columns = written_out(data, order, target)
     places = [acting(6, order + 1 + SPARE, 2, order, record) for record in range(2)]
     parts = [part[at] for part, at in zip(data.by_record(columns), places, strict=True)]
-    spent, covariance = taken_by(parts, places, weights)
+    spent, covariance = taken_by(parts, slice(6, 6 + order + 1 + SPARE), weights)
     both = np.concatenate([(columns * weights).real, (columns * weights).imag], axis=1)
     inverse = np.linalg.inv(both @ both.T)
     share = 0.5 * np.einsum("ib,ij,jb->b", both, inverse, both).reshape(2, -1).sum(axis=0)
     assert_close(spent, np.minimum(share, 0.95), rtol=1e-8, why="rounding")
     assert_close(covariance, inverse, atol=1e-8 * np.max(np.abs(inverse)), why="rounding")
+
+
+def test_coefficients_that_all_but_cancel_take_what_their_columns_span() -> None:
+    """A column beside another at 5e-8 of its size: products of columns would tell rounding."""
+    random = np.random.default_rng(8)
+    records = [random.standard_normal((2, 9, n)) for n in (60, 80)]
+    beside = [re + 1j * im for re, im in records]
+    for part in beside:
+        part[8] = part[0] + 5e-8 * part[8]
+    weights = np.ones(140)
+    spent, _ = taken_by(beside, slice(4, 7), weights)
+    columns = np.zeros((12, 140), dtype=complex)
+    for record, span in enumerate((slice(0, 60), slice(60, 140))):
+        columns[[0, 1, 2, 3, 10, 11], span] = beside[record][[0, 1, 2, 3, 7, 8]]
+        columns[4 + 3 * record : 7 + 3 * record, span] = beside[record][4:7]
+    basis = np.linalg.qr(np.concatenate([columns.real, columns.imag], axis=1).T)[0]
+    share = 0.5 * np.sum(basis**2, axis=1).reshape(2, -1).sum(axis=0)
+    assert_close(spent, share, rtol=1e-6, why="rounding over 5e-8")
 
 
 def test_slopes_of_a_record_are_those_of_what_acts_in_it() -> None:

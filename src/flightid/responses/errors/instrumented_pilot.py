@@ -9,13 +9,19 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.responses.errors.pilot_basis import PilotBasis, weighed_parts
 from flightid.responses.errors.pilot_errors import (
-    acting_in,
+    ending_of,
     noise_weights,
     slopes_of,
     taken_by,
 )
-from flightid.responses.errors.pilot_search import SPARE, PilotBins, PilotState, turns
+from flightid.responses.errors.pilot_search import (
+    PilotBins,
+    PilotColumns,
+    PilotState,
+    made,
+)
 from flightid.responses.errors.unseen_peaks import has_unseen_peak
 
 Complex = NDArray[np.complex128]
@@ -57,38 +63,44 @@ def instrumented(
     loop: Gilson & Van den Hof, *Automatica* 41 (2005), 241–249.
     """
     target, omega = np.concatenate(measured.output), np.concatenate(measured.omega)
-    places = [acting_in(measured, state, place) for place in range(len(measured.output))]
-    found, slopes = _made(measured, state, scale, weights), slopes_of(excited, state, scale)
-    taken = taken_by(slopes, places, weights)
+    order = len(state.denominator) - 1
+    ending = ending_of(state)
+    own, others = (PilotColumns.of(data, order, scale) for data in (measured, excited))
+    found, slopes = _with(measured, own, state, weights), slopes_of(others, state)
+    taken = taken_by(slopes, ending, weights)
     for _ in range(PASSES):
         weights = noise_weights(omega, target - found.modelled, target, taken[0])
-        found = _made(measured, found, scale, weights)
-        found = _settled(measured, excited, found, scale, weights)
-        slopes = slopes_of(excited, _made(excited, found, scale, weights), scale)
-        taken = taken_by(slopes, places, weights)
+        instruments = PilotBasis.of(weighed_parts(slopes, weights), ending)
+        found = _with(measured, own, found, weights)
+        found = _settled(measured, own, instruments, found, scale, weights)
+        slopes = slopes_of(others, _with(excited, others, found, weights))
+        taken = taken_by(slopes, ending, weights)
     return found, slopes, taken
 
 
 def _settled(
-    measured: PilotBins, excited: PilotBins, state: PilotState, scale: float, weights: Real
+    measured: PilotBins,
+    columns: PilotColumns,
+    instruments: PilotBasis,
+    state: PilotState,
+    scale: float,
+    weights: Real,
 ) -> PilotState:
     """Steps by instruments from a state, each of which foretells less of the residuals."""
     found = state
-    instruments = _weighed(excited, _made(excited, state, scale, weights), scale, weights)
-    basis = np.linalg.qr(instruments.T)[0]
-    foretold = _foretold(basis, found)
+    foretold = _foretold(measured, instruments, found)
     for _ in range(STEPS):
         if foretold < SETTLED * found.cost * measured.size:
             break
-        sensitivities = _weighed(measured, found, scale, weights)
-        right = basis.T @ _parts(found.residual)
-        step = np.linalg.lstsq(basis.T @ sensitivities.T, right, rcond=1e-10)[0]
+        moved_by = weighed_parts(slopes_of(columns, found), weights)
+        step = instruments.step(moved_by, _parts(measured, found))
         length = 1.0
         for _ in range(HALVINGS):
-            moved = _made(measured, _moved(found, np.asarray(length * step)), scale, weights)
-            peaked = has_unseen_peak(measured.omega, moved.numerators, moved.denominator, scale)
-            left = _foretold(basis, moved)
-            if left < foretold and not peaked:
+            moved = _with(measured, columns, _moved(found, step, length), weights)
+            left = _foretold(measured, instruments, moved)
+            if left < foretold and not has_unseen_peak(
+                measured.omega, moved.numerators, moved.denominator, scale
+            ):
                 break
             length *= 0.5
         else:
@@ -97,52 +109,29 @@ def _settled(
     return found
 
 
-def _foretold(basis: Real, state: PilotState) -> float:
+def _foretold(data: PilotBins, instruments: PilotBasis, state: PilotState) -> float:
     """Power of the weighed residuals that instruments foretell."""
-    return float(np.sum((basis.T @ _parts(state.residual)) ** 2))
+    own, shared = instruments.components(_parts(data, state))
+    return float(sum(each @ each for each in own) + shared @ shared)
 
 
-def _parts(values: Complex) -> Real:
-    return np.concatenate([values.real, values.imag], axis=-1)
+def _parts(data: PilotBins, state: PilotState) -> list[Real]:
+    return [each.view(np.float64) for each in data.by_record(state.residual)]
 
 
-def _weighed(data: PilotBins, state: PilotState, scale: float, weights: Real) -> Real:
-    """Slopes by all coefficients as real rows, shape (n_coefficients, 2 n_bins)."""
-    slopes = slopes_of(data, state, scale)
-    places = [acting_in(data, state, place) for place in range(len(slopes))]
-    rows = np.zeros((1 + max(int(at[-1]) for at in places), data.size), dtype=np.complex128)
-    ends = np.cumsum([0, *(each.shape[1] for each in slopes)])
-    for part, at, first, last in zip(slopes, places, ends[:-1], ends[1:], strict=True):
-        rows[at, first:last] = part
-    return _parts(rows * weights)
-
-
-def _moved(state: PilotState, step: Real) -> PilotState:
-    size = len(state.denominator)
-    split, own = state.numerators.size, size + SPARE
-    last = split + own * len(state.transients)
-    transients = step[split:last].reshape(-1, own)
+def _moved(state: PilotState, step: tuple[list[Real], Real], length: float) -> PilotState:
+    own, shared = step
+    split = state.numerators.size
     return PilotState(
-        state.numerators + step[:split].reshape(state.numerators.shape),
-        np.concatenate([[1.0], state.denominator[1:] + step[last:]]),
-        tuple(a + b for a, b in zip(state.transients, transients, strict=True)),
+        state.numerators + length * shared[:split].reshape(state.numerators.shape),
+        np.concatenate([[1.0], state.denominator[1:] + length * shared[split:]]),
+        tuple(a + length * b for a, b in zip(state.transients, own, strict=True)),
         state.modelled,
         state.residual,
         state.cost,
     )
 
 
-def _made(data: PilotBins, state: PilotState, scale: float, weights: Real) -> PilotState:
+def _with(data: PilotBins, columns: PilotColumns, state: PilotState, weights: Real) -> PilotState:
     """The coefficients of a state with what they make of some inputs."""
-    order, parts = len(state.denominator) - 1, []
-    for omega, u, transient in zip(data.omega, data.inputs, state.transients, strict=True):
-        ends = turns(omega, scale, order + SPARE)
-        basis = ends[: order + 1]
-        above = np.sum((state.numerators @ basis) * u, axis=0) + transient @ ends
-        parts.append(above / (state.denominator @ basis))
-    modelled = np.concatenate(parts)
-    residual = weights * (np.concatenate(data.output) - modelled)
-    cost = float(np.mean(np.abs(residual) ** 2))
-    return PilotState(
-        state.numerators, state.denominator, state.transients, modelled, residual, cost
-    )
+    return made(data, columns, weights, state.numerators, state.denominator, state.transients)

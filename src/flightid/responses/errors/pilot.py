@@ -20,7 +20,7 @@ from flightid.responses.errors.instrumented_pilot import instrumented
 from flightid.responses.errors.pilot_errors import (
     LEAST,
     acting,
-    acting_in,
+    ending_of,
     noise_weights,
     slopes_of,
     taken_by,
@@ -28,6 +28,7 @@ from flightid.responses.errors.pilot_errors import (
 from flightid.responses.errors.pilot_search import (
     SPARE,
     PilotBins,
+    PilotColumns,
     PilotState,
     search,
     spectra_of,
@@ -225,10 +226,9 @@ def _fit_output(measured: PilotBins, data: PilotBins) -> Pilot | None:
             break
         if best is not None:
             tried = (len(found.denominator) - 1,)
-        best, slopes = found, slopes_of(data, found, scale)
-        taken = taken_by(
-            slopes, [acting_in(data, found, place) for place in range(n_records)], weights
-        )
+        order = len(found.denominator) - 1
+        best, slopes = found, slopes_of(PilotColumns.of(data, order, scale), found)
+        taken = taken_by(slopes, ending_of(found), weights)
         omega = np.concatenate(data.omega)
         weights = noise_weights(omega, target - found.modelled, target, taken[0])
     if best is None:

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.responses.errors.pilot_search import SPARE, PilotBins, PilotState, turns
+from flightid.responses.errors.pilot_basis import PilotBasis, weighed_parts
+from flightid.responses.errors.pilot_search import SPARE, PilotColumns, PilotState
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -33,52 +34,37 @@ def acting(n_numerators: int, n_own: int, n_records: int, order: int, record: in
     return np.concatenate([np.arange(*span) for span in spans])
 
 
-def acting_in(data: PilotBins, state: PilotState, record: int) -> Places:
-    """As `acting`, of a state."""
-    size = len(state.denominator)
-    return acting(state.numerators.size, size + SPARE, len(data.output), size - 1, record)
-
-
-def slopes_of(data: PilotBins, state: PilotState, scale: float) -> list[Complex]:
+def slopes_of(columns: PilotColumns, state: PilotState) -> list[Complex]:
     """Derivatives of each record's modelled bins by what acts in it, shape (n_acting, n_f)."""
-    order = len(state.denominator) - 1
+    outputs = np.split(state.modelled, columns.edges)
     found = []
-    for u, y, omega in zip(data.inputs, data.by_record(state.modelled), data.omega, strict=True):
-        ends = turns(omega, scale, order + SPARE)
-        basis = ends[: order + 1]
-        rows = [*(row * basis for row in u), ends, -y * basis[1:]]
-        found.append(np.concatenate(rows) / (state.denominator @ basis))
+    for fixed, y, basis in zip(columns.fixed, outputs, columns.basis, strict=True):
+        n_own = len(basis) + SPARE
+        under = 1.0 / (state.denominator @ basis)
+        n_fixed = len(fixed) - n_own
+        rows = np.empty((len(fixed) + len(basis) - 1, len(y)), dtype=np.complex128)
+        np.multiply(fixed[n_own:], under, out=rows[:n_fixed])
+        np.multiply(fixed[:n_own], under, out=rows[n_fixed : n_fixed + n_own])
+        np.multiply(basis[1:], -y * under, out=rows[n_fixed + n_own :])
+        found.append(rows)
     return found
 
 
-def taken_by(
-    slopes: Sequence[Complex], places: Sequence[Places], weights: Real
-) -> tuple[Real, Real]:
+def ending_of(state: PilotState) -> slice:
+    """Place of a record's transient among its slopes."""
+    first = state.numerators.size
+    return slice(first, first + len(state.denominator) + SPARE)
+
+
+def taken_by(slopes: Sequence[Complex], ending: slice, weights: Real) -> tuple[Real, Real]:
     """Share of each bin's noise that the coefficients took, and their covariance in unit noise.
 
     A transient acts in the bins of its own record: records are tens, and products of all with all
     would be zeros for the most part.
     """
-    ends = np.cumsum([each.shape[1] for each in slopes])[:-1]
-    left = [
-        np.concatenate([weighed.real, weighed.imag], axis=1)
-        for each, weight in zip(slopes, np.split(weights, ends), strict=True)
-        for weighed in [each * weight]
-    ]
-    squares = np.zeros(1 + max(int(each[-1]) for each in places))
-    for rows, at in zip(left, places, strict=True):
-        squares[at] += np.einsum("ib,ib->i", rows, rows)
-    norms = np.maximum(np.sqrt(squares), np.finfo(float).tiny)
-    products = np.zeros((len(norms), len(norms)))
-    left = [rows / norms[at, None] for rows, at in zip(left, places, strict=True)]
-    for rows, at in zip(left, places, strict=True):
-        products[np.ix_(at, at)] += rows @ rows.T
-    inverse = np.linalg.pinv(products, hermitian=True)
-    spent = []
-    for rows, at in zip(left, places, strict=True):
-        taken = 0.5 * np.einsum("ib,ib->b", inverse[np.ix_(at, at)] @ rows, rows)
-        spent.append(np.minimum(taken.reshape(2, -1).sum(axis=0), MOST_SPENT))
-    return np.concatenate(spent), inverse / np.outer(norms, norms)
+    basis = PilotBasis.of(weighed_parts(slopes, weights), ending)
+    taken = [0.5 * each.reshape(-1, 2).sum(axis=1) for each in basis.taken()]
+    return np.minimum(np.concatenate(taken), MOST_SPENT), basis.covariance()
 
 
 def noise_weights(omega_rad_s: Real, residual: Complex, target: Complex, spent: Real) -> Real:

@@ -145,8 +145,8 @@ def search(data: PilotBins, order: int, scale: float, weights: Real) -> PilotSta
     for _ in range(STARTS):
         scaled = weights / np.abs(denominator)
         found = solve(columns, target, scaled, target * scaled)
-        made = _made(data, columns, weights, *found)
-        state = made if state is None or made.cost < state.cost else state
+        tried = made(data, columns, weights, *found)
+        state = tried if state is None or tried.cost < state.cost else state
         denominator = found[1] @ columns.whole
     assert state is not None
     for _ in range(STEPS):
@@ -231,7 +231,7 @@ def _least_squares(triangle: Real, sizes: Real) -> Real:
     return np.asarray(solved / sizes)
 
 
-def _made(
+def made(
     data: PilotBins,
     columns: PilotColumns,
     weights: Real,
@@ -239,6 +239,7 @@ def _made(
     denominator: Real,
     transients: tuple[Real, ...],
 ) -> PilotState:
+    """Coefficients with what they make of the bins."""
     still = np.zeros(len(denominator) - 1)
     above = columns.bins.numerator(np.concatenate([numerators.ravel(), still, *transients]))
     modelled = above / (denominator @ columns.whole)
@@ -254,7 +255,7 @@ def _gauss_newton(
     moves = solve(columns, state.modelled, weights / under, state.residual)
     length = 1.0
     for _ in range(HALVINGS):
-        moved = _made(
+        moved = made(
             data,
             columns,
             weights,
