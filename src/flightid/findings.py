@@ -306,3 +306,40 @@ def told_apart(value: float, *limits: float, decimals: int = 0) -> str:
 
 def _meets(value: float, limit: float, least: bool) -> bool:
     return value >= limit if least else value <= limit
+
+
+MOST_DECIMALS, LONGEST = 12, 1e6
+"""Of a number with its ends; from so much on the rounder form of a number is read more easily."""
+
+
+def ranged(value: float, ends: tuple[float, float] | None) -> str:
+    """A number with its ends, all to one decimal: three digits of the largest, or two of the width.
+
+    Parameters
+    ----------
+    value : float
+    ends : tuple of float or None
+        None, or two that are alike: the number alone.
+
+    Example
+    -------
+    >>> ranged(1.2, (1.15, 1.25)), ranged(101.26, (101.21, 101.31)), ranged(1.2, None)
+    ('1.20 (1.15 to 1.25)', '101.26 (101.21 to 101.31)', '1.2')
+    """
+    if ends is None or not abs(ends[1] - ends[0]) > 0.0:
+        return f"{value:.{SHOWN_DIGITS}g}"
+    if not all(map(math.isfinite, ends)):
+        low, high = (f"{each:.{SHOWN_DIGITS}g}" for each in ends)
+        return f"{value:.{SHOWN_DIGITS}g} ({low} to {high})"
+    largest = max(map(abs, (value, *ends)))
+    usual = SHOWN_DIGITS - 1 - math.floor(math.log10(largest))
+    needed = 1 - math.floor(math.log10(abs(ends[1] - ends[0])))
+    places = min(MOST_DECIMALS, max(usual, needed))
+
+    def told(each: float) -> str:
+        if each == 0.0:
+            return "0"
+        rough = f"{each:.{SHOWN_DIGITS}g}" if largest >= LONGEST else f"{round(each, places):.0f}"
+        return f"{each:.{places}f}" if places > 0 else rough
+
+    return f"{told(value)} ({told(ends[0])} to {told(ends[1])})"

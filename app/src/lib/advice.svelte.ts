@@ -1,4 +1,5 @@
 import { FORMS } from "./forms";
+import { raised } from "./unitWords";
 
 /** The log or records that the page is on; empty where none is open. */
 class Here {
@@ -37,7 +38,7 @@ function onScreen(screen: string, title: string, options: string) {
 /** What to do, with screens that there are in place of the commands that they stand for. */
 export function adviceParts(given: string, log: string, screens: string[]): AdvicePart[] {
   const parts: AdvicePart[] = [];
-  const text = inWords(given);
+  const text = raised(inWords(given));
   const table = here.ofRig && screens.includes("records") ? BRIDGE.exec(text) : null;
   if (table) {
     const [before, after] = [text.slice(0, table.index), text.slice(table.index + table[0].length)];

@@ -65,18 +65,5 @@ export const axis = (more: uPlot.Axis = {}): uPlot.Axis => ({
 export const plotted = (row: Float64Array): (number | null | undefined)[] =>
   Array.from(row, (each) => (Number.isNaN(each) ? null : each === Infinity ? undefined : each));
 
-/** A unit as people write it; nothing where there is none. */
-export const unitOf = (unit: string) => (unit === "1" ? "" : unit.replaceAll("^2", "²").replaceAll("^3", "³"));
 export const three = (value: number) => String(Number(value.toPrecision(3)));
-/** A number and its ends with two digits of what is between them: of 101.2 to 101.4 "101 to 101" says nothing. */
-export function ranged(value: number, ends: [number, number] | null): string {
-  if (!ends) return three(value);
-  const width = Math.abs(ends[1] - ends[0]);
-  const largest = Math.max(...[value, ...ends].map(Math.abs));
-  if (!(width > 0) || !(largest > 0)) return `${three(value)} (${three(ends[0])} to ${three(ends[1])})`;
-  const usual = 2 - Math.floor(Math.log10(largest));
-  const places = Math.min(12, Math.max(usual, 1 - Math.floor(Math.log10(width))));
-  const told = (each: number) => String(Number(places > 0 ? each.toFixed(places) : each.toPrecision(3)));
-  return `${told(value)} (${told(ends[0])} to ${told(ends[1])})`;
-}
 export const seconds = (value: number) => `${Number(value.toFixed(1))} s`;

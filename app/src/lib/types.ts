@@ -31,17 +31,13 @@ export interface AxisGains {
   controller: RigController | null;
 }
 
-/** A number of a loop on both sides, and their difference with its interval. */
+/** A number of a loop on both sides, and their difference, in words with interval and unit. */
 export interface ChangeRow {
   loop: string;
   name: string;
-  unit: string;
-  before: number | null;
-  before_95: [number, number] | null;
-  after: number | null;
-  after_95: [number, number] | null;
-  difference: number | null;
-  difference_95: [number, number] | null;
+  before: string;
+  after: string;
+  difference: string;
   significant: boolean;
 }
 

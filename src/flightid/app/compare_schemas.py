@@ -26,17 +26,13 @@ class CompareRequest(Message):
 
 
 class ChangeRow(Message):
-    """A number of a loop on both sides, and their difference with its interval."""
+    """A number of a loop on both sides, and their difference, in words with interval and unit."""
 
     loop: str
     name: str
-    unit: str
-    before: float | None
-    before_95: tuple[float, float] | None
-    after: float | None
-    after_95: tuple[float, float] | None
-    difference: float | None
-    difference_95: tuple[float, float] | None
+    before: str
+    after: str
+    difference: str
     significant: bool
 
 

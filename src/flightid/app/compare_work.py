@@ -35,6 +35,7 @@ from flightid.review.comparison import FlightComparison, unheld
 from flightid.review.flight import review_flight
 from flightid.review.flight_state import FlightState
 from flightid.review.next_step import FlownStep, flown_step, left_to_fly
+from flightid.review.tables import cell
 from flightid.study.gain_preview import preview_fits
 from flightid.surface import speaking
 from flightid.uncertainty.estimate import Reading
@@ -136,25 +137,19 @@ def _file(path: Path | None) -> GainFile | None:
 def _row(change: LoopChange, significant: bool) -> ChangeRow:
     factor, unit = change.shown_unit
 
-    def value(of: Reading) -> float | None:
-        return None if of.value is None else factor * of.value
-
-    def ends(of: Reading) -> tuple[float, float] | None:
-        found = of.interval(0.95)
-        if found is None or not all(map(math.isfinite, found)):
-            return None
-        return factor * found[0], factor * found[1]
+    def told(of: Reading) -> str:
+        said = cell(of, factor)
+        if said is None:
+            return "–"
+        value, *around = said.split(" (")
+        return " (".join((f"{value} {unit}" if unit else value, *around))
 
     return ChangeRow(
         loop=change.loop,
         name=change.name,
-        unit=unit,
-        before=value(change.before),
-        before_95=ends(change.before),
-        after=value(change.after),
-        after_95=ends(change.after),
-        difference=value(change.difference),
-        difference_95=ends(change.difference),
+        before=told(change.before),
+        after=told(change.after),
+        difference=told(change.difference),
         significant=significant,
     )
 

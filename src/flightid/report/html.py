@@ -26,6 +26,7 @@ from flightid.report.content import Document, Figure
 from flightid.report.glossary import GLOSSARY, symbols_in
 from flightid.report.json import to_dict
 from flightid.report.shared_arrays import SharedArrays
+from flightid.report.unit_words import in_words
 from flightid.table import Cell, Column, Table
 from flightid.version import VERSION
 
@@ -122,7 +123,8 @@ class _Numbering:
             case "figure":
                 self._plots += 1
                 spec = values["spec"]
-                text = _script_json(self.arrays.referred(spec) if self._packed else spec)
+                told = self.arrays.referred(spec) if self._packed else spec
+                text = in_words(_script_json(told))
                 small = self._packed and len(text) > LONG_PAYLOAD
                 place = f"plot-{self._plots}"
                 return {
@@ -240,6 +242,7 @@ def _resource(name: str) -> str:
 def environment() -> jinja2.Environment:
     """What draws the templates: everything that comes from a log is text."""
     made = jinja2.Environment(
+        finalize=lambda each: in_words(each) if type(each) is str else each,
         loader=jinja2.FunctionLoader(_resource),
         autoescape=True,
         undefined=jinja2.StrictUndefined,

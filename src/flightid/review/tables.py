@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 
+from flightid.findings import ranged
 from flightid.review.identity import Battery, FlightIdentity, ModeSpan
 from flightid.review.loop_response import LoopResponse
 from flightid.review.motors import MotorUse
@@ -16,7 +17,6 @@ from flightid.uncertainty.quantiles import interval_words, shown
 Rows = tuple[tuple[Cell, ...], ...]
 READ = 5
 """Readings of a step, of which those by frequency come behind."""
-MOST_DIGITS = 6
 
 
 def battery(found: Battery | None, *, flown: bool) -> Iterable[tuple[Cell, ...]]:
@@ -213,12 +213,12 @@ def gains(identity: FlightIdentity) -> Table:
 
 
 def cell(reading: Reading | Estimate | None, factor: float = 1.0) -> str | None:
-    """A value with its interval, to as many digits as tell its ends apart; None: not told.
+    """A value with its interval, as `flightid.findings.ranged` writes it; None: not told.
 
     Example
     -------
     >>> cell(Estimate("delay", 0.16372, "s", 1e-5), 1e3)
-    '163.72 (163.7 to 163.74)'
+    '163.720 (163.700 to 163.740)'
     """
     if reading is None or reading.value is None:
         return None
@@ -226,11 +226,7 @@ def cell(reading: Reading | Estimate | None, factor: float = 1.0) -> str | None:
     if ends is None:
         return f"{factor * reading.value:.3g}"
     low, high = sorted((factor * ends[0], factor * ends[1]))
-    for digits in range(3, MOST_DIGITS + 1):
-        value, *around = (f"{each:.{digits}g}" for each in (factor * reading.value, low, high))
-        if around[0] != around[1]:
-            return f"{value} ({around[0]} to {around[1]})"
-    return f"{factor * reading.value:.3g}"
+    return ranged(factor * reading.value, (low, high))
 
 
 def _in_degrees(tracking: Reading | None) -> str | None:
