@@ -17,7 +17,7 @@ SLOW = axis_loop("arducopter", "roll", loop_rate_hz=400.0).with_gains(
 
 
 def test_a_slow_vehicle_has_gains_below_the_documented_range_where_it_flew_there() -> None:
-    """Its crossover of at most 9 rad/s leaves no room for an angle gain of 3, the least one told."""
+    """Its crossover of at most 9 rad/s leaves no room for an angle gain of 3, the least told."""
     slow = fid.load_model("rate_integrator", axis="roll").with_values({"Ltphi": 90.0, "tau": 0.06})
     design = fid.tune_pid(slow, gains=SLOW, band_rad_s=(0.3, 27.0), nominal=True)
     assert SLOW.ranges[ANGLE].low == 3.0
