@@ -11,13 +11,14 @@ from scipy.signal import lfilter
 
 import flightid as fid
 from flightid.uncertainty.driven_noise import driven_products
-from flightid.uncertainty.periodograms import first_lags, periodogram
+from flightid.uncertainty.periodograms import first_lags, periodogram, transform_length
 from flightid.uncertainty.residual_noise import (
     Autoregression,
     _fitted,
+    _rounds,
     autoregression,
 )
-from flightid.uncertainty.slow_drift import FASTEST, SLOWEST, Drift, _parted, is_slow
+from flightid.uncertainty.slow_drift import FASTEST, SLOWEST, Drift, is_slow, parted
 from tests.closeness import assert_close
 from tests.strangers import noises, output_error
 
@@ -109,13 +110,32 @@ def test_rounds_end_where_more_of_them_would(seed: int) -> None:
     for corner in np.geomspace(SLOWEST / N, FASTEST, 4):
         fast, slow = fitted(power), Drift(0.3 * power.mean(), corner)
         for _ in range(100):
-            fast, slow = _parted(fitted, power, found.length, (fast, slow), 1)
+            fast, slow = parted(fitted, power, found.length, (fast, slow), 1)
         level = fast.spectrum() + slow.spectrum(found.length)
         worth = -N * np.mean(np.log(level) + power / level) - fast.order * np.log(N)
         ends.append((worth, slow))
     best = max(ends, key=lambda each: each[0])[1]
     assert found.drift.corner == pytest.approx(best.corner, rel=1e-12)
     assert_close(found.drift.variance, best.variance, rtol=1e-6, why="rounds end at 1e-7")
+
+
+def test_native_rounds_are_those_of_the_models_themselves() -> None:
+    """White, coloured and nearly a line; few samples, where rounds meet what is no power."""
+    for n, pole in ((N, 0.0), (N, 0.7), (N, -0.95), (60, 0.5)):
+        random = np.random.default_rng(n)
+        power = periodogram(noises.drift(random, n)[:, None] + noises.ar1(random, n, pole)[:, None])
+        power[1:] -= 0.9 * power[:-1].min()
+        length, whole = transform_length(n), np.maximum(power, 0.0)
+        model = partial(_fitted, n=n, length=length)
+        begun = model(whole), Drift(0.3 * float(whole.mean()), 0.02)
+        for rounds in (1, 6, 300):
+            native = _rounds(n, length, whole, begun, rounds)
+            own = parted(model, whole, length, begun, rounds)
+            assert native[0].weights.size == own[0].weights.size
+            assert_close(native[0].lags, own[0].lags, why="rounding", rtol=1e-9, atol=1e-12)
+            assert_close(native[0].weights, own[0].weights, why="rounding", rtol=1e-8)
+            assert_close(native[1].variance, own[1].variance, why="rounding", rtol=1e-9)
+            assert native[1].corner == own[1].corner
 
 
 @pytest.mark.parametrize("seed", range(4))

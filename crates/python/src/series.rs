@@ -1,12 +1,14 @@
 //! Face of what is done to sampled series.
-//! (Python side: uncertainty/residual_noise.py)
+//! (Python side: uncertainty/residual_noise.py, uncertainty/slow_drift.py)
 
 use flightid_core::frequency_domain::composite::{CompositeRule, composite as core_composite};
 use flightid_core::numerics::levinson::weights as levinson;
+use flightid_core::numerics::slow_drift::{Parts, Rounds, Spectrum};
 use numpy::{IntoPyArray, PyArray1};
 use pyo3::prelude::*;
 
-use crate::row_major::RowMajor1;
+use crate::error::from_core;
+use crate::row_major::{RowMajor1, RowMajor2};
 
 /// autoregression_weights(lags: NDArray[np.float64], n: int) -> tuple[NDArray[np.float64], bool]
 ///
@@ -43,11 +45,44 @@ fn composite<'py>(
     Ok(py.detach(|| core_composite(start, target, scale, rule)).into_pyarray(py))
 }
 
+/// drift_beside(power: NDArray[np.float64], tables: tuple[NDArray[np.float64], NDArray[np.float64]], sizes: tuple[int, int], begun: tuple[NDArray[np.float64], NDArray[np.float64], float], corner: float, rounds: tuple[int, float, float, float]) -> tuple[NDArray[np.float64], NDArray[np.float64], float]
+///
+/// Lags and weights of an autoregression and the variance of the drift beside it after some rounds,
+/// from those they begin with. `tables` hold the first rows of the inverse of a real transform and one
+/// less the cosine of each bin, `sizes` the length of the transform and how many samples there are;
+/// `rounds` their number, the change that ends them, the sharpest line and the lowest valley.
+#[pyfunction]
+#[allow(clippy::type_complexity)]
+fn drift_beside<'py>(
+    py: Python<'py>,
+    power: RowMajor1<'_, f64>,
+    tables: (RowMajor2<'_, f64>, RowMajor1<'_, f64>),
+    sizes: (usize, usize),
+    begun: (RowMajor1<'_, f64>, RowMajor1<'_, f64>, f64),
+    corner: f64,
+    rounds: (usize, f64, f64, f64),
+) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, f64)> {
+    let spectrum = Spectrum {
+        power: power.as_slice()?,
+        cosines: tables.0.as_slice()?,
+        turns: tables.1.as_slice()?,
+        length: sizes.0,
+        n: sizes.1,
+    };
+    let (lags, weights) = (begun.0.as_slice()?.to_vec(), begun.1.as_slice()?.to_vec());
+    let begun = Parts { lags, weights, variance: begun.2 };
+    let (most, settled, sharpest, cut) = rounds;
+    let rounds = Rounds { most, settled, sharpest, cut };
+    let found = py.detach(|| spectrum.apart(begun, corner, rounds)).map_err(from_core)?;
+    Ok((found.lags.into_pyarray(py), found.weights.into_pyarray(py), found.variance))
+}
+
 /// Add this file's names to the module.
 ///
 /// # Errors
 /// Never in practice; PyO3's own.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(composite, module)?)?;
+    module.add_function(wrap_pyfunction!(drift_beside, module)?)?;
     module.add_function(wrap_pyfunction!(autoregression_weights, module)?)
 }

@@ -218,6 +218,7 @@ def _under(
         _require_near(left, [slope for _, slope in runs], largest)
         left = [_whitened(each, filters) for each in left]
         slopes = slopes or [_whitened(slope, filters) for _, slope in runs]
+        del runs  # whose slopes would stand beside the next ones
         limits = None if cell is None else (cell[0] - values, cell[1] - values)
         steps = _steps(left, slopes, sizes, len(free), limits)
         parts = [(slice(None, len(free)), SHORT), (slice(len(free), None), NEAR * samples)]

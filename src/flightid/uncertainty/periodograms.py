@@ -67,7 +67,7 @@ def first_lags(power: Array, length: int, largest: int, *, often: bool = False) 
         return _by_spans(power, length, largest)
     if not often or length > LONGEST_TABLE:
         return np.asarray(scipy.fft.irfft(power, length)[: largest + 1])
-    return np.asarray(_cosines(length, largest) @ power)
+    return np.asarray(cosines(length, largest) @ power)
 
 
 def _by_spans(power: Array, length: int, largest: int) -> Array:
@@ -105,7 +105,7 @@ def _span_tables(length: int, largest: int) -> tuple[Array, Array, Array]:
 
 
 @lru_cache(maxsize=2)
-def _cosines(length: int, largest: int) -> Array:
+def cosines(length: int, largest: int) -> Array:
     """First rows of the inverse of a real transform, (largest + 1, n_bins)."""
     turn = np.cos(2.0 * np.pi * np.arange(length) / length)
     places = np.multiply.outer(np.arange(largest + 1), np.arange(length // 2 + 1)) % length

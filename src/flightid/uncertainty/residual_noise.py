@@ -17,19 +17,30 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from flightid._native import autoregression_weights
+from flightid._native import autoregression_weights, drift_beside
 from flightid.frozen import dataclass
 from flightid.recursive_filter import filtered_from, state_after
 from flightid.uncertainty.driven_noise import driven_products
 from flightid.uncertainty.fitted_directions import FittedDirections, WhiteNoiseLoss
 from flightid.uncertainty.periodograms import (
+    LONGEST_TABLE,
+    cosines,
     first_lags,
     leaking,
     pooled,
     transform_length,
     twice,
 )
-from flightid.uncertainty.slow_drift import Drift, apart, is_slow, n_slow_bins
+from flightid.uncertainty.slow_drift import (
+    SETTLED,
+    Drift,
+    apart,
+    is_slow,
+    n_slow_bins,
+    parted,
+    turns,
+)
+from flightid.uncertainty.transformed_columns import of_both, powers_of, squares_of, transforms
 
 Array = NDArray[np.float64]
 LARGEST_ORDER = 20
@@ -41,8 +52,6 @@ CUT = 1e-6
 """Of the mean power, to which a power that is negative is cut: below it rounding decides."""
 VALLEY = 0.02
 """Share of the mean power below which a spectrum is not believed."""
-AT_ONCE = 8192
-"""Real and imaginary parts of bins that are turned together."""
 LEAST_FREEDOM = 1.0
 """Below it Student's distribution has no mean, and its interval no meaning."""
 
@@ -213,8 +222,7 @@ def autoregression(
     length = transform_length(n) if length is None else length
     model = _fitted(power, n, length)
     if known is None:
-        again = partial(_fitted, n=n, length=length, often=True)
-        fast, drift = apart(model, power, n, length, again)
+        fast, drift = apart(model, power, n, length, partial(_rounds, n, length))
         return replace(fast, drift=drift)
     for _ in range(SEPARATIONS):
         own = model.spectrum()
@@ -239,6 +247,20 @@ def _fitted(power: Array, n: int, length: int, *, often: bool = False) -> Autore
         lags = first_lags(np.maximum(power, least), length, largest)
         weights, _ = autoregression_weights(lags, n)
     return Autoregression(lags, weights, n, length)
+
+
+def _rounds(
+    n: int, length: int, whole: Array, pair: tuple[Autoregression, Drift], rounds: int
+) -> tuple[Autoregression, Drift]:
+    """`parted` of autoregressions, natively by the tables of a transform that is not long."""
+    if length > LONGEST_TABLE:
+        return parted(partial(_fitted, n=n, length=length, often=True), whole, length, pair, rounds)
+    fast, drift = pair
+    tables = cosines(length, min(LARGEST_ORDER, n // 20)), turns(length)
+    begun = fast.lags, fast.weights, drift.variance
+    ends = rounds, SETTLED, SHARPEST, CUT
+    lags, weights, variance = drift_beside(whole, tables, (length, n), begun, drift.corner, ends)
+    return Autoregression(lags, weights, n, length), replace(drift, variance=variance)
 
 
 def noise_models(
@@ -274,7 +296,7 @@ def noise_models(
     seen = np.array([pooled([each[o][:, None] for each in residuals], length) for o in outputs])
     if known is None and (white := _white_models(seen, taken, total, length)) is not None:
         return white
-    directions = [[_transform(part, length) for part in each.together] for each in taken]
+    directions = [[transforms(part, length) for part in each.together] for each in taken]
     lost = np.zeros_like(seen)
     models: list[Autoregression] = []
     for round_ in range(RESTORATIONS + 1):
@@ -337,10 +359,10 @@ def _lost(
     """
     length = models[0].length
     spectra = [model.spectrum() for model in models]
-    weights = [_both(twice(length) * each / length) for each in spectra]
+    weights = [of_both(twice(length) * each / length) for each in spectra]
     inner = [
         np.sum(
-            [_squared(e, w, m.is_white) for e, w, m in zip(parts, weights, models, strict=True)],
+            [squares_of(e, w, m.is_white) for e, w, m in zip(parts, weights, models, strict=True)],
             axis=0,
         )
         for parts in directions
@@ -351,41 +373,10 @@ def _lost(
         each[m:, m:] = shared
         for o, (part, spectrum, model) in enumerate(zip(parts, spectra, models, strict=True)):
             if model.is_white:
-                lost[o] += _powers(2.0 * spectrum[0] * np.eye(len(part)) - each, part)
+                lost[o] += powers_of(2.0 * spectrum[0] * np.eye(len(part)) - each, part)
                 continue
-            shaped = part * _both(spectrum)  # which ends with the record
+            shaped = part * of_both(spectrum)  # which ends with the record
             ended = scipy.fft.irfft(shaped.view(np.complex128), length)[:, :n]
             met = np.einsum("kb,kb->b", scipy.fft.rfft(ended, length).view(np.float64), part)
-            lost[o] += 2.0 * (met[::2] + met[1::2]) - _powers(each, part)
+            lost[o] += 2.0 * (met[::2] + met[1::2]) - powers_of(each, part)
     return lost / sum(lengths)
-
-
-def _powers(form: Array, part: Array) -> Array:
-    """Quadratic form in the transforms of each bin, by spans of bins that stay in the cache."""
-    found = np.empty(part.shape[1] // 2)
-    for begin in range(0, part.shape[1], AT_ONCE):
-        here = part[:, begin : begin + AT_ONCE]
-        power = np.einsum("kb,kb->b", form @ here, here)
-        found[begin // 2 : (begin + AT_ONCE) // 2] = power[::2] + power[1::2]
-    return found
-
-
-def _squared(part: Array, weights: Array, is_white: bool) -> Array:
-    """Products of transforms with the weights of their bins; of white noise, twice the middle's."""
-    if not is_white:
-        return np.asarray((part * weights) @ part.T)
-    ends = [place for place in (0, 1, -2, -1) if weights[place] != weights[2]]
-    return np.asarray(
-        weights[2] * (part @ part.T)
-        + (part[:, ends] * (weights[ends] - weights[2])) @ part[:, ends].T
-    )
-
-
-def _transform(columns: Array, length: int) -> Array:
-    """Transforms of columns (n, k), real and imaginary parts in turn: (k, 2 n_bins)."""
-    return np.asarray(scipy.fft.rfft(np.ascontiguousarray(columns.T), length).view(np.float64))
-
-
-def _both(weights: Array) -> Array:
-    """Weights of bins for the real and the imaginary part of each."""
-    return np.repeat(weights, 2)

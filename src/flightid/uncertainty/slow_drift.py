@@ -82,11 +82,11 @@ class Drift:
     def _parts(self, length: int) -> tuple[float, Array]:
         """Power of the drive of unit variance, and what the recursion divides by at each bin."""
         pole = 1.0 - self.corner
-        return 1.0 - pole**2, self.corner**2 + 2.0 * pole * _turns(length)
+        return 1.0 - pole**2, self.corner**2 + 2.0 * pole * turns(length)
 
 
 @lru_cache(maxsize=2)
-def _turns(length: int) -> Array:
+def turns(length: int) -> Array:
     """One less the cosine of each bin's angle."""
     found = 1.0 - np.cos(2.0 * np.pi * np.arange(length // 2 + 1) / length)
     found.flags.writeable = False
@@ -105,11 +105,11 @@ class Spectral(Protocol):
 
 
 M = TypeVar("M", bound=Spectral)
+Rounds = Callable[[Array, tuple[M, Drift], int], tuple[M, Drift]]
+"""Of expectation and maximisation."""
 
 
-def apart(
-    plain: M, power: Array, n: int, length: int, fitted: Callable[[Array], M]
-) -> tuple[M, Drift | None]:
+def apart(plain: M, power: Array, n: int, length: int, rounds: Rounds[M]) -> tuple[M, Drift | None]:
     """Noise and the drift beside it; the noise as it was where nothing speaks for a drift.
 
     Expectation and maximisation over the spectrum, at corners a factor apart; Whittle's likelihood
@@ -124,8 +124,9 @@ def apart(
     n : int
         Number of samples.
     length : int
-    fitted : callable
-        Makes a model of a power.
+    rounds : callable
+        Takes a power, a noise with the drift beside it and a number of rounds; gives both after
+        these.
 
     Reference
     ---------
@@ -147,22 +148,45 @@ def apart(
         return _criterion(both, fast.weights.size + NUMBERS, whole, n)
 
     found = [
-        _parted(fitted, whole, length, (plain, Drift(start, corner)), LOOKS)
+        rounds(whole, (plain, Drift(start, corner)), LOOKS)
         for corner in np.geomspace(SLOWEST / n, FASTEST, count)
     ]
     values = [worth(pair) for pair in found]
     close = [pair for pair, value in zip(found, values, strict=True) if value > max(values) - CLOSE]
     if len(close) > 1:
-        close = [_parted(fitted, whole, length, pair, RACE) for pair in close]
-    best = _parted(fitted, whole, length, max(close, key=worth), ROUNDS)
+        close = [rounds(whole, pair, RACE) for pair in close]
+    best = rounds(whole, max(close, key=worth), ROUNDS)
     alone = _criterion(level, plain.weights.size, whole, n)
     return best if worth(best) > alone else (plain, None)
 
 
-def _parted(
+def parted(
     fitted: Callable[[Array], M], whole: Array, length: int, pair: tuple[M, Drift], rounds: int
 ) -> tuple[M, Drift]:
-    """Both models after some rounds, or fewer where these change nothing any more."""
+    """Both models after some rounds, or fewer where these change nothing any more.
+
+    Parameters
+    ----------
+    fitted : callable
+        Makes a model of a power.
+    whole : ndarray, shape (n_bins,)
+        Power at the bins of a real transform of `length`.
+    length : int
+    pair : tuple of model and Drift
+    rounds : int
+        Most of them.
+
+    Example
+    -------
+    >>> class White:
+    ...     weights = np.zeros(0)
+    ...     def __init__(self, power): self.level = np.full(power.shape, np.mean(power))
+    ...     def spectrum(self): return self.level
+    >>> whole = 1.0 + Drift(2.0, 0.01).spectrum(1000)
+    >>> fast, slow = parted(White, whole, 1000, (White(whole), Drift(1.0, 0.01)), 500)
+    >>> round(float(fast.level[0]), 2), round(slow.variance, 2)
+    (1.0, 2.0)
+    """
     fast, drift = pair
     ends = 1.0 if length % 2 == 0 else 2.0
     variance, (power, under) = drift.variance, drift._parts(length)

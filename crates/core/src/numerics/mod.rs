@@ -13,6 +13,7 @@ pub mod polynomial_roots;
 pub mod random;
 pub mod recursive_filter;
 pub mod running_median;
+pub mod slow_drift;
 pub mod span_hashes;
 pub mod sparse_lu;
 pub(crate) mod widest;

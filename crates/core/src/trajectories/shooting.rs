@@ -56,6 +56,10 @@ pub struct Flight {
     sides: Vec<f64>,
     outputs: Vec<f64>,
     rows: Vec<f64>,
+    /// Parameters, initial state and shift of the whole run whose states are at hand.
+    ran: Option<Vec<f64>>,
+    /// Whether its outputs are, too.
+    has_outputs: bool,
 }
 
 /// One run that is asked for.
@@ -76,6 +80,11 @@ pub struct Wish<'a> {
 }
 
 impl Wish<'_> {
+    /// All numbers that set a run whole.
+    fn whole(&self) -> Vec<f64> {
+        [self.parameters, self.initial, self.shift].concat()
+    }
+
     fn count(&self) -> usize {
         self.free.len() + self.free_initial.len() + self.free_shift.len()
     }
@@ -110,7 +119,7 @@ impl Plan {
 }
 
 impl Flight {
-    /// Run, and hand rows of `stride` numbers (output, then its derivatives) to `sink` as in
+    /// Run, without integrating a second time what was run last, and hand rows of `stride` numbers (output, then its derivatives) to `sink` as in
     /// `TrajectorySensitivity`.
     ///
     /// # Errors
@@ -124,7 +133,13 @@ impl Flight {
         stride: usize,
         sink: &mut dyn FnMut(usize, &mut [f64]),
     ) -> Result<(), CoreError> {
-        self.setting.prepare(ode, wish.parameters, course)?;
+        let asked = plan.is_single().then(|| wish.whole());
+        // A search weighs a point, then differentiates there; no number compares equal to itself but
+        // is not one.
+        if asked.is_none() || self.ran != asked {
+            self.ran = None;
+            self.setting.prepare(ode, wish.parameters, course)?;
+        }
         if plan.is_single() {
             self.nodes.clear();
             self.nodes.extend_from_slice(wish.initial);
@@ -137,9 +152,20 @@ impl Flight {
             self.find_nodes(ode, plan, wish)?;
         }
         for (place, segment) in plan.segments(course.n_samples).into_iter().enumerate() {
-            match wish.count() {
-                0 => self.plain(ode, segment, place, wish.shift, stride, sink)?,
-                _ => self.differentiated(ode, segment, place, wish, stride, sink)?,
+            let node = &self.nodes[place * ode.n_states..(place + 1) * ode.n_states];
+            let plain = wish.count() == 0;
+            if self.ran.is_none() || (plain && !self.has_outputs) {
+                self.ran = None;
+                self.outputs.resize(ode.n_outputs * course.n_samples, 0.0);
+                let (states, outputs) = (&mut self.states, plain.then_some(&mut self.outputs));
+                let outputs = outputs.map(Vec::as_mut_slice);
+                self.setting.run(ode, segment.clone(), node, wish.shift, states, outputs)?;
+                (self.ran, self.has_outputs) = (asked.clone(), plain);
+            }
+            if plain {
+                self.plain(ode, segment, stride, sink);
+            } else {
+                self.differentiated(ode, segment, place, wish, stride, sink)?;
             }
         }
         Ok(())
@@ -156,16 +182,10 @@ impl Flight {
         &mut self,
         ode: &OdeModel,
         segment: Range<usize>,
-        place: usize,
-        shift: &[f64],
         stride: usize,
         sink: &mut dyn FnMut(usize, &mut [f64]),
-    ) -> Result<(), CoreError> {
-        let (n, p, n_samples) = (ode.n_states, ode.n_outputs, self.setting.n_samples);
-        let node = &self.nodes[place * n..(place + 1) * n];
-        self.outputs.resize(p * n_samples, 0.0);
-        let (states, outputs) = (&mut self.states, &mut self.outputs);
-        self.setting.run(ode, segment.clone(), node, shift, states, Some(outputs))?;
+    ) {
+        let (p, n_samples) = (ode.n_outputs, self.setting.n_samples);
         self.rows.clear();
         self.rows.resize(segment.len() * p * stride, 0.0);
         for (rows, sample) in self.rows.chunks_exact_mut(p * stride).zip(segment.clone()) {
@@ -174,7 +194,6 @@ impl Flight {
             }
         }
         sink(segment.start, &mut self.rows);
-        Ok(())
     }
 
     fn differentiated(
@@ -186,11 +205,7 @@ impl Flight {
         stride: usize,
         sink: &mut dyn FnMut(usize, &mut [f64]),
     ) -> Result<(), CoreError> {
-        let n = ode.n_states;
-        let node = &self.nodes[place * n..(place + 1) * n];
-        let states = &mut self.states;
-        self.setting.run(ode, segment.clone(), node, wish.shift, states, None)?;
-        let width = n * wish.count();
+        let width = ode.n_states * wish.count();
         let seeds = &self.node_slopes[place * width..(place + 1) * width];
         let (setting, states, shift) = (&self.setting, &self.states[..], wish.shift);
         let trajectory = Trajectory { ode, setting, range: segment, states, shift };

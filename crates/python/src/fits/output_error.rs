@@ -194,7 +194,7 @@ fn outcome<'py>(
 }
 
 /// Outputs (n_outputs × n_samples) of one record without bias, and their derivatives by θ, free
-/// initial states and free shifts (n_outputs × n_samples × columns).
+/// initial states, free shifts and free biases (n_outputs × n_samples × columns).
 ///
 /// # Errors
 /// Where the model has no run at θ.
@@ -218,7 +218,13 @@ pub fn run<'py, T: Trajectories>(
         initial: if with_slopes { &own.free_initial } else { none },
         shift: if with_slopes { &own.free_shift } else { none },
     };
-    let columns = wanted.columns(trajectories.n_parameters()) - 1;
+    let run = wanted.columns(trajectories.n_parameters()) - 1;
+    let biases: &[usize] = if with_slopes { &own.free_bias } else { none };
+    if let Some(&found) = biases.iter().find(|&&output| output >= p) {
+        let error = CoreError::Shape { what: "output of a bias", found, needed: p };
+        return Err(from_core(error));
+    }
+    let columns = run + biases.len();
     let stride = wanted.stride(trajectories.n_parameters());
     let mut outputs = vec![0.0; p * n];
     // NumPy asks for large pages, which long records need thousands of times fewer of.
@@ -230,7 +236,10 @@ pub fn run<'py, T: Trajectories>(
             let (k, o) = (first + place / p, place % p);
             outputs[o * n + k] = row[0];
             let start = (o * n + k) * columns;
-            slopes[start..start + columns].copy_from_slice(&row[1..1 + columns]);
+            slopes[start..start + run].copy_from_slice(&row[1..1 + run]);
+            if let Some(bias) = biases.iter().position(|&output| output == o) {
+                slopes[start + run + bias] = 1.0;
+            }
         }
     };
     trajectories

@@ -157,7 +157,7 @@ impl TransferFunctions {
     /// run_record(self, values: NDArray[np.float64], free: Sequence[int], record: tuple[NDArray[np.float64], NDArray[np.float64], float], own: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int], Sequence[tuple[float, float]]], hold: str, with_slopes: bool) -> tuple[NDArray[np.float64], NDArray[np.float64]]
     ///
     /// Outputs (n_outputs, n_samples) without bias and, if asked, their derivatives by θ, free
-    /// initial states and free shifts (n_outputs, n_samples, columns).
+    /// initial states, free shifts and free biases (n_outputs, n_samples, columns).
     #[allow(clippy::too_many_arguments, clippy::type_complexity)]
     fn run_record<'py>(
         &self,

@@ -56,14 +56,7 @@ def run_with_slopes(
         if runs_of is None
         else runs_of.native.run_record(place, *asked)
     )
-    shifted = outputs + own.bias[:, None]
-    if not (sloped and own.free_bias):
-        return shifted, slopes
-    n_outputs, n_samples = outputs.shape
-    biases = np.zeros((n_outputs, n_samples, len(own.free_bias)))
-    for column, output in enumerate(own.free_bias):
-        biases[output, :, column] = 1.0
-    return shifted, np.concatenate([slopes, biases], axis=2)
+    return outputs + own.bias[:, None], slopes
 
 
 def require_distinct(

@@ -130,6 +130,50 @@ fn derivatives_match_differences() {
     }
 }
 
+/// Weighed, differentiated there, weighed again and moved: the same bits as flights of their own.
+#[test]
+fn a_run_that_is_at_hand_is_the_run() {
+    let (inputs, states) = held();
+    let ode = ode(&INVERTED, &["x", "v' + f"]);
+    let (course, single) = (course(&inputs), Plan::default());
+    let run = |flight: &mut Flight, values: &[f64], start: &[f64], slopes: bool| {
+        let (free, initials): (&[usize], &[usize]) =
+            if slopes { (&[0, 1], &[1]) } else { (&[], &[]) };
+        let wish = Wish {
+            parameters: values,
+            initial: start,
+            shift: &[0.1],
+            free,
+            free_initial: initials,
+            free_shift: &[],
+        };
+        let mut found = Vec::new();
+        let mut sink = |_: usize, rows: &mut [f64]| found.extend_from_slice(rows);
+        flight.run(&ode, &course, &single, &wish, 4, &mut sink).map(|()| found)
+    };
+    let mut kept = Flight::default();
+    let (start, mut other) = (states[0].to_vec(), VALUES);
+    other[1] *= 1.01;
+    let moved = [start[0] + 0.01, start[1]];
+    for (values, start, slopes) in [
+        (VALUES, &start[..], false),
+        (VALUES, &start, true),
+        (VALUES, &start, false),
+        (other, &start, true),
+        (other, &start, false),
+        (other, &start, false),
+        (other, &moved, true),
+    ] {
+        let fresh = run(&mut Flight::default(), &values, start, slopes).unwrap();
+        assert_eq!(run(&mut kept, &values, start, slopes).unwrap(), fresh);
+    }
+    // What failed is not at hand.
+    assert!(run(&mut kept, &VALUES, &[f64::NAN, 0.0], false).is_err());
+    assert!(run(&mut kept, &VALUES, &[f64::NAN, 0.0], true).is_err());
+    let fresh = run(&mut Flight::default(), &other, &moved, true).unwrap();
+    assert_eq!(run(&mut kept, &other, &moved, true).unwrap(), fresh);
+}
+
 #[test]
 fn plans_that_do_not_fit_are_refused() {
     let (_, states) = held();

@@ -1,0 +1,262 @@
+//! A slow drift beside an autoregression, told apart by expectation and maximisation over a spectrum.
+//! (Python side: uncertainty/slow_drift.py)
+//!
+//! Dempster, Laird & Rubin (1977), J. Royal Statistical Society B 39(1), section 2.
+
+use crate::error::CoreError;
+use crate::numerics::levinson;
+use crate::numerics::widest::widest;
+
+/// Bins that are worked on side by side.
+const LANES: usize = 8;
+
+/// A periodogram, and what its bins are weighted by.
+pub struct Spectrum<'a> {
+    /// Power at the bins of a real transform, none negative.
+    pub power: &'a [f64],
+    /// Rows of the inverse of that transform, (n_lags, n_bins): the first holds the weights of bins.
+    pub cosines: &'a [f64],
+    /// One less the cosine of each bin's angle.
+    pub turns: &'a [f64],
+    /// Length of the transform.
+    pub length: usize,
+    /// Samples.
+    pub n: usize,
+}
+
+/// Constants of the rounds.
+#[derive(Debug, Clone, Copy)]
+pub struct Rounds {
+    /// Most of them.
+    pub most: usize,
+    /// Relative change of a drift's variance that ends them.
+    pub settled: f64,
+    /// Power of one line over the whole power that no sound model reaches.
+    pub sharpest: f64,
+    /// Of the mean power, to which power is raised where rounding decides.
+    pub cut: f64,
+}
+
+/// An autoregression and the drift beside it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Parts {
+    /// Autocovariances of the autoregression.
+    pub lags: Vec<f64>,
+    /// Its weights.
+    pub weights: Vec<f64>,
+    /// Variance of the drift.
+    pub variance: f64,
+}
+
+impl Spectrum<'_> {
+    /// Whether there is one of everything for each bin, and lags in the table for `count`.
+    fn fits(&self, count: usize) -> bool {
+        let n_bins = self.length / 2 + 1;
+        count > 0
+            && [self.power.len(), self.turns.len()] == [n_bins; 2]
+            && self.cosines.len() >= count * n_bins
+    }
+
+    fn lags_of(&self, power: &[f64], count: usize) -> Vec<f64> {
+        let rows = self.cosines.chunks_exact(self.power.len()).take(count);
+        rows.map(|row| widest(|| product(row, power))).collect()
+    }
+
+    /// The autoregression of a power; its valleys are raised where its lags are no autocovariance.
+    fn fitted(&self, power: &[f64], count: usize, cut: f64) -> (Vec<f64>, Vec<f64>) {
+        let lags = self.lags_of(power, count);
+        let (weights, sound) = levinson::weights(&lags, self.n as f64);
+        if sound {
+            return (lags, weights);
+        }
+        let mean = power.iter().map(|each| each.max(0.0)).sum::<f64>() / power.len() as f64;
+        let raised: Vec<f64> = power.iter().map(|each| each.max(cut * mean)).collect();
+        let lags = self.lags_of(&raised, count);
+        let (weights, _) = levinson::weights(&lags, self.n as f64);
+        (lags, weights)
+    }
+
+    /// Both parts after some rounds, or fewer where these change nothing any more; `corner` is one
+    /// less the drift's pole, rad per sample.
+    ///
+    /// # Errors
+    /// `Shape` where there is not one of everything for each bin.
+    pub fn apart(&self, begun: Parts, corner: f64, rounds: Rounds) -> Result<Parts, CoreError> {
+        let (n_bins, count) = (self.power.len(), begun.lags.len());
+        if !self.fits(count) || begun.weights.len() >= count {
+            let needed = self.length / 2 + 1;
+            return Err(CoreError::Shape { what: "bins of a spectrum", found: n_bins, needed });
+        }
+        let pole = 1.0 - corner;
+        let drive = 1.0 - pole * pole;
+        let under = |turn: &f64| drive / (corner * corner + 2.0 * pole * turn);
+        let shape: Vec<f64> = self.turns.iter().map(under).collect();
+        let mut parts = begun;
+        let mut rest = vec![0.0; n_bins];
+        for _ in 0..rounds.most {
+            let level = Level::of(&parts, self.length, rounds.sharpest);
+            let slow = widest(
+                #[inline(always)]
+                || self.share(&level, &shape, parts.variance, &mut rest),
+            );
+            (parts.lags, parts.weights) = self.fitted(&rest, count, rounds.cut);
+            let before = parts.variance;
+            parts.variance = slow;
+            if (slow - before).abs() <= rounds.settled * before {
+                break;
+            }
+        }
+        Ok(parts)
+    }
+
+    /// What each part is expected to hold: the autoregression's power, and the drift's variance.
+    #[inline(always)]
+    fn share(&self, level: &Level<'_>, shape: &[f64], variance: f64, rest: &mut [f64]) -> f64 {
+        let n_bins = rest.len();
+        let mut total = [0.0; LANES];
+        for begin in (0..n_bins).step_by(LANES) {
+            let count = LANES.min(n_bins - begin);
+            // Beyond the last bin weights of zero add nothing.
+            let [mut power, mut weight, mut turn, mut own, mut left] = [[0.0; LANES]; 5];
+            for (to, from) in [
+                (&mut power, self.power),
+                (&mut weight, self.cosines),
+                (&mut turn, self.turns),
+                (&mut own, shape),
+            ] {
+                to[..count].copy_from_slice(&from[begin..begin + count]);
+            }
+            let other = level.at(&turn);
+            for k in 0..LANES {
+                let own = variance * own[k];
+                let share = own / (other[k] + own).max(f64::MIN_POSITIVE);
+                let mixed = share * other[k];
+                total[k] += weight[k] * (share * share * power[k] + mixed);
+                let beside = 1.0 - share;
+                left[k] = beside * beside * power[k] + mixed;
+            }
+            rest[begin..begin + count].copy_from_slice(&left[..count]);
+        }
+        total.iter().sum()
+    }
+}
+
+/// The spectrum of an autoregression: what its recursion does not foretell over |1 − Σ w zᵏ|².
+struct Level<'a> {
+    weights: &'a [f64],
+    innovation: f64,
+    /// Gain below which there is a pole that rounding puts onto the circle.
+    least: f64,
+}
+
+impl<'a> Level<'a> {
+    fn of(parts: &'a Parts, length: usize, sharpest: f64) -> Self {
+        let told: f64 = parts.weights.iter().zip(&parts.lags[1..]).map(|(w, r)| w * r).sum();
+        let innovation = (parts.lags[0] - told).max(0.0);
+        let most = sharpest * length as f64 * parts.lags[0].max(f64::MIN_POSITIVE);
+        Self {
+            weights: &parts.weights,
+            innovation,
+            least: (innovation / most).max(f64::MIN_POSITIVE),
+        }
+    }
+
+    /// By one less the cosine of each bin's angle.
+    #[inline(always)]
+    fn at(&self, turn: &[f64; LANES]) -> [f64; LANES] {
+        if self.weights.is_empty() {
+            return [self.innovation; LANES];
+        }
+        let cosine = turn.map(|t| 1.0 - t);
+        let sine = turn.map(|t| (t * (2.0 - t)).max(0.0).sqrt());
+        let (mut re, mut im) = ([0.0; LANES], [0.0; LANES]);
+        // Horner's scheme in z = exp(−jω) over 1, −w₁, −w₂ …
+        for &weight in self.weights.iter().rev() {
+            for k in 0..LANES {
+                let (x, y) = (re[k] - weight, im[k]);
+                re[k] = x * cosine[k] + y * sine[k];
+                im[k] = y * cosine[k] - x * sine[k];
+            }
+        }
+        std::array::from_fn(|k| {
+            let real = 1.0 + re[k];
+            self.innovation / (real * real + im[k] * im[k]).max(self.least)
+        })
+    }
+}
+
+#[inline(always)]
+fn product(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; 2 * LANES];
+    let (whole, more) = (a.chunks_exact(2 * LANES), b.chunks_exact(2 * LANES));
+    let rest: f64 = whole.remainder().iter().zip(more.remainder()).map(|(x, y)| x * y).sum();
+    for (x, y) in whole.zip(more) {
+        for k in 0..2 * LANES {
+            sums[k] += x[k] * y[k];
+        }
+    }
+    sums.iter().sum::<f64>() + rest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ROUNDS: Rounds = Rounds { most: 60, settled: 1e-12, sharpest: 1e6, cut: 1e-6 };
+
+    fn cosines(length: usize, n_lags: usize) -> Vec<f64> {
+        let n_bins = length / 2 + 1;
+        let twice = |bin: usize| if bin == 0 || 2 * bin == length { 1.0 } else { 2.0 };
+        let angle = 2.0 * std::f64::consts::PI / length as f64;
+        (0..n_lags * n_bins)
+            .map(|k| (k / n_bins, k % n_bins))
+            .map(|(lag, bin)| {
+                twice(bin) * (angle * ((lag * bin) % length) as f64).cos() / length as f64
+            })
+            .collect()
+    }
+
+    /// The expected power of a drift of variance 3 beside x(t) = 0.5 x(t − 1) + e is theirs: they
+    /// are where the rounds stay.
+    #[test]
+    fn the_parts_of_their_own_power_stay() {
+        let (length, n_lags, corner) = (1000, 3, 0.01);
+        let n_bins = length / 2 + 1;
+        let lags: Vec<f64> = (0..n_lags).map(|k| 0.5_f64.powi(k as i32) / 0.75).collect();
+        let pole: f64 = 1.0 - corner;
+        let power: Vec<f64> = (0..n_bins)
+            .map(|bin| {
+                let cosine = (2.0 * std::f64::consts::PI * bin as f64 / length as f64).cos();
+                let fast = 1.0 / (1.25 - cosine);
+                fast + 3.0 * (1.0 - pole * pole) / (1.0 + pole * pole - 2.0 * pole * cosine)
+            })
+            .collect();
+        let table = cosines(length, n_lags);
+        let angle = 2.0 * std::f64::consts::PI / length as f64;
+        let turns: Vec<f64> = (0..n_bins).map(|bin| 1.0 - (angle * bin as f64).cos()).collect();
+        let spectrum = Spectrum { power: &power, cosines: &table, turns: &turns, length, n: 500 };
+        let begun = Parts { lags, weights: vec![0.5], variance: 3.0 };
+        let found = spectrum.apart(begun.clone(), corner, ROUNDS).unwrap();
+        assert!((found.variance - 3.0).abs() < 1e-3, "{found:?}");
+        assert!((found.weights[0] - 0.5).abs() < 1e-3, "{found:?}");
+        // And where they come to from elsewhere.
+        let other = Parts { lags: vec![2.0, 0.0, 0.0], weights: vec![], variance: 1.0 };
+        let rounds = Rounds { most: 3000, ..ROUNDS };
+        let (there, here) =
+            [other, begun].map(|each| spectrum.apart(each, corner, rounds).unwrap()).into();
+        assert!((there.variance / here.variance - 1.0).abs() < 1e-5, "{there:?} {here:?}");
+    }
+
+    #[test]
+    fn a_level_is_that_of_its_recursion() {
+        let parts = Parts { lags: vec![2.0, 1.0, 0.2], weights: vec![0.6, -0.2], variance: 0.0 };
+        let level = Level::of(&parts, 64, 1e6);
+        let omega: [f64; LANES] = std::array::from_fn(|k| 0.3 * k as f64);
+        let found = level.at(&omega.map(|w| 1.0 - w.cos()));
+        for (w, value) in omega.iter().zip(found) {
+            let z = num_complex::Complex64::cis(-w);
+            let gain = (1.0 - 0.6 * z + 0.2 * z * z).norm_sqr();
+            assert!((value - (2.0 - 0.6 + 0.04) / gain).abs() < 1e-13);
+        }
+    }
+}
