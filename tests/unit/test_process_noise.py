@@ -11,6 +11,13 @@ import flightid as fid
 from flightid.conventions import Light
 from flightid.identification.output_error.disturbed_states import disturbances, moved_together
 from flightid.identification.output_error.process_noise import state_noise
+from flightid.identification.output_error.whitened_residuals import (
+    LAGS,
+    REACH,
+    colour_filters,
+    unforetold,
+)
+from tests.closeness import assert_close
 from tests.strangers.noises import ar1
 from tests.strangers.turbulence import CASES
 
@@ -271,6 +278,35 @@ def test_a_gust_below_the_noise_of_every_sensor_is_named() -> None:
     assert fit.covariance is None
     blamed = {check.name for check in fit.evidence.checks if check.light.value in ("red", "amber")}
     assert not blamed & {"input hold", "agreement of parts"}
+
+
+def test_what_inputs_foretell_is_least_squares_on_their_neighbours() -> None:
+    """Of white inputs by products, of smooth ones, whose products lose digits, by rows."""
+    random = np.random.default_rng(4)
+    noise = random.standard_normal((2, 900))
+    rows = [noise[:, :500], noise[:, 500:]]
+    slow = np.sin(np.linspace(0.0, 9.0, 900))
+    for inputs in (random.standard_normal((2, 900)), np.array([slow, slow**2])):
+        records = [inputs[:, :500], inputs[:, 500:]]
+        centred = [u - u.mean(axis=1, keepdims=True) for u in records]
+        padded = [np.pad(u, ((0, 0), (REACH, 1)), mode="edge") for u in centred]
+        columns = np.concatenate(
+            [np.concatenate([u[:, k : k + r.shape[1]] for k in range(REACH + 2)]).T
+             for u, r in zip(padded, rows, strict=True)]
+        )  # fmt: skip
+        weights = np.linalg.lstsq(columns, noise.T, rcond=1e-6)[0]
+        left = np.concatenate(unforetold(rows, records), axis=1)
+        assert_close(left, (noise.T - columns @ weights).T, why="least squares", atol=1e-7)
+    found = colour_filters([lfilter([1.0], [1.0, -0.6], each) for each in rows])
+    assert found is not None
+    whole = [lfilter([1.0], [1.0, -0.6], each) for each in rows]
+    for output, taps in enumerate(found):
+        now = np.concatenate([each[output, LAGS:] for each in whole])
+        past = np.concatenate(
+            [np.array([each[output, LAGS - k : each.shape[1] - k] for k in range(1, LAGS + 1)]).T
+             for each in whole]
+        )  # fmt: skip
+        assert_close(-taps[1:], np.linalg.lstsq(past, now)[0], why="least squares", rtol=1e-9)
 
 
 def test_sensors_alone_move_together_by_chance_as_often_as_is_said() -> None:

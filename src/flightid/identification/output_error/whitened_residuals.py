@@ -11,6 +11,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.uncertainty.lagged_products import lagged_products, products_with_past
 from flightid.uncertainty.triangle import triangle_of_parts
 
 Array = NDArray[np.float64]
@@ -52,7 +53,12 @@ def unforetold(rows: Sequence[Array], inputs: Sequence[Array]) -> list[Array]:
     def beside() -> Iterator[Array]:
         return (np.concatenate([lags, rows[k][:, part]]) for k, part, lags in pieces())
 
-    weights, _ = _regressed(beside, len(moved) * (reach + 2), ROUNDING)
+    inputs_alone = lagged_products(padded, reach + 1, reach + 1)[::-1, :, ::-1]
+    count = len(moved) * (reach + 2)
+    crossed = products_with_past(rows, padded, reach + 1)[::-1].reshape(count, -1)
+    own = np.sum([each @ each.T for each in rows], axis=0)
+    products = np.block([[inputs_alone.reshape(count, count), crossed], [crossed.T, own]])
+    weights, _ = _regressed(beside, products, count, ROUNDING)
     left = [each.copy() for each in rows]
     for k, part, lags in pieces():
         left[k][:, part] -= weights @ lags
@@ -68,7 +74,8 @@ def colour_filters(rows: Sequence[Array]) -> list[Array] | None:
     found = []
     for output in range(rows[0].shape[0]):
         own = [each[output : output + 1] for each in rows]
-        weights, left = _regressed(partial(_pasts, own), LAGS, None)
+        products = lagged_products(own, LAGS, LAGS)[::-1, 0, ::-1, 0]
+        weights, left = _regressed(partial(_pasts, own), products, LAGS, None)
         if not np.all(np.isfinite(weights)) or left[0] <= 0.0:
             return None
         found.append(np.concatenate([[1.0], -weights[0, ::-1]]))
@@ -104,12 +111,13 @@ def _pasts(outputs: Sequence[Array]) -> Iterator[Array]:
 
 
 def _regressed(
-    pieces: Callable[[], Iterable[Array]], count: int, rounding: float | None
+    pieces: Callable[[], Iterable[Array]], products: Array, count: int, rounding: float | None
 ) -> tuple[Array, Array]:
     """Weights in the first `count` of so many rows that foretell the others, and squares left.
 
-    Rows come by pieces of samples; weights (rows - count, count).
+    Rows come by pieces of samples, where their products keep too few digits; weights
+    (rows - count, count).
     """
-    root = triangle_of_parts(lambda: (piece.T for piece in pieces()))
+    root = triangle_of_parts(lambda: (piece.T for piece in pieces()), products)
     weights = np.linalg.lstsq(root[:count, :count], root[:count, count:], rcond=rounding)[0]
     return np.asarray(weights.T), np.asarray(np.sum(root[count:, count:] ** 2, axis=0))
