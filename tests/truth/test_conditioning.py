@@ -284,6 +284,16 @@ def test_velocity_and_air_data_on_a_lever_arm() -> None:
 # --- derivatives
 
 
+def test_local_derivative_is_that_of_savitzky_and_golay() -> None:
+    values = np.random.default_rng(0).standard_normal(23)
+    for half_width in (1, 2, 5, 11):
+        known = signal.savgol_filter(
+            values, 2 * half_width + 1, 2, deriv=1, delta=0.02, mode="interp"
+        )
+        found = c.local_derivative(values, 0.02, half_width=half_width)
+        assert_close(found, known, why="the ends too", rtol=1e-11, atol=1e-11)
+
+
 def test_local_derivative_of_a_sine() -> None:
     found = c.local_derivative(np.sin(3 * TIME_S), 0.01)
     assert_close(found[2:-2], 3 * np.cos(3 * TIME_S)[2:-2], atol=2e-3, why="fourth-order error")

@@ -221,13 +221,16 @@ def test_local_mean_belongs_to_the_derivative() -> None:
 
 def test_constants_of_a_record_are_least_squares_too() -> None:
     generator = np.random.default_rng(0)
-    directions, rows = generator.standard_normal((30, 3)), generator.standard_normal(30)
-    directions[:, 2] = directions[:, 0]  # not seen apart
-    found = Nuisance.best(directions, rows)
-    wanted = np.linalg.lstsq(directions, rows, rcond=None)
-    assert_close(found.values, wanted[0], atol=1e-12, why="minimum norm")
-    left = found.removed_from(rows)
-    assert_close(directions.T @ left, np.zeros(3), atol=1e-12, why="orthogonal")
+    apart, rows = generator.standard_normal((30, 3)), generator.standard_normal(30)
+    alike = apart.copy()
+    alike[:, 2] = alike[:, 0]  # not seen apart
+    for directions in (apart, alike, apart * np.array([1e-120, 1.0, 1e120])):
+        found = Nuisance.best(directions, rows)
+        size = np.linalg.norm(directions, axis=0)
+        wanted = np.linalg.lstsq(directions / size, rows, rcond=None)[0]
+        assert_close(found.values * size, wanted, atol=1e-12, why="minimum norm")
+        left = found.removed_from(rows)
+        assert_close((directions / size).T @ left, np.zeros(3), atol=1e-12, why="orthogonal")
 
 
 def test_spectral_covariance_of_white_noise_is_the_plain_one() -> None:

@@ -307,13 +307,13 @@ class InnovationsProblem:
             turns.append(turn)
         factor = np.exp(level / total)
         white = np.concatenate([each.ravel() for each in rows])
-        whole, first = np.zeros((size, count)), 0
+        whole, first = np.empty((size, count)), 0
         for (each, _), row, turn in zip(found, rows, turns, strict=True):
             # All that turns and stretches whitened innovations is one product with them.
             by = (rise / total)[:, None, None] * np.eye(row.shape[1]) - turn
-            moved = row @ by.transpose(2, 1, 0).reshape(row.shape[1], -1)
-            into = whole[first : first + row.size]
-            np.add(each.slopes.reshape(into.shape), moved.reshape(into.shape), out=into)
+            into = whole[first : first + row.size].reshape(len(row), -1)
+            np.matmul(row, by.transpose(2, 1, 0).reshape(row.shape[1], -1), out=into)
+            into += each.slopes.reshape(into.shape)
             first += row.size
         still = np.zeros(size - total)
         curvature = (

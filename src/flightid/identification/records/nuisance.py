@@ -14,6 +14,10 @@ from flightid.frozen import dataclass
 
 Array = NDArray[np.float64]
 _RANK = 1e-9
+CLEAR = 1e-2
+"""Smallest eigenvalue of products over the largest, from which they lose two digits at most."""
+SQUARES = 1e-200, 1e200
+"""Of directions that neither vanish nor overflow."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +58,8 @@ class Nuisance:
 
     def removed_from(self, rows: Array) -> Array:
         """Rows (n_rows, …) less their part along the directions."""
-        return np.asarray(rows - self.space @ (self.space.T @ rows))
+        along = self.space @ (self.space.T @ rows)
+        return np.subtract(rows, along, out=along)
 
 
 @dataclass(frozen=True)
@@ -75,6 +80,15 @@ class NuisanceDirections:
     @classmethod
     def of(cls, directions: Array) -> NuisanceDirections:
         """From directions of shape (n_rows, n_constants)."""
+        products = directions.T @ directions
+        squares = np.diag(products)
+        if squares.size and np.all((squares > SQUARES[0]) & (squares < SQUARES[1])):
+            size = np.sqrt(squares)
+            values, axes = np.linalg.eigh(products / np.outer(size, size))
+            # Products keep the digits of directions that are far from alike.
+            if values[0] > CLEAR * values[-1]:
+                weights = axes / np.sqrt(values) / size[:, None]
+                return cls(directions @ weights, weights)
         # Starts die out: most rows may show nothing of them.
         shown = directions.any(axis=1)
         seen = directions[shown]

@@ -10,6 +10,7 @@ model's own slope makes of each corner is added to the cubic that leaves it out.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -80,9 +81,11 @@ class RightSide:
     def bends(self, theta: Array, motion: StateMeasurements) -> Bends:
         """What corners of the inputs do to the states between samples, for these parameters."""
         values, late = self._late(theta, motion)
-        inputs = late.at(0.0)[0]
+        # Of linear equations derivatives by inputs are the same at every sample.
+        told = slice(1) if self.model.is_linear else slice(None)
+        states, inputs = motion.states[:, told], late.at(0.0)[0][:, told]
         n = len(self.model.states)
-        return Bends.of(late, self._computed(values, motion.states, inputs).by_input[:, :n])
+        return Bends.of(late, self._computed(values, states, inputs).by_input[:, :n])
 
     def at(self, theta: Array, motion: StateMeasurements, bends: Bends) -> RightSides:
         """Values and derivatives at free parameters, shape (n_free,), bends held.
@@ -97,6 +100,7 @@ class RightSide:
             State derivatives enter an equation other than linearly, or a delay is negative.
         """
         values, late = self._late(theta, motion)
+        late = bends.late if bends.late.is_like(late) else late
         n, cells = len(self.model.states), motion.n_samples - 1
         pieces = list(pairwise(late.corners))
         places = [a + (b - a) * (0.5 + side * _GAUSS) for a, b in pieces for side in (-1.0, 1.0)]
@@ -244,12 +248,22 @@ class Bends:
 
     @classmethod
     def of(cls, late: DelayedInputs, by_input: Array) -> Bends:
-        """From derivatives of ẋ by the inputs, shape (n_samples, n_states, n_inputs)."""
+        """From derivatives of ẋ by the inputs, (n_samples or 1, n_states, n_inputs)."""
         _, changes = late.changes()
         return cls(late, by_input.transpose(2, 1, 0) * changes[:, None])
 
     def at(self, place: float) -> Array:
-        """Added to the curve at a place in every interval, (n_states, n_samples − 1)."""
+        """Added to the curve at a place in every interval, (n_states, n_samples − 1), kept."""
+        if place not in self._known:
+            self._known[place] = self._made(place)
+            self._known[place].flags.writeable = False
+        return self._known[place]
+
+    @cached_property
+    def _known(self) -> dict[float, Array]:
+        return {}
+
+    def _made(self, place: float) -> Array:
         n_states, count = self.jumps.shape[1:]
         found = np.zeros((n_states, count - 1))
         if self.late.hold == "band_limited":
