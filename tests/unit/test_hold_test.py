@@ -14,6 +14,7 @@ from flightid.identification import hold_likelihood
 from flightid.identification.hold_likelihood import (
     HeldOutputs,
     _products,
+    _steps,
     _weighed,
     held_outputs,
 )
@@ -397,3 +398,27 @@ def test_products_of_a_step_are_those_of_its_columns() -> None:
     assert_close(
         _products(left, slopes, weights, 3), rows.T @ rows, rtol=1e-12, why="rounding of two ways"
     )
+
+
+def test_own_numbers_of_one_effect_take_nothing_from_shared_parameters() -> None:
+    """A start and a bias that move an output alike: the step is that of least squares on all."""
+    random = np.random.default_rng(0)
+    records = []
+    for n in (300, 450):
+        slopes = random.standard_normal((2, n, 5))
+        slopes[0, :, 2:], slopes[1, :, 2:] = [1.0, 0.0, 1.0], [0.0, 1.0, 0.0]
+        records.append((10.0 * random.standard_normal((2, n)), slopes))
+    left, slopes = zip(*records, strict=True)
+    found = _steps(left, slopes, np.array([2.0, 0.5]), 2, None)
+    whole, target = np.zeros((1500, 8)), np.concatenate([each.ravel() for each in left])
+    weights = np.concatenate([np.repeat([0.5, 2.0], n) for n in (300, 450)])
+    for place, (first, each) in enumerate(zip((0, 600), slopes, strict=True)):
+        rows = slice(first, first + each[..., 0].size)
+        flat = each.reshape(-1, 5)
+        whole[rows, :2], whole[rows, 2 + 3 * place : 5 + 3 * place] = flat[:, :2], flat[:, 2:]
+    known = np.linalg.lstsq(whole * weights[:, None], target * weights)[0]
+    for place, each in enumerate(found):
+        assert_close(each[:2], known[:2], rtol=1e-9, why="rounding of two ways")
+        own = known[2 + 3 * place : 5 + 3 * place]
+        effect = [each[2] + each[4], each[3]]
+        assert_close(effect, [own[0] + own[2], own[1]], rtol=1e-9, why="what records show")

@@ -38,6 +38,8 @@ from flightid.uncertainty.foretold import expected_gain, likelihood_gain
 from flightid.uncertainty.triangle import triangle_of_parts, triangle_of_rows
 
 Array = NDArray[np.float64]
+ALIKE = 1e-9
+"""Share of an own number's effect that others of its record leave, up to which it is rounding."""
 RIDGE = 1e-9
 """Added to the power of what is left, as white noise."""
 FAR = 100.0
@@ -282,6 +284,8 @@ def _steps(
         )
         for rest, slope in zip(left, slopes, strict=True)
     ]
+    seen = [_told_apart(each, each.shape[1] - n_free - 1) for each in triangles]
+    triangles = [each for each, _ in seen]
     n_own = [each.shape[1] - n_free - 1 for each in triangles]
     inner = [each[m:, m:] for each, m in zip(triangles, n_own, strict=True)]
     whole = triangle_of_rows(np.concatenate(inner))
@@ -289,10 +293,26 @@ def _steps(
     if limits is not None:
         shared = _inside(shared, whole, limits)
     found = []
-    for each, m in zip(triangles, n_own, strict=True):
+    for each, (_, kept), m in zip(triangles, seen, n_own, strict=True):
         rest = each[:m, -1] - each[:m, m:-1] @ shared
-        found.append(np.concatenate([shared, np.linalg.lstsq(each[:m, :m], rest)[0]]))
+        own = np.zeros(len(kept))
+        own[kept] = np.linalg.lstsq(each[:m, :m], rest)[0]
+        found.append(np.concatenate([shared, own]))
     return found
+
+
+def _told_apart(triangle: Array, n_own: int) -> tuple[Array, NDArray[np.bool_]]:
+    """The triangle without own numbers that do what others of the record do, and which are left.
+
+    A bias of an output that is a state and the state's start may have one effect: rounding would
+    decide along what the second of them is eliminated, and take that from the shared parameters.
+    """
+    size = np.linalg.norm(triangle[:, :n_own], axis=0)
+    kept = np.abs(np.diag(triangle)[:n_own]) > ALIKE * size
+    if np.all(kept):
+        return triangle, kept
+    rest = np.ones(triangle.shape[1] - n_own, dtype=bool)
+    return triangle_of_rows(triangle[:, np.concatenate([kept, rest])]), kept
 
 
 def _inside(step: Array, triangle: Array, limits: tuple[Array, Array]) -> Array:
