@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-ROWS, COLUMNS = 256, 4
-"""Rows of a block that stays in the cache, at least so many for each column."""
-AT_ONCE = 256
-"""Blocks that are copied together."""
+ROWS = 256
+"""From which products of columns are tried."""
+CACHED, PANEL = 2048, 8
+"""Rows that are taken in together, which stay in the cache, and columns that are reflected so."""
 LEAST_DIAGONAL = 1e-3
 """Smallest diagonal of the triangle, of columns of unit length, at which the squared condition of
 products of columns leaves ten good digits."""
@@ -25,7 +26,7 @@ def triangle_of_rows(columns: Array) -> Array:
     """R of columns = QR; the signs of its rows are as they come.
 
     By products of columns, which cost a tenth, where these keep enough digits, once or in two
-    rounds; else block by block.
+    rounds; else block by block (LAPACK's `tpqrt`).
 
     Parameters
     ----------
@@ -48,7 +49,7 @@ def triangle_of_rows(columns: Array) -> Array:
     array([[5.]])
     """
     found = _of_products(lambda: [columns]) if len(columns) >= ROWS else None
-    return _by_blocks(columns) if found is None else found
+    return _row_by_row([columns]) if found is None else found
 
 
 def _of_products(
@@ -91,17 +92,22 @@ def _refined(first: Array, parts: Callable[[], Iterable[Array]]) -> Array | None
     return np.asarray(np.linalg.cholesky(products).T @ first)
 
 
-def _by_blocks(columns: Array) -> Array:
-    n, k = columns.shape
-    rows = max(ROWS, COLUMNS * k)
-    if n < 2 * rows or not k:
-        return np.asarray(np.linalg.qr(columns, mode="r"))
-    blocks = columns[: n // rows * rows].reshape(-1, rows, k)
-    parts = [
-        np.asarray(np.linalg.qr(blocks[first : first + AT_ONCE], mode="r")).reshape(-1, k)
-        for first in range(0, len(blocks), AT_ONCE)
-    ]
-    return _by_blocks(np.concatenate([*parts, columns[len(blocks) * rows :]]))
+def _row_by_row(parts: Iterable[Array]) -> Array:
+    """The triangle of all rows, taken in block by block: each is reflected into what there is."""
+    found: Array | None = None
+    for part in parts:
+        k = part.shape[1]
+        found = part[:0] if found is None else found
+        for begin in range(0, len(part), CACHED):
+            block = part[begin : begin + CACHED]
+            if len(found) < max(k, 1):
+                found = np.asarray(np.linalg.qr(np.concatenate([found, block]), mode="r"))
+                continue
+            square, rows = np.asfortranarray(found), np.array(block, order="F")
+            found = scipy.linalg.lapack.dtpqrt(
+                0, min(PANEL, k), square, rows, overwrite_a=1, overwrite_b=1
+            )[0]
+    return np.zeros((0, 0)) if found is None else found
 
 
 def triangle_of_parts(parts: Callable[[], Iterable[Array]], products: Array | None = None) -> Array:
@@ -121,5 +127,5 @@ def triangle_of_parts(parts: Callable[[], Iterable[Array]], products: Array | No
     """
     found = _of_products(parts, products)
     if found is None:
-        found = _by_blocks(np.concatenate([_by_blocks(part) for part in parts()]))
+        found = _row_by_row(parts())
     return found
