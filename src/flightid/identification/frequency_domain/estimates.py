@@ -30,8 +30,8 @@ from flightid.uncertainty.response_errors import DECIBEL, DEGREE, Sensitivity
 from flightid.uncertainty.triangle import triangle_of_rows
 
 Array = NDArray[np.float64]
-Compare = Callable[[Array, NDArray[np.bool_], Array, Array], AgreementTest]
-"""By gain, free parameters that count, what adds to the covariance, and degrees of freedom."""
+Compare = Callable[[Array, Array, NDArray[np.bool_], Array, Array], AgreementTest]
+"""By gain, its triangle, free parameters that count, what adds to the covariance, and freedom."""
 _AT_BOUND = 1e-9
 _SHARE = 0.1
 UNSEEN = "no influence on what was fitted: its value is where it started"
@@ -114,7 +114,7 @@ def statistics(
         if compare is None:
             covariance = errors.propagated(gain) + added
         else:
-            agreed = compare(gain, inner, added, freedom)
+            agreed = compare(gain, triangle, inner, added, freedom)
             covariance, agreement, freedom = agreed.covariance, agreed.agreement, agreed.freedom
         if bias is not None:
             moved = -gain @ bias

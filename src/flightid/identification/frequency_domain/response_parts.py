@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from flightid.frozen import dataclass
@@ -52,7 +53,12 @@ class PartComparison:
     slopes: Array
 
     def compare(
-        self, gain: Array, inner: NDArray[np.bool_], added: Array, freedom: Array
+        self,
+        gain: Array,
+        triangle: Array,
+        inner: NDArray[np.bool_],
+        added: Array,
+        freedom: Array,
     ) -> AgreementTest:
         """Covariance of the estimates, halves and records compared.
 
@@ -60,6 +66,8 @@ class PartComparison:
         ----------
         gain : ndarray, shape (n, n_points)
             How the estimates move with the points, but for the sign.
+        triangle : ndarray, shape (n, n)
+            Upper root of the information that the fit weighs the points by.
         inner : ndarray of bool, shape (n_free,)
             Free parameters that are not at a bound.
         added : ndarray, shape (n, n)
@@ -78,6 +86,9 @@ class PartComparison:
         whole = self._points(modelled.sum(axis=(0, 1)))
         slopes = self.slopes[:, inner]
         n, count = len(gain), left.shape[0]
+        # Moves of parameters have units of their own; what solves for them is one measure of all.
+        root = scipy.linalg.solve_triangular(triangle, np.eye(n))
+        towards = triangle.T @ triangle
         scores, information, weighed, shares = [], [], [], []
         for kept, made in zip(
             left.reshape(-1, *left.shape[2:]), modelled.reshape(-1, *left.shape[2:]), strict=True
@@ -102,11 +113,11 @@ class PartComparison:
         for k in range(count):
             noise = np.zeros((2, n, 2, n))
             for half, place in enumerate(range(1, len(rows))[2 * k : 2 * k + 2]):
-                noise[half, :, half] = known[place, :, place]
+                noise[half, :, half] = towards @ known[place, :, place] @ towards
             both = slice(2 * k, 2 * k + 2)
-            part = np.array(information[both]) @ np.linalg.inv(total)
-            flights.append(RecordParts(np.array(scores[both]), part, noise))
-        return compared(flights, np.eye(n), known[0, :, 0] + added, freedom)
+            part = towards @ np.array(information[both]) @ np.linalg.inv(total)
+            flights.append(RecordParts(np.array(scores[both]) @ towards, part, noise))
+        return compared(flights, root @ root.T, known[0, :, 0] + added, freedom)
 
     def _each_input_fair(self, shares: Array) -> bool:
         """Whether every part makes a fair share of most points of each input.
