@@ -8,9 +8,11 @@ from flightid.responses.errors.pilot_errors import acting, taken_by
 from flightid.responses.errors.pilot_search import (
     SPARE,
     PilotBins,
-    PilotColumns,
+    PilotInputs,
+    made,
+    settled,
     solve,
-    spectra_of,
+    started,
     turns,
 )
 from tests.closeness import assert_close
@@ -23,7 +25,7 @@ def written_out(data: PilotBins, order: int, target: NDArray[np.complex128]) -> 
     for place, (omega, u, y) in enumerate(
         zip(data.omega, data.inputs, data.by_record(target), strict=True)
     ):
-        powers = turns(omega, 10.0, order + SPARE)
+        powers = turns(omega, data.given.scale_rad_s, order + SPARE)
         basis = powers[: order + 1]
         part = np.zeros(((order + 1) * n_in + own * n_records + order, len(omega)), complex)
         part[: (order + 1) * n_in] = np.concatenate([row * basis for row in u])
@@ -38,7 +40,7 @@ def test_what_a_fit_takes_of_noise_is_that_of_all_columns() -> None:
     """The diagonal of the projection on all columns, and their covariance, record by record."""
     random = np.random.default_rng(5)
     inputs = [random.standard_normal((2, n)) for n in (90, 120)]
-    data = spectra_of(inputs, [np.cumsum(u.sum(0)) for u in inputs], 0.02, 60.0)
+    data = PilotInputs.of(inputs, 0.02, 60.0).with_output([np.cumsum(u.sum(0)) for u in inputs])
     target, order = np.concatenate(data.output), 2
     weights = 1.0 / (1.0 + np.abs(target))
     columns = written_out(data, order, target)
@@ -87,10 +89,10 @@ def test_eliminated_transients_solve_the_whole_problem() -> None:
     """Three records of unlike length, two inputs: as by one problem of all columns."""
     random = np.random.default_rng(3)
     inputs = [random.standard_normal((2, n)) for n in (300, 180, 240)]
-    data = spectra_of(inputs, [np.cumsum(u.sum(0)) for u in inputs], 0.02, 60.0)
+    data = PilotInputs.of(inputs, 0.02, 60.0).with_output([np.cumsum(u.sum(0)) for u in inputs])
     order, target = 3, np.concatenate(data.output)
     weights = 1.0 / (1.0 + np.abs(target))
-    made = PilotColumns.of(data, order, 10.0)
+    made = data.given.columns(order)
     numerators, denominator, transients = solve(made, target, weights, target * weights)
     columns = written_out(data, order, target) * weights
     both = np.concatenate([columns.real, columns.imag], axis=1).T
@@ -104,11 +106,28 @@ def test_columns_that_are_alike_are_solved_by_triangles() -> None:
     """An output that is an input: numerator and denominator of order two share both roots."""
     random = np.random.default_rng(4)
     inputs = [random.standard_normal((1, n)) for n in (200, 160)]
-    data = spectra_of(inputs, [u[0] for u in inputs], 0.02, 60.0)
+    data = PilotInputs.of(inputs, 0.02, 60.0).with_output([u[0] for u in inputs])
     target, ones = np.concatenate(data.output), np.ones(data.size)
-    made = PilotColumns.of(data, 2, 10.0)
+    made = data.given.columns(2)
     assert made.bins.solve(target, ones, target) is None
     numerators, denominator, transients = solve(made, target, ones, target)
     still = np.zeros(2)
     above = made.bins.numerator(np.concatenate([numerators.ravel(), still, *transients]))
     assert_close(above, target * (denominator @ made.whole), atol=1e-9, why="rounding")
+
+
+def test_an_order_goes_on_from_where_it_was() -> None:
+    """By other weights no worse than the known state, and at the minimum that nothing leads to."""
+    random = np.random.default_rng(9)
+    inputs = [random.standard_normal((1, n)) for n in (260, 240)]
+    outputs = [np.convolve(u[0], [0.0, 0.9, 0.5, -0.2])[: u.shape[1]] for u in inputs]
+    noisy = [y + 0.1 * random.standard_normal(len(y)) for y in outputs]
+    data = PilotInputs.of(inputs, 0.02, 60.0).with_output(noisy)
+    ones = np.ones(data.size)
+    known = settled(data, ones, started(data, 3, ones))
+    weights = 1.0 / (0.3 + np.abs(data.target))
+    under_these = made(data, data.given.columns(3), weights, *known.coefficients)
+    further = settled(data, weights, started(data, 3, weights, known))
+    anew = settled(data, weights, started(data, 3, weights))
+    assert further.cost < under_these.cost
+    assert_close(further.cost, anew.cost, rtol=1e-4, why="steps end at shares of 1e-5")

@@ -16,6 +16,7 @@ from flightid.responses.errors.pilot_errors import (
     slopes_of,
     taken_by,
 )
+from flightid.responses.errors.pilot_orders import PilotFit
 from flightid.responses.errors.pilot_search import (
     PilotBins,
     PilotColumns,
@@ -32,9 +33,7 @@ SETTLED = 1e-4
 """Share of the noise's power that instruments foretell of residuals, from which steps end."""
 
 
-def instrumented(
-    measured: PilotBins, excited: PilotBins, state: PilotState, scale: float, weights: Real
-) -> tuple[PilotState, list[Complex], tuple[Real, Real]]:
+def instrumented(measured: PilotBins, fit: PilotFit) -> PilotFit:
     """A pilot of the measured inputs whose residuals no instrument foretells.
 
     Instruments are the slopes of the response to the excited part of the inputs, weighed by the
@@ -43,39 +42,34 @@ def instrumented(
 
     Parameters
     ----------
-    measured, excited : PilotBins
-        With the inputs as measured, and as excitations alone would have moved them.
-    state : PilotState
-        The fit to the excited part.
-    scale : float
-        See `Pilot.scale_rad_s`.
-    weights : ndarray, shape (n_bins,)
-        One over the root of the noise's spectrum of that fit.
+    measured : PilotBins
+        With the inputs as measured.
+    fit : PilotFit
+        To the inputs as excitations alone would have moved them.
 
     Returns
     -------
-    PilotState, list of ndarray, (ndarray, ndarray)
-        Of the measured inputs; slopes of the excited ones, by which the errors go; `taken_by`.
+    PilotFit
+        Of the measured inputs; its slopes, by which the errors go, are of the excited ones.
 
     Reference
     ---------
     Young, *Recursive Estimation and Time-Series Analysis*, 2nd ed. (2011), chapter 7; in closed
     loop: Gilson & Van den Hof, *Automatica* 41 (2005), 241–249.
     """
-    target, omega = np.concatenate(measured.output), np.concatenate(measured.omega)
-    order = len(state.denominator) - 1
-    ending = ending_of(state)
-    own, others = (PilotColumns.of(data, order, scale) for data in (measured, excited))
-    found, slopes = _with(measured, own, state, weights), slopes_of(others, state)
-    taken = taken_by(slopes, ending, weights)
+    excited, ending = fit.data, ending_of(fit.state)
+    own, others = (data.given.columns(fit.state.order) for data in (measured, excited))
+    found, slopes = _with(measured, own, fit.state, fit.weights), fit.slopes
+    taken, omega = taken_by(slopes, ending, fit.weights), np.concatenate(measured.omega)
+    weights = fit.weights
     for _ in range(PASSES):
-        weights = noise_weights(omega, target - found.modelled, target, taken[0])
+        left = measured.target - found.modelled
+        weights = noise_weights(omega, left, measured.target, taken[0])
         instruments = PilotBasis.of(weighed_parts(slopes, weights), ending)
-        found = _with(measured, own, found, weights)
-        found = _settled(measured, own, instruments, found, scale, weights)
+        found = _settled(measured, own, instruments, _with(measured, own, found, weights), weights)
         slopes = slopes_of(others, _with(excited, others, found, weights))
         taken = taken_by(slopes, ending, weights)
-    return found, slopes, taken
+    return PilotFit(measured, found, slopes, taken, weights)
 
 
 def _settled(
@@ -83,11 +77,10 @@ def _settled(
     columns: PilotColumns,
     instruments: PilotBasis,
     state: PilotState,
-    scale: float,
     weights: Real,
 ) -> PilotState:
     """Steps by instruments from a state, each of which foretells less of the residuals."""
-    found = state
+    found, scale = state, measured.given.scale_rad_s
     foretold = _foretold(measured, instruments, found)
     for _ in range(STEPS):
         if foretold < SETTLED * found.cost * measured.size:
@@ -126,6 +119,7 @@ def _moved(state: PilotState, step: tuple[list[Real], Real], length: float) -> P
         state.numerators + length * shared[:split].reshape(state.numerators.shape),
         np.concatenate([[1.0], state.denominator[1:] + length * shared[split:]]),
         tuple(a + length * b for a, b in zip(state.transients, own, strict=True)),
+        state.under,
         state.modelled,
         state.residual,
         state.cost,

@@ -17,37 +17,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from flightid.frozen import dataclass
 from flightid.responses.errors.instrumented_pilot import instrumented
-from flightid.responses.errors.pilot_errors import (
-    LEAST,
-    acting,
-    ending_of,
-    noise_weights,
-    slopes_of,
-    taken_by,
-)
-from flightid.responses.errors.pilot_search import (
-    SPARE,
-    PilotBins,
-    PilotColumns,
-    PilotState,
-    search,
-    spectra_of,
-    turns,
-)
-from flightid.responses.errors.unseen_peaks import has_unseen_peak
+from flightid.responses.errors.pilot_errors import acting
+from flightid.responses.errors.pilot_orders import PilotFit, fitted
+from flightid.responses.errors.pilot_search import SPARE, PilotBins, PilotInputs, turns
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 Places = NDArray[np.intp]
-
-ORDERS = (1, 2, 3, 4, 5, 6, 8, 10)
-"""Orders that are tried, each started by itself."""
-SPENT = 3.0
-"""Equations for each unknown that a fit needs."""
-PASSES = 3
-"""Fits by the noise that the one before left: of all orders twice, then of the one found."""
-PATIENCE = 2
-"""Orders beyond the best that are still tried."""
 
 
 @dataclass(frozen=True)
@@ -184,75 +160,29 @@ def fit_pilots(
     Akaike's criterion for few data (Hurvich & Tsai, *Biometrika* 76, 1989): an order too low would
     be a bias that no covariance holds.
     """
+    limits = sample_time_s, highest_rad_s
+    measured = PilotInputs.of(inputs, *limits)
+    instruments = PilotInputs.of(excited, *limits) if excited else measured
     found = []
     for row in range(len(outputs[0])):
-        limits = [each[row] for each in outputs], sample_time_s, highest_rad_s
-        known = spectra_of(inputs, *limits)
-        found.append(_fit_output(known, spectra_of(excited, *limits) if excited else known))
+        output = [each[row] for each in outputs]
+        data = measured.with_output(output)
+        fit = fitted(instruments.with_output(output) if excited else data)
+        if fit is not None and excited:
+            fit = instrumented(data, fit)
+        found.append(None if fit is None else _pilot(data, fit))
     return found
 
 
-def _fit_output(measured: PilotBins, data: PilotBins) -> Pilot | None:
-    """A pilot by the measured inputs, or by their excited part as instruments."""
-    n_in, n_records = len(data.inputs[0]), len(data.output)
-    target = np.concatenate(data.output)
-    if not data.size or not np.any(target):
-        return None
-    last, first = max(each[-1] for each in data.omega), min(each[0] for each in data.omega)
-    scale = float(np.sqrt(last * first))
-    best: PilotState | None = None
-    slopes: list[Complex] = []
-    taken = np.zeros(0), np.zeros(0)
-    weights = np.ones(data.size)
-    tried: tuple[int, ...] = ORDERS
-    for _ in range(PASSES):
-        lowest, found, since = np.inf, None, 0
-        for order in tried:
-            unknowns = (order + 1) * (n_in + n_records) + order + SPARE * n_records
-            if 2 * data.size < SPENT * unknowns:
-                break
-            state = search(data, order, scale, weights)
-            if has_unseen_peak(data.omega, state.numerators, state.denominator, scale):
-                continue
-            # The criterion for an unknown variance of the noise.
-            height = 2.0 * data.size * np.log(max(state.cost, LEAST))
-            height += 2.0 * unknowns / (1.0 - (unknowns + 1.0) / (2.0 * data.size))
-            since += 1
-            if height < lowest:
-                lowest, found, since = height, state, 0
-            if since > PATIENCE:
-                break
-        if found is None:
-            break
-        if best is not None:
-            tried = (len(found.denominator) - 1,)
-        order = len(found.denominator) - 1
-        best, slopes = found, slopes_of(PilotColumns.of(data, order, scale), found)
-        taken = taken_by(slopes, ending_of(found), weights)
-        omega = np.concatenate(data.omega)
-        weights = noise_weights(omega, target - found.modelled, target, taken[0])
-    if best is None:
-        return None
-    if data is not measured:
-        best, slopes, taken = instrumented(measured, data, best, scale, weights)
-    return _pilot(data, best, scale, slopes, taken)
-
-
-def _pilot(
-    data: PilotBins,
-    state: PilotState,
-    scale: float,
-    slopes: Sequence[Complex],
-    taken: tuple[Real, Real],
-) -> Pilot:
-    spent, covariance = taken
+def _pilot(data: PilotBins, fit: PilotFit) -> Pilot:
+    state, (spent, covariance) = fit.state, fit.taken
     variance = state.cost * data.size / max(2.0 * data.size - len(covariance), 1.0)
     return Pilot(
-        scale,
+        data.given.scale_rad_s,
         state.numerators,
         state.denominator,
         data.samples(data.by_record(state.modelled)),
-        data.samples(slopes),
+        data.samples(fit.slopes),
         variance * covariance,
         tuple(data.by_record(spent)),
     )

@@ -15,11 +15,13 @@ from flightid.frozen import dataclass
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 Kind = TypeVar("Kind", np.float64, np.complex128)
+ORDERS = (1, 2, 3, 4, 5, 6, 8, 10)
+"""Orders that are tried."""
 SPARE = 2
 """Terms of a transient beyond the order: band limits and aliases bend it."""
 BEYOND_BAND = 1.3
 """Bins are fitted up to this multiple of the highest frequency of the response."""
-STARTS, STEPS, HALVINGS = 6, 12, 6
+STARTS, FURTHER, STEPS, HALVINGS = 6, 2, 12, 6
 SETTLED = 1e-5
 SOUND = 1e-6
 """Diagonal of a triangle, of columns of unit length, above which it is solved as it is."""
@@ -35,14 +37,94 @@ def turns(omega: Real, scale_rad_s: float, order: int) -> Complex:
 
 
 @dataclass(frozen=True)
-class PilotBins:
-    """Fourier bins of the records inside the band."""
+class PilotInputs:
+    """Fourier bins of the records' inputs inside the band, and powers for pilots of all orders.
+
+    Attributes
+    ----------
+    omega : tuple of ndarray, each shape (n_f,)
+        rad/s.
+    inputs : tuple of ndarray, each shape (n_in, n_f)
+    lengths : tuple of int
+        Samples of each record.
+    sample_time_s : float
+    """
 
     omega: tuple[Real, ...]
     inputs: tuple[Complex, ...]
-    output: tuple[Complex, ...]
     lengths: tuple[int, ...]
     sample_time_s: float
+
+    @classmethod
+    def of(cls, inputs: Sequence[Real], sample_time_s: float, highest: float) -> PilotInputs:
+        """Of samples of each record, shape (n_in, n), up to a little above a frequency in rad/s."""
+        omegas, found = [], []
+        lengths = tuple(each.shape[1] for each in inputs)
+        for u, n in zip(inputs, lengths, strict=True):
+            spacing = 2.0 * np.pi / (n * sample_time_s)
+            last = min((n - 1) // 2, int(BEYOND_BAND * highest / spacing))
+            omegas.append(spacing * np.arange(1, last + 1, dtype=np.float64))
+            found.append(_scale(n, sample_time_s) * np.fft.rfft(u, axis=1)[:, 1 : last + 1])
+        return cls(tuple(omegas), tuple(found), lengths, sample_time_s)
+
+    def with_output(self, output: Sequence[Real]) -> PilotBins:
+        """With samples of an output of each record, shape (n,)."""
+        found = []
+        for y, n, omega in zip(output, self.lengths, self.omega, strict=True):
+            found.append(_scale(n, self.sample_time_s) * np.fft.rfft(y)[1 : len(omega) + 1])
+        return PilotBins(self, tuple(found))
+
+    @cached_property
+    def scale_rad_s(self) -> float:
+        """Frequency about which the powers turn: the middle of the bins, in logarithms."""
+        held = [each for each in self.omega if len(each)]
+        return float(np.sqrt(max(each[-1] for each in held) * min(each[0] for each in held)))
+
+    def columns(self, order: int) -> PilotColumns:
+        """What one order makes of the bins: the first of the powers."""
+        ends = [each[: order + 1 + SPARE] for each in self._powers]
+        basis = [each[: order + 1] for each in ends]
+        lengths, whole = [len(each) for each in self.omega], self._joined[0][: order + 1]
+        bins = RationalBins(self._joined[1], self._joined[0][1], lengths, order, order + 1 + SPARE)
+        return PilotColumns(basis, ends, whole, self.inputs, bins)
+
+    @cached_property
+    def _powers(self) -> list[Complex]:
+        """Of the highest order, and of its transient, by record."""
+        return [turns(omega, self.scale_rad_s, ORDERS[-1] + SPARE) for omega in self.omega]
+
+    @cached_property
+    def _joined(self) -> tuple[Complex, Complex]:
+        """Powers and inputs of all records."""
+        powers = [each[: ORDERS[-1] + 1] for each in self._powers]
+        return np.concatenate(powers, axis=1), np.concatenate(self.inputs, axis=1)
+
+
+def _scale(n_samples: int, sample_time_s: float) -> float:
+    return float(np.sqrt(2.0 * sample_time_s / n_samples))
+
+
+@dataclass(frozen=True)
+class PilotBins:
+    """Fourier bins of the records inside the band: of the inputs, and of one output."""
+
+    given: PilotInputs
+    output: tuple[Complex, ...]
+
+    @property
+    def omega(self) -> tuple[Real, ...]:
+        """Frequencies of each record's bins, rad/s."""
+        return self.given.omega
+
+    @property
+    def inputs(self) -> tuple[Complex, ...]:
+        """Bins of each record's inputs."""
+        return self.given.inputs
+
+    @cached_property
+    def target(self) -> Complex:
+        """Output of all records."""
+        return np.concatenate(self.output)
 
     @property
     def size(self) -> int:
@@ -56,9 +138,9 @@ class PilotBins:
     def samples(self, values: Sequence[Complex]) -> tuple[Real, ...]:
         """Samples of each record, shape (…, n), from its bins in the band, shape (…, n_f)."""
         made: list[Real] = []
-        for each, n in zip(values, self.lengths, strict=True):
+        for each, n in zip(values, self.given.lengths, strict=True):
             bins = np.zeros((*each.shape[:-1], n // 2 + 1), dtype=np.complex128)
-            bins[..., 1 : each.shape[-1] + 1] = each * np.sqrt(n / (2.0 * self.sample_time_s))
+            bins[..., 1 : each.shape[-1] + 1] = each / _scale(n, self.given.sample_time_s)
             made.append(np.asarray(np.fft.irfft(bins, n), dtype=np.float64))
         return tuple(made)
 
@@ -70,25 +152,20 @@ class PilotState:
     numerators: Real
     denominator: Real
     transients: tuple[Real, ...]
+    under: Complex
     modelled: Complex
     residual: Complex
     cost: float
 
+    @property
+    def order(self) -> int:
+        """Number of poles."""
+        return len(self.denominator) - 1
 
-def spectra_of(
-    inputs: Sequence[Real], output: Sequence[Real], sample_time_s: float, highest: float
-) -> PilotBins:
-    """Bins of the records inside the band, of all inputs and one output."""
-    omegas, ins, outs = [], [], []
-    for u, y in zip(inputs, output, strict=True):
-        n = len(y)
-        last = min((n - 1) // 2, int(BEYOND_BAND * highest * n * sample_time_s / (2.0 * np.pi)))
-        scale = np.sqrt(2.0 * sample_time_s / n)
-        omegas.append(2.0 * np.pi / (n * sample_time_s) * np.arange(1, last + 1, dtype=np.float64))
-        ins.append(scale * np.fft.rfft(u, axis=1)[:, 1 : last + 1])
-        outs.append(scale * np.fft.rfft(y)[1 : last + 1])
-    lengths = tuple(len(each) for each in output)
-    return PilotBins(tuple(omegas), tuple(ins), tuple(outs), lengths, sample_time_s)
+    @property
+    def coefficients(self) -> tuple[Real, Real, tuple[Real, ...]]:
+        """Numerators, denominator and transients."""
+        return self.numerators, self.denominator, self.transients
 
 
 @dataclass(frozen=True)
@@ -112,17 +189,6 @@ class PilotColumns:
     inputs: tuple[Complex, ...]
     bins: RationalBins
 
-    @classmethod
-    def of(cls, data: PilotBins, order: int, scale: float) -> PilotColumns:
-        """Of an order."""
-        ends = [turns(omega, scale, order + SPARE) for omega in data.omega]
-        basis = [each[: order + 1] for each in ends]
-        whole = np.concatenate(basis, axis=1)
-        lengths = [len(each) for each in data.omega]
-        inputs = np.concatenate(data.inputs, axis=1)
-        bins = RationalBins(inputs, whole[1], lengths, order, order + 1 + SPARE)
-        return cls(basis, ends, whole, data.inputs, bins)
-
     @cached_property
     def fixed(self) -> list[Complex]:
         """Sensitivities times the denominator of transient and numerators, each (n_fixed, n_f)."""
@@ -137,18 +203,27 @@ class PilotColumns:
         return [int(each) for each in np.cumsum([phi.shape[1] for phi in self.basis])[:-1]]
 
 
-def search(data: PilotBins, order: int, scale: float, weights: Real) -> PilotState:
-    """Sanathanan and Koerner's iteration, then Gauss–Newton steps from its best."""
-    columns = PilotColumns.of(data, order, scale)
-    target = np.concatenate(data.output)
-    state, denominator = None, np.ones(len(target), dtype=np.complex128)
-    for _ in range(STARTS):
-        scaled = weights / np.abs(denominator)
-        found = solve(columns, target, scaled, target * scaled)
-        tried = made(data, columns, weights, *found)
+def started(
+    data: PilotBins, order: int, weights: Real, known: PilotState | None = None
+) -> PilotState:
+    """The best of Sanathanan and Koerner's iteration, from a state of the order or from nothing."""
+    columns, target, state = data.given.columns(order), data.target, None
+    under = np.ones(len(target), dtype=np.complex128)
+    if known is not None:
+        state = made(data, columns, weights, *known.coefficients)
+        under = state.under
+    for _ in range(STARTS if known is None else FURTHER):
+        scaled = weights / np.abs(under)
+        tried = made(data, columns, weights, *solve(columns, target, scaled, target * scaled))
         state = tried if state is None or tried.cost < state.cost else state
-        denominator = found[1] @ columns.whole
+        under = tried.under
     assert state is not None
+    return state
+
+
+def settled(data: PilotBins, weights: Real, state: PilotState) -> PilotState:
+    """Gauss–Newton steps from a state."""
+    columns = data.given.columns(state.order)
     for _ in range(STEPS):
         stepped = _gauss_newton(data, columns, weights, state)
         done = stepped.cost > state.cost * (1.0 - SETTLED)
@@ -242,17 +317,17 @@ def made(
     """Coefficients with what they make of the bins."""
     still = np.zeros(len(denominator) - 1)
     above = columns.bins.numerator(np.concatenate([numerators.ravel(), still, *transients]))
-    modelled = above / (denominator @ columns.whole)
-    residual = weights * (np.concatenate(data.output) - modelled)
-    cost = float(np.mean(np.abs(residual) ** 2))
-    return PilotState(numerators, denominator, transients, modelled, residual, cost)
+    under = denominator @ columns.whole
+    modelled = above / under
+    residual = weights * (data.target - modelled)
+    cost = float(np.vdot(residual, residual).real) / len(residual)
+    return PilotState(numerators, denominator, transients, under, modelled, residual, cost)
 
 
 def _gauss_newton(
     data: PilotBins, columns: PilotColumns, weights: Real, state: PilotState
 ) -> PilotState:
-    under = state.denominator @ columns.whole
-    moves = solve(columns, state.modelled, weights / under, state.residual)
+    moves = solve(columns, state.modelled, weights / state.under, state.residual)
     length = 1.0
     for _ in range(HALVINGS):
         moved = made(
