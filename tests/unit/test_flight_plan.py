@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,12 +13,12 @@ import flightid as fid
 from flightid.cli.program import run
 from flightid.control.autopilots import axis_loop_of, read_parameters
 from flightid.conventions import Light
-from flightid.errors import OptionError, UnknownNameError
+from flightid.errors import DataError, OptionError, UnknownNameError
 from flightid.evidence.part_checks import agreement_check
 from flightid.findings import Finding
 from flightid.inspection.advice import set_bits
 from flightid.inspection.flight_phases import FlightPhases, flight_phases
-from flightid.planning.axis_guess import guess_axis
+from flightid.planning.axis_guess import _measured, guess_axis
 from flightid.planning.flight_findings import flight_findings
 from flightid.planning.flown_sweeps import FlownSweeps
 from flightid.planning.loop_check import CAREFULLY, MISSED
@@ -203,6 +204,24 @@ def test_chirps_are_as_asked(tmp_path: Path) -> None:
     )  # fmt: skip
     with pytest.raises(OptionError, match="leaves the autopilot's range"):
         fid.plan_flight(vehicle="quad", autopilot="betaflight", amplitude=20.0)
+
+
+def test_a_small_amplitude_is_not_rounded_to_nothing() -> None:
+    """0.0004 of full stood as SID_MAGNITUDE 0 in a no-go."""
+    small = fid.plan_flight(vehicle="quad", axes=("pitch",), amplitude=0.0004)
+    assert {each.name: each.value for each in small.sweeps[0].changes}["SID_MAGNITUDE"] == 4e-4
+
+
+def test_a_set_point_that_stands_still_is_called_that() -> None:
+    """A flight by rates told “input 'theta_ref' has no power” of what nobody had asked for."""
+    time_s = np.arange(0.0, 20.0, 0.01)
+    flown = fid.Record.from_arrays(
+        time_s, inputs={"tau_theta": 0.1 * np.sin(3.0 * time_s), "theta_ref": 0.0 * time_s},
+        outputs={"q": np.cos(3.0 * time_s)}, units={"theta_ref": "rad", "q": "rad/s"},
+    )  # fmt: skip
+    loop = SimpleNamespace(output_unit="1")
+    with pytest.raises(DataError, match="set-point of the pitch attitude stands still in the air"):
+        _measured("pitch", [flown], None, loop)  # type: ignore[arg-type]
 
 
 def test_helicopters_keep_their_integrator() -> None:

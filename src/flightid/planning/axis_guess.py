@@ -171,6 +171,8 @@ def _measured(axis: str, pieces: list[Record], base: FlownAxis, loop: AxisLoop) 
         raise DataError("the command was at its limit", found=f"{100 * limited:.0f} % of the time")
     if angle not in pieces[0]:
         raise DataError("no set-point of attitude is logged")
+    if all(np.ptp(piece[angle]) == 0.0 for piece in pieces):
+        raise DataError(f"the set-point of the {axis} attitude stands still in the air")
     rate_hz = min(record.sample_rate_hz for record in pieces)
     highest = min(HIGHEST_RAD_S, 2.0 * np.pi * rate_hz / SAMPLES_IN_CYCLE)
     if highest < 4.0 * LOWEST_RAD_S:

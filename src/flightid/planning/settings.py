@@ -24,6 +24,8 @@ SID_NAMES = {
     "SID_T_FADE_OUT": "fade_out_s",
     "SID_T_REC": "record_s",
 }
+LEAST_DECIMAL = 0.1
+"""Of a setting: below it three decimals are fewer than three digits."""
 # Ranges that the autopilots document; they would clip or refuse in flight, which is too late.
 RANGES = {
     "SID_F_START_HZ": (0.01, 100.0),
@@ -128,7 +130,9 @@ def _system_identification(
     prefix = "Q_A" if procedure.name == "quadplane" else "ATC"
     made: dict[str, tuple[float, str]] = {}
     for name, option in SID_NAMES.items():
-        made[name] = (round(float(str(excitation.options[option])), 3), "")
+        asked = float(str(excitation.options[option]))
+        # Three decimals, and three digits: of a small amplitude decimals alone left nothing.
+        made[name] = (round(asked, 3) if asked >= LEAST_DECIMAL else float(f"{asked:.3g}"), "")
     made["SID_AXIS"] = (float(SID_AXES[axis]), f"at the mixer, {axis}")
     made[f"{prefix}_RATE_FF_ENAB"] = (0.0, "keeps command shaping out of the sweep")
     if procedure.kind == "multirotor":
