@@ -79,3 +79,47 @@ def _typed_over_an_own_model(page: Any) -> None:
     opens.click()
     page.get_by_role("button", name="Back to what was typed").wait_for()
     assert text.input_value() == whole
+
+
+def test_roles_of_several_columns_are_given_at_once_and_wait_for_the_study(tmp_path: Path) -> None:
+    """What was chosen on Records before there was a study went with a reload."""
+    if missing := _missing():
+        pytest.fail(missing) if REQUIRED else pytest.skip(missing)
+    folder, table = tmp_path / "workspace", tmp_path / "rig.csv"
+    names = ("u_one", "u_two", "y_one", "y_two")
+    rows = ("".join(f",{(k * (j + 3)) % 17 - 8}" for j in range(4)) for k in range(200))
+    body = "".join(f"{0.1 * k:.1f}{row}\n" for k, row in enumerate(rows))
+    table.write_text(f"time [s],{','.join(names)}\n{body}")
+    with opened_desk(folder) as desk:
+        page = desk.open().page
+        page.wait_for_selector(".drop")
+        page.set_input_files("input[type=file]", table)
+        page.get_by_label("Mark u_one").check()
+        page.get_by_label("Mark u_two").check()
+        page.get_by_text("2 marked:").wait_for()
+        page.get_by_label("Role of all that are marked").select_option("input")
+        page.get_by_label("Unit of all that are marked").fill("V")
+        page.get_by_label("Unit of all that are marked").press("Tab")
+        page.get_by_role("button", name="None", exact=True).click()
+        page.get_by_label("Mark y_one").click()
+        page.get_by_label("Mark y_two").click(modifiers=["Shift"])
+        page.get_by_label("Role of all that are marked").select_option("output")
+        rig = page.url.rpartition("/")[2]
+        until(page, lambda: page.evaluate(KEPT) == 1)
+    with opened_desk(folder) as desk:
+        page = desk.open(f"#/records/{rig}").page
+        page.get_by_text("Chosen before, and not written yet.").wait_for()
+        roles = [page.get_by_label(f"Role of {each}", exact=True).input_value() for each in names]
+        assert roles == ["input", "input", "output", "output"]
+        assert page.get_by_label("Unit of u_two", exact=True).input_value() == "V"
+        page.get_by_role("button", name="Write the study").click()
+        page.get_by_role("button", name="Propose anew").wait_for()
+        assert desk.study["model"][0]["inputs"] == ["u_one", "u_two"]
+        until(page, lambda: page.evaluate(KEPT) == 0)
+        # Of a study too: both leave every model in one step, that Undo takes back.
+        page.get_by_label("Mark u_two").check()
+        page.get_by_label("Unit of all that are marked").fill("mV")
+        page.get_by_label("Unit of all that are marked").press("Tab")
+        page.locator("pre .changed", has_text="mV").first.wait_for()
+        page.get_by_label("Role of all that are marked").select_option("left out")
+        until(page, lambda: desk.study["model"][0]["inputs"] in ("u_one", ["u_one"]))
