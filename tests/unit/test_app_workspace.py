@@ -19,7 +19,7 @@ from flightid.app import bare_study
 from flightid.app.bare_study import UNWRITTEN
 from flightid.app.plot_layouts import keep_layout, plot_layouts, remove_layout
 from flightid.app.plot_schemas import PlotLayout
-from flightid.app.schemas import Edit, Edits, StudyStep, StudyText
+from flightid.app.schemas import Edit, Edits, StudyStep, StudyText, WholeText
 from flightid.app.studies import Studies
 from flightid.app.study_edits import KeyEdit, edited, etag_of, write_study
 from flightid.app.workspace import Workspace
@@ -242,6 +242,27 @@ def test_what_a_log_without_a_model_asks_begins_its_study(
         told = studies.step(known, StudyStep(back=True), told.etag)
         assert told is not None
     assert (told.undoable, told.redoable, told.settings["plan"]) == (0, 3, {})
+
+
+def test_a_deleted_study_is_written_again_from_its_text_alone(tmp_path: Path, log: Path) -> None:
+    """The page had the words, and the folder took them no more."""
+    workspace = Workspace(tmp_path)
+    known = asyncio.run(workspace.take("calm.bin", _pieces(log.read_bytes())))
+    studies, path = Studies(workspace), workspace.study_path(known)
+    text = f'[study]\ntitle = "t"\n[log]\npath = "../logs/{known}/calm.bin"\n[plan]\n'
+    path.parent.mkdir(exist_ok=True)
+    assert studies.replace(known, WholeText(text=text), '"some"') is None
+    assert studies.replace("0" * 16, WholeText(text=text), UNWRITTEN) is None
+    with pytest.raises(StudyError):
+        studies.replace(known, WholeText(text="[model"), UNWRITTEN)
+    assert not path.exists()
+    told = studies.replace(known, WholeText(text=text), UNWRITTEN)
+    assert told is not None
+    assert (told.text, path.read_text("utf-8")) == (text, text)
+    # Somebody may have written it first: that is asked about, not overwritten.
+    with pytest.raises(HTTPException) as other:
+        studies.replace(known, WholeText(text=text + "\n"), UNWRITTEN)
+    assert other.value.status_code == 409
 
 
 def test_the_page_has_the_types_of_the_server() -> None:

@@ -76,8 +76,9 @@ export class Study {
   load(): Promise<void> {
     return this.#inTurn(async () => {
       try {
-        this.file = await api.study(this.log);
-        this.error = "";
+        const told = await api.study(this.log);
+        if (this.file && !told) this.#gone(this.file.text, null);
+        else [this.file, this.error] = [told, ""];
       } catch (error) {
         this.error = (error as Error).message;
       }
@@ -202,6 +203,7 @@ export class Study {
       this.error = "";
     } catch (error) {
       const refusal = error as api.Refusal;
+      if (refusal.status === 404 && this.file) return this.#gone(this.file.text, meant);
       if (refusal.status !== 409) {
         this.error = refusal.message;
         return false;
@@ -215,6 +217,14 @@ export class Study {
     const old = new Set(before.split("\n"));
     this.changed = this.file.text.split("\n").filter((line) => !old.has(line));
     return true;
+  }
+
+  /** Somebody has deleted it: what was typed, else what stood here, waits to be written again. */
+  #gone(text: string, meant: Meant | null): boolean {
+    if (!drafts.kept(this.place)) drafts.keep(this.place, { text: meant?.text ?? text, name: "", before: text });
+    this.file = null;
+    this.error = "The study was deleted meanwhile: nothing was stored. Its text is kept above.";
+    return false;
   }
 
   /** Keys that were changed before the question stood there are of what is asked about. */

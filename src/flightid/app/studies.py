@@ -12,6 +12,7 @@ from fastapi import HTTPException
 from flightid.app.bare_study import UNWRITTEN, bare_study, completed, opened
 from flightid.app.own_folders import read_plain, shown_name
 from flightid.app.python_lines import python_lines
+from flightid.app.rigs import Rigs
 from flightid.app.schemas import Edits, StudyStep, StudyText, WholeText
 from flightid.app.study_edits import KeyEdit, edited, etag_of, parts_of, write_study
 from flightid.app.study_history import StudyHistory, Versions
@@ -89,7 +90,12 @@ class Studies:
         return self._put(log, tag, changed)
 
     def replace(self, log: str, whole: WholeText, tag: str) -> StudyText | None:
-        """Put a text in place of the version that `tag` names; another is a conflict (409)."""
+        """Put a text in place of the version that `tag` names; another is a conflict (409).
+
+        Where there is none, a text of `UNWRITTEN` is written: of a study that was deleted.
+        """
+        if tag == UNWRITTEN and self.path(log) is None:
+            return self._written_again(log, whole.text)
         return self._put(log, tag, lambda old: old.followed_by(whole.text))
 
     def step(self, log: str, steps: StudyStep, tag: str) -> StudyText | None:
@@ -111,6 +117,17 @@ class Studies:
             versions = made(Versions((bare,), 0))
             write_study(path, versions.text)
             self._history.keep(log, versions)
+            return self.read(log)
+
+    def _written_again(self, log: str, text: str) -> StudyText | None:
+        """Write the study of a log or of records that are there; None where they are not."""
+        known = self._workspace.log_path(log) is not None or Rigs(self._workspace).files(log)
+        with self._lock:
+            path = self._workspace.study_path(log)
+            if not known or path.exists():
+                return None
+            write_study(path, text)
+            self._history.keep(log, self._history.versions(log, text))
             return self.read(log)
 
     def _put(self, log: str, tag: str, made: Callable[[Versions], Versions]) -> StudyText | None:
