@@ -49,14 +49,9 @@ def test_means_of_two_noises_are_as_meier_has_them() -> None:
     assert_close(levels.doubt(solve)[0], np.sum(parts**2 / freedom), rtol=1e-12, why="rounding")
 
 
-def test_other_weights_than_those_of_the_noise_add_nothing() -> None:
-    levels = EstimatedLevels(np.ones((2, 1, 1)), None, np.array([8.0, 20.0]))
-    assert levels.added(np.eye(1)).item() == 0.0
-
-
 def test_parts_of_the_levels_add_up_to_the_covariance(response: fid.FrequencyResponse) -> None:
     errors, points, gain = _errors(response)
-    found = errors.by_level(points, gain)
+    (found,) = errors.by_level([points], [gain])
     assert found is not None
     whole = errors.covariances([points])[0]
     assert_close(
@@ -72,7 +67,7 @@ def test_parts_of_the_levels_add_up_to_the_covariance(response: fid.FrequencyRes
 
 def test_a_part_is_what_its_level_moves(response: fid.FrequencyResponse) -> None:
     errors, points, gain = _errors(response)
-    found = errors.by_level(points, gain)
+    (found,) = errors.by_level([points], [gain])
     assert found is not None
     level, step = 4, 1e-5
     density = errors.noise.density.copy()
@@ -88,7 +83,7 @@ def test_a_part_is_what_its_level_moves(response: fid.FrequencyResponse) -> None
 def test_noise_without_levels_is_held_for_known(response: fid.FrequencyResponse) -> None:
     errors, points, gain = _errors(response)
     given = NoiseSpectrum(errors.noise.omega_rad_s, errors.noise.density)
-    assert replace(errors, known_noise=given).by_level(points, gain) is None
+    assert replace(errors, known_noise=given).by_level([points], [gain]) == [None]
 
 
 @pytest.mark.parametrize("cost", ["likelihood", "coherence"])

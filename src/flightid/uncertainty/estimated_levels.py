@@ -26,8 +26,8 @@ class EstimatedLevels:
     heard : ndarray, shape (n_levels, n, n)
         ``G V_g Gᵀ``: what each level adds to the covariance of the scores ``G e`` of errors e, V_g
         the derivative of their covariance V by the level's logarithm.
-    weighed : ndarray, shape (n_levels, n, n), or None
-        ``G V_g V⁻¹ V_g Gᵀ`` where V⁻¹ weighs the data; None where weights are others.
+    weighed : ndarray, shape (n_levels, n, n)
+        ``G V_g V⁻¹ V_g Gᵀ``: V⁻¹ weighs the data.
     freedom : ndarray, shape (n_levels,)
         Degrees of freedom of each level.
 
@@ -48,25 +48,24 @@ class EstimatedLevels:
     """
 
     heard: Array
-    weighed: Array | None
+    weighed: Array
     freedom: Array
 
     @classmethod
     def joined(cls, parts: Sequence[EstimatedLevels]) -> EstimatedLevels | None:
-        """Of several data; None of none. All parts weigh their data, or none does."""
+        """Of several data; None of none."""
         if not parts:
             return None
-        weighed = [part.weighed for part in parts if part.weighed is not None]
         return cls(
             np.concatenate([part.heard for part in parts]),
-            np.concatenate(weighed) if weighed else None,
+            np.concatenate([part.weighed for part in parts]),
             np.concatenate([part.freedom for part in parts]),
         )
 
     def along(self, directions: Array) -> EstimatedLevels:
         """By combinations of the parameters, one a column."""
-        turned = None if self.weighed is None else directions.T @ self.weighed @ directions
-        return EstimatedLevels(directions.T @ self.heard @ directions, turned, self.freedom)
+        heard, weighed = (directions.T @ part @ directions for part in (self.heard, self.weighed))
+        return EstimatedLevels(heard, weighed, self.freedom)
 
     def added(self, covariance: Array) -> Array:
         """Covariance of the scores beyond what the weights promise, shape (n, n).
@@ -79,8 +78,6 @@ class EstimatedLevels:
         covariance : ndarray, shape (n, n)
             Of the estimates, by the weights.
         """
-        if self.weighed is None:
-            return np.zeros_like(covariance)
         met = self.weighed - self.heard @ covariance @ self.heard
         total = np.einsum("g,gij->ij", 4.0 / self.freedom, met)
         own, axes = np.linalg.eigh(0.5 * (total + total.T))

@@ -19,7 +19,7 @@ from flightid.responses.errors.random_error import (
     CovarianceSource,
     Points,
     by_level,
-    combined,
+    combined_by_level,
     covariances,
     knows_between_outputs,
 )
@@ -100,7 +100,7 @@ class ErrorModel:
             for run, matrix in zip(self.runs, full, strict=True)
         )
 
-    def propagated(self, gain: Array) -> Array:
+    def propagated(self, gain: Array, told: int = 0) -> tuple[Array, Array]:
         """Covariance of a gain times the errors of all points, across outputs.
 
         A gust moves all outputs at once: where the errors of the response know it, so does this.
@@ -109,22 +109,37 @@ class ErrorModel:
         ----------
         gain : ndarray, shape (n_rows, n_points)
             Columns in the order of the runs, and within one of `Run.kept`.
+        told : int
+            First rows of which freedom is asked.
 
         Returns
         -------
-        ndarray, shape (n_rows, n_rows)
+        covariance : ndarray, shape (n_rows, n_rows)
+        freedom : ndarray, shape (told,)
+            Degrees of freedom of variances: noise is an estimate. Outputs count apart; infinite
+            where nobody knows from how much noise errors are.
+
+        Reference
+        ---------
+        Satterthwaite (1946), Biometrics Bulletin 2(6), eq. 17.
         """
-        sizes = [len(run.kept) for run in self.runs]
-        parts = np.split(gain, np.cumsum(sizes)[:-1], axis=1)
+        parts = self._parts(gain)
+        known = np.full(told, np.inf)
         if self.known is None:
             blocks = zip(parts, self.approximate, strict=True)
-            return np.asarray(sum(part @ block @ part.T for part, block in blocks))
+            return np.asarray(sum(part @ block @ part.T for part, block in blocks)), known
         wide = [run.widened(part) for run, part in zip(self.runs, parts, strict=True)]
-        found = combined(self.known, [run.points for run in self.runs], wide)
-        return np.asarray(0.5 * (found + found.T))
+        points = [run.points for run in self.runs]
+        found, levels = combined_by_level(self.known, points, wide, told)
+        if told and levels:
+            variances, freedom = (np.concatenate(part) for part in zip(*levels, strict=True))
+            doubt = np.sum(variances**2 / freedom[:, None], axis=0)
+            seen = doubt > 0.0
+            known[seen] = (np.sum(variances, axis=0)[seen]) ** 2 / doubt[seen]
+        return np.asarray(0.5 * (found + found.T)), known
 
-    def levels(self, gain: Array, *, weigh: bool) -> EstimatedLevels | None:
-        """How a gain times the errors of all points hangs on levels of noise that were estimated.
+    def levels(self, gain: Array) -> EstimatedLevels | None:
+        """How scores hang on levels of noise that were estimated, where errors weigh points.
 
         Outputs are taken one by one. None where no errors know from how much noise they are.
 
@@ -132,29 +147,26 @@ class ErrorModel:
         ----------
         gain : ndarray, shape (n_rows, n_points)
             As `propagated` takes it.
-        weigh : bool
-            Whether the fit weighs the points by these errors, as `whitening` does.
         """
         if self.known is None:
             return None
-        sizes = [len(run.kept) for run in self.runs]
-        parts = np.split(gain, np.cumsum(sizes)[:-1], axis=1)
-        weights = [matrix for *_, matrix in whitening(self)] if weigh else [None] * len(sizes)
+        parts = self._parts(gain)
+        wide = [run.widened(part) for run, part in zip(self.runs, parts, strict=True)]
+        every = by_level(self.known, [run.points for run in self.runs], wide)
         found = []
-        for run, part, matrix in zip(self.runs, parts, weights, strict=True):
-            met = by_level(self.known, run.points, run.widened(part))
-            if met is None:
-                continue
-            products = met.products[:, run.kept]
-            white = None if matrix is None else matrix @ products
-            found.append(
-                EstimatedLevels(
-                    part @ products,
-                    None if white is None else white.transpose(0, 2, 1) @ white,
-                    met.freedom,
-                )
-            )
+        for run, part, (*_, matrix), met in zip(
+            self.runs, parts, whitening(self), every, strict=True
+        ):
+            if met is not None:
+                products = met.products[:, run.kept]
+                white = matrix @ products
+                weighed = white.transpose(0, 2, 1) @ white
+                found.append(EstimatedLevels(part @ products, weighed, met.freedom))
         return EstimatedLevels.joined(found)
+
+    def _parts(self, gain: Array) -> list[Array]:
+        sizes = [len(run.kept) for run in self.runs]
+        return np.split(gain, np.cumsum(sizes)[:-1], axis=1)
 
 
 def error_model(data: FrequencyResponse, selected: Sequence[SelectedResponse]) -> ErrorModel:

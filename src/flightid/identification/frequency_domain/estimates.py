@@ -30,8 +30,8 @@ from flightid.uncertainty.response_errors import DECIBEL, DEGREE, Sensitivity
 from flightid.uncertainty.triangle import triangle_of_rows
 
 Array = NDArray[np.float64]
-Compare = Callable[[Array, Array, NDArray[np.bool_], Array, Array], AgreementTest]
-"""By gain, its triangle, free parameters that count, what adds to the covariance, and freedom."""
+Compare = Callable[[Array, Array, NDArray[np.bool_], Array], AgreementTest]
+"""By gain, its triangle, free parameters that count, and what adds to the covariance."""
 _AT_BOUND = 1e-9
 _SHARE = 0.1
 UNSEEN = "no influence on what was fitted: its value is where it started"
@@ -110,11 +110,15 @@ def statistics(
     covariance, freedom, agreement, moved = None, None, None, None
     if sensitivity is not None and names and not withheld:
         gain = estimator_gain(triangle, basis.T @ sensitivity)
-        added, freedom = _by_levels(errors, gain, triangle, weighs_errors=weighs_errors)
+        levels = errors.levels(gain) if weighs_errors else None
+        added = np.zeros((len(gain), len(gain)))
+        if levels is not None:
+            added = levels.added(triangle.T @ triangle)
         if compare is None:
-            covariance = errors.propagated(gain) + added
+            covariance, freedom = errors.propagated(gain, len(gain))
+            covariance = covariance + added
         else:
-            agreed = compare(gain, triangle, inner, added, freedom)
+            agreed = compare(gain, triangle, inner, added)
             covariance, agreement, freedom = agreed.covariance, agreed.agreement, agreed.freedom
         if bias is not None:
             moved = -gain @ bias
@@ -135,21 +139,6 @@ def statistics(
         agreement,
         moved,
     )
-
-
-def _by_levels(
-    errors: ErrorModel, gain: Array, triangle: Array, *, weighs_errors: bool
-) -> tuple[Array, Array]:
-    """What estimated noise adds to the covariance, and the degrees of freedom it leaves."""
-    n = len(gain)
-    levels = errors.levels(gain, weigh=weighs_errors)
-    if levels is None:
-        return np.zeros((n, n)), np.full(n, np.inf)
-    doubt = levels.doubt(np.eye(n))
-    variances = np.diag(errors.propagated(gain))
-    known = doubt > 0.0
-    freedom = np.where(known, variances**2 / np.where(known, doubt, 1.0), np.inf)
-    return levels.added(triangle.T @ triangle), freedom
 
 
 def at_bound(parameter: Parameter) -> bool:

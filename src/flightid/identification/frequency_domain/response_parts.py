@@ -53,12 +53,7 @@ class PartComparison:
     slopes: Array
 
     def compare(
-        self,
-        gain: Array,
-        triangle: Array,
-        inner: NDArray[np.bool_],
-        added: Array,
-        freedom: Array,
+        self, gain: Array, triangle: Array, inner: NDArray[np.bool_], added: Array
     ) -> AgreementTest:
         """Covariance of the estimates, halves and records compared.
 
@@ -72,8 +67,6 @@ class PartComparison:
             Free parameters that are not at a bound.
         added : ndarray, shape (n, n)
             Covariance of the estimates beyond that of the points' errors.
-        freedom : ndarray, shape (n,)
-            Degrees of freedom of their variances.
 
         Assumes
         -------
@@ -107,7 +100,7 @@ class PartComparison:
         total = np.sum(information, axis=0)
         # Nobody asks for the noise of parts that are not compared.
         rows = [gain, *weighed] if any(compared.keywords.values()) else [gain]
-        known = self.errors.propagated(np.vstack(rows))
+        known, freedom = self.errors.propagated(np.vstack(rows), n)
         known = known.reshape(len(rows), n, len(rows), n)
         flights = []
         for k in range(count):

@@ -102,7 +102,7 @@ class ChosenPoints:
         weights = whitening(self.errors)
         rows = whitened(slopes, weights).T
         gain = rows.T @ PointSensitivity.of([matrix for *_, matrix in weights])
-        levels = self.errors.levels(gain, weigh=True) if judged() else None
+        levels = self.errors.levels(gain) if judged() else None
         return JointResiduals(rows, rows, levels=levels)
 
     def whitened_bias(

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from flightid.frozen import dataclass
 from flightid.responses.errors.noise import NoiseOfRecords, NoiseSpectrum
-from flightid.responses.errors.noise_levels import LevelProducts
+from flightid.responses.errors.noise_levels import LevelProducts, LevelVariances
 from flightid.responses.errors.random_error import JointErrors, Points, union
 from flightid.responses.windows.window_weights import WindowWeights
 
@@ -82,12 +82,20 @@ class WindowedErrors(JointErrors):
 
     def combined(self, wanted: Sequence[Points], gains: Sequence[Real]) -> Real:
         """See `JointErrors`."""
+        return self.combined_by_level(wanted, gains, 0)[0]
+
+    def combined_by_level(
+        self, wanted: Sequence[Points], gains: Sequence[Real], count: int
+    ) -> tuple[Real, list[LevelVariances]]:
+        """See `LevelledErrors`: each bin has its share in the levels of its output's noise."""
         inputs, frequencies = union(wanted)
         parts = [
             self._part(each, inputs, frequencies).through(gain)
             for each, gain in zip(wanted, gains, strict=True)
         ]
         total = np.zeros(2 * (len(gains[0]),))
+        levels = [self.noise.levels_of(part.output) for part in parts] if count else []
+        told = [np.zeros((0 if each is None else len(each.freedom), count)) for each in levels]
         for noise, kernels, near in self._kernels(inputs, frequencies):
             moved = [part.combine(kernels, near) * noise.level[part.output] for part in parts]
             for place, (part, row) in enumerate(zip(parts, moved, strict=True)):
@@ -95,24 +103,38 @@ class WindowedErrors(JointErrors):
                     turn = noise.coherency[:, part.output, other.output]
                     block = np.real((row * turn) @ column.conj().T)
                     total += block if part is other else block + block.T
-        return total
+            for each, row, variances in zip(levels, moved, told, strict=False):
+                if each is not None:
+                    variances[:] += each.shares(noise.omega_rad_s) @ (np.abs(row[:count]) ** 2).T
+        pairs = zip(levels, told, strict=True)
+        return total, [LevelVariances(v, each.freedom) for each, v in pairs if each is not None]
 
-    def by_level(self, wanted: Points, gain: Real) -> LevelProducts | None:
-        """See `LevelledErrors`: the same sum over bins, each with its share in the levels."""
-        levels = self.noise.levels_of(wanted.output)
-        if levels is None:
-            return None
-        part = self._part(wanted, *union([wanted]))
-        found = np.zeros((len(levels.freedom), gain.shape[1], len(gain)))
-        for noise, kernels, near in self._kernels(*union([wanted])):
-            rows, points = part.weighted(kernels, near, noise.level[part.output])
-            turned = (gain[:, points] @ rows).conj()
-            shares = levels.shares(noise.omega_rad_s)
-            for level in np.flatnonzero(np.any(shares > 0.0, axis=1)):
-                bins = np.flatnonzero(shares[level])
-                some = (rows[:, bins] * shares[level, bins]) @ turned[:, bins].T
-                found[level, points] += np.real(some)
-        return LevelProducts(found, levels.freedom)
+    def by_level(
+        self, wanted: Sequence[Points], gains: Sequence[Real]
+    ) -> list[LevelProducts | None]:
+        """See `LevelledErrors`."""
+        inputs, frequencies = union(wanted)
+        parts = [self._part(each, inputs, frequencies) for each in wanted]
+        levels = [self.noise.levels_of(part.output) for part in parts]
+        found = [
+            np.zeros((0 if each is None else len(each.freedom), gain.shape[1], len(gain)))
+            for each, gain in zip(levels, gains, strict=True)
+        ]
+        for noise, kernels, near in self._kernels(inputs, frequencies):
+            for part, gain, each, products in zip(parts, gains, levels, found, strict=True):
+                if each is None:
+                    continue
+                rows, points = part.weighted(kernels, near, noise.level[part.output])
+                turned = (gain[:, points] @ rows).conj()
+                shares = each.shares(noise.omega_rad_s)
+                for level in np.flatnonzero(np.any(shares > 0.0, axis=1)):
+                    bins = np.flatnonzero(shares[level])
+                    some = (rows[:, bins] * shares[level, bins]) @ turned[:, bins].T
+                    products[level, points] += np.real(some)
+        return [
+            None if each is None else LevelProducts(products, each.freedom)
+            for each, products in zip(levels, found, strict=True)
+        ]
 
     def _kernels(
         self, inputs: Places, frequencies: Places

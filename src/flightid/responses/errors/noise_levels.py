@@ -42,6 +42,19 @@ class NoiseLevels:
         return np.asarray(np.maximum(1.0 - np.abs(place - np.arange(count)[:, None]), 0.0))
 
 
+class LevelVariances(NamedTuple):
+    """What each level of a noise adds to some variances.
+
+    Attributes
+    ----------
+    variances : ndarray, shape (n_levels, n)
+    freedom : ndarray, shape (n_levels,)
+    """
+
+    variances: Real
+    freedom: Real
+
+
 class LevelProducts(NamedTuple):
     """What each level of a noise adds to a covariance, times a gain.
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.frozen import dataclass
-from flightid.responses.errors.noise_levels import LevelProducts
+from flightid.responses.errors.noise_levels import LevelProducts, LevelVariances
 
 
 class CovarianceSource(Protocol):
@@ -65,23 +65,48 @@ class JointErrors(CovarianceSource, Protocol):
 class LevelledErrors(Protocol):
     """A source that knows from how much noise its covariance was estimated."""
 
-    def by_level(self, wanted: Points, gain: NDArray[np.float64]) -> LevelProducts | None:
-        """How the covariance hangs on each level of the noise; None where that is not known.
+    def by_level(
+        self, wanted: Sequence[Points], gains: Sequence[NDArray[np.float64]]
+    ) -> list[LevelProducts | None]:
+        """How each output's covariance hangs on levels of its noise; None where nobody knows.
 
         Parameters
         ----------
-        wanted : Points
-        gain : ndarray, shape (n_rows, 2 n_in n_f)
+        wanted : sequence of Points
+        gains : sequence of ndarray, each shape (n_rows, 2 n_in n_f)
             Columns ordered as the rows of `CovarianceSource.covariance`.
+        """
+        ...
+
+    def combined_by_level(
+        self, wanted: Sequence[Points], gains: Sequence[NDArray[np.float64]], count: int
+    ) -> tuple[NDArray[np.float64], list[LevelVariances]]:
+        """`JointErrors.combined`, and what levels of each output add to the first variances.
+
+        Outputs whose levels nobody knows are left out of the latter.
         """
         ...
 
 
 def by_level(
-    errors: CovarianceSource, wanted: Points, gain: NDArray[np.float64]
-) -> LevelProducts | None:
+    errors: CovarianceSource, wanted: Sequence[Points], gains: Sequence[NDArray[np.float64]]
+) -> list[LevelProducts | None]:
     """See `LevelledErrors`; None of a source that does not know."""
-    return errors.by_level(wanted, gain) if isinstance(errors, LevelledErrors) else None
+    if isinstance(errors, LevelledErrors):
+        return errors.by_level(wanted, gains)
+    return [None] * len(wanted)
+
+
+def combined_by_level(
+    errors: CovarianceSource,
+    wanted: Sequence[Points],
+    gains: Sequence[NDArray[np.float64]],
+    count: int,
+) -> tuple[NDArray[np.float64], list[LevelVariances]]:
+    """See `LevelledErrors`; a source that does not know tells no levels."""
+    if isinstance(errors, LevelledErrors):
+        return errors.combined_by_level(wanted, gains, count)
+    return combined(errors, wanted, gains), []
 
 
 def covariances(errors: CovarianceSource, wanted: Sequence[Points]) -> list[NDArray[np.float64]]:
@@ -174,9 +199,17 @@ class ErrorSelection:
         """See `JointErrors`."""
         return combined(self.errors, self._there(wanted), gains)
 
-    def by_level(self, wanted: Points, gain: NDArray[np.float64]) -> LevelProducts | None:
+    def by_level(
+        self, wanted: Sequence[Points], gains: Sequence[NDArray[np.float64]]
+    ) -> list[LevelProducts | None]:
         """See `LevelledErrors`."""
-        return by_level(self.errors, self._there([wanted])[0], gain)
+        return by_level(self.errors, self._there(wanted), gains)
+
+    def combined_by_level(
+        self, wanted: Sequence[Points], gains: Sequence[NDArray[np.float64]], count: int
+    ) -> tuple[NDArray[np.float64], list[LevelVariances]]:
+        """See `LevelledErrors`."""
+        return combined_by_level(self.errors, self._there(wanted), gains, count)
 
     def _there(self, wanted: Sequence[Points]) -> list[Points]:
         return [
