@@ -105,6 +105,7 @@ class ExtendedProblem(InnovationsProblem):
             np.zeros((n_samples, p, 0)),
             own[: len(start)],
             np.zeros((n_samples * p, 0)),
+            np.zeros((len(start), 0)),
             SteadyFilter(np.eye(n), np.zeros((n, p)), np.zeros((p, n)), usual, prior[:n, :n]),
         )
 

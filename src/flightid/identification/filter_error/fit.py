@@ -22,6 +22,7 @@ from flightid.identification.filter_error.gust_severity import judge_gust
 from flightid.identification.filter_error.gusts import GUST, GUST_UNKNOWNS, Gust
 from flightid.identification.filter_error.innovation_covariance import innovation_covariance
 from flightid.identification.filter_error.innovations import InnovationsProblem, RecordInnovations
+from flightid.identification.filter_error.noise_doubt import noise_doubt
 from flightid.identification.filter_error.problem import innovations_problem
 from flightid.identification.filter_error.search import NEAR, across_jumps, minimise, with_gust
 from flightid.identification.fit import Fit
@@ -95,10 +96,15 @@ def fit_filter_error(
     require_seen(inner, jacobian[:, : len(inner.names)])
     found = innovation_covariance(filtered, end.residuals / np.sqrt(end.cost / freedom), jacobian)
     count = len(inner.names)
+    covariance, degrees = found.covariance[:count, :count], found.freedom[:count]
+    if judged():
+        doubt = noise_doubt(problem, end, columns, found.covariance)
+        covariance = covariance * np.outer(doubt.factor, doubt.factor)
+        degrees = 2.0 / (2.0 / degrees + doubt.variance)
     known = Knowledge(
         jacobian[:, :count],
-        found.covariance[:count, :count],
-        found.freedom[:count],
+        covariance,
+        degrees,
         "innovations",
         found.colour_of(count),
         found.agreement.of(count),

@@ -61,6 +61,8 @@ class RecordInnovations:
         Initial state, then output biases, then input shifts.
     space : ndarray, shape (n_samples · n_outputs, rank)
         Orthonormal directions that the constants follow in the whitened innovations.
+    weights : ndarray, shape (n_constants, rank)
+        The constants by what shows along these.
     filter : SteadyFilter
     """
 
@@ -69,6 +71,7 @@ class RecordInnovations:
     slopes: Array
     constants: Array
     space: Array
+    weights: Array
     filter: SteadyFilter
 
 
@@ -257,6 +260,7 @@ class InnovationsProblem:
             white.reshape(slope.shape),
             nuisance.values,
             nuisance.space,
+            free.directions.weights,
             found,
         )
 

@@ -1,0 +1,104 @@
+"""Noises of a filter are told by its own record: what they leave in doubt, by dense matrices."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.linalg
+
+import flightid as fid
+from flightid.identification.filter_error.noise_doubt import noise_doubt
+from flightid.identification.filter_error.problem import innovations_problem
+from flightid.identification.multistart import DenseEnd
+from flightid.identification.regression.options import FilterErrorOptions
+from tests.closeness import assert_close
+
+STEP_S, DAMPING, N = 0.05, -1.0, 240
+SPREAD = np.array([[0.4, 0.1], [0.1, 0.2]])
+"""Covariance of the control derivative and of the logarithm of the process noise."""
+
+
+def _model() -> fid.StateSpaceModel:
+    return fid.StateSpaceModel(
+        states={"p": "rad/s"},
+        input_units={"u": "rad"},
+        measurements={"rate": fid.Output("p", "rad/s")},
+        equations={"p'": "Lp*p + Ld*u"},
+        parameters=fid.Parameters(
+            [
+                fid.Parameter("Lp", DAMPING, "1/s", free=False),
+                fid.Parameter("Ld", 4.0, "1/s^2"),
+            ]
+        ),
+        name="roll",
+    )
+
+
+def _record(seed: int) -> fid.Record:
+    drawn = np.random.default_rng(seed)
+    u = 0.1 * np.sign(np.sin(np.arange(N) * STEP_S * 1.3))
+    keep, push = np.exp(DAMPING * STEP_S), np.expm1(DAMPING * STEP_S) / DAMPING
+    p = np.zeros(N)
+    for k in range(N - 1):
+        p[k + 1] = keep * p[k] + push * 4.0 * u[k] + 0.02 * drawn.standard_normal()
+    return fid.Record.from_arrays(
+        np.arange(N) * STEP_S,
+        inputs={"u": u},
+        outputs={"rate": p + 0.03 * drawn.standard_normal(N)},
+        units={"u": "rad", "rate": "rad/s"},
+        hold="zero",
+        loop="open",
+    )
+
+
+def _dense(record: fid.Record, process: float, measured: float) -> np.ndarray:
+    """Logarithms of the variance of Ld, and of the determinant with start and output bias.
+
+    The start is what the steady filter foretells: the state lies about it by its own error.
+    """
+    u, y = record.matrix(["u"])[0], record.matrix(["rate"])[0]
+    keep, push = np.exp(DAMPING * STEP_S), np.expm1(DAMPING * STEP_S) / DAMPING
+    drive = process * np.expm1(2.0 * DAMPING * STEP_S) / (2.0 * DAMPING)
+    runs = scipy.linalg.toeplitz(keep ** np.arange(N), np.zeros(N))
+    moved = np.zeros((N, N))
+    moved[1:] = runs[:-1]
+    first = keep ** np.arange(N)
+    prior = scipy.linalg.solve_discrete_are(keep, 1.0, drive, measured)[0, 0]
+    noise = drive * moved @ moved.T + measured * np.eye(N) + prior * np.outer(first, first)
+    own = np.column_stack([first, np.ones(N)])
+    slope = moved @ (push * u)
+    white = scipy.linalg.solve_triangular(
+        np.linalg.cholesky(noise), np.column_stack([slope, own, y - 4.0 * slope]), lower=True
+    )
+    rest = white - white[:, 1:3] @ np.linalg.lstsq(white[:, 1:3], white)[0]
+    squares = float(rest[:, 3] @ rest[:, 3])
+    whole = np.linalg.slogdet(white[:, :3].T @ white[:, :3])[1]
+    return np.array([np.log(squares / (rest[:, 0] @ rest[:, 0])), 3.0 * np.log(squares) - whole])
+
+
+@pytest.mark.parametrize("level", [-1.0, 1.0])
+def test_it_is_what_dense_matrices_make_of_the_noise(level: float) -> None:
+    record = _record(3)
+    options = FilterErrorOptions(hold="zero", process_noise=("p",))
+    problem = innovations_problem(_model(), [record], options)
+    x = np.array([4.0, level])
+    residuals, jacobian = problem.residuals(x, with_slopes=True)
+    end = DenseEnd(x, float(residuals @ residuals), 1, "gradient", residuals, jacobian)
+    found = noise_doubt(problem, end, np.ones(2, dtype=bool), SPREAD)
+    step = np.sqrt(SPREAD[1, 1])
+    noises = [problem.noise(np.array([4.0, at])) for at in (level, level + step)]
+    here, there = (_dense(record, float(w[0]), float(r[0])) for w, r in noises)
+    own, whole = (there - here) / step
+    why = "two ways to one likelihood"
+    assert_close(found.variance[0], own**2 * SPREAD[1, 1], rtol=1e-3, why=why)
+    lacking = 0.5 * SPREAD[1, 1] * whole
+    assert_close(np.log(found.factor[0]), 0.5 * own * lacking, rtol=1e-3, why=why)
+    assert found.factor[0] > 1.01
+
+
+def test_bars_of_a_short_record_know_that_it_tells_its_noise() -> None:
+    fit = fid.identify(_model(), _record(5), method="filter_error")
+    freedom = fit.parameters["Ld"].freedom
+    assert freedom is not None
+    # The innovations alone would tell some 240.
+    assert 5.0 < freedom < 120.0
