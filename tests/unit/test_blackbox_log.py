@@ -10,6 +10,7 @@ import flightid as fid
 from flightid.control.autopilots.from_log import autopilot_of
 from flightid.errors import DataError, LogFormatError, MissingColumnError
 from flightid.logs.blackbox.reader import open_blackbox
+from flightid.logs.blackbox.scales import FINE, FORCES, INAV_BATTERY, scales_of
 from tests.blackbox_builder import END, FIELDS, SETTINGS, blackbox, header, unsigned
 
 
@@ -138,6 +139,16 @@ def test_log_without_end_is_called_cut(tmp_path: Path) -> None:
     log = _open(tmp_path, blackbox(_columns(n=64)).removesuffix(END))
     assert [finding.code for finding in log.findings] == ["log-cut"]
     assert len(log.table("main")) == 64
+
+
+def test_scales_hold_what_the_firmware_logs_and_nothing_else() -> None:
+    flown = {"Firmware revision": "Betaflight 4.4.0 (a) F7", "gyro_scale": "0x3f800000"}
+    scales, untold = scales_of(flown)
+    assert set(scales) == {*FINE, "vbatLatest", "amperageLatest"}
+    assert set(untold) == {FORCES}
+    inav = {"Firmware revision": "INAV 1.9.0 (a) F3"}
+    assert set(INAV_BATTERY[-1]) <= set(scales_of(inav)[1])
+    assert scales_of({**inav, "Firmware revision": "INAV 2.0.0 (a) F3"})[0]["vbat"] == 0.01
 
 
 def test_scales_of_the_header(tmp_path: Path) -> None:

@@ -17,8 +17,9 @@ from flightid.errors import (
     UnknownNameError,
 )
 from flightid.logs import DataflashWriter, channel_map
-from flightid.logs.channels.channel_map import DEFAULTS, default_map
+from flightid.logs.channels.channel_map import DEFAULTS, ChannelSource, default_map
 from flightid.logs.dataflash.field_units import UNITS
+from flightid.logs.extraction import _euler, _values
 from flightid.units import canonical, same_dimension
 from tests.closeness import assert_close
 
@@ -188,6 +189,32 @@ def test_quaternions_become_euler_angles(shared_data: Path) -> None:
     assert np.corrcoef(rate, kinematic)[0, 1] > 0.97
     assert record.inputs == ("tau_phi", "tau_theta", "tau_psi", "thrust")
     assert np.mean(record["az"]) == pytest.approx(-9.8, abs=0.6)
+
+
+def test_euler_angles_come_back_from_large_turns() -> None:
+    """A quaternion of three turns one after the other, z-y-x, multiplied out."""
+    angles = {"roll": 2.1, "pitch": -1.2, "yaw": -2.6}
+    turned = np.array([1.0, 0.0, 0.0, 0.0])
+    for place, name in ((3, "yaw"), (2, "pitch"), (1, "roll")):
+        half = 0.5 * angles[name]
+        step = np.zeros(4)
+        step[[0, place]] = np.cos(half), np.sin(half)
+        turned = np.concatenate(
+            (
+                [turned[0] * step[0] - turned[1:] @ step[1:]],
+                turned[0] * step[1:] + step[0] * turned[1:] + np.cross(turned[1:], step[1:]),
+            )
+        )
+    for name, angle in angles.items():
+        assert_close(_euler(name, *turned), angle, rtol=1e-12, why="the turn that was made")
+
+
+def test_whole_numbers_are_cut_only_where_the_map_says_so(tmp_path: Path) -> None:
+    rates = np.round(100.0 * np.sin(T))
+    table = _log(tmp_path, RATE={"R": rates}).table("RATE")
+    assert np.array_equal(_values(table, ChannelSource("RATE", ("R",))), rates)
+    cut = _values(table, ChannelSource("RATE", ("R",), cut=True))
+    assert np.array_equal(cut, rates + 0.5 * np.sign(rates))
 
 
 def test_the_real_copter_gives_a_record_at_its_slow_rate(shared_data: Path) -> None:

@@ -207,6 +207,11 @@ def test_what_cannot_be_logged_is_refused() -> None:
 def test_layouts_that_contradict_themselves_are_refused() -> None:
     with pytest.raises(OptionError, match="cannot be logged"):
         MessageLayout("BAD", 200, "Qf", "TimeUS", "s-", "F-")
+    for name in ("", "LONGS"):
+        with pytest.raises(OptionError, match="cannot be logged"):
+            MessageLayout(name, 200, "Q", "TimeUS", "s", "F")
+    for name in ("A", "FOUR"):
+        assert MessageLayout(name, 200, "Q", "TimeUS", "s", "F").dtype.itemsize == 3 + 8
     writer = DataflashWriter()
     with pytest.raises(OptionError, match="cannot be defined"):
         writer.define(MessageLayout("OWN", 75, "Qf", "TimeUS,x", "s-", "F-"))

@@ -12,6 +12,7 @@ import flightid as fid
 from flightid.conventions import Light
 from flightid.errors import DataError, LogFormatError
 from flightid.logs import is_log
+from flightid.logs.blackbox.resolution import resolution_of
 from tests.blackbox_builder import FIELDS, SETTINGS, blackbox
 
 UNITS = {"time": " (us)", "vbatLatest": " (V)", "amperageLatest": " (A)"}
@@ -199,3 +200,14 @@ def test_a_decoder_s_deg_s_may_be_ten_times_too_large(tmp_path: Path, divided: b
             columns[f"gyroADC[{axis}]"] = columns[f"gyroADC[{axis}]"] / 10.0
     log = fid.read_log(_written(columns, tmp_path / "a.csv", "deg/s"))
     np.testing.assert_allclose(log.table("main")["gyroADC[0]"], truth)
+
+
+def test_counts_a_tenth_beyond_a_limit_are_finer() -> None:
+    """A trim or a rounding reaches past it; of throttle, counts within it are plain."""
+    for name, limit in (("rcCommand[1]", 500.0), ("setpoint[2]", 1998.0), ("setpoint[3]", 1000.0)):
+        within, beyond = (
+            resolution_of({}, {name: np.array([0.0, times * limit])}) for times in (1.09, 1.11)
+        )
+        assert within.is_fine is (False if name == "setpoint[3]" else None)
+        assert beyond.is_fine is True
+        assert beyond.sign == f"{name} counts to {1.11 * limit:,.0f}, and its limit is {limit:,.0f}"

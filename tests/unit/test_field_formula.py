@@ -9,6 +9,7 @@ import flightid as fid
 from flightid.errors import FlightidError
 from flightid.logs import Log
 from flightid.logs.field_formula import field_formula
+from flightid.logs.field_plot import field_plot
 from tests.sweep_log import SweepFlight
 
 
@@ -49,3 +50,11 @@ def test_a_formula_is_worked_out_on_the_stamps_of_its_first_field(log: Log) -> N
 def test_what_cannot_be_plotted_says_why(log: Log, formula: str, said: str) -> None:
     with pytest.raises(FlightidError, match=said):
         field_formula(log, formula)
+
+
+def test_figures_of_a_field_have_six_digits(log: Log) -> None:
+    values = log.table("RATE")["R"]
+    said = field_plot(log, ["RATE.R"]).summary().to_text()
+    figures = values.min(), values.mean(), values.max(), np.sqrt(np.mean(values**2))
+    for figure in figures:
+        assert f"{figure:.6g}" in said

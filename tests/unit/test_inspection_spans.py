@@ -92,15 +92,22 @@ def test_nothing_that_tells_of_flight_is_not_called_never_airborne(tmp_path: Pat
 @pytest.mark.parametrize(
     ("pwm", "limits"),
     [
-        ({"MOT_PWM_MIN": 0.0, "MOT_PWM_MAX": 0.0, "RC3_MIN": 1100.0, "RC3_MAX": 1900.0}, 1100.0),
-        ({"MOT_PWM_MIN": 1050.0, "MOT_PWM_MAX": 1950.0, "RC3_MIN": 1100.0}, 1050.0),
-        ({"MOT_PWM_MIN": 0.0, "MOT_PWM_MAX": 0.0}, 1000.0),
+        ({"MOT_PWM_MAX": 0.0, "RC3_MIN": 1100.0, "RC3_MAX": 1900.0}, (1100.0, 1900.0)),
+        ({"MOT_PWM_MIN": 1050.0, "MOT_PWM_MAX": 1950.0, "RC3_MIN": 1100.0}, (1050.0, 1950.0)),
+        ({"RCMAP_THROTTLE": 1.0, "RC1_MIN": 900.0, "RC1_MAX": 2100.0}, (900.0, 2100.0)),
+        ({"MOT_PWM_MIN": 0.0, "MOT_PWM_MAX": 0.0}, (1000.0, 2000.0)),
     ],
 )
-def test_zero_is_no_limit_of_a_motor(tmp_path: Path, pwm: dict[str, float], limits: float) -> None:
-    found = find_actuators(written(tmp_path, MOT_SPIN_MIN=0.0, **pwm))
+def test_zero_is_no_limit_of_a_motor(
+    tmp_path: Path, pwm: dict[str, float], limits: tuple[float, float]
+) -> None:
+    found = find_actuators(written(tmp_path, MOT_SPIN_MIN=0.0, MOT_SPIN_MAX=1.0, **pwm))
     assert found is not None
-    assert found.low == limits
+    assert (found.low, found.high) == limits
+    used = find_actuators(written(tmp_path, **pwm))
+    assert used is not None
+    width = limits[1] - limits[0]
+    assert (used.low, used.high) == (limits[0] + 0.15 * width, limits[0] + 0.95 * width)
 
 
 def test_a_pause_between_arms_is_no_slow_card(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import flightid as fid
-from flightid.inspection.stamps import believable
+from flightid.inspection.stamps import BLOCK, believable, longer_steps
 from flightid.logs import Log
 from flightid.logs.ulog.reader import UlogSource
 from tests.examples import examples
@@ -31,6 +31,13 @@ def test_one_damaged_stamp_costs_one_sample() -> None:
 def test_a_damaged_last_stamp_is_not_believed() -> None:
     stamps = np.append(np.arange(1000) / 250, 1e6)
     assert believable(stamps).tolist() == [True] * 1000 + [False]
+
+
+def test_a_pause_where_blocks_meet_is_one() -> None:
+    for last in (BLOCK - 1, BLOCK):
+        stamps = np.arange(BLOCK + 3.0)
+        stamps[last + 1 :] += 5.0
+        assert longer_steps(stamps, 5.0) == [(last, last + 6.0)]
 
 
 def test_stamps_all_over_the_place_are_not_believed() -> None:

@@ -14,19 +14,21 @@ import flightid as fid
 from flightid.conventions import Light
 from flightid.evidence import inspection_check, sweep_check
 from flightid.findings import Finding
-from flightid.inspection import advice
+from flightid.inspection import advice, thresholds
 from flightid.inspection.excitation_found import FoundExcitation, _plain, _steps, _sweep
 from flightid.inspection.flight_phases import FlightPhases
 from flightid.inspection.gap_findings import _remedy
 from flightid.inspection.inspection import Inspection
 from flightid.inspection.rates import StreamRate
+from flightid.inspection.saturation import Saturation
 from flightid.inspection.signals import Signal
 from flightid.inspection.skew import StreamSkew, _skew
 from flightid.inspection.thresholds import LONGEST_WINDOW
 from flightid.inspection.usable_band import AxisBand, _longest_window
-from flightid.inspection.verdicts import _logging
+from flightid.inspection.verdicts import _logging, _quality
 from flightid.logs.dataflash.writer import DataflashWriter
 from flightid.logs.source import Event, Gap
+from flightid.record.stamps import GAP_FACTOR
 from flightid.study.proposal import propose_study
 from flightid.study.settings import read_settings
 from tests.closeness import assert_close
@@ -281,3 +283,45 @@ def test_steps_of_a_set_point_are_counted_where_a_level_is_held() -> None:
     assert _steps(stamps, stairs) == 3
     assert _steps(stamps, np.sin(stamps)) == 0
     assert _steps(stamps[:39], stairs[:39]) == 0
+
+
+def test_limits_are_what_their_sentences_say() -> None:
+    """Each beside the figures of its source, rounded to as many digits as it has."""
+    meant = {
+        "INDEPENDENT_WINDOWS": 1 / (1 / 5),
+        "CYCLES_IN_WINDOW": 2.0,
+        "LOWEST_OF_INTEREST": 2 / (2 * np.pi),
+        "LONGEST_WINDOW": 2 / 0.05,
+        "SAMPLES_PER_CYCLE": 180 / 18,
+        "SAMPLES_PER_CYCLE_LEAST": 1 / (1 / 5),
+        "RATE_GOOD": 25 * 4.0,
+        "RATE_LEAST": 10 * 3.0,
+        "EXCITED_POWER": 10 ** (-20 / 10),
+        "BAND_GOOD": 10.0,
+        "BAND_LEAST": 10**0.5,
+        "GAP_FACTOR": GAP_FACTOR,
+        "RESTING_RATE": np.radians(3.0),
+        "SHORTEST_SEGMENT": 2 / 1.0,
+        "LYING_TILT": np.radians(30.0),
+        "TIPPING_TILT": np.radians(20.0),
+        "GYRO_RANGE": 0.98 * np.radians(2000.0),
+        "SKEW": np.radians(14.0) / (2 * np.pi * 10.0),
+        "GROWTH": 2.0**3,
+        "DIVERGED_RATE": np.radians(29.0),
+        "DIVERGED_ANGLE": np.radians(20.0),
+    }
+    held = {name: getattr(thresholds, name).value for name in meant}
+    digits = {name: len(f"{value:g}".replace(".", "").strip("0")) for name, value in held.items()}
+    assert {name: float(f"{meant[name]:.{digits[name]}g}") for name in meant} == held
+
+
+def test_a_twentieth_of_the_flight_at_a_limit_and_a_fifth_of_jitter_are_said() -> None:
+    rows = SimpleNamespace(time_s=np.arange(0.0, 9.0, 0.0025))
+    flown = log(table=lambda *_: rows, events=())
+    band = AxisBand("roll", "RATE.ROut", "RATE.R", 400.0, None, None)
+    phases = FlightPhases(((0.0, 9.0),), True, None, "")
+    for times, codes in ((0.98, []), (1.02, ["saturated-yaw", "saturated", "jitter"])):
+        rate = StreamRate("RATE", None, 9000, 400.0, 400.0, 0.2 * times, 0, 60.0, 0)
+        hits = tuple(Saturation("x", "upper limit 1", 0.05 * times, axis) for axis in ("", "yaw"))
+        seen = Inspection("a", "px4", "", "copter", 9.0, (rate,), phases, (), hits, (), (band,))
+        assert [finding.code for finding in _quality(flown, seen)] == codes

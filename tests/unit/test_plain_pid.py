@@ -282,6 +282,10 @@ def test_few_plants_of_the_other_sign_leave_the_promise_of_the_others(
     assert 0 < against <= 5
     assert design.n_plants == 101 - against
     assert_close(design.content, least_share(100 - against, 100), rtol=1e-12, why="Clopper-Pearson")
+    (note,) = design.worst_case_table().notes
+    part = float(re.search(r"; ([\d.]+)% of such plants", note).group(1))
+    assert 0.0 <= 100.0 * design.content - part < 0.1
+    assert part % 1.0
 
 
 def test_a_command_ends_in_gains_and_code(

@@ -9,7 +9,8 @@ import pytest
 
 import flightid as fid
 from flightid.conventions import Light
-from flightid.logs.scale_check import ScaleCheck
+from flightid.inspection.signals import map_of, places
+from flightid.logs.scale_check import ScaleCheck, check_scales
 from flightid.record.checks import record_findings
 from tests.old_log import write_old_log
 
@@ -33,6 +34,11 @@ def test_rates_are_in_the_units_of_the_firmwares_age(
     found = {finding.code: finding.light for finding in fid.inspect_log(log).findings}
     assert found["no-units"] is Light.AMBER
     assert "scale-contradicted" not in found
+    compared = {(each.first, each.second) for each in check_scales(log, map_of(log))}
+    pairs = (("RATE.R", "IMU.GyrX"), ("RATE.P", "IMU.GyrY"), ("RATE.Y", "IMU.GyrZ"))
+    assert compared == {*pairs, ("RATE.R", "ATT.Roll")}
+    assert [each.label for each in places(log, "q")] == ["RATE.P", "IMU.GyrY"]
+    assert [each.label for each in places(log, "q", most=1)] == ["RATE.P"]
 
 
 def test_no_age_is_claimed_where_no_version_is_told(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from flightid.errors import FileFormatError
 from flightid.inspection.signals import find
 from flightid.logs import is_log
 from flightid.logs.ros.names import published
+from flightid.logs.ros.reader import _findings
 from flightid.record.formats.ros import read_columns
 from tests.closeness import assert_close
 from tests.ulog_builder import UlogBuilder
@@ -283,3 +284,10 @@ def test_a_bag_without_numbers_of_an_autopilot_is_refused(tmp_path: Path) -> Non
     topics = {"/mavros/imu/data_raw": ("std_msgs/msg/String", [words("px4_msgs/")] * 3)}
     with pytest.raises(FileFormatError, match="no topic of an autopilot with numbers"):
         fid.read_log(_write(tmp_path / "a", topics, store))
+
+
+def test_of_topics_that_are_left_out_six_are_named() -> None:
+    for count, end in ((6, "; t5"), (8, "; t5; and 2 more")):
+        said, _ = _findings([f"t{k}" for k in range(count)], {("px4", ""): 1}, "")
+        assert said.message.startswith("t0; t1; ")
+        assert said.message.endswith(end)

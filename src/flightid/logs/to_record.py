@@ -184,7 +184,7 @@ def _found(
             left_out.append(f"{channel.name} (no samples in the span)")
             continue
         found.append(item)
-    if not required:
+    if found and not required:
         begin, end = _core_span(found)
         for item in [i for i in found if not i.channel.sets_rate]:
             slack = EDGE_STEPS * item.interval_s
@@ -204,8 +204,6 @@ def _found(
 
 def _core_span(found: list[ChannelSamples]) -> tuple[float, float]:
     core = [item for item in found if item.channel.sets_rate] or found
-    if not core:
-        return 0.0, 0.0
     return max(float(i.time_s[0]) for i in core), min(float(i.time_s[-1]) for i in core)
 
 
