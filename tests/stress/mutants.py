@@ -46,12 +46,12 @@ OPERATORS = (
     *("ReplaceComparisonOperator_Eq_NotEq", "ReplaceComparisonOperator_NotEq_Eq"),
     *("ReplaceUnaryOperator_USub_UAdd", "ReplaceBreakWithContinue", "ZeroIterationForLoop"),
 )
-MOST_TESTS, MOST_FILES, LONGEST_S = 60, 8, 150
+MOST_TESTS, MOST_FILES, LONGEST_S = 60, 3, 150
 FILES_AT_ONCE = 24
 """Test files of one run with coverage: what is lost where it is stopped."""
 WAITING = 10
 """Wall time a processor's second may take: a busy machine is not a loop without end."""
-PASSED, NO_TESTS = 0, 5
+PASSED, MISUSED, NO_TESTS = 0, 4, 5
 ENDS = {PASSED: "survived", 1: "killed", 2: "killed"}
 """By pytest's code: 1, a test failed; 2, the tree cannot be imported."""
 UNNOTICED = ("survived", "not reached", "not run", "too long")
@@ -190,7 +190,7 @@ def end_of(tree: Path, mutant: Mutant, names: Reached) -> str:
     from cosmic_ray.mutating import mutate_code
     from cosmic_ray.plugins import get_operator
 
-    tests = near(mutant, names)
+    tests = near(tree, mutant, names)
     place = tree / mutant.path
     text = place.read_text(encoding="utf-8")
     changed = mutate_code(text, get_operator(f"core/{mutant.operator}")(), mutant.occurrence)
@@ -204,21 +204,27 @@ def end_of(tree: Path, mutant: Mutant, names: Reached) -> str:
             code = tested(tree, ["-x", *words], LONGEST_S, [])
         finally:
             place.write_text(text, encoding="utf-8")
-        if code is None or code < 0:
+        if code is None or code not in (*ENDS, NO_TESTS):
+            # No end in time, or names that are not found since a file of tests cannot be imported.
             unchanged = tested(tree, ["-x", *words], LONGEST_S // 2, [])
-            return "endless" if unchanged == PASSED else "too long"
+            ended, left = ("killed", "not run") if code == MISUSED else ("endless", "too long")
+            return ended if unchanged == PASSED else left
         if code not in (PASSED, NO_TESTS):
-            return ENDS.get(code, "not run")
+            return ENDS[code]
     return ENDS[PASSED] if tests else "not reached"
 
 
-def near(mutant: Mutant, names: Reached) -> list[str]:
+def near(tree: Path, mutant: Mutant, names: Reached) -> list[str]:
     """Tests that reach a mutant's line: those of its module first, then those that reach little."""
-    lines = names.get(mutant.path, {})
-    # What runs on import belongs to no test: those of the whole file stand for it.
-    tests = lines.get(mutant.line) or {each for found in lines.values() for each in found}
+    lines = [names.get(mutant.path, {})]
+    # What runs on import belongs to no test: those of the whole file stand for it, and where all
+    # of the file runs so, those of the files that take from it.
+    if not any(lines[0].values()):
+        module = ".".join(Path(mutant.path).with_suffix("").parts[1:])
+        lines = [of for file, of in names.items() if module in (tree / file).read_text("utf-8")]
+    breadth = Counter(each for of in lines for found in of.values() for each in found)
     stem = Path(mutant.path).stem.rstrip("s")
-    breadth = Counter(each for found in lines.values() for each in found)
+    tests = names.get(mutant.path, {}).get(mutant.line) or breadth
     return sorted(tests, key=lambda each: (stem not in each, breadth[each], each))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -282,6 +283,16 @@ def test_gains_are_whole_numbers_that_keep_their_margins() -> None:
     far = whole_gains(design.problem, paths, found)
     assert not far.exists
     assert far.binding == (ROUNDED,)
+    # Gains that are whole have no neighbours above them, however much these would be worth.
+    one = np.array([loop.unit_of(role) for role in paths.roles])
+    judged = lambda gains: SimpleNamespace(  # noqa: E731 - of any gains
+        names=("a",), slack=np.ones((1, len(gains), 1)), objective=gains.sum(axis=1)[:, None]
+    )
+    wide = SimpleNamespace(judge=judged, low=one, high=500.0 * one)
+    flown = GainSearchResult(one * np.arange(40.0, 40.0 + one.size), True, (), {})
+    kept = whole_gains(wide, paths, flown)
+    assert kept.exists
+    assert_close(kept.gains / one, np.arange(40.0, 40.0 + one.size), rtol=1e-9, why="themselves")
     # The map is drawn in counts and judged by what they are worth: the new gains lie inside.
     drawn = gain_map(design)
     line = next(trace for trace in drawn.data if trace.name == "all requirements met")

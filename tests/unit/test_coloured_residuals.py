@@ -9,6 +9,7 @@ from scipy import signal
 from flightid.uncertainty.blocks import RecordBlock
 from flightid.uncertainty.coloured_residuals import (
     ResidualCovariance,
+    _lifted,
     colour_findings,
     residual_covariance,
 )
@@ -157,3 +158,16 @@ def test_a_covariance_of_nearly_equal_sensitivities_has_no_negative_direction():
     found = residual_covariance([block]).covariance
     size = np.sqrt(np.diag(found))
     assert np.linalg.eigvalsh(found / np.outer(size, size))[0] > 0.0
+
+
+def test_a_covariance_that_rounding_bent_is_one_again() -> None:
+    """Three errors of which two are one, with triangles that differ and a power below nothing."""
+    root = np.array([[1.0, 0.0], [1.0, 0.0], [0.0, 1e-3]])
+    plain = root @ root.T
+    bent = plain + 1e-13 * np.array([[0.0, 9.0, 0.0], [7.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    assert np.linalg.eigvalsh(0.5 * (bent + bent.T))[0] < 0.0
+    whole = _lifted(bent, plain)
+    size = np.sqrt(np.diag(whole))
+    assert np.linalg.eigvalsh(whole / np.outer(size, size))[0] > 0.0
+    assert_close(whole, plain, rtol=1e-9, atol=1e-15, why="moved by roundings alone")
+    assert np.array_equal(_lifted(plain + np.eye(3), plain), plain + np.eye(3))

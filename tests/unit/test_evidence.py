@@ -15,6 +15,7 @@ from flightid.conventions import Light
 from flightid.errors import OptionError
 from flightid.evidence import Check, Evidence, inspection_check, residual_check
 from flightid.evidence.evidence import ALWAYS, NAMES
+from flightid.evidence.explained import ExplainedRun, _powers
 from flightid.evidence.gather import LIMITS, _of_findings
 from flightid.evidence.parameter_checks import declared_signs
 from flightid.evidence.spans import Span, judge_coherence, judge_span, spans_of
@@ -220,3 +221,13 @@ def test_what_data_cannot_tell_stands_beside_what_they_say() -> None:
     assert (alone.light, alone.limit) == (Light.GREEN, "No data tell of drift")
     assert both is not None
     assert (both.light, both.what, both.limit) == (Light.RED, "fails", "No data tell of drift")
+
+
+def test_a_tone_that_is_explained_stands_in_the_bin_of_its_frequency() -> None:
+    edges, step = np.array([1.0, 2.0, 4.0, 8.0, 16.0]), 0.02
+    time_s = step * np.arange(4000)
+    for place, omega in enumerate((1.4, 2.8, 5.6, 11.2)):
+        tone = np.sin(omega * time_s)[None]
+        said, left = _powers(ExplainedRun(tone, 0.5 * tone, step), edges)[:, 0]
+        assert int(np.argmax(said)) == int(np.argmax(left)) == place
+        assert_close(said[place], said.sum(), rtol=1e-6, why="a Hann window")

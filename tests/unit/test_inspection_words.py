@@ -15,7 +15,7 @@ from flightid.conventions import Light
 from flightid.evidence import inspection_check, sweep_check
 from flightid.findings import Finding
 from flightid.inspection import advice, thresholds
-from flightid.inspection.excitation_found import FoundExcitation, _plain, _steps, _sweep
+from flightid.inspection.excitation_found import FoundExcitation, _plain, _shape, _steps, _sweep
 from flightid.inspection.flight_phases import FlightPhases
 from flightid.inspection.gap_findings import _remedy
 from flightid.inspection.inspection import Inspection
@@ -24,7 +24,7 @@ from flightid.inspection.saturation import Saturation
 from flightid.inspection.signals import Signal
 from flightid.inspection.skew import StreamSkew, _skew
 from flightid.inspection.thresholds import LONGEST_WINDOW
-from flightid.inspection.usable_band import AxisBand, _longest_window
+from flightid.inspection.usable_band import AxisBand, _longest_window, _of_windows
 from flightid.inspection.verdicts import _logging, _quality
 from flightid.logs.dataflash.writer import DataflashWriter
 from flightid.logs.source import Event, Gap
@@ -51,7 +51,12 @@ def log(**fields: object) -> Any:
 
 
 def skew(
-    late_s: float, rate_hz: float, seconds: float, noise: float, scale: float = 1.0
+    late_s: float,
+    rate_hz: float,
+    seconds: float,
+    noise: float,
+    scale: float = 1.0,
+    level: float = 0.0,
 ) -> StreamSkew:
     rng = np.random.default_rng(3)
     fast_s = np.arange(0.0, seconds, 0.005)
@@ -61,7 +66,7 @@ def skew(
     values += noise * motion.std() * rng.standard_normal(slow_s.size)
     first, second = (
         Signal("p", fast_s, motion, "rad/s", "a"),
-        Signal("p", slow_s, scale * values, "", "b"),
+        Signal("p", slow_s, scale * values + level, "", "b"),
     )
     found = _skew("p", first, second, ((0.0, seconds),))
     assert found is not None
@@ -72,6 +77,8 @@ def test_a_lag_has_an_interval_and_is_told_only_where_the_streams_tell_it() -> N
     clear = skew(0.02, 50.0, 60.0, noise=0.1)
     assert abs(clear.lag_s - 0.02) < clear.half_width_s < 0.002
     assert clear.exceeds(0.004)
+    level = skew(0.02, 50.0, 60.0, noise=0.1, level=100.0)
+    assert_close(level.half_width_s, clear.half_width_s, rtol=1e-6, why="nor of their level")
     other_unit = skew(0.02, 50.0, 60.0, noise=0.1, scale=57.3).half_width_s
     assert_close(other_unit, clear.half_width_s, rtol=1e-6, why="a lag has no unit of the values")
     assert not skew(0.03, 1.0, 90.0, noise=0.1).is_told
@@ -185,6 +192,14 @@ def test_a_long_flight_gives_more_windows_not_longer_ones() -> None:
     assert _longest_window([12_000.0], 7.0) == LONGEST_WINDOW.value
 
 
+def test_where_no_band_is_left_both_of_its_ends_are_said() -> None:
+    """Two cycles in 4 s, five samples a cycle of 0.5 s."""
+    said = _of_windows((), (("tau_phi",), ("p",)), 4.0, 0.5, "; cut")
+    assert said == (
+        "the windows reach down to 0.5 Hz, the sampling up to 0.4 Hz: no band is left; cut"
+    )
+
+
 def test_bursts_have_no_rate() -> None:
     steady = StreamRate("SIDD", None, 9000, 400.0, 80.0, 0.1, 1, 60.0, 0)
     assert not steady.is_burst
@@ -251,6 +266,11 @@ def test_a_sweep_of_a_set_point_grows_or_shrinks_threefold(
         slope = (last**2 - first**2) / (2.75 * 20.0)
         middle = np.sqrt([first**2 + 3.5 * slope, last**2 - 3.5 * slope])
         assert_close(np.array(ends), middle, rtol=0.05, why="stamps of 0.01 s")
+    shape = _shape(Signal("p", stamps, swept, "rad/s", "a"), "roll", (0.0, 19.99))
+    assert (shape is not None) is found
+    if shape is not None and ends is not None:
+        assert (shape.kind, shape.start_s, shape.stop_s) == ("sweep", 0.0, 19.99)
+        assert shape.detail == f"set-point from {ends[0]:.2g} to {ends[1]:.2g} Hz"
 
 
 def test_axes_share_a_reason_and_each_has_its_number(shared_data: Path) -> None:

@@ -10,9 +10,10 @@ from scipy import stats
 from flightid.conventions import Light
 from flightid.evidence import Check, Evidence
 from flightid.evidence.part_checks import agreement_check
-from flightid.uncertainty.agreement import Agreement, _in_doubt, compare_parts
+from flightid.uncertainty.agreement import Agreement, _freedom_of, _in_doubt, compare_parts
 from flightid.uncertainty.blocks import RecordBlock, flights_of, noise_heard
 from flightid.uncertainty.parts import RecordParts, _freedom, chance_alike, larger, scatter
+from flightid.uncertainty.quantiles import LEVEL, half_width
 from flightid.uncertainty.residual_noise import Autoregression
 from tests.closeness import assert_close
 from tests.strangers.parts import arx_flown, by_arx, by_output_error, changed_midway, steps_flown
@@ -235,3 +236,11 @@ def test_doubt_of_a_pair_beside_noise_that_is_known_warns_of_nothing() -> None:
     """Freedom without end met a share of none: NumPy's warning stood on the screen."""
     found = _in_doubt(np.array([1.0, 1.0, 5.0]), np.array([np.inf, 9.0, np.inf]))
     assert found.tolist() == [np.inf, 9.0, 5.0]
+
+
+def test_degrees_of_freedom_are_those_of_the_width() -> None:
+    for freedom in (3.0, 3.7, 11.0, 39.9):
+        found = _freedom_of(half_width(LEVEL, freedom), 3.0, 40.0)
+        assert_close(found, freedom, rtol=1e-7, why="widths to 1e-9")
+    assert _freedom_of(100.0, 3.0, 40.0) == 3.0
+    assert _freedom_of(1.0, 3.0, 40.0) == 40.0

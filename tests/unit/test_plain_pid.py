@@ -19,7 +19,7 @@ from flightid.cli.program import run
 from flightid.control.autopilots.pid_loop import PidLoop
 from flightid.control.tuning.order_statistics import least_share
 from flightid.control.tuning.requirements import TuningRequirements
-from flightid.control.tuning.standing_error import judge_standing, standing_errors
+from flightid.control.tuning.standing_error import judge_standing, slow_gain, standing_errors
 from flightid.conventions import Light
 from flightid.errors import DataError, ExportError, OptionError
 from flightid.models.linear.linear_system import LinearSystem
@@ -198,6 +198,12 @@ def test_a_step_that_p_alone_does_not_follow_is_told() -> None:
     assert_close(standing_errors(loop, [falling], "y", "u"), 1.0 - steps[-1:], atol=1e-9, why="end")
     loop = replace(loop, direct=False)
     assert_close(standing_errors(loop, [integrator], "y", "u"), [0.0], atol=1e-12, why="integrates")
+    twice = LinearSystem([[0.0, 1.0], [0.0, 0.0]], [[0.0], [3.0]], [[1.0, 0.0]], [[0.0]], ("u",),
+                         ("y",))  # fmt: skip
+    for plant, count, unstable in ((falling, 0, 1), (integrator, 1, 0), (twice, 2, 0)):
+        gain, *counts = slow_gain(plant, "y", "u")
+        assert_close(gain, 1.5 if unstable else 3.0, rtol=1e-9, why="of (jω)ⁿ G(jω)")
+        assert counts == [count, unstable]
     # An integral gain of zero is no integrator.
     assert [each.code for each in judge_standing(loop, LAG, [], "y", "u")] == ["standing-error"]
     assert not judge_standing(loop.with_gains(Ki=0.1), LAG, [], "y", "u")
@@ -312,3 +318,15 @@ def _fit() -> fid.Fit:
         units=model.units, random_error=np.full((1, 1, 40), 0.03),
     )  # fmt: skip
     return fid.identify(model, data, correct_bias=False, minimum_coherence=None)
+
+
+def test_noise_of_the_output_is_what_the_loop_makes_of_white_samples() -> None:
+    """Of P alone at 100 Hz: variance σ² up to half the rate, through C over 1 + L."""
+    noisy = _tuned(controller="p", loop_rate_hz=100.0, measurement_noise=0.05)
+    omega = np.linspace(0.0, 100.0 * np.pi, 4001)
+    z = np.exp(0.01j * omega)
+    plant = 2.0 * (1.0 - np.exp(-0.05)) / (z - np.exp(-0.05)) * z**-2
+    through = np.abs(noisy.gains["Kp"] / (1.0 + noisy.gains["Kp"] * plant))
+    rms = 0.05 * np.sqrt(np.trapezoid(through**2, omega) / omega[-1])
+    told = noisy.worst_case("output", "noise, rms").nominal
+    assert_close(told, rms, rtol=0.03, why="a grid of the loop's own")

@@ -32,6 +32,16 @@ def test_without_influence_of_the_fit_errors_are_those_of_independent_series() -
     assert_close(found.values, wanted, atol=1e-3, why="means of finite samples")
 
 
+def test_correlations_are_of_the_whole_input_where_a_lag_loses_its_end() -> None:
+    random = np.random.default_rng(3)
+    u, e, other = random.standard_normal((3, N))
+    u[-1] = 60.0
+    found = _tested(other[:, None], e, u)
+    left = np.array([np.sqrt(u[: N - k] @ u[: N - k]) for k in range(LAGS + 1)])
+    wanted = left / left[0] * N**-0.5
+    assert_close(found.errors, wanted, rtol=0.05, why="a sample of N(0, 1)")
+
+
 def test_lags_that_the_fit_takes_out_carry_no_evidence() -> None:
     random = np.random.default_rng(1)
     u, e = random.standard_normal((2, N))

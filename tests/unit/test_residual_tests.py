@@ -41,6 +41,18 @@ def _verification(seed: int = 0) -> fid.Verification:
     return fid.verify(lag, seen.replace({"y": seen["y"] + 0.05 * rng.standard_normal(800)}))
 
 
+def test_covariances_of_lags_take_every_lag_of_a_short_record() -> None:
+    """Bartlett's sum over all lags of five samples, beside a long coloured series."""
+    short = np.array([3.0, -1.0, 0.5, -2.0, 4.0])
+    b = lfilter([1.0], [1.0, -0.8], np.random.default_rng(4).standard_normal(4000))
+    x = short - short.mean()
+    of_a = np.correlate(x, x, "full") / (x @ x)
+    of_b = 0.8 ** np.abs(np.arange(-4, 5))
+    wanted = np.array([of_a[lag:] @ of_b[: 9 - lag] for lag in range(3)])
+    found = lag_covariance((short,), (b,), 3)
+    assert_close(found, wanted, atol=0.03, why="a recursion of 4,000 samples")
+
+
 def test_correlation_is_its_definition() -> None:
     a, b = _pair(1, 50)
     x, y = a - a.mean(), b - b.mean()

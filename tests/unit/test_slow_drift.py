@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -136,6 +137,29 @@ def test_native_rounds_are_those_of_the_models_themselves() -> None:
             assert_close(native[0].weights, own[0].weights, why="rounding", rtol=1e-8)
             assert_close(native[1].variance, own[1].variance, why="rounding", rtol=1e-9)
             assert native[1].corner == own[1].corner
+
+
+@pytest.mark.parametrize("length", [64, 65])
+def test_a_round_shares_the_power_of_all_bins_and_has_no_unit(length: int) -> None:
+    power = np.random.default_rng(7).exponential(size=length // 2 + 1)
+    power[-1] = 200.0  # the highest bin of an even transform stands alone in the whole circle
+    flat, drift = np.full(power.size, 1e-2), Drift(0.3, 0.3)
+
+    def ended(unit: float, rounds: int) -> Drift:
+        fast = SimpleNamespace(spectrum=lambda: unit * flat)
+        begun = Drift(unit * drift.variance, drift.corner)
+        return parted(lambda _: fast, unit * power, length, (fast, begun), rounds)[1]
+
+    own = drift.spectrum(length)
+    share = own / (own + flat)
+    slow = share**2 * power + share * flat
+    circle = np.r_[slow, slow[1 : (length + 1) // 2][::-1]]
+    assert circle.size == length
+    assert_close(ended(1.0, 1).variance, circle.mean(), rtol=1e-12, why="the mean over the circle")
+    many = ended(1.0, 40).variance
+    assert many != ended(1.0, 2).variance
+    for unit in (1e-6, 1e6):
+        assert_close(ended(unit, 40).variance / unit, many, rtol=1e-12, why="power has a unit")
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -16,6 +16,7 @@ from flightid.control.tuning.axis_tuning import Setting, noise_limit
 from flightid.control.tuning.controller_paths import ControllerPaths
 from flightid.control.tuning.evidence import _towards_errors
 from flightid.control.tuning.gain_search import _report
+from flightid.control.tuning.gain_steps import AT_LIMIT, TunedGain
 from flightid.control.tuning.loop_problem import LoopProblem, highest_crossover
 from flightid.control.tuning.order_statistics import content_of_worst, least_share
 from flightid.control.tuning.requirements import TuningRequirements
@@ -415,6 +416,43 @@ def test_a_late_output_turns_both_paths_by_its_delay() -> None:
     turned = np.exp(-0.002j * omega)
     for path in (ControllerPaths.feedback, ControllerPaths.forward):
         assert_close(path(after, omega), path(here, omega) * turned, rtol=1e-12, why="exact")
+
+
+def test_noise_behind_a_gain_is_its_rms_over_the_band() -> None:
+    omega = np.linspace(0.0, 50.0, 101)
+    problem = cast("LoopProblem", SimpleNamespace(noise_psd=np.full(101, 0.2)))
+    rms = float(LoopProblem._noise(problem, omega, np.full(101, 3.0)))
+    assert_close(
+        rms, np.sqrt(9.0 * 0.2 * 50.0 / (2.0 * np.pi)), rtol=1e-12, why="one-sided, per Hz"
+    )
+    problem = cast("LoopProblem", SimpleNamespace(noise_psd=None))
+    rms = float(LoopProblem._noise(problem, omega, omega))
+    assert_close(rms, 50.0 / np.sqrt(3.0), rtol=1e-4, why="a ramp's rms")
+
+
+def test_a_gain_stands_at_its_limit_within_a_thousandth_of_the_range() -> None:
+    near = AT_LIMIT * 0.5
+    places = {0.1: True, 0.1 + 0.9 * near: True, 0.1 + 1.1 * near: False, 0.3: False,
+              0.5 - 1.1 * near: False, 0.5 - 0.9 * near: True, 0.5: True}  # fmt: skip
+    made = {new: TunedGain("P", "1", 0.2, new, 0.1, 0.5).at_limit for new in places}
+    assert made == places
+
+
+def test_an_integral_flown_without_p_asks_for_no_more_than_usual() -> None:
+    names = FLOWN.names
+    usual = [FLOWN.ranges[names[role]].default for role in "pi"]
+    ratios = []
+    for flown in ({"p": 0.0, "i": 0.3}, {"p": 0.2, "i": 0.0}, {"p": 0.1, "i": 0.9}):
+        loop = FLOWN.with_gains({names[role]: value for role, value in flown.items()})
+        ratios.append(ControllerPaths(loop, "filtered", False).integral_ratio(2.0))
+    assert ratios == [2.0 * usual[1] / usual[0], 2.0 * usual[1] / usual[0], 9.0]
+
+
+def test_the_largest_sensitivity_is_the_smaller_of_both_that_are_asked() -> None:
+    asked = TuningRequirements(sensitivity_peak=1.5, disturbance_peak_db=20.0 * np.log10(1.2))
+    assert_close(asked.peak, 1.2, rtol=1e-12, why="dB")
+    assert dataclasses.replace(asked, disturbance_peak_db=6.0).peak == 1.5
+    assert dataclasses.replace(asked, disturbance_peak_db=None).peak == 1.5
 
 
 def test_white_gyro_noise_has_its_variance_up_to_half_the_rate() -> None:

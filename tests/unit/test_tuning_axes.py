@@ -11,6 +11,7 @@ import pytest
 import flightid as fid
 from flightid.control.autopilots import AxisLoop, axis_loop, read_parameters
 from flightid.control.tuning.sampled_plants import SampledPlants, sample_plants
+from flightid.control.tuning.tune_pid import _couplings
 from flightid.conventions import Light
 from flightid.errors import DataError, ModelError, OptionError, UnknownNameError
 from flightid.plot.gains import margins_caption, overlaid_steps, promised_margins, steps_caption
@@ -110,6 +111,11 @@ def test_coupled_axes_are_stable_together_by_their_poles(tuning: fid.Tuning) -> 
     assert together.coupling > 0.2
     assert (together.worst_disk_margin or 0.0) > 0.3
     assert together.flown_stable_plants == together.n_plants == 1
+    table = tuning.together_table()
+    digits = [column.digits for column in table.columns]
+    assert digits[2:6] == [3, 3, 3, 3], "as margins are said everywhere"
+    shown = (together.disk_margin, together.worst_disk_margin, together.gain_db)
+    assert table.rows[0][2:5] == shown
     assert any(f.code == "together" and f.light is Light.GREEN for f in tuning.findings)
 
 
@@ -370,3 +376,23 @@ def test_parameters_by_name_stand_for_loops() -> None:
     )  # fmt: skip
     assert made["yaw"].exists
     assert set(made.gains) == {"MC_YAWRATE_P", "MC_YAWRATE_I", "MC_YAWRATE_D"}
+
+
+def test_angles_of_a_recursion_are_trapezoids_of_its_rates() -> None:
+    plant = fid.LinearSystem(
+        [[0.9, 0.1], [0.0, 0.7]], [[0.3], [0.5]], [[1.0, 0.4]], [[0.0]], ("u",), ("p",),
+        sample_time_s=STEP_S,
+    )  # fmt: skip
+    (system,) = sample_plants([plant], ["p"], ["u"], STEP_S, hold_in_model=False).systems
+    omega = np.geomspace(1.0, 1000.0, 20)
+    rate, angle = system.frequency_response(omega)[:, 0]
+    turn = np.exp(1j * omega * STEP_S)
+    trapezoid = 0.5 * STEP_S * (turn + 1.0) / (turn - 1.0)
+    assert_close(angle, rate * trapezoid, rtol=1e-9, why="the same sums")
+    assert_close(rate, plant.frequency_response(omega)[0, 0], rtol=1e-9, why="the plant")
+
+
+def test_couplings_are_the_other_rates_whose_commands_the_model_holds() -> None:
+    assert _couplings(_FIXED, "p") == ["q"]
+    assert _couplings(_FIXED, "q") == ["p"]
+    assert _couplings(_FIXED.select(inputs=["tau_phi"]), "p") == []

@@ -98,7 +98,7 @@ BELONGS = {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FitFacts:
     """What a fit hands over.
 

@@ -16,7 +16,7 @@ TURNED = {"roll": lambda a: a, "pitch": lambda a: -a, "yaw": lambda a: 0.5 * np.
 """Angles of an aircraft's axes to north, east, down, from those of ROS (REP 103)."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ChannelSamples:
     """Samples of a channel with their own stamps.
 

@@ -20,7 +20,7 @@ TURN, TERMS = 0.5, 12
 """Largest phase (rad) over half of a span of samples, and terms of its series: 5e-13 is left."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FittedDirections:
     """Orthonormal directions along which a fit takes noise out of one record's residuals.
 

@@ -56,7 +56,7 @@ def white_deviation(samples: Array) -> float:
     return float(np.sqrt(np.median(power[n // 4 :]) / MEDIAN_OF_EXPONENTIAL))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class InputNoise:
     """White noise of the inputs, and how it reaches the outputs.
 

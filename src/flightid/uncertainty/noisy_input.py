@@ -114,7 +114,7 @@ def _smallest(asked: _NoisyPast, variances: Array) -> tuple[float, float]:
     return best
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Directions:
     """Columns of an input's past by the directions of their products, from strong to weak ones."""
 
@@ -137,7 +137,7 @@ class _Directions:
         return np.asarray((self.along * gains) @ (self.along.T @ aims))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _NoisyPast:
     """An input, its past, and outputs that their own past has whitened; others' pasts taken out.
 

@@ -56,7 +56,7 @@ LEAST_FREEDOM = 1.0
 """Below it Student's distribution has no mean, and its interval no meaning."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Autoregression:
     """Autoregressive model of a stationary residual.
 

@@ -22,7 +22,7 @@ DECIBEL, DEGREE = 20.0 / np.log(10.0), 180.0 / np.pi
 """Of a relative change of a response: its real part in dB, its imaginary part in deg."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PointSensitivity:
     """Derivatives of residuals with respect to data, of which each residual answers to few.
 
@@ -71,7 +71,7 @@ class PointSensitivity:
             first += len(block)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PolarSensitivity:
     """Derivatives of residuals two by two, each pair of which answers to one complex point.
 

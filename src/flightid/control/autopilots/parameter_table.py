@@ -26,9 +26,9 @@ class GainRange:
     unit : str
         Unit of the parameter.
     increment : float
-        Step in which a ground station changes it.
+        Step in which a ground station changes it; 0 where there is none.
     default : float
-        Value of a fresh vehicle.
+        Value of a fresh vehicle; 0 where there is none.
     note : str
         What else is to be known.
 
@@ -41,8 +41,8 @@ class GainRange:
     low: float
     high: float
     unit: str
-    increment: float
-    default: float
+    increment: float = 0.0
+    default: float = 0.0
     note: str = ""
 
     def __repr__(self) -> str:

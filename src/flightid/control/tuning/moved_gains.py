@@ -126,7 +126,7 @@ def move_gains(
         beside,
         met,
         short,
-        int((~judged.stable[0]).sum()),
+        int(np.count_nonzero(~judged.stable)),
         holds := bool(judged.stable[0, 0]),
         _bands(design, loop) if responses and holds else (),
         problem.plants.omega_rad_s,

@@ -304,9 +304,9 @@ def _scaled(loop: PidLoop, turn: float, gain: complex) -> PidLoop:
     scale, size = VEHICLE_RAD_S / turn, 1.0 / abs(gain)
     low, high = (share * size for share in WIDEST_P)
     ranges = {
-        "p": GainRange(low, high, loop.unit_told("p"), 0.0, 0.0),
-        "i": GainRange(1e-3 * low / scale, HIGHEST_I * high / scale, loop.unit_told("i"), 0.0, 0.0),
-        "d": GainRange(0.0, HIGHEST_D * high * scale, loop.unit_told("d"), 0.0, 0.0),
+        "p": GainRange(low, high, loop.unit_told("p")),
+        "i": GainRange(1e-3 * low / scale, HIGHEST_I * high / scale, loop.unit_told("i")),
+        "d": GainRange(0.0, HIGHEST_D * high * scale, loop.unit_told("d")),
     }
     named = {loop.names[role]: each for role, each in ranges.items() if role in loop.names}
     values = dict(loop.values)

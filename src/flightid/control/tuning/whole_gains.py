@@ -38,12 +38,11 @@ def whole_gains(
     candidates = np.clip(np.array(sorted(near)) * one, problem.low, problem.high)
     judged = problem.judge(candidates)
     slack = judged.slack.min(axis=(0, 2))
-    if found.exists:
-        rank = np.where(slack >= 0.0, 100.0 + judged.objective.min(axis=1), slack)
-    else:
-        rank = slack
-    best = int(np.argmax(rank))
+    worth = judged.objective.min(axis=1)
+    # What meets everything goes first, by its worth; the others by what they lack.
+    met = (slack >= 0.0) & found.exists
+    best = max(range(slack.size), key=lambda k: (met[k], worth[k] if met[k] else slack[k]))
     least = dict(zip(judged.names, map(float, judged.slack[:, best].min(axis=1)), strict=True))
-    met = found.exists and min(least.values()) >= 0.0
-    binding = found.binding if met or not found.exists else (*found.binding, ROUNDED)
-    return replace(found, gains=candidates[best], exists=met, binding=binding, slack=least)
+    exists = bool(met[best])
+    binding = found.binding if exists or not found.exists else (*found.binding, ROUNDED)
+    return replace(found, gains=candidates[best], exists=exists, binding=binding, slack=least)

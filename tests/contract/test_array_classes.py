@@ -1,0 +1,32 @@
+"""Classes that hold arrays compare as objects: `==` of arrays has no truth value, nor a hash."""
+
+from __future__ import annotations
+
+import ast
+import re
+
+from tests.contract.source import PACKAGE, nodes, python_files, tree
+
+PACKAGES = ("logs", "inspection", "evidence", "uncertainty", "control/tuning")
+ARRAY = re.compile(r"^(?!Callable).*\b(?:Array|NDArray|Complex)\b")
+
+
+def _is_compared(made: ast.ClassDef) -> bool:
+    """Whether it is a dataclass whose arrays `==` would compare."""
+    told = [ast.unparse(each) for each in made.decorator_list if "dataclass" in ast.unparse(each)]
+    kinds = [ast.unparse(each.annotation) for each in made.body if isinstance(each, ast.AnnAssign)]
+    return any("eq=False" not in each for each in told) and any(map(ARRAY.search, kinds))
+
+
+def test_classes_that_hold_arrays_are_told_apart_by_identity() -> None:
+    found = [
+        f"{path.relative_to(PACKAGE)}: {node.name}"
+        for path in python_files()
+        if path.relative_to(PACKAGE).as_posix().startswith(PACKAGES)
+        for node in nodes(tree(path))
+        if isinstance(node, ast.ClassDef) and _is_compared(node)
+    ]
+    assert not found, "dataclass(frozen=True, eq=False)"
+    (planted,) = ast.parse("@dataclass(frozen=True)\nclass A:\n    x: Array | None = None").body
+    assert isinstance(planted, ast.ClassDef)
+    assert _is_compared(planted)
