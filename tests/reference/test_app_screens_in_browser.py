@@ -240,15 +240,15 @@ def _planned(page: Any) -> list[str]:
     # What makes no band with the other end stays, marked, and is taken with what is typed there.
     page.fill("#low", "50")
     page.press("#low", "Tab")
-    page.get_by_text("say where it shall end").wait_for()
+    page.get_by_text("From has to be below To (To, where nothing is typed").wait_for()
     assert page.get_attribute("#low", "aria-invalid") == "true"
     page.fill("#high", "1")
     page.press("#high", "Tab")
-    page.get_by_text("needs a lowest frequency below its highest").wait_for()
+    page.get_by_text("From has to be below To, and each above 0 Hz").wait_for()
     assert (page.input_value("#low"), page.input_value("#high")) == ("50", "1")
     page.fill("#low", "")
     page.press("#low", "Tab")
-    page.get_by_text("needs a lowest frequency below its highest").wait_for(state="detached")
+    page.get_by_text("From has to be below To").wait_for(state="detached")
     page.fill("#amplitude", "0.0001")
     page.press("#amplitude", "Tab")
     page.locator("h1", has_text="no-go").wait_for()

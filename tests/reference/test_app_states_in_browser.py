@@ -376,7 +376,7 @@ def _of_rig_gains(stage: Stage) -> Iterator[str]:
     typed = page.get_by_label("Ki, value")
     typed.fill("1e9")
     typed.press("Tab")
-    page.locator("#range-Ki").wait_for()
+    page.locator("#why-value-Ki").wait_for()
     page.locator("#slider-Kp").press("End")
     page.get_by_text("Nothing to download: the reason stands above.").wait_for()
     yield "gains of a rig, refused"

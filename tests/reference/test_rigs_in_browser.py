@@ -175,12 +175,12 @@ def test_gains_of_a_rig_by_hand(desk: Desk, tmp_path: Path) -> None:
     typed, kept = page.get_by_label("Ki, value"), page.get_by_label("Ki, value").input_value()
     typed.fill("1e9")
     typed.press("Tab")
-    assert f"; {float(kept):.3g} stands" in page.locator("#range-Ki").inner_text()
+    assert f"; {float(kept):g} " in page.locator("#why-value-Ki").inner_text()
     assert typed.input_value() == "1e9"
     assert "by_hand" not in desk.study["tune"]
     typed.fill(kept)
     typed.press("Tab")
-    page.locator("#range-Ki").wait_for(state="detached")
+    page.locator("#why-value-Ki").wait_for(state="detached")
     slider.press("End")
     page.get_by_text("Nothing to download: the reason stands above.").wait_for()
     # What to do is a button of the page, no key of a study.

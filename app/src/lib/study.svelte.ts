@@ -102,6 +102,11 @@ export class Study {
     return waiting.stored;
   }
 
+  /** Change keys, and tell why that was refused; nothing where it was not. */
+  async stored(edits: Edit[]): Promise<string> {
+    return (await this.edit(edits)) ? "" : this.error;
+  }
+
   /** Change keys whose places hang on what stands there when the turn comes. */
   editThen(make: () => Edit[]): Promise<boolean> {
     return this.#heard(() => {
