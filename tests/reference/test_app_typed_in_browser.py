@@ -79,3 +79,32 @@ def test_a_band_is_taken_as_both_fields_show_it_or_not_at_all(desk: Desk, tmp_pa
     until(page, lambda: desk.study["model"][0]["band_rad_s"] == [3.142, 31.42])
     assert not page.locator("[aria-invalid=true]").count()
     page.close()
+
+
+def test_a_handle_that_is_taken_again_follows_the_hand(desk: Desk, tmp_path: Path) -> None:
+    """What the first drag had stored came back meanwhile, and threw the handle there."""
+    page = _dropped(desk, tmp_path)
+    _opened(page, "Response")
+    page.wait_for_selector(".handle")
+    page.locator(".uplot canvas").nth(2).wait_for()
+    handle = page.locator(".handle").nth(1)
+    band = desk.study["model"][0]["band_rad_s"]
+
+    def middle() -> tuple[float, float]:
+        box = handle.bounding_box()
+        return box["x"] + box["width"] / 2.0, box["y"] + box["height"] / 2.0
+
+    x, y = middle()
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x - 60.0, y, steps=6)
+    page.mouse.up()
+    page.mouse.down()
+    page.mouse.move(x - 80.0, y)
+    until(page, lambda: desk.study["model"][0]["band_rad_s"] != band)
+    page.wait_for_timeout(1000)
+    assert abs(middle()[0] - (x - 80.0)) < 2.0
+    stored = desk.study["model"][0]["band_rad_s"]
+    page.mouse.up()
+    until(page, lambda: desk.study["model"][0]["band_rad_s"][1] < stored[1])
+    page.close()
