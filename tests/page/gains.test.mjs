@@ -52,13 +52,39 @@ test("a slider that is pressed stays where it is when gains are found anew, and 
   assert.deepEqual(hand.values, {});
 });
 
+test("while another slider is held the numbers are of the sliders, not of the study before", () => {
+  const hand = aHand();
+  assert.equal(hand.told, null);
+  hand.move("P", 0.2);
+  asked.at(-1).answer({ error: null, moved: judged });
+  hand.pressed = true;
+  hand.move("D", 0.005);
+  assert.deepEqual(hand.told, { axis: "roll", now: false });
+  asked.at(-1).answer({ error: null, moved: judged });
+  assert.deepEqual(hand.told, { axis: "roll", now: true });
+  hand.forget();
+});
+
+test("a slider that is let go where its study has it keeps nothing of the hand", () => {
+  const hand = aHand();
+  hand.move("P", 0.1);
+  asked.at(-1).answer({ error: null, moved: judged });
+  hand.pressed = true;
+  hand.anew(false);
+  hand.pressed = false;
+  assert.deepEqual(hand.values, {});
+  assert.equal(hand.moved, null);
+});
+
 test("the banner says of each number whose it is", () => {
   const of = (preset, form = "") => ({ preset, form });
-  assert.match(oldNumbers(of("balanced"), of("balanced"), ""), /^The numbers shown are of the study before/);
-  assert.match(oldNumbers(of("balanced"), of("balanced"), "roll"), /^The numbers of roll are of its sliders as they stand; files and other axes are still/);
-  assert.match(oldNumbers(of("gentle"), of("firm"), "roll"), /still those of `gentle`; `firm` has none yet/);
+  const roll = (now) => ({ axis: "roll", now });
+  assert.match(oldNumbers(of("balanced"), of("balanced"), null), /^The numbers shown are of the study before/);
+  assert.match(oldNumbers(of("balanced"), of("balanced"), roll(true)), /^The numbers of roll are of its sliders as they stand; files and other axes are still/);
+  assert.match(oldNumbers(of("balanced"), of("balanced"), roll(false)), /^The numbers of roll follow its sliders; files and other axes are still/);
+  assert.match(oldNumbers(of("gentle"), of("firm"), roll(true)), /still those of `gentle`; `firm` has none yet/);
   const forms = { pi: "PI", pid: "PID in parallel" };
-  assert.match(oldNumbers(of("firm", "pi"), of("firm", "pid"), "", forms), /`firm, PI`; `firm, PID in parallel` has none/);
+  assert.match(oldNumbers(of("firm", "pi"), of("firm", "pid"), null, forms), /`firm, PI`; `firm, PID in parallel` has none/);
 });
 
 test("where gains come from stands beside what they promise", () => {

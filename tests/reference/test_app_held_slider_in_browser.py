@@ -13,6 +13,12 @@ from tests.reference.test_app_screens_in_browser import SLOW_MS, _flown
 
 __all__ = ["desk"]
 pytestmark = pytest.mark.slow
+OF_BEFORE = "The numbers shown are of the study before its last change."
+TOLD = """() => { const told = window.told = new Set();
+  const read = () => document.querySelectorAll("p.old").forEach((each) => told.add(each.textContent));
+  read();
+  new MutationObserver(read).observe(document.body, { subtree: true, childList: true, characterData: true }); }"""
+"""Whatever is said of old numbers from now on."""
 ASKED = "1 of the tunings that a hand asked for has ended"
 
 
@@ -44,7 +50,13 @@ def test_a_tuning_that_ends_moves_no_slider_under_the_hand(desk: Desk, tmp_path:
         page.mouse.up()
     page.get_by_text("of the study before its last change").first.wait_for()
     assert [first.bounding_box()["y"], last.bounding_box()["y"]] == places, "sliders moved"
+    # What was released is in the file, and in the numbers: nothing says that they are of before it.
+    assert page.get_by_role("button", name="As found").is_enabled()
+    page.get_by_text("The numbers of roll are of its sliders as they stand").wait_for()
+    page.evaluate(TOLD)
     held = _pressed(page, last, -0.12)
+    page.wait_for_timeout(300)
+    assert not [each for each in page.evaluate("() => [...window.told]") if OF_BEFORE in each]
     page.get_by_text("of the study before its last change").first.wait_for(state="detached")
     page.wait_for_timeout(500)
     assert int(last.input_value()) == held, ASKED

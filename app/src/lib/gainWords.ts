@@ -14,13 +14,13 @@ interface Asked { preset: string; form: string }
 /**
  * Whose numbers a screen shows while those of its study are not there; names stand in back-quotes.
  *
- * `hand` is the axis whose numbers are already of the gains that its sliders show; empty where none is.
+ * `hand` is the axis whose numbers are already of its sliders, and whether of where they stand now.
  */
-export function oldNumbers(shown: Asked, wanted: Asked, hand: string, forms: Record<string, string> = {}): string {
+export function oldNumbers(shown: Asked, wanted: Asked, hand: { axis: string; now: boolean } | null, forms: Record<string, string> = {}): string {
   const form = wanted.form !== "" && shown.form !== wanted.form;
   const named = (each: Asked) => [each.preset, ...(form ? [forms[each.form] ?? each.form] : [])].join(", ");
   if (named(shown) !== named(wanted)) return `The numbers shown are still those of \`${named(shown)}\`; \`${named(wanted)}\` has none yet.`;
-  if (hand) return `The numbers of ${hand} are of its sliders as they stand; files and other axes are still of the study before its last change.`;
+  if (hand) return `The numbers of ${hand.axis} ${hand.now ? "are of its sliders as they stand" : "follow its sliders"}; files and other axes are still of the study before its last change.`;
   return "The numbers shown are of the study before its last change.";
 }
 

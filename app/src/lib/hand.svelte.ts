@@ -14,7 +14,7 @@ export class Hand {
   refused = $state("");
   late = $state(false);
   /** Whether a slider is pressed: what is found anew does not move it under the hand. */
-  pressed = false;
+  #pressed = false;
   /** Gains that `moved` is of. */
   #of = $state.raw<Record<string, number>>({});
   #rest = 0;
@@ -43,6 +43,22 @@ export class Hand {
   get holds(): boolean {
     const now = this.now;
     return this.moved !== null && this.moved === this.shown && Object.keys(now).every((name) => now[name] === this.#of[name]);
+  }
+
+  get pressed() {
+    return this.#pressed;
+  }
+
+  /** Let go where the study has it, a hand holds nothing: what it kept from gains found anew goes. */
+  set pressed(pressed: boolean) {
+    this.#pressed = pressed;
+    const stands = (this.still()?.sliders ?? []).every((each) => this.values[each.name] === undefined || this.values[each.name] === each.value);
+    if (!pressed && stands) this.forget();
+  }
+
+  /** Whose axis has numbers of its sliders rather than of the study, and whether of where they stand now. */
+  get told(): { axis: string; now: boolean } | null {
+    return this.moved !== null && this.moved === this.shown ? { axis: this.moved.axis, now: this.holds } : null;
   }
 
   /** Gains are there anew: a slider that is pressed, or is ahead of them, stays and is judged beside them. */
