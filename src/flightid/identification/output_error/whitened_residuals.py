@@ -23,6 +23,8 @@ SAMPLES_A_NUMBER = 5
 """Of all records, for each number of that answer."""
 AT_ONCE = 2048
 """Samples or frequencies that are worked on at a time: long records need no more memory."""
+EVEN = 0.8
+"""Smallest power of a channel over its largest at any lag, from which products are differences."""
 ROUNDING = 1e-6
 """Of the largest direction of inputs, below which one tells nothing."""
 
@@ -53,11 +55,12 @@ def unforetold(rows: Sequence[Array], inputs: Sequence[Array]) -> list[Array]:
     def beside() -> Iterator[Array]:
         return (np.concatenate([lags, rows[k][:, part]]) for k, part, lags in pieces())
 
-    inputs_alone = lagged_products(padded, reach + 1, reach + 1)[::-1, :, ::-1]
     count = len(moved) * (reach + 2)
-    crossed = products_with_past(rows, padded, reach + 1)[::-1].reshape(count, -1)
-    own = np.sum([each @ each.T for each in rows], axis=0)
-    products = np.block([[inputs_alone.reshape(count, count), crossed], [crossed.T, own]])
+    products = _even_products(padded, reach + 1)
+    if products is not None:
+        crossed = products_with_past(rows, padded, reach + 1)[::-1].reshape(count, -1)
+        own = np.sum([each @ each.T for each in rows], axis=0)
+        products = np.block([[products, crossed], [crossed.T, own]])
     weights, _ = _regressed(beside, products, count, ROUNDING)
     left = [each.copy() for each in rows]
     for k, part, lags in pieces():
@@ -74,7 +77,7 @@ def colour_filters(rows: Sequence[Array]) -> list[Array] | None:
     found = []
     for output in range(rows[0].shape[0]):
         own = [each[output : output + 1] for each in rows]
-        products = lagged_products(own, LAGS, LAGS)[::-1, 0, ::-1, 0]
+        products = _even_products(own, LAGS)
         weights, left = _regressed(partial(_pasts, own), products, LAGS, None)
         if not np.all(np.isfinite(weights)) or left[0] <= 0.0:
             return None
@@ -111,13 +114,30 @@ def _pasts(outputs: Sequence[Array]) -> Iterator[Array]:
 
 
 def _regressed(
-    pieces: Callable[[], Iterable[Array]], products: Array, count: int, rounding: float | None
+    pieces: Callable[[], Iterable[Array]],
+    products: Array | None,
+    count: int,
+    rounding: float | None,
 ) -> tuple[Array, Array]:
     """Weights in the first `count` of so many rows that foretell the others, and squares left.
 
-    Rows come by pieces of samples, where their products keep too few digits; weights
-    (rows - count, count).
+    Rows come by pieces of samples, where their products are not known or keep too few digits;
+    weights (rows - count, count).
     """
     root = triangle_of_parts(lambda: (piece.T for piece in pieces()), products)
     weights = np.linalg.lstsq(root[:count, :count], root[:count, count:], rcond=rounding)[0]
     return np.asarray(weights.T), np.asarray(np.sum(root[count:, count:] ** 2, axis=0))
+
+
+def _even_products(records: Sequence[Array], longest: int) -> Array | None:
+    """Products of all lags of all channels, the oldest first; None where they may lack digits.
+
+    They come as differences, which keep all digits where no channel's power changes much from lag
+    to lag: one that grows does all at its end.
+    """
+    found = lagged_products(records, longest, longest)
+    power = np.einsum("iaia->ia", found)
+    if not np.all(power.min(axis=0) > EVEN * power.max(axis=0)):
+        return None
+    size = found.shape[0] * found.shape[1]
+    return np.asarray(found[::-1, :, ::-1].reshape(size, size))
