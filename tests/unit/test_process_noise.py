@@ -9,7 +9,12 @@ from scipy.signal import lfilter
 
 import flightid as fid
 from flightid.conventions import Light
-from flightid.identification.output_error.disturbed_states import disturbances, moved_together
+from flightid.identification.output_error import disturbed_states
+from flightid.identification.output_error.disturbed_states import (
+    _transforms,
+    disturbances,
+    moved_together,
+)
 from flightid.identification.output_error.process_noise import state_noise
 from flightid.identification.output_error.whitened_residuals import (
     LAGS,
@@ -307,6 +312,14 @@ def test_what_inputs_foretell_is_least_squares_on_their_neighbours() -> None:
              for each in whole]
         )  # fmt: skip
         assert_close(-taps[1:], np.linalg.lstsq(past, now)[0], why="least squares", rtol=1e-9)
+
+
+def test_rows_that_share_a_transform_keep_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    rows = np.random.default_rng(3).standard_normal((3, 77))
+    monkeypatch.setattr(disturbed_states, "LONG", 10)
+    for count, n in ((3, 77), (2, 76), (1, 77)):
+        known = np.fft.rfft(rows[:count, :n], axis=1)
+        assert_close(_transforms(rows[:count, :n]), known, atol=1e-12, why="rounding")
 
 
 def test_sensors_alone_move_together_by_chance_as_often_as_is_said() -> None:

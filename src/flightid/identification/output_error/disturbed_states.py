@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from flightid import _native
@@ -40,6 +41,8 @@ MEMORIES_S = (0.0, 0.3, 2.0)
 """Of disturbances, s: gusts have one."""
 FALSE_ALARMS = 0.001
 """Share of records with noise of sensors alone in which a disturbance is named."""
+LONG = 1 << 16
+"""Samples from which two rows are transformed together."""
 TRIED = 2
 """Disturbances whose chance is worked out: those that stand out most."""
 
@@ -201,7 +204,7 @@ class _LookedAt:
         system: DisturbedSystem,
         step_s: float,
     ) -> _LookedAt:
-        spectra = turned @ np.fft.rfft(white, axis=1)[:, 1:]
+        spectra = turned @ _transforms(white)[:, 1:]
         omega = 2.0 * np.pi * np.arange(1, spectra.shape[1] + 1) / (white.shape[1] * step_s)
         power = _smoothed(np.abs(spectra) ** 2)
         told = spectra / np.sqrt(power)
@@ -223,6 +226,25 @@ class _LookedAt:
             (self.omega, self.told, self.power),
             (self.filters, self.turned, self.step_s),
         )
+
+
+def _transforms(rows: Array) -> Complex:
+    """Of real rows (n_rows, n_samples), bins 0 to the middle.
+
+    Long records may have lengths of large factors, whose transforms are complex inside: two rows
+    share one there.
+    """
+    count, n = rows.shape
+    if n < LONG:
+        return np.asarray(scipy.fft.rfft(rows, axis=1))
+    bins = np.arange(n // 2 + 1)
+    found = np.empty((count + count % 2, bins.size), dtype=np.complex128)
+    for first in range(0, count, 2):
+        second = rows[first + 1] if first + 1 < count else 0.0
+        both = scipy.fft.fft(rows[first] + 1j * second)
+        here, there = both[bins], np.conj(both[-bins])
+        found[first], found[first + 1] = 0.5 * (here + there), -0.5j * (here - there)
+    return found[:count]
 
 
 def _smoothed(power: Array) -> Array:
