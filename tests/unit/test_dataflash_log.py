@@ -22,6 +22,7 @@ from flightid.errors import (
     UnknownNameError,
 )
 from flightid.logs import DataflashWriter, MessageLayout
+from flightid.logs.dataflash.writer import _stamps
 from tests.examples import examples
 
 TIME_US = np.arange(0, 1_000_000, 10_000)
@@ -198,6 +199,9 @@ def test_what_cannot_be_logged_is_refused() -> None:
         writer.add("EV", [0], {"Id": [np.nan]})
     with pytest.raises(DataError, match="stamps cannot be logged"):
         writer.add("EV", [-1], {"Id": [3]})
+    for wrong in ([[1], [2]], [1.5], [True], ["1"]):
+        with pytest.raises(DataError, match="stamps cannot be logged"):
+            _stamps(wrong)
     with pytest.raises(DataError, match="text that is too long"):
         writer.message(0, "x" * 65)
     with pytest.raises(DataError, match="nothing to write"):

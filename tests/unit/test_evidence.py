@@ -15,7 +15,7 @@ from flightid.conventions import Light
 from flightid.errors import OptionError
 from flightid.evidence import Check, Evidence, inspection_check, residual_check
 from flightid.evidence.evidence import ALWAYS, NAMES
-from flightid.evidence.explained import ExplainedRun, _powers
+from flightid.evidence.explained import FEWEST, ExplainedRun, _powers, explained_spans
 from flightid.evidence.gather import LIMITS, _of_findings
 from flightid.evidence.parameter_checks import declared_signs
 from flightid.evidence.spans import Span, judge_coherence, judge_span, spans_of
@@ -231,3 +231,10 @@ def test_a_tone_that_is_explained_stands_in_the_bin_of_its_frequency() -> None:
         said, left = _powers(ExplainedRun(tone, 0.5 * tone, step), edges)[:, 0]
         assert int(np.argmax(said)) == int(np.argmax(left)) == place
         assert_close(said[place], said.sum(), rtol=1e-6, why="a Hann window")
+
+
+def test_a_record_of_fewer_than_64_samples_is_not_looked_at() -> None:
+    tone = np.sin(0.5 * np.arange(64.0))[None]
+    assert FEWEST == 64
+    assert explained_spans(["y"], [ExplainedRun(tone[:, :-1], tone[:, :-1], 0.02)])[0] == []
+    assert len(explained_spans(["y"], [ExplainedRun(tone, tone, 0.02)])[0]) == 1

@@ -24,7 +24,7 @@ from flightid.inspection.saturation import Saturation
 from flightid.inspection.signals import Signal
 from flightid.inspection.skew import StreamSkew, _skew
 from flightid.inspection.thresholds import LONGEST_WINDOW
-from flightid.inspection.usable_band import AxisBand, _longest_window, _of_windows
+from flightid.inspection.usable_band import AxisBand, _cut, _longest_window, _of_windows
 from flightid.inspection.verdicts import _logging, _quality
 from flightid.logs.dataflash.writer import DataflashWriter
 from flightid.logs.source import Event, Gap
@@ -197,6 +197,15 @@ def test_where_no_band_is_left_both_of_its_ends_are_said() -> None:
     said = _of_windows((), (("tau_phi",), ("p",)), 4.0, 0.5, "; cut")
     assert said == (
         "the windows reach down to 0.5 Hz, the sampling up to 0.4 Hz: no band is left; cut"
+    )
+
+
+def test_pieces_that_gaps_made_of_spans_are_counted() -> None:
+    """Two spans in three parts, and five records: two are by gaps."""
+    flown: Any = SimpleNamespace(n_parts=3, spans=((0.0, 9.0), (20.0, 29.0)))
+    assert _cut([1.0, 2.0, 3.0], flown) == ""
+    assert _cut([1.0, 2.0, 3.0, 4.0, 5.25], flown) == (
+        "; gaps cut the flight into 4 pieces, the longest 5.2 s: close them first"
     )
 
 

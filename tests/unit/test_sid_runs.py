@@ -10,7 +10,7 @@ import pytest
 import flightid as fid
 from flightid.conventions import Axis, Role
 from flightid.errors import OptionError
-from flightid.logs.self_check import mixer_residual
+from flightid.logs.self_check import chirp_clock, mixer_residual
 from tests.closeness import assert_close
 from tests.mixer_sweep_log import write_sweep
 
@@ -20,6 +20,9 @@ def test_runs_are_located_with_their_settings(tmp_path: Path) -> None:
     assert len(log.sid_runs) == 2
     run = log.sid_runs[1]
     assert (run.axis, run.point, run.body_axis, run.unit) == (10, "mixer", Axis.ROLL, "1")
+    stamps, clock, _ = chirp_clock(log, run)
+    assert (stamps[0], stamps.size) == (run.start_s, run.n_rows)
+    assert np.all(np.diff(clock) > 0.0)
     assert_close(run.start_s, 20.0, atol=2e-3, why="written within the loop that starts the mode")
     assert_close(run.chirp_span_s, (21.0, 33.0), atol=2e-3, why="one second of silence, then T_REC")
     assert (run.f_start_hz, run.f_stop_hz, run.fade_in_s, run.record_s) == (0.5, 5.0, 2.0, 12.0)
