@@ -13,6 +13,7 @@ from flightid.errors import DataError
 from flightid.frozen import dataclass
 from flightid.identification.fit_findings import EXCELLENT_COST
 from flightid.identification.frequency_domain.error_model import ErrorModel, whitening
+from flightid.identification.frequency_domain.known_minimum import KnownMinimum
 from flightid.identification.frequency_domain.model_curves import curves_of
 from flightid.identification.frequency_domain.selection import SelectedResponse
 from flightid.identification.multistart import DenseEnd, collect, draw_starts
@@ -91,17 +92,38 @@ class _Descent:
         around = self._ends(np.ascontiguousarray(early), maximum_iterations)
         return [end for end in around if end.cost < best * (1.0 - LOWER)]
 
-    def by_errors(self, begin: Array, best: float, maximum_iterations: int) -> list[DenseEnd]:
-        """Ends below the best cost that begin where the least relative complex errors lie.
+    def by_errors(self, drawn: Array, best: DenseEnd, maximum_iterations: int) -> list[DenseEnd]:
+        """Ends below the best one that begin where the least relative complex errors lie.
 
         Decibels and degrees of a response hold it back where it has to pass zero: the sign of an
         effect that starts wrong, or a zero on the wrong side of the axis, stays. The complex error
         passes it straight, so that signs come right; the cost itself then goes on from there.
         """
         leading = replace(self, white=[*map(_relative, range(len(self.selected)), self.selected)])
-        led = [end.x for end in leading._ends(begin, maximum_iterations)]
-        ends = self._ends(np.ascontiguousarray(led), maximum_iterations)
-        return [end for end in ends if end.cost < best * (1.0 - LOWER)]
+        led = leading._apart(np.vstack([best.x, drawn]), [], maximum_iterations)
+        begin = np.ascontiguousarray([end.x for end in led])
+        ends = self._apart(begin, [best], maximum_iterations)
+        return [end for end in ends if end.cost < best.cost * (1.0 - LOWER)]
+
+    def _apart(self, begin: Array, known: list[DenseEnd], steps: int) -> list[DenseEnd]:
+        """Ends of starts that after their first steps are at no minimum that is known or found.
+
+        The first start goes ahead: most of the others come to its end.
+        """
+        found: list[DenseEnd] = []
+        for wave in (begin[:1], begin[1:]):
+            minima = [
+                each for end in (*known, *found) if (each := KnownMinimum.of(end)) is not None
+            ]
+            if not minima:
+                found += self._ends(wave, steps)
+                continue
+            early = self._ends(wave, min(FIRST_STEPS, steps))
+            others = [end for end in early if not any(each.holds(end.x) for each in minima)]
+            further = [end.x for end in others if not end.is_converged]
+            found += [end for end in others if end.is_converged]
+            found += self._ends(np.ascontiguousarray(further), max(steps - FIRST_STEPS, 1))
+        return found
 
     def _costs(self, starts: Array) -> Array:
         """Weighted dB and degrees at each start; infinite where it has no response."""
@@ -206,7 +228,7 @@ def minimise(
         outcomes = [*outcomes, *descent.follow(np.array(led), maximum_iterations)]
     if len(selected) > 1:
         ends = [end for end in outcomes if not isinstance(end, str)]
-        best = min((end.cost for end in ends), default=np.inf)
-        begin = np.vstack([drawn, *(end.x for end in ends if end.cost == best)])
-        outcomes = [*outcomes, *descent.by_errors(begin, best, maximum_iterations)]
+        if ends:
+            lowest = min(ends, key=lambda end: end.cost)
+            outcomes = [*outcomes, *descent.by_errors(drawn, lowest, maximum_iterations)]
     return collect(outcomes)
