@@ -15,9 +15,11 @@ __all__ = ["desk"]
 pytestmark = pytest.mark.slow
 OF_BEFORE = "The numbers shown are of the study before its last change."
 TOLD = """() => { const told = window.told = new Set();
-  const read = () => document.querySelectorAll("p.old").forEach((each) => told.add(each.textContent));
+  const old = () => document.querySelectorAll("p.old");
+  const read = () => old().forEach((each) => told.add(each.textContent));
   read();
-  new MutationObserver(read).observe(document.body, { subtree: true, childList: true, characterData: true }); }"""
+  const all = { subtree: true, childList: true, characterData: true };
+  new MutationObserver(read).observe(document.body, all); }"""
 """Whatever is said of old numbers from now on."""
 ASKED = "1 of the tunings that a hand asked for has ended"
 

@@ -1,4 +1,4 @@
-"""Numbers that are typed in pairs: what is refused stands with its range, and nothing else counts."""
+"""Numbers that are typed in pairs: what is refused stands with its range, all else waits."""
 
 from __future__ import annotations
 
