@@ -140,6 +140,8 @@
     } else if (phone.matches) stack(spec.layout, place);
     if (!paper && place.clientWidth < 520) {
       spec.layout.margin = { ...spec.layout.margin, l: 52, r: 8 };
+      // Long numbers push the title of their axis: the margin goes with them.
+      for (const name in spec.layout) if (/^yaxis\d*$/.test(name)) spec.layout[name].automargin = true;
       spec.layout.font.size = 11;
     }
     const options = { responsive: true, displaylogo: false, displayModeBar: paper || place.clientWidth < 520 ? false : "hover", scrollZoom: false,
