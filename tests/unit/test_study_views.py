@@ -155,3 +155,15 @@ def test_the_page_says_what_a_comparison_left_to_fly_as_the_command_does(
     made.set_otherwise = ("INS_GYRO_FILTER",)
     *_, last = compare_work._with_next(made, step, tmp_path / "step-1.bin")
     assert last.action.startswith("set INS_GYRO_FILTER as before and fly gains-1.param again")
+
+
+def test_a_table_more_takes_no_comment_from_the_one_below() -> None:
+    below = "\n# Windows are chosen\n# by the record.\n[response]\nn_omega = 60\n"
+    text = f"[[segment]]\nname = 'a'\n# of a\n{below}"
+    more = KeyEdit(("segment", 1), {"name": "b", "span_s": [1.0, 2.0]})
+    made = edited(text, [more])
+    assert made.endswith(f'name = "b"\nspan_s = [1.0, 2.0]\n{below}')
+    assert made.startswith("[[segment]]\nname = 'a'\n# of a\n\n[[segment]]\n")
+    inner = f"[[model]]\nname = 'a'\n[model.response]\nn_omega = 9\n{below}"
+    made = edited(inner, [KeyEdit(("model", 1), {"name": "b"})])
+    assert made.endswith(f'[[model]]\nname = "b"\n{below}')

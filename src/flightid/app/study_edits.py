@@ -9,6 +9,7 @@ from typing import Any
 
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
+from tomlkit.items import AoT, Comment, Table, Whitespace
 
 from flightid.app.own_folders import draft_of
 from flightid.app.schemas import StudyParts
@@ -135,7 +136,7 @@ def _apply(document: Any, edit: KeyEdit) -> list[Any]:  # noqa: ANN401 - a parse
             if number and not inline and not isinstance(following, int):
                 begun.append(place[key])
         elif isinstance(key, int) and key == len(place):
-            place.append(tomlkit.table())
+            _append(place, tomlkit.table())
         around, place = place, place[key]
     if edit.value is None:
         if isinstance(last, int) or last in place:
@@ -143,10 +144,37 @@ def _apply(document: Any, edit: KeyEdit) -> list[Any]:  # noqa: ANN401 - a parse
         if isinstance(last, int) and not place:
             del around[parents[-1]]
     elif isinstance(last, int) and last == len(place):
-        place.append(tomlkit.item(edit.value))
+        _append(place, tomlkit.item(edit.value))
     else:
         place[last] = edit.value
     return begun
+
+
+def _append(tables: Any, made: Any) -> None:  # noqa: ANN401 - of a parsed document
+    """One more table of a list: what stands behind the last, above the next header, stays there.
+
+    A parser takes comments above a header as the end of the table before it.
+    """
+    last = tables[-1] if len(tables) and isinstance(made, Table) else None
+    tables.append(made)
+    if last is None:
+        return
+    while isinstance(last, (Table, AoT)):
+        body: list[Any] = last.value.body if isinstance(last, Table) else [(None, last[-1])]
+        if not body or not isinstance(body[-1][1], (Table, AoT)):
+            break
+        last = body[-1][1]
+    start = len(body)
+    while start and isinstance(body[start - 1][1], (Comment, Whitespace)):
+        start -= 1
+    # A comment right below the keys is of them: what follows the first empty line is of the next.
+    empty = (k for k in range(start, len(body)) if isinstance(body[k][1], Whitespace))
+    behind = body[next(empty, len(body)) :]
+    if any(isinstance(each, Comment) for _, each in behind):
+        del body[len(body) - len(behind) :]
+        body.append((None, Whitespace("\n")))
+        for _, each in behind:
+            tables[-1].add(each)
 
 
 def _bytes_of(text: str) -> bytes:
