@@ -20,8 +20,10 @@ from flightid.app.study_compare_routes import _ran
 from flightid.app.study_compare_work import make_study_comparison
 from flightid.app.study_edits import etag_of, parts_of
 from flightid.app.workspace import Workspace
+from flightid.errors import ModelError
 from flightid.models.saved_files import MODELS
 from flightid.study.output import WRITTEN
+from tests.sweep_log import SweepFlight
 
 STUDY = (
     '[study]\ntitle = "t"\naircraft = "a"\n'
@@ -62,6 +64,31 @@ def test_parameters_modes_and_margins_of_both_are_told(tmp_path: Path) -> None:
     *_, margins, picture = section["blocks"]
     assert margins["title"] == "Margins, before and after"
     assert picture["kind"] == "figure"
+
+
+def test_a_refusal_names_no_path_of_this_machine_and_nothing_the_page_cannot_do(
+    tmp_path: Path,
+) -> None:
+    both = {"monday": _results(tmp_path / "a", -4.0), "friday": _results(tmp_path / "b", -5.0)}
+    model = fid.load_model("rate_first_order", axis="yaw").with_values({"Ntpsi": 4.0, "Nr": -1.0})
+    (both["friday"] / MODELS / "roll.toml").unlink()
+    fid.write_model(model, both["friday"] / MODELS / "yaw.toml")
+    with pytest.raises(ModelError, match="fit again") as told:
+        make_study_comparison(both)
+    assert "monday: roll (p of tau_phi); friday: yaw (r of tau_psi)" in str(told.value)
+    assert str(tmp_path) not in str(told.value)
+    assert "name the files" not in str(told.value)
+
+
+def test_a_log_without_a_model_is_not_told_to_write_a_study(tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path)
+    backstage: Any = SimpleNamespace(workspace=workspace, studies=Studies(workspace))
+    log = SweepFlight(sweep_s=5.0, rate_hz=50.0).write(tmp_path)
+    workspace.scan()
+    (known,) = workspace.index.entries()
+    with pytest.raises(HTTPException, match="Its screen Flight says what it lacks") as told:
+        _ran(backstage, known.id)
+    assert log.name in str(told.value.detail)
 
 
 def test_a_run_that_is_not_there_or_is_planted_is_named(tmp_path: Path) -> None:

@@ -55,7 +55,13 @@ def _ran(backstage: Backstage, log: str) -> tuple[str, Path, bool]:
     name = _name_of(workspace, log)
     path = backstage.studies.path(log)
     if path is None:
-        raise HTTPException(404, f"{name} has no study: open it, and write one first.")
+        if workspace.log_path(log) is None:
+            raise HTTPException(404, f"{name} has no study: open it, and write one first.")
+        raise HTTPException(
+            404,
+            f"{name} has no study, so there are no models of it to compare: a log has one from "
+            "when it is opened, if it can carry a model. Its screen Flight says what it lacks.",
+        )
     part = kept_part(workspace, log, "run")
     if not isinstance(part, RunPart):
         raise HTTPException(404, f"The study of {name} was not run yet: open Verify, fit first.")
