@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,9 +15,12 @@ pytest.importorskip("fastapi", reason="the extra app is not installed")
 
 from flightid import run_study
 from flightid.app import gain_work
+from flightid.app.gain_work import _margins
 from flightid.app.study_edits import KeyEdit, edited
+from flightid.control.tuning.worst_cases import WorstCase
 from flightid.errors import OptionError
 from flightid.export.gains import write_gains
+from flightid.uncertainty.estimate import Estimate
 
 STUDY = """
 [study]
@@ -136,3 +141,13 @@ def test_loops_of_several_inputs_are_chosen_before_anything_is_tuned(study: Path
     told = gain_work.gains_of(study, alone)
     assert (told.axes, told.loops) == ([], ["z/u", "z/v"])
     assert told.refusal.startswith("choose the loops to close")
+
+
+def test_a_requirement_without_a_number_has_its_reason() -> None:
+    """It binds as others do: a row of it was left out where the estimate has no crossing."""
+    none = Estimate("loop: gain margin", None, "dB", None, "no crossing in the band of the loop")
+    moved: Any = SimpleNamespace(
+        worst_cases=[WorstCase("loop", "gain margin", none, None, None, None, "≥ 6")]
+    )
+    (row,) = _margins(moved)
+    assert (row.required, row.nominal, row.untold) == ("≥ 6", None, none.reason)

@@ -337,9 +337,7 @@ def _margins(moved: MovedGains) -> list[MarginRow]:
                 worst=each.shown_worst[0],
                 flown=each.flown,
                 flown_worst=each.shown_worst[1],
-                untold=""
-                if each.nominal is None or each.worst is not None
-                else each.estimate.reason,
+                untold="" if each.worst is not None else each.estimate.reason,
             )
         )
     return rows
