@@ -15,8 +15,8 @@ __all__ = ["desk"]
 pytestmark = pytest.mark.slow
 OF_BEFORE = "The numbers shown are of the study before its last change."
 TOLD = """() => { const told = window.told = new Set();
-  const old = () => document.querySelectorAll("p.old");
-  const read = () => old().forEach((each) => told.add(each.textContent));
+  const add = (each) => told.add(each.textContent);
+  const read = () => document.querySelectorAll("p.old").forEach(add);
   read();
   const all = { subtree: true, childList: true, characterData: true };
   new MutationObserver(read).observe(document.body, all); }"""

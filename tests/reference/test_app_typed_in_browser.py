@@ -1,4 +1,4 @@
-"""Numbers that are typed in pairs: what is refused stands with its range, all else waits."""
+"""Numbers that are typed in pairs: what is refused stands with its range, and counts nowhere."""
 
 from __future__ import annotations
 
