@@ -4,8 +4,8 @@ import { test } from "node:test";
 
 const kept = {};
 globalThis.standIns["./drafts"] = { drafts: { kept: (place) => kept[place] ?? null, keep: (place, draft) => (kept[place] = draft), drop: (place) => delete kept[place] } };
-const folder = { text: "[study]\n", stored: [] };
-const told = (text) => ({ text, etag: `"${text.length}"`, settings: {}, undoable: false, redoable: false });
+const folder = { text: "[study]\n", stored: [], lack: "" };
+const told = (text) => ({ text, etag: `"${text.length}"`, settings: {}, undoable: false, redoable: false, lack: folder.lack });
 function store(etag, text) {
   folder.stored.push(etag);
   if (folder.text === null && etag !== '""') throw Object.assign(new Error("This log has no study."), { status: 404 });
@@ -22,7 +22,7 @@ const { Study } = await import("../../app/src/lib/study.svelte.ts");
 
 async function deleted() {
   delete kept["study:a"];
-  folder.text = "[study]\n";
+  [folder.text, folder.lack] = ["[study]\n", ""];
   const study = new Study("a");
   await study.load();
   folder.text = null;
@@ -33,7 +33,7 @@ test("a whole text that was typed stays, and is written again where nothing stan
   const study = await deleted();
   assert.equal(await study.replace("[study]\ntitle = 'mine'\n"), false);
   assert.equal(study.file, null);
-  assert.match(study.error, /deleted meanwhile: nothing was stored/);
+  assert.match(study.error, /not stored/);
   assert.equal(kept["study:a"].text, "[study]\ntitle = 'mine'\n");
   assert.equal(await study.replace(kept["study:a"].text), true);
   assert.equal(folder.stored.at(-1), '""');
@@ -55,4 +55,45 @@ test("what waits already as typed text is not overwritten", async () => {
   kept["study:a"] = { text: "half typed", name: "", before: "[study]\n" };
   await study.edit([{ path: ["plan"], value: {} }]);
   assert.equal(kept["study:a"].text, "half typed");
+});
+
+test("one that cannot be read is a lack with its text: keys change nothing, a whole text mends it", async () => {
+  delete kept["study:a"];
+  [folder.text, folder.lack] = ['title = "a', "the study file is no TOML: line 1"];
+  const study = new Study("a");
+  await study.load();
+  assert.deepEqual([study.file, study.lack.lack, study.lack.text], [null, "the study file is no TOML: line 1", 'title = "a']);
+  const before = folder.stored.length;
+  assert.equal(await study.edit([{ path: ["plan"], value: {} }]), false);
+  assert.equal(folder.stored.length, before);
+  assert.match(study.error, /not stored/);
+  assert.equal(kept["study:a"], undefined, "its text stands in the file");
+  const tag = study.lack.etag;
+  folder.lack = "";
+  assert.equal(await study.replace('title = "a"'), true);
+  assert.deepEqual([folder.stored.at(-1), study.lack, study.error, folder.text], [tag, null, "", 'title = "a"']);
+});
+
+test("one that stood before this page was opened is told as lost, and what was typed waits", async () => {
+  kept["study:a"] = { text: "half typed", name: "", before: "" };
+  [folder.text, folder.lack] = [null, ""];
+  const study = new Study("a");
+  await study.load();
+  assert.equal(study.file, null);
+  assert.match(study.lack.lack, /not in the folder/);
+  assert.equal(kept["study:a"].text, "half typed");
+  delete kept["study:a"];
+  await study.load();
+  assert.equal(study.lack, null, "thrown away, it is as if none had been");
+});
+
+test("what was kept alone goes when a study stands again; what was typed stays", async () => {
+  for (const [text, left] of [["[study]\n", undefined], ["half typed", "half typed"]]) {
+    const study = await deleted();
+    await study.load();
+    if (left) kept["study:a"] = { ...kept["study:a"], text };
+    folder.text = "[study]\ntitle = 'proposed'\n";
+    await study.load();
+    assert.deepEqual([study.lack, study.file.text, kept["study:a"]?.text], [null, folder.text, left]);
+  }
 });

@@ -168,6 +168,38 @@ def test_who_has_not_seen_the_last_version_changes_nothing(browser: Browser, flo
     assert flown.study.read_text() == before
 
 
+def test_a_study_that_is_lost_is_told_and_proposed_again(browser: Browser, flown: Flown) -> None:
+    """One that is gone and one with a slip: nothing is written over either unasked."""
+    place, before = f"/api/studies/{flown.log}", flown.study.read_text()
+    slip = 'title = "'
+    flown.study.write_text(before.replace(slip, "title = ", 1))
+    status, told, _ = browser.ask(place)
+    assert (status, told["settings"]) == (200, {})
+    assert f"line {before[: before.index(slip)].count(chr(10)) + 1} col" in told["lack"]
+    status, made, _ = browser.ask(f"/api/logs/{flown.log}/study", "POST", {})
+    assert status == 200
+    assert made["models"]
+    assert flown.study.read_text() != made["text"]
+    flown.study.unlink()
+    told = browser.ask(place)[1]
+    assert "not in the folder any more" in told["lack"]
+    plot = {"edits": [{"path": ["plot"], "value": [{"series": ["A.B"]}]}]}
+    assert browser.ask(place, "PATCH", plot, If_Match=told["etag"])[0] == 404
+    assert not flown.study.exists()
+    status, told, _ = browser.ask(place, "POST", {"text": made["text"]}, If_Match=told["etag"])
+    assert (status, told["lack"]) == (200, "")
+    flown.study.write_text(before)
+    rig = "c" * 16
+    (flown.folder / "records" / rig).mkdir(parents=True)
+    (flown.folder / "records" / rig / "a.csv").write_text("time,u,y\n0,1,2\n1,0,3\n2,1,1\n")
+    (flown.folder / "studies" / f"{rig}.toml").write_text('title = "a')
+    asked = {"inputs": ["u"], "outputs": ["y"]}
+    status, told, _ = browser.ask(f"/api/records/{rig}/study", "POST", asked)
+    assert status == 422
+    assert "a study file that cannot be read stands there" in told["error"]
+    assert "line 1" in told["error"]
+
+
 def test_a_study_that_leads_out_of_the_folder_is_said_and_opened_by_nothing(
     browser: Browser, flown: Flown, tmp_path: Path
 ) -> None:

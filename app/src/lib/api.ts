@@ -110,6 +110,8 @@ export const rig = (id: string, reading: Reading) => json<RigScreen>(`/api/recor
 /** Take a file out of a set, or put it back; it stays where it is. */
 export const leaveOut = (id: string, name: string, out: boolean) => json<RigItem>(`/api/records/${id}/files`, sent("POST", { name, out }));
 export const propose = (id: string, body: unknown) => json<ProposedStudy>(`/api/records/${id}/study`, sent("POST", body));
+/** The study that a log asks for; nothing is written. */
+export const proposeOfLog = (log: string) => json<ProposedStudy>(`/api/logs/${log}/study`, sent("POST", {}));
 export const lastRun = (log: string) => json<RunScreen>(`/api/runs/${log}`);
 export const run = (log: string) => json<RunScreen>(`/api/runs/${log}`, sent("POST", {}));
 export const runFigure = (log: string, number: number) => json<{ data: object[]; layout: Record<string, any> }>(`/api/runs/${log}/figures/${number}`);

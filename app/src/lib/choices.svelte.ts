@@ -7,6 +7,7 @@ const isTable = (value: unknown): value is Record<string, unknown> => typeof val
 const only = <T>(value: unknown, fits: (each: unknown) => each is T): Record<string, T> => (isTable(value) ? Object.fromEntries(Object.entries(value).filter((pair): pair is [string, T] => fits(pair[1]))) : {});
 const isRole = (value: unknown): value is Role => ROLES.includes(value as Role);
 const isText = (value: unknown): value is string => typeof value === "string";
+const isSaid = (value: unknown): value is string => isText(value) && value !== "";
 const isNumber = (value: unknown): value is number => typeof value === "number" && Number.isFinite(value);
 
 /**
@@ -48,6 +49,14 @@ export class Choices {
     return none(this.roles) && none(this.units) && none(this.servos) && this.sample === null && this.grid === null && this.held === null && !this.bridges.length && !this.template;
   }
 
+  /** A unit of columns; empty: nobody says it. */
+  measured(names: string[], unit: string) {
+    for (const name of names) {
+      if (unit) this.units[name] = unit;
+      else delete this.units[name];
+    }
+  }
+
   keep() {
     if (this.bare) drafts.drop(this.#place);
     else drafts.keep(this.#place, { text: this.#told, name: "", before: "" });
@@ -75,7 +84,7 @@ export class Choices {
     }
     if (!isTable(found)) return;
     this.roles = only(found.roles, isRole);
-    this.units = only(found.units, isText);
+    this.units = only(found.units, isSaid);
     this.servos = only(found.servos, isNumber);
     this.sample = isNumber(found.sample) ? found.sample : null;
     this.grid = isNumber(found.grid) ? found.grid : null;

@@ -39,7 +39,7 @@ const hasModels = ({ log, study }: Given) => Boolean(log && study?.models.length
 const hasStudy = ({ log, study }: Given) => Boolean(log && study?.file);
 
 /** Whether the address is that of records of a rig, which have no flight. */
-export const ofRecords = ({ study }: Given) => location.hash.startsWith("#/records/") || Boolean(study?.file?.settings.record);
+export const ofRecords = ({ study }: Given) => location.hash.startsWith("#/records/") || Boolean(study?.file?.settings.record || study?.lack?.of_records);
 
 /** In the order of the links; the first is where the address says nothing else. */
 export const SCREENS: Screen[] = [

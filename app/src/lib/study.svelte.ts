@@ -39,12 +39,17 @@ interface Waiting {
 }
 /** What a change names where there is no study yet: of a log it begins one. */
 const UNWRITTEN = '""';
+const UNTOUCHED = "What was changed last was not stored.";
+const GONE = "The study is not in the folder any more";
+const BARE: StudyText = { text: "", etag: UNWRITTEN, parts: { models: "", gains: "", views: "" }, settings: {}, python: "", outside: [], undoable: 0, redoable: 0, of_records: false, lack: GONE };
 const keysOf = (edits: Edit[]) => JSON.stringify(edits.map((each) => each.path));
 
 /** The study file of a log: every click of the page changes it here, and nowhere else. */
 export class Study {
   file: StudyText | null = $state(null);
   error = $state("");
+  /** Why there is none to show: it cannot be read, or stood and is gone; what is left of its text. */
+  lack: StudyText | null = $state(null);
   conflict: Conflict | null = $state.raw(null);
   changed: string[] = $state([]);
   /** Whether the server was asked once: before that nobody knows whether there is a study. */
@@ -77,8 +82,8 @@ export class Study {
     return this.#inTurn(async () => {
       try {
         const told = await api.study(this.log);
-        if (this.file && !told) this.#gone(this.file.text, null);
-        else [this.file, this.error] = [told, ""];
+        if (told && !told.lack) this.#stands(told);
+        else this.#lost(told, null);
       } catch (error) {
         this.error = (error as Error).message;
       }
@@ -127,7 +132,7 @@ export class Study {
 
   /** Versions are the server's: a reload, and the next window, go back as far. */
   undo(): Promise<boolean> {
-    return this.#heard(async () => !!this.file?.undoable && this.#store((etag) => api.step(this.log, etag, true)));
+    return this.#heard(async () => !!(this.file ?? this.lack)?.undoable && this.#store((etag) => api.step(this.log, etag, true)));
   }
 
   redo(): Promise<boolean> {
@@ -201,14 +206,20 @@ export class Study {
 
   async #store(store: (etag: string) => Promise<StudyText>, meant: Meant | null = null): Promise<Stored> {
     if (!this.file && !this.known) return false;
+    if (this.lack && meant?.edits) {
+      this.error = UNTOUCHED;
+      return false;
+    }
     if (this.conflict) return this.#besides(this.conflict, meant);
     const before = this.file?.text ?? "";
     try {
-      this.file = await store(this.file?.etag ?? UNWRITTEN);
-      this.error = "";
+      this.#stands(await store((this.file ?? this.lack)?.etag || UNWRITTEN));
     } catch (error) {
       const refusal = error as api.Refusal;
-      if (refusal.status === 404 && this.file) return this.#gone(this.file.text, meant);
+      if ([404, 409].includes(refusal.status)) {
+        const told = await api.study(this.log).catch(() => this.file);
+        if (told?.lack || (!told && this.file)) return this.#lost(told, meant);
+      }
       if (refusal.status !== 409) {
         this.error = refusal.message;
         return false;
@@ -220,15 +231,27 @@ export class Study {
       return false;
     }
     const old = new Set(before.split("\n"));
-    this.changed = this.file.text.split("\n").filter((line) => !old.has(line));
+    this.changed = this.file!.text.split("\n").filter((line) => !old.has(line));
     return true;
   }
 
-  /** Somebody has deleted it: what was typed, else what stood here, waits to be written again. */
-  #gone(text: string, meant: Meant | null): boolean {
-    if (!drafts.kept(this.place)) drafts.keep(this.place, { text: meant?.text ?? text, name: "", before: text });
-    this.file = null;
-    this.error = "The study was deleted meanwhile: nothing was stored. Its text is kept above.";
+  /** What was kept of one that was lost, and nobody has typed into, needs no keeping any more. */
+  #stands(told: StudyText) {
+    const kept = this.lack && drafts.kept(this.place);
+    if (kept && kept.text === kept.before) drafts.drop(this.place);
+    [this.file, this.lack, this.error] = [told, null, ""];
+  }
+
+  /** None stands that can be read: what was typed, else what stood here, waits to be written again. */
+  #lost(told: StudyText | null, meant: Meant | null): boolean {
+    const stood = this.file;
+    const waits = drafts.kept(this.place);
+    // A file that cannot be read has its own text: what was typed alone would be lost with this page.
+    const left = meant?.text ?? (told?.lack && told.text ? undefined : stood?.text);
+    if (!waits && left !== undefined) drafts.keep(this.place, { text: left, name: "", before: stood?.text ?? "" });
+    const gone = stood || waits ? { ...BARE, of_records: stood?.of_records ?? false } : null;
+    [this.file, this.lack] = [null, told ?? gone];
+    this.error = meant ? UNTOUCHED : "";
     return false;
   }
 

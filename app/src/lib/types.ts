@@ -961,6 +961,7 @@ export interface RigProposal {
   units: Record<string, string>;
   actuators: Record<string, number>;
   conditioning: Record<string, unknown>[];
+  anew: boolean;
 }
 
 /** How files are read, where they do not tell: as in `[defaults.record]` of a study. */
@@ -1125,6 +1126,8 @@ export interface StudyText {
   outside: string[];
   undoable: number;
   redoable: number;
+  of_records: boolean;
+  lack: string;
 }
 
 /** A time response of the estimate, with the extremes of some plants. */

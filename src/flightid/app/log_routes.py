@@ -10,11 +10,13 @@ from typing import Annotated, Any
 
 from fastapi import FastAPI, HTTPException, Query, Request
 
-from flightid.app.backstage import Backstage, LogName, known_log
+from flightid.app import rig_work
+from flightid.app.backstage import Backstage, LogName, known_log, made
 from flightid.app.guard import UPLOAD_BYTES
 from flightid.app.kept_parts import kept_overview, kept_review
 from flightid.app.own_folders import shown_name
 from flightid.app.removed import RemovedList
+from flightid.app.rig_schemas import ProposedStudy
 from flightid.app.schemas import FlightScreen, LeftOut, Listing, LogItem
 from flightid.app.workspace import UNDATED_NS, Workspace
 from flightid.findings import unsaid
@@ -37,11 +39,11 @@ def add_log_routes(app: FastAPI, backstage: Backstage) -> None:
     @app.get("/api/workspace")
     async def listing() -> Listing:
         await asyncio.to_thread(workspace.scan)
-        made = await asyncio.to_thread(_listing, workspace, removed.ids())
-        for each in [log for log in made.logs if log.light is None][:MOST_LOOKED_AT]:
+        listed = await asyncio.to_thread(_listing, workspace, removed.ids())
+        for each in [log for log in listed.logs if log.light is None][:MOST_LOOKED_AT]:
             if (path := workspace.log_path(each.id)) is not None:
                 workers.ensure("overview", each.id, path)
-        return made
+        return listed
 
     @app.put("/api/logs")
     async def upload(
@@ -76,6 +78,13 @@ def add_log_routes(app: FastAPI, backstage: Backstage) -> None:
             review=review,
             jobs=workers.of_log(log),
         )
+
+    @app.post("/api/logs/{log}/study")
+    async def propose(log: LogName) -> ProposedStudy:
+        """The study that `flightid new` writes for a log, to take the place of one that is lost."""
+        path, folder = known_log(workspace, log), workspace.study_path(log).parent
+        call = workers.proposed(log, rig_work.propose, [path], folder, {}, {})
+        return ProposedStudy(**await made(call))
 
 
 def _folder_words(folder: Path) -> str:

@@ -85,17 +85,7 @@ def add_rig_routes(app: FastAPI, backstage: Backstage) -> None:
 
     @app.post("/api/records/{rig}/study")
     async def propose(rig: LogName, asked: RigProposal) -> ProposedStudy:
-        paths, target = _known(rigs, rig), workspace.study_path(rig)
-        if asked.model is not None and asked.model not in library_names():
-            raise HTTPException(422, f"The library has no model {asked.model}.")
-        roles = asked.model_dump(include=ROLES)
-        reading = _options(asked) | ({"units": asked.units} if asked.units else {})
-        # Structures are tried for as long as that takes, where it holds up no hand that drags.
-        call = workers.proposed(rig, rig_work.propose, paths, target.parent, roles, reading)
-        proposed = ProposedStudy(**await made(call))
-        if proposed.text and studies.path(rig) is None:
-            await asyncio.to_thread(write_study, target, proposed.text)
-        return proposed
+        return await _proposed(backstage, rig, asked)
 
     @app.get("/api/records/{rig}/view", response_class=Response)
     async def seen(
@@ -120,6 +110,26 @@ def add_rig_routes(app: FastAPI, backstage: Backstage) -> None:
         levels = [await _levels(backstage, rig, path, manoeuvre, each, options) for each in series]
         table = await asyncio.to_thread(view, levels, (start_s, stop_s), columns)
         return Response(_packed(table), media_type="application/octet-stream")
+
+
+async def _proposed(backstage: Backstage, rig: str, asked: RigProposal) -> ProposedStudy:
+    """What `flightid new` writes for a set; written where nothing stands."""
+    workspace, workers, studies = backstage.workspace, backstage.workers, backstage.studies
+    rigs = Rigs(workspace)
+    paths, target = _known(rigs, rig), workspace.study_path(rig)
+    if asked.model is not None and asked.model not in library_names():
+        raise HTTPException(422, f"The library has no model {asked.model}.")
+    if not asked.anew:
+        await asyncio.to_thread(studies.require_readable, rig)
+    roles = asked.model_dump(include=ROLES)
+    units = asked.units_of_roles()
+    reading = _options(asked) | ({"units": units} if units else {})
+    # Structures are tried for as long as that takes, where it holds up no hand that drags.
+    call = workers.proposed(rig, rig_work.propose, paths, target.parent, roles, reading)
+    proposed = ProposedStudy(**await made(call))
+    if proposed.text and studies.path(rig) is None:
+        await asyncio.to_thread(write_study, target, proposed.text)
+    return proposed
 
 
 def _require_span(start_s: float, stop_s: float) -> None:

@@ -92,6 +92,22 @@ class RigProposal(RigReading):
     actuators: dict[str, Annotated[float, Field(gt=0.0)]] = Field(default_factory=dict)
     conditioning: list[dict[str, Any]] = Field(default_factory=list, max_length=64)
     """Tables ``[[conditioning]]`` to keep; `records` are manoeuvres, ``FILE: MANOEUVRE``."""
+    anew: bool = False
+    """Whether what stands is known, and the text is to take its place: by `POST /api/studies`."""
+
+    def units_of_roles(self) -> dict[str, str]:
+        """Units that are said of columns with a role, or of any where none has one.
+
+        Example
+        -------
+        >>> RigProposal(inputs=["u"], units={"u": "V", "T": "degC"}).units_of_roles()
+        {'u': 'V'}
+        >>> RigProposal(units={"u": "V", "T": ""}).units_of_roles()
+        {'u': 'V'}
+        """
+        chosen = {*self.inputs, *self.outputs, *self.excitations}
+        said = {name: unit for name, unit in self.units.items() if unit.strip()}
+        return {name: unit for name, unit in said.items() if not chosen or name in chosen}
 
 
 class RigScreen(Message):

@@ -229,6 +229,10 @@ class StudyText(Message):
     undoable: int = 0
     """How many versions can be gone back."""
     redoable: int = 0
+    of_records: bool = False
+    lack: str = ""
+    """Why there is none to show; empty: it is sound. `text` is then what is left of it, and `etag`
+    the tag by which another text takes its place; empty where none may."""
 
 
 class StudyStep(Message):

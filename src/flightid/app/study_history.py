@@ -85,15 +85,24 @@ class StudyHistory:
 
     def versions(self, log: str, text: str) -> Versions:
         """Versions of a study that stands so; of a history that is broken or a link, this one."""
+        held = self._held(log)
+        return Versions((text,), 0) if held is None else held.standing(text)
+
+    def last(self, log: str) -> str:
+        """Text that stood last, of all that are kept; empty where none is."""
+        held = self._held(log)
+        return "" if held is None else held.text
+
+    def _held(self, log: str) -> Versions | None:
         try:
             held = json.loads(read_plain(self._path(log), MOST_BYTES))
             texts, at = tuple(held["texts"]), held["at"]
         except (OSError, OptionError, ValueError, KeyError, TypeError, RecursionError):
-            return Versions((text,), 0)
+            return None
         sound = bool(texts) and isinstance(at, int) and 0 <= at < len(texts)
         if not sound or not all(isinstance(each, str) for each in texts):
-            return Versions((text,), 0)
-        return Versions(texts, at).standing(text)
+            return None
+        return Versions(texts, at)
 
     def keep(self, log: str, versions: Versions) -> None:
         """Write them."""

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from flightid.app.overview import light_of, overview_of, review_of
+from flightid.app.own_folders import draft_of
 from flightid.app.pyramid import Pyramid
 from flightid.app.schemas import FieldGroup, ResponseCurve, ResponsePart, ShownFinding
 from flightid.app.stage_cache import StageCache
@@ -28,8 +29,8 @@ from flightid.responses.response_band import ResponseIntervals, response_bands
 from flightid.review import review_flight
 from flightid.review.timeline import flight_timeline
 from flightid.study.preview import preview_responses
-from flightid.study.proposal import propose_study
-from flightid.study.settings import read_settings
+from flightid.study.proposal import Proposal, propose_study
+from flightid.study.settings import Settings, read_settings
 from flightid.study.stage_runner import StageRunner
 
 BESIDE_BYTES = 2 << 30
@@ -78,10 +79,22 @@ def make_overview(path: Path, study: Path, result: Path) -> None:
     (log,) = (each for each in cache.values() if isinstance(each, Log))
     if made.models and not study.exists():
         made.write(study)
-    settings = read_settings(study) if study.exists() else None
     timeline = flight_timeline(log, inspection)
-    shown = overview_of(log, inspection, timeline, made.findings, settings)
+    shown = overview_of(log, inspection, timeline, made.findings, _settings_of(study, made))
     write_atomically(result, shown.model_dump_json())
+
+
+def _settings_of(study: Path, made: Proposal) -> Settings | None:
+    """What the study asks; of one that cannot be read what its log would be asked."""
+    if not study.exists():
+        return None
+    try:
+        return read_settings(study)
+    except FlightidError:
+        if not made.models:
+            return None
+        with draft_of(study, made.text) as draft:
+            return read_settings(draft)
 
 
 def make_review(path: Path, result: Path) -> None:
