@@ -175,7 +175,7 @@ def test_a_study_that_is_lost_is_told_and_proposed_again(browser: Browser, flown
     flown.study.write_text(before.replace(slip, "title = ", 1))
     status, told, _ = browser.ask(place)
     assert (status, told["settings"]) == (200, {})
-    assert f"line {before[: before.index(slip)].count(chr(10)) + 1} col" in told["lack"]
+    assert f"line {before[: before.index(slip)].count(chr(10)) + 1}, col" in told["lack"]
     status, made, _ = browser.ask(f"/api/logs/{flown.log}/study", "POST", {})
     assert status == 200
     assert made["models"]
@@ -192,12 +192,14 @@ def test_a_study_that_is_lost_is_told_and_proposed_again(browser: Browser, flown
     rig = "c" * 16
     (flown.folder / "records" / rig).mkdir(parents=True)
     (flown.folder / "records" / rig / "a.csv").write_text("time,u,y\n0,1,2\n1,0,3\n2,1,1\n")
-    (flown.folder / "studies" / f"{rig}.toml").write_text('title = "a')
+    (flown.folder / "studies" / f"{rig}.toml").write_text('title = "a\n')
     asked = {"inputs": ["u"], "outputs": ["y"]}
     status, told, _ = browser.ask(f"/api/records/{rig}/study", "POST", asked)
     assert status == 422
     assert "a study file that cannot be read stands there" in told["error"]
     assert "line 1" in told["error"]
+    shutil.rmtree(flown.folder / "records" / rig)
+    (flown.folder / "studies" / f"{rig}.toml").unlink()
 
 
 def test_a_study_that_leads_out_of_the_folder_is_said_and_opened_by_nothing(

@@ -41,7 +41,7 @@ MOST_CHANNELS = 128
 
 def add_rig_routes(app: FastAPI, backstage: Backstage) -> None:
     """Answer what the screen of records asks."""
-    workspace, workers, studies = backstage.workspace, backstage.workers, backstage.studies
+    workspace, workers = backstage.workspace, backstage.workers
     rigs, removed = Rigs(workspace), RemovedList(workspace)
 
     @app.get("/api/records")

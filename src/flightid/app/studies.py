@@ -70,7 +70,7 @@ class Studies:
         text = ""
         try:
             text = text_of(path)
-            parts, settings = parts_of(text), _tables(path)
+            settings, parts = _tables(path), parts_of(text)
         except FlightidError as error:
             return self._lacking(log, str(error), text, etag_of(text) if text else "")
         outside = _outside(self._workspace.folder, path)
