@@ -97,3 +97,16 @@ test("what was kept alone goes when a study stands again; what was typed stays",
     assert.deepEqual([study.lack, study.file.text, kept["study:a"]?.text], [null, folder.text, left]);
   }
 });
+
+test("what an editor changed is read by who comes back, and nothing where it stands as it did", async () => {
+  await deleted();
+  folder.text = "[study]\n";
+  const study = new Study("a");
+  await study.load();
+  const before = study.file;
+  await study.reread();
+  assert.equal(study.file, before);
+  folder.text = "[study]\ntitle = 'by an editor'\n";
+  await study.reread();
+  assert.equal(study.file.text, folder.text);
+});

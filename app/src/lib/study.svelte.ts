@@ -91,6 +91,16 @@ export class Study {
     });
   }
 
+  /** Read the file again: an editor, another window or a run may know more than this page. */
+  reread(): Promise<void> {
+    return this.#inTurn(async () => {
+      if (this.conflict) return;
+      const told = await api.study(this.log).catch(() => null);
+      if (told && !told.lack && told.etag !== this.file?.etag) this.#stands(told);
+      else if (told?.lack && this.file) this.#lost(told, null);
+    });
+  }
+
   /** Change keys; while others of the same keys wait, these take their place. */
   edit(edits: Edit[]): Promise<boolean> {
     const behind = this.#waiting;
