@@ -108,3 +108,23 @@ def test_a_handle_that_is_taken_again_follows_the_hand(desk: Desk, tmp_path: Pat
     page.mouse.up()
     until(page, lambda: desk.study["model"][0]["band_rad_s"][1] < stored[1])
     page.close()
+
+
+def test_a_run_of_what_an_editor_changed_is_told_of_the_study_as_it_stands(
+    desk: Desk, tmp_path: Path
+) -> None:
+    """The page kept the text of before, and called the numbers of the file those of before."""
+    page = _dropped(desk, tmp_path)
+    page.wait_for_selector(".cards")
+    log = page.url.rpartition("/")[2]
+    page.goto(f"{page.url.partition('#')[0]}#/verify/{log}")
+    again = page.get_by_role("button", name="Fit again")
+    again.or_(page.get_by_role("button", name="Fit and verify")).first.press("Enter")
+    page.locator("main table").first.wait_for()
+    path = desk.folder / "studies" / f"{log}.toml"
+    path.write_text(path.read_text(encoding="utf-8") + "\n# by an editor\n", encoding="utf-8")
+    with page.expect_response(lambda told: told.request.method == "POST" and "run" in told.url):
+        again.press("Enter")
+    page.get_by_text("# by an editor").wait_for(state="attached")
+    page.wait_for_timeout(1500)
+    assert page.get_by_text("these numbers are of the one before").count() == 0
