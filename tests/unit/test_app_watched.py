@@ -68,12 +68,33 @@ def test_work_whose_process_was_killed_says_what_to_do(error: Exception) -> None
     future.set_exception(error)
     workers, heard = Workers.__new__(Workers), list[str]()
     workers._jobs = {"run": Job(id="run", kind="run", log=LOG, state="waiting")}
-    workers._futures = {"run": future}
+    workers._futures, workers._stopping = {"run": future}, False
     workers._change = lambda name, state, reason: heard.extend((name, state, reason))
     workers._ended("run", future)
     assert heard[:2] == ["run", "failed"]
     assert "ask again" in heard[2]
     assert type(error).__name__ not in heard[2]
+
+
+def test_work_of_a_server_that_is_stopped_is_offered_by_the_next(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An ordinary end of the server took its note away, where a killed one's stayed."""
+    place = tmp_path / "pids"
+    monkeypatch.setitem(jobs.WORK, "run", lambda *_: (silent, place))
+
+    async def begun() -> None:
+        workers = Workers(Workspace(tmp_path))
+        workers.start()
+        workers.ensure("run", LOG, tmp_path)
+        await _until(place.is_file)
+        await asyncio.to_thread(workers.stop)
+        await asyncio.sleep(0.1)
+
+    asyncio.run(begun())
+    workers = Workers(Workspace(tmp_path))
+    assert [(each.kind, each.state) for each in workers.all()] == [("run", "interrupted")]
+    workers.stop()
 
 
 @pytest.mark.slow

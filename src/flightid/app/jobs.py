@@ -97,6 +97,7 @@ class Workers:
         self._places: dict[str, Path] = {}
         self._ending: set[Path] = set()
         self._prepared: set[str] = set()
+        self._stopping = False
         self._look: asyncio.Task[None] | None = None
         self._listeners: list[Listener] = []
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -118,7 +119,8 @@ class Workers:
         self._look = self._loop.create_task(self._looked())
 
     def stop(self) -> None:
-        """End all processes."""
+        """End all processes; what they work on is offered again by the next server."""
+        self._stopping = True
         if self._look is not None and self._loop is not None and not self._loop.is_closed():
             self._loop.call_soon_threadsafe(self._look.cancel)
         short = (self._live, self._tuning, self._compared, self._planned, self._asked)
@@ -273,6 +275,8 @@ class Workers:
         try:
             _, refusal, _ = future.result()
         except (CancelledError, TimeoutError, ProcessExpired, BrokenProcessPool) as error:
+            if self._stopping:
+                return  # its note stays: the next server reads it
             refusal = _why_ended(error)
         except Exception as error:
             refusal = f"a fault in flightid: {type(error).__name__}: {error}"
