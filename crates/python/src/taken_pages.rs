@@ -7,8 +7,9 @@
 use std::sync::Once;
 use std::sync::atomic::{AtomicBool, AtomicPtr, AtomicUsize, Ordering::SeqCst};
 
-/// Mappings that can be watched at a time.
-const PLACES: usize = 64;
+/// Mappings that can be watched at a time: as many as files may be open where nobody asks for more.
+/// Logs beyond them are read whole, into memory of this process.
+const PLACES: usize = 1024;
 static PLACES_WATCHED: [Place; PLACES] = [const { Place::free() }; PLACES];
 static PAGE: AtomicUsize = AtomicUsize::new(4096);
 static EARLIER: AtomicPtr<libc::sigaction> = AtomicPtr::new(std::ptr::null_mut());
