@@ -170,7 +170,12 @@ def estimate_response(
     response = windowed_response(estimate, estimator, step)
     if estimator == PREWHITENED:
         response = estimate_prewhitened(
-            response, samples, listed, shifts=shifts_of(overlap), covariance=covariance
+            response,
+            samples,
+            listed,
+            shifts=shifts_of(overlap),
+            covariance=covariance,
+            loop=loop,
         )
         return _with_inputs(response, samples, listed, loop)
     response = _with_inputs(response, samples, listed, loop)

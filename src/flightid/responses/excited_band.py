@@ -89,9 +89,20 @@ def excited_to(response: ExcitedResponse, input: str) -> float:
     # Outputs without noise feed none back inside the excited band; above it a loop is as strong.
     if loop.loop == "open" and loop.source != "no noise":
         return math.inf
-    place = response.inputs.index(input)
-    level = response.omega_rad_s * np.real(response.input_spectrum[place, place])
-    return float(response.omega_rad_s[np.flatnonzero(level >= STRONG * level.max())[-1]])
+    return excited_span(response, input)[1]
+
+
+def excited_span(response: ExcitedResponse, input: str) -> tuple[float, float]:
+    """Lowest and highest frequency of an input's power, rad/s.
+
+    Beyond them ω·S(ω) stays 20 dB below its most; zero and infinity without spectra.
+    """
+    if response.input_spectrum is None:
+        return 0.0, math.inf
+    place, omega = response.inputs.index(input), response.omega_rad_s
+    level = omega * np.real(response.input_spectrum[place, place])
+    strong = omega[level >= STRONG * level.max()]
+    return float(strong[0]), float(strong[-1])
 
 
 def excited_band(

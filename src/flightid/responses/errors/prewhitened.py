@@ -32,7 +32,7 @@ MOST_NUMBERS = 60_000_000
 RANK = 1e-11
 
 
-def lag_blocks(reach: int, most: int) -> tuple[tuple[int, int], ...]:
+def lag_blocks(reach: int, most: int, in_octave: int = OCTAVE) -> tuple[tuple[int, int], ...]:
     """First lags of blocks and of what follows them: single ones, then ever wider ones.
 
     Parameters
@@ -41,6 +41,8 @@ def lag_blocks(reach: int, most: int) -> tuple[tuple[int, int], ...]:
         Last lag.
     most : int
         Blocks at most.
+    in_octave : int
+        Blocks to an octave, a power of two up to `SINGLE`.
 
     Example
     -------
@@ -51,7 +53,7 @@ def lag_blocks(reach: int, most: int) -> tuple[tuple[int, int], ...]:
     first = 1
     while first <= reach and len(found) < most:
         octave = max((first - 1) // SINGLE, 1)
-        width = (1 << (octave.bit_length() - 1)) * SINGLE // OCTAVE if first > SINGLE else 1
+        width = (1 << (octave.bit_length() - 1)) * SINGLE // in_octave if first > SINGLE else 1
         found.append((first, first + width))
         first += width
     return tuple(found)
@@ -95,10 +97,12 @@ class NoiseModel:
         *,
         direct: bool,
         memory: float = 1.0,
+        octave: int = OCTAVE,
     ) -> NoiseModel:
         """Least squares on the samples of all records, means removed.
 
-        `memory` is the share that is kept of the longest lag that the records allow.
+        `memory` is the share that is kept of the longest lag that the records allow, `octave` the
+        number of blocks to an octave of lags.
 
         Raises
         ------
@@ -115,9 +119,9 @@ class NoiseModel:
         shortest = min(each.shape[1] for each in inputs)
         cycle = int(2.0 * np.pi / (lowest_rad_s * sample_time_s))
         most = size // (SAMPLES_PER_NUMBER * (n_in + n_out)) - direct
-        blocks = lag_blocks(max(min(cycle, shortest // SAMPLES_PER_NUMBER), 1), most)
+        blocks = lag_blocks(max(min(cycle, shortest // SAMPLES_PER_NUMBER), 1), most, octave)
         if memory < 1.0 and len(blocks) > 2:
-            blocks = lag_blocks(max(int(memory * blocks[-1][1]), 2), most)
+            blocks = lag_blocks(max(int(memory * blocks[-1][1]), 2), most, octave)
         numbers = len(blocks) * (n_in + n_out) + direct * n_in
         if len(blocks) < 2 or size * numbers > MOST_NUMBERS:
             few = len(blocks) < 2
@@ -229,7 +233,7 @@ class PrewhitenedErrors(JointErrors):
     omega_rad_s : ndarray, shape (n_f,)
     doubt : ndarray, shape (n_out, n_in, n_f), optional
         Standard deviation of complex points beside that of the noise, each by itself: what a
-        longer memory may move; see `memory_doubt`.
+        longer memory or narrower blocks may move; see `model_doubt`.
     """
 
     model: NoiseModel

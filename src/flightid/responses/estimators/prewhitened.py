@@ -12,15 +12,16 @@ from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.record import Record
 from flightid.record.history import is_of_log
-from flightid.record.hold import common_hold
+from flightid.record.hold import Loop, common_hold, common_loop
 from flightid.responses.errors.linear_estimate import LinearEstimate
-from flightid.responses.errors.noise_memory import HALF, memory_doubt, near
+from flightid.responses.errors.noise_memory import COARSER, NOTHING, model_doubt, near
 from flightid.responses.errors.prewhitened import (
     NoiseModel,
     PrewhitenedErrors,
     PrewhitenedWeights,
 )
 from flightid.responses.estimators.conditioned import coherence_of
+from flightid.responses.excited_band import excited_span
 from flightid.responses.response import FrequencyResponse
 from flightid.responses.windows.defaults import WINDOWS_IN_RECORDS
 from flightid.responses.windows.samples import Samples
@@ -37,6 +38,7 @@ def estimate_prewhitened(
     *,
     shifts: int,
     covariance: bool,
+    loop: Loop | None = None,
 ) -> FrequencyResponse:
     """The response of a long ARX model, with the spectra of a windowed estimate.
 
@@ -50,6 +52,8 @@ def estimate_prewhitened(
     shifts : int
         Hops in a window.
     covariance : bool
+    loop : {"open", "closed"}, optional
+        What was told, in place of what the records know.
 
     Raises
     ------
@@ -68,13 +72,18 @@ def estimate_prewhitened(
     equation 13.61, counts the part of the inputs that no noise moved.
     """
     omega = windowed.omega_rad_s
-    held = common_hold([record.input_shape for record in records]) == "zero"
+    shapes = [record.input_shape for record in records]
+    held = common_hold(shapes) == "zero"
     held = held or is_of_log(record.history for record in records)
     asked = (samples.part("inputs"), samples.part("outputs"), samples.sample_time_s)
     model = NoiseModel.of(*asked, float(omega[0]), direct=not held)
     response = model.response(omega)
-    errors = PrewhitenedErrors(model, omega, _doubt(model, asked, omega))
-    variance = _variance(errors, response)
+    excited, words = _excited(windowed, loop or common_loop(shapes))
+    own = _variance(PrewhitenedErrors(model, omega), response)
+    doubt = _doubt(model, own, asked, omega)
+    doubt = np.where(excited, doubt, np.maximum(doubt, NOTHING * np.abs(response)))
+    errors = PrewhitenedErrors(model, omega, doubt)
+    variance = own + doubt**2
     relative = np.sqrt(0.5 * variance) / np.maximum(np.abs(response), TINY)
     around = near(omega)
     smooth = np.sqrt(0.5 * (variance @ around) / np.maximum(np.abs(response) ** 2 @ around, TINY))
@@ -88,7 +97,7 @@ def estimate_prewhitened(
         errors=errors if covariance else None,
         linear=LinearEstimate.of(samples, weights, omega) if covariance else None,
         estimator=PREWHITENED,
-        findings=(*windowed.findings, _assumption(held=held)),
+        findings=(*windowed.findings, _assumption(held=held), *words),
     )
 
 
@@ -102,14 +111,45 @@ def _variance(errors: PrewhitenedErrors, response: NDArray[np.complex128]) -> ND
 
 def _doubt(
     model: NoiseModel,
+    variance: Real,
     asked: tuple[Sequence[Real], Sequence[Real], float],
     omega: Real,
 ) -> Real:
-    """Of the memory of the model: see `memory_doubt`."""
-    shorter = NoiseModel.of(*asked, float(omega[0]), direct=model.direct, memory=HALF)
-    response = model.response(omega)
-    variances = [_variance(PrewhitenedErrors(each, omega), response) for each in (model, shorter)]
-    return memory_doubt(model, shorter, omega, (variances[0], variances[1]))
+    """Of the model itself: see `model_doubt`."""
+    response, beside = model.response(omega), []
+    for memory, octave in COARSER:
+        other = NoiseModel.of(
+            *asked, float(omega[0]), direct=model.direct, memory=memory, octave=octave
+        )
+        beside.append((other, _variance(PrewhitenedErrors(other, omega), response)))
+    return model_doubt(model, variance, beside, omega)
+
+
+def _excited(
+    windowed: FrequencyResponse, loop: Loop | None
+) -> tuple[NDArray[np.bool_], list[Finding]]:
+    """Where each input has power of its own, shape (n_in, n_f), and words on where it has none.
+
+    Beyond that power a loop shows itself, and models of any memory lean to it alike.
+    """
+    omega = windowed.omega_rad_s
+    found = np.ones((len(windowed.inputs), len(omega)), dtype=bool)
+    words: list[Finding] = []
+    for row, name in enumerate(windowed.inputs) if loop != "open" else ():
+        low, high = excited_span(windowed, name)
+        found[row] = (omega >= low) & (omega <= high)
+        if not np.all(found[row]):
+            words.append(
+                Finding(
+                    "not-excited",
+                    Light.GREEN,
+                    f"{name} has power from {low:.3g} to {high:.3g} rad/s: outside, nothing tells "
+                    "the vehicle from what a loop feeds back, and no bar is known",
+                    "sweep further where the response is wanted there, or declare loop='open' if "
+                    "nothing moved the inputs after the outputs",
+                )
+            )
+    return found, words
 
 
 def _assumption(*, held: bool) -> Finding:
