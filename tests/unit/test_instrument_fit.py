@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -12,6 +14,8 @@ from tests.strangers import gains as flown
 
 SEED = 5083
 """Gusts, which the loop feeds back: a fifth of the rate is left by output error."""
+STRAIGHT = 8291
+"""Gusts that make the direct response another vehicle's: its effect is 56 % too large."""
 
 
 @pytest.fixture(scope="module")
@@ -73,3 +77,40 @@ def test_an_open_loop_or_nothing_injected_keeps_the_fit() -> None:
         other = found.fit.parameters[name]
         spread = np.hypot(estimate.stderr, other.stderr)
         assert abs(other.value - estimate.value) < 4.0 * spread, name
+
+
+@pytest.fixture(scope="module")
+def flights() -> list[fid.Record]:
+    """Two sweeps of half a minute, logged at every fourth loop."""
+    flight = replace(flown.drawn(STRAIGHT), every=4)
+    return [flown.record(flight, STRAIGHT + flown.OTHER * k, 30.0) for k in range(2)]
+
+
+def test_a_direct_response_has_the_excitation_of_its_records_taken(
+    flights: list[fid.Record],
+) -> None:
+    known = flown.drawn(STRAIGHT).craft.about
+    response = fid.estimate_response(flights, inputs="tau_phi", outputs="p")
+    direct = fid.identify(fid.load_model("rate_motor_lag", axis="roll"), response, n_omega=25)
+    found = instrument_fit(direct)
+    assert found is not None
+    assert "in place of the direct response, which feedback of noise biases" in found.reason
+    for name, truth in {"Ltphi": known["effect"], "T_m": known["motor_s"]}.items():
+        ours, theirs = found.fit.parameters[name].value, direct.parameters[name].value
+        assert abs(theirs / truth - 1.0) > 0.5
+        assert abs(ours / truth - 1.0) < 0.05
+    assert found.fit.provenance["told"] == {"n_omega": 25}, "the fit's own options are kept"
+
+
+def test_a_response_that_needs_no_other_way_knows_no_records(flights: list[fid.Record]) -> None:
+    options = {"inputs": "tau_phi", "outputs": "p", "n_omega": 15}
+
+    def excited(records: list[fid.Record], estimator: str = "composite") -> int:
+        linear = fid.estimate_response(records, estimator=estimator, **options).linear
+        assert linear is not None
+        return len(linear.excited)
+
+    assert excited(flights) == 2
+    assert excited(flights, "instrument") == 0
+    bare = [each.select(["tau_phi", "p"]) for each in flights]
+    assert excited([flights[0], bare[1]]) == 0

@@ -14,18 +14,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.conventions import Light
-from flightid.evidence.evidence import BAND, COHERENCE, Check
+from flightid.evidence.data_checks import UNKNOWN_ACTION, loop_check
+from flightid.evidence.evidence import BAND, COHERENCE, LOOP, Check
 from flightid.evidence.spans import Span
 from flightid.frozen import dataclass
 from flightid.inspection.thresholds import BAND_GOOD, MINIMUM_COHERENCE
 from flightid.responses.bands import coherent_band, coherent_parts
 from flightid.responses.windows.defaults import CYCLES_AT_LOWEST, HIGHEST_FRACTION
+from flightid.uncertainty.feedback_result import FeedbackTest
 
 Array = NDArray[np.float64]
 BINS = 32
 """Log-spaced frequencies at which powers are added up."""
 FEWEST = 64
 """Samples of a record that is looked at."""
+HIDDEN = 1e-4
+"""Share of an output's variance that a free run may leave of one in which no noise was seen."""
+NOTHING = loop_check(FeedbackTest("open", "no noise"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,3 +143,37 @@ def by_free_runs(
         else replace(each, light=Light.GREEN, what=said[each.name], action="")
         for each in checks
     ]
+
+
+def unless_hidden(loop: Check, runs: Sequence[ExplainedRun]) -> Check:
+    """The check of a loop, unknown where noise was not seen that the free run of the fit leaves.
+
+    The test looks at what one sample adds. Filtered outputs, many times faster than the vehicle,
+    are foretold by their own past to the last digits, whatever gusts have added up to over seconds.
+
+    Parameters
+    ----------
+    loop : Check
+    runs : sequence of ExplainedRun
+
+    Example
+    -------
+    >>> run = np.sin(np.arange(400) * 0.1)[None]
+    >>> unless_hidden(NOTHING, [ExplainedRun(run, 0.9 * run, 0.02)]).light.value
+    'unknown'
+    >>> unless_hidden(NOTHING, [ExplainedRun(run, run, 0.02)]).light.value
+    'green'
+    """
+    shares = [
+        float(np.max(np.var(each.measured - each.modelled, axis=1) / np.var(each.measured, axis=1)))
+        for each in runs
+        if np.all(np.ptp(each.measured, axis=1) > 0.0)
+    ]
+    left = max(shares, default=0.0)
+    if loop.what != NOTHING.what or left < HIDDEN:
+        return loop
+    what = (
+        "whether a loop is closed cannot be told: outputs are so smooth from sample to sample "
+        f"that no noise is seen in them, but the free run leaves {100.0 * left:.2g} % of one"
+    )
+    return Check(LOOP, Light.UNKNOWN, what, UNKNOWN_ACTION)

@@ -32,7 +32,7 @@ from flightid.evidence.evidence import (
     Check,
     Evidence,
 )
-from flightid.evidence.explained import ExplainedRun, by_free_runs
+from flightid.evidence.explained import ExplainedRun, by_free_runs, unless_hidden
 from flightid.evidence.parameter_checks import declared_signs
 from flightid.evidence.part_checks import agreement_check, beside_disturbances
 from flightid.evidence.spans import Span, judge_coherence, judge_span
@@ -164,7 +164,8 @@ def gather_evidence(made: FitFacts) -> Evidence:
     loop = declared or (loop_of_responses(responses) if responses else None)
     if loop is None and records:
         loop = loop_of_records(tuple(records), made.inputs, made.outputs)
-    checks += [] if loop is None else [not_turned_round(loop, made.at_once)]
+    if loop is not None:
+        checks.append(not_turned_round(unless_hidden(loop, made.free_runs), made.at_once))
     if made.agreement is not None:
         check = agreement_check(made.agreement, made.values)
         disturbed = any(each.code == PROCESS_NOISE for each in made.findings)

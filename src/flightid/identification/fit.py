@@ -66,6 +66,7 @@ class Fit(
     untold={
         "prediction_errors": "time histories",
         "input_correlations": "residual_tests tells them",
+        "excited": "time histories",
     },
 ):
     """Result of `flightid.identify`.
@@ -124,6 +125,8 @@ class Fit(
         Of records and of their halves, in the order of `names`.
     input_correlations : tuple of FittedCorrelation
         Of inputs with residuals, by what the fit leaves of noise; empty where it is not known.
+    excited : tuple of Record
+        Behind direct responses: see `LinearEstimate.excited`.
 
     Example
     -------
@@ -165,6 +168,7 @@ class Fit(
     evidence: Evidence = field(default_factory=Evidence)
     agreement: Agreement | None = None
     input_correlations: tuple[FittedCorrelation, ...] = ()
+    excited: tuple[Record, ...] = ()
 
     def __getstate__(self) -> dict[str, Any]:
         return {**vars(self), "evidence": self.evidence}

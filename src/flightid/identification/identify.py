@@ -217,7 +217,8 @@ def identify(
     with bases_kept():
         fit = chosen.run(model, data, given)
         # Where data chose among structures the fit knows which.
-        fit = replace(fit, structure=fit.structure or model, method=chosen.name)
+        structure = fit.structure or model
+        fit = replace(fit, structure=structure, method=chosen.name, excited=_excited(flat(data)))
         told = options if loop is None else {**options, "loop": loop}
         channels = (*fit.model.inputs, *fit.model.outputs)
         known = data_provenance(flat(data), channels)
@@ -234,6 +235,12 @@ def identify(
     # Gathered once somebody asks for it, in the words of who asked for the fit.
     gathered: Any = partial(copy_context().run, evidence_of, fit, flat(data), loop)
     return replace(fit, evidence=gathered)
+
+
+def _excited(data: Sequence[object]) -> tuple[Record, ...]:
+    """Records behind direct responses that hold what was injected."""
+    linear = [each.linear for each in data if isinstance(each, FrequencyResponse)]
+    return tuple(record for each in linear if each is not None for record in each.excited)
 
 
 def _require_roles(model: Any, data: Sequence[object]) -> None:  # noqa: ANN401 - any kind

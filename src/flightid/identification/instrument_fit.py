@@ -1,4 +1,4 @@
-"""The same structure by way of the injected excitation, where a loop biases a fit of records."""
+"""The same structure by way of the injected excitation, where a loop biases a fit."""
 
 from __future__ import annotations
 
@@ -16,8 +16,10 @@ from flightid.responses import estimate_response
 
 DIRECT = ("output_error", "equation_error", "fourier_regression", "fourier_output_error")
 """Methods without a model of the noise that a loop feeds back."""
+OF_RESPONSES = ("frequency_domain", "joint")
+"""Methods that have none where a response goes straight from inputs to outputs."""
 KEPT = ("starts", "seed", "maximum_iterations", "hold")
-"""Options that mean the same to a fit of a response."""
+"""Options that mean the same to a fit of a response, whatever the method was."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,14 +41,15 @@ def instrument_fit(fit: Fit) -> InstrumentFit | None:
     """The structure of a fit again, from the response to the excitation that its records hold.
 
     A loop feeds noise and gusts of the outputs back to the inputs. A model that runs free along
-    those inputs takes them for the vehicle's answer, and is biased however long the records are.
-    What was injected does not know the noise: a response by way of it, and what is fitted to that,
-    is consistent, and the error bound of the fit is then measured by way of it too.
+    those inputs, or a response straight from them, takes them for the vehicle's answer, and is
+    biased however long the records are. What was injected does not know the noise: a response by
+    way of it, and what is fitted to that, is consistent, and the error bound of the fit is then
+    measured by way of it too.
 
     Parameters
     ----------
     fit : Fit
-        Of records, by a method without a model of the noise.
+        Of records or responses, by a method without a model of the noise.
 
     Returns
     -------
@@ -75,14 +78,15 @@ def instrument_fit(fit: Fit) -> InstrumentFit | None:
     >>> instrument_fit(fid.identify(model, flown)) is None                      # nothing injected
     True
     """
-    records = [each.measured for each in fit.records]
-    if fit.responses or fit.method not in DIRECT or not _injected(fit, records):
+    records = _injected(fit)
+    if not records:
         return None
     loop = fit.evidence.check(LOOP)
     if loop is None or loop.light is Light.GREEN:
         return None
     told: dict[str, Any] = dict(fit.provenance.get("told", {}))  # type: ignore[call-overload]
-    options = {name: told[name] for name in KEPT if name in told}
+    kept = (*told,) if fit.method == OF_RESPONSES[0] else KEPT
+    options = {name: told[name] for name in kept if name in told}
     try:
         response = estimate_response(
             records, inputs=fit.model.inputs, outputs=fit.model.outputs, estimator="instrument"
@@ -92,13 +96,21 @@ def instrument_fit(fit: Fit) -> InstrumentFit | None:
         return None
     if made.covariance is None or made.evidence.light is Light.RED:
         return None
-    method = fit.method.replace("_", " ")
-    reason = f"{method}, which feedback of noise biases ({loop.what})"
+    way = "the direct response" if fit.method == OF_RESPONSES[0] else fit.method.replace("_", " ")
+    reason = f"{way}, which feedback of noise biases ({loop.what})"
     return InstrumentFit(made, f"the response to what was injected in place of {reason}")
 
 
-def _injected(fit: Fit, records: list[Record]) -> bool:
-    """Whether a linear model's records hold an excitation for each of its inputs."""
-    if not records or not isinstance(fit.structure, StateSpaceModel | TransferFunctionModel):
-        return False
-    return min(len(each.excitations) for each in records) >= len(fit.model.inputs)
+def _injected(fit: Fit) -> list[Record]:
+    """Records of a linear model, behind its responses too, that hold an excitation for each input.
+
+    None of a fit whose method, or whose responses, keep the loop's noise out by themselves.
+    """
+    if not isinstance(fit.structure, StateSpaceModel | TransferFunctionModel):
+        return []
+    direct = fit.method in OF_RESPONSES and bool(fit.excited)
+    if not direct and (fit.responses or fit.method not in DIRECT):
+        return []
+    records = [*fit.excited, *(each.measured for each in fit.records)]
+    least = min((len(each.excitations) for each in records), default=0)
+    return records if least >= len(fit.model.inputs) else []

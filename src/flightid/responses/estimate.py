@@ -159,7 +159,7 @@ def estimate_response(
     if estimator in ("local_polynomial", "periodic") or (estimator == "auto" and free):
         whole = _of_whole_records(estimator, samples, listed, omega, options, covariance=covariance)
         if whole is not None:
-            return _with_inputs(whole, samples, listed, loop)
+            return _with_excited(_with_inputs(whole, samples, listed, loop), listed)
     if estimator == "auto":
         options["estimator"] = estimator = "composite"
     plans = plan_windows(window_s, samples, float(omega[-1]), shifts_of(overlap))
@@ -187,7 +187,7 @@ def estimate_response(
         missing = Finding("no-covariance", Light.UNKNOWN, str(error))
         return replace(response, findings=(*response.findings, missing))
     linear = LinearEstimate.of(samples, WindowedWeights(errors), omega)
-    return replace(response, errors=errors, linear=linear)
+    return _with_excited(replace(response, errors=errors, linear=linear), listed)
 
 
 def _of_whole_records(
@@ -227,6 +227,15 @@ def _with_inputs(
         input_shape=InputShape(common_hold(shapes), loop=common_loop(shapes)),
         digests=RecordDigests(records, channels),
     )
+
+
+def _with_excited(response: FrequencyResponse, records: Sequence[Record]) -> FrequencyResponse:
+    """A direct estimate that knows its records, where they hold an excitation for each input."""
+    linear, loop = response.linear, response.loop
+    least = min(len(each.excitations) for each in records)
+    if linear is None or least < len(response.inputs) or (loop and loop.is_taken_care_of):
+        return response
+    return replace(response, linear=replace(linear, excited=tuple(records)))
 
 
 def _require_motion_in_windows(samples: Samples, longest: int) -> None:

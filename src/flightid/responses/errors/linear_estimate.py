@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from flightid.errors import ShapeError
 from flightid.frozen import dataclass
+from flightid.record import Record
 from flightid.responses.errors.covariance import WindowedErrors
 from flightid.responses.errors.functional import Functional, one_by_one
 from flightid.responses.errors.local_errors import LocalErrors
@@ -215,6 +216,9 @@ class LinearEstimate:
         Outputs, inputs and frequencies of the estimate that the response holds.
     pilots : Pilots
         Models of all outputs that foretell the estimate's bias.
+    excited : tuple of Record
+        Where the estimate goes straight from inputs to outputs: its records, if they hold an
+        excitation for each input, by way of which it could have gone.
 
     Example
     -------
@@ -235,6 +239,7 @@ class LinearEstimate:
     sample_time_s: float
     places: tuple[Places, Places, Places]
     pilots: Pilots
+    excited: tuple[Record, ...] = ()
 
     @classmethod
     def of(cls, samples: Samples, weights: OutputWeights, omega_rad_s: Real) -> LinearEstimate:
