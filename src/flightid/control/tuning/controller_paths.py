@@ -67,7 +67,8 @@ class ControllerPaths:
     def ranges(self) -> tuple[Array, Array]:
         """Lowest and highest value of each gain; an angle time constant as its inverse, 1/s.
 
-        The autopilot's documentation gives them for usual vehicles: they reach what flew.
+        The autopilot's documentation gives them for usual vehicles: they reach what flew
+        (`reached`).
 
         Raises
         ------
@@ -83,7 +84,7 @@ class ControllerPaths:
                 )
             least, most = known[name].low, known[name].high
             if flown.has_flown:
-                least, most = reached(least, most, flown.gains.get(name))
+                least, most = reached(least, most, flown.gains.get(name), known[name].unit)
             if role == "angle_tc":
                 least, most = 1.0 / most, 1.0 / max(least, LEAST_SHARE * most)
             one = self.loop.unit_of(role)

@@ -11,9 +11,10 @@ from flightid.control.autopilots import AxisLoop
 from flightid.control.gyro import Gyro
 from flightid.control.margins.findings import COHERENCE
 from flightid.control.tuning.axis_tuning import AxisResult
-from flightid.control.tuning.gain_search import INTEGRAL
+from flightid.control.tuning.gain_search import INTEGRAL, LOW_END
 from flightid.control.tuning.gain_search_result import NO_GAINS, GainSearchResult
 from flightid.control.tuning.gain_steps import Stage, TunedGain
+from flightid.control.tuning.limits import ANGLE
 from flightid.control.tuning.order_statistics import ENOUGH, least_share
 from flightid.conventions import Light
 from flightid.findings import Finding, at_least
@@ -29,6 +30,8 @@ ADVICE = {
     "output noise": "lower the derivative filter, find the vibration, or allow more noise",
     "ratio of I": "take preset firm, or a larger integral_factor, knowingly",
     "target": "lower the target, or make actuators and filters faster",
+    "low": "fly that gain once below its documented range, and tune again: there ranges reach a "
+    "step below what flew",
     "margin": "identify the delay better or make it shorter (filters, loop rate, motors)",
 }
 
@@ -84,7 +87,12 @@ def _no_gains(found: GainSearchResult) -> Finding:
         return Finding(NO_GAINS, Light.RED, said + told, action)
     said = "no gains were found that meet all requirements for every plant, on a grid over their "
     said += "ranges nor by search from it; nearest: "
-    return Finding(NO_GAINS, Light.RED, said + told, advice(found.binding))
+    low = [name.removesuffix(LOW_END) for name in found.binding if name.endswith(LOW_END)]
+    if low:
+        told += f", at the low end of the {' and the '.join(low)}"
+    return Finding(
+        NO_GAINS, Light.RED, said + told, ADVICE["low"] if low else advice(found.binding)
+    )
 
 
 def _short(name: str, slack: float) -> str:
@@ -204,8 +212,11 @@ def low_coherence(result: AxisResult, measured: tuple[Array, Array] | None) -> I
         if each.name != "crossover" or each.nominal is None:
             continue
         near = np.geomspace(each.nominal / NEAR, each.nominal * NEAR, 21)
-        known = float(np.mean(np.interp(near, omega, coherence)))
-        if known < COHERENCE:
+        points = np.interp(near, omega, coherence)
+        known = float(np.mean(points))
+        if each.loop == ANGLE:
+            points = _behind_rate_loop(result, near, points)
+        if float(np.mean(points)) < COHERENCE:
             yield Finding(
                 "coherence-at-crossover",
                 Light.RED,
@@ -214,3 +225,17 @@ def low_coherence(result: AxisResult, measured: tuple[Array, Array] | None) -> I
                 "sweep that band with more amplitude, or ask for a crossover where the response "
                 "was measured",
             )
+
+
+def _behind_rate_loop(result: AxisResult, omega: Array, coherence: Array) -> Array:
+    """Coherence of the angle loop where the vehicle's own is known.
+
+    The rate loop is closed inside it and makes up for an error of the vehicle: of a share ε of its
+    response 1/|1 + L| is left, and so it is of what noise hides. Below the rate's crossover the
+    angle loop is what the controller makes of it, and a sweep need not tell it.
+    """
+    problem = result.problem
+    rate = problem.loops(result.found.gains[None], problem.plants.take([0])).rate[0, 0]
+    left = np.interp(omega, problem.plants.omega_rad_s, np.abs(1.0 + rate) ** -2)
+    tiny = np.finfo(float).tiny
+    return np.asarray(coherence / (coherence + np.minimum(left, 1.0) * (1.0 - coherence) + tiny))

@@ -69,7 +69,7 @@ def require_known(values: Mapping[str, float], loops: Sequence[AxisLoop]) -> Non
             needed="among " + ", ".join(sorted(known & ranges.keys())),
         )
     flown = {n: value for loop in loops if loop.has_flown for n, value in loop.gains.items()}
-    ends = {n: reached(each.low, each.high, flown.get(n)) for n, each in ranges.items()}
+    ends = {n: reached(each.low, each.high, flown.get(n), each.unit) for n, each in ranges.items()}
     outside = [
         f"{name} = {value:g} ({ends[name][0]:g} to {ends[name][1]:g})"
         for name, value in values.items()
@@ -79,5 +79,5 @@ def require_known(values: Mapping[str, float], loops: Sequence[AxisLoop]) -> Non
         raise OptionError(
             "a gain by hand lies outside its range",
             found=", ".join(outside),
-            needed="values inside the range that the autopilot's documentation gives, or as flown",
+            needed="values in the range of the autopilot's documentation, which reaches what flew",
         )

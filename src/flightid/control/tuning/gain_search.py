@@ -39,6 +39,8 @@ PENALTY = 50.0
 LARGEST_TD_S, TIME_SCALE_S = 0.5, 0.1
 TINY_GAIN = 1e-9
 INTEGRAL = "ratio of I to P"
+LOW_END = " (low end)"
+"""After the range of a gain that could be lower, where there are no gains."""
 IN_WORDS = {"A": "the angle's P"}
 EDGE = 0.02
 """Slack below which a requirement binds."""
@@ -356,18 +358,27 @@ def _violating(judged: LoopAssessment, rows: list[int]) -> list[int]:
     return list(dict.fromkeys(new))
 
 
+def _ends(problem: LoopProblem, gains: Array, *, exists: bool) -> Iterator[str]:
+    """Ranges that the gains stand at an end of, where that may be what keeps them there.
+
+    No gains at all may lie below the range of the angle's P or of I, too.
+    """
+    keeping = "P" if exists else "PIA"
+    for kind, value, low, high in zip(problem.kinds, gains, problem.low, problem.high, strict=True):
+        name = f"range of {IN_WORDS.get(kind, kind)}"
+        if value >= high * (1.0 - 1e-3):
+            yield name
+        elif kind in keeping and value <= low * (1.0 + 1e-3):
+            yield name if exists else name + LOW_END
+
+
 def _report(problem: LoopProblem, gains: Array) -> GainSearchResult:
     judged = problem.judge(gains[None])
     least = dict(zip(judged.names, judged.slack[:, 0].min(axis=1), strict=True))
     exists = bool(min(least.values()) >= 0.0)
     edge = EDGE if exists else 0.0
     binding = tuple(name for name, slack in least.items() if slack < edge + 2 * HEADROOM)
-    placed = zip(problem.kinds, gains, problem.low, problem.high, strict=True)
-    at_range = tuple(
-        f"range of {IN_WORDS.get(kind, kind)}"
-        for kind, value, low, high in placed
-        if value >= high * (1.0 - 1e-3) or (kind == "P" and value <= low * (1.0 + 1e-3))
-    )
+    at_range = tuple(_ends(problem, gains, exists=exists))
     slack = {name: float(each) for name, each in least.items()}
     known = dict(zip(problem.kinds, gains, strict=True))
     if "I" in known and known["I"] >= problem.integral_ratio * known["P"] * (1.0 - 1e-3):

@@ -6,6 +6,10 @@ from collections.abc import Mapping
 
 from flightid.frozen import dataclass
 
+GENTLER = 2.0
+"""Ratio by which a gain may lie below one that flew below its documented range."""
+TIME = "s"
+"""Unit of gains that are time constants."""
 AT_LIMIT = 1.1e-3
 """Of the range's upper end: with it the least value that a search takes counts as an end."""
 
@@ -51,18 +55,35 @@ class TunedGain:
     @property
     def ends(self) -> tuple[float, float]:
         """Of its range, which reaches what flew."""
-        return reached(self.low, self.high, self.flown)
+        return reached(self.low, self.high, self.flown, self.unit)
 
 
-def reached(low: float, high: float, flown: float | None) -> tuple[float, float]:
+def reached(low: float, high: float, flown: float | None, unit: str = "") -> tuple[float, float]:
     """A range of the autopilot's documentation, made as wide as to hold what flew.
+
+    Documented ranges are for usual vehicles. One that flew gentler than the gentlest of them may
+    have to fly gentler still: there the range reaches one safe step (`GENTLER`) further.
+
+    Parameters
+    ----------
+    low, high : float
+        As documented.
+    flown : float or None
+    unit : str
+        Of the parameter: of a time constant the larger value is the gentler one.
 
     Example
     -------
-    >>> reached(3.0, 12.0, 2.2), reached(3.0, 12.0, None)
-    ((2.2, 12.0), (3.0, 12.0))
+    >>> reached(3.0, 12.0, 2.2), reached(3.0, 12.0, 14.0), reached(3.0, 12.0, None)
+    ((1.1, 12.0), (3.0, 14.0), (3.0, 12.0))
+    >>> reached(0.2, 1.0, 1.4, TIME)
+    (0.2, 2.8)
     """
-    return (low, high) if flown is None else (min(low, flown), max(high, flown))
+    if flown is None:
+        return low, high
+    if unit == TIME:
+        return min(low, flown), GENTLER * flown if flown > high else high
+    return flown / GENTLER if flown < low else low, max(high, flown)
 
 
 @dataclass(frozen=True)
