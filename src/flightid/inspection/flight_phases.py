@@ -89,15 +89,15 @@ def flight_phases(log: Log, actuators: Actuators | None) -> FlightPhases:
     flying = _landing_detector(log)
     if carrying is None and flying is None:
         return _untold(log, ran)
-    spans, evidence, limit = [(-np.inf, np.inf)], [], 0.0
+    spans, evidence, tipped = [(-np.inf, np.inf)], [], None
     if carrying is not None:
         limit = AIRBORNE_SPEED.value if plane else _carrying_throttle(carrying.values)
         spans = _spans(carrying.time_s, carrying.values > limit)
         evidence.append(f"{carrying.label} above {limit:.3g} {carrying.unit}".removesuffix(" 1"))
+        tipped = _tip_over(log, carrying, limit)
     if flying is not None:
         spans = _common(spans, _spans(*flying))
         evidence.append("landing detector")
-    tipped = None if carrying is None else _tip_over(log, carrying, limit)
     if tipped is not None and not any(start < tipped < stop + FALL_S for start, stop in spans):
         # Moved by hand after landing.
         tipped = None
@@ -202,7 +202,7 @@ def _held(
     first, last = log_span(log)
     grid = np.linspace(first, last, min(max(2, int((last - first) / 0.1)), 1_000_000))
     index = np.searchsorted(time_s, grid, side="right") - 1
-    return grid, np.where(index >= 0, flying[np.maximum(index, 0)], ~flying[0])
+    return grid, np.where(index >= 0, flying[index], ~flying[0])
 
 
 def tilt(log: Log) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
@@ -213,12 +213,12 @@ def tilt(log: Log) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
         table = log.table("vehicle_attitude", log.messages["vehicle_attitude"].instances[0])
         cosine = 1.0 - 2.0 * (table["q[1]"] ** 2 + table["q[2]"] ** 2)
         good = believable(table.time_s) & np.isfinite(cosine)
-        return table.time_s[good], np.arccos(np.clip(cosine[good], -1.0, 1.0))
+        return table.time_s[good], np.arccos(np.maximum(cosine[good], -1.0))
     phi, theta = find(log, "phi"), find(log, "theta")
     if phi is None or theta is None:
         return None
     pitch = np.interp(phi.time_s, theta.time_s, theta.values)
-    return phi.time_s, np.arccos(np.clip(np.cos(phi.values) * np.cos(pitch), -1.0, 1.0))
+    return phi.time_s, np.arccos(np.cos(phi.values) * np.cos(pitch))
 
 
 def _tip_over(log: Log, carrying: Signal, limit: float) -> float | None:
