@@ -1,10 +1,12 @@
 //! Face of what is done to sampled series.
-//! (Python side: uncertainty/residual_noise.py, uncertainty/slow_drift.py)
+//! (Python side: uncertainty/residual_noise.py, uncertainty/slow_drift.py,
+//! responses/windows/transform.py)
 
 use flightid_core::frequency_domain::composite::{CompositeRule, composite as core_composite};
+use flightid_core::numerics::folded_frames::{Frames, folded_frames as folded};
 use flightid_core::numerics::levinson::weights as levinson;
 use flightid_core::numerics::slow_drift::{Parts, Rounds, Spectrum};
-use numpy::{IntoPyArray, PyArray1};
+use numpy::{IntoPyArray, PyArray1, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
 use crate::error::from_core;
@@ -77,6 +79,24 @@ fn drift_beside<'py>(
     Ok((found.lags.into_pyarray(py), found.weights.into_pyarray(py), found.variance))
 }
 
+/// folded_frames(samples: NDArray[np.float64], length: int, hop: int, width: int) -> list[NDArray[np.float64]]
+///
+/// Even parts of windows of channels by distance from their middles, and odd ones with the sign of
+/// exp(−jωd): windows slowest, channels within each, zeros up to the width of a row.
+#[pyfunction]
+fn folded_frames<'py>(
+    py: Python<'py>,
+    samples: RowMajor2<'_, f64>,
+    length: usize,
+    hop: usize,
+    width: usize,
+) -> PyResult<[Bound<'py, PyArray1<f64>>; 2]> {
+    let (n, frames) = (samples.shape()[1], Frames { length, hop, width });
+    let samples = samples.as_slice()?;
+    let found = py.detach(|| folded(samples, n, frames)).map_err(from_core)?;
+    Ok(found.map(|each| each.into_pyarray(py)))
+}
+
 /// Add this file's names to the module.
 ///
 /// # Errors
@@ -84,5 +104,6 @@ fn drift_beside<'py>(
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(composite, module)?)?;
     module.add_function(wrap_pyfunction!(drift_beside, module)?)?;
+    module.add_function(wrap_pyfunction!(folded_frames, module)?)?;
     module.add_function(wrap_pyfunction!(autoregression_weights, module)?)
 }

@@ -4,6 +4,7 @@ pub mod complex_lanes;
 pub mod complex_lu;
 pub(crate) mod decay;
 pub mod dual;
+pub mod folded_frames;
 pub(crate) mod gram_schmidt;
 pub mod householder;
 pub mod lagged_forms;

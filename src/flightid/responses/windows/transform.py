@@ -14,6 +14,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from flightid import _native
 from flightid.frozen import dataclass
 from flightid.responses.windows.panels import PanelBasis, PanelSpace, exponentials, panel_levels
 
@@ -183,35 +184,15 @@ def transform_into(samples: Real, basis: FoldedBasis, parts: Real) -> None:
 
     Windows come before channels, so that the windows of several records lie side by side.
     """
-    window = frames(samples, basis.plan, "line" if basis.detrend == "line" else "none")
-    width = basis.slow[0].width if basis.slow else 0
-    even, odd = _fold(window, width)
-    rows = [even, odd]
-    for place, part in enumerate(rows):
-        found = parts[:, place].reshape(len(parts), len(part))
-        _product(basis, place, part, found)
-    np.negative(parts[:, 1], out=parts[:, 1])
-
-
-def _fold(window: Real, at_least: int) -> tuple[Real, Real]:
-    """Even and odd parts about the middle, shape (n_rows, distances), zeros up to `at_least`.
-
-    Rows are windows, and channels within each.
-    """
-    channels, count, length = window.shape
-    half = length // 2
-    width = max(half + 1, at_least)
-    even = np.empty((count, channels, width))
-    odd = np.empty_like(even)
-    window = window.transpose(1, 0, 2)
-    right, left = window[:, :, half + 1 :], window[:, :, half - 1 : 0 : -1]
-    np.add(right, left, out=even[:, :, 1:half])
-    np.subtract(right, left, out=odd[:, :, 1:half])
-    even[:, :, 0], odd[:, :, 0] = window[:, :, half], 0.0
-    # The window's first sample stands alone: its mirror image is the next window's first.
-    even[:, :, half], odd[:, :, half] = window[:, :, 0], -window[:, :, 0]
-    even[:, :, half + 1 :], odd[:, :, half + 1 :] = 0.0, 0.0
-    return even.reshape(-1, width), odd.reshape(-1, width)
+    length, hop = basis.plan.length, basis.plan.hop
+    if basis.detrend == "line":
+        # Each has a line of its own: frames, one after another, as channels of one window.
+        window = frames(samples, basis.plan, "line").transpose(1, 0, 2)
+        samples, hop = window.reshape(-1, length), length
+    width = max(length // 2 + 1, basis.slow[0].width if basis.slow else 0)
+    for place, rows in enumerate(_native.folded_frames(samples, length, hop, width)):
+        part = rows.reshape(-1, width)
+        _product(basis, place, part, parts[:, place].reshape(len(parts), len(part)))
 
 
 def _product(basis: FoldedBasis, place: int, rows: Real, found: Real) -> None:
