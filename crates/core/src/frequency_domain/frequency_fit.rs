@@ -29,15 +29,16 @@ pub struct Measured {
     pub weight_deg: Vec<f64>,
 }
 
-/// Whitening of a run of consecutive responses: an m × m matrix W (row-major) applied to the errors
-/// stacked as all real parts, then all imaginary parts, in the order of the responses.
+/// Whitening of a run of consecutive responses: an m × m matrix W (row-major), or the m numbers of its
+/// diagonal, applied to the errors stacked as all real parts, then all imaginary parts, in the order
+/// of the responses.
 #[derive(Debug, Clone)]
 pub struct Whitening {
     /// First response of the run.
     pub first: usize,
     /// Number of responses in it.
     pub count: usize,
-    /// W, with WᵀW the inverse of the covariance.
+    /// W, with WᵀW the inverse of the covariance; of m numbers, its diagonal.
     pub matrix: Vec<f64>,
 }
 
@@ -86,7 +87,8 @@ impl<'a, M: ResponseModel> FrequencyFit<'a, M> {
                 next += run.count;
                 same("responses of a whitening", next.min(data.len()), next)?;
                 let m = 2 * points(&data[run.first..next]);
-                same("entries of a whitening", run.matrix.len(), m * m)?;
+                let needed = if run.matrix.len() == m { m } else { m * m };
+                same("entries of a whitening", run.matrix.len(), needed)?;
             }
             same("whitened responses", next, data.len())?;
         }
@@ -194,13 +196,19 @@ fn same(what: &'static str, found: usize, needed: usize) -> Result<(), CoreError
     if found == needed { Ok(()) } else { Err(CoreError::Shape { what, found, needed }) }
 }
 
-/// result (m × n) = a (m × m) · b (m × n), all row-major.
+/// result (m × n) = a (m × m) · b (m × n), all row-major; of an a of m numbers, its diagonal.
 fn multiply(a: &[f64], b: &[f64], n: usize, result: &mut [f64]) {
     result.fill(0.0);
     if n == 0 {
         return;
     }
     let m = b.len() / n;
+    if a.len() == m {
+        for ((out, line), factor) in result.chunks_exact_mut(n).zip(b.chunks_exact(n)).zip(a) {
+            out.iter_mut().zip(line).for_each(|(entry, value)| *entry = factor * value);
+        }
+        return;
+    }
     for (row, out) in result.chunks_exact_mut(n).enumerate() {
         for (&factor, line) in a[row * m..(row + 1) * m].iter().zip(b.chunks_exact(n)) {
             for (entry, &value) in out.iter_mut().zip(line) {
@@ -252,5 +260,21 @@ pub fn minimise_from<P: Problem + Clone + Sync>(
     match starts {
         [only] => vec![one(only)],
         _ => starts.par_iter().map(one).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::multiply;
+
+    #[test]
+    fn a_diagonal_weighs_as_its_whole_matrix_does() {
+        let (diagonal, b) = ([2.0, -0.5, 3.0], [1.0, 4.0, -2.0, 8.0, 0.25, 5.0]);
+        let whole = [2.0, 0.0, 0.0, 0.0, -0.5, 0.0, 0.0, 0.0, 3.0];
+        let (mut short, mut long) = ([9.0; 6], [9.0; 6]);
+        multiply(&diagonal, &b, 2, &mut short);
+        multiply(&whole, &b, 2, &mut long);
+        assert_eq!(short, long);
+        assert_eq!(short, [2.0, 8.0, 1.0, -4.0, 0.75, 15.0]);
     }
 }

@@ -50,7 +50,7 @@ from flightid.identification.frequency_domain.selection import (
     SelectedResponse,
     select_points,
 )
-from flightid.identification.frequency_domain.setup_checks import check_setup
+from flightid.identification.frequency_domain.setup_checks import Start, check_setups
 from flightid.identification.frequency_domain.unseen import with_starts
 from flightid.identification.frequency_domain.without_bias import far_from_best, take_out
 from flightid.identification.multistart import DenseEnd, cluster, local_minima, require_free
@@ -189,7 +189,7 @@ def check_start(model: GreyBoxModel, selected: Sequence[SelectedResponse]) -> li
     FitError
         The model has no response of a pair.
     """
-    found: list[Finding] = []
+    looked: list[Start] = []
     try:
         starts = curves_of(model, [each.omega_rad_s for each in selected])
     except DataError:
@@ -203,8 +203,8 @@ def check_start(model: GreyBoxModel, selected: Sequence[SelectedResponse]) -> li
                 action="leave the pair out, or start its parameters away from zero",
             )
         if np.all(np.isfinite(start)) and np.all(np.abs(start) > 0.0):
-            found += check_setup(each.name, each.omega_rad_s, each.response, start)
-    return found
+            looked.append(Start(each.name, each.omega_rad_s, each.response, start))
+    return check_setups(looked)
 
 
 def _minimise(

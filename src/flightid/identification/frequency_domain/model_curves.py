@@ -3,49 +3,82 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.frozen import dataclass
 from flightid.models import GreyBoxModel
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+Places = NDArray[np.intp]
 
 
-def curves_of(
-    model: GreyBoxModel, grids: Sequence[Array], free: Array | None = None
-) -> list[Complex]:
+@dataclass(frozen=True, eq=False)
+class Grids:
+    """Frequencies of several responses, found among all of them once for many evaluations.
+
+    Attributes
+    ----------
+    own : sequence of ndarray
+        Those of each response, rad/s.
+
+    Example
+    -------
+    >>> grids = Grids([np.array([1.0, 3.0]), np.array([2.0, 3.0])])
+    >>> grids.omega, grids.places
+    (array([1., 2., 3.]), array([0, 2, 4, 5]))
+    """
+
+    own: Sequence[Array]
+
+    @cached_property
+    def omega(self) -> Array:
+        """All frequencies, none twice."""
+        return np.unique(np.concatenate(self.own))
+
+    @cached_property
+    def places(self) -> Places:
+        """Of each response's frequencies in the responses on all of them, row after row."""
+        rows = len(self.omega) * np.arange(len(self.own))
+        each = np.searchsorted(self.omega, np.concatenate(self.own))
+        return np.repeat(rows, [len(own) for own in self.own]) + each
+
+    def joined(self, model: GreyBoxModel, free: Array | None = None) -> Complex:
+        """The model's responses on their own frequencies, one after another; see `curves_of`."""
+        values = model.parameters.independent_values()
+        if free is not None:
+            values[model.parameters.free_indices] = free
+        return np.asarray(model.native.response(values, self.omega).ravel()[self.places])
+
+    def apart(self, joined: Complex) -> list[Complex]:
+        """Values of each response."""
+        return np.split(joined, np.cumsum([len(own) for own in self.own])[:-1])
+
+
+def curves_of(model: GreyBoxModel, grids: Sequence[Array]) -> list[Complex]:
     """Each response of the model, in their order, on its own frequencies, rad/s.
-
-    `free` are values of the free parameters; default: the model's.
 
     Raises
     ------
     DataError
         The model has no response at one of the frequencies.
     """
-    omega = np.unique(np.concatenate(grids))
-    values = model.parameters.independent_values()
-    if free is not None:
-        values[model.parameters.free_indices] = free
-    found = model.native.response(values, omega)
-    return _chosen(found, omega, grids)
+    known = Grids(grids)
+    return known.apart(known.joined(model))
 
 
 def log_slopes_of(model: GreyBoxModel, grids: Sequence[Array]) -> list[Complex]:
     """Derivatives of the logarithm of each response, shape (n, n_free), as `curves_of`."""
-    omega = np.unique(np.concatenate(grids))
-    parameters = model.parameters
+    known, parameters = Grids(grids), model.parameters
     values, free = parameters.independent_values(), parameters.free_indices
-    return _chosen(model.native.log_gradient(values, free, omega), omega, grids)
+    found = model.native.log_gradient(values, free, known.omega)
+    return known.apart(found.reshape(-1, len(free))[known.places])
 
 
 def slopes_of(model: GreyBoxModel, grids: Sequence[Array]) -> list[Complex]:
     """Derivatives of each response itself, shape (n, n_free), as `curves_of`."""
     pairs = zip(curves_of(model, grids), log_slopes_of(model, grids), strict=True)
     return [curve[:, None] * slope for curve, slope in pairs]
-
-
-def _chosen(found: Complex, omega: Array, grids: Sequence[Array]) -> list[Complex]:
-    return [row[np.searchsorted(omega, grid)] for row, grid in zip(found, grids, strict=True)]

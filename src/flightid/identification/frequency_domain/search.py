@@ -14,7 +14,7 @@ from flightid.frozen import dataclass
 from flightid.identification.fit_findings import EXCELLENT_COST
 from flightid.identification.frequency_domain.error_model import ErrorModel, whitening
 from flightid.identification.frequency_domain.known_minimum import KnownMinimum
-from flightid.identification.frequency_domain.model_curves import curves_of
+from flightid.identification.frequency_domain.model_curves import Grids
 from flightid.identification.frequency_domain.selection import SelectedResponse
 from flightid.identification.multistart import DenseEnd, collect, draw_starts
 from flightid.models import GreyBoxModel
@@ -53,7 +53,8 @@ class _Descent:
     model : GreyBoxModel
     selected : sequence of SelectedResponse
     white : list of tuple
-        Whitening of the errors by run; empty for weighted dB and degrees.
+        Whitening of the errors by run, a matrix or one row of weights; empty for weighted dB and
+        degrees.
     """
 
     model: GreyBoxModel
@@ -130,10 +131,10 @@ class _Descent:
         measured = np.concatenate([each.response for each in self.selected])
         weight_db = np.concatenate([each.weight_db for each in self.selected])
         weight_deg = np.concatenate([each.weight_deg for each in self.selected])
-        found = np.full(len(starts), np.inf)
+        found, grids = np.full(len(starts), np.inf), Grids(self._grids)
         for place, start in enumerate(starts):
             with suppress(DataError), np.errstate(all="ignore"):
-                ratio = np.concatenate(curves_of(self.model, self._grids, start)) / measured
+                ratio = grids.joined(self.model, start) / measured
                 gain, phase = DECIBEL * np.log(np.abs(ratio)), DEGREE * np.angle(ratio)
                 cost = weight_db @ gain**2 + weight_deg @ phase**2
                 found[place] = cost if np.isfinite(cost) else np.inf
@@ -158,7 +159,7 @@ class _Descent:
 def _relative(place: int, response: SelectedResponse) -> tuple[int, int, Array]:
     """Weights of a response's complex errors, as decibels of small ones weigh."""
     weight = DECIBEL * np.sqrt(response.weight_db) / np.abs(response.response)
-    return place, 1, np.ascontiguousarray(np.diag(np.tile(weight, 2)))
+    return place, 1, np.tile(weight, 2)[None]
 
 
 def _thinned(response: SelectedResponse, stride: int) -> SelectedResponse:

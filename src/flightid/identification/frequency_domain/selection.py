@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -72,12 +73,12 @@ class SelectedResponse:
     weight_db: NDArray[np.float64]
     weight_deg: NDArray[np.float64]
 
-    @property
+    @cached_property
     def omega_rad_s(self) -> NDArray[np.float64]:
         """Frequencies that are fitted, rad/s."""
         return np.ascontiguousarray(self.measured.omega_rad_s[self.places])
 
-    @property
+    @cached_property
     def response(self) -> NDArray[np.complex128]:
         """Measured values there."""
         return np.ascontiguousarray(self.measured.response[self.places])

@@ -7,11 +7,16 @@ integration; one of 57.3 is degrees against radians.
 
 from __future__ import annotations
 
+import cmath
+import math
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.conventions import Light
 from flightid.findings import Finding
+from flightid.frozen import dataclass
 
 _STEADY = 0.8
 _SLOPE = 20.0
@@ -21,22 +26,32 @@ _RAD_TO_DEG_DB = 20.0 * np.log10(180.0 / np.pi)
 _UNIT_TOLERANCE_DB = 1.5
 
 
-def check_setup(
-    name: str,
-    omega_rad_s: NDArray[np.float64],
-    measured: NDArray[np.complex128],
-    start: NDArray[np.complex128],
-) -> list[Finding]:
-    """Compare a measured response with the model at its start.
+@dataclass(frozen=True)
+class Start:
+    """A measured response and the model's at its start values.
 
-    Parameters
+    Attributes
     ----------
     name : str
         ``"output/input"``.
     omega_rad_s : ndarray, shape (n,)
         Frequencies, rad/s.
     measured, start : ndarray of complex, shape (n,)
-        Measured response, and the model's at its start values.
+    """
+
+    name: str
+    omega_rad_s: NDArray[np.float64]
+    measured: NDArray[np.complex128]
+    start: NDArray[np.complex128]
+
+
+def check_setups(starts: Sequence[Start]) -> list[Finding]:
+    """Compare measured responses with the model at its start.
+
+    Parameters
+    ----------
+    starts : sequence of Start
+        Of frequencies of their own, three at least.
 
     Returns
     -------
@@ -51,18 +66,36 @@ def check_setup(
     -------
     >>> omega = np.array([1.0, 2.0, 4.0, 8.0])
     >>> model = 1.0 / (1j * omega + 3.0)
-    >>> [finding.code for finding in check_setup("p/u", omega, -model, model)]
-    ['setup-sign']
+    >>> starts = [Start("p/u", omega, -model, model), Start("q/u", omega, model, model)]
+    >>> [(finding.code, finding.message[:3]) for finding in check_setups(starts)]
+    [('setup-sign', 'p/u')]
     """
-    ratio = measured / start
-    direction = np.mean(ratio / np.abs(ratio))
-    if np.abs(direction) < _STEADY:
+    if not starts:
         return []
-    phase_deg = float(np.degrees(np.angle(direction)))
-    decibel = 20.0 * np.log10(np.abs(ratio))
-    decades = np.log10(omega_rad_s / omega_rad_s[0])
-    decades -= decades.mean()
-    slope = float(decades @ decibel / (decades @ decades))
+    counts = np.array([len(each.omega_rad_s) for each in starts])
+    first = np.cumsum(counts) - counts
+
+    def means(values: NDArray[np.inexact]) -> NDArray[np.inexact]:
+        return np.asarray(np.add.reduceat(values, first) / counts)
+
+    measured = np.concatenate([each.measured for each in starts])
+    ratio = measured / np.concatenate([each.start for each in starts])
+    size = np.abs(ratio)
+    directions, decibel = means(ratio / size), 20.0 * np.log10(size)
+    decades = np.log10(np.concatenate([each.omega_rad_s for each in starts]))
+    decades -= np.repeat(means(decades), counts)
+    slopes = means(decades * decibel) / means(decades**2)
+    found = zip(starts, directions.tolist(), slopes.tolist(), means(decibel).tolist(), strict=True)
+    return [
+        each
+        for start, direction, slope, offset in found
+        if abs(direction) >= _STEADY
+        for each in _judged(start.name, math.degrees(cmath.phase(direction)), slope, offset)
+    ]
+
+
+def _judged(name: str, phase_deg: float, slope: float, offset: float) -> list[Finding]:
+    """What a steady ratio tells by its phase, its slope in dB a decade and its mean in dB."""
     if abs(abs(phase_deg) - 180.0) < _PHASE_TOLERANCE_DEG and abs(slope) < _SLOPE_TOLERANCE:
         return [
             Finding(
@@ -84,7 +117,6 @@ def check_setup(
                     "check whether the channel is a rate or an angle, or choose another structure",
                 )
             ]
-    offset = float(np.mean(decibel))
     is_unit = abs(abs(offset) - _RAD_TO_DEG_DB) < _UNIT_TOLERANCE_DB
     if is_unit and abs(slope) < _SLOPE_TOLERANCE and abs(phase_deg) < _PHASE_TOLERANCE_DEG:
         return [
