@@ -7,46 +7,15 @@ import pytest
 from scipy.signal import lfilter
 
 import flightid as fid
-from flightid.identification.advice.delays import delays_to_scan, find_delays
+from flightid.identification.advice.delays import UNCERTAIN, delays_to_scan, find_delays
 from flightid.models.sampled.channels import gather_channels
-from tests.strangers import open_loops, rig_lights
-
-KINDS = ("white", "prbs", "sweep", "coloured", "periodic", "multisine")
-
-
-def _input(random: np.random.Generator, kind: str, n: int) -> np.ndarray:
-    t = np.arange(n)
-    if kind == "white":
-        return random.standard_normal(n)
-    if kind == "prbs":
-        return np.repeat(random.choice([-1.0, 1.0], n // 4 + 1), 4)[:n]
-    if kind == "sweep":
-        rate = np.log(1.5 / 0.02)
-        return np.sin(0.02 * n / rate * (np.exp(t / n * rate) - 1.0))
-    if kind == "coloured":
-        return lfilter([1.0], [1.0, -0.9], random.standard_normal(n))
-    if kind == "periodic":
-        return np.resize(random.choice([-1.0, 1.0], 255), n)
-    phases = random.uniform(0.0, 2.0 * np.pi, 120)
-    lines = 2.0 * np.pi / 500 * np.arange(1, 121)
-    return np.cos(np.outer(t, lines) + phases).sum(axis=1) / 8
+from tests.strangers import delay_bounds, open_loops, rig_lights
 
 
 def _fly(seed: int) -> tuple[int, fid.Record]:
-    """A second-order plant, damping 0.02 every other time, with a delay of 0 to 12 samples."""
-    random, n = np.random.default_rng(seed), 2000
-    damping = 0.02 if seed // 6 % 2 else random.uniform(0.2, 1.0)
-    omega = np.exp(random.uniform(np.log(0.1), np.log(1.2)))
-    pole = np.exp(omega * (-damping + 1j * np.sqrt(1.0 - damping**2)))
-    a = [1.0, -2.0 * pole.real, abs(pole) ** 2]
-    delay = int(random.integers(0, 13))
-    u = _input(random, KINDS[seed % 6], n)
-    b = np.concatenate([np.zeros(delay), [1.0, random.uniform(-0.9, 1.0)]])
-    y = lfilter(b, a, u)
-    below = a if random.random() < 0.3 else [1.0, -random.uniform(0.0, 0.95)]
-    noise = lfilter([1.0], below, random.standard_normal(n))
-    y += noise * random.uniform(0.03, 0.3) * y.std() / noise.std()
-    return delay, fid.Record.from_arrays(np.arange(n) / 50, inputs={"u": u}, outputs={"y": y})
+    """Delay and record of a plant."""
+    plant = delay_bounds.drawn(seed)
+    return plant.delay, plant.record
 
 
 @pytest.mark.parametrize(
@@ -66,6 +35,19 @@ def test_an_input_without_effect_has_no_delay() -> None:
         record.time_s, inputs={"u": record["u"], "idle": idle}, outputs={"y": record["y"]}
     )
     assert fid.impulse_response(beside, n_lags=20).delays == {"u": delay, "idle": None}
+
+
+@pytest.mark.slow
+def test_an_open_delay_is_what_the_record_knows() -> None:
+    """No test could narrow it: ends of its range lose less than the odds that refuse a delay."""
+    plant = delay_bounds.drawn(116)
+    (found,) = find_delays(gather_channels([plant.record], "y", ("u",), "mean"), 40)
+    assert found.samples is None
+    assert found.interval is not None
+    assert all(delay_bounds.lost(plant, end) < UNCERTAIN for end in found.interval)
+    known = delay_bounds.drawn(7)
+    assert delay_bounds.lost(known, known.delay) < 1e-6
+    assert delay_bounds.lost(known, known.delay + 1) > 100.0 * UNCERTAIN
 
 
 @pytest.mark.slow
