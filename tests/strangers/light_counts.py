@@ -1,8 +1,9 @@
 """False greens over records that hold nothing, false reds over good ones, as one number each.
 
-Run: python -m tests.strangers.light_counts barren|sound [--runs 500] [--family fits|run]
-[--keep FILE]. Seeds go round the cases of `false_lights` (records and the methods of fits) and
-`rig_lights` (`flightid run`, a hundred times as dear), one flight each.
+Run: python -m tests.strangers.light_counts barren|sound [--runs 500]
+[--family fits|run|inspections] [--keep FILE]. Seeds go round the cases of `false_lights` (records
+and the methods of fits), `rig_lights` (`flightid run`, a hundred times as dear) and
+`inspected_logs`, one flight each.
 
 Barren: hovers, loops without injection, wrong units, spikes, dead sensors, cuts. Refused is not
 green, and of a sound one it counts as red.
@@ -15,13 +16,14 @@ from pathlib import Path
 
 from scipy.stats import beta
 
-from tests.strangers import false_lights, rig_lights
+from tests.strangers import false_lights, inspected_logs, rig_lights
 from tests.strangers.counting import Tally
 from tests.strangers.kept import KeptFlights
 
 FAMILIES = {
     "fits": false_lights.LIGHTS,
     "run": rig_lights.LIGHTS,
+    "inspections": inspected_logs.LIGHTS,
     "both": (*false_lights.LIGHTS, *rig_lights.LIGHTS),
 }
 WRONG = {"barren": ("green",), "sound": ("red", "refused")}

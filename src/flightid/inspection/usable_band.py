@@ -13,6 +13,7 @@ from flightid.frozen import dataclass
 from flightid.inspection.axes import AxisChannels, axes_of
 from flightid.inspection.excitation_found import FoundExcitation
 from flightid.inspection.excited_to import excited_to
+from flightid.inspection.injected import injected_ratio
 from flightid.inspection.signals import Signal, Span, find
 from flightid.inspection.stretches import FlightStretches, packed
 from flightid.inspection.thresholds import (
@@ -32,6 +33,10 @@ from flightid.responses.running import SpectralSum
 
 OF_WINDOW = 2.0
 """Above the lowest coherent frequency: there a window holds two cycles, and a fit wants four."""
+LOOP_ALONE = (
+    "what was injected explains too little of the rate (coherence of 0.6 in no half decade), so "
+    "that what hangs together with the command may be gusts that the loop answers"
+)
 NARROW = "too narrow for more than a gain"
 N_OMEGA = 60
 """Frequencies at which coherence is computed."""
@@ -209,6 +214,10 @@ def axis_bands(
         band = None if coherent is None else _fitted(coherent)
         if coherent is not None and band is None:
             why = f"coherence reaches 0.6 from {hertz_words(coherent)} alone: too narrow for a fit"
+        if band is not None:
+            wide = injected_ratio(log, axis, excited, motion, highest)
+            if wide is not None and wide < BAND_LEAST.value:
+                band, coherent, why = None, None, LOOP_ALONE
         told = band, coherence, why, largest, highest, coherent, (command.rate_hz, motion.rate_hz)
         found.append(AxisBand(axis, labels[0], labels[1], slowest, *told))
     return tuple(found)
