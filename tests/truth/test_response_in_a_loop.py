@@ -18,13 +18,13 @@ NUMERATOR, DENOMINATOR = (
 )
 
 
-def flown(seed: int) -> Record:
+def flown(seed: int, *, gusts: float = 0.9, part: slice = slice(600, 2250)) -> Record:
     """From 12 to 45 s of a sweep of .6 to 15 rad/s in 60 s: gusts by way of rate feedback too."""
     random, n = np.random.default_rng(seed), 3000
     t = np.arange(n) * STEP_S
     rate = np.log(15.0 / 0.6) / t[-1]
     command = np.sin(0.6 / rate * np.expm1(rate * t)) * np.minimum(1.0, t / 3.0)
-    gust = 0.9 * signal.lfilter([0.1], [1.0, -0.9], random.standard_normal(n))
+    gust = gusts * signal.lfilter([0.1], [1.0, -0.9], random.standard_normal(n))
     sensed = 0.003 * random.standard_normal(n)
     u, y = np.zeros(n), np.zeros(n)
     past_in, past_out, held = np.zeros(2), np.zeros(2), 0.0
@@ -35,7 +35,6 @@ def flown(seed: int) -> Record:
         u[k] = command[k] - held
         past_in = np.array([u[k] + gust[k], past_in[0]])
         past_out = np.array([move, past_out[0]])
-    part = slice(600, 2250)
     return fid.Record.from_arrays(
         t[part],
         inputs={"u": u[part]},
@@ -78,3 +77,23 @@ def test_a_pilot_by_instruments_leans_to_no_controller(seed: int) -> None:
     slopes = pilot.response_slopes(excited)[:, 0]
     variance = np.real(np.einsum("if,ij,jf->f", slopes.conj(), pilot.covariance, slopes))
     assert np.sqrt(np.mean((error * np.abs(truth)) ** 2 / variance)) < 1.8
+
+
+def test_bars_of_calm_air_are_as_long_as_errors_scatter() -> None:
+    """What local fits on the excitation left was leakage, not noise: bars 15 times as long."""
+    errors, bars = [], []
+    for seed in range(5):
+        found = fid.estimate_response(
+            flown(seed, gusts=0.0, part=slice(None)),
+            band_rad_s=(1.2, 10.0),
+            n_omega=20,
+            estimator="instrument",
+        ).shown
+        truth = signal.freqz(NUMERATOR, DENOMINATOR, found.omega_rad_s * STEP_S)[1]
+        errors.append(np.abs(found.response[0, 0] / truth - 1.0))
+        bars.append(found.random_error[0, 0])
+    scatter = np.sqrt(np.mean(np.square(errors), axis=0) / 2.0)
+    times = np.sqrt(np.mean(np.square(bars), axis=0)) / scatter
+    assert 0.6 < np.median(times) < 1.8
+    assert np.max(times) < 4.0
+    assert np.mean(np.array(errors) < 1.96 * np.sqrt(2.0) * np.array(bars)) > 0.9

@@ -30,6 +30,12 @@ SURER = 1.5
 
 Beyond, it rests on what it assumes of the vehicle, where the input has no power of its own.
 """
+EXTRAPOLATED = 0.2
+"""Power of what bins tell less than the best ones by which errors by way of an excitation grow.
+
+Where excitations end, a pilot by instruments goes on by what it found inside, and errs by more
+than slopes say: 1.2 times where bins tell a third, 2 times where they tell a fortieth.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,16 +164,11 @@ def _inside(outputs: Real, last: int) -> Real:
 
 
 def _noise(linear: LinearEstimate, pilots: Sequence[Pilot]) -> NoiseSpectrum:
-    """Noise of the outputs: what pilots leave, and no less than what excitations leave.
-
-    Where excitations move little, a pilot by way of them has few bins to tell noise by.
-    """
+    """Noise of the outputs: what pilots leave."""
     residuals = _residuals(linear, pilots)
     highest = BEYOND_BAND * linear.pilots.highest_rad_s
     spent = _stacked([each.spent for each in pilots])
-    noise = mean_spectrum(residuals, linear.sample_time_s, highest, spent)
-    fed_back = linear.weights.fed_back_noise(linear.places[0])
-    return noise if fed_back is None else noise.no_less_than(fed_back)
+    return mean_spectrum(residuals, linear.sample_time_s, highest, spent)
 
 
 def _errors(
@@ -182,6 +183,7 @@ def _errors(
     wanted = [Points(row, group, points) for group in groups for row in range(len(pilots))]
     totals = iter(covariances(linear.errors_with(noise), wanted))
     least = _least_variances(linear, noise, omega, spread)
+    beyond = _extrapolated(linear, spread)
     found = []
     for group in groups:
         columns = linear.places[1][group]
@@ -196,6 +198,9 @@ def _errors(
             if least is not None:
                 needed = np.tile(least[row, group].ravel(), 2)
                 longer = _longer(needed, np.diag(known))
+                known *= np.outer(longer, longer)
+            if beyond is not None:
+                longer = np.tile(beyond[group].ravel(), 2)
                 known *= np.outer(longer, longer)
             found.append(known)
     return np.stack(found).reshape(len(groups), len(pilots), *found[0].shape)
@@ -221,6 +226,20 @@ def _least_variances(
     ends = np.log(np.minimum(alone, np.finfo(float).max)) @ spread
     made = np.log(np.maximum(noise.at(omega), np.finfo(float).tiny))[:, None]
     return np.asarray(np.exp(np.minimum(made + ends + np.log(0.5 / SURER**2), LARGEST)))
+
+
+def _extrapolated(linear: LinearEstimate, spread: Real) -> Real | None:
+    """How many times as long errors by way of an excitation are, (n_in, n_f); see `EXTRAPOLATED`.
+
+    One where bins tell nothing at all: what is needed there is beyond all numbers.
+    """
+    alone = linear.local_spread() if linear.pilots.excitations else None
+    if alone is None:
+        return None
+    best = np.min(alone, axis=1, keepdims=True)
+    told = np.isfinite(alone) & np.isfinite(best)
+    less = np.divide(alone, best, out=np.ones_like(alone), where=told)
+    return np.asarray(less**EXTRAPOLATED @ spread)
 
 
 def _longer(needed: Real, known: Real) -> Real:

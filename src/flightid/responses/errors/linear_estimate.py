@@ -66,13 +66,6 @@ class OutputWeights(Protocol):
         """
         ...
 
-    def fed_back_noise(self, outputs: Places) -> NoiseSpectrum | None:
-        """Noise of some outputs that a loop feeds back, by what excitations leave.
-
-        None where the estimate does not go by way of an excitation.
-        """
-        ...
-
 
 @dataclass(frozen=True)
 class WindowedWeights:
@@ -136,13 +129,6 @@ class WindowedWeights:
         windows, step = self.errors.windows, self.errors.sample_time_s
         return local_spread(inputs, windows.instruments, windows.omega / step, step)
 
-    def fed_back_noise(self, outputs: Places) -> NoiseSpectrum | None:
-        """See `OutputWeights`."""
-        known = self.errors.known_noise
-        if isinstance(known, NoiseSpectrum) or not known.samples.excitations:
-            return None
-        return known.spectrum.of(outputs)
-
 
 @dataclass(frozen=True)
 class LocalWeights:
@@ -192,11 +178,6 @@ class LocalWeights:
     def local_spread(self, inputs: Sequence[Real]) -> Real | None:
         """See `OutputWeights`."""
         del inputs
-        return None
-
-    def fed_back_noise(self, outputs: Places) -> NoiseSpectrum | None:
-        """None: an estimate by way of an excitation has windows."""
-        del outputs
         return None
 
 

@@ -167,7 +167,7 @@ def fit_pilots(
     for row in range(len(outputs[0])):
         output = [each[row] for each in outputs]
         data = measured.with_output(output)
-        fit = fitted(instruments.with_output(output) if excited else data)
+        fit = fitted(instruments.with_output(output) if excited else data, beyond=bool(excited))
         if fit is not None and excited:
             fit = instrumented(data, fit)
         found.append(None if fit is None else _pilot(data, fit))

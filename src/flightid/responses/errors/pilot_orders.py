@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from bisect import bisect
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -64,12 +66,14 @@ class PilotFit:
         return cls(data, state, slopes, taken, weights)
 
 
-def fitted(data: PilotBins) -> PilotFit | None:
+def fitted(data: PilotBins, *, beyond: bool = False) -> PilotFit | None:
     """A fit of the order that Akaike's criterion chooses; None where bins are too few.
 
     The noise is not known at first: what the best of all orders leaves without weights tells it,
     for which the others need not be settled. By these weights every order goes on from where it
-    was, and by the noise that the best of them leaves that one is fitted once more.
+    was, and by the noise that the best of them leaves that one is fitted once more; with `beyond`
+    the next one in its place, where bins are enough: an order too low is a bias that no covariance
+    holds where a pilot extrapolates, and one too high costs little where windows tell.
     """
     if not data.size or not np.any(data.target):
         return None
@@ -77,7 +81,9 @@ def fitted(data: PilotBins) -> PilotFit | None:
     weights, fit = np.ones(data.size), None
     for settle, orders in ((False, ORDERS), (True, ORDERS), (True, None)):
         among = orders or ((fit.state.order,) if fit else ())
-        state = _best(data, weights, among, known, settle=settle)
+        further = ORDERS[bisect(ORDERS, among[0]) :][:1] if beyond and not orders and among else ()
+        state = _best(data, weights, further, known, settle=settle)
+        state = state or _best(data, weights, among, known, settle=settle)
         if state is None:
             break
         if not settle:

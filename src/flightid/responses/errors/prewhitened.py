@@ -327,7 +327,3 @@ class PrewhitenedWeights:
         """None: the noise model's errors are of the whole band."""
         del inputs
         return None
-
-    def fed_back_noise(self, outputs: Places) -> None:
-        """None: the noise model's innovations are no part of the inputs."""
-        del outputs
