@@ -9,9 +9,7 @@ import pytest
 from scipy.signal import lfilter
 
 import flightid as fid
-from flightid import _native
 from flightid.errors import DataError, ModelError, OptionError
-from flightid.identification.subspace.matrices import own_columns, run_columns
 from flightid.identification.subspace.roots import may_reach_circle
 from flightid.models.sampled.recursion import run_recursion
 from flightid.plot.subspace import singular_values
@@ -360,19 +358,6 @@ def test_a_mean_is_no_trim_where_a_record_begins_away_from_its_working_point(met
     assert_close(fit.details.gains["y/u"].value, 4.0, rtol=1e-3, why="hardly any noise")
     point = fit.model.operating_point
     assert_close(point["y"], 20.0 + 4.0 * point["u"], rtol=1e-3, why="on the steady line")
-
-
-def test_columns_of_a_start_are_run_until_they_died_out():
-    random = np.random.default_rng(0)
-    closed, c = np.array([[0.6, 0.3], [-0.2, 0.5]]), np.array([[1.0, -0.5]])
-    k, (y, u) = np.array([[0.3], [0.2]]), random.standard_normal((2, 1, 900))
-    columns = own_columns(closed, c, k, 1, levels=True)
-    found = run_columns(closed, c, columns, y, u)
-    begun = np.vstack([np.eye(1, 900), np.ones((1, 900))])
-    whole = _native.slope_recursion(closed, c, *columns, np.concatenate([u, y, begun]))
-    assert_close(found, whole, why="a state below rounding", rtol=0.0, atol=1e-18)
-    assert not found[450:, :, :2].any()
-    assert found[450:, :, 2].any()
 
 
 def test_a_predictor_reaches_the_circle_by_its_determinant_not_by_clustered_eigenvalues():

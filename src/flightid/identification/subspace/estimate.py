@@ -88,7 +88,18 @@ def realise(
     structure: SubspaceStructure, data: SubspaceData, found: Subspace, order: int
 ) -> Matrices:
     """A, B, C, D, K of one order, in the channels' units."""
+    return realised(structure, data, found, order)[0]
+
+
+def realised(
+    structure: SubspaceStructure, data: SubspaceData, found: Subspace, order: int
+) -> tuple[Matrices, float | None]:
+    """The same, and squares of its errors; None where no least squares told them.
+
+    Errors of outputs of unit size, with the best start of each record and the best levels.
+    """
     _require_rank(found, order)
+    squares = None
     if found.compressed is None:
         a, b, c, d, k = _from_states(structure, data, found, order)
     else:
@@ -98,9 +109,9 @@ def realise(
         a = np.asarray(np.linalg.lstsq(gamma[:-p], gamma[p:], rcond=None)[0], dtype=np.float64)
         a = stabilised(a) if structure.enforce_stability else a
         k = kalman_gain(a, c, *found.compressed.residual_covariance(gamma, a, c))
-        b, d = feedthrough(data, a, c, k, direct=bool(structure.direct))
+        b, d, squares = feedthrough(data, a, c, k, direct=bool(structure.direct))
     size = data.scales
-    return a, b, size[:, None] * c, size[:, None] * d, k / size
+    return (a, b, size[:, None] * c, size[:, None] * d, k / size), squares
 
 
 def _left(matrix: Array) -> tuple[Array, Array]:
@@ -175,6 +186,6 @@ def _from_states(
     if structure.enforce_stability and spectral_radius(a) >= STABLE:
         a = stabilised(a)
         k = steady_gain(a, c, k, errors @ errors.T / errors.shape[1])
-        b, d = feedthrough(data, a, c, k, direct=bool(structure.direct))
+        b, d, _ = feedthrough(data, a, c, k, direct=bool(structure.direct))
         return a, b, c, d, k
     return a, b, c, d, steady_gain(a, c, k, errors @ errors.T / errors.shape[1])

@@ -19,6 +19,7 @@ from flightid.identification.subspace.estimate import (
     Subspace,
     decompose,
     realise,
+    realised,
 )
 from flightid.identification.subspace.prediction_errors import Predictor
 from flightid.models.innovations.model import InnovationsModel
@@ -165,9 +166,9 @@ def choose_order(
         after = float(found.correlations[n]) if n < found.correlations.size else 0.0
         svc.append(after**2 + d * math.log(samples) / samples)
         if structure.order in (None, n):
-            fitted[n] = realise(structure, data, found, n)
-        if structure.order is None:
-            made.append(_prediction_criteria(structure, data, fitted[n], d))
+            fitted[n], squares = realised(structure, data, found, n)
+            if structure.order is None:
+                made.append(_prediction_criteria(structure, data, fitted[n], d, squares))
     padded = np.maximum(values[: largest + 1], RANK * values[0])
     ratios = padded[:-1] / padded[1:] if padded.size > 1 else np.ones(1)
     gap = int(np.argmax(ratios)) + 1
@@ -258,8 +259,16 @@ def simplest(errors: Sequence[Array], *, errors_apart: float = BEYOND_CHANCE) ->
 
 
 def _prediction_criteria(
-    structure: SubspaceStructure, data: SubspaceData, matrices: Matrices, count: int
+    structure: SubspaceStructure,
+    data: SubspaceData,
+    matrices: Matrices,
+    count: int,
+    squares: float | None,
 ) -> Criteria:
+    """Criteria of the prediction errors; `squares` are those of `realised`."""
+    if squares is not None and data.n_outputs == 1 and structure.initial_state == "estimate":
+        samples = sum(y.shape[1] for y in data.outputs)
+        return _criteria_of(np.array([[squares]]), samples, data.scales, count)
     predictor, scaled = predictor_of(structure, data, matrices)
     errors = np.hstack(predictor.fitted_errors(scaled, np.eye(data.n_outputs)))
     return determinant_criteria(data.scales[:, None] * errors, data.scales[:, None], count)
@@ -280,10 +289,14 @@ def determinant_criteria(errors: Array, size: Array, count: int) -> Criteria:
 
     Rounding below the outputs' own size counts as no error at all.
     """
-    samples = errors.shape[1]
     relative = errors / size
-    sign, level = np.linalg.slogdet(relative @ relative.T / samples)
-    if sign <= 0 or level < -60.0 * len(errors):
+    return _criteria_of(relative @ relative.T, errors.shape[1], size, count)
+
+
+def _criteria_of(products: Array, samples: int, size: Array, count: int) -> Criteria:
+    """The same from products of errors in the outputs' own sizes."""
+    sign, level = np.linalg.slogdet(products / samples)
+    if sign <= 0 or level < -60.0 * len(products):
         return criteria(0.0, samples, count)
     determinant = float(np.exp(level)) * float(np.prod(np.asarray(size) ** 2))
     return criteria(determinant * samples, samples, count)

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid import _native
-from flightid.errors import DataError
 from flightid.frozen import dataclass
 from flightid.identification.multistart import DenseEnd
 from flightid.identification.records.nuisance import Nuisance, NuisanceDirections
 from flightid.identification.subspace.data import SubspaceData
 from flightid.identification.subspace.determinant import Goal, log_determinant
-from flightid.identification.subspace.matrices import STABLE, own_columns, run_columns
+from flightid.identification.subspace.matrices import STABLE
+from flightid.identification.subspace.predictor_columns import OwnColumns
 from flightid.models.sampled.recursion import run_recursion, spectral_radius
 from flightid.progress import progress
 from flightid.uncertainty.agreement import Agreement
@@ -105,20 +105,16 @@ class Predictor:
     def errors(self, matrices: Matrices, whiten: Array) -> list[Array]:
         """Whitened errors of each record and, in further columns, what its own numbers make."""
         a, b, c, d, k = matrices
-        closed, (p, m), found = a - k @ c, d.shape, []
-        forced, shown = own_columns(
-            closed, c, k, m, levels=self.data.channels.levels, start=self.free_initial
-        )
-        run = np.zeros((1, len(a), m + p + 2)), np.zeros((1, p, m + p + 2))
-        run[0][0, :, : m + p] = np.concatenate([b - k @ d, k], axis=1)
-        run[1][0, :, : m + p] = np.concatenate([-d, np.eye(p)], axis=1)
-        columns = np.concatenate([run[0], forced]), whiten @ np.concatenate([run[1], shown])
+        closed, shown, found = a - k @ c, whiten @ c, []
+        levels = self.data.channels.levels
+        own = OwnColumns(closed, shown, k, whiten, self.free_initial, levels)
         for y, u in zip(self.data.outputs, self.data.inputs, strict=True):
-            try:
-                made = run_columns(closed, whiten @ c, columns, y, u)
-            except DataError:
-                made = np.full((y.shape[1], p, len(columns[0])), np.inf)
-            found.append(made.swapaxes(0, 1).reshape(y.size, -1))
+            made = np.zeros((*y.shape, 1 + own.count))
+            with np.errstate(over="ignore", invalid="ignore"):
+                state = run_recursion(closed, (b - k @ d) @ u + k @ y)
+                np.subtract(whiten @ (y - d @ u), shown @ state, out=made[:, :, 0])
+                own.filled(made[:, :, 1:])
+            found.append(made.reshape(y.size, -1))
         return found
 
     def states(self, matrices: Matrices, own: Sequence[Array]) -> list[Array]:
@@ -148,6 +144,8 @@ class Predictor:
     def levels(self, matrices: Matrices, whiten: Array) -> list[Array]:
         """Level of each output in each record, beside its initial state."""
         p = self.data.n_outputs
+        if not self.data.channels.levels:
+            return [np.zeros(p) for _ in self.data.outputs]
         return [self._level(own.values, p) for own in self.residuals(matrices, whiten)[1]]
 
     def fitted_errors(self, matrices: Matrices, whiten: Array) -> tuple[Array, ...]:
