@@ -24,6 +24,7 @@ STARTED = {
     "guide/test_examples.py": 1,
     "reference/test_report_in_browser.py": 1,
     "reference/test_app_seeds_in_browser.py": 1,  # the examples that fly; nightly
+    "unit/test_app_watched.py": 1,  # a server, to be killed with all of its processes; slow
     "unit/test_cli_program.py": 3,
     "unit/test_commit_subject.py": 2,
     "unit/test_fleet_claims.py": 1,  # `sleep`, to be killed

@@ -127,3 +127,5 @@ def _begun(kept: Kept, session: Session) -> Iterator[str]:
             yield f"{kind} of {log} was begun and is not offered again"
         if jobs and jobs[0]["state"] not in ("waiting", "interrupted", "failed"):
             yield f"{kind} of {log} is said to be {jobs[0]['state']}"
+        if kind == "run" and jobs and not session.offers(log):
+            yield f"run of {log} is not offered on its screen"

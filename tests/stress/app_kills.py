@@ -1,9 +1,10 @@
 """Kill server, worker and browser of the page: `python -m tests.stress.app_kills --kills 100`.
 
 A session in Chromium drops logs, edits studies, keeps models, runs studies. At a random moment of
-it one of them is killed, or the process that workers are forked from; what the page was told is
-done must be there afterwards, whole, and what it was told is begun must be there or be offered
-again. A line follows each kill.
+it one of them is killed, or the process that workers are forked from, or ("machine"), as power
+cuts do, the server with all that it began; what the page was told is done must be there after it,
+whole, and what it was told is begun must be there or be offered again, on its screen. A line
+follows each kill.
 """
 
 from __future__ import annotations
@@ -21,9 +22,17 @@ from playwright.sync_api import Error as BrowserError
 from playwright.sync_api import Playwright, sync_playwright
 
 from tests.stress.app_kept import Kept, losses
-from tests.stress.app_session import RefusedError, Server, Session, forkers, kill, workers
+from tests.stress.app_session import (
+    RefusedError,
+    Server,
+    Session,
+    descendants,
+    forkers,
+    kill,
+    workers,
+)
 
-KINDS = ("server", "worker", "forker", "browser")
+KINDS = ("server", "worker", "forker", "browser", "machine")
 FOLDER_KILLS = 10
 """Kills on one folder, before a new one is begun."""
 LEFT_S = 40.0
@@ -47,6 +56,10 @@ class Victim:
             kill(self._session.pid)
         elif self.kind == "server":
             kill(self._server.pid)
+        elif self.kind == "machine":
+            family = [pid for pid, _ in descendants(self._server.pid)]
+            for pid in (self._server.pid, *family):
+                kill(pid)
         else:
             find = workers if self.kind == "worker" else forkers
             while not (found := find(self._server.pid)):
@@ -89,7 +102,7 @@ class Desk:
                     self.session.problems.append(f"before the kill: {error}")
         victim.wait()
         stood = self.session.step
-        if kind == "server":
+        if kind in ("server", "machine"):
             self.orphans += self.server.workers
             self.server.close()
             self.server = Server(self.folder)
@@ -119,6 +132,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--kills", type=int, default=100)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--kinds", nargs="+", choices=KINDS, default=KINDS)
     asked = parser.parse_args(arguments)
     chance = random.Random(asked.seed)
     lost, kills, stood_at = Counter[str](), Counter[str](), Counter[str]()
@@ -131,7 +145,7 @@ def main(arguments: list[str] | None = None) -> int:
             with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as name:
                 desk = Desk(tools, Path(name))
                 for _ in range(min(FOLDER_KILLS, asked.kills - done)):
-                    kind, delay_s = chance.choice(KINDS), chance.uniform(0.0, whole_s)
+                    kind, delay_s = chance.choice(asked.kinds), chance.uniform(0.0, whole_s)
                     stood, said = desk.kill(kind, delay_s)
                     done += 1
                     kills[kind] += 1
@@ -141,7 +155,7 @@ def main(arguments: list[str] | None = None) -> int:
                     print(line, flush=True)
                 desk.close()
                 orphans += ended(desk.orphans)
-    for kind in KINDS:
+    for kind in asked.kinds:
         print(f"{kind:8}{kills[kind]:4} kills{lost[kind]:4} lost or half")
     print(f"moments: {dict(stood_at.most_common())}")
     print(f"{done} kills, {lost.total()} losses, {len(orphans)} processes left behind")

@@ -250,6 +250,15 @@ class Session:
         self._page.wait_for_selector(".cards")
         return self._page.locator(".cards > *").count() == 3
 
+    def offers(self, log: str) -> bool:
+        """Whether the screen Report tells of a run that goes on, was cut short, or has ended."""
+        self._page.goto(self._server.address.partition("?")[0] + f"#/report/{log}")
+        self._page.wait_for_selector(".bar")
+        told = self._page.locator(".working, .bar .error, .links")
+        with suppress(BrowserError):
+            told.first.wait_for(timeout=10_000)
+        return told.count() > 0
+
     def ask(
         self,
         path: str,

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import os
+import signal
+import subprocess
+import sys
 import time
 from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
@@ -22,6 +25,7 @@ from flightid.app.watched import ENDED, ask_to_end, forget, progress_at, watched
 from flightid.app.work import StageCache
 from flightid.app.workspace import Workspace
 from flightid.progress import progress
+from tests.contract.source import ROOT
 
 LOG = "0" * 16
 
@@ -94,6 +98,52 @@ def test_work_of_a_server_that_is_stopped_is_offered_by_the_next(
     asyncio.run(begun())
     workers = Workers(Workspace(tmp_path))
     assert [(each.kind, each.state) for each in workers.all()] == [("run", "interrupted")]
+    workers.stop()
+
+
+def test_work_that_outlived_its_server_is_not_offered_again(tmp_path: Path) -> None:
+    """The process of a killed server brings its work to the end; its note stays behind."""
+    workspace = Workspace(tmp_path)
+    Workers(workspace).stop()
+    mark = tmp_path / ".flightid" / "jobs" / f"run-{LOG}.json"
+    begun = Job(id=mark.stem, kind="run", log=LOG, state="waiting", begun_s=time.time() - 10.0)
+    mark.write_text(begun.model_dump_json())
+    workers = Workers(workspace)
+    workspace.keep_result(LOG, "run", {})
+    result = workspace.result_path(LOG, "run.json")
+    os.utime(result, (0.0, begun.begun_s - 1.0))
+    assert [each.state for each in workers.of_log(LOG)] == ["interrupted"], "of the run before"
+    os.utime(result, (0.0, begun.begun_s + 1.0))
+    assert (workers.of_log(LOG), workers.all(), mark.exists()) == ([], [], False)
+    workers.stop()
+
+
+BEGUN = """
+import asyncio, pathlib, sys
+from flightid.app import jobs
+from flightid.app.workspace import Workspace
+from tests.unit.test_app_watched import LOG, silent
+folder = pathlib.Path(sys.argv[1])
+jobs.WORK["run"] = lambda *_: (silent, folder / "pids")
+async def begin():
+    workers = jobs.Workers(Workspace(folder))
+    workers.start()
+    workers.ensure("run", LOG, folder)
+    await asyncio.sleep(600)
+asyncio.run(begin())
+"""
+
+
+@pytest.mark.slow
+def test_work_that_fell_with_its_server_and_all_processes_is_offered(tmp_path: Path) -> None:
+    """As a power cut leaves it: nobody brings the work to its end."""
+    words = [sys.executable, "-c", BEGUN, str(tmp_path)]
+    server = subprocess.Popen(words, cwd=ROOT, start_new_session=True)
+    asyncio.run(_until((tmp_path / "pids").is_file))
+    os.killpg(server.pid, signal.SIGKILL)
+    server.wait()
+    workers = Workers(Workspace(tmp_path))
+    assert [(each.kind, each.state) for each in workers.of_log(LOG)] == [("run", "interrupted")]
     workers.stop()
 
 

@@ -18,6 +18,11 @@ export class Runs {
     return this.job?.state === "waiting";
   }
 
+  /** What goes on, or what a server that ended left undone: that is offered again. */
+  get work() {
+    return this.job && ["waiting", "interrupted"].includes(this.job.state) ? this.job : null;
+  }
+
   async load() {
     await this.#heard(api.lastRun(this.log));
   }

@@ -140,11 +140,23 @@ class Workers:
 
     def of_log(self, log: str) -> list[Job]:
         """Jobs of a log that are not done."""
-        return [job for job in self._jobs.values() if job.log == log and job.state != "done"]
+        return [job for job in self.all() if job.log == log]
 
     def all(self) -> list[Job]:
         """Every job that is not done."""
+        for job in [each for each in self._jobs.values() if each.state == "interrupted"]:
+            if self._outlived(job):
+                self._change(job.id, "done", "")
         return [job for job in self._jobs.values() if job.state != "done"]
+
+    def _outlived(self, job: Job) -> bool:
+        """Whether the process of a server that was killed has brought its work to the end."""
+        if job.of or job.kind not in WORK:
+            return False  # of each version there is a result: a screen asks for the one it needs
+        with suppress(FlightidError, OSError):
+            made = self._workspace.result_path(job.log, f"{job.kind}.json")
+            return made.stat().st_mtime > job.begun_s
+        return False
 
     def ensure(self, kind: str, log: str, path: Path, *, again: bool = False, of: str = "") -> None:
         """Begin a job, unless its result is there, it runs, or it failed and nobody asks again.
