@@ -134,6 +134,14 @@ def test_gains_by_hand_that_break_a_requirement_are_red_and_not_written(
     value, over, most = map(float, above.groups())
     assert value - most == pytest.approx(over, abs=0.006 * value)
     assert "short of ≤" not in str(no.value)
+    # The numbers beside the crosses are of the same plants, promised or not.
+    broken = [each for each in made.worst_cases if not each.met]
+    assert broken
+    for each in broken:
+        value = f" {each.shown_missed:.{each.digits}g}"
+        whose = rf"\({each.n_missed} of {each.n_plants} plants\)"
+        assert re.search(rf"{re.escape(value)}\b[^;]*{whose}", str(no.value)), each
+    assert {each.n_missed for each in made.worst_cases if each.met} == {0}
     assert "no gains meet" not in fid.Tuning((made,), ()).left_out["roll"]
     assert not list(folder.iterdir())
 

@@ -581,6 +581,9 @@ export interface MarginRow {
   flown: number | null;
   flown_worst: number | null;
   untold: string;
+  missed: number | null;
+  n_missed: number;
+  n_plants: number;
 }
 
 /** A line of two versions: of both, of one of them, or a mark for equal lines left out. */

@@ -39,6 +39,10 @@ class MarginRow(Message):
     flown_worst: float | None
     untold: str
     """Why nothing is promised of it; empty where something is."""
+    missed: float | None
+    """Of the plant that is furthest from what is required, where one misses it."""
+    n_missed: int
+    n_plants: int
 
 
 class TimeCurve(Message):

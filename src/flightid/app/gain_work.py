@@ -338,6 +338,9 @@ def _margins(moved: MovedGains) -> list[MarginRow]:
                 flown=each.flown,
                 flown_worst=each.shown_worst[1],
                 untold="" if each.worst is not None else each.estimate.reason,
+                missed=each.shown_missed,
+                n_missed=each.n_missed,
+                n_plants=each.n_plants,
             )
         )
     return rows

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from flightid.control.tuning.limits import Limit, limits, noise_limit
 from flightid.control.tuning.loop_problem import LoopAssessment, LoopProblem
-from flightid.control.tuning.worst_cases import KINDS
+from flightid.control.tuning.worst_cases import KINDS, missed_most
 from flightid.findings import held
 
 UNITS = {each.field: "" if each.unit == "1" else f" {each.unit}" for each in KINDS}
@@ -34,11 +34,7 @@ def shortfalls(problem: LoopProblem, judged: LoopAssessment) -> tuple[str, ...]:
         least = slack[limit.name]
         if least.min() >= 0.0:
             continue
-        worst = int(least.argmin())
-        if limit.highest:
-            value = limit.bound * float(np.exp(-least[worst]))
-        else:
-            value = float(getattr(judged.metrics[limit.loop], limit.field)[0][worst])
+        value = missed_most(limit, least, getattr(judged.metrics[limit.loop], limit.field)[0])
         name, unit = f"{limit.loop}: {NAMES[limit.field]}", UNITS[limit.field]
         told.append(_short(name, value, unit, limit, least))
     if problem.noise_limit is not None and (least := slack["output noise"]).min() < 0.0:

@@ -46,6 +46,11 @@ class WorstCase:
         Whether every plant meets it.
     digits : int
         How many its numbers are shown with: as many as tell them from what was asked for.
+    missed : float or None
+        Of the plant that is furthest from what was asked for, where one misses it: promised or not,
+        that is what the verdict is on.
+    n_missed, n_plants : int
+        How many of the plants miss it.
 
     Example
     -------
@@ -63,6 +68,9 @@ class WorstCase:
     required: str = ""
     met: bool = True
     digits: int = DIGITS
+    missed: float | None = None
+    n_missed: int = 0
+    n_plants: int = 1
 
     def __repr__(self) -> str:
         """Loop, name and numbers on one line."""
@@ -88,6 +96,12 @@ class WorstCase:
             to_the_worse(self.name, self.flown_worst, self.flown, self.digits),
         )
 
+    @property
+    def shown_missed(self) -> float | None:
+        """The plant that is furthest from what was asked for, rounded to the worse."""
+        least = "≥" in self.required
+        return None if self.missed is None else held(self.missed, self.digits, least=least)
+
     def shown(self, value: float | None) -> float | None:
         """Another number of it, such as the estimate or an end of its interval, at its digits."""
         return None if value is None else float(f"{value:.{self.digits}g}")
@@ -100,6 +114,9 @@ class WorstCase:
             "flown_worst": self.flown_worst,
             "required": self.required,
             "met": self.met,
+            "missed": self.missed,
+            "n_missed": self.n_missed,
+            "n_plants": self.n_plants,
         }
 
 
@@ -211,7 +228,7 @@ def worst_cases(
                 _worst(before, kind.more)
                 if before is not None and old is not None and bool(old.stable.all())
                 else None,
-                *_requirement(new, asked, worst, _number(values[0])),
+                *_requirement(new, asked, values, worst),
             )
         )
     made.append(_noise(problem, new, old))
@@ -256,19 +273,49 @@ def _asked_of(judged: LoopAssessment, asked: list[Limit], values: Array) -> Arra
 
 
 def _requirement(
-    judged: LoopAssessment, asked: list[Limit], worst: float | None, nominal: float | None
-) -> tuple[str, bool, int]:
-    """What was asked of a number, in words, whether all plants meet it, and digits that show it."""
-    met = all(bool((_slack(judged, limit) >= 0.0).all()) for limit in asked)
-    digits = max((_digits(limit, worst, nominal) for limit in asked), default=DIGITS)
-    return " and ".join(limit.told(digits) for limit in asked), met, digits
+    judged: LoopAssessment, asked: list[Limit], values: Array, worst: float | None
+) -> tuple[str, bool, int, float | None, int, int]:
+    """What was asked of a number, in words; whether all plants meet it, and which misses most."""
+    slacks = [_slack(judged, limit) for limit in asked]
+    missing = (
+        [bool(each) for each in np.any([slack < 0.0 for slack in slacks], axis=0)] if asked else []
+    )
+    missed = None
+    if any(missing):
+        k = int(np.argmin([slack.min() for slack in slacks]))
+        missed = _number(missed_most(asked[k], slacks[k], values))
+    shown = (worst, _number(values[0]), missed)
+    digits = max((_digits(limit, shown) for limit in asked), default=DIGITS)
+    told = " and ".join(limit.told(digits) for limit in asked)
+    return told, not any(missing), digits, missed, sum(missing), len(values)
 
 
-def _digits(limit: Limit, worst: float | None, nominal: float | None) -> int:
-    """How many tell the worst plant and the estimate from a limit."""
-    of_worst = DIGITS if worst is None else limit.digits_beside(worst)
+def missed_most(limit: Limit, slack: Array, values: Array) -> float:
+    """Number of the plant that is furthest from a limit.
+
+    Parameters
+    ----------
+    limit : Limit
+    slack, values : ndarray, shape (n_plants,)
+        Of the limit, and of the number that it speaks of, in its unit.
+
+    Returns
+    -------
+    float
+        In the unit of the number; not finite where that plant has no such number.
+    """
+    worst = int(slack.argmin())
+    if limit.highest:
+        return float(limit.bound * np.exp(-slack[worst]))
+    return float(values[worst])
+
+
+def _digits(limit: Limit, shown: tuple[float | None, float | None, float | None]) -> int:
+    """How many tell the worst plant, the estimate and the one that misses most from a limit."""
+    worst, nominal, missed = shown
+    promised = [limit.digits_beside(each) for each in (worst, missed) if each is not None]
     of_nominal = DIGITS if nominal is None else limit.digits_beside(nominal, promised=False)
-    return max(of_worst, of_nominal)
+    return max(DIGITS, of_nominal, *promised)
 
 
 def _noise(problem: LoopProblem, new: LoopAssessment, old: LoopAssessment | None) -> WorstCase:
@@ -288,7 +335,7 @@ def _noise(problem: LoopProblem, new: LoopAssessment, old: LoopAssessment | None
         worst,
         None if before is None else _number(before[0]),
         None if before is None or old is None or not old.stable.all() else _worst(before, False),
-        *_requirement(new, asked, worst, _number(values[0])),
+        *_requirement(new, asked, values, worst),
     )
 
 
