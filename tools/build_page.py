@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parent.parent
 SOURCES = ROOT / "app"
 PAGE = ROOT / "src" / "flightid" / "app" / "page"
 GUNZIP = ROOT / "src" / "flightid" / "report" / "templates" / "gunzip.js"
-NOTICE = "/* Made by tools/build_page.py of fflate, MIT, Copyright 2026 Arjun Barrett. */"
+NOTICE = "/* Made by build_page.py from app/ and fflate, MIT, Copyright 2026 Arjun Barrett. */"
 STAMP = "sources.sha256"
 NEEDED = ("index.html", "page.js", STAMP)
 

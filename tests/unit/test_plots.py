@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import plotly.graph_objects
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -164,6 +165,18 @@ def test_bode_greys_what_lies_beyond_the_band_and_shows_hertz() -> None:
     place = hertz.ticktext.index("2")
     assert_close(hertz.tickvals[place], 4.0 * np.pi, rtol=1e-12, why="2 Hz in rad/s")
     assert [each.name for each in made.data if each.xaxis == "x99"] == ["model"]
+
+
+@pytest.mark.parametrize("height_px", [300, 580, 900])
+def test_a_legend_begins_above_the_axis_in_hertz(height_px: int) -> None:
+    """Its place is a share of the plots' height: in a low picture it lay on that axis' title."""
+    made = look.figure(height_px=height_px)
+    made.add_trace(look.line("measured", [1.0, 2.0], [1.0, 2.0], colour=look.BLACK))
+    look.hertz_above(made)
+    inner_px = height_px - made.layout.margin["t"] - made.layout.margin["b"]
+    above_px = (made.layout.legend["y"] - 1.0) * inner_px
+    assert_close(above_px, 42.0, rtol=1e-9, why="ticks, numbers and title of 11 px")
+    assert made.layout.margin["t"] > above_px + 20.0
 
 
 def test_many_responses_share_a_page_of_small_plots() -> None:

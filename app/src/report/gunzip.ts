@@ -1,4 +1,6 @@
-// Of reports: gzip unpacked while the caller waits, as paper does not wait for the browser's own stream.
+// Of reports: gzip unpacked while the caller waits, as paper does not wait for the browser's own stream, and
+// panels below each other on a phone, as the page has them.
 import { gunzipSync } from "fflate";
+import { stack } from "../lib/stack";
 
-(globalThis as unknown as Record<string, unknown>).inflated = gunzipSync;
+Object.assign(globalThis, { inflated: gunzipSync, stacked: stack });

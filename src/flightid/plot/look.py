@@ -38,6 +38,8 @@ ROW_HEIGHT_PX = 170
 GAP_PX = 36
 """Between plots whose x axes have numbers of their own."""
 MARGIN_PX = 130
+HERTZ_PX, ABOVE_HERTZ_PX = 90, 42
+"""Margin of a figure with an axis in hertz above it, and where in it the legend begins."""
 
 
 def axis_title(quantity: str, unit: str = "") -> str:
@@ -171,7 +173,8 @@ def hertz_above(made: go.PlotFigure) -> None:
     }  # fmt: skip
     # An axis without a series is not drawn: it takes the last line of its plot.
     next(each for each in reversed(made.data) if each["xaxis"] == "x")["xaxis"] = "x99"
-    made.update_layout(margin={"t": 90}, legend={"y": 1.09})
+    inner_px = made.layout.height - HERTZ_PX - made.layout.margin["b"]
+    made.update_layout(margin={"t": HERTZ_PX}, legend={"y": 1.0 + ABOVE_HERTZ_PX / inner_px})
 
 
 def line(

@@ -19,6 +19,8 @@ from flightid.validation.order_scan.result import words_of
 
 LEAST_ZOOM, MARGIN, SMALLEST = 1.5, 1.3, 1e-4
 """How much closer a second look at the poles has to be, its room about them, least half width."""
+BESIDE = ([0.0, 0.44], [0.56, 1.0])
+"""Shares of the width for the planes, with room for numbers such as −1.5×10⁻⁴ between them."""
 HIGHEST = 3.0
 """Errors beyond this many times the smallest are drawn at the upper edge."""
 
@@ -117,13 +119,16 @@ def pole_zero(fit: Fit, response: str | None = None) -> go.PlotFigure:
     for column in (1, 2)[: 1 + zooms]:
         _add_roots(made, within, column)
         made.update_xaxes(title_text="real", col=column)
-        made.update_yaxes(title_text="imaginary", col=column)
+    # The one title serves both planes: small numbers of the right one fill the room between them.
+    made.update_yaxes(title_text="imaginary", col=1)
     made.update_xaxes(range=[-reach, reach], col=1)
     made.update_yaxes(range=[-reach, reach], scaleanchor="x", col=1)
     if zooms and box is not None:
         centre, half = box
         made.update_xaxes(range=[centre.real - half, centre.real + half], col=2)
         made.update_yaxes(range=[centre.imag - half, centre.imag + half], scaleanchor="x2", col=2)
+        for column, domain in ((1, BESIDE[0]), (2, BESIDE[1])):
+            made.update_xaxes(domain=domain, col=column)
     made.update_layout(hovermode="closest")
     return made
 

@@ -63,41 +63,7 @@
   const phone = matchMedia("(max-width: 600px)");
   function stack(layout, place) {
     place.parentElement.classList.toggle("wide", "width" in layout);
-    const axes = (letter) => Object.entries(layout).filter(([name]) => new RegExp(`^${letter}axis\\d*$`).test(name))
-      .map(([name, axis]) => ({ id: name.replace("axis", ""), axis, domain: axis.domain ?? [0, 1] }));
-    const across = axes("x"), up = axes("y");
-    const sides = new Map(across.map(({ domain }) => [domain[0].toFixed(3), domain]));
-    const columns = [...sides.values()].sort((a, b) => a[0] - b[0]), count = columns.length;
-    if (count < 2) return;
-    const column = (x) => Math.max(0, columns.findLastIndex(([from]) => from <= x + 1e-3));
-    const frame = (layout.margin?.t ?? 0) + (layout.margin?.b ?? 0);
-    const panel = (layout.height ?? place.clientHeight) - frame, between = 80;
-    const beside = ({ axis }) => across.find(({ id }) => id === (axis.anchor ?? "x"));
-    const places = up.map((one) => column(beside(one)?.domain[0] ?? 0));
-    // A column may have fewer panels than the first: it ends where its last one does.
-    const ends = columns.map((_, place) => Math.min(...up.filter((one, k) =>
-      places[k] === place && one.axis.visible !== false).map(({ domain }) => domain[0]), 1));
-    const heights = ends.map((end) => (1 - end) * panel);
-    const below = (place) => heights.slice(place + 1).reduce((sum, height) => sum + height + between, 0);
-    const inner = below(-1) - between;
-    const lower = (y, place) => Math.max(0, below(place) + (y - ends[place]) * panel) / inner;
-    up.forEach(({ axis, domain }, k) => {
-      const level = up.filter((one) => one.domain[0] === domain[0]);
-      const first = level.find((one) => one.axis.title?.text) ?? level[0];
-      // Where one title serves a whole line of panels, each gets it; a panel's own title stays its own.
-      if (places[k] && !axis.title?.text) { axis.title = first.axis.title; axis.showticklabels = first.axis.showticklabels; }
-      axis.domain = domain.map((y) => lower(y, places[k]));
-    });
-    for (const note of [...layout.annotations ?? [], ...layout.images ?? []]) {
-      if (note.xref !== "paper" || note.yref !== "paper") continue;
-      const place = column(note.x), [from, to] = columns[place];
-      note.x = (note.x - from) / (to - from);
-      note.y = lower(note.y, place);
-    }
-    across.forEach(({ axis }) => { axis.domain = [0, 1]; });
-    if (layout.legend?.y > 1) layout.legend.y = 1 + (layout.legend.y - 1) * panel / inner;
-    layout.height = inner + frame;
-    place.style.height = `${layout.height}px`;
+    if (stacked(layout, place.clientHeight)) place.style.height = `${layout.height}px`;
   }
 
   // What a plot needs is unpacked ahead of its drawing; what paper, which does not wait, finds packed
