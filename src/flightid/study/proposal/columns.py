@@ -12,6 +12,8 @@ from flightid.frozen import dataclass
 from flightid.models import load_model
 from flightid.record import Record
 
+MOST = 6
+"""Columns that a refusal names; of more it tells how many there are."""
 DRIVES = re.compile(
     r"u\d*|inputs?\d*|in\d*|.*_in|d_(lat|lon|ped|col)|.*(command|cmd|voltage|volt|current|throttle|pwm|duty|stick|torque|force"
     r"|aileron|elevator|rudder|collective|tau_).*",
@@ -118,7 +120,9 @@ def columns_of(
         drives, how_in = _told(first, shared, Role.INPUT, inputs, answers)
     for role, found in (("inputs", drives), ("outputs", answers)):
         if not found:
-            columns = ", ".join(f"{name} [{first.unit(name) or '?'}]" for name in shared)
+            columns = ", ".join(f"{name} [{first.unit(name) or '?'}]" for name in shared[:MOST])
+            if len(shared) > MOST:
+                columns = f"{len(shared)} columns: {columns} and so on"
             raise StudyError(
                 f"the columns do not tell which are {role}",
                 found=columns or "no column that all records have",
