@@ -23,8 +23,9 @@ from benchmarks.app_served import Served, processor_s
 from flightid.app import gain_work, model_prediction, work
 from flightid.app.own_folders import draft_of
 from flightid.app.pyramid import Pyramid, view
-from flightid.app.study_edits import KeyEdit, edited, write_study
+from flightid.app.study_edits import KeyEdit, edited, require_study
 from flightid.errors import FlightidError
+from flightid.files import write_atomically
 from flightid.study.gain_preview import preview_fits
 from flightid.vehicles import PilotDoublet, SidActivation, fly
 from flightid.vehicles.ardupilot_log import write_ardupilot_log
@@ -73,10 +74,12 @@ def drags(log: Path, folder: Path) -> None:
     def brush(number: int) -> None:
         span = [KeyEdit(("segment", 0), {"name": "brushed", "span_s": [6.0, 60.0 + number]})]
         names = [KeyEdit(("model", 0, "identify"), ["brushed"])]
-        write_study(study, edited(text, [*span, *names]))
+        brushed = edited(text, [*span, *names])
+        require_study(study, brushed)
+        write_atomically(study, brushed)
 
     print(f"brush → segment written:            {medians(brush)}")
-    write_study(study, text)
+    write_atomically(study, text)
 
     def fit(number: int) -> None:
         band = [KeyEdit(("model", 0, "band_rad_s"), [2.0 + 0.001 * number, 20.0])]

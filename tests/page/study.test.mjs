@@ -4,105 +4,128 @@ import { test } from "node:test";
 
 const kept = {};
 globalThis.standIns["./drafts"] = { drafts: { kept: (place) => kept[place] ?? null, keep: (place, draft) => (kept[place] = draft), drop: (place) => delete kept[place] } };
-const folder = { text: "[study]\n", stored: [], lack: "" };
-const told = (text) => ({ text, etag: `"${text.length}"`, settings: {}, undoable: false, redoable: false, lack: folder.lack });
+const folder = { text: "[study]\n", stored: [], lack: "", last: null, asked: [] };
+const told = (text) => ({ text, etag: `"${text.length}"`, settings: {}, undoable: 0, redoable: 0, state: folder.lack ? "unreadable" : "readable", lack: folder.lack });
+/** The server, which remembers what stood last; of another study than the one it knows of it tells nothing. */
+const known = () => (folder.text !== null ? told(folder.text) : folder.last === null ? null : { ...told(folder.last), etag: '""', state: "lost", lack: "not in the folder" });
 function store(etag, text) {
   folder.stored.push(etag);
   if (folder.text === null && etag !== '""') throw Object.assign(new Error("This log has no study."), { status: 404 });
+  if (folder.text !== null && etag !== told(folder.text).etag) throw Object.assign(new Error("changed"), { status: 409 });
+  if (text.startsWith("slip")) throw Object.assign(new Error("no TOML"), { status: 422 });
+  folder.lack = "";
   return told((folder.text = text));
 }
 globalThis.standIns["./api"] = {
-  study: async () => (folder.text === null ? null : told(folder.text)),
+  study: async () => known(),
   change: async (_, etag) => store(etag, "changed"),
   replace: async (_, etag, text) => store(etag, text),
   step: async () => {},
-  merge: async () => ({}),
+  merge: async (_, two) => (folder.asked.push(two), { mine: two.mine, merged: null, why: "", lines: [] }),
 };
 const { Study } = await import("../../app/src/lib/study.svelte.ts");
 
-async function deleted() {
+/** A page on a study that stands so; then the file is as an editor leaves it. */
+async function opened(before, after, { lack = "", remembers = false, typed = "" } = {}) {
   delete kept["study:a"];
-  [folder.text, folder.lack] = ["[study]\n", ""];
+  Object.assign(folder, { text: before, lack: "", last: null, stored: [], asked: [] });
   const study = new Study("a");
   await study.load();
-  folder.text = null;
+  if (typed) study.type(typed);
+  Object.assign(folder, { text: after, lack, last: remembers ? before : null });
   return study;
 }
 
-test("a whole text that was typed stays, and is written again where nothing stands", async () => {
-  const study = await deleted();
-  assert.equal(await study.replace("[study]\ntitle = 'mine'\n"), false);
-  assert.equal(study.file, null);
-  assert.match(study.error, /not stored/);
-  assert.equal(kept["study:a"].text, "[study]\ntitle = 'mine'\n");
-  assert.equal(await study.replace(kept["study:a"].text), true);
-  assert.equal(folder.stored.at(-1), '""');
-  assert.equal(folder.text, "[study]\ntitle = 'mine'\n");
+test("a text that was typed stays, and is written again where nothing stands", async () => {
+  for (const remembers of [false, true]) {
+    const study = await opened("[study]\n", null, { remembers, typed: "mine" });
+    assert.equal(await study.save(), false);
+    assert.deepEqual([study.file, study.lack.text, study.typed.text, kept["study:a"].text], [null, "[study]\n", "mine", "mine"]);
+    assert.match(study.error, /not stored/);
+    assert.equal(await study.save(), true);
+    assert.deepEqual([folder.stored.at(-1), folder.text, study.typed, kept["study:a"]], ['""', "mine", null, undefined]);
+  }
 });
 
-test("a click, and a reading of what is gone, keep the text as it was last shown", async () => {
-  const study = await deleted();
+test("a click, a focus and a reload say that it is lost, show its text, and call nothing typed", async () => {
+  for (const remembers of [false, true])
+    for (const look of [(study) => study.edit([{ path: ["plan"], value: {} }]), (study) => study.reread(), (study) => study.load()]) {
+      const study = await opened("[study]\n", null, { remembers });
+      await look(study);
+      assert.deepEqual([study.file, study.lack.text, study.typed, kept["study:a"]], [null, "[study]\n", null, undefined]);
+      folder.text = "[study]\n";
+      await study.reread();
+      assert.deepEqual([study.lack, study.file.text, study.typed], [null, "[study]\n", null]);
+    }
+});
+
+test("one that cannot be read is a lack with its text: a click changes nothing, the same text neither", async () => {
+  const study = await opened("[study]\n", "slip", { lack: "no TOML" });
+  await study.reread();
+  assert.deepEqual([study.file, study.lack.lack, study.lack.text, study.typed], [null, "no TOML", "slip", null]);
   assert.equal(await study.edit([{ path: ["plan"], value: {} }]), false);
-  assert.equal(kept["study:a"].text, "[study]\n");
-  const other = await deleted();
-  await other.load();
-  assert.equal(kept["study:a"].text, "[study]\n");
-  assert.equal(other.file, null);
+  assert.deepEqual(folder.stored, []);
+  assert.equal(await study.save(), false);
+  assert.match(study.error, /^Not written: no TOML/);
+  assert.deepEqual([study.file, study.lack.text], [null, "slip"]);
+  study.type("mended");
+  assert.equal(await study.save(), true);
+  assert.deepEqual([folder.text, study.lack, study.typed, kept["study:a"]], ["mended", null, null, undefined]);
 });
 
-test("what waits already as typed text is not overwritten", async () => {
-  const study = await deleted();
-  kept["study:a"] = { text: "half typed", name: "", before: "[study]\n" };
-  await study.edit([{ path: ["plan"], value: {} }]);
-  assert.equal(kept["study:a"].text, "half typed");
+test("an answer that cannot be read is a lack, whoever asked", async () => {
+  const study = await opened("[study]\n", "slip", { lack: "no TOML" });
+  globalThis.standIns["./api"].step = async () => told(folder.text);
+  await study.reread();
+  assert.deepEqual([study.file, study.lack.text], [null, "slip"]);
 });
 
-test("one that cannot be read is a lack with its text: keys change nothing, a whole text mends it", async () => {
-  delete kept["study:a"];
-  [folder.text, folder.lack] = ['title = "a', "the study file is no TOML: line 1"];
-  const study = new Study("a");
-  await study.load();
-  assert.deepEqual([study.file, study.lack.lack, study.lack.text], [null, "the study file is no TOML: line 1", 'title = "a']);
-  const before = folder.stored.length;
-  assert.equal(await study.edit([{ path: ["plan"], value: {} }]), false);
-  assert.equal(folder.stored.length, before);
-  assert.match(study.error, /not stored/);
-  assert.equal(kept["study:a"], undefined, "its text stands in the file");
-  const tag = study.lack.etag;
-  folder.lack = "";
-  assert.equal(await study.replace('title = "a"'), true);
-  assert.deepEqual([folder.stored.at(-1), study.lack, study.error, folder.text], [tag, null, "", 'title = "a"']);
+test("other words than those typed over are asked about, readable or not, seen before or not", async () => {
+  for (const lack of ["", "no TOML"])
+    for (const seen of [true, false]) {
+      const study = await opened("base", "of an editor", { lack, typed: "mine" });
+      if (seen) await study.reread();
+      if (seen) assert.equal(study.moved, true);
+      const saved = study.save();
+      while (!study.conflict) await new Promise((go) => setTimeout(go));
+      assert.deepEqual([folder.asked.at(-1).base, folder.asked.at(-1).theirs, folder.asked.at(-1).mine], ["base", "of an editor", "mine"]);
+      assert.equal(folder.text, "of an editor");
+      await study.settle("later");
+      assert.equal(await saved, false);
+      assert.deepEqual([folder.text, study.typed.text, study.typed.before], ["of an editor", "mine", "base"]);
+      const again = study.save();
+      while (!study.conflict) await new Promise((go) => setTimeout(go));
+      await study.settle("mine");
+      assert.equal(await again, true);
+      assert.deepEqual([folder.text, study.typed, kept["study:a"]], ["mine", null, undefined]);
+    }
+});
+
+test("words of nobody's typing are no draft, and those of a page before are taken up", async () => {
+  await opened("base", "base");
+  for (const [text, before, left] of [["base", "older", null], ["older", "older", null], ["mine", "older", "mine"]]) {
+    kept["study:a"] = { text, name: "", before };
+    const study = new Study("a");
+    await study.load();
+    assert.deepEqual([study.typed?.text ?? null, study.again, kept["study:a"]?.text ?? null], [left, left !== null, left]);
+    study.discard();
+  }
 });
 
 test("one that stood before this page was opened is told as lost, and what was typed waits", async () => {
+  await opened("base", null);
   kept["study:a"] = { text: "half typed", name: "", before: "" };
-  [folder.text, folder.lack] = [null, ""];
   const study = new Study("a");
   await study.load();
   assert.equal(study.file, null);
   assert.match(study.lack.lack, /not in the folder/);
-  assert.equal(kept["study:a"].text, "half typed");
-  delete kept["study:a"];
-  await study.load();
+  assert.equal(study.typed.text, "half typed");
+  study.discard();
   assert.equal(study.lack, null, "thrown away, it is as if none had been");
 });
 
-test("what was kept alone goes when a study stands again; what was typed stays", async () => {
-  for (const [text, left] of [["[study]\n", undefined], ["half typed", "half typed"]]) {
-    const study = await deleted();
-    await study.load();
-    if (left) kept["study:a"] = { ...kept["study:a"], text };
-    folder.text = "[study]\ntitle = 'proposed'\n";
-    await study.load();
-    assert.deepEqual([study.lack, study.file.text, kept["study:a"]?.text], [null, folder.text, left]);
-  }
-});
-
 test("what an editor changed is read by who comes back, and nothing where it stands as it did", async () => {
-  await deleted();
-  folder.text = "[study]\n";
-  const study = new Study("a");
-  await study.load();
+  const study = await opened("[study]\n", "[study]\n");
   const before = study.file;
   await study.reread();
   assert.equal(study.file, before);

@@ -105,7 +105,7 @@ def test_one_that_is_gone_is_not_begun_anew_without_its_models(
     path.unlink()
     told = _told(studies)
     assert f"studies/{RIG}.toml" in told.lack
-    assert (told.text, told.etag, told.undoable) == (stood, UNWRITTEN, 0)
+    assert (told.state, told.text, told.etag, told.undoable) == ("lost", stood, UNWRITTEN, 1)
     plot = Edits(edits=[Edit(path=["plot"], value=[{"series": ["A.B"]}])])
     assert studies.change(RIG, plot, UNWRITTEN) is None
     assert not path.exists()

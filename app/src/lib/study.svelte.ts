@@ -1,6 +1,6 @@
 import * as api from "./api";
 import { drafts } from "./drafts";
-import type { Edit, MergedStudy, StudyText } from "./types";
+import type { Draft, Edit, MergedStudy, StudyText } from "./types";
 
 export interface ModelTable {
   name: string;
@@ -41,15 +41,24 @@ interface Waiting {
 const UNWRITTEN = '""';
 const UNTOUCHED = "What was changed last was not stored.";
 const GONE = "The study is not in the folder any more";
-const BARE: StudyText = { text: "", etag: UNWRITTEN, parts: { models: "", gains: "", views: "" }, settings: {}, python: "", outside: [], undoable: 0, redoable: 0, of_records: false, lack: GONE };
+const MOVED = "The study was changed elsewhere meanwhile, and stands below as it is now: no version was taken back or made again.";
+const BARE: StudyText = { text: "", etag: UNWRITTEN, parts: { models: "", gains: "", views: "" }, settings: {}, python: "", outside: [], undoable: 0, redoable: 0, of_records: false, state: "lost", lack: GONE };
 const keysOf = (edits: Edit[]) => JSON.stringify(edits.map((each) => each.path));
+const seemsSame = (one: StudyText | null, other: StudyText | null) => (["etag", "state", "lack", "undoable", "redoable"] as const).every((key) => one?.[key] === other?.[key]);
 
-/** The study file of a log: every click of the page changes it here, and nowhere else. */
+/**
+ * The study file of a log: every click of the page changes it here, and nowhere else. What the server
+ * told last and what a hand has typed are its whole state; all that screens show is derived from both.
+ */
 export class Study {
-  file: StudyText | null = $state(null);
+  #told: StudyText | null = $state(null);
+  /** Text that this page has shown last as a study that can be read. */
+  #shown: StudyText | null = $state.raw(null);
+  /** The whole text as a hand has typed it, and the one from which it began. */
+  typed: Draft | null = $state.raw(null);
+  /** Whether that was typed before this page was opened. */
+  again = $state(false);
   error = $state("");
-  /** Why there is none to show: it cannot be read, or stood and is gone; what is left of its text. */
-  lack: StudyText | null = $state(null);
   conflict: Conflict | null = $state.raw(null);
   changed: string[] = $state([]);
   /** Whether the server was asked once: before that nobody knows whether there is a study. */
@@ -59,6 +68,38 @@ export class Study {
   #turn: Promise<unknown> = Promise.resolve();
   #waiting: Waiting | null = null;
   constructor(readonly log: string) {}
+
+  /** The study where it can be read. */
+  get file(): StudyText | null {
+    return this.#told?.state === "readable" ? this.#told : null;
+  }
+
+  /** Why there is none to show, and what is left of its text: it cannot be read, or stood and is gone. */
+  get lack(): StudyText | null {
+    if (this.#told) return this.file ? null : this.#told;
+    if (!this.known || !(this.#shown || this.typed)) return null;
+    return { ...BARE, text: this.#shown?.text ?? "", of_records: this.#shown?.of_records ?? false };
+  }
+
+  /** Text that stands, whether it can be read or not; of one that is lost what stood last. */
+  get text(): string {
+    return (this.#told ?? this.#shown)?.text ?? "";
+  }
+
+  /** Whether a text stands that another may take the place of. */
+  get stands(): boolean {
+    return this.#told?.state === "readable" || this.#told?.state === "unreadable";
+  }
+
+  /** Whether nobody but this page knows of one that is lost. */
+  get alone(): boolean {
+    return this.#told === null && this.lack !== null;
+  }
+
+  /** Whether other words stand now than those from which the typed ones began. */
+  get moved(): boolean {
+    return this.typed !== null && this.typed.before !== this.text;
+  }
 
   get models(): ModelTable[] {
     return (this.file?.settings.model as ModelTable[]) ?? [];
@@ -81,9 +122,8 @@ export class Study {
   load(): Promise<void> {
     return this.#inTurn(async () => {
       try {
-        const told = await api.study(this.log);
-        if (told && !told.lack) this.#stands(told);
-        else this.#lost(told, null);
+        this.#take(await api.study(this.log));
+        this.error = "";
       } catch (error) {
         this.error = (error as Error).message;
       }
@@ -95,10 +135,57 @@ export class Study {
   reread(): Promise<void> {
     return this.#inTurn(async () => {
       if (this.conflict) return;
-      const told = await api.study(this.log).catch(() => null);
-      if (told && !told.lack && told.etag !== this.file?.etag) this.#stands(told);
-      else if (told?.lack && this.file) this.#lost(told, null);
+      try {
+        const told = await api.study(this.log);
+        if (this.known && seemsSame(told, this.#told)) return;
+        this.#take(told);
+        this.error = "";
+      } catch {
+        // whoever asks for more hears why nobody answers
+      }
     });
+  }
+
+  /** What the server knows takes the place of what it knew; words that nobody typed are none. */
+  #take(told: StudyText | null) {
+    this.#told = told;
+    this.known = true;
+    if (this.file) this.#shown = this.file;
+    const kept = this.typed ?? drafts.kept(this.place);
+    const idle = kept && told && (kept.text === kept.before || kept.text === told.text);
+    if (idle) drafts.drop(this.place);
+    if (!idle && !this.typed && kept) this.again = true;
+    this.typed = idle ? null : kept;
+  }
+
+  /** The whole text as a hand types it: kept until it is stored or thrown away. */
+  type(text: string) {
+    const before = this.typed?.before ?? this.text;
+    this.again = false;
+    if (text === before || text === this.text) return this.#untype();
+    this.#keep({ text, name: "", before });
+  }
+
+  #keep(typed: Draft) {
+    this.typed = typed;
+    drafts.keep(this.place, typed);
+  }
+
+  #untype() {
+    [this.typed, this.again] = [null, false];
+    drafts.drop(this.place);
+  }
+
+  /** Throw away what was typed, and of a study that nobody but this page knows what stood. */
+  discard() {
+    this.#untype();
+    if (!this.#told) this.#shown = null;
+  }
+
+  /** Store the text that is typed, or the one that is left. */
+  save(): Promise<boolean> {
+    const { text, before } = this.typed ?? { text: this.text, before: this.text };
+    return this.replace(text, before);
   }
 
   /** Change keys; while others of the same keys wait, these take their place. */
@@ -131,22 +218,22 @@ export class Study {
   }
 
   /** Put a whole text in place, which was made of `base`; it can be taken back. */
-  replace(text: string, base?: string): Promise<boolean> {
+  replace(text: string, base: string): Promise<boolean> {
     return this.#heard(async () => {
-      const file = this.file;
-      const meant = { text, base: base ?? file?.text };
-      if (file && meant.base !== file.text) return this.#ask(meant, file);
+      const meant = { text, base };
+      // Nothing is written over words that whoever wrote this had not before his eyes.
+      if (this.stands && base !== this.text) return this.#ask(meant);
       return this.#store((etag) => api.replace(this.log, etag, text), meant);
     });
   }
 
   /** Versions are the server's: a reload, and the next window, go back as far. */
   undo(): Promise<boolean> {
-    return this.#heard(async () => !!(this.file ?? this.lack)?.undoable && this.#store((etag) => api.step(this.log, etag, true)));
+    return this.#heard(async () => !!this.#told?.undoable && this.#store((etag) => api.step(this.log, etag, true)));
   }
 
   redo(): Promise<boolean> {
-    return this.#heard(async () => !!this.file?.redoable && this.#store((etag) => api.step(this.log, etag, false)));
+    return this.#heard(async () => !!this.#told?.redoable && this.#store((etag) => api.step(this.log, etag, false)));
   }
 
   /** One after the other: a request that went beside another would name a version that is gone. */
@@ -173,14 +260,16 @@ export class Study {
     const asked = this.conflict;
     if (!asked) return;
     this.conflict = null;
-    if (choice === "later") this.#later(asked);
     if (choice === "later" || choice === "theirs") {
+      const waits = choice === "theirs" || this.#later(asked);
+      if (choice === "theirs" && asked.typed) this.#untype();
       await this.load();
-      if (choice === "later" && !asked.typed && drafts.kept(this.place)?.text !== asked.mine) this.error = "Your change was not made: the study had changed meanwhile, and text that is not saved stands here.";
+      if (!waits) this.error = "Your change was not made: the study had changed meanwhile, and text that is not saved stands here.";
       return asked.settled(choice === "theirs" && asked.typed);
     }
     const text = choice === "both" ? asked.merged! : asked.mine;
     const stored = await this.#heard(() => this.#store(() => api.replace(this.log, asked.etag, text), { text, base: choice === "both" ? asked.theirs : asked.base }));
+    if (stored && asked.typed) this.#untype();
     if (!stored && this.error) {
       const said = this.error;
       this.#later(asked);
@@ -190,9 +279,10 @@ export class Study {
     asked.settled(stored);
   }
 
-  /** Nothing is lost with the question: Lines takes it up, as it does what was typed there. */
-  #later(asked: Conflict) {
-    if (!drafts.kept(this.place)) drafts.keep(this.place, { text: asked.mine, name: "", before: asked.base });
+  /** Nothing is lost with the question: it is taken up as what was typed is; false: other words wait. */
+  #later(asked: Conflict): boolean {
+    if (!this.typed) this.#keep({ text: asked.mine, name: "", before: asked.base });
+    return asked.typed || this.typed?.text === asked.mine;
   }
 
   /** Of its text, among what is typed and not saved. */
@@ -200,13 +290,14 @@ export class Study {
     return `study:${this.log}`;
   }
 
-  async #ask(meant: Meant, now: { text: string; etag: string }): Promise<Stored> {
-    const base = meant.base ?? this.file?.text ?? "";
+  /** What was meant, beside the text that stands now. */
+  async #ask(meant: Meant): Promise<Stored> {
+    const [base, theirs, etag] = [meant.base!, this.text, this.#told!.etag];
     try {
-      const told = await api.merge(this.log, { base, mine: meant.text ?? base, theirs: now.text, edits: meant.edits ?? [] });
+      const told = await api.merge(this.log, { base, mine: meant.text ?? base, theirs, edits: meant.edits ?? [] });
       let settled: (done: boolean) => void = () => {};
       const asked = new Promise<boolean>((give) => (settled = give));
-      this.conflict = { ...told, base, theirs: now.text, etag: now.etag, typed: meant.text !== undefined, settled };
+      this.conflict = { ...told, base, theirs, etag, typed: meant.text !== undefined, settled };
       return { asked };
     } catch (error) {
       this.error = (error as Error).message;
@@ -215,53 +306,36 @@ export class Study {
   }
 
   async #store(store: (etag: string) => Promise<StudyText>, meant: Meant | null = null): Promise<Stored> {
-    if (!this.file && !this.known) return false;
+    if (!this.known) return false;
     if (this.lack && meant?.edits) {
       this.error = UNTOUCHED;
       return false;
     }
     if (this.conflict) return this.#besides(this.conflict, meant);
-    const before = this.file?.text ?? "";
+    const before = this.text;
     try {
-      this.#stands(await store((this.file ?? this.lack)?.etag || UNWRITTEN));
+      this.#take(await store(this.#told?.etag || UNWRITTEN));
     } catch (error) {
-      const refusal = error as api.Refusal;
-      if ([404, 409].includes(refusal.status)) {
-        const told = await api.study(this.log).catch(() => this.file);
-        if (told?.lack || (!told && this.file)) return this.#lost(told, meant);
-      }
-      if (refusal.status !== 409) {
-        this.error = refusal.message;
-        return false;
-      }
-      const now = refusal.detail as { text: string; etag: string };
-      if (meant) return this.#ask(meant, now);
-      this.file = await api.study(this.log);
-      this.error = "The study was changed elsewhere meanwhile, and stands below as it is now: no version was taken back or made again.";
-      return false;
+      return this.#refused(error as api.Refusal, meant && { ...meant, base: meant.base ?? before });
     }
     const old = new Set(before.split("\n"));
-    this.changed = this.file!.text.split("\n").filter((line) => !old.has(line));
+    this.error = "";
+    this.changed = (this.file?.text ?? "").split("\n").filter((line) => !old.has(line));
     return true;
   }
 
-  /** What was kept of one that was lost, and nobody has typed into, needs no keeping any more. */
-  #stands(told: StudyText) {
-    const kept = this.lack && drafts.kept(this.place);
-    if (kept && kept.text === kept.before) drafts.drop(this.place);
-    [this.file, this.lack, this.error] = [told, null, ""];
-  }
-
-  /** None stands that can be read: what was typed, else what stood here, waits to be written again. */
-  #lost(told: StudyText | null, meant: Meant | null): boolean {
-    const stood = this.file;
-    const waits = drafts.kept(this.place);
-    // A file that cannot be read has its own text: what was typed alone would be lost with this page.
-    const left = meant?.text ?? (told?.lack && told.text ? undefined : stood?.text);
-    if (!waits && left !== undefined) drafts.keep(this.place, { text: left, name: "", before: stood?.text ?? "" });
-    const gone = stood || waits ? { ...BARE, of_records: stood?.of_records ?? false } : null;
-    [this.file, this.lack] = [null, told ?? gone];
-    this.error = meant ? UNTOUCHED : "";
+  /** Not stored: where other words stand than this page knew both are shown, else the reason is said. */
+  async #refused(refusal: api.Refusal, meant: Meant | null): Promise<Stored> {
+    this.error = (meant?.text === undefined ? "" : "Not written: ") + refusal.message;
+    if (![404, 409].includes(refusal.status)) return false;
+    const told = await api.study(this.log).catch(() => undefined);
+    if (told === undefined) return false;
+    this.#take(told);
+    // A text can be laid beside any other; keys only beside one that has them.
+    if (meant && (meant.text !== undefined ? this.stands : this.file)) return this.#ask(meant);
+    if (meant?.text !== undefined && !this.typed && meant.text !== this.text) this.#keep({ text: meant.text, name: "", before: meant.base! });
+    if (this.lack) this.error = meant ? UNTOUCHED : "";
+    else if (refusal.status === 409) this.error = MOVED;
     return false;
   }
 

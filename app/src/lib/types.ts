@@ -1130,6 +1130,7 @@ export interface StudyText {
   undoable: number;
   redoable: number;
   of_records: boolean;
+  state: "readable" | "unreadable" | "no text" | "lost";
   lack: string;
 }
 

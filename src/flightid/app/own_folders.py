@@ -17,7 +17,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO
 
-from flightid.errors import OptionError
+from flightid.errors import FlightidError, OptionError
 from flightid.files import STALE_S, process_lives
 
 NO_LINK: int = getattr(os, "O_NOFOLLOW", 0)
@@ -139,6 +139,8 @@ def new_file(folder: Path, name: str) -> Iterator[tuple[IO[bytes], Path]]:
 def draft_of(study: Path, text: str) -> Iterator[Path]:
     """A text as a file beside a study, for as long as it is looked at.
 
+    What is raised meanwhile names the study: a reader has never seen the other file.
+
     Raises
     ------
     OSError
@@ -147,7 +149,27 @@ def draft_of(study: Path, text: str) -> Iterator[Path]:
     with new_file(study.parent, f".draft-{made_name('toml')}") as (stream, path):
         stream.write(text.encode())
         stream.close()
-        yield path
+        try:
+            yield path
+        except FlightidError as error:
+            call_file(error, path.name, study.name)
+            raise
+
+
+def call_file(error: FlightidError, path: str, name: str) -> None:
+    """Call a file by another name in an error, where a copy was read in its place.
+
+    Example
+    -------
+    >>> error = OptionError("no table", found="copy.toml: line 2")
+    >>> call_file(error, "copy.toml", "mine.toml")
+    >>> print(error, error.found, sep="; ")
+    no table: found mine.toml: line 2; mine.toml: line 2
+    """
+    for key, told in vars(error).items():
+        if isinstance(told, str):
+            setattr(error, key, told.replace(path, name))
+    error.args = tuple(str(each).replace(path, name) for each in error.args)
 
 
 def clear_left(folder: Path) -> None:

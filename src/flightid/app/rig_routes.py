@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from flightid.app import rig_work
 from flightid.app.backstage import Backstage, LogName, made
+from flightid.app.bare_study import UNWRITTEN
 from flightid.app.field_routes import MOST_COLUMNS
 from flightid.app.guard import UPLOAD_BYTES
 from flightid.app.own_folders import is_link
@@ -30,7 +31,7 @@ from flightid.app.rig_schemas import (
     RigScreen,
 )
 from flightid.app.rigs import Rigs
-from flightid.app.study_edits import write_study
+from flightid.app.schemas import WholeText
 from flightid.models import library_names
 
 ROLES = {"inputs", "outputs", "excitations", "model", "actuators", "conditioning"}
@@ -128,7 +129,8 @@ async def _proposed(backstage: Backstage, rig: str, asked: RigProposal) -> Propo
     call = workers.proposed(rig, rig_work.propose, paths, target.parent, roles, reading)
     proposed = ProposedStudy(**await made(call))
     if proposed.text and studies.path(rig) is None:
-        await asyncio.to_thread(write_study, target, proposed.text)
+        whole = WholeText(text=proposed.text)
+        await asyncio.to_thread(studies.replace, rig, whole, UNWRITTEN)
     return proposed
 
 

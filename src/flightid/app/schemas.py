@@ -230,9 +230,12 @@ class StudyText(Message):
     """How many versions can be gone back."""
     redoable: int = 0
     of_records: bool = False
+    state: Literal["readable", "unreadable", "no text", "lost"] = "readable"
+    """A study is read where `flightid run` would read it. Unreadable: `text` stands, and is none.
+    No text: bytes stand that are none, and nothing may take their place. Lost: nothing stands, and
+    `text` stood last. `etag` is the tag by which another text takes the place."""
     lack: str = ""
-    """Why there is none to show; empty: it is sound. `text` is then what is left of it, and `etag`
-    the tag by which another text takes its place; empty where none may."""
+    """Why it is not readable; empty: it is."""
 
 
 class StudyStep(Message):

@@ -6,30 +6,32 @@ import threading
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Literal
 
 from fastapi import HTTPException
 
 from flightid.app.bare_study import UNWRITTEN, bare_study, completed, opened
 from flightid.app.kept_parts import kept_overview
-from flightid.app.own_folders import read_plain, shown_name
+from flightid.app.own_folders import call_file, draft_of, read_plain, shown_name
 from flightid.app.python_lines import python_lines
 from flightid.app.rigs import Rigs
 from flightid.app.schemas import Edits, StudyParts, StudyStep, StudyText, WholeText
-from flightid.app.study_edits import KeyEdit, edited, etag_of, parts_of, write_study
+from flightid.app.study_edits import KeyEdit, edited, etag_of, parts_of, require_study
 from flightid.app.study_history import StudyHistory, Versions
 from flightid.app.study_reach import outside_places
 from flightid.app.workspace import ID, Workspace
-from flightid.errors import FlightidError, StudyError
-from flightid.reading import DOCUMENT_BYTES, read_toml
-from flightid.study.settings import read_settings
+from flightid.errors import FlightidError, OptionError, StudyError
+from flightid.files import write_atomically
+from flightid.reading import DOCUMENT_BYTES, parse_toml
+from flightid.study.settings import Settings, read_settings
 
 GONE = "The study is not in the folder any more: studies/{}.toml was removed or renamed"
+UNSTORED = "the text to be written"
 UNOPENED = "# The study names files outside the folder of the page, which opens none of them.\n"
 
 
 class Studies:
-    """The study of each log.
+    """The study of each log: what is known of it, and the one hand that writes it.
 
     Parameters
     ----------
@@ -38,8 +40,8 @@ class Studies:
 
     def __init__(self, workspace: Workspace) -> None:
         self._workspace = workspace
-        self._history = StudyHistory(workspace)
-        self._lock = threading.Lock()
+        self._history = StudyHistory(workspace.folder)
+        self._lock = threading.RLock()
 
     def path(self, log: str) -> Path | None:
         """Study file of a log; None where there is none."""
@@ -60,32 +62,34 @@ class Studies:
         return path, text_of(path)
 
     def read(self, log: str) -> StudyText | None:
-        """The study file with what the page reads off it; None where there never was one.
+        """The study in its state, with what the page reads off it; None where there never was one.
 
-        One that cannot be read, or stood and is gone, is told as a lack: the reason, and its text.
+        What stands is kept as a version: the page has shown it, and an editor may take it away.
         """
-        path = self.path(log)
-        if path is None:
-            return self._missing(log)
-        text = ""
+        with self._lock:
+            path = self.path(log)
+            if path is None:
+                return self._lost(log)
+            try:
+                text = text_of(path)
+            except FlightidError as error:
+                return self._bare(log, "no text", str(error))
+            try:
+                versions = self._history.seen(log, text)
+            except (OSError, OptionError):  # it can be read without
+                versions = Versions((text,), 0)
+        bare = self._bare(log, "unreadable", "", versions, etag_of(text))
         try:
-            text = text_of(path)
-            settings, parts = _tables(path), parts_of(text)
-        except FlightidError as error:
-            return self._lacking(log, str(error), text, etag_of(text) if text else "")
-        outside = _outside(self._workspace.folder, path)
-        versions = self._history.versions(log, text)
-        return StudyText(
-            undoable=versions.behind,
-            redoable=versions.ahead,
-            text=text,
-            etag=etag_of(text),
-            parts=parts,
-            settings=settings,
-            python=UNOPENED if outside else _python(path),
-            outside=outside,
-            of_records=bool(Rigs(self._workspace).files(log)),
-        )
+            with draft_of(path, text) as draft:
+                settings = read_settings(draft)
+            tables, parts = parse_toml(text, "the study file", path.name), parts_of(text)
+        except (FlightidError, OSError) as error:
+            return bare.model_copy(update={"lack": str(error)})
+        places = outside_places(self._workspace.folder, settings, path.parent)
+        outside = [shown_name(each) for each in places]
+        python = UNOPENED if outside else _python(settings, path.parent)
+        told = {"state": "readable", "parts": parts, "settings": tables, "python": python}
+        return bare.model_copy(update={**told, "outside": outside})
 
     def require_readable(self, log: str) -> None:
         """Refuse a file that stands where the study is, and cannot be read.
@@ -106,58 +110,119 @@ class Studies:
     def change(self, log: str, edits: Edits, tag: str) -> StudyText | None:
         """Change keys of the version that `tag` names; another version is a conflict (409).
 
-        Where there is none, a change of `UNWRITTEN` begins the study of a log.
+        Where there is none, a change of `UNWRITTEN` begins the study of a log; not in the place
+        of one with models that is gone: they would be gone for good.
         """
         made = [KeyEdit(tuple(each.path), each.value) for each in edits.edits]
 
-        def changed(old: Versions) -> Versions:
+        def changed(old: Versions | None, stands: bool) -> Versions | None:
+            if not stands:
+                bare = None if self._lost(log) else bare_study(self._workspace, log)
+                if bare is None:
+                    return None
+                old = _after(old, bare)
+            assert old is not None
             return old.followed_by(completed(edited(opened(old.text), made)))
 
-        if tag == UNWRITTEN and self.path(log) is None:
-            return self._begin(log, changed)
-        return self._put(log, tag, changed)
+        return self._write(log, tag, changed)
 
     def replace(self, log: str, whole: WholeText, tag: str) -> StudyText | None:
         """Put a text in place of the version that `tag` names; another is a conflict (409).
 
-        Where there is none, a text of `UNWRITTEN` is written: of a study that was deleted.
+        Where there is none, a text of `UNWRITTEN` is written: of a study that is lost, or the
+        first one.
         """
-        if tag == UNWRITTEN and self.path(log) is None:
-            return self._written_again(log, whole.text)
-        return self._put(log, tag, lambda old: old.followed_by(whole.text))
+        return self._write(log, tag, lambda old, _: _after(old, whole.text))
 
     def step(self, log: str, steps: StudyStep, tag: str) -> StudyText | None:
-        """Go a version back, or forward again; nothing happens where there is none."""
+        """Go a version back, or forward again; nothing happens where there is none.
+
+        A version that could not be read comes back as it stood.
+        """
         by = -1 if steps.back else 1
 
-        def moved(old: Versions) -> Versions:
-            return old.moved(by) if (old.behind if steps.back else old.ahead) else old
+        def moved(old: Versions | None, stands: bool) -> Versions | None:
+            if old is None or not (old.behind if steps.back else old.ahead):
+                return old if stands else None
+            return old.moved(by)
 
-        return self._put(log, tag, moved)
+        return self._write(log, tag, moved, checked=False)
 
-    def _missing(self, log: str) -> StudyText | None:
+    def _write(
+        self,
+        log: str,
+        tag: str,
+        made: Callable[[Versions | None, bool], Versions | None],
+        *,
+        checked: bool = True,
+    ) -> StudyText | None:
+        """The only writer: over nothing but the version that `tag` names, which is kept before.
+
+        Parameters
+        ----------
+        log, tag : str
+            `UNWRITTEN`: nothing stands.
+        made : callable
+            Versions of the study, the one to be written standing, of those that are kept (None:
+            no one is) and whether a file stands; None: nothing is written.
+        checked : bool
+            Whether a text that `flightid run` would refuse is refused.
+        """
+        with self._lock:
+            path = self._workspace.study_path(log)
+            stands = path.is_file()
+            if stands:
+                text = text_of(path)
+                if etag_of(text) != tag:
+                    raise HTTPException(409, {"text": text, "etag": etag_of(text)})
+                old: Versions | None = self._history.seen(log, text)
+            elif tag != UNWRITTEN or path.exists() or not self._is_known(log):
+                return None
+            else:
+                text, old = "", self._history.held(log)
+            versions = made(old, stands)
+            if versions is None:
+                return None
+            if checked:
+                _require(path, versions.text)
+            if versions.text != text or not stands:
+                write_atomically(path, versions.text)
+                self._history.keep(log, versions)
+            return self.read(log)
+
+    def _lost(self, log: str) -> StudyText | None:
         """What is left of a study with models that is in the folder no more; None: there was none.
 
         Who inspected the log saw a study, or its versions are kept.
         """
         if not ID.fullmatch(log) or not self._is_known(log):
             return None
-        text, seen = self._history.last(log), kept_overview(self._workspace, log)
-        if not (seen is not None and seen.has_study) and not _names_models(text):
+        held, seen = self._history.held(log), kept_overview(self._workspace, log)
+        kept = held or Versions(("",), 0)
+        if not (seen is not None and seen.has_study) and not _names_models(kept.text):
             return None
-        return self._lacking(log, GONE.format(log), text, UNWRITTEN)
+        return self._bare(log, "lost", GONE.format(log), kept, UNWRITTEN)
 
-    def _lacking(self, log: str, why: str, text: str, tag: str) -> StudyText:
-        undoable = self._history.versions(log, text).behind if tag not in ("", UNWRITTEN) else 0
+    def _bare(
+        self,
+        log: str,
+        state: Literal["unreadable", "no text", "lost"],
+        why: str,
+        versions: Versions | None = None,
+        tag: str = "",
+    ) -> StudyText:
+        versions = versions or Versions(("",), 0)
         return StudyText(
-            text=text,
+            state=state,
+            lack=why,
+            text=versions.text,
             etag=tag,
+            undoable=versions.behind,
+            redoable=versions.ahead,
             parts=StudyParts(models="", gains="", views=""),
             settings={},
             python="",
-            undoable=undoable,
             of_records=bool(Rigs(self._workspace).files(log)),
-            lack=why,
         )
 
     def _is_known(self, log: str) -> bool:
@@ -165,45 +230,12 @@ class Studies:
         workspace = self._workspace
         return workspace.log_path(log) is not None or bool(Rigs(workspace).files(log))
 
-    def _begin(self, log: str, made: Callable[[Versions], Versions]) -> StudyText | None:
-        """Write the first version of a study that no proposal wrote; None where it has no place.
 
-        In the place of one with models that is gone it has none: they would be gone for good.
-        """
-        with self._lock:
-            bare = bare_study(self._workspace, log)
-            path = self._workspace.study_path(log)
-            if bare is None or path.exists() or self._missing(log) is not None:
-                return None
-            versions = made(Versions((bare,), 0))
-            write_study(path, versions.text)
-            self._history.keep(log, versions)
-            return self.read(log)
-
-    def _written_again(self, log: str, text: str) -> StudyText | None:
-        """Write the study of a log or of records that are there; None where they are not."""
-        known = self._is_known(log)
-        with self._lock:
-            path = self._workspace.study_path(log)
-            if not known or path.exists():
-                return None
-            write_study(path, text)
-            self._history.keep(log, self._history.versions(log, text))
-            return self.read(log)
-
-    def _put(self, log: str, tag: str, made: Callable[[Versions], Versions]) -> StudyText | None:
-        path = self.path(log)
-        if path is None:
-            return None
-        with self._lock:
-            text = text_of(path)
-            if etag_of(text) != tag:
-                raise HTTPException(409, {"text": text, "etag": etag_of(text)})
-            versions = made(self._history.versions(log, text))
-            if versions.text != text:
-                write_study(path, versions.text)
-                self._history.keep(log, versions)
-            return self.read(log)
+def _after(old: Versions | None, text: str) -> Versions:
+    """A text behind those that are kept; the one that stood last is not kept twice."""
+    if old is None:
+        return Versions((text,), 0)
+    return old if old.text == text else old.followed_by(text)
 
 
 def text_of(path: Path) -> str:
@@ -222,6 +254,15 @@ def text_of(path: Path) -> str:
         ) from error
 
 
+def _require(path: Path, text: str) -> None:
+    """Refuse what `flightid run` would refuse, and say that it is not what stands."""
+    try:
+        require_study(path, text)
+    except FlightidError as error:
+        call_file(error, path.name, UNSTORED)
+        raise
+
+
 def _names_models(text: str) -> bool:
     """Whether a text that stood names models; one that is no TOML may."""
     try:
@@ -230,23 +271,9 @@ def _names_models(text: str) -> bool:
         return True
 
 
-def _tables(path: Path) -> dict[str, Any]:
-    return read_toml(path, "the study file")
-
-
-def _outside(folder: Path, path: Path) -> list[str]:
-    """Files outside the folder; none of a study that cannot be read."""
-    try:
-        return [shown_name(each) for each in outside_places(folder, path)]
-    except FlightidError:
-        return []
-
-
-def _python(path: Path) -> str:
+def _python(settings: Settings, folder: Path) -> str:
     """Python lines of every model, one after the other; why there are none, where it is so."""
     try:
-        settings = read_settings(path)
-        folder = path.parent
         parts = [
             f"# {model.name}\n{python_lines(settings, model.name, folder)}"
             for model in settings.models

@@ -14,7 +14,6 @@ from tomlkit.items import AoT, Comment, Table, Whitespace
 from flightid.app.own_folders import draft_of
 from flightid.app.schemas import StudyParts
 from flightid.errors import StudyError
-from flightid.files import write_atomically
 from flightid.frozen import dataclass
 from flightid.reading import DOCUMENT_BYTES
 from flightid.study.settings import read_settings
@@ -198,16 +197,3 @@ def require_study(path: Path, text: str) -> None:
         raise StudyError("the study file is too long", needed=f"{DOCUMENT_BYTES} bytes at most")
     with draft_of(path, text) as draft:
         read_settings(draft)
-
-
-def write_study(path: Path, text: str) -> str:
-    """Check a study file, write it whole, and return its tag.
-
-    Raises
-    ------
-    StudyError
-        It cannot be carried out as written.
-    """
-    require_study(path, text)
-    write_atomically(path, text)
-    return etag_of(text)

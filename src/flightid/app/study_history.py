@@ -1,7 +1,9 @@
 """Versions of a study, for Undo and Redo: kept beside the workspace, so that a reload loses none.
 
-``.flightid/undo/<id>.json`` holds the texts in their order and which of them stands. The study file
-is written first: whoever reads the history later sees by the text that stands how far it came.
+``.flightid/undo/<id>.json`` holds the texts in their order and which of them stands, those of an
+editor too, as soon as the page has read them. What stands is kept before another text is written
+over it; that one is kept after: whoever reads the history later sees by the text that stands how
+far it came.
 """
 
 from __future__ import annotations
@@ -11,7 +13,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from flightid.app.own_folders import own_folder, read_plain
-from flightid.app.workspace import HIDDEN, ID, Workspace
+from flightid.app.workspace import HIDDEN, ID
 from flightid.errors import OptionError
 from flightid.files import write_atomically
 from flightid.frozen import dataclass
@@ -30,7 +32,7 @@ class Versions:
     -------
     >>> made = Versions(("a",), 0).followed_by("b").followed_by("c")
     >>> made.moved(-1).text, made.moved(-1).followed_by("d").texts
-    ('b', ('a', 'b', 'd'))
+    ('b', ('a', 'c', 'b', 'd'))
     >>> made.behind, made.ahead, made.standing("b").ahead, made.standing("x").texts
     (2, 0, 1, ('a', 'b', 'c', 'x'))
     """
@@ -58,8 +60,12 @@ class Versions:
         return Versions(self.texts, self.at + steps)
 
     def followed_by(self, text: str) -> Versions:
-        """With a version after the one that stands; what was ahead of it is gone."""
-        return Versions(_bounded((*self.texts[: self.at + 1], text)), -1)._counted()
+        """With a version after the one that stands; what was ahead of it lies before that one.
+
+        Whatever stood once can be gone back to, what was taken back too.
+        """
+        before, ahead = self.texts[: self.at], self.texts[self.at + 1 :]
+        return Versions(_bounded((*before, *ahead, self.text, text)), -1)._counted()
 
     def standing(self, text: str) -> Versions:
         """Where a text stands that nobody told of: a kill cut the step off, or a hand wrote it."""
@@ -73,27 +79,35 @@ class Versions:
 
 
 class StudyHistory:
-    """Versions of the studies of a workspace.
+    """Versions of the studies of a workspace: every text that stood, whoever wrote it.
 
     Parameters
     ----------
-    workspace : Workspace
+    folder : Path
+        Of the workspace.
     """
 
-    def __init__(self, workspace: Workspace) -> None:
-        self._workspace = workspace
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
 
-    def versions(self, log: str, text: str) -> Versions:
-        """Versions of a study that stands so; of a history that is broken or a link, this one."""
-        held = self._held(log)
-        return Versions((text,), 0) if held is None else held.standing(text)
+    def seen(self, log: str, text: str) -> Versions:
+        """Versions of a study that stands so, this one among them: it is kept before it may go.
 
-    def last(self, log: str) -> str:
-        """Text that stood last, of all that are kept; empty where none is."""
-        held = self._held(log)
-        return "" if held is None else held.text
+        Of a history that is broken, this one alone.
 
-    def _held(self, log: str) -> Versions | None:
+        Raises
+        ------
+        OSError, OptionError
+            They cannot be kept: the folder is a link, or cannot be written.
+        """
+        held = self.held(log)
+        now = Versions((text,), 0) if held is None else held.standing(text)
+        if now != held:
+            self.keep(log, now)
+        return now
+
+    def held(self, log: str) -> Versions | None:
+        """All that are kept, and which stood last; None where none is, or it is broken."""
         try:
             held = json.loads(read_plain(self._path(log), MOST_BYTES))
             texts, at = tuple(held["texts"]), held["at"]
@@ -112,7 +126,7 @@ class StudyHistory:
     def _path(self, log: str) -> Path:
         if not ID.fullmatch(log):
             raise OptionError("no name of a study", found=log)
-        return own_folder(self._workspace.folder, HIDDEN, FOLDER) / f"{log}.json"
+        return own_folder(self._folder, HIDDEN, FOLDER) / f"{log}.json"
 
 
 def _bounded(texts: Sequence[str]) -> tuple[str, ...]:

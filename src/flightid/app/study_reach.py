@@ -13,7 +13,7 @@ from pathlib import Path
 from flightid.app.own_folders import draft_of, shown_name
 from flightid.errors import StudyError
 from flightid.study.run import named_paths
-from flightid.study.settings import read_settings
+from flightid.study.settings import Settings, read_settings
 
 MOST_NAMED = 5
 """Files that a refusal lists."""
@@ -27,15 +27,19 @@ def named_places(study: Path) -> list[Path]:
     StudyError
         The study cannot be carried out as written.
     """
-    named = dict.fromkeys(named_paths(read_settings(study)))
-    places = (path if path.is_absolute() else study.parent / path for path in named)
-    return list(dict.fromkeys(_followed(each) for each in places))
+    return _places(read_settings(study), study.parent)
 
 
-def outside_places(folder: Path, study: Path) -> list[Path]:
-    """Those of them that do not lie in a folder, whether they are there or not."""
+def outside_places(folder: Path, settings: Settings, beside: Path) -> list[Path]:
+    """Files that a study in the folder `beside` names and that do not lie in `folder`."""
     root = folder.resolve()
-    return [each for each in named_places(study) if not each.is_relative_to(root)]
+    return [each for each in _places(settings, beside) if not each.is_relative_to(root)]
+
+
+def _places(settings: Settings, beside: Path) -> list[Path]:
+    named = dict.fromkeys(named_paths(settings))
+    places = (path if path.is_absolute() else beside / path for path in named)
+    return list(dict.fromkeys(_followed(each) for each in places))
 
 
 def require_inside(folder: Path, study: Path) -> None:
@@ -46,7 +50,7 @@ def require_inside(folder: Path, study: Path) -> None:
     StudyError
         With the files.
     """
-    if outside := outside_places(folder, study):
+    if outside := outside_places(folder, read_settings(study), study.parent):
         named = ", ".join(map(shown_name, outside[:MOST_NAMED]))
         more = f" and {len(outside) - MOST_NAMED} more" if len(outside) > MOST_NAMED else ""
         raise StudyError(

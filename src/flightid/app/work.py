@@ -9,6 +9,7 @@ import json
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +19,9 @@ from flightid.app.pyramid import Pyramid
 from flightid.app.schemas import FieldGroup, ResponseCurve, ResponsePart, ShownFinding
 from flightid.app.stage_cache import StageCache
 from flightid.app.study_edits import KeyEdit, edited
+from flightid.app.study_history import StudyHistory
 from flightid.app.study_reach import draft_inside
-from flightid.errors import FlightidError
+from flightid.errors import FlightidError, OptionError
 from flightid.files import write_atomically
 from flightid.logs import Log, read_log
 from flightid.logs.field_formula import field_formula
@@ -79,6 +81,9 @@ def make_overview(path: Path, study: Path, result: Path) -> None:
     (log,) = (each for each in cache.values() if isinstance(each, Log))
     if made.models and not study.exists():
         made.write(study)
+        # As with every text that ever stood, an editor may take it away before a page has read it.
+        with suppress(OSError, OptionError):
+            StudyHistory(study.parent.parent).seen(study.stem, made.text)
     timeline = flight_timeline(log, inspection)
     shown = overview_of(log, inspection, timeline, made.findings, _settings_of(study, made))
     write_atomically(result, shown.model_dump_json())
