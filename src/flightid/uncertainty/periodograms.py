@@ -84,10 +84,10 @@ def _by_spans(power: Array, length: int, largest: int) -> Array:
     on_even, on_odd = even @ moments[:, ::2], odd @ moments[:, 1::2]
     series *= signs
     sums = np.sum(on_even * series[:, ::2], axis=1) + np.sum(on_odd * series[:, 1::2], axis=1)
-    alone = power[0] + 0.0 * sums
+    sums = 2.0 * sums - power[0]
     if length % 2 == 0:
-        alone += power[-1] * (-1.0) ** np.arange(largest + 1)
-    return np.asarray((2.0 * sums - alone) / length)
+        sums -= power[-1] * (-1.0) ** np.arange(largest + 1)
+    return np.asarray(sums / length)
 
 
 @lru_cache(maxsize=2)

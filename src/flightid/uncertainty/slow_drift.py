@@ -70,11 +70,10 @@ class Drift:
         By Whittle's information of n samples on both levels and the corner; `fast` is the spectrum
         of the other noise.
         """
-        corner, pole = self.corner, 1.0 - self.corner
         power, under = self._parts(length)
         own = self.variance * power / under
-        bend = 2.0 * pole / power - (2.0 * corner - (under - corner**2) / pole) / under
-        slopes = np.array([fast, own, corner * bend * own]) / (fast + own)
+        # By the corner: a number times `own`, which is there, and one times this.
+        slopes = np.array([fast, own, own * self.corner**2 / under]) / (fast + own)
         information = 0.5 * n * (slopes @ slopes.T) / len(fast)
         inverse = np.linalg.pinv(information, rcond=1e-12, hermitian=True)
         return np.asarray(np.einsum("ib,ij,jb->b", slopes, inverse, slopes))
