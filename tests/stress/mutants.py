@@ -3,12 +3,14 @@
 `python -m tests.stress.mutants --sample 200 --keep FILE`, with the extra `mutants`: `make mutants`.
 
 Drawn by chance from all mutants of the packages that tell users what to believe, with annotations
-left out. Each meets the tests that reach its line, by a run with coverage that comes first and is
-kept by groups of files, and the examples of its file; then, where none of them notices, the other
-tests of their files, which may take what a fixture made of that line for another. The tree is a
-copy. A mutant that no test notices is printed with its line: mend the test, or argue that the line
-does the same without it. Kept mutants are not tried again. The share is told by package, each with
-the interval of Clopper and Pearson, *Biometrika* 26 (1934), 404-413.
+left out, and what alters no result: sizes of caches, arrays that may be overwritten, checks that a
+caller would have to fail (`strict` of zip). Each meets the tests that reach its line, by a run with
+coverage that comes first and is kept by groups of files, and the examples of its file; what runs on
+import alone also the contract of classes, which reads the source. Then, where none of them notices,
+the other tests of their files, which may take what a fixture made of that line for another. The
+tree is a copy. A mutant that no test notices is printed with its line: mend the test, or argue that
+the line does the same without it. Kept mutants are not tried again. The share is told by package,
+each with the interval of Clopper and Pearson, *Biometrika* 26 (1934), 404-413.
 """
 
 from __future__ import annotations
@@ -46,6 +48,11 @@ OPERATORS = (
     *("ReplaceComparisonOperator_Eq_NotEq", "ReplaceComparisonOperator_NotEq_Eq"),
     *("ReplaceUnaryOperator_USub_UAdd", "ReplaceBreakWithContinue", "ZeroIterationForLoop"),
 )
+CONTRACTS = ("tests/contract/test_array_classes.py",)
+"""They read the source of classes: no line of it is run by them."""
+COSTS_ALONE = ("strict", "overwrite_input", "overwrite_a", "overwrite_b", "check_finite", "maxsize")
+"""Arguments that no result depends on: they refuse, keep or overwrite."""
+CACHES = ("lru_cache", "cache")
 MOST_TESTS, MOST_FILES, LONGEST_S = 60, 3, 150
 FILES_AT_ONCE = 24
 """Test files of one run with coverage: what is lost where it is stopped."""
@@ -159,7 +166,7 @@ def _cover(
 
 
 def mutants(tree: Path, packages: Sequence[str]) -> Iterator[Mutant]:
-    """All of those packages, but those of annotations."""
+    """All of those packages, but those of annotations and of what alters no result."""
     from cosmic_ray.ast import ast_nodes, get_ast
     from cosmic_ray.plugins import get_operator
 
@@ -167,7 +174,7 @@ def mutants(tree: Path, packages: Sequence[str]) -> Iterator[Mutant]:
         p for each in packages for p in (tree / "src/flightid" / each).rglob("*.py")
     ):
         text = path.read_text(encoding="utf-8")
-        spans = list(_annotations(ast.parse(text)))
+        spans = list(_left_out(ast.parse(text)))
         nodes = list(ast_nodes(get_ast(text)))
         for name in OPERATORS:
             operator = get_operator(f"core/{name}")()
@@ -177,10 +184,17 @@ def mutants(tree: Path, packages: Sequence[str]) -> Iterator[Mutant]:
                     yield Mutant(str(path.relative_to(tree)), name, occurrence, start[0])
 
 
-def _annotations(module: ast.Module) -> Iterator[tuple[tuple[int, int], tuple[int, int]]]:
-    """Where each begins and ends, line and column: `|` between types runs nowhere."""
+def _left_out(module: ast.Module) -> Iterator[tuple[tuple[int, int], tuple[int, int]]]:
+    """Where what is not changed begins and ends, line and column.
+
+    `|` between types runs nowhere, and `COSTS_ALONE` change no number.
+    """
     for node in ast.walk(module):
-        for told in (getattr(node, "annotation", None), getattr(node, "returns", None)):
+        parts = [getattr(node, "annotation", None), getattr(node, "returns", None)]
+        if isinstance(node, ast.Call):
+            parts += [each.value for each in node.keywords if each.arg in COSTS_ALONE]
+            parts += node.args if getattr(node.func, "id", "") in CACHES else []
+        for told in parts:
             if isinstance(told, ast.expr) and told.end_lineno and told.end_col_offset:
                 yield (told.lineno, told.col_offset), (told.end_lineno, told.end_col_offset)
 
@@ -198,6 +212,8 @@ def end_of(tree: Path, mutant: Mutant, names: Reached) -> str:
         return "no change"
     files = list(dict.fromkeys(each.partition("::")[0] for each in tests))[:MOST_FILES]
     examples = ["--doctest-modules", mutant.path]
+    if not names.get(mutant.path, {}).get(mutant.line):
+        examples += CONTRACTS
     for words in ([*tests[:MOST_TESTS], *examples], *([each] for each in files)):
         try:
             place.write_text(changed, encoding="utf-8")
