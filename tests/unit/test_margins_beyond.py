@@ -5,11 +5,15 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 import pytest
 
 import flightid as fid
+from flightid.control.margins import gain_limits
+from flightid.control.margins.loop_source import read_loop
+from flightid.control.margins.margins import margins_of
 from flightid.control.margins.resonance_slack import TAKEN
 from flightid.conventions import Light
 from flightid.evidence.evidence import Check, Evidence
@@ -115,6 +119,24 @@ def test_margins_promise_no_more_than_a_frame_above_the_band_leaves(
         assert found.sensitivity_peak.interval95[1] >= 1.0 / nearest
         assert rejected.peak.interval95[1] >= -20.0 * np.log10(nearest)
     assert min(true) < known.gain_margin.interval95[0] - 3.0, "frames take what was promised"
+
+
+def test_all_frequencies_of_a_loop_are_found_once_and_each_draw_is_run_once(monkeypatch) -> None:
+    found, once = [], gain_limits.measured_up
+    monkeypatch.setattr(gain_limits, "measured_up", lambda loop: found.append(loop) or once(loop))
+    source = Uncertain(np.array([8.0, 30.0]), np.diag([0.01, 0.1]), partial(_lagged, 0.01))
+    band: dict[str, Any] = {"given": "broken", "band_rad_s": (1.0, 60.0)}
+    loop = read_loop(source, None, None, controller=None, unstable_poles=None, **band)
+    margins_of(loop)
+    assert len(found) == 1
+    assert gain_limits.everywhere(loop, loop.omega_rad_s) is not None
+    assert len(found) == 1, "known of this loop"
+    asked = []
+    whole = replace(
+        loop, whole_rad_s=None, of=lambda thing, w: asked.append(w) or loop.of(thing, w)
+    )
+    gain_limits.loop_numbers(whole, whole.omega_rad_s, [source.value], ["phase_margin_deg"])
+    assert [len(each) for each in asked] == [len(loop.omega_rad_s) + 1]
 
 
 def _lagged(delay: float, n: np.ndarray) -> fid.LinearSystem:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,8 @@ GAIN_LIMITS = {
     "gain_reduction_margin_db": "gain_reduction_rad_s",
 }
 """How far the gain may go, and where."""
+_UNBOUNDED: WeakKeyDictionary[BrokenLoop, Array] = WeakKeyDictionary()
+"""Frequencies of `everywhere` of loops that are still about."""
 GAIN_MARGINS = (*GAIN_LIMITS, *GAIN_LIMITS.values())
 
 
@@ -68,8 +71,11 @@ def everywhere(loop: BrokenLoop, omega: Array) -> Array | None:
     if loop.measured:
         return None
     if loop.whole_rad_s is not None:
-        unbounded = replace(loop, omega_rad_s=loop.whole_rad_s, closed_unstable_poles=None)
-        omega = measured_up(unbounded)[0]
+        # They are those of the loop as estimated, whichever of its draws is asked.
+        if loop not in _UNBOUNDED:
+            unbounded = replace(loop, omega_rad_s=loop.whole_rad_s, closed_unstable_poles=None)
+            _UNBOUNDED[loop] = measured_up(unbounded)[0]
+        omega = _UNBOUNDED[loop]
     return np.asarray(np.concatenate([STEADY * omega[:1], omega]))
 
 
@@ -110,15 +116,18 @@ def loop_numbers(
     loop: BrokenLoop, omega: Array, things: Sequence[Any], names: Sequence[str]
 ) -> tuple[Array, Complex]:
     """Numbers of loops by name of `LoopMetrics`, shape (n, n_names), and the loops, (n, n_f)."""
-    values = np.array([loop.of(each, omega) for each in things])
-    found, whole = loop.metrics(omega, values), everywhere(loop, omega)
+    whole = everywhere(loop, omega)
+    # All frequencies are those of the band and one below them, or others.
+    asked = omega if whole is None or loop.whole_rad_s is not None else whole
+    every = np.array([loop.of(each, asked) for each in things])
+    values = every[:, len(asked) - len(omega) :]
+    found = loop.metrics(omega, values)
     numbers = {name: np.array(getattr(found, name)) for name in (*GAIN_MARGINS, *names)}
     for place, each in enumerate(things if whole is not None else ()):
         assert whole is not None
         own = {name: float(row[place]) for name, row in numbers.items()}
-        if loop.whole_rad_s is None:
-            # All frequencies are those of the band and one below them.
-            seen = np.concatenate([loop.of(each, whole[:1]), values[place]])
+        if asked is whole:
+            seen = every[place]
         elif all(own[at] > whole[1] for at in GAIN_LIMITS.values()):
             continue  # a band that holds both limits has told them
         else:
