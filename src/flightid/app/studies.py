@@ -248,7 +248,10 @@ def text_of(path: Path) -> str:
     """
     try:
         return read_plain(path, DOCUMENT_BYTES).decode()
-    except (OSError, UnicodeError) as error:
+    except UnicodeDecodeError as error:
+        found = f"{path.name}: byte {error.start} is none of UTF-8"
+        raise StudyError("the study file is no text", found=found, needed="UTF-8") from error
+    except OSError as error:
         raise StudyError(
             "the study file cannot be read", found=str(error), needed="a file of UTF-8"
         ) from error

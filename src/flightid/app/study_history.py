@@ -32,7 +32,7 @@ class Versions:
     -------
     >>> made = Versions(("a",), 0).followed_by("b").followed_by("c")
     >>> made.moved(-1).text, made.moved(-1).followed_by("d").texts
-    ('b', ('a', 'c', 'b', 'd'))
+    ('b', ('c', 'a', 'b', 'd'))
     >>> made.behind, made.ahead, made.standing("b").ahead, made.standing("x").texts
     (2, 0, 1, ('a', 'b', 'c', 'x'))
     """
@@ -60,12 +60,12 @@ class Versions:
         return Versions(self.texts, self.at + steps)
 
     def followed_by(self, text: str) -> Versions:
-        """With a version after the one that stands; what was ahead of it lies before that one.
+        """With a version after the one that stands; what was ahead of that lies before all others.
 
-        Whatever stood once can be gone back to, what was taken back too.
+        So Undo goes back as it would without them, and whatever stood once is reached in the end.
         """
-        before, ahead = self.texts[: self.at], self.texts[self.at + 1 :]
-        return Versions(_bounded((*before, *ahead, self.text, text)), -1)._counted()
+        stood, ahead = self.texts[: self.at + 1], self.texts[self.at + 1 :]
+        return Versions(_bounded((*ahead, *stood, text)), -1)._counted()
 
     def standing(self, text: str) -> Versions:
         """Where a text stands that nobody told of: a kill cut the step off, or a hand wrote it."""
