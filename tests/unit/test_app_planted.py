@@ -17,9 +17,9 @@ from flightid.app import jobs
 from flightid.app.jobs import Workers
 from flightid.app.kept_parts import kept_fields, kept_overview
 from flightid.app.own_folders import made_name
-from flightid.app.schemas import Job
+from flightid.app.schemas import Job, WholeText
 from flightid.app.studies import Studies
-from flightid.app.study_edits import KeyEdit, edited, require_study
+from flightid.app.study_edits import KeyEdit, edited, etag_of, require_study
 from flightid.app.workspace import NAME_BYTES, Workspace, plain_name
 from flightid.errors import OptionError, StudyError
 from tests.sweep_log import SweepFlight
@@ -65,8 +65,13 @@ def test_a_draft_is_never_written_through_a_link(tmp_path: Path) -> None:
     assert target.read_text() == "original"
     workspace = Workspace(tmp_path)
     (tmp_path / "studies" / f"{'0' * 16}.toml").symlink_to(target)
+    told = Studies(workspace).read("0" * 16)
+    assert told is not None
+    assert (told.state, told.text, told.etag) == ("no text", "", "")
+    assert "a study file is a link" in told.lack
     with pytest.raises(OptionError, match="a study file is a link"):
-        Studies(workspace).read("0" * 16)
+        Studies(workspace).replace("0" * 16, WholeText(text="a = 1"), etag_of("original"))
+    assert target.read_text() == "original"
 
 
 def test_what_a_living_app_uploads_is_left_alone(tmp_path: Path) -> None:

@@ -31,13 +31,14 @@ OTHER = TEXT.replace('"A rig"', '"Of an editor"')
 TYPED = TEXT.replace('"A rig"', '"As typed"')
 NONSENSE = TEXT.replace('structure = "arx"', "structure = 3")
 """TOML, and no study."""
-LEFT: dict[str, tuple[str | bytes | None, str]] = {
+LEFT: dict[str, tuple[str | bytes | Path | None, str]] = {
     "as known": (TEXT, "readable"),
     "changed": (OTHER, "readable"),
     "a slip": (BROKEN, "unreadable"),
     "nonsense": (NONSENSE, "unreadable"),
     "emptied": ("", "unreadable"),
     "no text": (b"\xff\xfe", "no text"),
+    "a link": (Path(__file__), "no text"),
     "removed": (None, "lost"),
 }
 """What an editor leaves, and the state in which the page shall be told of it."""
@@ -94,10 +95,12 @@ class _Desk:
         )
         asyncio.run(_proposed(cast("Any", stage), RIG, RigProposal()))
 
-    def leave(self, content: str | bytes | None) -> None:
+    def leave(self, content: str | bytes | Path | None) -> None:
         """As an editor does."""
-        if content is None:
+        if content is None or isinstance(content, Path):
             self.path.unlink()
+            if content is not None:
+                self.path.symlink_to(content)
         else:
             self.path.write_bytes(content if isinstance(content, bytes) else content.encode())
 

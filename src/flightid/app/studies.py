@@ -67,12 +67,14 @@ class Studies:
         What stands is kept as a version: the page has shown it, and an editor may take it away.
         """
         with self._lock:
-            path = self.path(log)
-            if path is None:
-                return self._lost(log)
             try:
+                path = self._workspace.study_path(log)
+                if not path.exists():
+                    return self._lost(log)
                 text = text_of(path)
             except FlightidError as error:
+                if not ID.fullmatch(log):
+                    raise
                 return self._bare(log, "no text", str(error))
             try:
                 versions = self._history.seen(log, text)
@@ -170,13 +172,13 @@ class Studies:
         """
         with self._lock:
             path = self._workspace.study_path(log)
-            stands = path.is_file()
+            stands = path.exists()
             if stands:
                 text = text_of(path)
                 if etag_of(text) != tag:
                     raise HTTPException(409, {"text": text, "etag": etag_of(text)})
                 old: Versions | None = self._history.seen(log, text)
-            elif tag != UNWRITTEN or path.exists() or not self._is_known(log):
+            elif tag != UNWRITTEN or not self._is_known(log):
                 return None
             else:
                 text, old = "", self._history.held(log)
@@ -244,8 +246,10 @@ def text_of(path: Path) -> str:
     Raises
     ------
     StudyError
-        It is a link, too long, no UTF-8, or cannot be read.
+        It is a link, a folder, too long, no UTF-8, or cannot be read.
     """
+    if path.is_dir():
+        raise StudyError("the study file is no file", found=f"a folder, {path.name}")
     try:
         return read_plain(path, DOCUMENT_BYTES).decode()
     except UnicodeDecodeError as error:
