@@ -56,7 +56,7 @@ export class Study {
   #shown: StudyText | null = $state.raw(null);
   /** The whole text as a hand has typed it, and the one from which it began. */
   typed: Draft | null = $state.raw(null);
-  /** Whether that was typed before this page was opened. */
+  /** Whether that was typed before this page, or the screen that is shown, was opened. */
   again = $state(false);
   error = $state("");
   conflict: Conflict | null = $state.raw(null);
