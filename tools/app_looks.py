@@ -9,7 +9,7 @@ extras app and fleet.
 
 from __future__ import annotations
 
-import sys
+import argparse
 from pathlib import Path
 
 from app_screens import REST_MS, SCREENS
@@ -52,4 +52,10 @@ def main(folder: Path, names: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), sys.argv[2:])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("folder", type=Path, help="keeps what is flown and computed")
+    parser.add_argument("screens", nargs="*", metavar="SCREEN", help=", ".join(SCREENS))
+    asked = parser.parse_args()
+    if unknown := [each for each in asked.screens if each not in SCREENS]:
+        parser.error(f"no screen is called {unknown[0]}; there are {', '.join(SCREENS)}")
+    main(asked.folder, asked.screens)

@@ -8,6 +8,7 @@ Chromium, the built page and the extras app and fleet. Writes docs/pictures/app-
 
 from __future__ import annotations
 
+import argparse
 import sys
 import tempfile
 from pathlib import Path
@@ -48,8 +49,11 @@ def main(folder: Path, names: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    if len(sys.argv) > 1:
-        main(Path(sys.argv[1]), sys.argv[2:])
-    else:
-        with tempfile.TemporaryDirectory() as made:
-            main(Path(made), [])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("folder", nargs="?", type=Path, help="keeps what is flown and computed")
+    parser.add_argument("screens", nargs="*", metavar="SCREEN", help=", ".join(SCREENS))
+    asked = parser.parse_args()
+    if unknown := [each for each in asked.screens if each not in SCREENS]:
+        parser.error(f"no screen is called {unknown[0]}; there are {', '.join(SCREENS)}")
+    with tempfile.TemporaryDirectory() as made:
+        main(asked.folder or Path(made), asked.screens)
