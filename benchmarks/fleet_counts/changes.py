@@ -151,7 +151,7 @@ def shared(fleets: int) -> Section:
 
 
 def kinds(fleets: int) -> Section:
-    """Whether a change was at once or by and by, and the size of a drift."""
+    """Whether a change was at once or gradually, and the size of a drift."""
 
     def rows() -> Iterator[Words]:
         for n in (12, 40):
@@ -177,7 +177,7 @@ def kinds(fleets: int) -> Section:
                     )
 
     return Section(
-        ("what happens to 5 of 20", "flights", "found", "at once", "by and by", "changed",
+        ("what happens to 5 of 20", "flights", "found", "at once", "gradually", "changed",
          "size held"), rows,
     )  # fmt: skip
 

@@ -64,6 +64,11 @@ def test_the_page_says_of_a_fleet_what_its_report_says(tmp_path: Path) -> None:
     first = part.histories[0]
     told = next(h for h in drift.histories if (h.vehicle, h.name) == (first.vehicle, first.name))
     assert first.changed
+    # What a light speaks of has its picture before the least likely of what it does not.
+    place = [(each.vehicle, each.name) for each in part.histories]
+    moved = place.index(("v02", "Ltphi"))
+    assert "at the event “new motor”" in part.histories[moved].words
+    assert set(place[: moved + 1]) <= drift.cited
     assert first.values == told.values.tolist()
     assert_close(
         np.array(first.half), 1.959964 * np.sqrt(told.variances), rtol=1e-6, why="95 %, normal"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -45,7 +45,7 @@ from flightid.fleet.page import (
 )
 from flightid.fleet.statistics.answers import FleetAnswers, TypeAnswers
 from flightid.fleet.statistics.parameter_history import ParameterHistory
-from flightid.fleet.vehicle_lights import change_words, going_on_words
+from flightid.fleet.vehicle_lights import change_words, event_words, going_on_words
 from flightid.table import Table
 from flightid.uncertainty.quantiles import half_width, showing, shown
 
@@ -76,8 +76,8 @@ def answer_fleet(place: Path) -> dict[str, Any]:
     """The answers of a fleet's catalogue."""
     answers, level = _answers(place), _level(place)
     with showing(level):
-        every = [(t, h) for t in answers.types if t.drift for h in t.drift.judged]
-        every.sort(key=lambda pair: pair[1].chance or 0.0)
+        every = [(t.drift, t, h) for t in answers.types if t.drift for h in t.drift.drawn]
+        every.sort(key=lambda each: each[0].place_drawn(each[2]))
         return FleetPart(
             title=_title(place),
             words=fleet_words(answers),
@@ -87,7 +87,7 @@ def answer_fleet(place: Path) -> dict[str, Any]:
                 _vehicle(name, found, answers) for name, found in fleet_vehicles(answers).items()
             ],
             types=[_type(each) for each in answers.types],
-            histories=[_history(*pair) for pair in every[:SHOWN]],
+            histories=[_history(t, h) for _, t, h in every[:SHOWN]],
             refused=_table(_refused(answers)),
             undated=answers.undated,
         ).model_dump()
@@ -241,7 +241,19 @@ def _words(of: TypeAnswers, each: ParameterHistory) -> str:
     """What changed or may have, else what would have been found; empty where nothing was asked."""
     if each.is_alarm:
         return change_words(each, of.labels)
-    return going_on_words(each, of.labels) if each.goes_on else least_words(each)
+    if each.goes_on:
+        return going_on_words(each, of.labels)
+    return "; ".join(_doubts(of, each)) or least_words(each)
+
+
+def _doubts(of: TypeAnswers, each: ParameterHistory) -> Iterator[str]:
+    """What events did to it, and whether its newest flight is off, as its light says."""
+    if of.drift is None:
+        return
+    yield from (event_words(h, e, of.labels) for h, e in of.drift.by_event if h is each)
+    for newest in of.drift.newest_off:
+        if (newest.vehicle, newest.name) == (each.vehicle, each.name):
+            yield newest.words(of.labels)
 
 
 def _flight(row: Mapping[str, Any]) -> FleetFlight:

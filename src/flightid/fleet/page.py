@@ -238,9 +238,10 @@ def _drift_blocks(drift: FleetDrift, labels: Mapping[str, str]) -> Iterator[Bloc
     if drift.judged:
         caption = (
             "Estimates of flights with their intervals, what covariates explain taken out; the "
-            "level behind them; orange where it changed, and when. Drawn are the least likely ones."
+            "level behind them; orange where it changed, and when. What a light speaks of is drawn "
+            "first, then the least likely ones."
         )
-        yield figure_block(history_picture(drift.judged[:SHOWN], labels), caption)
+        yield figure_block(history_picture(drift.drawn[:SHOWN], labels), caption)
 
 
 def _unchanged(drift: FleetDrift, changes: Table) -> str:

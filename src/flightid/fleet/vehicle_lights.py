@@ -87,7 +87,7 @@ def _left_behind(history: ParameterHistory, each: TypeAnswers) -> str:
 
 def change_words(history: ParameterHistory, labels: Mapping[str, str]) -> str:
     """What changed, by how much, in words."""
-    how = {STEP: " at once", DRIFT: " by and by, the last flight beside those before"}.get(
+    how = {STEP: " at once", DRIFT: " gradually, the last flight beside those before"}.get(
         history.kind, ""
     )
     name, change = labels.get(history.name, history.name), history.change_percent

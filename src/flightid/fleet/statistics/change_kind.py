@@ -1,4 +1,4 @@
-"""Whether a level changed at once or by and by, where the flights can tell: a calibrated choice."""
+"""Whether a level changed at once or gradually, where the flights can tell: a calibrated choice."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from flightid.fleet.statistics.largest_step import FEWEST, NEWEST, SHORTEST
 
 Array = NDArray[np.float64]
 STEP, DRIFT, CHANGED = "a step", "drift", "changed"
-"""At once; by and by; and where the flights do not tell which."""
+"""At once; gradually; and where the flights do not tell which."""
 DRAWS = 399
 WRONG = 0.05
 """Chance of ruling out the kind that it was."""

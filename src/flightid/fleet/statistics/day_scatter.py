@@ -101,7 +101,7 @@ def day_scatter(groups: Iterable[DayMeans]) -> DayScatter:
 
     Assumes
     -------
-    Days differ alike on all vehicles, independently; a movement by and by counts in part.
+    Days differ alike on all vehicles, independently; a gradual movement counts in part.
     """
     kept = [each for each in groups if each.free >= FEWEST_FREE]
     moments = [(len(each.means), *left_of_normal(each.free)) for each in kept]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import field
 from functools import cached_property
@@ -140,6 +141,25 @@ class FleetDrift(Result, schema="flightid.fleet_drift/1"):
         """Histories long enough to be asked, the least likely first."""
         found = [each for each in self.histories if each.chance is not None]
         return tuple(sorted(found, key=lambda each: each.chance or 0.0))
+
+    @cached_property
+    def cited(self) -> frozenset[tuple[str, str]]:
+        """Vehicle and parameter of all that a light of a vehicle speaks of."""
+        said = (*self.alarms, *self.going_on, *(each for each, _ in self.by_event))
+        found = {(each.vehicle, each.name) for each in said}
+        return frozenset(found | {(each.vehicle, each.name) for each in self.newest_off})
+
+    @property
+    def drawn(self) -> tuple[ParameterHistory, ...]:
+        """Histories for pictures: what a light speaks of, then the least likely of the others."""
+        every = [each for each in self.histories if self.place_drawn(each)[1] < math.inf]
+        return tuple(sorted(every, key=self.place_drawn))
+
+    def place_drawn(self, each: ParameterHistory) -> tuple[bool, float]:
+        """Where a picture of a history stands among others; at infinity it says nothing."""
+        is_cited = (each.vehicle, each.name) in self.cited
+        chance = each.chance if each.chance is not None else 1.0 if is_cited else math.inf
+        return not is_cited, chance
 
     @property
     def newest_off(self) -> tuple[NewestFlight, ...]:

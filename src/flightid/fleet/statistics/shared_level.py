@@ -64,7 +64,7 @@ class SharedLevel:
         Vehicles that tell it, and those of them that move with the others: of a step those whose
         own is told apart from none, and not apart from it.
     trend : SharedTrend or None
-        Where all may rise or fall by and by; beside a step where days do not tell which it is.
+        Where all may rise or fall gradually; beside a step where days do not tell which it is.
     telling : tuple of str
         Of a step: vehicles whose own is told apart from none, and not apart from it.
     """
@@ -101,16 +101,14 @@ class SharedLevel:
 
     @property
     def course(self) -> str:
-        """What they did: at once, by and by, either where their days do not tell, or otherwise."""
+        """What they did: at once, gradually, either where their days do not tell, or otherwise."""
         unit = "" if self.change.unit == "1" else f" {self.change.unit}"
         since = datetime.datetime.fromtimestamp(self.since_s, datetime.UTC).date().isoformat()
         low, high = self.change.interval(shown()) or (-np.inf, np.inf)
         by = f"{self.change.value:+.2g}{unit} ({low:+.2g} to {high:+.2g}{unit})"
         at_once = f"changed together by {by} from {since}"
         if self.trend is not None and self.is_step:
-            return (
-                f"{at_once}, or {self.trend.words}; their days do not tell at once from by and by"
-            )
+            return f"{at_once}, or {self.trend.words}; their days do not tell which"
         if self.trend is not None:
             return self.trend.words
         if self.is_step:
