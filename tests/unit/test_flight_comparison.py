@@ -27,8 +27,10 @@ from flightid.record import Record
 from flightid.review.changes import (
     TRACKING,
     ExpectedLoop,
+    LoopChange,
     _beside,
     change_of,
+    significant_of,
     verdicts,
 )
 from flightid.review.comparison import compare_loops, expected, unheld
@@ -376,6 +378,27 @@ def test_parts_of_one_log_are_compared(
     assert str(none.value).count("nothing was flown") == 1
     assert run(["compare", f"{log}@0:1", str(log)]) == 2
     assert "lies outside of the log: 10.0 to" in capsys.readouterr().err
+
+
+def test_a_difference_beyond_its_own_interval_is_told_where_chance_allows_it() -> None:
+    """It stood under "flown as promised" without a word: the reader saw zero outside of it."""
+
+    def change(loop: str, apart: float) -> LoopChange:
+        one, other = (Estimate("gain at 1 Hz", 0.4 + by, "1", 1e-3) for by in (0.0, apart))
+        return change_of(loop, one, other)
+
+    same = [change(f"loop {k}", 1e-4 * (k - 9)) for k in range(19)]
+    beyond = change("yaw rate", 3.2e-3)
+    assert beyond.excludes_zero
+    assert not any(each.excludes_zero for each in same)
+    significant = significant_of([*same, beyond])
+    assert significant == (), "by Holm's rule over all rows"
+    for promised, told in ((True, "flown as promised"), (False, "no change beyond chance")):
+        (found,) = verdicts([*same, beyond], significant, promised=promised)
+        said = "1 is beyond its own 95 % interval, where chance alone brings 1 of so many"
+        assert found.message == f"20 numbers of 20 loops: {told}; {said}"
+        (found,) = verdicts(same, (), promised=promised)
+        assert found.message == f"19 numbers of 19 loops: {told}"
 
 
 @pytest.fixture(scope="module")

@@ -39,6 +39,7 @@ export interface ChangeRow {
   after: string;
   difference: string;
   significant: boolean;
+  alone: boolean;
 }
 
 /** Both sides. */

@@ -34,6 +34,8 @@ class ChangeRow(Message):
     after: str
     difference: str
     significant: bool
+    alone: bool
+    """Beyond its own 95 % interval, but not beyond chance among all rows."""
 
 
 class LoopSteps(Message):

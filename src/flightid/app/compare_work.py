@@ -151,6 +151,7 @@ def _row(change: LoopChange, significant: bool) -> ChangeRow:
         after=told(change.after),
         difference=told(change.difference),
         significant=significant,
+        alone=change.chance is not None and change.excludes_zero and not significant,
     )
 
 

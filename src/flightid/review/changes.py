@@ -96,6 +96,12 @@ class LoopChange:
         return (IN_MILLISECONDS, "ms") if unit == "s" else (1.0, "" if unit == "1" else unit)
 
     @property
+    def excludes_zero(self) -> bool:
+        """Whether the 95 % interval of the difference, taken alone, leaves zero out."""
+        low, high = self.difference.interval(0.95) or (0.0, 0.0)
+        return low > 0.0 or high < 0.0
+
+    @property
     def words(self) -> str:
         """Name and both numbers."""
         factor, unit = self.shown_unit
@@ -234,8 +240,19 @@ def verdicts(
         small = sum(each.key in significant for each in judged)
         if small:
             told += f" but for {small} that changed by less than what counts ({TOLERANCE})"
+        told += _alone(judged, significant)
         code = "promise-kept" if promised else "loops-unchanged"
         yield Finding(code, Light.GREEN, f"{said}: {told}")
+
+
+def _alone(judged: Sequence[LoopChange], significant: Sequence[str]) -> str:
+    """Differences beyond their own interval that are none beyond chance among so many."""
+    alone = sum(each.excludes_zero for each in judged if each.key not in significant)
+    if not alone:
+        return ""
+    verb, whose = ("is", "its") if alone == 1 else ("are", "their")
+    usual = f"chance alone brings {0.05 * len(judged):.2g} of so many"
+    return f"; {alone} {verb} beyond {whose} own 95 % interval, where {usual}"
 
 
 def _changed(
