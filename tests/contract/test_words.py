@@ -66,6 +66,43 @@ def test_a_shared_name_is_seen() -> None:
     ]
 
 
+JOINED = re.compile(r"\{[^{}]*%\}|(?<=[\d}])%(?=[ ,.;:)\"'])")
+"""A percent sign without its space: of a format, or behind a number or a value of a sentence."""
+
+
+def test_percent_signs_stand_apart() -> None:
+    """Sentences had "99.0%" beside "93.5 %"."""
+    offenders = [
+        f"{path.relative_to(PACKAGE)}:{node.lineno}"
+        for path in python_files()
+        for node in nodes(tree(path))
+        if (isinstance(node, ast.FormattedValue) and _is_percent(node))
+        or (isinstance(node, ast.JoinedStr) and JOINED.search(_flat(node)))
+    ]
+    assert not offenders, "write f'{100.0 * share:.0f} %': " + ", ".join(offenders)
+
+
+def _is_percent(node: ast.FormattedValue) -> bool:
+    return node.format_spec is not None and ast.unparse(node.format_spec).rstrip("'\"").endswith(
+        "%"
+    )
+
+
+def _flat(node: ast.JoinedStr) -> str:
+    """Text of a sentence, a number in place of each value."""
+    parts = (each.value if isinstance(each, ast.Constant) else "0" for each in node.values)
+    return "".join(map(str, parts)) + " "
+
+
+def test_a_joined_percent_sign_is_seen() -> None:
+    (planted,) = ast.parse("f'{share:.0%} of them'").body
+    (format_,) = (n for n in ast.walk(planted) if isinstance(n, ast.FormattedValue))
+    assert _is_percent(format_)
+    (planted,) = ast.parse("f'at {share}% of them'").body
+    (sentence,) = (n for n in ast.walk(planted) if isinstance(n, ast.JoinedStr))
+    assert JOINED.search(_flat(sentence))
+
+
 def test_a_participle_is_seen() -> None:
     assert [bool(_offences(name)) for name in ("Taken", "_Staged", "LineFlown")] == [True] * 3
     assert _offences("MeasuredMotion") == ["MeasuredMotion: call it ODE model"]

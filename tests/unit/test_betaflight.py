@@ -237,7 +237,7 @@ def test_loops_of_a_log_are_those_of_its_header(tmp_path: Path) -> None:
         "d_max_roll": 40.0,
         "simplified_pids_mode": 2.0,
     }
-    assert "TPA leaves 100% of P and " in " ".join(loop.unmodelled)
+    assert "TPA leaves 100 % of P and " in " ".join(loop.unmodelled)
     for firmware in ("Betaflight 3.0.1", "EmuFlight 0.4.1"):
         other = _log(tmp_path, **{"Betaflight 2025.12.1": firmware})
         with pytest.raises(DataError, match=r"needed Betaflight 3\.1 or newer"):

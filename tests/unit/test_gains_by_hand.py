@@ -151,7 +151,7 @@ def test_an_unstable_loop_is_called_that_and_its_margins_are_no_shares(by_hand: 
     slack = {"stability": 2.0, "loop: phase margin": -0.4, "loop: sensitivity peak": -1.8}
     short = GainSearchResult(np.ones(3), False, ("loop: phase margin",), slack, by_hand)
     said = verdict(short, np.zeros(3, bool), 3).message
-    assert said.endswith(": loop: phase margin -40%, loop: sensitivity peak")
+    assert said.endswith(": loop: phase margin -40 %, loop: sensitivity peak")
     slack = {"stability": -1.0, "loop: phase margin": -2.31}
     unstable = GainSearchResult(np.ones(3), False, ("stability",), slack, by_hand)
     said = verdict(unstable, np.zeros(3, bool), 3).message

@@ -135,7 +135,7 @@ def test_gains_are_those_of_the_header_and_go_back(tmp_path: Path) -> None:
     assert [(s.name, s.settings) for s in loop.filter_stages()] == [
         ("dterm_lpf_hz", "PT2 at 90 Hz")
     ]
-    assert "TPA leaves 96% of P and D" in " ".join(loop.unmodelled)
+    assert "TPA leaves 96 % of P and D" in " ".join(loop.unmodelled)
     made = write_parameters("inav", [GainChange("mc_p_pitch", 50, 44)], tmp_path / "gains.txt")
     assert "set mc_p_pitch = 50" in made.path.read_text().splitlines()
     assert made.rollback is not None

@@ -190,7 +190,7 @@ def test_a_step_that_p_alone_does_not_follow_is_told() -> None:
     _, steps = scipy.signal.step(([10.0 * kp], [1.0, 5.0 + 10.0 * kp]), T=np.linspace(0.0, 9.0, 99))
     told = next(each for each in design.findings if each.code == "standing-error")
     assert told.light is Light.AMBER
-    assert f"ends {1.0 - steps[-1]:.0%} short of it" in told.message
+    assert f"ends {100.0 * (1.0 - steps[-1]):.0f} % short of it" in told.message
     falling = LinearSystem([[2.0]], [[1.0]], [[-3.0]], [[0.0]], ("u",), ("y",))
     integrator = LinearSystem([[0.0]], [[1.0]], [[3.0]], [[0.0]], ("u",), ("y",))
     loop = _loop(direct=True).with_gains(Kp=4.0, Ki=0.0, b=1.0)
@@ -289,7 +289,7 @@ def test_few_plants_of_the_other_sign_leave_the_promise_of_the_others(
     assert design.n_plants == 101 - against
     assert_close(design.content, least_share(100 - against, 100), rtol=1e-12, why="Clopper-Pearson")
     (note,) = design.worst_case_table().notes
-    part = float(re.search(r"; ([\d.]+)% of such plants", note).group(1))
+    part = float(re.search(r"; ([\d.]+) % of such plants", note).group(1))
     assert 0.0 <= 100.0 * design.content - part < 0.1
     assert part % 1.0
 

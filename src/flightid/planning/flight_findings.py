@@ -71,7 +71,7 @@ def _trims(log: Log, phases: FlightPhases, sweeps: Iterable[AxisSweep]) -> Itera
             "trim-let-go",
             Light.AMBER,
             f"{each.axis}: the sweep is flown with {let_go[0]} 0, and the integrator held "
-            f"{np.mean(held):+.0%} of full command in this flight: without it the vehicle turns as "
-            "the sweep begins",
+            f"{100.0 * np.mean(held):+.0f} % of full command in this flight: without it the "
+            "vehicle turns as the sweep begins",
             "take the trim out first (motors, frame, centre of gravity), or hold it by stick",
         )

@@ -47,7 +47,7 @@ def folded_power(name: str, time_s: Array, samples: Array, step_s: float) -> Sam
     True
     >>> fault = folded_power("p", t, motion + np.sin(2 * np.pi * 83.0 * t), 0.02)
     >>> print(fault.finding.message.split(":")[1])
-     45% of its power lies above 25 Hz, most at 82.8 Hz, which folds to 17.2 Hz
+     45 % of its power lies above 25 Hz, most at 82.8 Hz, which folds to 17.2 Hz
     """
     good = np.isfinite(samples) & np.isfinite(time_s)
     time_s, values = time_s[good], samples[good]
@@ -65,7 +65,7 @@ def folded_power(name: str, time_s: Array, samples: Array, step_s: float) -> Sam
     line_hz = float(frequency[above][np.argmax(power[above])])
     folded_hz = abs(line_hz - new_hz * round(line_hz / new_hz))
     said = (
-        f"{name}: {share:.0%} of its power lies above {0.5 * new_hz:.3g} Hz, most at "
+        f"{name}: {100.0 * share:.0f} % of its power lies above {0.5 * new_hz:.3g} Hz, most at "
         f"{line_hz:.3g} Hz, which folds to {folded_hz:.3g} Hz: it is read at the instants of the "
         "inputs, without a low-pass"
     )

@@ -75,7 +75,7 @@ def bridge_outliers(
         raise DataError(
             f"too many samples of channel {name!r} would count as outliers",
             found=f"{count} of {samples.size}",
-            needed=f"at most {MOST:.0%}",
+            needed=f"at most {100.0 * MOST:.0f} %",
             action="raise deviations, or leave the channel out",
         )
     good = present & ~bad

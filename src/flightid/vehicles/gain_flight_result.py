@@ -132,7 +132,7 @@ class GainFlight(Result, schema="flightid.gain_flight/1"):
         ]  # fmt: skip
         found += [
             Finding("saturated", Light.RED,
-                    f"{axis}: hands off, the command reaches {size:.0%} of what there is",
+                    f"{axis}: hands off, the command reaches {100.0 * size:.0f} % of what there is",
                     "do not fly these gains: the vehicle oscillates, and no margin counts")
             for axis, size in self.largest_command.items() if size >= SATURATED
         ]  # fmt: skip

@@ -80,7 +80,7 @@ class QuadrotorParameters(Options):
         if self.hover_throttle >= 1:
             raise OptionError(
                 "the motors cannot lift the vehicle",
-                found=f"hover at {self.hover_throttle:.0%} of full thrust",
+                found=f"hover at {100.0 * self.hover_throttle:.0f} % of full thrust",
                 needed="below 100 %",
             )
 

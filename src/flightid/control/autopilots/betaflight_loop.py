@@ -346,8 +346,8 @@ def _said(known: Mapping[str, float], axis: str, throttle: float, era: Betafligh
     shares = throttle_shares(known, throttle, era)
     if known.get("tpa_rate"):
         said.append(
-            f"TPA leaves {shares[0]:.0%} of P and {shares[1]:.0%} of D at the flight's throttle "
-            f"of {throttle:.0%}: this view stays there"
+            f"TPA leaves {100.0 * shares[0]:.0f} % of P and {100.0 * shares[1]:.0f} % of D at the "
+            f"flight's throttle of {100.0 * throttle:.0f} %: this view stays there"
         )
     if known.get("tpa_rate") and era.gyro_at_once and era.tpa_of_d and "tpa_mode" not in known:
         said.append("this version's header does not tell tpa_mode: TPA is taken as of D alone")

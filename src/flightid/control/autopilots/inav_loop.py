@@ -165,8 +165,8 @@ def _said(known: Mapping[str, float], throttle: float, share: float) -> tuple[st
     said = ["d_boost moves D with the motion, and the log tells none of its settings: D is at rest"]
     if known.get("tpa_rate"):
         said.append(
-            f"TPA leaves {share:.0%} of P and D at the flight's throttle of {throttle:.0%}: this "
-            "view stays there"
+            f"TPA leaves {100.0 * share:.0f} % of P and D at the flight's throttle of "
+            f"{100.0 * throttle:.0f} %: this view stays there"
         )
     said.append(
         "mc_iterm_relax, antigravity_gain, mc_cd_lpf_hz and pid_iterm_limit_percent are not "

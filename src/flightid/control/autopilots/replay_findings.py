@@ -160,20 +160,19 @@ def _limits(c: Circumstances) -> list[Finding]:
     if c.signals.unallocated is not None:
         share = float(np.mean(c.signals.unallocated.values != 0))
         if share > 0:
-            text = f"the allocation could not give the torque in {share:.0%} of its rows"
+            text = f"the allocation could not give the torque in {100.0 * share:.0f} % of its rows"
             found.append(Finding("limit-flag", Light.AMBER, text, "choose a span without limits"))
     if c.signals.flags is not None:
         bits = c.signals.flags.values.astype(int)
         limited = float(np.mean((bits & LIMIT) > 0))
         reset = float(np.mean((bits & (RESET | I_SET)) > 0))
         if limited > 0:
-            text = (
-                f"the limit flag is set in {limited:.0%} of the rows: the integrator may not grow"
-            )
+            rows = f"{100.0 * limited:.0f} % of the rows"
+            text = f"the limit flag is set in {rows}: the integrator may not grow"
             found.append(Finding("limit-flag", Light.AMBER, text, "choose a span without limits"))
         if reset > 0:
             text = (
-                f"the autopilot set or reset the integrator in {reset:.0%} of the rows; "
+                f"the autopilot set or reset the integrator in {100.0 * reset:.0f} % of the rows; "
                 f"{c.time_s[0]:.2f} to {c.time_s[-1]:.2f} s were replayed"
             )
             found.append(

@@ -61,7 +61,7 @@ def verdict(found: GainSearchResult, met: NDArray[np.bool_], drawn: int) -> Find
         "gains",
         Light.GREEN if share >= ENOUGH else Light.AMBER,
         f"{good} of {drawn} fresh plants meet every requirement: at least "
-        f"{at_least(100.0 * share, 1)}% of those that the data allow (95 % confidence); "
+        f"{at_least(100.0 * share, 1)} % of those that the data allow (95 % confidence); "
         f"{_bound(found)}",
         "" if share >= ENOUGH else "draw more plants for the search",
     )
@@ -97,7 +97,7 @@ def _no_gains(found: GainSearchResult) -> Finding:
 
 def _short(name: str, slack: float) -> str:
     """A requirement with the share of it that is missing, where less than all of it is."""
-    return f"{name} {slack:+.0%}" if slack > -1.0 else name
+    return f"{name} {100.0 * slack:+.0f} %" if slack > -1.0 else name
 
 
 def advice(binding: Sequence[str]) -> str:

@@ -207,7 +207,7 @@ class PidDesign(
             rows.append((*asked, *spread, worst, each.unit, each.shown(each.flown), flown))
         note = (
             f"Worst: of {self.n_plants} plants drawn from what the data allow; "
-            f"{at_least(100.0 * self.content, 1)}% of such plants do at least as well "
+            f"{at_least(100.0 * self.content, 1)} % of such plants do at least as well "
             "(95 % confidence)."
             if self.content
             else "Of the model alone: its errors are not known."

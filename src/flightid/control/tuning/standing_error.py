@@ -72,9 +72,9 @@ def judge_standing(
     first, *others = standing_errors(loop, [estimate, *drawn], output, input)
     worst = max((first, *others), key=abs)
     beyond = "short of" if first >= 0.0 else "beyond"
-    said = f"a step of the set-point ends {abs(first):.0%} {beyond} it, and stays there"
+    said = f"a step of the set-point ends {100.0 * abs(first):.0f} % {beyond} it, and stays there"
     if others:
-        said += f" (worst plant {abs(worst):.0%})"
+        said += f" (worst plant {100.0 * abs(worst):.0f} %)"
     if abs(worst) <= MOST:
         return [Finding("standing-error", Light.GREEN, said)]
     said += ": the controller has no integrator, and the plant none that makes up for it"

@@ -53,12 +53,12 @@ def identified_band(
 
 def no_band(errors: Mapping[str, ModelErrorBound], pairs: Sequence[str]) -> DataError:
     """Why there is no band, and what to do."""
-    far = [f"{name} {errors[name].bound.min():.0%}" for name in pairs if name in errors]
+    far = [f"{name} {100.0 * errors[name].bound.min():.0f} %" for name in pairs if name in errors]
     if far:
         return DataError(
             "the model was nowhere shown to hold, so no gains are made from it",
             found=f"least error against its data: {', '.join(far)}",
-            needed=f"at most {SHOWN:.0%} over some band",
+            needed=f"at most {100.0 * SHOWN:.0f} % over some band",
             action="add the dynamics that the model lacks, or fly a sweep with more amplitude",
         )
     return DataError(

@@ -173,7 +173,7 @@ def _weighted(
         over = float(steps.max() - 1.0)
         if over <= limit:
             return made, []
-    said = f"a step of the set-point overshoots by up to {over:.0%}{how}"
+    said = f"a step of the set-point overshoots by up to {100.0 * over:.0f} %{how}"
     return made, [Finding("overshoot", Light.AMBER, said, instead)]
 
 
@@ -233,7 +233,7 @@ def _of_one_sign(evidence: TuningEvidence, output: str, input: str) -> tuple[boo
         raise DataError(
             f"the data leave open which way {output} answers a steady {input}",
             found=said,
-            needed=f"at most {MOST_AGAINST:.0%}",
+            needed=f"at most {100.0 * MOST_AGAINST:.0f} %",
             action=action,
         )
     findings = evidence.findings
