@@ -80,7 +80,7 @@ def test_by_keyboard_from_take_off_to_a_rated_record(desk: Desk) -> None:
     # Which stick was swept, and which was not; numbers in a pilot's order.
     page.get_by_text("Not swept: lat, ped and col").wait_for()
     numbers = page.locator("section[aria-label=Instruments] dt").all_inner_texts()
-    assert numbers[:6] == ["time", "phi", "theta", "p", "q", "r"]
+    assert numbers[:6] == ["time", "roll", "pitch", "roll rate", "pitch rate", "yaw rate"]
     assert page.title() == "Fly · flightid"
     page.get_by_role("group", name="Was it controllable?").get_by_role("button", name="No").press(
         "Enter"

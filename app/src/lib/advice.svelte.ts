@@ -27,7 +27,7 @@ export interface AdvicePart { text: string; href: string | null }
 
 /** Keys of a study by what the page has for them. */
 const inWords = (text: string) =>
-  text.replace("leave out by_hand", "press As found").replace(/take these as a proposal: output_low = \S+, output_high = [^\s;]+/, () => `take these as a proposal: a button ${here.open === "gains" ? "under Controller" : "of Gains"} does`).replace(/\btake the form (\w+)/, (all, form) => (FORMS[form] ? `take the form “${FORMS[form]}”` : all));
+  text.replace(/: flightid design plans it/, here.ofRig ? "" : ": flightid plan plans it").replace("leave out by_hand", "press As found").replace(/take these as a proposal: output_low = \S+, output_high = [^\s;]+/, () => `take these as a proposal: a button ${here.open === "gains" ? "under Controller" : "of Gains"} does`).replace(/\btake the form (\w+)/, (all, form) => (FORMS[form] ? `take the form “${FORMS[form]}”` : all));
 
 /** What the open screen is asked in place of its own command. */
 function onScreen(screen: string, title: string, options: string) {

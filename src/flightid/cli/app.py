@@ -16,7 +16,10 @@ from flightid.cli.output import note
     type=click.Path(exists=True, file_okay=False, path_type=Path),
 )
 @click.option(
-    "--port", type=click.IntRange(0, 65535), default=0, help="Default: that of before, if free."
+    "--port",
+    type=click.IntRange(0, 65535),
+    default=0,
+    help="Of the address http://127.0.0.1:PORT. Default, and 0: that of before, else a free one.",
 )
 @click.option("--no-browser", is_flag=True, help="Print the address and open nothing.")
 def command(folder: Path, port: int, no_browser: bool) -> None:

@@ -187,7 +187,7 @@ def _models(study: StudyResults, source: str) -> Finding:
     if not lights:
         return Finding("answer", Light.UNKNOWN, "no model was asked for")
     if all(item.fit is None for item in study.identified):
-        said = "no model was made, for the reasons named above: there is nothing to use"
+        said = "no model was made, for the reasons told of each: there is nothing to use"
         if Light.RED in {each.light for each in lights}:
             return Finding("answer", Light.RED, said, "mend first what is red there")
         action = "move the inputs more, over a decade of frequencies: flightid design plans it"
@@ -269,7 +269,7 @@ def _next(study: StudyResults, source: str, good: Sequence[ModelResults]) -> str
     if all(item.fit is not None and isinstance(item.fit.model, NarxModel) for item in good):
         return "gains of a PID need a linear model: record small steps about one operating point"
     if all(item.fit is None or item.fit.covariance is None for item in good):
-        return "gains of a PID need a model whose errors are known: mend first what is named above"
+        return "gains of a PID need a model whose errors are known: mend first what is told of each"
     fits = [item.fit for item in good if item.fit is not None]
     if any(len(fit.model.inputs) > 1 and _grows(fit) for fit in fits):
         return (
