@@ -211,7 +211,7 @@ def likelihood_gain(
     tiny = float(np.finfo(float).tiny)
     power = [max(sum(float(row @ row) for row in rows), tiny) for rows in (before, after)]
     count = sum(row.size * share(row) for row in after)
-    return 0.5 * count * math.log(power[0] / power[1])
+    return 0.5 * count * (math.log(power[0]) - math.log(power[1]))
 
 
 def expected_gain(
