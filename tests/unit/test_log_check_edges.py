@@ -223,6 +223,7 @@ def test_the_curve_that_p_terms_bear_out_is_taken() -> None:
     ]
     error, other = np.array([1.0, 0.0]), np.array([3.0, 4.0])
     assert stick_rates._explained(error, other) == pytest.approx(0.36)
+    assert stick_rates._explained(1e-3 * error, 1e-3 * other) == pytest.approx(0.36)
     assert stick_rates._explained(error, -other) == pytest.approx(-0.36)
     assert stick_rates._explained(0.0 * error, other) == 0.0
     for share, is_borne_out in ((0.9, True), (0.899, False)):

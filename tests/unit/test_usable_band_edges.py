@@ -291,3 +291,16 @@ def test_contacts_closer_than_told_are_one() -> None:
     assert contact.spans(1.0) == [(0.0, 1.0), (3.0, 3.0), (7.0, 7.0)]
     assert contact.spans(2.0) == [(0.0, 3.0), (7.0, 7.0)]
     assert saturation.LimitContact("x", "y", np.arange(10.0), touched & False).spans(1.0) == []
+
+
+def test_what_is_not_logged_of_an_axis_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    stamps = np.arange(0.0, 9.0, 0.1)
+    held = {"p": Signal("p", stamps, np.sin(stamps), "rad/s", "P")}
+    monkeypatch.setattr(usable_band, "find", lambda _, name: held.get(name))
+    roll, pitch, _ = usable_band.axis_bands(HandmadeLog("px4").log, (), ())
+    assert (roll.reason, roll.rate_hz) == ("mixer command is not logged", 0.0)
+    assert (pitch.reason, pitch.input) == ("mixer command and body rate are not logged", "")
+    held["tau_phi"] = Signal("tau_phi", stamps[::2], np.cos(stamps[::2]), "1", "M")
+    roll, *_ = usable_band.axis_bands(HandmadeLog("px4").log, (), ())
+    assert (roll.reason, roll.input, roll.output) == ("nothing was flown", "M", "P")
+    assert (roll.rate_hz, roll.rates_hz) == (pytest.approx(5.0), pytest.approx((5.0, 10.0)))
