@@ -31,7 +31,7 @@ SURER = 1.5
 Beyond, it rests on what it assumes of the vehicle, where the input has no power of its own.
 """
 EXTRAPOLATED = 0.2
-"""Power of what bins tell less than the best ones by which errors by way of an excitation grow.
+"""Power of what bins tell less than half of them by which errors by way of an excitation grow.
 
 Where excitations end, a pilot by instruments goes on by what it found inside, and errs by more
 than slopes say: 1.2 times where bins tell a third, 2 times where they tell a fortieth.
@@ -236,9 +236,13 @@ def _extrapolated(linear: LinearEstimate, spread: Real) -> Real | None:
     alone = linear.local_spread() if linear.pilots.excitations else None
     if alone is None:
         return None
-    best = np.min(alone, axis=1, keepdims=True)
-    told = np.isfinite(alone) & np.isfinite(best)
-    less = np.divide(alone, best, out=np.ones_like(alone), where=told)
+    told = np.isfinite(alone)
+    usual = [
+        np.median(row[known]) if known.any() else 1.0
+        for row, known in zip(alone, told, strict=True)
+    ]
+    less = np.divide(alone, np.array(usual)[:, None], out=np.ones_like(alone), where=told)
+    less = np.maximum(less, 1.0)
     return np.asarray(less**EXTRAPOLATED @ spread)
 
 
