@@ -23,10 +23,6 @@ pub struct Slopes<'a> {
     pub sizes: [usize; 3],
     /// Of unknowns.
     pub count: usize,
-    /// Those of which nothing is left after `until` samples, one for each unknown; empty: none.
-    pub brief: &'a [bool],
-    /// Samples, in whole blocks, through which brief ones are carried; zeros follow.
-    pub until: usize,
 }
 
 impl Slopes<'_> {
@@ -38,28 +34,12 @@ impl Slopes<'_> {
             ("forces", self.forced.len(), self.count * n * q),
             ("direct parts", self.direct.len(), self.count * p * q),
             ("signals", signals.len(), q * n_samples),
-            (
-                "brief unknowns",
-                self.brief.len(),
-                if self.brief.is_empty() { 0 } else { self.count },
-            ),
         ] {
             if found != needed {
                 return Err(CoreError::Shape { what, found, needed });
             }
         }
         Ok(())
-    }
-
-    /// Unknowns that are carried together, brief ones last, and how many groups are not brief.
-    fn groups(&self) -> (Vec<Vec<usize>>, usize) {
-        let is_brief = |&unknown: &usize| self.brief.get(unknown).copied().unwrap_or(false);
-        let (brief, lasting): (Vec<_>, Vec<_>) = (0..self.count).partition(is_brief);
-        let together = |of: &[usize]| of.chunks(LANES).map(<[_]>::to_vec).collect::<Vec<_>>();
-        let mut all = together(&lasting);
-        let n_lasting = all.len();
-        all.extend(together(&brief));
-        (all, n_lasting)
     }
 
     /// Of one group of unknowns, the signals that act on each of so many rows.
@@ -86,7 +66,8 @@ impl Slopes<'_> {
 pub fn slopes(of: Slopes<'_>, signals: &[f64], n_samples: usize) -> Result<Vec<f64>, CoreError> {
     of.check(signals, n_samples)?;
     let [n, p, _] = of.sizes;
-    let (groups, n_lasting) = of.groups();
+    let unknowns: Vec<usize> = (0..of.count).collect();
+    let groups: Vec<&[usize]> = unknowns.chunks(LANES).collect();
     let forced: Vec<_> = groups.iter().flat_map(|group| of.acting(of.forced, n, group)).collect();
     let direct: Vec<_> = groups.iter().flat_map(|group| of.acting(of.direct, p, group)).collect();
     let mut found = vec![0.0; n_samples * p * of.count];
@@ -94,8 +75,6 @@ pub fn slopes(of: Slopes<'_>, signals: &[f64], n_samples: usize) -> Result<Vec<f
     let (mut sources, mut lines) = (Vec::new(), vec![[[0.0; LANES]; BLOCK]; groups.len() * n]);
     for (block, into) in found.chunks_mut((BLOCK * p * of.count).max(1)).enumerate() {
         gather(&mut sources, signals, n_samples, block * BLOCK);
-        let busy = if block * BLOCK < of.until { groups.len() } else { n_lasting };
-        let (lines, states) = (&mut lines[..busy * n], &mut states[..busy * n]);
         widest(
             #[inline(always)]
             || {
@@ -103,8 +82,8 @@ pub fn slopes(of: Slopes<'_>, signals: &[f64], n_samples: usize) -> Result<Vec<f
                     *line = [[0.0; LANES]; BLOCK];
                     acting.drive(line, &sources, 0);
                 }
-                carry(of.transition, states, lines);
-                for (at, acting) in direct[..busy * p].iter().enumerate() {
+                carry(of.transition, &mut states, &mut lines);
+                for (at, acting) in direct.iter().enumerate() {
                     let (group, row) = (at / p, at % p);
                     let mut shown = [[0.0; LANES]; BLOCK];
                     acting.drive(&mut shown, &sources, 0);
@@ -112,7 +91,7 @@ pub fn slopes(of: Slopes<'_>, signals: &[f64], n_samples: usize) -> Result<Vec<f
                     for (factor, line) in factors.iter().zip(&lines[group * n..]) {
                         take(&mut shown, *factor, line);
                     }
-                    put(into, &shown, of.count, &groups[group], (row, p));
+                    put(into, &shown, of.count, groups[group], (row, p));
                 }
             },
         );
@@ -181,8 +160,6 @@ mod tests {
                 direct: &g,
                 sizes: [n, p, q],
                 count,
-                brief: &[],
-                until: 0,
             };
             let found = slopes(of, &signals, n_samples).unwrap();
             for unknown in 0..count {
@@ -209,38 +186,6 @@ mod tests {
     }
 
     #[test]
-    fn brief_unknowns_end_and_the_others_go_on() {
-        // One pulse at the first sample; each second unknown is driven by it alone.
-        let (n_samples, count) = (5 * BLOCK, 9);
-        let mut signals = vec![0.0; 2 * n_samples];
-        signals[0] = 1.0;
-        signals[n_samples..].copy_from_slice(&sines(n_samples, 3.0));
-        let brief: Vec<bool> = (0..count).map(|k| k % 2 == 0).collect();
-        let mut forced = sines(count * 2 * 2, 1.0);
-        for (unknown, rows) in forced.chunks_exact_mut(4).enumerate() {
-            if brief[unknown] {
-                (rows[1], rows[3]) = (0.0, 0.0);
-            }
-        }
-        let whole = Slopes {
-            transition: &[0.3, 0.1, -0.2, 0.4],
-            output: &[1.0, 2.0],
-            forced: &forced,
-            direct: &vec![0.0; count * 2],
-            sizes: [2, 1, 2],
-            count,
-            brief: &[],
-            until: 0,
-        };
-        let cut = Slopes { brief: &brief, until: BLOCK + 1, ..whole };
-        let [all, some] = [whole, cut].map(|of| slopes(of, &signals, n_samples).unwrap());
-        for (at, (one, other)) in all.iter().zip(&some).enumerate() {
-            let is_past = brief[at % count] && at / count >= 2 * BLOCK;
-            assert!(if is_past { *other == 0.0 && one.abs() < 1e-20 } else { one == other });
-        }
-    }
-
-    #[test]
     fn what_does_not_fit_or_runs_away_is_refused() {
         let grown = Slopes {
             transition: &[1e200],
@@ -249,13 +194,9 @@ mod tests {
             direct: &[0.0],
             sizes: [1, 1, 1],
             count: 1,
-            brief: &[],
-            until: 0,
         };
         let found = slopes(grown, &[1.0; 100], 100);
         assert!(matches!(found, Err(CoreError::NotFinite { .. })));
         assert!(matches!(slopes(grown, &[1.0; 3], 2), Err(CoreError::Shape { .. })));
-        let longer = Slopes { brief: &[true, false], ..grown };
-        assert!(matches!(slopes(longer, &[1.0; 2], 2), Err(CoreError::Shape { .. })));
     }
 }

@@ -15,7 +15,7 @@ from flightid.identification.records.nuisance import Nuisance, NuisanceDirection
 from flightid.identification.subspace.data import SubspaceData
 from flightid.identification.subspace.determinant import Goal, log_determinant
 from flightid.identification.subspace.matrices import STABLE
-from flightid.identification.subspace.predictor_columns import OwnColumns
+from flightid.identification.subspace.predictor_columns import AT_ONCE, OwnColumns
 from flightid.models.sampled.recursion import run_recursion, spectral_radius
 from flightid.progress import progress
 from flightid.uncertainty.agreement import Agreement
@@ -178,7 +178,9 @@ class Predictor:
         ):
             error = y - self._level(own.values, len(c))[:, None] - c @ state - d @ u
             made = self._slopes(matrices, whiten, basis, (error, state, u))
-            made -= own.space @ (own.space.T @ made)
+            along = own.space.T @ made
+            for first in range(0, len(made), AT_ONCE):
+                made[first : first + AT_ONCE] -= own.space[first : first + AT_ONCE] @ along
             parts.append(made)
         return parts[0] if len(parts) == 1 else np.vstack(parts)
 
