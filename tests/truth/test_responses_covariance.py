@@ -256,3 +256,22 @@ def test_scatter_over_flights_is_the_covariance_that_is_printed(case: str, kind:
     scale = np.sqrt(np.diag(predicted))
     difference = (scatter - predicted) / np.outer(scale, scale)
     assert np.sqrt(np.mean(difference**2)) < 0.12, "correlations across frequencies"
+
+
+def test_local_polynomials_take_another_noise_at_their_own_frequencies() -> None:
+    """A spectrum on another grid was read by places: bars of red noise were 1.4 times as long."""
+    u, e = np.random.default_rng(3).standard_normal((2, 2000))
+    record = Record.from_arrays(
+        np.arange(2000.0), inputs={"u": u}, outputs={"y": np.convolve(u, [0.5, 0.5])[:2000] + e}
+    )
+    omega = np.geomspace(0.2, 2.0, 9)
+    linear = estimate_response(record, omega_rad_s=omega, estimator="local_polynomial").linear
+    assert linear is not None
+    grid = np.linspace(0.1, 2.5, 40)
+
+    every, one, found = np.arange(len(omega)), np.arange(1), []
+    for density in (np.exp(-2.0 * grid), np.ones_like(grid)):
+        errors = linear.errors_with(NoiseSpectrum(grid, density[None]))
+        found.append(np.diag(errors.covariance(one, one, every)[0])[: len(omega)])
+    ratio = found[0] / found[1]
+    assert_close(ratio, np.exp(-2.0 * omega), rtol=1e-9, why="log-linear between points")

@@ -173,7 +173,8 @@ class LocalWeights:
 
     def errors_with(self, noise: NoiseSpectrum, outputs: Places) -> CovarianceSource:
         """See `OutputWeights`; the other outputs keep their noise, as independent."""
-        return LocalErrors(self.fits, self.noise.replaced(noise, outputs))
+        known = self.noise.replaced(noise, outputs)
+        return LocalErrors(self.fits, known.on(self.noise.omega_rad_s))
 
     def local_spread(self, inputs: Sequence[Real]) -> Real | None:
         """See `OutputWeights`."""

@@ -114,6 +114,11 @@ class NoiseSpectrum:
         coherency[low] = other.coherency_at(omega[low])
         return NoiseSpectrum(omega, density, coherency, self.levels)
 
+    def on(self, omega_rad_s: Real) -> NoiseSpectrum:
+        """On other frequencies."""
+        coherency = None if self.coherency is None else self.coherency_at(omega_rad_s)
+        return NoiseSpectrum(omega_rad_s, self.at(omega_rad_s), coherency, self.levels)
+
     def at(self, omega_rad_s: Real) -> Real:
         """Density between the grid's frequencies, log-linear; held beyond its ends."""
         logs = np.log(np.maximum(self.density, np.finfo(float).tiny))
