@@ -129,6 +129,24 @@ def fitted(seed: int, *, flight: Callable[[np.random.Generator], Columns], metho
     return fit_trial(lambda: fid.identify(model(), record, method=method), TRUTH)
 
 
+def in_a_loop(seed: int, *, gust: float, gain: float) -> Trial:
+    """A sweep under a rate controller that stays on, fitted by way of what was injected."""
+    random = np.random.default_rng([seed, 14])
+    injected = sweep(random, _n())
+    columns = flown(random, injected, gust=gust, gain=gain, sensor=0.005)
+    record = fid.Record.from_arrays(
+        np.arange(injected.size) * STEP_S,
+        inputs={"da": columns["da"]},
+        outputs={"p": columns["p"]},
+        excitations={"da_injected": injected},
+        units={"da": "rad", "p": "rad/s", "da_injected": "rad"},
+        hold="zero",
+        loop="closed",
+    )
+    response = fid.estimate_response(record, estimator="instrument")
+    return fit_trial(lambda: fid.identify(model(), response), TRUTH)
+
+
 BARREN_FLIGHTS = {
     "hover": hover,
     "hover, tight": partial(hover, gain=0.5),
@@ -154,4 +172,8 @@ def _cases(
 BARREN = _cases(BARREN_FLIGHTS, "barren", ("output_error", "arx", "oe"))
 SOUND = _cases(SOUND_FLIGHTS, "sound", ("output_error", "oe"))
 """ARX shares its noise's poles, which a gyroscope's noise does not: red is true there."""
-LIGHTS = (*BARREN, *SOUND)
+LOOPED = tuple(
+    Case(f"sound, instrument, {name}", partial(in_a_loop, gust=gust, gain=gain))
+    for name, gust, gain in (("calm", 0.0, GAIN), ("gusts", 0.003, 0.5), ("heavy gusts", 0.01, 0.5))
+)
+LIGHTS = (*BARREN, *SOUND, *LOOPED)

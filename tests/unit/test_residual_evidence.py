@@ -53,6 +53,13 @@ def test_lags_that_the_fit_takes_out_carry_no_evidence() -> None:
     assert_close(found.errors[:2], np.zeros(2), atol=1e-3, why="orthogonal but for means")
 
 
+@pytest.mark.parametrize(("seed", "colour"), [(76, "white"), (42, "AR(1) 0.9")])
+def test_a_short_lag_that_is_missing_shows_at_the_first_lags(seed: int, colour: str) -> None:
+    """10 ms, at 50 Hz beside a tenth of noise: 26 lags together hid it."""
+    record = late(seed, 0.01, 0.1, COLOURS[colour])
+    assert fid.identify(model(), record, method="output_error").covariance is None
+
+
 @pytest.mark.parametrize("colour", COLOURS)
 def test_a_true_model_keeps_its_bars_in_every_colour(colour: str) -> None:
     fit = fid.identify(model(), flight(1, COLOURS[colour]), method="output_error")
