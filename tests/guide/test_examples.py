@@ -315,12 +315,16 @@ def test_tuned_gains_fly_with_the_margins_that_were_promised(tmp_path: Path) -> 
     margins = results["gain_flight"]["margins"]
     assert len(margins) == 25
     promised = [each for each in margins if each["agrees"] is not None]
-    # Gain margins of the whole loops are read above the identified band: told, not promised.
+    # What lies above the identified band may alter gain margins and peaks: told, not promised.
     told = [each for each in margins if each["agrees"] is None]
-    assert {(each["loop"], each["name"]) for each in told} == {("whole loop", "gain margin")}
-    assert {each["promised"]["reason"] for each in told} == {"read above the identified band"}
+    assert {each["name"] for each in told} <= {"gain margin", "sensitivity peak"}
+    assert {each["promised"]["reason"] for each in told} <= {
+        "read above the identified band",
+        "a resonance above the identified band may leave less",
+    }
     for each in told:
-        assert abs(each["measured"]["value"] - each["promised"]["value"]) < 2.0, "dB"
+        apart = 2.0 if each["name"] == "gain margin" else 0.1
+        assert abs(each["measured"]["value"] - each["promised"]["value"]) < apart
     assert sum(each["agrees"] for each in promised) >= len(promised) - 2
     for each in margins:
         if each["name"] == "phase margin":

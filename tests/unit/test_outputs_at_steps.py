@@ -87,7 +87,7 @@ def test_a_line_above_the_new_nyquist_frequency_is_named(share: float) -> None:
         found = [step.options for step in steps if step.options.get("code") == "folded-power"]
         assert bool(found) is (share == 0.5 and interpolation is None)
         for each in found:
-            text = r"y: (\d+)% of its power lies above 25 Hz, most at 83 Hz"
+            text = r"y: (\d+) % of its power lies above 25 Hz, most at 83 Hz"
             said = re.search(text, str(each["found"]))
             assert said is not None
             # Windows of 5 s see a little less of the slow motion of some than of others.
