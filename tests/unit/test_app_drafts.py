@@ -29,10 +29,24 @@ def test_a_draft_outlives_the_server_that_took_it(tmp_path: Path) -> None:
     again = Workspace(tmp_path)
     told = {each.place: each.draft.text for each in all_drafts(again).drafts if each.draft}
     assert told == {"study:0123": "[study]", "model:0123": "half \U0001f681 a model"}
-    keep_draft(again, PlacedDraft(place="study:0123", draft=None))
+    known = _typed("study:0123", "[study]").draft
+    keep_draft(again, PlacedDraft(place="study:0123", draft=None, known=known))
     keep_draft(again, PlacedDraft(place="never typed", draft=None))
     assert [each.place for each in all_drafts(again).drafts] == ["model:0123"]
     again.index.close()
+
+
+def test_a_window_removes_no_draft_but_the_one_that_it_knows(tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path)
+    mine, other = (_typed("study:0123", text) for text in ("A", "B"))
+    for each in (mine, other):
+        keep_draft(workspace, each)
+    for known in (mine.draft, None):
+        there = keep_draft(workspace, PlacedDraft(place="study:0123", draft=None, known=known))
+        assert all_drafts(workspace).drafts == [other] == [there]
+    keep_draft(workspace, PlacedDraft(place="study:0123", draft=None, known=other.draft))
+    assert all_drafts(workspace).drafts == []
+    workspace.index.close()
 
 
 def test_folders_are_told_apart_and_the_oldest_drafts_go(

@@ -59,6 +59,8 @@ export class Study {
   /** Whether that was typed before this page, or the screen that is shown, was opened. */
   again = $state(false);
   error = $state("");
+  /** Whether another window has typed it, whose words stay when this one's are stored or thrown away. */
+  elsewhere = $state(false);
   conflict: Conflict | null = $state.raw(null);
   changed: string[] = $state([]);
   /** Whether the server was asked once: before that nobody knows whether there is a study. */
@@ -160,8 +162,9 @@ export class Study {
 
   /** The whole text as a hand types it: kept until it is stored or thrown away. */
   type(text: string) {
+    if (idle) this.elsewhere = false;
     const before = this.typed?.before ?? this.text;
-    this.again = false;
+    [this.again, this.elsewhere] = [false, false];
     if (text === before || text === this.text) return this.#untype();
     this.#keep({ text, name: "", before });
   }
@@ -172,7 +175,7 @@ export class Study {
   }
 
   #untype() {
-    [this.typed, this.again] = [null, false];
+    [this.typed, this.again, this.elsewhere] = [null, false, false];
     drafts.drop(this.place);
   }
 
@@ -180,6 +183,12 @@ export class Study {
   discard() {
     this.#untype();
     if (!this.#told) this.#shown = null;
+  }
+
+  /** Take up what another window has typed and the folder keeps, where nothing is typed here. */
+  offer() {
+    const kept = this.typed ? null : drafts.kept(this.place);
+    if (kept && kept.text !== this.text) [this.typed, this.again, this.elsewhere] = [kept, true, true];
   }
 
   /** Store the text that is typed, or the one that is left. */
@@ -279,10 +288,20 @@ export class Study {
     asked.settled(stored);
   }
 
-  /** Nothing is lost with the question: it is taken up as what was typed is; false: other words wait. */
-  #later(asked: Conflict): boolean {
-    if (!this.typed) this.#keep({ text: asked.mine, name: "", before: asked.base });
-    return asked.typed || this.typed?.text === asked.mine;
+  /**
+   * Nothing is lost with the question: it is taken up as what was typed is, among the words that are;
+   * false: these are of the same lines, or began elsewhere.
+   */
+  async #later(asked: Conflict): Promise<boolean> {
+    const [typed, { base, mine }] = [this.typed, asked];
+    if (asked.typed && typed) return true;
+    if (!typed) this.#keep({ text: mine, name: "", before: base });
+    else if (typed.before === base) {
+      const both = await api.merge(this.log, { base, mine, theirs: typed.text, edits: [] }).catch(() => null);
+      if (!both || both.merged === null || this.typed?.text !== typed.text) return false;
+      this.#keep({ ...typed, text: both.merged });
+    }
+    return this.typed?.text === mine || typed?.before === base;
   }
 
   /** Of its text, among what is typed and not saved. */

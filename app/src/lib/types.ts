@@ -679,6 +679,7 @@ export interface OwnVehicles {
 export interface PlacedDraft {
   place: string;
   draft: Draft | null;
+  known: Draft | null;
 }
 
 /** A plan of the next flight. */

@@ -21,7 +21,6 @@ def add_draft_routes(app: FastAPI, backstage: Backstage) -> None:
 
     @app.post("/api/drafts")
     async def keep(typed: PlacedDraft) -> PlacedDraft:
-        """Write it, in the order in which it came."""
+        """Write it, in the order in which it came; what the folder has there then."""
         async with turn:
-            await asyncio.to_thread(keep_draft, backstage.workspace, typed)
-        return typed
+            return await asyncio.to_thread(keep_draft, backstage.workspace, typed)

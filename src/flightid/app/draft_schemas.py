@@ -27,6 +27,8 @@ class PlacedDraft(Message):
     place: Annotated[str, Field(min_length=1, max_length=400)]
     draft: Draft | None
     """None: it is stored, or thrown away."""
+    known: Draft | None = None
+    """What is removed where there is none to be kept: the draft that whoever asks has seen."""
 
 
 class Drafts(Message):

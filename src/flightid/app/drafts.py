@@ -24,16 +24,20 @@ MOST_BYTES = 8 << 20
 
 def all_drafts(workspace: Workspace) -> Drafts:
     """Drafts of a workspace; a file that is none is passed over."""
-    found = []
-    for path in _paths(workspace)[:MOST]:
-        with suppress(OSError, ValueError, ValidationError, RecursionError):
-            found.append(PlacedDraft.model_validate_json(read_plain(path, MOST_BYTES)))
+    found = [each for path in _paths(workspace)[:MOST] if (each := _draft(path)) is not None]
     named = hashlib.sha256(str(workspace.folder).encode("utf-8", "surrogateescape")).hexdigest()
     return Drafts(folder=named[:16], drafts=[each for each in found if each.draft is not None])
 
 
-def keep_draft(workspace: Workspace, typed: PlacedDraft) -> None:
-    """Write a draft in the place of the one before, or remove that.
+def keep_draft(workspace: Workspace, typed: PlacedDraft) -> PlacedDraft:
+    """Write a draft in the place of the one before, or remove the one that is known.
+
+    Another one was typed in another window, which may be closed: it stays.
+
+    Returns
+    -------
+    PlacedDraft
+        What the folder has there now.
 
     Raises
     ------
@@ -45,11 +49,23 @@ def keep_draft(workspace: Workspace, typed: PlacedDraft) -> None:
     name = hashlib.sha256(typed.place.encode("utf-8", "surrogatepass")).hexdigest()[:32]
     path = own_folder(workspace.folder, HIDDEN, FOLDER) / f"{name}{ENDING}"
     if typed.draft is None:
+        stands = _draft(path)
+        if stands is not None and stands.draft not in (None, typed.known):
+            return stands
         path.unlink(missing_ok=True)
-        return
-    write_atomically(path, typed.model_dump_json())
+        return PlacedDraft(place=typed.place, draft=None)
+    made = PlacedDraft(place=typed.place, draft=typed.draft)
+    write_atomically(path, made.model_dump_json())
     for old in _paths(workspace)[MOST:]:
         old.unlink(missing_ok=True)
+    return made
+
+
+def _draft(path: Path) -> PlacedDraft | None:
+    """A draft as it was written; None where a file is none."""
+    with suppress(OSError, ValueError, ValidationError, RecursionError):
+        return PlacedDraft.model_validate_json(read_plain(path, MOST_BYTES))
+    return None
 
 
 def _paths(workspace: Workspace) -> list[Path]:
