@@ -4,7 +4,7 @@ import { test } from "node:test";
 
 const kept = {};
 globalThis.standIns["./drafts"] = { drafts: { kept: (place) => kept[place] ?? null, keep: (place, draft) => (kept[place] = draft), drop: (place) => delete kept[place] } };
-const folder = { text: "[study]\n", stored: [], lack: "", last: null, asked: [] };
+const folder = { text: "[study]\n", stored: [], lack: "", last: null, asked: [], merged: null };
 const told = (text) => ({ text, etag: `"${text.length}"`, settings: {}, undoable: 0, redoable: 0, state: folder.lack ? "unreadable" : "readable", lack: folder.lack });
 /** The server, which remembers what stood last; of another study than the one it knows of it tells nothing. */
 const known = () => (folder.text !== null ? told(folder.text) : folder.last === null ? null : { ...told(folder.last), etag: '""', state: "lost", lack: "not in the folder" });
@@ -21,14 +21,14 @@ globalThis.standIns["./api"] = {
   change: async (_, etag) => store(etag, "changed"),
   replace: async (_, etag, text) => store(etag, text),
   step: async () => {},
-  merge: async (_, two) => (folder.asked.push(two), { mine: two.mine, merged: null, why: "", lines: [] }),
+  merge: async (_, two) => (folder.asked.push(two), { mine: two.mine, merged: folder.merged, why: "", lines: [] }),
 };
 const { Study } = await import("../../app/src/lib/study.svelte.ts");
 
 /** A page on a study that stands so; then the file is as an editor leaves it. */
 async function opened(before, after, { lack = "", remembers = false, typed = "" } = {}) {
   delete kept["study:a"];
-  Object.assign(folder, { text: before, lack: "", last: null, stored: [], asked: [] });
+  Object.assign(folder, { text: before, lack: "", last: null, stored: [], asked: [], merged: null });
   const study = new Study("a");
   await study.load();
   if (typed) study.type(typed);
@@ -99,6 +99,33 @@ test("other words than those typed over are asked about, readable or not, seen b
       assert.equal(await again, true);
       assert.deepEqual([folder.text, study.typed, kept["study:a"]], ["mine", null, undefined]);
     }
+});
+
+test("a click that waits is among the words that are typed, else the study's value is shown again", async () => {
+  const { unstored } = await import("../../app/src/lib/stands.svelte.ts");
+  for (const [merged, text, why] of [["mine, 77", "mine, 77", /^$/], [null, "mine", /was not made/]]) {
+    const study = await opened("base", "of an editor", { typed: "mine" });
+    const times = unstored.times;
+    const clicked = study.edit([{ path: ["n"], value: 77 }]);
+    while (!study.conflict) await new Promise((go) => setTimeout(go));
+    study.conflict = { ...study.conflict, mine: "base, 77" };
+    folder.merged = merged;
+    await study.settle("later");
+    assert.equal(await clicked, false);
+    assert.deepEqual(folder.asked.at(-1), { base: "base", mine: "base, 77", theirs: "mine", edits: [] });
+    assert.deepEqual([folder.text, study.typed.text, study.typed.before, kept["study:a"].text], ["of an editor", text, "base", text]);
+    assert.match(study.error, why);
+    assert.equal(unstored.times, times + 1);
+  }
+});
+
+test("an emptied study is a text that stands, and one that cannot be read keeps the screens of what it was", async () => {
+  const study = await opened("[study]\n", "", { lack: "no model" });
+  await study.reread();
+  assert.deepEqual([study.stands, study.lack.text, study.models.length, study.lackedModels], [true, "", 0, false]);
+  const unseen = new Study("a");
+  await unseen.load();
+  assert.equal(unseen.lackedModels, true);
 });
 
 test("words of nobody's typing are no draft, and those of a page before are taken up", async () => {

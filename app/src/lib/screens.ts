@@ -34,9 +34,10 @@ export interface Screen {
   shows: (given: Given) => boolean;
 }
 
-const hasModels = ({ log, study }: Given) => Boolean(log && study?.models.length);
+/** One that cannot be read has the screens of what it was: each tells why, and has its text. */
+const hasModels = ({ log, study }: Given) => Boolean(log && (study?.models.length || study?.lackedModels));
 /** One without a model still tells filters, fields and a plan. */
-const hasStudy = ({ log, study }: Given) => Boolean(log && study?.file);
+const hasStudy = ({ log, study }: Given) => Boolean(log && (study?.file || study?.lack));
 
 /** Whether the address is that of records of a rig, which have no flight. */
 export const ofRecords = ({ study }: Given) => location.hash.startsWith("#/records/") || Boolean(study?.file?.settings.record || study?.lack?.of_records);

@@ -1,5 +1,6 @@
 import * as api from "./api";
 import { drafts } from "./drafts";
+import { unstored } from "./stands.svelte";
 import type { Draft, Edit, MergedStudy, StudyText } from "./types";
 
 export interface ModelTable {
@@ -58,9 +59,9 @@ export class Study {
   typed: Draft | null = $state.raw(null);
   /** Whether that was typed before this page, or the screen that is shown, was opened. */
   again = $state(false);
-  error = $state("");
   /** Whether another window has typed it, whose words stay when this one's are stored or thrown away. */
   elsewhere = $state(false);
+  error = $state("");
   conflict: Conflict | null = $state.raw(null);
   changed: string[] = $state([]);
   /** Whether the server was asked once: before that nobody knows whether there is a study. */
@@ -81,6 +82,11 @@ export class Study {
     if (this.#told) return this.file ? null : this.#told;
     if (!this.known || !(this.#shown || this.typed)) return null;
     return { ...BARE, text: this.#shown?.text ?? "", of_records: this.#shown?.of_records ?? false };
+  }
+
+  /** Whether one that cannot be read had models when it could; of what nobody has seen it is supposed. */
+  get lackedModels(): boolean {
+    return this.lack !== null && (this.#shown === null || ((this.#shown.settings.model as ModelTable[]) ?? []).length > 0);
   }
 
   /** Text that stands, whether it can be read or not; of one that is lost what stood last. */
@@ -156,13 +162,13 @@ export class Study {
     const kept = this.typed ?? drafts.kept(this.place);
     const idle = kept && told && (kept.text === kept.before || kept.text === told.text);
     if (idle) drafts.drop(this.place);
+    if (idle) this.elsewhere = false;
     if (!idle && !this.typed && kept) this.again = true;
     this.typed = idle ? null : kept;
   }
 
   /** The whole text as a hand types it: kept until it is stored or thrown away. */
   type(text: string) {
-    if (idle) this.elsewhere = false;
     const before = this.typed?.before ?? this.text;
     [this.again, this.elsewhere] = [false, false];
     if (text === before || text === this.text) return this.#untype();
@@ -179,16 +185,16 @@ export class Study {
     drafts.drop(this.place);
   }
 
-  /** Throw away what was typed, and of a study that nobody but this page knows what stood. */
-  discard() {
-    this.#untype();
-    if (!this.#told) this.#shown = null;
-  }
-
   /** Take up what another window has typed and the folder keeps, where nothing is typed here. */
   offer() {
     const kept = this.typed ? null : drafts.kept(this.place);
     if (kept && kept.text !== this.text) [this.typed, this.again, this.elsewhere] = [kept, true, true];
+  }
+
+  /** Throw away what was typed, and of a study that nobody but this page knows what stood. */
+  discard() {
+    this.#untype();
+    if (!this.#told) this.#shown = null;
   }
 
   /** Store the text that is typed, or the one that is left. */
@@ -205,7 +211,7 @@ export class Study {
       return behind.stored;
     }
     const waiting: Waiting = { edits, stored: Promise.resolve(false) };
-    waiting.stored = this.#heard(() => {
+    waiting.stored = this.#changed(() => {
       if (this.#waiting === waiting) this.#waiting = null;
       return this.#store((etag) => api.change(this.log, etag, waiting.edits), { edits: waiting.edits });
     });
@@ -220,7 +226,7 @@ export class Study {
 
   /** Change keys whose places hang on what stands there when the turn comes. */
   editThen(make: () => Edit[]): Promise<boolean> {
-    return this.#heard(() => {
+    return this.#changed(() => {
       const edits = make();
       return this.#store((etag) => api.change(this.log, etag, edits), { edits });
     });
@@ -264,13 +270,20 @@ export class Study {
     return typeof stored === "object" && "asked" in stored ? stored.asked : stored;
   }
 
+  /** Fields that have asked for a change which was not made show what stands again. */
+  async #changed(task: () => Promise<Stored>): Promise<boolean> {
+    const stored = await this.#heard(task);
+    if (!stored) unstored.times += 1;
+    return stored;
+  }
+
   /** One of both versions, both together, or neither yet: what was meant here waits as typed text. */
   async settle(choice: Choice) {
     const asked = this.conflict;
     if (!asked) return;
     this.conflict = null;
     if (choice === "later" || choice === "theirs") {
-      const waits = choice === "theirs" || this.#later(asked);
+      const waits = choice === "theirs" || (await this.#later(asked));
       if (choice === "theirs" && asked.typed) this.#untype();
       await this.load();
       if (!waits) this.error = "Your change was not made: the study had changed meanwhile, and text that is not saved stands here.";
@@ -281,7 +294,7 @@ export class Study {
     if (stored && asked.typed) this.#untype();
     if (!stored && this.error) {
       const said = this.error;
-      this.#later(asked);
+      await this.#later(asked);
       await this.load();
       this.error = said;
     }
