@@ -184,7 +184,7 @@ def test_a_bent_valve_is_a_narx_model_from_the_file_to_the_answer(tmp_path: Path
     np.savetxt(path, rows, "%.7g", ",", header="time [s],u,y", comments="")
     known: dict[str, object] = {}
     made = propose_study(
-        [path], folder=tmp_path, cache=known, inputs=["u"], outputs=["y"], hold="zero"
+        [path], folder=tmp_path, cache=known, inputs=["u"], outputs=["y"], hold="zero", loop="open"
     )
     assert any(said.startswith("NARX taken, tried for ") for said in made.said)
     study = run_study(made.write(tmp_path / "valve-study.toml"), cache=known)
