@@ -27,13 +27,14 @@ from flightid.review.apart import gains_between
 from flightid.review.deconvolution import closed_loop
 from flightid.review.gyro_noise import GyroNoise
 from flightid.review.loop_samples import LoopSamples
-from flightid.review.loops import _pair, refused, tracking_error
+from flightid.review.loops import IN_SWEEPS, _pair, loop_responses, refused, tracking_error
 from flightid.review.motors import motor_use, turning, yaw_trim
 from flightid.review.verdicts import judge_flight
 from flightid.uncertainty.estimate import Estimate, Reading
 from flightid.uncertainty.uneven import DrawnEnds
 from tests.closeness import assert_close
 from tests.ordinary_log import write_ordinary_log
+from tests.strangers import inspected_logs
 from tests.strangers.ordinary_flights import Axis, step
 
 
@@ -115,6 +116,17 @@ def test_a_quiet_flight_says_what_to_fly(tmp_path: Path) -> None:
     assert "raise" not in still.action
     sure = tuple(Estimate("r", value, "s", 0.05 * value) for value, _, _ in ends)
     assert refused(yaw, sure, 0.01, "") is None
+
+
+def test_a_flight_of_sweeps_alone_was_flown(tmp_path: Path) -> None:
+    path = tmp_path / "swept.bin"
+    random = np.random.default_rng([0, 1215])
+    inspected_logs.write(inspected_logs.sound(random), random, path)
+    log = fid.read_log(path)
+    (run,) = log.sid_runs
+    made = loop_responses(log, ((run.start_s, run.stop_s),))
+    assert {each.reason for each in made} == {IN_SWEEPS}
+    assert {each.reason for each in loop_responses(log, ())} == {"nothing was flown"}
 
 
 def test_a_slow_log_says_what_to_log(tmp_path: Path) -> None:

@@ -123,7 +123,9 @@ def _next(review: ReviewedFlight) -> str:
     if _diverging(review):
         return "mend what diverges; sweeps, filters and gains come after it"
     if review.swept:
-        return f"flightid tune {review.name} (models of its sweeps, then gains)"
+        return (
+            f"flightid tune {review.name} (models of its sweeps, where they carry any, then gains)"
+        )
     mended = any(f.light in AMISS and f.code.startswith(CAUSES) for f in review.findings)
     way = "mend what is said of motors and vibration first" if mended else ""
     if review.kind != "ardupilot" or review.vehicle in PLANNED:

@@ -76,6 +76,8 @@ CHANNELS = {
     ("yaw", "attitude"): ("psi_ref", "psi", None),
 }
 EMPTY = np.zeros(0)
+IN_SWEEPS = "all of the time in the air is sweeps at the mixer, which disturb the loops"
+ORDINARY = "hand in a log that holds ordinary flight"
 
 
 @dataclass(frozen=True)
@@ -93,7 +95,8 @@ def loop_responses(log: Log, spans: tuple[Span, ...]) -> tuple[LoopResponse, ...
     Sweeps at the mixer are left out: they are disturbances to the loops, and larger than any gust.
     """
     ordinary = without(spans, [(r.start_s, r.stop_s) for r in log.sid_runs if r.point == "mixer"])
-    made = (_loop(log, ordinary, axis, loop) for axis, loop in CHANNELS)
+    airborne = bool(spans)
+    made = (_loop(log, ordinary, axis, loop, airborne=airborne) for axis, loop in CHANNELS)
     return tuple(each for each in made if each is not None)
 
 
@@ -111,7 +114,9 @@ def without(spans: tuple[Span, ...], cuts: list[Span]) -> tuple[Span, ...]:
     return spans
 
 
-def _loop(log: Log, spans: tuple[Span, ...], axis: str, loop: str) -> LoopResponse | None:
+def _loop(
+    log: Log, spans: tuple[Span, ...], axis: str, loop: str, *, airborne: bool
+) -> LoopResponse | None:
     pair = _pair(log, axis, loop)
     if pair is None:
         return None
@@ -121,7 +126,8 @@ def _loop(log: Log, spans: tuple[Span, ...], axis: str, loop: str) -> LoopRespon
         fly_in=mode_to_fly(log, loop, spans),
     )  # fmt: skip
     if not spans:
-        return replace(blank, reason="nothing was flown", action="hand in a log of a flight")
+        reason = IN_SWEEPS if airborne else "nothing was flown"
+        return replace(blank, reason=reason, action=ORDINARY)
     pieces = _pieces(pair, spans)
     unfit = _uneven(pair, spans) or ("" if pieces else "no span in the air of 2 s holds both")
     if unfit:
