@@ -376,7 +376,7 @@ def test_margins_below_what_is_asked_and_columns_left_out_are_told() -> None:
         share_met=0.9847, stages=(SimpleNamespace(gains={}),),
         flown=SimpleNamespace(autopilot="px4", gains={}),
     )  # fmt: skip
-    tuning = SimpleNamespace(sound=[roll], findings=(), left_out={}, designs=())
+    tuning = SimpleNamespace(sound=[roll], findings=(), left_out={}, designs=(), untouched=())
     said = gains_finding(tuning, "study.toml").message  # type: ignore[arg-type]
     assert "at least 44°" in said, "44.6 are not 45"
     assert said.endswith("(98.4 % of them or more keep 45° and all else asked)")
@@ -405,7 +405,9 @@ def test_margins_below_what_is_asked_and_columns_left_out_are_told() -> None:
     step.flown = copter
     doubts = (Finding("a", Light.AMBER, "the band ends early"), Finding("b", Light.AMBER, "windy"))
     step.findings = doubts
-    two = SimpleNamespace(sound=[step], findings=doubts, left_out={}, designs=(step,))
+    two = SimpleNamespace(
+        **{**vars(tuning), "sound": [step], "findings": doubts, "designs": (step,)}
+    )
     told = gains_finding(two, "study.toml", results="out")  # type: ignore[arg-type]
     assert told.light is Light.AMBER
     assert told.message.endswith("; but roll the band ends early (1 other reason: report)")

@@ -12,6 +12,7 @@ import click
 from flightid.cli.output import Exit, emit_values, note
 
 if TYPE_CHECKING:
+    from flightid.findings import Finding
     from flightid.options import Options
     from flightid.study import Study
     from flightid.study.proposal import Proposal
@@ -41,10 +42,14 @@ def propose(files: Sequence[Path], target: Path, **asked: Any) -> Proposal:  # n
 
 def note_of(made: Proposal) -> None:
     """Say what data were taken for, and what was left out of the study."""
+    from flightid.conventions import Light
+    from flightid.findings import said_once
+
     for text in made.said:
         note(text)
-    for finding in made.findings:
-        note(f"{finding.light.words}: {finding.message}")
+    for finding in said_once(made.findings):
+        light = "" if finding.light is Light.GREEN else f"{finding.light.words}: "
+        note(f"{light}{finding.message}")
 
 
 def end_without_model(made: Proposal) -> None:
@@ -67,7 +72,7 @@ def taken_study(
     *,
     tune: bool = False,
     cache: MutableMapping[str, Any] | None = None,
-) -> tuple[Path, Path | None]:
+) -> tuple[Path, Path | None, tuple[Finding, ...]]:
     """The study that was named, or the one that data ask for, written beside its results.
 
     What is read and found of a log stands in `cache` for the run of the study. Where the data
@@ -75,8 +80,8 @@ def taken_study(
 
     Returns
     -------
-    tuple of Path, and Path or None
-        The study, and the folder of its results.
+    tuple of Path, Path or None, and tuple of Finding
+        The study, the folder of its results, and what it has no model of.
 
     Raises
     ------
@@ -93,7 +98,7 @@ def taken_study(
                 raise click.UsageError(
                     f"{flags_of(name)[-1]} belongs to a log or records; a study says its own"
                 )
-        return files[0], output
+        return files[0], output, ()
     if log is not None:
         raise click.UsageError("--log belongs to a study, and there is none")
     target = study_path(files, output)
@@ -104,7 +109,7 @@ def taken_study(
     note_of(made)
     from flightid.study.output import output_folder
 
-    return target, output or output_folder(target)
+    return target, output or output_folder(target), made.findings
 
 
 def show_study(result: Study, *, whole: bool, as_json: bool) -> None:

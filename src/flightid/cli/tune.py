@@ -25,6 +25,7 @@ from flightid.errors import OptionError
 
 if TYPE_CHECKING:
     from flightid.control.tuning.result import Tuning
+    from flightid.findings import Finding
     from flightid.options import Options
     from flightid.study.tuning import TuneSettings
 
@@ -122,6 +123,7 @@ def command(
         raise click.UsageError(f"--write: there is no folder {target.parent}: make it first")
     _require_free(target, overwrite)
     study = None
+    missed: tuple[Finding, ...] = ()
     *parts, data = parted(options, _fields())
     asked = {name: each for part in parts for name, each in part.items()}
     fleet = _fleet(
@@ -143,7 +145,7 @@ def command(
                 f"--controller {USUAL}"
             )
         cache: dict[str, Any] = {}
-        path, folder = taken_study(files, output, log, data, tune=not own, cache=cache)
+        path, folder, missed = taken_study(files, output, log, data, tune=not own, cache=cache)
         study = run_study(
             path, output=folder, log=log, tune=asked, level=level, cache=cache,
             gains_file="" if target is None else str(target),
@@ -169,7 +171,7 @@ def command(
         written = _write(tuning, target, overwrite, accept_red=accepted)
     if study is not None and not as_json:
         show_answer(study, written)
-    leave_by_verdict(tuning.findings)
+    leave_by_verdict((*missed, *tuning.findings))
 
 
 def _require_free(target: Path | None, overwrite: bool) -> None:

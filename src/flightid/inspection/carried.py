@@ -42,6 +42,8 @@ class InspectedLog(Protocol):
         ...
 
 
+NOT_SWEPT = "nothing was injected, and no sweep was flown"
+"""Why most axes of a log carry no model: nobody meant them to."""
 SEARCHED = ("sid", "chirp", "sweep", "autotune")
 """Excitations from which a model may be tried."""
 
@@ -51,7 +53,7 @@ def why_no_model(inspection: InspectedLog, band: AxisBand) -> str:
     if not band.input:
         return band.reason
     if not is_swept(inspection, band.axis):
-        return "nothing was injected, and no sweep was flown"
+        return NOT_SWEPT
     if band.band_rad_s is None:
         return band.reason
     if band.span < BAND_LEAST.value:

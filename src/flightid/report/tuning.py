@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from flightid.control.tuning.result import untouched_finding
 from flightid.plot.margins import loop_bode
 from flightid.plot.tuning import gain_map, nichols, time_responses
 from flightid.report.blocks import result_blocks
@@ -48,6 +49,8 @@ def tuning_section(tuning: Tuning, title: str = "Gains") -> Section:
     blocks: list[Block] = []
     if tuning.refused:
         blocks.append(Lights(tuple(each.finding for each in tuning.refused)))
+    if tuning.untouched:
+        blocks.append(Lights((untouched_finding(tuning.untouched),)))
     verdicts = [finding for each in tuning.together for finding in each.findings()]
     if tuning.together:
         blocks += [Lights(tuple(verdicts)), TableBlock(tuning.together_table())]

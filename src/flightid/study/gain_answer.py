@@ -12,6 +12,7 @@ from flightid.control.autopilots.angle_law import angle_law
 from flightid.control.autopilots.parameter_files import parameter_suffix
 from flightid.control.autopilots.pid_loop import PidLoop
 from flightid.control.tuning.limits import ANGLE
+from flightid.control.tuning.result import untouched_finding
 from flightid.conventions import Light
 from flightid.findings import MOST_DIGITS, Finding, at_least, counted, worst
 from flightid.table import Cell, Column, Table
@@ -86,6 +87,8 @@ def gains_finding(
         message += _kept(tuning.left_out, plain=plain)
     else:
         message += _doubt(tuning, light)
+    if tuning.untouched:
+        message += f"; {untouched_finding(tuning.untouched).message}"
     return Finding("gains", light, message, way)
 
 

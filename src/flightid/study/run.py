@@ -19,6 +19,7 @@ from flightid.review import FlightReview, review_flight
 from flightid.study.error_list import ErrorList
 from flightid.study.faults import TUNING, Faults
 from flightid.study.flight import fly_again
+from flightid.study.other_axes import with_other_axes
 from flightid.study.output import (
     RESULTS,
     output_folder,
@@ -146,7 +147,7 @@ def _run(
         if wanted is not None:
             inputs = (runner, staged, taken.log, wanted, settings.record_files)
             tuned = faults.spare(TUNING, _tuned, None, *inputs)
-        tuning = None if tuned is None else tuned.value
+        tuning = None if tuned is None else with_other_axes(tuned, taken.inspection, staged)
         flown = None
         if settings.flight is not None and settings.fly is not None and tuning is not None:
             asked = (tuned, settings.flight, settings.fly)

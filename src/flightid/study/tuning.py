@@ -26,6 +26,7 @@ from flightid.models.model import model_of
 from flightid.options import options_of
 from flightid.review.suggested_filters import suggested_filters
 from flightid.study.actuator_range import input_ranges, untold_limits
+from flightid.study.other_axes import untouched_axes
 from flightid.study.reading import TableReader, read_each
 from flightid.study.record_files import RecordFile
 from flightid.validation import Comparison, Verification
@@ -395,4 +396,5 @@ def _tuned(
         filters=choice,
         **asked,
     )
+    made = replace(made, untouched=untouched_axes(log, fits))
     return replace(made, filters=TunedFilters(reason=reason)) if reason else made

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
@@ -49,6 +50,34 @@ class RefusedAxis:
         return Finding("axis-refused", Light.RED, said, self.action)
 
 
+@dataclass(frozen=True)
+class UntouchedAxis:
+    """An axis that nobody asked gains of: no failure, but whoever flies the others has to know.
+
+    Attributes
+    ----------
+    axis : str
+    reason : str
+
+    Example
+    -------
+    >>> print(untouched_finding([UntouchedAxis(axis, "not swept") for axis in ("pitch", "yaw")]))
+    [green] pitch, yaw: not swept, gains left as flown
+    """
+
+    axis: str
+    reason: str
+
+
+def untouched_finding(axes: Sequence[UntouchedAxis]) -> Finding:
+    """One line of all of them, those with one reason together."""
+    reasons: dict[str, list[str]] = {}
+    for each in axes:
+        reasons.setdefault(each.reason, []).append(each.axis)
+    told = "; ".join(f"{', '.join(names)}: {why}" for why, names in reasons.items())
+    return Finding("axis-untouched", Light.GREEN, f"{told}, gains left as flown")
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Tuning(Result, schema="flightid.tuning/1"):
     """Result of `flightid.tune`.
@@ -63,6 +92,8 @@ class Tuning(Result, schema="flightid.tuning/1"):
         Axes that were asked for and that their data do not allow; the others stand.
     filters : TunedFilters or None
         Filters that the gains were tuned with; None: those that flew, unasked.
+    untouched : tuple of UntouchedAxis
+        Axes of the autopilot that nobody asked for.
 
     Example
     -------
@@ -74,6 +105,7 @@ class Tuning(Result, schema="flightid.tuning/1"):
     together: tuple[Together, ...]
     refused: tuple[RefusedAxis, ...] = ()
     filters: TunedFilters | None = None
+    untouched: tuple[UntouchedAxis, ...] = ()
 
     def __getitem__(self, axis: str) -> PidDesign:
         """Design of an axis.
@@ -134,7 +166,12 @@ class Tuning(Result, schema="flightid.tuning/1"):
         single = [finding for design in self.designs for finding in design.findings]
         together = [finding for each in self.together for finding in each.findings()]
         filters = () if self.filters is None else self.filters.findings()
-        return (*(each.finding for each in self.refused), *single, *together, *filters)
+        refused = (each.finding for each in self.refused)
+        return (*refused, *single, *together, *filters, *self._others)
+
+    @property
+    def _others(self) -> tuple[Finding, ...]:
+        return (untouched_finding(self.untouched),) if self.untouched else ()
 
     def __repr__(self) -> str:
         """Axes with their worst phase margins on one line."""
@@ -155,6 +192,7 @@ class Tuning(Result, schema="flightid.tuning/1"):
         refused = tuple(str(each.finding) for each in self.refused)
         if self.filters is not None:
             together += tuple(map(str, self.filters.findings()))
+        together += tuple(map(str, self._others))
         columns = tables[0].columns if tables else (Column("parameter"),)
         return Table("Gains", columns, rows, (*refused, *notes, *together))
 
@@ -255,7 +293,7 @@ class Tuning(Result, schema="flightid.tuning/1"):
             for axis, why in self.left_out.items()
             if axis not in kept
         )
-        return designs, left
+        return designs, (*left, *(each.message for each in self._others))
 
     def _computed(self) -> dict[str, object]:
         return {

@@ -13,7 +13,7 @@ from flightid.findings import Finding
 from flightid.frozen import dataclass
 from flightid.inspection import Inspection, inspect_log
 from flightid.inspection.axes import axes_of
-from flightid.inspection.carried import why_no_model
+from flightid.inspection.carried import NOT_SWEPT, why_no_model
 from flightid.inspection.log_clock import begins_later
 from flightid.inspection.signals import Span
 from flightid.inspection.usable_band import AxisBand, hertz_words
@@ -140,9 +140,14 @@ COMMANDS = ("tau_phi", "tau_theta", "tau_psi")
 
 
 def _missed(inspection: Inspection, axis: str, why: str, action: str = "") -> Finding:
-    """Why there is no model of an axis; the inspection's advice where there is none of its own."""
+    """Why there is no model of an axis; the inspection's advice where there is none of its own.
+
+    That nobody swept an axis is no failure: it is told, and green.
+    """
     advice = next((f.action for f in inspection.findings if f.code == "no-excitation"), "")
-    return Finding("no-model", Light.RED, f"{axis}: no model, {why}", action or advice)
+    failed = why != NOT_SWEPT
+    code, light = ("no-model", Light.RED) if failed else ("not-swept", Light.GREEN)
+    return Finding(code, light, f"{axis}: no model, {why}", action or advice)
 
 
 def _lines(
