@@ -2,267 +2,267 @@
 
 `python -m tests.stress.mutants --sample 200 --keep FILE`, with the extra `mutants`: `make mutants`.
 
-Drawn by chance from all mutants of the packages that tell users what to believe, with annotations
-left out, and what alters no result: sizes of caches, arrays that may be overwritten, checks that a
-caller would have to fail (`strict` of zip). Each meets the tests that reach its line, by a run with
-coverage that comes first and is kept by groups of files, and the examples of its file; what runs on
-import alone also the contract of classes, which reads the source. Then, where none of them notices,
-the other tests of their files, which may take what a fixture made of that line for another. The
-tree is a copy. A mutant that no test notices is printed with its line: mend the test, or argue that
-the line does the same without it. Kept mutants are not tried again. The share is told by package,
-each with the interval of Clopper and Pearson, *Biometrika* 26 (1934), 404-413.
+Drawn by chance from all mutants of the packages that tell users what to believe
+(`mutations.EQUIVALENT` and its neighbours say what is left out). pytest collects the default suite
+once, each file of tests runs in a fork with coverage, and each mutant meets, in a fork of its own
+(`mutant_forks.py`): every test that reaches its statement, those of its module and short ones first
+(`BUDGET_S` seconds of them; where that is not all, its end says so), then the other tests of the
+nearest files, which may take what a fixture or a cache made of that line for another. A mutant of
+what runs on import meets the tests that reach most of its file, and the contracts that read the
+source. One that no test notices is printed: mend the test, or delete what nothing needs.
+
+What tests reach is kept beside the file by the text of the test file; of a source that changed
+since, lines that stand elsewhere take their tests with them. Ends are kept for a tree that is the
+same. `--again` tries anew what was not noticed. The share is told by package, each with the
+interval of Clopper and Pearson, *Biometrika* 26 (1934), 404-413.
 """
 
 from __future__ import annotations
 
 import argparse
-import ast
+import hashlib
 import json
 import os
 import random
-import re
-import resource
 import shutil
 import subprocess
-import sys
 import tempfile
+import time
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
-from functools import partial
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
-from scipy.stats import beta
+from tests.stress.mutations import (
+    EQUIVALENT,
+    Mutant,
+    changed,
+    check_equivalent,
+    moved,
+    mutants,
+    mutants_of,
+    statement,
+    told,
+)
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("logs", "inspection", "evidence", "uncertainty", "control/tuning")
-TESTS = ("tests/unit", "tests/truth", "tests/contract")
-SLOW = ("test_app_", "test_fleet_")  # they try other packages, in processes of their own
-OPERATORS = (
-    *("NumberReplacer", "ReplaceTrueWithFalse", "ReplaceFalseWithTrue"),
-    *("ReplaceAndWithOr", "ReplaceOrWithAnd", "AddNot", "ReplaceUnaryOperator_Delete_Not"),
-    *("ReplaceBinaryOperator_Add_Sub", "ReplaceBinaryOperator_Sub_Add"),
-    *("ReplaceBinaryOperator_Mul_Div", "ReplaceBinaryOperator_Div_Mul"),
-    *("ReplaceComparisonOperator_Lt_LtE", "ReplaceComparisonOperator_LtE_Gt"),
-    *("ReplaceComparisonOperator_Gt_LtE", "ReplaceComparisonOperator_GtE_Lt"),
-    *("ReplaceComparisonOperator_Eq_NotEq", "ReplaceComparisonOperator_NotEq_Eq"),
-    *("ReplaceUnaryOperator_USub_UAdd", "ReplaceBreakWithContinue", "ZeroIterationForLoop"),
-)
-CONTRACTS = ("tests/contract/test_array_classes.py",)
+TESTS = ("tests/unit", "tests/truth", "tests/contract", "tests/guide", "src/flightid")
+SLOW = ("test_app_", "test_fleet_")
+"""They try other packages, in processes of their own."""
+READERS = ("tests/contract/test_array_classes.py",)
 """They read the source of classes: no line of it is run by them."""
-COSTS_ALONE = ("strict", "overwrite_input", "overwrite_a", "overwrite_b", "check_finite", "maxsize")
-"""Arguments that no result depends on: they refuse, keep or overwrite."""
-CACHES = ("lru_cache", "cache")
-MOST_TESTS, MOST_FILES, LONGEST_S = 60, 3, 150
-FILES_AT_ONCE = 24
-"""Test files of one run with coverage: what is lost where it is stopped."""
-WAITING = 10
-"""Wall time a processor's second may take: a busy machine is not a loop without end."""
-PASSED, MISUSED, NO_TESTS = 0, 4, 5
-ENDS = {PASSED: "survived", 1: "killed", 2: "killed"}
-"""By pytest's code: 1, a test failed; 2, the tree cannot be imported."""
-UNNOTICED = ("survived", "not reached", "not run", "too long")
-Reached = Mapping[str, Mapping[int, Sequence[str]]]
+BUDGET_S, FILES_S, MOST_FILES = 60.0, 30.0, 3
+"""Processor's seconds of tests that reach a mutant, and of the other tests of so many files."""
+FILE_S = 600.0
+"""Processor's seconds that a file of tests may take with coverage."""
+UNNOTICED = ("survived", "not all run", "not reached", "not run")
 
 
-@dataclass(frozen=True)
-class Mutant:
-    """One change of one file."""
+@dataclass
+class Reached:
+    """Tests by file and line that they run, and the seconds that each takes."""
 
-    path: str
-    operator: str
-    occurrence: int
-    line: int
+    lines: dict[str, dict[int, set[str]]] = field(default_factory=dict)
+    seconds: dict[str, float] = field(default_factory=dict)
 
-    @property
-    def name(self) -> str:
-        """The file, its line and what is done there."""
-        return f"{self.path}:{self.line} {self.operator} {self.occurrence}"
+    def take(self, kept: Mapping[str, Any], tree: Path, texts: Path) -> None:
+        """Add what a file of tests reaches, where those lines stand now."""
+        names = list(kept["seconds"])
+        failed = set(kept["failed"])
+        self.seconds |= {k: v for k, v in kept["seconds"].items() if k not in failed}
+        for file, (digest, of) in kept["lines"].items():
+            if not (tree / file).exists():
+                continue
+            now = (tree / file).read_text(encoding="utf-8")
+            same = digest == _digest(now)
+            places = {} if same else moved((texts / digest).read_text(encoding="utf-8"), now)
+            here = self.lines.setdefault(file, {})
+            for line, tests in of.items():
+                place = int(line) if same else places.get(int(line), 0)
+                here.setdefault(place, set()).update({names[k] for k in tests} - failed)
 
-
-def copied(folder: Path) -> Path:
-    """The tracked files and what was built in place, where mutants harm nobody."""
-    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=True)
-    native = [str(each.relative_to(ROOT)) for each in (ROOT / "src/flightid").glob("_native*.so")]
-    for name in [*filter(None, listed.stdout.decode().split("\0")), *native]:
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy2(ROOT / name, folder / name)
-    return folder
-
-
-def tested(tree: Path, words: Sequence[str], longest_s: int | None, told: list[str]) -> int | None:
-    """How pytest ends in that tree; below zero or None where its processor's time is not enough."""
-    first = (str(tree), str(tree / "src"), *filter(None, [os.environ.get("PYTHONPATH")]))
-    given = os.environ | {"PYTHONPATH": os.pathsep.join(first)}
-    limit = partial(resource.setrlimit, resource.RLIMIT_CPU, (longest_s, longest_s))
-    for threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "RAYON_NUM_THREADS"):
-        given[threads] = "1"
-    try:
-        ended = subprocess.run(
-            [sys.executable, "-m", "pytest", "-q", "--no-header", "--tb=no", "-rfE", *words],
-            cwd=tree, env=given, timeout=longest_s and WAITING * longest_s, check=False, text=True,
-            preexec_fn=limit if longest_s else None,
-            stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
-        )  # fmt: skip
-    except subprocess.TimeoutExpired:
-        return None
-    told += re.findall(r"^(?:FAILED|ERROR) (\S+::.+?)(?: - .*)?$", ended.stdout, re.MULTILINE)
-    return ended.returncode
+    def of(self, path: str, places: Sequence[int]) -> set[str]:
+        """The tests that run any of those lines."""
+        here = self.lines.get(path, {})
+        return set().union(*(here.get(line, set()) for line in places))
 
 
-def reached(
-    tree: Path, kept: Path, packages: Sequence[str], tests: Sequence[str], workers: int
-) -> Reached:
-    """Tests by file and line that they run; made once, for minutes, and read from `kept` again."""
-    from coverage import CoverageData
-
-    kept.mkdir(parents=True, exist_ok=True)
-    files = [
-        str(path.relative_to(tree))
-        for each in tests
-        for path in sorted(
-            (tree / each).rglob("test_*.py") if each[-3:] != ".py" else [tree / each]
-        )
-        if not path.name.startswith(SLOW)
-    ]
-    found: dict[str, dict[int, set[str]]] = {}
-    for start in range(0, len(files), FILES_AT_ONCE):
-        data = kept / f"{start:04d}"
-        if not data.exists():
-            _cover(tree, data, packages, files[start : start + FILES_AT_ONCE], workers)
-            print(f"{min(start + FILES_AT_ONCE, len(files))}/{len(files)} test files", flush=True)
-        known = CoverageData(str(data))
-        known.read()
-        for file in known.measured_files():
-            lines = found.setdefault(str(Path(file)), {})
-            for line, names in known.contexts_by_lineno(file).items():
-                # Names of examples hold bars of their own: the last one is the coverage's.
-                lines.setdefault(line, set()).update(each.rpartition("|")[0] for each in names)
-    return {
-        file: {line: sorted(names - {""}) for line, names in lines.items()}
-        for file, lines in found.items()
-    }
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-def _cover(
-    tree: Path, data: Path, packages: Sequence[str], files: Sequence[str], workers: int
-) -> None:
-    """Run those test files with coverage; those that fail would notice everything: left out."""
-    settings = tree / "coverage.rc"
-    sources = "\n    ".join(str(tree / "src/flightid" / each) for each in packages)
-    settings.write_text(f"[run]\nrelative_files = true\nsource =\n    {sources}\n")
-    words = ["--cov", f"--cov-config={settings}", "--cov-context=test", "--cov-report="]
-    failed: list[str] = []
-    while True:
-        left_out = [f"--deselect={each}" for each in failed]
-        before = len(failed)
-        code = tested(tree, [*words, f"-n{workers}", *left_out, *files], None, failed)
-        if code in (PASSED, NO_TESTS):
-            break
-        if len(failed) == before:
-            raise SystemExit(f"pytest ends with {code} before anything is changed: {files}")
-        print(f"fail unchanged, left out: {failed[before:]}", flush=True)
-    shutil.copy(tree / ".coverage", data)
+def copied(folder: Path) -> tuple[Path, str]:
+    """The files that git knows or would take, and the native half: where mutants harm nobody.
 
-
-def mutants(tree: Path, packages: Sequence[str]) -> Iterator[Mutant]:
-    """All of those packages, but those of annotations and of what alters no result."""
-    from cosmic_ray.ast import ast_nodes, get_ast
-    from cosmic_ray.plugins import get_operator
-
-    for path in sorted(
-        p for each in packages for p in (tree / "src/flightid" / each).rglob("*.py")
-    ):
-        text = path.read_text(encoding="utf-8")
-        spans = list(_left_out(ast.parse(text)))
-        nodes = list(ast_nodes(get_ast(text)))
-        for name in OPERATORS:
-            operator = get_operator(f"core/{name}")()
-            places = [at for node in nodes for at in operator.mutation_positions(node)]
-            for occurrence, (start, _) in enumerate(places):
-                if not any(low <= start < high for low, high in spans):
-                    yield Mutant(str(path.relative_to(tree)), name, occurrence, start[0])
-
-
-def _left_out(module: ast.Module) -> Iterator[tuple[tuple[int, int], tuple[int, int]]]:
-    """Where what is not changed begins and ends, line and column.
-
-    `|` between types runs nowhere, and `COSTS_ALONE` change no number.
+    With a digest of sources and tests.
     """
-    for node in ast.walk(module):
-        parts = [getattr(node, "annotation", None), getattr(node, "returns", None)]
-        if isinstance(node, ast.Call):
-            parts += [each.value for each in node.keywords if each.arg in COSTS_ALONE]
-            parts += node.args if getattr(node.func, "id", "") in CACHES else []
-        for told in parts:
-            if isinstance(told, ast.expr) and told.end_lineno and told.end_col_offset:
-                yield (told.lineno, told.col_offset), (told.end_lineno, told.end_col_offset)
+    words = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
+    listed = subprocess.run(words, cwd=ROOT, capture_output=True, check=True)
+    native = [str(each.relative_to(ROOT)) for each in (ROOT / "src/flightid").glob("_native*.so")]
+    digest = hashlib.sha256()
+    for name in sorted({*filter(None, listed.stdout.decode().split("\0")), *native}):
+        if (ROOT / name).is_file():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(ROOT / name, folder / name)
+            if name.startswith(("src/", "tests/")):
+                digest.update((ROOT / name).read_bytes())
+    return folder, digest.hexdigest()[:16]
 
 
-def end_of(tree: Path, mutant: Mutant, names: Reached) -> str:
-    """Killed, endless, survived, not reached by any test, or such that those are not found."""
-    from cosmic_ray.mutating import mutate_code
-    from cosmic_ray.plugins import get_operator
-
-    tests = near(tree, mutant, names)
-    place = tree / mutant.path
-    text = place.read_text(encoding="utf-8")
-    changed = mutate_code(text, get_operator(f"core/{mutant.operator}")(), mutant.occurrence)
-    if changed is None or changed == text:
-        return "no change"
-    files = list(dict.fromkeys(each.partition("::")[0] for each in tests))[:MOST_FILES]
-    examples = ["--doctest-modules", mutant.path]
-    if not names.get(mutant.path, {}).get(mutant.line):
-        examples += CONTRACTS
-    for words in ([*tests[:MOST_TESTS], *examples], *([each] for each in files)):
-        try:
-            place.write_text(changed, encoding="utf-8")
-            code = tested(tree, ["-x", *words], LONGEST_S, [])
-        finally:
-            place.write_text(text, encoding="utf-8")
-        if code is None or code not in (*ENDS, NO_TESTS):
-            # No end in time, or names that are not found since a file of tests cannot be imported.
-            unchanged = tested(tree, ["-x", *words], LONGEST_S // 2, [])
-            ended, left = ("killed", "not run") if code == MISUSED else ("endless", "too long")
-            return ended if unchanged == PASSED else left
-        if code not in (PASSED, NO_TESTS):
-            return ENDS[code]
-    return ENDS[PASSED] if tests else "not reached"
+def reached(forks: Any, tree: Path, kept: Path) -> Reached:
+    """What each file of tests reaches: run with coverage, or read where its text is the same."""
+    (kept / "texts").mkdir(parents=True, exist_ok=True)
+    files: dict[str, list[str]] = {}
+    for each in forks.tests:
+        files.setdefault(each.partition("::")[0], []).append(each)
+    found = Reached()
+    for k, (file, tests) in enumerate(files.items()):
+        text = (tree / file).read_text(encoding="utf-8")
+        place = kept / f"{_digest(file + text)}.json"
+        if not place.exists():
+            covered = forks.covered(tests, FILE_S)
+            if covered is None:
+                print(f"{file}: no end with coverage, left out", flush=True)
+                continue
+            place.write_text(json.dumps(_packed(covered, tree, kept / "texts")))
+            told = f"; fail unchanged, left out: {covered.failed}" if covered.failed else ""
+            spent = sum(covered.seconds.values())
+            print(f"{k + 1}/{len(files)} {file}: {spent:.1f} s{told}", flush=True)
+        found.take(json.loads(place.read_text()), tree, kept / "texts")
+    return found
 
 
-def near(tree: Path, mutant: Mutant, names: Reached) -> list[str]:
-    """Tests that reach a mutant's line: those of its module first, then those that reach little."""
-    lines = [names.get(mutant.path, {})]
-    # What runs on import belongs to no test: those of the whole file stand for it, and where all
-    # of the file runs so, those of the files that take from it.
-    if not any(lines[0].values()):
-        module = ".".join(Path(mutant.path).with_suffix("").parts[1:])
-        lines = [of for file, of in names.items() if module in (tree / file).read_text("utf-8")]
-    breadth = Counter(each for of in lines for found in of.values() for each in found)
+def _packed(covered: Any, tree: Path, texts: Path) -> dict[str, Any]:
+    """As it is kept: tests by their numbers, and the texts of the files that lines count in."""
+    number = {name: k for k, name in enumerate(covered.seconds)}
+    lines = {}
+    for file, of in covered.lines.items():
+        text = (tree / file).read_text(encoding="utf-8")
+        (texts / _digest(text)).write_text(text, encoding="utf-8")
+        here = {k: [number[each] for each in tests if each in number] for k, tests in of.items()}
+        lines[file] = (_digest(text), here)
+    return {"seconds": covered.seconds, "failed": covered.failed, "lines": lines}
+
+
+def end_of(forks: Any, mutant: Mutant, text: str, new: str, known: Reached) -> tuple[str, str]:
+    """How a mutant ends, and which test noticed it."""
+    tests, others, left_out = chosen(forks, mutant, known, text)
+    if not tests:
+        return "not reached", ""
+    for names in (tests, others):
+        if not names:
+            continue
+        cpu_s = 30.0 + 3.0 * sum(known.seconds.get(each, 1.0) for each in names)
+        ended = forks.tried(mutant.path, new, names, cpu_s)
+        if ended.end == "endless" and not forks.unchanged(names, cpu_s):
+            return "not run", "nor do these tests end without it"
+        if ended.end != "survived":
+            return ended.end, ended.by
+    return ("not all run", f"{left_out} left out") if left_out else ("survived", "")
+
+
+def chosen(
+    forks: Any, mutant: Mutant, known: Reached, text: str
+) -> tuple[list[str], list[str], int]:
+    """Tests that reach it, the others of the nearest files, and how many there was no time for."""
+    at = known.of(mutant.path, statement(text, mutant.line))
+    here = known.lines.get(mutant.path, {})
+    readers = []
+    if not at:
+        # What runs on import belongs to no test: those of the whole file stand for it, and where
+        # all of the file runs so, those of the files that take from it.
+        readers = [each for each in forks.tests if each.partition("::")[0] in READERS]
+        if not any(here.values()):
+            module = ".".join(Path(mutant.path).with_suffix("").parts[1:])
+            takers = [
+                of
+                for file, of in known.lines.items()
+                if module in (forks.tree / file).read_text("utf-8")
+            ]
+            here = {k: names for k, of in enumerate(takers) for names in of.values()}
+        at = set().union(*here.values())
+    breadth = Counter(each for names in here.values() for each in names)
     stem = Path(mutant.path).stem.rstrip("s")
-    tests = names.get(mutant.path, {}).get(mutant.line) or breadth
-    return sorted(tests, key=lambda each: (stem not in each, breadth[each], each))
+
+    def rank(test: str) -> tuple[bool, bool, float, str]:
+        near = stem in test.partition("::")[0]
+        seconds = known.seconds.get(test, 0.0)
+        return not near, bool(readers) and breadth[test] < max(breadth.values()) / 2, seconds, test
+
+    ranked = [*sorted(at, key=rank), *readers]
+    taken, left_out = _within(ranked, known, BUDGET_S)
+    files = list(dict.fromkeys(each.partition("::")[0] for each in taken))
+    place = {each: k for k, each in enumerate(forks.tests)}
+    tests = sorted(taken, key=lambda each: (files.index(each.partition("::")[0]), place[each]))
+    beside = [
+        each
+        for file in files[:MOST_FILES]
+        for each in forks.tests
+        if each.partition("::")[0] == file and each not in taken and each in known.seconds
+    ]
+    return tests, _within(beside, known, FILES_S)[0], left_out
+
+
+def _within(names: Sequence[str], known: Reached, most_s: float) -> tuple[list[str], int]:
+    """The first of those that take so long together, at least one; how many are left out."""
+    taken: list[str] = []
+    spent = 0.0
+    for each in names:
+        spent += known.seconds.get(each, 1.0)
+        if taken and spent > most_s:
+            break
+        taken.append(each)
+    return taken, len(names) - len(taken)
 
 
 def share(missed: int, tried: int) -> str:
     """So many of so many in percent, with its interval."""
+    from scipy.stats import beta
+
     low = beta.ppf(0.025, missed, tried - missed + 1) if missed else 0.0
     high = beta.ppf(0.975, missed + 1, tried - missed) if missed < tried else 1.0
     return f"{100 * missed / tried:.1f} % ({100 * low:.1f} to {100 * high:.1f}) of {tried}"
 
 
-def counts(drawn: Sequence[Mutant], ends: Mapping[str, str], packages: Sequence[str]) -> list[str]:
+def counts(ends: Sequence[tuple[Mutant, str]], packages: Sequence[str]) -> list[str]:
     """A line of each package, and of all."""
     lines = []
     for package in (*packages, ""):
         found = Counter(
-            ends[each.name] for each in drawn if each.path.startswith(f"src/flightid/{package}")
+            end for each, end in ends if each.path.startswith(f"src/flightid/{package}")
         )
-        tried = found.total() - found["no change"]
+        tried = found.total()
         missed = sum(found[each] for each in UNNOTICED)
         if tried:
             lines.append(f"{package or 'all'}: unnoticed {share(missed, tried)}; {dict(found)}")
     return lines
+
+
+def drawn(asked: argparse.Namespace, tree: Path, kept: Sequence[Mapping[str, Any]]) -> list[Mutant]:
+    """In the order of chance; or what was not noticed; or all of some files."""
+    if asked.again or asked.only:
+        wanted = {each["name"] for each in kept if each["end"] in UNNOTICED}
+        words = asked.only or sorted({each.partition(": ")[0] for each in wanted})
+        paths = [str(p.relative_to(tree)) for p in sorted((tree / "src/flightid").rglob("*.py"))]
+        found = [
+            each
+            for path in paths
+            if any(word in path for word in words)
+            for each in mutants_of(path, (tree / path).read_text(encoding="utf-8"))
+        ]
+        return [each for each in found if not asked.again or _change(tree, each)[0] in wanted]
+    every = mutants(tree, asked.packages)
+    random.Random(asked.seed).shuffle(every)
+    return every
+
+
+def _change(tree: Path, mutant: Mutant) -> tuple[str, str, str]:
+    """What a change is called, which holds where lines move, and the texts before and after."""
+    text = (tree / mutant.path).read_text(encoding="utf-8")
+    new = changed(text, mutant.operator, mutant.occurrence)
+    return f"{mutant.path}: {' => '.join(told(text, new))}", text, new
 
 
 def main() -> None:
@@ -271,27 +271,50 @@ def main() -> None:
     parser.add_argument("--sample", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--packages", nargs="+", default=PACKAGES)
+    parser.add_argument(
+        "--only", nargs="+", help="all of files whose names hold one of these words"
+    )
+    parser.add_argument("--again", action="store_true", help="try anew what was not noticed")
     parser.add_argument("--tests", nargs="+", default=TESTS)
-    parser.add_argument("--workers", type=int, default=2, help="of the run with coverage")
     parser.add_argument("--keep", type=Path, required=True, help="file of what was found")
     asked = parser.parse_args()
-    kept = [json.loads(line) for line in asked.keep.open()] if asked.keep.exists() else []
-    ends = {each["name"]: each["end"] for each in kept}
-    asked.keep.parent.mkdir(parents=True, exist_ok=True)
+    for threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "RAYON_NUM_THREADS"):
+        os.environ[threads] = "1"
+    from tests.stress.mutant_forks import Forks
+
+    keep = asked.keep.resolve()
+    keep.parent.mkdir(parents=True, exist_ok=True)
+    kept = [json.loads(line) for line in keep.open()] if keep.exists() else []
     with tempfile.TemporaryDirectory() as folder:
-        tree = copied(Path(folder))
-        kept_lines = asked.keep.with_suffix(".coverage")
-        names = reached(tree, kept_lines, asked.packages, asked.tests, asked.workers)
-        drawn = random.Random(asked.seed).sample(list(mutants(tree, asked.packages)), asked.sample)
-        for k, mutant in enumerate(drawn):
-            if mutant.name not in ends:
-                ends[mutant.name] = end_of(tree, mutant, names)
-                with asked.keep.open("a") as file:
-                    found = {"name": mutant.name, "end": ends[mutant.name], **asdict(mutant)}
-                    file.write(json.dumps(found) + "\n")
-            if ends[mutant.name] in UNNOTICED:
-                print(f"{k + 1}/{asked.sample} {ends[mutant.name]}: {mutant.name}", flush=True)
-    print("\n".join(counts(drawn, ends, asked.packages)))
+        tree, digest = copied(Path(folder))
+        check_equivalent(tree)
+        sample = drawn(asked, tree, kept)
+        words = [*asked.tests, *(f"--ignore-glob=*/{each}*" for each in SLOW)]
+        forks = Forks(tree, words, [f"src/flightid/{each}" for each in PACKAGES])
+        known = reached(forks, tree, keep.with_suffix(".reach"))
+        had = {each["name"]: each["end"] for each in kept if each["tree"] == digest}
+        ends: list[tuple[Mutant, str]] = []
+        for mutant in sample:
+            if len(ends) == asked.sample and not (asked.again or asked.only):
+                break
+            start, by = time.monotonic(), ""
+            name, text, new = _change(tree, mutant)
+            if new == text or (mutant.path, *told(text, new)) in EQUIVALENT:
+                continue
+            end = had.get(name, "")
+            if not end or asked.again:
+                end, by = end_of(forks, mutant, text, new, known)
+                record = {"name": name, "end": end, "by": by, "tree": digest}
+                record |= {"line": mutant.line, "s": round(time.monotonic() - start, 1)}
+                with keep.open("a") as file:
+                    file.write(json.dumps(record) + "\n")
+            if end == "no change":
+                continue
+            ends.append((mutant, end))
+            if end in UNNOTICED:
+                print(f"{len(ends)} {end} {by} :{mutant.line} {name}", flush=True)
+        forks.end()
+    print("\n".join(counts(ends, asked.packages)))
 
 
 if __name__ == "__main__":
