@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,12 @@ from flightid.models.model import Model, linear_system
 from flightid.record import Record
 from flightid.responses import FrequencyResponse, estimate_response
 from flightid.responses.bands import usable_band
+from flightid.responses.errors.linear_estimate import LinearEstimate
+from flightid.responses.estimators.by_window import (
+    NarrowResidual,
+    WindowResidual,
+    residuals_by_window,
+)
 from flightid.simulation import simulate
 
 Array = NDArray[np.float64]
@@ -28,6 +34,9 @@ REACH = 0.25 * np.log(2.0)
 FEWEST = 2
 ALIKE = 2.0
 """Neighbouring estimates that share their windows count as one."""
+STANDS_OUT = 2.63
+"""Standard deviations that noise alone leaves behind at one frequency in 1,000: exp(-2.63²)."""
+TINY = float(np.finfo(float).tiny)
 TRACE = 1e-9
 """Share of an output that is left of it where the model leaves nothing."""
 MOST = 0.9
@@ -62,17 +71,20 @@ class ModelErrorBound:
         return usable_band(self.omega_rad_s, -self.bound, -SHOWN)
 
     def at(self, omega_rad_s: Array) -> Array:
-        """Bound at any frequency: above the band it grows with frequency, below it stays.
+        """Bound at any frequency; beyond the band, on either side, it grows with the distance.
 
-        An error of dynamics that are missing grows with the frequency beyond the band that shows
-        it, as that of a lag does; slow dynamics that are missing, as damping, lead the loop.
+        Beyond the band that shows it, an error of dynamics that are missing grows as that of a lag
+        does: with frequency above it, and below it as that of a damping, with the period. There it
+        ends at `SHOWN`, for what a whole loop does so low hangs little on the vehicle.
         """
         omega = np.asarray(omega_rad_s, dtype=np.float64)
         band = self.band_rad_s
         if band is None:
             return np.full(omega.shape, MOST)
         inside = np.interp(np.log(np.clip(omega, *band)), np.log(self.omega_rad_s), self.bound)
-        return np.asarray(np.minimum(inside * np.maximum(omega / band[1], 1.0), MOST))
+        above = np.minimum(inside * np.maximum(omega / band[1], 1.0), MOST)
+        slow = np.maximum(band[0] / np.maximum(omega, TINY), 1.0)
+        return np.asarray(np.where(omega < band[0], np.minimum(inside * slow, SHOWN), above))
 
     def to_dict(self) -> dict[str, object]:
         """Plain values, four digits."""
@@ -147,8 +159,37 @@ def model_errors(
         inside = (omega >= low) & (omega <= high)
         ratio = each.measured.response[inside] / each.model[inside]
         spread = each.measured.random_error[inside] * np.abs(ratio)
-        found |= _named(each.name, omega[inside], ratio - 1.0, spread)
+        made = _named(each.name, omega[inside], ratio - 1.0, spread)
+        found |= {name: reaching(bound, each.narrow) for name, bound in made.items()}
     return found or _of_records(model, records, filtered)
+
+
+def reaching(bound: ModelErrorBound, narrow: Iterable[NarrowResidual]) -> ModelErrorBound:
+    """The bound as far up as what single window lengths show beyond their noise.
+
+    A composite leans on short windows, and its mean over half an octave on many frequencies: both
+    smooth what a lightly damped mode that the structure lacks does to its response.
+
+    Parameters
+    ----------
+    bound : ModelErrorBound
+    narrow : iterable of NarrowResidual
+
+    Returns
+    -------
+    ModelErrorBound
+        At the same frequencies.
+    """
+    made = np.array(bound.bound)
+    for each in narrow:
+        size, omega = np.abs(each.error), each.omega_rad_s
+        stands_out = size > STANDS_OUT * each.spread
+        # What a window shows at one frequency it holds to one of its bins beside it.
+        near = np.abs(omega[:, None] - omega[stands_out]) <= 2.0 * np.pi / each.window_s
+        shown = near.any(axis=1) & np.isin(omega, bound.omega_rad_s)
+        places = np.searchsorted(bound.omega_rad_s, omega[shown])
+        made[places] = np.maximum(made[places], (size + SIGMAS * each.spread)[shown])
+    return ModelErrorBound(bound.omega_rad_s, made)
 
 
 def _of_records(
@@ -161,6 +202,7 @@ def _of_records(
         left = [_left_over(model, each, filtered) for each in records]
         seen = _response(left, model)
         known = linear_system(model).frequency_response(seen.omega_rad_s)
+        narrow = [] if seen.linear is None else [*_by_window(seen.linear, seen.omega_rad_s)]
     except FlightidError:
         return {}
     for i, output in enumerate(model.outputs):
@@ -168,8 +210,16 @@ def _of_records(
             if np.all(known[i, j] != 0.0):
                 error = seen.response[i, j] / known[i, j]
                 spread = seen.random_error[i, j] * np.abs(error)
-                found |= _named(f"{output}/{name}", seen.omega_rad_s, error, spread)
+                made = _named(f"{output}/{name}", seen.omega_rad_s, error, spread)
+                some = [each.relative(i, j, known[i, j], seen.omega_rad_s) for each in narrow]
+                found |= {name: reaching(bound, some) for name, bound in made.items()}
     return found
+
+
+def _by_window(left: LinearEstimate, omega_rad_s: Array) -> Iterator[WindowResidual]:
+    """What each window length makes of records that hold what a model leaves."""
+    band = float(omega_rad_s[0]), float(omega_rad_s[-1])
+    return residuals_by_window(left, omega_rad_s, left.output_records, band)
 
 
 def _left_over(model: Model, item: FittedRecord, filtered: bool) -> Record:
@@ -195,7 +245,6 @@ def _response(records: Sequence[Record], model: Model) -> FrequencyResponse:
         inputs=model.inputs,
         outputs=model.outputs,
         estimator=estimator,
-        covariance=False,
         loop="open",
     )
 

@@ -23,6 +23,7 @@ from flightid.responses import FrequencyResponse
 from flightid.responses.errors.functional import Functional
 from flightid.responses.errors.linear_estimate import LinearEstimate
 from flightid.responses.errors.random_error import CovarianceSource
+from flightid.responses.estimators.by_window import WindowResidual, residuals_by_window
 from flightid.responses.estimators.prewhitened import PREWHITENED
 from flightid.responses.windows.local_fit import bins_needed
 from flightid.simulation.model_outputs import systems_of
@@ -161,6 +162,18 @@ class Correction:
             np.array([halved(place, rows) for place, rows in enumerate(made)]),
         )
 
+    def left_by_window(
+        self, model: GreyBoxModel, band_rad_s: tuple[float, float]
+    ) -> list[WindowResidual]:
+        """What each window length of the estimate makes of what the model leaves, in a band.
+
+        Raises as `apply`.
+        """
+        left, linear = self._records.of(model), self._linear
+        resonant = resonant_up_to(model, self._width)
+        omega = self.data.omega_rad_s
+        return [*residuals_by_window(linear, omega, left, band_rad_s, resonant)]
+
     def errors(self, model: GreyBoxModel) -> CovarianceSource | None:
         """Errors of a corrected response: their noise is what the model leaves.
 
@@ -173,11 +186,15 @@ class Correction:
         """
         if self.data.errors is None:
             return None
+        return self._linear.errors_of(self._records.of(model), resonant_up_to(model, self._width))
+
+    @property
+    def _width(self) -> float:
+        """Over which the noise of a model's residuals is averaged, rad/s."""
         linear = self._linear
         longest = max(each.shape[1] for each in linear.input_records)
         bins = bins_needed(len(linear.inputs), len(linear.input_records))
-        width = 2.0 * np.pi * bins / (longest * linear.sample_time_s)
-        return linear.errors_of(self._records.of(model), resonant_up_to(model, width))
+        return float(2.0 * np.pi * bins / (longest * linear.sample_time_s))
 
     def _moved(self, model: GreyBoxModel, parameter: Parameter) -> tuple[GreyBoxModel, float]:
         """The model a small step away, on the side where no held input reaches another sample."""

@@ -41,6 +41,7 @@ from flightid.identification.frequency_domain.feedback_findings import (
 )
 from flightid.identification.frequency_domain.longer_windows import judge_windows
 from flightid.identification.frequency_domain.model_curves import curves_of
+from flightid.identification.frequency_domain.narrow_errors import with_narrow_residuals
 from flightid.identification.frequency_domain.noise_cost import noise_costs
 from flightid.identification.frequency_domain.opened import opened
 from flightid.identification.frequency_domain.options import FrequencyDomainOptions
@@ -111,6 +112,8 @@ def _fit_selected(
             selected, errors, fitted = list(done.selected), done.errors, done.model
             curves = done.estimates
     responses = compare_responses(fitted, selected)
+    if curves is not None and judged():
+        responses = with_narrow_residuals(responses, without, fitted)
     points = [each.model[chosen.places] for each, chosen in zip(responses, selected, strict=True)]
     compared = points if curves is None else curves
     sensitivity = _sensitivity(selected, errors, options, compared) if judged() else None

@@ -47,6 +47,7 @@ from flightid.identification.frequency_domain.fit import (
     select_by,
 )
 from flightid.identification.frequency_domain.model_curves import curves_of, slopes_of
+from flightid.identification.frequency_domain.narrow_errors import with_narrow_residuals
 from flightid.identification.frequency_domain.noise_cost import noise_costs
 from flightid.identification.frequency_domain.opened import opened
 from flightid.identification.frequency_domain.options import FrequencyDomainOptions
@@ -148,7 +149,7 @@ def fit_jointly(model: GreyBoxModel, data: Sequence[object], options: JointOptio
     bent_by = why_bent(response, beside.bias, bent)
     curves = curves_of(fit.model, [each.omega_rad_s for each in points.selected])
     noise = noise_costs(points.selected, curves, points.errors) if judged() else {}
-    fit = _with_responses(fit, response, made.points, noise, made.outcome.provenance(options.hold))
+    fit = _with_responses(fit, response, made.points, noise, made.outcome, options.hold)
     reason = made.outcome.withheld or why_misfit(fit.average_cost, noise) or bent_by
     return without_intervals(fit, reason) if reason else fit
 
@@ -282,10 +283,13 @@ def _with_responses(
     response: FrequencyResponse,
     points: ChosenPoints,
     noise: Mapping[str, NoiseCost],
-    correction: Mapping[str, object],
+    outcome: BiasOutcome,
+    hold: str,
 ) -> Fit:
     """The fit of the records with its responses beside them."""
     compared = compare_responses(fit.model, points.selected)
+    if outcome.applied and judged():
+        compared = with_narrow_residuals(compared, Correction(response, hold), fit.model)
     costs = {each.name: each.cost for each in compared}
     total = sum(costs.values())
     source = points.errors.source
@@ -305,6 +309,6 @@ def _with_responses(
             **fit.provenance,
             "method": "joint",
             "response_history": [str(step) for step in response.history],
-            "estimator_bias": dict(correction),
+            "estimator_bias": outcome.provenance(hold),
         },
     )
