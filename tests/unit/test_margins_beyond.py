@@ -174,3 +174,22 @@ def test_a_loop_is_known_where_the_responses_that_it_closes_are(
     assert not [each for each in alone.findings if "2 rad/s" in each.message]
     words = shown_words(evidence.by_response_rad_s, evidence.band_rad_s)
     assert words == "its responses hold from 0.4 to 30 rad/s together, u/lon up to 2 rad/s"
+
+
+@pytest.mark.parametrize(("low", "promised"), [(0.5, True), (4.0, False)])
+def test_of_a_phase_that_is_read_below_the_band_nothing_is_promised(
+    low: float, promised: bool
+) -> None:
+    """The angle loop of these gains passes one at 1 to 4 rad/s, the rate loop far above."""
+    plant = fid.load_model("rate_integrator", axis="roll").with_values(
+        {"Ltphi": 140.0, "tau": 0.03}
+    )
+    flown = fid.axis_loop("arducopter", "roll", loop_rate_hz=400.0)
+    kept = {"ATC_ANG_RLL_P": 3.0}
+    asked = {"band_rad_s": (low, 100.0), "nominal": True, "by_hand": kept}
+    design = fid.tune_pid(plant, gains=flown, **asked)  # type: ignore[arg-type]
+    assert 1.0 < design.worst_case("angle loop", "crossover").nominal < 4.0  # type: ignore[operator]
+    said = [each.light for each in design.findings if each.code == "margin-below-band"]
+    assert said == ([] if promised else [Light.AMBER])
+    assert (design.worst_case("angle loop", "phase margin").worst is not None) is promised
+    assert design.worst_case("rate loop", "phase margin").worst is not None

@@ -16,12 +16,15 @@ from flightid.control.tuning.gain_search_result import NO_GAINS, GainSearchResul
 from flightid.control.tuning.gain_steps import Stage, TunedGain
 from flightid.control.tuning.limits import ANGLE
 from flightid.control.tuning.order_statistics import ENOUGH, least_share
+from flightid.control.tuning.worst_cases import BELOW_BAND
 from flightid.conventions import Light
 from flightid.findings import Finding, at_least
 
 Array = NDArray[np.float64]
 NEAR = 2.0**0.5
 """Half an octave to either side."""
+SLOWER = 3.0
+"""Ratio of a band's low end to where a sweep begins that brings a crossover just below into it."""
 GAINS = ("gains", NO_GAINS)
 """Codes of `verdict`."""
 ADVICE = {
@@ -239,3 +242,24 @@ def _behind_rate_loop(result: AxisResult, omega: Array, coherence: Array) -> Arr
     left = np.interp(omega, problem.plants.omega_rad_s, np.abs(1.0 + rate) ** -2)
     tiny = np.finfo(float).tiny
     return np.asarray(coherence / (coherence + np.minimum(left, 1.0) * (1.0 - coherence) + tiny))
+
+
+def below_band(result: AxisResult, band_rad_s: tuple[float, float] | None) -> Iterator[Finding]:
+    """Amber where a loop passes one below the band: its phase margin there is the model's word.
+
+    Parameters
+    ----------
+    result : AxisResult
+    band_rad_s : tuple of float or None
+        Where the model was shown to hold, rad/s; nothing is said where that is not known.
+    """
+    found = [e.loop for e in result.worst_cases if e.required and e.estimate.reason == BELOW_BAND]
+    if band_rad_s is None or not found:
+        return
+    yield Finding(
+        "margin-below-band",
+        Light.AMBER,
+        f"{' and '.join(dict.fromkeys(found))}: the gain passes one below the {band_rad_s[0]:.3g} "
+        "rad/s from which the model was shown to hold: nothing is promised of the phase there",
+        f"sweep from {band_rad_s[0] / SLOWER:.2g} rad/s or lower, with more amplitude there",
+    )

@@ -81,8 +81,9 @@ def perturbed(
 ) -> Complex:
     """Factors 1 + Δ of plants with |Δ| at the bound, each in a direction of its own.
 
-    Below the band Δ turns to the real axis in proportion to frequency: the response of a vehicle
-    and of its model is real at zero frequency, so no error goes on turning the phase down to it.
+    Below the band Δ grows up to `SHOWN` and turns to the real axis in proportion to frequency: the
+    response of a vehicle and of its model is real at zero frequency, so no error goes on turning
+    the phase down to it.
 
     Parameters
     ----------

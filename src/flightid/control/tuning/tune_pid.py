@@ -25,7 +25,7 @@ from flightid.control.tuning.axis_tuning import (
 from flightid.control.tuning.controller_paths import ControllerPaths, has_angle_loop
 from flightid.control.tuning.evidence import TuningEvidence, Verdicts, gather
 from flightid.control.tuning.filter_choice import FilterChoice
-from flightid.control.tuning.findings import low_coherence, remarks, verdict
+from flightid.control.tuning.findings import below_band, low_coherence, remarks, verdict
 from flightid.control.tuning.flown_gains import Gains, flown_loop, require_known
 from flightid.control.tuning.options import DRAWS
 from flightid.control.tuning.order_statistics import least_share
@@ -312,6 +312,7 @@ def design_of(
             *remarks(result, flown, changes, stages, couplings, setting.gyro),
             *low_coherence(result, setting.coherence_of(place)),
             *beyond_findings(result.beyond, setting.evidence.band_rad_s),
+            *below_band(result, setting.evidence.band_rad_s),
             *setting.evidence.findings,
         ),
         {

@@ -20,6 +20,7 @@ from flightid.uncertainty.estimate import Estimate, Reading
 from flightid.uncertainty.uneven import DrawnEnds, Reaching
 
 Array = NDArray[np.float64]
+BELOW_BAND = "read below the identified band"
 FEWEST_PLANTS = 3
 """An interval needs more than the estimate and one other."""
 
@@ -37,7 +38,7 @@ class WorstCase:
     worst : float or None
         Of all plants, on the side of its limit, and no better than a resonance above the identified
         band may leave it; none where one of them reads it there, or such a resonance may leave less
-        than is required.
+        than is required, nor of the phase where a loop passes one below the band.
     flown, flown_worst : float or None
         The same with the gains of the log; None where they are not stable either.
     required : str
@@ -130,15 +131,17 @@ class _Kind:
     more: bool
     place: str = ""
     """Field that says at which frequency it is read, where that may lie above the band."""
+    slow: str = ""
+    """The same, where it may lie below: what crosses one there rests on the model's form."""
 
 
 NOISE = _Kind("noise", "noise", "1", False)
 KINDS = (
-    _Kind("crossover_rad_s", "crossover", "rad/s", True),
-    _Kind("phase_margin_deg", "phase margin", "deg", True),
+    _Kind("crossover_rad_s", "crossover", "rad/s", True, slow="crossover_rad_s"),
+    _Kind("phase_margin_deg", "phase margin", "deg", True, slow="crossover_rad_s"),
     _Kind("gain_margin_db", "gain margin", "dB", True, "phase_crossover_rad_s"),
     _Kind("gain_reduction_margin_db", "gain reduction margin", "dB", True),
-    _Kind("delay_margin_s", "delay margin", "s", True),
+    _Kind("delay_margin_s", "delay margin", "s", True, slow="delay_crossover_rad_s"),
     _Kind("sensitivity_peak", "sensitivity peak", "1", False, "sensitivity_peak_rad_s"),
     _Kind("disturbance_bandwidth_rad_s", "disturbance bandwidth", "rad/s", True),
     _Kind("disturbance_peak_db", "disturbance peak", "dB", False),
@@ -342,11 +345,15 @@ def _noise(problem: LoopProblem, new: LoopAssessment, old: LoopAssessment | None
 def _beyond(
     judged: LoopAssessment, loop: str, kind: _Kind, band_rad_s: tuple[float, float] | None
 ) -> str:
-    """Why nothing is promised: a plant reads a number above the band; empty where none does."""
-    if band_rad_s is None or not kind.place:
+    """Why nothing is promised: a plant reads a number outside the band; empty where none does."""
+    if band_rad_s is None:
         return ""
-    read = getattr(judged.metrics[loop], kind.place)[0]
-    return "read above the identified band" if np.any(read > band_rad_s[1]) else ""
+    metrics = judged.metrics[loop]
+    if kind.place and np.any(getattr(metrics, kind.place)[0] > band_rad_s[1]):
+        return "read above the identified band"
+    if kind.slow and np.any(getattr(metrics, kind.slow)[0] < band_rad_s[0]):
+        return BELOW_BAND
+    return ""
 
 
 def _number(value: float) -> float | None:
