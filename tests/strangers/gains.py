@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import time
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -82,7 +83,7 @@ class Flight:
     @property
     def right(self) -> bool:
         """Whether the structure holds the truth."""
-        return self.structure in HOLDS[self.craft.name]
+        return self.structure in HOLDS.get(self.craft.name, ())
 
 
 def drawn(seed: int) -> Flight:
@@ -109,7 +110,7 @@ def drawn(seed: int) -> Flight:
     elif structure == "published":
         method = "output_error"
     return Flight(
-        craft, _flown(craft, r), structure, method,
+        craft, flown_gains(craft, r), structure, method,
         noise=float(np.exp(r.uniform(np.log(0.003), np.log(0.05)))),
         gust=float(np.exp(r.uniform(np.log(0.002), np.log(0.03)))),
         every=int(r.choice([1, 1, 4])),
@@ -126,7 +127,7 @@ def _frame(name: str, r: np.random.Generator) -> tuple[float, float, float] | No
     return None
 
 
-def _flown(craft: Vehicle, r: np.random.Generator) -> Gains:
+def flown_gains(craft: Vehicle, r: np.random.Generator) -> Gains:
     """Timid gains: lowered until the margins are 40° and 8 dB, outer loops and I faster than P.
 
     Lowered alike they would never be stable around an undamped rate: I over P and the angle's gain
@@ -214,7 +215,12 @@ def loop_of(gains: Gains, flight: Flight) -> fid.AxisLoop:
 
 def tried(seed: int, *, draws: int = 120) -> Outcome:
     """Draw, fly, fit, tune and fly what was tuned."""
-    begun, flight = time.process_time(), drawn(seed)
+    return outcome_of(drawn(seed), seed, draws=draws)
+
+
+def outcome_of(flight: Flight, seed: int, *, draws: int = 120) -> Outcome:
+    """Fly, fit, tune and fly what was tuned."""
+    begun = time.process_time()
 
     def outcome(verdict: str, why: str, broken: str = "", wasted: bool = False) -> Outcome:
         return Outcome(
@@ -293,25 +299,24 @@ def saturation(axis: Axis, flight: Flight, seed: int) -> float:
     return share if share > SATURATED else 0.0
 
 
-def main() -> None:
-    """Count."""
-    parser = argparse.ArgumentParser(description=__doc__)
+def count(families: Mapping[str, Callable[[int], Outcome]], description: str | None) -> None:
+    """Count by options of the command line; the first family by default."""
+    parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--runs", type=int, default=40)
     parser.add_argument("--first-seed", type=int, default=0)
-    parser.add_argument("--family", choices=("hover", "rig"), default="hover")
+    parser.add_argument("--family", choices=(*families,), default=next(iter(families)))
     parser.add_argument("--keep", type=Path, help="file that outcomes are added to, and read from")
     parser.add_argument("--each", action="store_true", help="one line for every tuning")
     asked = parser.parse_args()
     tune_pid.response_bands = lambda *_: ()  # pictures, which no gain depends on
     seeds = range(asked.first_seed, asked.first_seed + asked.runs)
-    fly = tried if asked.family == "hover" else rig_gains.tried
 
     def show(found: Outcome) -> None:
         if asked.each or (found.broken and found.is_made):
             print(found.row(), flush=True)
 
-    print(table(collected(seeds, fly, asked.keep, show)))
+    print(table(collected(seeds, families[asked.family], asked.keep, show)))
 
 
 if __name__ == "__main__":
-    main()
+    count({"hover": tried, "rig": rig_gains.tried}, __doc__)
