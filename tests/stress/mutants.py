@@ -51,8 +51,8 @@ PACKAGES = ("logs", "inspection", "evidence", "uncertainty", "control/tuning")
 TESTS = ("tests/unit", "tests/truth", "tests/contract", "tests/guide", "src/flightid")
 SLOW = ("test_app_", "test_fleet_")
 """They try other packages, in processes of their own."""
-READERS = ("tests/contract/test_array_classes.py",)
-"""They read the source of classes: no line of it is run by them."""
+READERS = ("tests/contract/test_array_classes.py", "tests/contract/test_named_numbers.py")
+"""They read the source of classes and numbers: no line of it is run by them."""
 BUDGET_S, FILES_S, MOST_FILES = 60.0, 30.0, 3
 """Processor's seconds of tests that reach a mutant, and of the other tests of so many files."""
 FILE_S = 600.0

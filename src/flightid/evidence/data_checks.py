@@ -21,6 +21,7 @@ from flightid.responses.windows.defaults import CYCLES_AT_LOWEST, HIGHEST_FRACTI
 from flightid.uncertainty.feedback_result import FeedbackTest
 
 FREQUENCIES = 40
+"""Of the quick response."""
 LONGEST, SHORTEST = 1.0 / 3.0, 1.0 / 15.0
 """Windows of the quick response: shares of the longest record, if all together are as long."""
 CLOSED_ACTION = (

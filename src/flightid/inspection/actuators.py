@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 MOTOR_FUNCTIONS = range(33, 41)
 """SERVOn_FUNCTION of ArduPilot's motors 1 to 8."""
 FEWEST_SAMPLES = 5
+"""Samples above the idle level that tell a motor."""
 DEFAULT_PWM = (1000.0, 2000.0)
 """Pulses, µs, of a log without parameters for them."""
 

@@ -23,6 +23,7 @@ from flightid.logs import Log
 
 Array = NDArray[np.float64]
 SHORTEST_S, LONGEST_S, ROWS_IN_WINDOW = 0.1, 6.4, 4
+"""Shortest and longest window of an envelope, s, and rows that it holds at least."""
 STEADY = 6
 """Windows in a row over which it grows."""
 LEAST_RISE, LARGEST_RISE = 1.05, 8.0

@@ -34,6 +34,7 @@ PLANE_AUTOMATIC = {"LOITER", "TAKEOFF", "QLAND", "QRTL", "THERMAL", "LOITER_ALT_
 """ArduPlane's own: a copter's LOITER is flown by stick."""
 WORDS = {"sid": "injected sweep", "steps": "steps", "flying": "plain flying", "hand": "by hand"}
 SWEEP_RATIO, SWEEP_CYCLES, SWEEP_ORDER = 3.0, 8, 0.9
+"""Last frequency over the first, cycles and rank correlation from which a set-point sweeps."""
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 PIECES = 8
 """Windows of a run in its spectrum, besides the half of one on each side of it."""
 LEAST_SAMPLES = 64
+"""Samples of a run without which its spectrum tells nothing."""
 
 
 def excited_to(log: Log, axis: str, excited: Iterable[FoundExcitation]) -> float:

@@ -28,7 +28,9 @@ Array = NDArray[np.float64]
 SHARES = (0.25, 0.1)
 """Windows, of the longest run."""
 N_OMEGA = 40
+"""Frequencies of its responses."""
 LEAST_SAMPLES = 64
+"""Samples of a run that is looked at."""
 
 
 def injected_ratio(

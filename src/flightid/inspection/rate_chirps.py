@@ -22,8 +22,11 @@ from flightid.logs.blackbox.firmware import BETAFLIGHT, INAV
 Array = NDArray[np.float64]
 PHASE = "debug[0]"
 PHASE_SCALE = 5000.0
+"""Counts of the logged phase to a radian."""
 SHORTEST_S, PAUSE_S = 2.0, 0.25
+"""Shortest chirp, s, and the pause that ends one."""
 LEAST_CYCLES = 8.0
+"""Cycles of the phase without which it is no chirp."""
 PIECES = 24
 """Pieces of a chirp in each of which its gain and phase stand still."""
 LEAST_SHARE = 0.6

@@ -13,6 +13,7 @@ from flightid.logs import Log
 from flightid.uncertainty.quantiles import half_width
 
 LONGEST_LAG_S = 0.3
+"""Lags that are looked at, s, to either side."""
 COARSE, FINE = 61, 41
 """Lags over the whole range, then between the neighbours of the best one."""
 APART = 5

@@ -15,6 +15,7 @@ LONGEST_LOG_S = 1e6
 MARGIN = 0.2
 """A stamp may lie so many spans of the middle 98 % outside of them."""
 SLACK_S = 1.0
+"""And so many seconds."""
 BLOCK = 1 << 16
 """Steps looked at together: stamps of a large log are not held twice."""
 

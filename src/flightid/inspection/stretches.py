@@ -22,6 +22,7 @@ WINDOWS = 8
 MARGIN_S = 2.0
 """What the low-pass of a faster signal reads beyond a stretch, s, at least."""
 MARGIN_STEPS = 64
+"""And steps of the stretch."""
 
 
 @dataclass(frozen=True, eq=False)

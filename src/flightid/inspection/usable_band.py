@@ -43,6 +43,7 @@ N_OMEGA = 60
 SHORTENED = 6
 """Lengths of windows that are tried until enough of them are independent."""
 ROUNDING = 1e-9
+"""Share by which a record may be short of a window by rounding."""
 SAME_RATE = 1.01
 """Rates nearer to each other than this ratio are one: medians of stamps scatter so much."""
 

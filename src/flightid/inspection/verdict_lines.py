@@ -8,6 +8,7 @@ from flightid.findings import Finding, said_once
 from flightid.wrapping import wrapped
 
 WIDTH = 100
+"""Letters of a line."""
 
 
 def verdict_lines(findings: Iterable[Finding]) -> str:

@@ -27,8 +27,11 @@ Stream = tuple[Array, Array]
 AXES = ("p", "q", "r")
 ANGLES = ("phi", "theta", "psi")
 WINDOW_S, SAMPLES_IN_WINDOW, MOST_WINDOWS = 0.3, 10, 5000
+"""Shortest window whose turn is compared, s; samples that it holds at least; most windows."""
 FEWEST_WINDOWS = 25
+"""Windows without which nothing is said."""
 TOLERANCE = 0.05
+"""Share by which rates may miss a known factor and still have it."""
 DEVIATIONS = 3.0
 """Standard errors of the factor, by the noise between the streams, that are allowed for."""
 LEAST_RATE = 0.02

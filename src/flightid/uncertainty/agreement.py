@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 FALSE_ALARM = 0.005
 """Share of sound data that fails each of the two tests: halves, and records."""
 CERTAIN = 1.0 - 1e-15
+"""Chance that counts as certain: its complement has a logarithm."""
 DOUBT = 0.1
 """Chance below which scatter between records is carried on: what is not proven may be there."""
 TELLING = 2.0

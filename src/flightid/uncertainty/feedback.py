@@ -49,7 +49,9 @@ MAXIMUM_SAMPLES = 20_000
 """Of all records together that a test looks at."""
 PAST = range(1, LAGS + 1)
 SAMPLES_PER_NUMBER = 10
+"""Samples for each number of a model."""
 FEWEST_FREE = 30
+"""Degrees of freedom without which nothing is tested."""
 SMALLEST_NOISE = 1e-8
 """Share of an output's power below which its noise is rounding, or cannot bias anything."""
 SMALLEST_NEWS = 10.0 * RIDGE

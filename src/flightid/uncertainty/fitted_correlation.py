@@ -22,6 +22,7 @@ from flightid.uncertainty.residual_noise import Autoregression
 
 Array = NDArray[np.float64]
 LAGS = 25
+"""Most lags of a test."""
 FIRST, SHARE_OF_FIRST = 4, 0.5
 """Lags at which a short lag that a model lacks shows, and their part of the false alarms.
 

@@ -17,7 +17,9 @@ Array = NDArray[np.float64]
 # A Hann window's power over n samples, and the median of a chi-square with two degrees over its
 # mean: with both a median ordinate stands for the variance of white noise.
 HANN_POWER = 3 / 8
+"""Mean square of the Hann window."""
 MEDIAN_OF_EXPONENTIAL = float(np.log(2))
+"""Median over mean of the power of noise at a frequency."""
 
 
 def white_deviation(samples: Array) -> float:

@@ -15,6 +15,7 @@ NODES = 40
 REACH = 6.0
 """Standard errors beyond which noise across it has no chance."""
 HALVINGS = 30
+"""Of the interval in which a limit lies."""
 
 
 def magnitude_interval(size: Real, along: Real, across: Real, *, level: float = LEVEL) -> Real:

@@ -23,6 +23,7 @@ MOVING_LAGS = 8
 DEGREE = 4
 """Of the polynomials in time that they follow, by record."""
 ROWS_PER_COLUMN = 5
+"""Rows of a regression for each of its columns, at least."""
 ENOUGH = 4000
 """Samples that are asked first."""
 SMALLEST = 1e-10

@@ -35,12 +35,14 @@ SHOWN = 3.0
 BEYOND = 3.0
 """Times the power of the weakest direction, which is less than the noise by chance."""
 FIRST = 1e-2
+"""Least variance that is tried, over the largest."""
 TRIED, REFINED = 14, 5
 """Variances from a share of the largest on, and steps of a golden section between them."""
 LONGEST, SAMPLES_PER_NUMBER = 36, 20
 """Past samples that foretell an input where records have so many samples for each: steps that are
 held have a long past, and what a shorter one misses outputs tell."""
 RANK = 1e-10
+"""Singular values below this share of the largest are rounding."""
 GOLDEN = (5.0**0.5 - 1.0) / 2.0
 
 

@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 Series = tuple[Array, ...]
 
 LEVEL = 0.95
+"""Share of sound residuals that stay within the bounds of a correlation."""
 FEW = 128
 """Lags up to which sums of products take less than transforms."""
 SMALLEST_EIGENVALUE = 1e-3

@@ -44,7 +44,9 @@ from flightid.uncertainty.transformed_columns import of_both, powers_of, squares
 
 Array = NDArray[np.float64]
 LARGEST_ORDER = 20
+"""Most coefficients of a model of noise."""
 SEPARATIONS = 20
+"""Rounds in which a known part is told from the rest."""
 RESTORATIONS = 2
 SHARPEST = 1e6
 """Power of one line over the whole power that no sound model reaches."""

@@ -15,6 +15,7 @@ Complex = NDArray[np.complex128]
 SHARE = 0.3
 """Share of all frequencies that a spectrum is averaged over, to each side."""
 FEWEST = 10
+"""Frequencies to each side that are averaged at least."""
 
 
 def neighbours(count: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

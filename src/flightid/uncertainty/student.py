@@ -13,11 +13,15 @@ MANY = 1e4
 LARGE = 200.0
 """Degrees of freedom from which the ratio of gamma functions is a series."""
 SETTLED = 4e-16
+"""Relative step, or factor of a fraction less one, below which iterations end."""
 STEPS = 5
 """Of Halley's from the bound, which make any share's quantile exact to rounding."""
 MOST_STEPS = 60
+"""Of a search for a quantile."""
 MOST_TERMS = 2000
+"""Of a continued fraction."""
 TINY = 1e-300
+"""In place of zero where it is divided by, or its logarithm is taken."""
 
 
 def normal_quantile(share: float) -> float:

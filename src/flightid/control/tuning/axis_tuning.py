@@ -36,6 +36,7 @@ from flightid.frozen import dataclass
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 SEARCH_POINTS, JUDGED_POINTS = 200, 700
+"""Frequencies of the loops that are searched, and of those that judge the gains."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,9 @@ Array = NDArray[np.float64]
 MOVABLE = ("gyro_filter", "fltd", "derivative_filter")
 """Roles of the low-passes that are moved; the error's and the target's stay."""
 STEPS = 9
+"""Cut-offs that are tried between the lowest and the highest."""
 LOWEST_HZ = 5.0
+"""Lowest cut-off that is tried, Hz."""
 BEYOND = 3.0
 """Times a cut-off that a spectrum must reach to tell what passes it."""
 WORTH_DEG = 1.0

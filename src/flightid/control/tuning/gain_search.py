@@ -23,21 +23,31 @@ Array = NDArray[np.float64]
 Linear = tuple[Array, Array, Array, Array]
 """Limits, levels and their slopes."""
 GRID_P, GRID_I, GRID_D, GRID_A = 14, 5, 4, 3
+"""Points of the first grid by P, I, D and angle gain."""
 CHUNK = 96
+"""Candidates that are judged together."""
 STARTS, MORE_STARTS = 2, 4
+"""Points from which a search descends, and where these miss a requirement."""
 ROUNDS = 8
+"""In which plants that gains violate join those of the search."""
 HEADROOM = 2e-3
 """Slack kept in the search, for rounding of gains and frequencies between grid points."""
 STEP = 1e-4
+"""Logarithm by which gains are moved for slopes."""
 FIRST_REACH, SMALLEST_REACH = 0.25, 1e-4
+"""First and last size of a trusted step, in logarithms of gains."""
 SMALLEST_GAIN, SHRINK = 1e-6, 0.25
+"""Least rise of the merit that counts, and what a step that fails shrinks to."""
 ITERATIONS = 60
+"""Most steps of a descent."""
 FAR = 1.0
 """Slack beyond the least one at which a limit takes no part in a step."""
 PENALTY = 50.0
 """Loss of merit for a violated limit, in e-folds of the objective."""
 LARGEST_TD_S, TIME_SCALE_S = 0.5, 0.1
+"""Largest ratio of D to P, s, of a loop with the time scale that follows, s."""
 TINY_GAIN = 1e-9
+"""In place of a gain of zero where its logarithm is taken."""
 INTEGRAL = "ratio of I to P"
 LOW_END = " (low end)"
 """After the range of a gain that could be lower, where there are no gains."""

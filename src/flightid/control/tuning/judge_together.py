@@ -21,6 +21,7 @@ LOOKED_AT = 40
 WORST = 8
 """Plants of the largest such values whose disk margin is taken."""
 LOWEST_RAD_S = 0.1
+"""Frequency above which margins of loops together are judged, rad/s."""
 
 
 def _matrix(plants: PlantSet, loops: list[AxisLoop], gyro: Gyro) -> Complex:

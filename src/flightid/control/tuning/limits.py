@@ -21,6 +21,7 @@ TARGET = "of the target"
 IN_BAND = "in the identified band"
 """Ends of names: which requirement on a number that can have several."""
 TINY = 1e-12
+"""In place of zero where a logarithm is taken."""
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,9 @@ from flightid.frozen import dataclass
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 DISTURBANCE_WEIGHT = 0.2
+"""Of the rejection of disturbances beside the logarithm of a bandwidth."""
 LOWEST_PEAK_RAD_S, PEAK_BANDS = 0.5, 20
+"""Lowest frequency at which a peak of sensitivity is looked for, rad/s, and bands of the search."""
 FULL, NONE = 1.0, -20.0
 """Slack of a requirement that sets no limit, for lack of a crossing; and the least that counts."""
 

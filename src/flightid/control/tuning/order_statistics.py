@@ -9,6 +9,7 @@ import scipy
 from flightid.errors import OptionError
 
 CONFIDENCE = 0.95
+"""With which a share of plants is told from draws."""
 ENOUGH = 0.95
 """Share of the plants that the data allow for which gains must hold."""
 MOST = 0.9

@@ -53,9 +53,11 @@ UNITS = {
     CONTROL: "",
 }
 SETTLED_SHARE = 1e-3
+"""Of a step: what an end that is settled may still miss."""
 AT_A_TIME = 16
 """Plants whose pulses are held at once."""
 FIRST_S, LONGEST = 8.0, 1 << 16
+"""First length of a pulse response, s, and the most samples of one."""
 LIKE_ZERO = 1e-4
 """Share of the lowest frequency at which the limit towards zero is taken."""
 MOST_KEPT = 3

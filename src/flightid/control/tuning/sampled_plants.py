@@ -18,8 +18,11 @@ from flightid.progress import track
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 ON_CIRCLE = 1e-9
+"""Distance from the unit circle within which a pole is an integrator."""
 LOWEST_RAD_S, KNEE_RAD_S = 1e-5, 0.05
+"""Lowest frequency of a grid, rad/s, and the one below which it is thin."""
 TAIL_POINTS = 40
+"""Frequencies below the knee."""
 FEWEST_DECADES = 600.0
 """Least ratio of the highest frequency to the knee: slow loops have a lower one."""
 BELOW_NYQUIST = 1.0 - 1e-4

@@ -13,6 +13,7 @@ from flightid.findings import Finding
 from flightid.models.linear.linear_system import LinearSystem
 
 AT_ZERO, ON_AXIS = 1e-6, 1e-9
+"""Shares of the largest pole within which one is at zero, or on the real axis."""
 MOST = 0.10
 """Share of a step beyond which a set-point is not followed, argued: what a step still moves by
 where it counts as settled."""

@@ -45,6 +45,7 @@ from flightid.threads import on_one_thread
 
 Array = NDArray[np.float64]
 ROUNDS = 4
+"""In which each axis is tuned beside the others."""
 BESIDE = ("filters", "by_hand")
 """What is shared by axes and is no part of the evidence."""
 SETTLED = 0.02

@@ -37,12 +37,17 @@ TURN_DEG = -135.0
 VEHICLE_RAD_S = 20.0
 """The same frequency of a vehicle's rate loop, whose search ranges are scaled to the plant's."""
 FILTER_SHARE, TRACKING_SHARE = 0.1, 1.0
+"""Of a derivative's filter and of tracking, in the time that the loop's frequency tells."""
 FINE = 200.0
 """Samples of a continuous loop over that frequency's period, in radians."""
 LOOKED_AT_RAD_S = (1e-4, 1e4)
+"""Where the crossover of a plant alone is looked for, rad/s."""
 POINTS = 4000
+"""Frequencies of that search."""
 WIDEST_P, HIGHEST_I, HIGHEST_D = (1e-3, 10.0), 50.0, 0.5
+"""Ranges of P, over the gain that the plant's size tells; and of I and D, over P and time."""
 WEIGHTS_TRIED = np.linspace(1.0, 0.0, 21)
+"""Weights of the set-point, the liveliest first."""
 LIVELY = 0.31
 """Overshoot of two poles damped by 0.35, the least of MIL-F-8785C's level 1."""
 MOST_AGAINST = 0.05

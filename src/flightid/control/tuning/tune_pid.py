@@ -43,6 +43,7 @@ from flightid.version import VERSION
 CHANNELS = {"roll": ("tau_phi", "p"), "pitch": ("tau_theta", "q"), "yaw": ("tau_psi", "r")}
 """Command and rate of each axis, as channel maps and library models name them."""
 SHOWN, MOVED = 60, 12
+"""Plants whose steps are shown, and whose loops move beside sliders of gains."""
 SEARCHED_SIZE = 1.25
 """Errors of structure in the search over those that judge it, whose directions it has not met."""
 ANSWER_S = 0.15

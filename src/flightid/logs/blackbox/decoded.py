@@ -38,6 +38,7 @@ HEADING = re.compile(rb'^\s*"?loopIteration"?, ?"?time(?: \([a-z]+\))?"?,', re.M
 """How the columns of every decoder begin."""
 UNIT = re.compile(r"(?P<name>.*?) \((?P<unit>[^)]*)\)")
 LARGEST_HEADING = 1 << 20
+"""Bytes in which a decoded file ends its first line, and of the file of its headers."""
 HEADERS = ".headers.csv"
 A_SECOND = {"us": 1e6, "ms": 1e3, "s": 1.0, "": 1e6}
 WORTH = {"deg/s": 1.0, "rad/s": float(np.degrees(1.0)), "g": 1.0, "m/s/s": 1.0 / 9.80665,

@@ -12,6 +12,7 @@ from flightid.logs.blackbox.settings import settings_of
 
 GRAVITY = "acc_1G"
 HIGH_RESOLUTION = 10.0
+"""Counts to one of the usual size where headers say that resolution is high."""
 RATES = ("gyroADC[", "gyroUnfilt[", "gyroRaw[")
 FINE = (*RATES, "setpoint[", "rcCommand[")
 """Fields that ``blackbox_high_resolution`` stores ten times as fine."""

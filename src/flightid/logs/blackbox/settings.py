@@ -43,6 +43,7 @@ OLDER = {
 }
 """The same, of headers before Betaflight 4.3."""
 NEWER = (4, 3)
+"""Version of Betaflight from which settings have their names of today."""
 VERSION = "firmware_version"
 """Name of the version among the settings: 4.05 is 4.5. Before, controllers differed."""
 OF_INAV = {

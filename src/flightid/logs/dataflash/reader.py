@@ -342,7 +342,7 @@ class DataflashSource:
                 yield Finding(
                     "messages-dropped",
                     Light.AMBER,
-                    f"the logger dropped {dropped} messages while it ran",
+                    f"the logger dropped {counted(dropped, 'message')} while it ran",
                     "log fewer messages (LOG_BITMASK) or use a faster card",
                 )
 

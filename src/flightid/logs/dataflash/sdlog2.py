@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from flightid.logs.dataflash.reader import GAP_S, DataflashSource, open_dataflash
 from flightid.logs.source import Event, Gap, LogSource
 from flightid.logs.table_source import MessageRows, TableSource
-from flightid.logs.ulog.names import AIRFRAMES, ARMED
+from flightid.logs.ulog.names import AIRFRAMES, ARMED, changes_of
 
 STAMP = ("TIME", "StartTime")
 AXES = ("X", "Y", "Z")
@@ -95,10 +95,11 @@ def _table_source(source: DataflashSource) -> TableSource:
             topic, fields = TOPICS.get(name, (name, {}))
             tables[topic] = _rows(source, name, fields, clock_s[last[known]], known)
     versions = source.texts("VER", "FwGit", None) if "VER" in source.messages else []
+    firmware = next(iter(versions), "")
     return TableSource(
         "px4",
         _vehicle(source),
-        f"PX4 {versions[0][:8]} (sdlog2)" if versions else "PX4 (sdlog2)",
+        f"PX4 {firmware[:8]} (sdlog2)" if firmware else "PX4 (sdlog2)",
         tables,
         parameters=source.parameters,
         events=_arming(tables),
@@ -128,9 +129,10 @@ def _rows(
 
 
 def _vehicle(source: DataflashSource) -> str | None:
-    known = AIRFRAMES.get(int(source.parameters.get("MAV_TYPE", -1)))
-    number = int(source.parameters.get("SYS_AUTOSTART", -1))
-    return known or next((name for name, span in AUTOSTART.items() if number in span), None)
+    kind, number = map(source.parameters.get, ("MAV_TYPE", "SYS_AUTOSTART"))
+    if kind in AIRFRAMES:
+        return AIRFRAMES[int(kind)]
+    return next((name for name, span in AUTOSTART.items() if number in span), None)
 
 
 def _arming(tables: Mapping[str, MessageRows]) -> list[Event]:
@@ -138,9 +140,5 @@ def _arming(tables: Mapping[str, MessageRows]) -> list[Event]:
     status = tables.get("vehicle_status")
     if status is None or "arming_state" not in status.units:
         return []
-    states = status.read("arming_state").astype(int)
-    changed = np.flatnonzero(np.diff(states, prepend=-1))
-    return [
-        Event(float(status.time_s[i]), "arming", ARMED.get(int(states[i]), f"state {states[i]}"))
-        for i in changed
-    ]
+    states = status.read("arming_state").astype(np.int64)
+    return changes_of(states, status.time_s, "state", "arming", ARMED)

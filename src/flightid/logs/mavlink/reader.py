@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from functools import partial
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ from flightid.logs.dataflash.events import mode_text
 from flightid.logs.mavlink.messages import TelemetryMessage, telemetry_messages
 from flightid.logs.source import Event, changes_among
 from flightid.logs.table_source import Array, MessageRows, TableSource
+from flightid.logs.ulog.names import starts_of
 from flightid.reading import bounded_bytes, memory_budget, within_memory
 
 ARDUPILOT = 3
@@ -84,7 +86,7 @@ def open_telemetry(path: Path) -> TableSource:
         tables,
         {name: value for _, name, value in values},
         changes_among(values),
-        sorted(events, key=lambda event: event.time_s or 0.0),
+        sorted(events, key=attrgetter("time_s")),
         findings=tuple(_findings(lost, len(data), len(starts))),
     )
 
@@ -149,7 +151,7 @@ def _made_s(rows: Table) -> Array | None:
     for name, per_second in STAMPS.items():
         if rows.dtype.names is not None and name in rows.dtype.names:
             made = rows[name].astype(np.float64) / per_second
-            return made if 0.0 < float(made.max(initial=0.0)) < LATEST_BOOT_S else None
+            return made if 0.0 < float(made.max()) < LATEST_BOOT_S else None
     return None
 
 
@@ -167,10 +169,10 @@ def _rows(message: TelemetryMessage, rows: Table, time_s: Array) -> MessageRows:
     units: dict[str, str] = {}
     for name, unit in message.units.items():
         width = message.layout[name].shape
-        names = [f"{name}[{i}]" for i in range(width[0])] if width else [name]
+        names = [f"{name}[{i}]" for i in range(*width)] if width else [name]
         units.update(dict.fromkeys(names, unit))
     words = {
-        name: [bytes(word).split(b"\0")[0].decode("utf-8", "replace") for word in rows[name]]
+        name: [bytes(word).partition(b"\0")[0].decode("utf-8", "replace") for word in rows[name]]
         for name in message.units
         if message.layout[name].kind == "S"
     }
@@ -179,7 +181,7 @@ def _rows(message: TelemetryMessage, rows: Table, time_s: Array) -> MessageRows:
 
 def _column(rows: Table, name: str) -> Array:
     base, _, index = name.partition("[")
-    values = rows[base][:, int(index[:-1])] if index else rows[base]
+    values = rows[base][:, int(index.removesuffix("]"))] if index else rows[base]
     return np.asarray(values, np.float64)
 
 
@@ -194,10 +196,10 @@ def _parameter_values(tables: Mapping[str, MessageRows]) -> list[tuple[float | N
 def _events(tables: Mapping[str, MessageRows], vehicle: str | None) -> Iterator[Event]:
     beats = tables["HEARTBEAT"]
     armed = (beats.read("base_mode").astype(np.int64) & ARMED) != 0
-    for at in np.flatnonzero(np.diff(armed, prepend=~armed[:1])):
+    for at in starts_of(armed):
         yield Event(float(beats.time_s[at]), "arming", "armed" if armed[at] else "disarmed")
     modes = beats.read("custom_mode").astype(np.int64)
-    for at in np.flatnonzero(np.diff(modes, prepend=modes[:1] - 1)):
+    for at in starts_of(modes):
         yield Event(float(beats.time_s[at]), "mode", mode_text(vehicle, int(modes[at]), None))
     if "STATUSTEXT" in tables:
         said = tables["STATUSTEXT"]

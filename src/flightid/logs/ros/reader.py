@@ -6,6 +6,7 @@ ULog serve both. MAVROS publishes in the axes of ROS; its map turns them. A bag 
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
@@ -24,6 +25,7 @@ from flightid.record.formats.sniff import MCAP, ROSBAG, SQLITE
 
 STAMP, SAMPLED = "timestamp", "timestamp_sample"
 SAME_CLOCK_US = 0.5e6
+"""Median lateness of stamps, µs, beyond which the sampled ones are of another clock."""
 PEEKED = 1 << 20
 """Bytes at either end of a file that tell the types of its messages."""
 SIGNS = (PX4_TYPES.encode(), MAVROS_TYPES.encode(), b"px4_msgs::msg", b"/mavros/")
@@ -73,10 +75,9 @@ def open_bag(path: Path) -> TableSource:
             needed="messages of px4_msgs, or topics of MAVROS",
             action=f"read its columns: flightid run {path.name} --inputs … --outputs …",
         )
-    sizes: dict[tuple[str, str], int] = {}
+    sizes: Counter[tuple[str, str]] = Counter()
     for what, each in known:
-        key = what.kind, what.vehicle
-        sizes[key] = sizes.get(key, 0) + each.n_messages
+        sizes[what.kind, what.vehicle] += each.n_messages
     kind, vehicle = max(sizes, key=lambda key: (sizes[key], key))
     chosen = _chosen(pair for pair in known if (pair[0].kind, pair[0].vehicle) == (kind, vehicle))
     tables = dict(_px4_tables(chosen) if kind == "px4" else _mavros_tables(chosen))

@@ -77,8 +77,20 @@ def changes_of(
     names : mapping of int to str
         Words of the values.
     """
-    starts = np.flatnonzero(np.diff(values, prepend=values[0] - 1)) if values.size else ()
     return [
         Event(float(time_s[at]), kind, names.get(int(values[at]), f"{field} {values[at]}"))
-        for at in starts
+        for at in starts_of(values)
     ]
+
+
+def starts_of(values: NDArray[np.int64] | NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Where a value differs from the one before; the first place among them.
+
+    Example
+    -------
+    >>> starts_of(np.array([3, 3, 1, 1, 3])), starts_of(np.empty(0, int))
+    (array([0, 2, 4]), array([], dtype=int64))
+    """
+    differs = np.ones(values.shape, np.bool_)
+    np.not_equal(values[1:], values[:-1], out=differs[1:])
+    return np.flatnonzero(differs)

@@ -1,0 +1,132 @@
+"""Results know neither units nor the order of records, outputs, inputs, states and parameters.
+
+Factors are powers of two, which no product rounds. What is told twice, of one motion in other
+units or another order, is told alike: estimates by their factors, their errors and freedom, the
+chances behind each light, and its words.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+import flightid as fid
+from tests.closeness import assert_close
+
+STEP_S = 0.02
+PLAIN = {"p": 1.0, "r": 1.0, "da": 1.0, "dr": 1.0}
+OTHER = {"p": 64.0, "r": 0.125, "da": 0.25, "dr": 16.0}
+TRUTH = {"Lp": -3.0, "Lr": 1.2, "Lda": 10.0, "Np": -0.4, "Nr": -1.1, "Ndr": -4.0}
+OF = {
+    "Lp": ("p", "p"), "Lr": ("p", "r"), "Lda": ("p", "da"),
+    "Np": ("r", "p"), "Nr": ("r", "r"), "Ndr": ("r", "dr"),
+}  # fmt: skip
+EQUATIONS = {"p": "Lp*p + Lr*r + Lda*da", "r": "Nr*r + Np*p + Ndr*dr"}
+
+
+def _factor(name: str, units: dict[str, float]) -> float:
+    """Of a coefficient: its derivative's over its variable's."""
+    rate, by = OF[name]
+    return units[rate] / units[by]
+
+
+def _model(units: dict[str, float], order: int) -> fid.StateSpaceModel:
+    """Started a fifth off; in reversed order where that is -1."""
+    names = list(TRUTH)[::order]
+    axes, inputs = ["p", "r"][::order], ["da", "dr"][::order]
+    return fid.StateSpaceModel(
+        states=dict.fromkeys(axes, "rad/s"),
+        input_units=dict.fromkeys(inputs, "rad"),
+        measurements={each: fid.Output(each, "rad/s") for each in axes},
+        equations={f"{each}'": EQUATIONS[each] for each in axes},
+        parameters=fid.Parameters(
+            [
+                fid.Parameter(n, 0.8 * TRUTH[n] * _factor(n, units), "1/s^2" if "d" in n else "1/s")
+                for n in names
+            ]
+        ),
+        name="lateral",
+    )
+
+
+def _flight(
+    seed: int, units: dict[str, float], order: int, gusts: float, n: int = 420
+) -> fid.Record:
+    """Steps on both axes; noise of two levels, coloured on the second where no gusts are."""
+    random = np.random.default_rng(seed)
+    axes, inputs = ["p", "r"][::order], ["da", "dr"][::order]
+    moved = {
+        name: size * np.repeat(random.choice([-1.0, 0.0, 1.0], n // 35 + 1), 35)[:n]
+        for name, size in (("da", 0.05), ("dr", 0.08))
+    }
+    a = np.array([[TRUTH["Lp"], TRUTH["Lr"]], [TRUTH["Np"], TRUTH["Nr"]]])
+    b = np.diag([TRUTH["Lda"], TRUTH["Ndr"]])
+    value, vector = np.linalg.eig(a)
+    phi = np.real(vector * np.exp(value * STEP_S) @ np.linalg.inv(vector))
+    gamma = np.linalg.solve(a, (phi - np.eye(2)) @ b)
+    state, states = np.zeros(2), []
+    for u in np.array([moved["da"], moved["dr"]]).T:
+        states.append(state)
+        state = phi @ state + gamma @ u + gusts * np.array([0.02, 0.01]) * random.standard_normal(2)
+    clean = dict(zip(("p", "r"), np.array(states).T, strict=True))
+    noise = {
+        "p": 0.03 * random.standard_normal(n),
+        "r": lfilter([0.01], [1.0, -0.6 * (1.0 - gusts)], random.standard_normal(n)),
+    }
+    return fid.Record.from_arrays(
+        np.arange(n) * STEP_S,
+        inputs={each: units[each] * moved[each] for each in inputs},
+        outputs={each: units[each] * (clean[each] + noise[each]) for each in axes},
+        units={"da": "rad", "dr": "rad", "p": "rad/s", "r": "rad/s"},
+        hold="zero",
+    )
+
+
+def _fit(method: str, units: dict[str, float], order: int) -> Any:
+    gusts = 1.0 if method == "filter_error" else 0.0
+    records = [_flight(seed, units, order, gusts) for seed in (1, 2, 3)[::order]]
+    return fid.identify(_model(units, order), records, method=method, loop="open")
+
+
+def _told(fit: Any, units: dict[str, float]) -> dict[str, tuple[Any, ...]]:
+    """All numbers of the estimates, by name."""
+    found = {}
+    for name in TRUTH:
+        each = fit.parameters[name]
+        size = _factor(name, units)
+        assert each.value is not None
+        assert each.stderr is not None
+        found[name] = (
+            each.value / size,
+            each.stderr / size,
+            each.freedom,
+            each.cramer_rao_percent,
+            each.insensitivity_percent,
+        )
+    return found
+
+
+@pytest.mark.parametrize(
+    ("method", "near"), [("output_error", 1e-4), ("equation_error", 1e-4), ("filter_error", 1e-2)]
+)
+def test_other_units_and_another_order_tell_the_same(method: str, near: float) -> None:
+    first, in_units, in_order = (
+        _fit(method, *each) for each in ((PLAIN, 1), (OTHER, 1), (PLAIN, -1))
+    )
+    for second, units, within in ((in_units, OTHER, 1e-6), (in_order, PLAIN, near)):
+        one, two = _told(first, PLAIN), _told(second, units)
+        for name, numbers in one.items():
+            assert_close(
+                np.array(two[name], dtype=float),
+                np.array(numbers, dtype=float),
+                rtol=within,
+                why=f"{name}: an end of the search, in sums of another order",
+            )
+        lights = [[(e.name, e.light) for e in each.evidence.checks] for each in (first, second)]
+        assert lights[0] == lights[1]
+    # Of checks that are alike the first is told, which is another in another order.
+    words = [[(e.what, e.limit) for e in each.evidence.checks] for each in (first, in_units)]
+    assert words[0] == words[1]
