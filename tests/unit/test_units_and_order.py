@@ -7,6 +7,7 @@ chances behind each light, and its words.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -91,42 +92,56 @@ def _fit(method: str, units: dict[str, float], order: int) -> Any:
     return fid.identify(_model(units, order), records, method=method, loop="open")
 
 
-def _told(fit: Any, units: dict[str, float]) -> dict[str, tuple[Any, ...]]:
-    """All numbers of the estimates, by name."""
-    found = {}
-    for name in TRUTH:
-        each = fit.parameters[name]
-        size = _factor(name, units)
-        assert each.value is not None
-        assert each.stderr is not None
-        found[name] = (
-            each.value / size,
-            each.stderr / size,
-            each.freedom,
-            each.cramer_rao_percent,
-            each.insensitivity_percent,
-        )
-    return found
+def _numbers(told: object, place: str = "") -> Iterator[tuple[str, float]]:
+    """All numbers of a result with where they stand, but a logarithm of what has a unit."""
+    if isinstance(told, dict):
+        for key, each in told.items():
+            if key != "objective":
+                yield from _numbers(each, f"{place}.{key}")
+    elif isinstance(told, list | tuple):
+        for k, each in enumerate(told):
+            yield from _numbers(each, f"{place}[{k}]")
+    elif isinstance(told, int | float):
+        yield place, float(told)
+
+
+def _judged(method: str, units: dict[str, float]) -> dict[str, object]:
+    """What a fit tells; what it tells in units stands in numbers, not in words."""
+    if method == "response":
+        records = [_flight(seed, units, 1, 0.0) for seed in (1, 2, 3)]
+        return fid.estimate_response(records, loop="open").to_dict()
+    fit = _fit(method, units, 1)
+    words = [(each.name, each.light, each.limit) for each in fit.evidence.checks]
+    return {"fit": fit.to_dict(), "words": repr(words)}
+
+
+@pytest.mark.parametrize("method", ["output_error", "equation_error", "filter_error", "response"])
+def test_other_units_scale_every_number_by_a_power_of_two(method: str) -> None:
+    one, two = (_judged(method, units) for units in (PLAIN, OTHER))
+    assert one.get("words") == two.get("words")
+    first, second = list(_numbers(one)), list(_numbers(two))
+    assert [place for place, _ in first] == [place for place, _ in second]
+    before, after = (np.array([number for _, number in each]) for each in (first, second))
+    assert np.array_equal(np.sign(before), np.sign(after))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        steps = np.where(before == after, 0.0, np.log2(after / before))
+    wrong = np.flatnonzero(~(np.abs(steps - np.rint(steps)) < 1e-3))
+    assert not [(first[k], second[k][1]) for k in wrong]
 
 
 @pytest.mark.parametrize(
     ("method", "near"), [("output_error", 1e-4), ("equation_error", 1e-4), ("filter_error", 1e-2)]
 )
-def test_other_units_and_another_order_tell_the_same(method: str, near: float) -> None:
-    first, in_units, in_order = (
-        _fit(method, *each) for each in ((PLAIN, 1), (OTHER, 1), (PLAIN, -1))
-    )
-    for second, units, within in ((in_units, OTHER, 1e-6), (in_order, PLAIN, near)):
-        one, two = _told(first, PLAIN), _told(second, units)
-        for name, numbers in one.items():
+def test_another_order_tells_the_same(method: str, near: float) -> None:
+    first, second = (_fit(method, PLAIN, order) for order in (1, -1))
+    for name in TRUTH:
+        one, two = (each.parameters[name] for each in (first, second))
+        for kind in ("value", "stderr", "freedom", "cramer_rao_percent", "insensitivity_percent"):
             assert_close(
-                np.array(two[name], dtype=float),
-                np.array(numbers, dtype=float),
-                rtol=within,
-                why=f"{name}: an end of the search, in sums of another order",
+                getattr(two, kind),
+                getattr(one, kind),
+                rtol=near,
+                why=f"{kind} of {name}: an end of the search, in sums of another order",
             )
-        lights = [[(e.name, e.light) for e in each.evidence.checks] for each in (first, second)]
-        assert lights[0] == lights[1]
-    # Of checks that are alike the first is told, which is another in another order.
-    words = [[(e.what, e.limit) for e in each.evidence.checks] for each in (first, in_units)]
-    assert words[0] == words[1]
+    lights = [[(e.name, e.light) for e in each.evidence.checks] for each in (first, second)]
+    assert lights[0] == lights[1]
