@@ -52,7 +52,7 @@ from flightid.identification.frequency_domain.noise_cost import noise_costs
 from flightid.identification.frequency_domain.opened import opened
 from flightid.identification.frequency_domain.options import FrequencyDomainOptions
 from flightid.identification.frequency_domain.selection import SelectedResponse
-from flightid.identification.frequency_domain.without_bias import CHANCE, MISFIT, NOISE
+from flightid.identification.frequency_domain.without_bias import CHANCE, MISFIT, RISEN
 from flightid.identification.joint.estimator_inside import InsideEnd, again, search_inside
 from flightid.identification.joint.independence import judge_independence
 from flightid.identification.joint.options import JointOptions
@@ -270,7 +270,7 @@ def _why_worse(found: SearchEnd, end: InsideEnd, objective: Objective) -> str:
     before = float(residuals @ residuals)
     rise = 2.0 * (end.cost - found.groups[0][0].cost)
     chance = end.misfit <= CHANCE and objective.correction.data.errors is None
-    if rise <= (NOISE - 1.0) * before or chance:
+    if rise <= (RISEN - 1.0) * before or chance:
         return ""
     return (
         f"it would raise the cost of the response from {before:.3g} by {rise:.3g}: the model does "
