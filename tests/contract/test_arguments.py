@@ -116,7 +116,7 @@ OWN = {
         "expected fixed flight lock_number n_alpha normalisation output_is response_type "
         "rotor_speed_rad_s sign signs speed states t_theta2_s task",
     ),
-    "review": ("two flights beside each other", "after before promise review state"),
+    "review": ("two flights beside each other", "after before promise review state inspection"),
     "planning": (
         "a sweep and what the vehicle may do meanwhile",
         "amplitude attitude_rad control loop_rate_hz n_records rate_rad_s write_no_go",

@@ -37,7 +37,11 @@ def test_a_review_ends_with_what_it_tells_and_what_is_next(review: fid.FlightRev
     assert kinds[:3] == ["Paragraph", "Figure", "Lights"], "answer, picture, verdicts"
     assert review.answer in to_text(flight_document(review)).replace("\n", " ")
     assert review.to_dict()["answer"] == review.answer
-    assert "Next: flightid tune flight.bin" in replace(review, swept=True).answer
+    swept = replace(review, swept=True)
+    assert "Next: flightid tune flight.bin" in replace(swept, carried=("roll",)).answer
+    # `tune` had nothing of such sweeps but `flight`, which named `tune`.
+    assert "Next: flightid inspect flight.bin (why" in swept.answer
+    assert "then flightid plan flight.bin" in swept.answer
     shaken = replace(review, findings=(Finding("vibration", Light.AMBER, "shaken"),))
     assert "Next: mend what is said of motors and vibration first; then" in shaken.answer
     assert "plan" not in replace(review, vehicle="rover").answer

@@ -296,9 +296,9 @@ def test_a_loop_that_ends_far_from_what_is_asked_is_amber(
 
 
 def _with_sweeps(review: fid.FlightReview, readings: tuple[Reading, ...], gains: str) -> None:
-    """Where sweeps were flown no gain is named: a model weighs them, and may say otherwise."""
+    """Where sweeps carry a model no gain is named: a model weighs them, and may say otherwise."""
     loop = replace(review["roll rate"], readings=readings)
-    found = judge_flight(replace(review, loops=(loop,), swept=True))
+    found = judge_flight(replace(review, loops=(loop,), swept=True, carried=("roll",)))
     step = next(f for f in found if f.code == "step-roll-rate")
     assert ("flightid tune" in step.action) is bool(gains)
     assert not any(word in step.action for word in ("raise I", "lower I"))

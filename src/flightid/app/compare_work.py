@@ -26,6 +26,8 @@ from flightid.app.work import KEPT, kept_log
 from flightid.conventions import Light
 from flightid.files import sha256_of_file
 from flightid.findings import Finding, worst
+from flightid.inspection import inspect_log
+from flightid.inspection.carried import carried_axes
 from flightid.planning.plan import plan_flight
 from flightid.planning.result import DEGREES, AxisSweep, SweepPlan
 from flightid.report.flight_card import card_html
@@ -75,6 +77,7 @@ def make_comparison(
 
 def _with_next(made: FlightComparison, step: FlownStep, after: Path) -> tuple[Finding, ...]:
     """Verdicts with what to do after the step that a log flew, as the command says it."""
+    flown = kept_log(after)
     plain = FlownStep(Path(step.flown.name), _named(step.following), _named(step.back))
     to_fly = left_to_fly(made)
     found = plain.finding(
@@ -82,7 +85,7 @@ def _with_next(made: FlightComparison, step: FlownStep, after: Path) -> tuple[Fi
         to_fly=to_fly,
         log=after.name,
         again="drop its log here",
-        swept=bool(kept_log(after).sid_runs),
+        swept=bool(flown.sid_runs and carried_axes(inspect_log(flown))),
         otherwise=made.set_otherwise,
     )
     said = made.findings
@@ -100,8 +103,7 @@ def _named(path: Path | None) -> Path | None:
 def _reviewed(path: Path, side: ComparedSide) -> Any:  # noqa: ANN401 - a review
     key = f"review of {sha256_of_file(path)} {side.span_s}"
     if key not in KEPT:
-        span = {} if side.span_s is None else {"span_s": side.span_s}
-        KEPT[key] = review_flight(kept_log(path), **span)
+        KEPT[key] = review_flight(kept_log(path), span_s=side.span_s)
     return KEPT[key]
 
 

@@ -275,6 +275,8 @@ def _with_step(
 
     `models` promised, as they were named.
     """
+    from flightid.inspection import inspect_log
+    from flightid.inspection.carried import carried_axes
     from flightid.review.comparison import unheld
     from flightid.review.next_step import flown_step, left_to_fly
 
@@ -290,7 +292,7 @@ def _with_step(
         to_fly=to_fly,
         log=log.path.name,
         again=f"flightid compare {' '.join(map(quote, models))} LOG",
-        swept=bool(log.sid_runs),
+        swept=bool(log.sid_runs and carried_axes(inspect_log(log))),
         otherwise=promise.set_otherwise,
     )
     if to_fly and promise.kept is not False:

@@ -54,6 +54,11 @@ class ReviewedFlight(Protocol):
         """Whether the autopilot flew sweeps."""
         ...
 
+    @property
+    def carried(self) -> tuple[str, ...]:
+        """Axes whose sweeps carry a model."""
+        ...
+
 
 def closing_lines(review: ReviewedFlight) -> Iterator[str]:
     """Sentences that end a review: a fall first, steps of the loops, what is next.
@@ -122,16 +127,22 @@ def _next(review: ReviewedFlight) -> str:
         return "find the cause of the fall; sweeps, filters and gains come after it"
     if _diverging(review):
         return "mend what diverges; sweeps, filters and gains come after it"
+    if review.carried:
+        return f"flightid tune {review.name} (models of its sweeps, then gains)"
     if review.swept:
-        return (
-            f"flightid tune {review.name} (models of its sweeps, where they carry any, then gains)"
-        )
+        why = f"flightid inspect {review.name} (why its sweeps carry no model)"
+        planned = f", then flightid plan {review.name} (amplitude, band and axis of better ones)"
+        return why + (planned if _plannable(review) else "")
     mended = any(f.light in AMISS and f.code.startswith(CAUSES) for f in review.findings)
     way = "mend what is said of motors and vibration first" if mended else ""
-    if review.kind != "ardupilot" or review.vehicle in PLANNED:
+    if _plannable(review):
         planned = f"flightid plan {review.name} (sweeps to fly, for models and gains)"
         way = "; then ".join(filter(None, (way, planned)))
     return way
+
+
+def _plannable(review: ReviewedFlight) -> bool:
+    return review.kind != "ardupilot" or review.vehicle in PLANNED
 
 
 def _listed(names: list[str]) -> str:

@@ -6,7 +6,9 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
+from flightid.inspection import Inspection, inspect_log
 from flightid.inspection.actuators import find_actuators
+from flightid.inspection.carried import carried_axes
 from flightid.inspection.divergence import divergence_findings
 from flightid.inspection.excitation_found import injected_spans
 from flightid.inspection.flight_phases import flight_phases
@@ -27,7 +29,10 @@ from flightid.threads import on_one_thread
 
 @on_one_thread
 def review_flight(
-    log: Log | str | Path, *, span_s: tuple[float, float] | None = None
+    log: Log | str | Path,
+    *,
+    span_s: tuple[float, float] | None = None,
+    inspection: Inspection | None = None,
 ) -> FlightReview:
     """Say what one flight tells of its vehicle; no sweep is needed.
 
@@ -41,6 +46,8 @@ def review_flight(
         An opened log or its file.
     span_s : tuple of float, optional
         Part of the flight to look at, s on the autopilot's clock; default: all of it.
+    inspection : Inspection, optional
+        Of the same log, where it is known; default: made of one that flew sweeps.
 
     Raises
     ------
@@ -74,6 +81,7 @@ def review_flight(
     ways = None if actuators is None else turning(opened, len(actuators.names))
     loops = loop_responses(opened, phases.airborne)
     noise = gyro_noise(opened, phases.airborne)
+    swept = bool(injected_spans(opened))
     found = FlightReview(
         name=opened.path.name,
         kind=opened.kind,
@@ -90,7 +98,8 @@ def review_flight(
         noise=noise,
         filters=filter_review(opened, phases.airborne, noise, loops),
         throttle=find(opened, "thrust"),
-        swept=bool(injected_spans(opened)),
+        swept=swept,
+        carried=carried_axes(inspection or inspect_log(opened)) if swept else (),
         ranges=flown_ranges(opened, loops),
     )
     of_log = (*opened.findings, *divergence_findings(opened, phases.airborne))

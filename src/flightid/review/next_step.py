@@ -62,7 +62,7 @@ class FlownStep:
         again : str
             Command that compares the promise with the next log.
         swept : bool
-            Whether the log holds sweeps, of which models can be made anew.
+            Whether the log holds sweeps that carry models, so that they can be made anew.
         otherwise : sequence of str
             What was set otherwise than the models promised for: no reason to go back.
         """

@@ -63,7 +63,9 @@ class FlightReview(
     throttle : Signal or None
         Thrust that was asked for, share of the most; None where it is not logged.
     swept : bool
-        Whether the autopilot flew sweeps, whose models weigh gains as no step does.
+        Whether the autopilot flew sweeps.
+    carried : tuple of str
+        Axes whose sweeps carry a model, which weighs gains as no step does.
     ranges : tuple of FlownRange
         What the flown gains promise over all typical vehicles that would fly so.
 
@@ -92,6 +94,7 @@ class FlightReview(
     findings: tuple[Finding, ...] = ()
     throttle: Signal | None = None
     swept: bool = False
+    carried: tuple[str, ...] = ()
     ranges: tuple[FlownRange, ...] = ()
 
     @property

@@ -160,9 +160,9 @@ UNFED_CALMER = {**CALMER, "attitude": CALMER["attitude"].removesuffix(f", or {LE
 def _gains(review: FlightReview, sure: str) -> str:
     """What to do about gains: what sweeps of the log say, else what a step says that is sure.
 
-    A step does not weigh P against I, as a model does: no gain is named where sweeps were flown.
+    A step does not weigh P against I, as a model does: no gain is named where sweeps carry one.
     """
-    if review.swept:
+    if review.carried:
         return f"flightid tune {review.name} weighs the gains by the log's sweeps"
     return sure or f"which gain, sweeps tell: flightid plan {review.name}, then flightid tune"
 

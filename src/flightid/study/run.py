@@ -11,6 +11,7 @@ from typing import Any
 from flightid.control.tuning.result import Tuning
 from flightid.export.gains import write_gains
 from flightid.files import sha256_of_file
+from flightid.inspection import Inspection
 from flightid.logs import Log
 from flightid.progress import progress
 from flightid.report.html import to_html
@@ -158,9 +159,8 @@ def _run(
         qualities = {}
         if rated is not None:
             qualities = rate_models(staged, uses.loops, rated, faults, runner)
-        reviewed = None
-        if taken.log is not None:
-            reviewed = faults.spare("the flight review", _reviewed, None, runner, taken.log)
+        seen = (taken.log, taken.inspection)
+        reviewed = faults.spare("the flight review", _reviewed, None, runner, *seen)
         tried, plots, plan = view_log(settings.views, taken.log, runner, faults, folder)
         study = Study(
             settings,
@@ -195,9 +195,15 @@ def _tuned(runner: StageRunner, *inputs: object) -> StageResult[Tuning | None]:
     return runner.stage("tuning", tune_models, *inputs)
 
 
-def _reviewed(runner: StageRunner, log: StageResult[Log]) -> FlightReview:
-    """What the flight tells besides, as a stage."""
-    return runner.stage("flight review", review_flight, log).value
+def _reviewed(
+    runner: StageRunner, log: StageResult[Log] | None, *inspected: object
+) -> FlightReview | None:
+    """What the flight tells besides, as a stage; None without a log."""
+    return None if log is None else runner.stage("flight review", _review, log, *inspected).value
+
+
+def _review(log: Log, inspection: Inspection | None) -> FlightReview:
+    return review_flight(log, inspection=inspection)
 
 
 def _flown(runner: StageRunner, *inputs: object) -> GainFlight:
