@@ -3,5 +3,6 @@
 pub(crate) mod assembly;
 pub(crate) mod derivative_tape;
 pub mod expression_tape;
+pub(crate) mod fused_steps;
 pub(crate) mod operation;
 pub(crate) mod tape_program;

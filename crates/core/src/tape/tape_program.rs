@@ -5,6 +5,7 @@ use crate::language::lookup_table::{LookupTable, Part};
 use crate::language::syntax::{Binary, Unary};
 use crate::numerics::widest::widest;
 use crate::tape::expression_tape::Tape;
+use crate::tape::fused_steps::{Fusions, sines_with_cosines};
 use crate::tape::operation::{Operation, apply_binary, apply_unary};
 
 #[derive(Debug, Clone, Copy)]
@@ -14,6 +15,12 @@ enum Step {
     Subtract(u32, u32, u32),
     Multiply(u32, u32, u32),
     Divide(u32, u32, u32),
+    /// c + a b, c − a b, a b − c.
+    AddProduct(u32, u32, u32, u32),
+    SubtractProduct(u32, u32, u32, u32),
+    FromProduct(u32, u32, u32, u32),
+    /// Sine and cosine.
+    Turn(u32, u32, u32),
     Integer(u32, u32, i32),
     Unary(Unary, u32, u32),
     Binary(Binary, u32, u32, u32),
@@ -61,18 +68,24 @@ struct Places {
 
 impl Places {
     /// `kept` are the registers whose values stay; `early` are computed in that order.
-    fn new(tape: &Tape, needed: &[bool], kept: &[bool], early: &[usize]) -> Self {
+    fn new(
+        tape: &Tape,
+        fusions: &Fusions,
+        needed: &[bool],
+        kept: &[bool],
+        early: &[usize],
+    ) -> Self {
         let mut places = Self { of: vec![0; needed.len()], count: 0 };
         for register in (0..needed.len()).filter(|&r| needed[r] && kept[r]) {
             places.of[register] = places.fresh();
         }
         let mut last = vec![0; needed.len()];
         for (time, &register) in early.iter().enumerate() {
-            tape.operations[register].arguments().for_each(|a| last[a] = time);
+            fusions.arguments(tape, register).into_iter().for_each(|a| last[a] = time);
         }
         let mut free = Vec::new();
         for (time, &register) in early.iter().enumerate() {
-            let mut read: Vec<usize> = tape.operations[register].arguments().collect();
+            let mut read = fusions.arguments(tape, register);
             read.sort_unstable();
             read.dedup();
             // A step reads before it writes, so that its result may take the place of an argument.
@@ -98,27 +111,28 @@ impl Program {
     pub(crate) fn new(tape: &Tape, outputs: &[usize], n_late: usize, n_moving: usize) -> Self {
         let needed = tape.needed(outputs);
         let moments = moments(tape, n_late, n_moving);
+        let together = |a: usize, b: usize| moments[a] == moments[b];
+        let fusions = Fusions::new(tape, &needed, outputs, together);
         let steps = |moment: Moment| -> Vec<usize> {
             let wanted = |&r: &usize| {
                 let leaf =
                     matches!(tape.operations[r], Operation::Constant(_) | Operation::Input(_));
-                needed[r] && !leaf && moments[r] == moment
+                needed[r] && !leaf && moments[r] == moment && !fusions.takes(r)
             };
-            (0..needed.len()).filter(wanted).collect()
+            let found: Vec<usize> = (0..needed.len()).filter(wanted).collect();
+            sines_with_cosines(tape, &found)
         };
         let (fixed, early, late) =
             (steps(Moment::Before), steps(Moment::Early), steps(Moment::Late));
         let mut kept = vec![true; needed.len()];
         early.iter().for_each(|&register| kept[register] = false);
+        (0..needed.len()).filter(|&r| fusions.takes(r)).for_each(|r| kept[r] = false);
         outputs.iter().for_each(|&register| kept[register] = true);
         for &register in &late {
-            tape.operations[register].arguments().for_each(|a| kept[a] = true);
+            fusions.arguments(tape, register).into_iter().for_each(|a| kept[a] = true);
         }
-        let places = Places::new(tape, &needed, &kept, &early);
-        let made = |registers: &[usize]| -> Vec<Step> {
-            let of = |&register: &usize| step(tape, &places.of, register);
-            registers.iter().filter_map(of).collect()
-        };
+        let places = Places::new(tape, &fusions, &needed, &kept, &early);
+        let made = |registers: &[usize]| steps_of(tape, &fusions, &places.of, registers);
         let mut constants = Vec::new();
         let mut inputs = vec![None; tape.n_inputs];
         for register in (0..needed.len()).filter(|&r| needed[r]) {
@@ -217,10 +231,43 @@ fn moments(tape: &Tape, n_late: usize, n_moving: usize) -> Vec<Moment> {
     moments
 }
 
-fn step(tape: &Tape, places: &[usize], register: usize) -> Option<Step> {
+/// Steps that compute registers in this order.
+fn steps_of(tape: &Tape, fusions: &Fusions, places: &[usize], registers: &[usize]) -> Vec<Step> {
+    let mut steps = Vec::with_capacity(registers.len());
+    for &register in registers {
+        let Some(made) = step(tape, fusions, places, register) else { continue };
+        // A cosine follows the sine of its angle.
+        match (steps.last_mut(), made) {
+            (Some(last), Step::Unary(Unary::Cos, cosine, angle)) => match *last {
+                Step::Unary(Unary::Sin, sine, of) if of == angle && sine != angle => {
+                    *last = Step::Turn(sine, cosine, angle);
+                }
+                _ => steps.push(made),
+            },
+            _ => steps.push(made),
+        }
+    }
+    steps
+}
+
+fn step(tape: &Tape, fusions: &Fusions, places: &[usize], register: usize) -> Option<Step> {
     // A tape holds at most MAXIMUM_OPERATIONS registers, so their numbers fit.
     let short = |register: usize| places[register] as u32;
     let to = short(register);
+    if let Some(product) = fusions.product(register) {
+        let (Operation::Binary(kind, left, right), Operation::Binary(_, a, b)) =
+            (tape.operations[register], tape.operations[product])
+        else {
+            return None;
+        };
+        let (a, b) = (short(a), short(b));
+        return Some(match kind {
+            Binary::Add if right == product => Step::AddProduct(to, a, b, short(left)),
+            Binary::Add => Step::AddProduct(to, a, b, short(right)),
+            _ if right == product => Step::SubtractProduct(to, a, b, short(left)),
+            _ => Step::FromProduct(to, a, b, short(right)),
+        });
+    }
     Some(match tape.operations[register] {
         Operation::Constant(_) | Operation::Input(_) => return None,
         Operation::Unary(Unary::Negate, a) => Step::Negate(to, short(a)),
@@ -263,6 +310,25 @@ fn pair<const B: usize>(
     lanes[to as usize] = result;
 }
 
+#[inline(always)]
+fn triple<const B: usize>(
+    lanes: &mut [[f64; B]],
+    to: u32,
+    (a, b, c): (u32, u32, u32),
+    function: impl Fn(f64, f64, f64) -> f64,
+) {
+    let (a, b, c) = (&lanes[a as usize], &lanes[b as usize], &lanes[c as usize]);
+    let result = std::array::from_fn(|lane| function(a[lane], b[lane], c[lane]));
+    lanes[to as usize] = result;
+}
+
+#[inline(always)]
+fn turn<const B: usize>(lanes: &mut [[f64; B]], sine: u32, cosine: u32, angle: u32) {
+    let both: [(f64, f64); B] = lanes[angle as usize].map(f64::sin_cos);
+    lanes[sine as usize] = both.map(|both| both.0);
+    lanes[cosine as usize] = both.map(|both| both.1);
+}
+
 fn run<const B: usize>(steps: &[Step], tables: &[LookupTable], lanes: &mut [[f64; B]]) {
     if B == 1 {
         return execute(steps, tables, lanes);
@@ -282,6 +348,10 @@ fn execute<const B: usize>(steps: &[Step], tables: &[LookupTable], lanes: &mut [
             Step::Subtract(to, a, b) => pair(lanes, to, (a, b), |x, y| x - y),
             Step::Multiply(to, a, b) => pair(lanes, to, (a, b), |x, y| x * y),
             Step::Divide(to, a, b) => pair(lanes, to, (a, b), |x, y| x / y),
+            Step::AddProduct(to, a, b, c) => triple(lanes, to, (a, b, c), |x, y, z| z + x * y),
+            Step::SubtractProduct(to, a, b, c) => triple(lanes, to, (a, b, c), |x, y, z| z - x * y),
+            Step::FromProduct(to, a, b, c) => triple(lanes, to, (a, b, c), |x, y, z| x * y - z),
+            Step::Turn(sine, cosine, angle) => turn(lanes, sine, cosine, angle),
             Step::Integer(to, a, power) => each(lanes, to, a, |x| x.powi(power)),
             Step::Unary(function, to, a) => each(lanes, to, a, |x| apply_unary(function, x)),
             Step::Binary(function, to, a, b) => {

@@ -64,47 +64,62 @@ impl HeldInput {
         let (fraction, lag) = (late - lag, lag as usize);
         self.steps.clear();
         self.samples.clear();
+        if hold == Hold::BandLimited {
+            self.follow_smooth(samples, (lag, fraction), sample_s, substeps);
+            return Ok(());
+        }
         let last = samples.len().saturating_sub(1);
         for k in 0..samples.len() {
             let at = |shift: usize| samples[(k + shift).saturating_sub(lag + 1).min(last)];
             let near = [at(0), at(1), at(2)];
-            if hold == Hold::BandLimited {
-                let value = |weights: Weights| {
-                    let pairs = weights.iter().enumerate().map(|(j, &(value, slope))| {
-                        let place = (k + j).saturating_sub(lag + REACH as usize).min(last);
-                        (value * samples[place], -slope * samples[place] / sample_s)
-                    });
-                    pairs.fold((0.0, 0.0), |sum, each| (sum.0 + each.0, sum.1 + each.1))
-                };
-                self.samples.push(value(interpolation(-fraction)));
-                let parts = substeps as f64;
-                let point = |part: usize| value(corner(part as f64 / parts - fraction, parts));
-                let mut before = point(0);
-                for part in 1..=substeps {
-                    let after = point(part);
-                    self.steps.push(Line {
-                        start: before.0,
-                        end: after.0,
-                        start_slope: before.1,
-                        end_slope: after.1,
-                    });
-                    before = after;
-                }
-                continue;
-            }
-            self.samples.push(match hold {
-                Hold::BandLimited => (0.0, 0.0),
-                Hold::First => {
-                    let change = near[0] - near[1];
-                    (near[1] + fraction * change, change / sample_s)
-                }
-                Hold::Zero => (if fraction > 0.0 { near[0] } else { near[1] }, 0.0),
+            self.samples.push(if hold == Hold::First {
+                let change = near[0] - near[1];
+                (near[1] + fraction * change, change / sample_s)
+            } else {
+                (if fraction > 0.0 { near[0] } else { near[1] }, 0.0)
             });
             for part in 0..substeps {
                 self.steps.push(line(near, fraction, part as f64, substeps as f64, hold, sample_s));
             }
         }
         Ok(())
+    }
+
+    /// The same of a smooth input, late by whole samples and part of one.
+    fn follow_smooth(
+        &mut self,
+        samples: &[f64],
+        (lag, fraction): (usize, f64),
+        sample_s: f64,
+        substeps: usize,
+    ) {
+        let last = samples.len().saturating_sub(1);
+        let parts = substeps as f64;
+        // All samples have the same weights.
+        let centre = interpolation(-fraction);
+        let points: Vec<Weights> =
+            (0..=substeps).map(|part| corner(part as f64 / parts - fraction, parts)).collect();
+        for k in 0..samples.len() {
+            let value = |weights: &Weights| {
+                let pairs = weights.iter().enumerate().map(|(j, &(value, slope))| {
+                    let place = (k + j).saturating_sub(lag + REACH as usize).min(last);
+                    (value * samples[place], -slope * samples[place] / sample_s)
+                });
+                pairs.fold((0.0, 0.0), |sum, each| (sum.0 + each.0, sum.1 + each.1))
+            };
+            self.samples.push(value(&centre));
+            let mut before = value(&points[0]);
+            for point in &points[1..] {
+                let after = value(point);
+                self.steps.push(Line {
+                    start: before.0,
+                    end: after.0,
+                    start_slope: before.1,
+                    end_slope: after.1,
+                });
+                before = after;
+            }
+        }
     }
 }
 

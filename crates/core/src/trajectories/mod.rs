@@ -11,6 +11,7 @@ pub mod runge_kutta;
 pub(crate) mod scalar_equations;
 pub mod sensitivity;
 pub(crate) mod sensitivity_columns;
+pub(crate) mod sensitivity_flow;
 pub mod sensitivity_pattern;
 pub mod shooting;
 pub(crate) mod state_covariance;

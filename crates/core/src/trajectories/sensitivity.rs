@@ -6,13 +6,15 @@
 //! sequence is a sparse product for each stage.
 
 use crate::error::CoreError;
+use crate::numerics::widest::widest;
 use crate::state_space::ode_model::{Mass, OdeModel};
 use crate::tape::expression_tape::Registers;
 use crate::tape::tape_program::Lanes;
-use crate::trajectories::runge_kutta::{STAGES, Setting, expect, inverse};
-use crate::trajectories::sensitivity_columns::{BLOCK, ColumnSteps, Derivatives};
-use crate::trajectories::sensitivity_pattern::{Directions, GROUP, Pattern, Seeds};
-use crate::trajectories::trajectory::{Rate, Trajectory};
+use crate::trajectories::runge_kutta::{STAGES, expect, inverse};
+use crate::trajectories::sensitivity_columns::{ColumnSteps, Many};
+use crate::trajectories::sensitivity_flow::{Flow, Folded, Instant};
+use crate::trajectories::sensitivity_pattern::{BLOCK, Directions, GROUP, Pattern, Seeds, VECTOR};
+use crate::trajectories::trajectory::Trajectory;
 
 /// Buffers, kept from run to run.
 #[derive(Debug, Clone, Default)]
@@ -20,13 +22,14 @@ pub struct TrajectorySensitivity {
     registers: Registers,
     leaf_values: Vec<f64>,
     leaf_slopes: Vec<f64>,
-    rate_pattern: Pattern,
+    flow: Flow,
     output_pattern: Pattern,
     slopes: Lanes<BLOCK>,
     outputs: Lanes<BLOCK>,
-    /// Derivatives of each stage of each part of a block; then M⁻¹ of each.
-    stages: Vec<Vec<[f64; BLOCK]>>,
-    masses: Vec<Vec<[f64; BLOCK]>>,
+    /// Of each stage of each part of a block, then of the samples themselves.
+    stages: Vec<Folded>,
+    /// M⁻¹ of the stage at work, where it moves.
+    masses: Vec<[f64; BLOCK]>,
     output_stage: Vec<[f64; BLOCK]>,
     scratch: Vec<f64>,
     inverse: Vec<f64>,
@@ -56,11 +59,7 @@ impl TrajectorySensitivity {
         let (ode, setting) = (trajectory.ode, trajectory.setting);
         let n_columns = directions.count();
         expect("seeds of the derivatives", seeds.len(), ode.n_states * n_columns)?;
-        self.prepare(ode, setting, parameters, directions)?;
-        for (place, &seed) in seeds.iter().enumerate() {
-            let (state, column) = (place / n_columns, place % n_columns);
-            self.columns.reached[column / GROUP * ode.n_states + state][column % GROUP] = seed;
-        }
+        self.prepare(trajectory, parameters, directions, seeds)?;
         let height = ode.n_outputs * stride;
         let mut start = trajectory.range.start;
         while start < trajectory.range.end {
@@ -69,47 +68,49 @@ impl TrajectorySensitivity {
             let mut rows = std::mem::take(&mut self.rows);
             rows.clear();
             rows.resize((stop - start) * height, 0.0);
-            for sample in start..stop {
-                if stride > 0 {
-                    let rows = &mut rows[(sample - start) * height..][..height];
-                    self.measure(trajectory, sample, sample - start, n_columns, stride, rows);
-                }
-                // No step follows the record's last sample; one follows the last of a segment, up
-                // to its end.
-                if sample + 1 < setting.n_samples {
-                    let known = Derivatives {
-                        trajectory,
-                        pattern: &self.rate_pattern,
-                        stages: &self.stages,
-                        masses: &self.masses,
-                        lane: sample - start,
-                    };
-                    (0..setting.substeps)
-                        .for_each(|part| self.columns.advance(&known, sample, part));
-                }
-            }
+            widest(
+                #[inline(always)]
+                || {
+                    for sample in start..stop {
+                        let lane = sample - start;
+                        if stride > 0 {
+                            let rows = &mut rows[lane * height..][..height];
+                            self.measure(trajectory, sample, lane, stride, rows);
+                        }
+                        // No step follows the record's last sample; one follows the last of a
+                        // segment, up to its end.
+                        if sample + 1 < setting.n_samples {
+                            for stages in self.stages.chunks_exact(STAGES.len()) {
+                                self.columns.advance(&self.flow, stages, lane, setting.step_s);
+                            }
+                        }
+                    }
+                },
+            );
             if stride > 0 {
                 sink(start, &mut rows);
             }
             self.rows = rows;
             start = stop;
         }
-        let sound = self.columns.reached.iter().flatten().all(|entry| entry.is_finite());
+        let sound = self.columns.reached.as_flattened().as_flattened();
+        let sound = sound.iter().all(|entry| entry.is_finite());
         if sound { Ok(()) } else { Err(CoreError::Diverged { sample: trajectory.range.end }) }
     }
 
     /// Derivative of the state after the last step of the run by a column.
     pub fn end(&self, ode: &OdeModel, state: usize, column: usize) -> f64 {
-        self.columns.reached[column / GROUP * ode.n_states + state][column % GROUP]
+        self.columns.at(ode.n_states, state, self.flow.places[column])
     }
 
     fn prepare(
         &mut self,
-        ode: &OdeModel,
-        setting: &Setting,
+        trajectory: &Trajectory<'_>,
         parameters: &[f64],
         directions: &Directions<'_>,
+        seeds: &[f64],
     ) -> Result<(), CoreError> {
+        let (ode, setting) = (trajectory.ode, trajectory.setting);
         let (n, n_moving) = (ode.n_states, ode.n_moving());
         let count = directions.parameters.len();
         let n_values = ode.leaves.n_outputs();
@@ -124,18 +125,17 @@ impl TrajectorySensitivity {
             values,
             slopes,
         )?;
-        let n_groups = self.columns.begin(n, directions.count());
-        let leaf_slopes = &self.leaf_slopes;
-        let seeds = Seeds { ode, directions, leaf_slopes, n_groups };
-        self.rate_pattern = seeds.pattern(&ode.rate_entries);
-        self.output_pattern = seeds.pattern(&ode.output_entries);
+        let found = Seeds { ode, directions, leaf_slopes: &self.leaf_slopes };
+        let rates = found.pattern(&ode.rate_entries);
+        self.flow = Flow::new(trajectory, &rates, seeds, directions.count());
+        self.columns.begin(&self.flow, seeds);
+        self.output_pattern = found.pattern(&ode.output_entries);
         ode.rate_slopes.prepare(n_moving, &setting.leaves, &mut self.slopes);
         ode.output_slopes.prepare(n_moving, &setting.leaves, &mut self.outputs);
         // Four stages of each part of a sample interval, and one at the sample for outputs that
         // need ẋ.
         let n_stages = 4 * setting.substeps + 1;
-        self.stages.resize(n_stages, Vec::new());
-        self.masses.resize(n_stages, Vec::new());
+        self.stages.resize(n_stages, Folded::default());
         self.inverse.resize(n * n, 0.0);
         Ok(())
     }
@@ -169,7 +169,8 @@ impl TrajectorySensitivity {
                         lanes[lane] = setting.held[input].steps[step].at(place).0 + shift[input];
                     }
                 }
-                self.stage(trajectory, 4 * part + stage, &state, &driven, &mut slope)?;
+                let instant = Instant::Stage(part, stage);
+                self.stage(trajectory, (start, stop), instant, (&state, &driven), &mut slope)?;
             }
         }
         for lane in 0..BLOCK {
@@ -181,7 +182,8 @@ impl TrajectorySensitivity {
         }
         let program = &ode.output_slopes;
         if ode.outputs_need_rates {
-            self.stage(trajectory, 4 * setting.substeps, &state, &driven, &mut slope)?;
+            let instant = Instant::Sample;
+            self.stage(trajectory, (start, stop), instant, (&state, &driven), &mut slope)?;
             slope.iter().enumerate().for_each(|(i, v)| program.load(i, *v, &mut self.outputs));
         }
         state.iter().enumerate().for_each(|(i, v)| program.load(n + i, *v, &mut self.outputs));
@@ -197,9 +199,9 @@ impl TrajectorySensitivity {
     fn stage(
         &mut self,
         trajectory: &Trajectory<'_>,
-        place: usize,
-        state: &[[f64; BLOCK]],
-        driven: &[[f64; BLOCK]],
+        samples: (usize, usize),
+        instant: Instant,
+        (state, driven): (&[[f64; BLOCK]], &[[f64; BLOCK]]),
         slope: &mut [[f64; BLOCK]],
     ) -> Result<(), CoreError> {
         let ode = trajectory.ode;
@@ -224,15 +226,18 @@ impl TrajectorySensitivity {
                     slope[row].iter_mut().zip(residual).for_each(|(k, r)| *k -= weight * r);
                 }
             }
-            Mass::Moving(_) => self.solve_mass(trajectory, place, slope)?,
+            Mass::Moving(_) => self.solve_mass(trajectory, slope)?,
         }
         if !ode.mass.is_one() {
             slope.iter().enumerate().for_each(|(i, v)| program.load(i, *v, &mut self.slopes));
             program.run_late(&mut self.slopes);
         }
-        let stage = &mut self.stages[place];
-        stage.clear();
-        stage.extend(ode.rate_entries.iter().map(|entry| self.slopes[entry.register]));
+        let into = &mut self.stages[match instant {
+            Instant::Stage(part, stage) => STAGES.len() * part + stage,
+            Instant::Sample => STAGES.len() * trajectory.setting.substeps,
+        }];
+        let known = (&ode.rate_entries[..], &self.slopes);
+        self.flow.fold(trajectory, samples, instant, known, &self.masses, into);
         Ok(())
     }
 
@@ -240,12 +245,11 @@ impl TrajectorySensitivity {
     fn solve_mass(
         &mut self,
         trajectory: &Trajectory<'_>,
-        place: usize,
         slope: &mut [[f64; BLOCK]],
     ) -> Result<(), CoreError> {
         let ode = trajectory.ode;
         let n = ode.n_states;
-        let store = &mut self.masses[place];
+        let store = &mut self.masses;
         store.clear();
         store.resize(n * n, [0.0; BLOCK]);
         for lane in 0..BLOCK {
@@ -265,52 +269,54 @@ impl TrajectorySensitivity {
     }
 
     /// Rows of one sample.
+    #[inline(always)]
     fn measure(
         &mut self,
         trajectory: &Trajectory<'_>,
         sample: usize,
         lane: usize,
-        n_columns: usize,
         stride: usize,
         rows: &mut [f64],
     ) {
-        let ode = trajectory.ode;
-        let n = ode.n_states;
+        let (ode, flow, pattern) = (trajectory.ode, &self.flow, &self.output_pattern);
+        let (n, places) = (ode.n_states, &flow.places);
         for (row, &register) in rows.chunks_exact_mut(stride).zip(&ode.output_registers) {
             row[0] = self.outputs[register][lane];
         }
-        for group in 0..self.output_pattern.forces.len() {
+        for group in 0..places.len().div_ceil(GROUP) {
             let own = group * n..(group + 1) * n;
             if ode.outputs_need_rates {
                 // ẋ at the sample itself: S as it stands, between no stages.
-                let known = Derivatives {
-                    trajectory,
-                    pattern: &self.rate_pattern,
-                    stages: &self.stages,
-                    masses: &self.masses,
-                    lane,
-                };
-                let place = 4 * trajectory.setting.substeps;
-                self.columns.measured(&known, place, sample, group);
+                let known = &self.stages[STAGES.len() * trajectory.setting.substeps];
+                self.columns.measured(flow, known, lane, group);
             }
-            let (state, slope) = (&self.columns.reached[own], &self.columns.slope[..]);
-            let (pattern, first) = (&self.output_pattern, 1 + group * GROUP);
-            let width = GROUP.min(n_columns - group * GROUP);
-            for (links, from) in [(&pattern.by_state, state), (&pattern.by_rate, slope)] {
-                for link in links {
-                    let factor = self.output_stage[link.entry][lane];
-                    let row = &mut rows[link.row * stride + first..][..width];
-                    for (entry, from) in row.iter_mut().zip(&from[link.from]) {
-                        *entry += factor * from;
+            let (state, slope) = (&self.columns.reached[own.clone()], &self.columns.slope[own]);
+            let (mut states, mut rates) = (&pattern.by_state[..], &pattern.by_rate[..]);
+            let order = &flow.order[group * GROUP..];
+            for (row, values) in rows.chunks_exact_mut(stride).enumerate() {
+                let (mut sum, mut width) = (Many::default(), 0);
+                for (links, from) in [(&mut states, state), (&mut rates, slope)] {
+                    while let Some((link, rest)) = links.split_first() {
+                        if link.row != row {
+                            break;
+                        }
+                        *links = rest;
+                        let factor = self.output_stage[link.entry][lane];
+                        let reached = flow.widths[group * n + link.from];
+                        for (sum, from) in sum.iter_mut().zip(&from[link.from]).take(reached) {
+                            (0..VECTOR).for_each(|place| sum[place] += factor * from[place]);
+                        }
+                        width = width.max(reached);
                     }
                 }
+                let sums = sum[..width].as_flattened();
+                order.iter().zip(sums).for_each(|(&column, sum)| values[1 + column] = *sum);
             }
-            for force in &pattern.forces[group] {
-                let rate = Rate::Sample(sample);
-                let late = force.delayed.map_or(1.0, |input| rate.of(trajectory, input));
-                let factor = self.output_stage[force.entry][lane];
-                rows[force.row * stride + first + force.lane] += factor * force.factor * late;
-            }
+        }
+        for force in &pattern.forces {
+            let rate = |input: usize| trajectory.setting.held[input].samples[sample].1;
+            let factor = self.output_stage[force.entry][lane] * force.factor;
+            rows[force.row * stride + 1 + force.column] += factor * force.delayed.map_or(1.0, rate);
         }
     }
 }

@@ -1,172 +1,226 @@
 //! Derivatives of a state, column by column, taken over the steps of a trajectory. (Python side: none)
 
-use crate::numerics::widest::widest;
-use crate::state_space::ode_model::Mass;
 use crate::trajectories::runge_kutta::{STAGES, WEIGHTS};
-use crate::trajectories::sensitivity_pattern::{GROUP, Pattern};
-use crate::trajectories::trajectory::{Rate, Trajectory};
+use crate::trajectories::sensitivity_flow::{Flow, Folded};
+use crate::trajectories::sensitivity_pattern::{GROUP, VECTOR, VECTORS};
 
-/// Samples whose derivatives are known side by side.
-pub(crate) const BLOCK: usize = 16;
-/// Columns that fit a vector register.
-const VECTOR: usize = 4;
-type Many = [f64; GROUP];
-
-/// Derivatives of the equations along a block of a trajectory, and the lane of the sample at work.
-pub(crate) struct Derivatives<'a> {
-    pub(crate) trajectory: &'a Trajectory<'a>,
-    pub(crate) pattern: &'a Pattern,
-    /// Of each stage of each part of a sample interval; then M⁻¹, where it moves.
-    pub(crate) stages: &'a [Vec<[f64; BLOCK]>],
-    pub(crate) masses: &'a [Vec<[f64; BLOCK]>],
-    pub(crate) lane: usize,
-}
-
-/// A stage of a step.
-#[derive(Debug, Clone, Copy)]
-struct Stage {
-    place: usize,
-    rate: Rate,
-}
+/// Numbers of a group of columns.
+pub(crate) type Many = [[f64; VECTOR]; VECTORS];
+const NONE: Many = [[0.0; VECTOR]; VECTORS];
 
 /// Buffers, kept from run to run.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct ColumnSteps {
-    /// Columns of each group, whole vectors of them.
-    widths: Vec<usize>,
     /// S by group, then state.
     pub(crate) reached: Vec<Many>,
-    /// Of the group at work, by state.
-    moved: Vec<Many>,
+    /// K of the sample at work, by group, then state.
     pub(crate) slope: Vec<Many>,
-    plain: Vec<Many>,
+    /// S within a step, of every other stage; by group, for what no column reaches stays zero.
+    moved: [Vec<Many>; 2],
     sum: Vec<Many>,
+    /// What drives the columns, by group, stage, state.
+    driven: Vec<Many>,
+}
+
+/// Do something with as many vectors as a row has; a row that nothing reaches is left out.
+macro_rules! by_width {
+    ($width:expr, $work:ident, $($argument:expr),+) => {
+        match $width {
+            0 => {}
+            1 => $work::<1>($($argument),+),
+            2 => $work::<2>($($argument),+),
+            3 => $work::<3>($($argument),+),
+            4 => $work::<4>($($argument),+),
+            5 => $work::<5>($($argument),+),
+            6 => $work::<6>($($argument),+),
+            7 => $work::<7>($($argument),+),
+            _ => $work::<VECTORS>($($argument),+),
+        }
+    };
+}
+
+/// The sum of a row's links: their states, their values, and S.
+#[derive(Clone, Copy)]
+struct Row<'a> {
+    driven: &'a Many,
+    sources: &'a [usize],
+    values: &'a [f64],
+    from: &'a [Many],
+}
+
+impl Row<'_> {
+    #[inline(always)]
+    fn slope<const V: usize>(self) -> [[f64; VECTOR]; V] {
+        let mut sum: [[f64; VECTOR]; V] = std::array::from_fn(|v| self.driven[v]);
+        for (&source, &value) in self.sources.iter().zip(self.values) {
+            let from = &self.from[source];
+            for (sum, from) in sum.iter_mut().zip(from) {
+                (0..VECTOR).for_each(|lane| sum[lane] += value * from[lane]);
+            }
+        }
+        sum
+    }
+}
+
+#[inline(always)]
+fn keep<const V: usize>(row: Row<'_>, slope: &mut Many) {
+    slope[..V].copy_from_slice(&row.slope::<V>());
+}
+
+/// A stage whose end another one follows.
+#[inline(always)]
+fn pass<const V: usize>(
+    row: Row<'_>,
+    (stage, ahead): (usize, f64),
+    begun: &Many,
+    sum: &mut Many,
+    next: &mut Many,
+) {
+    let slope = row.slope::<V>();
+    for v in 0..V {
+        for lane in 0..VECTOR {
+            let before = if stage == 0 { 0.0 } else { sum[v][lane] };
+            sum[v][lane] = before + WEIGHTS[stage] * slope[v][lane];
+            next[v][lane] = begun[v][lane] + ahead * slope[v][lane];
+        }
+    }
+}
+
+/// The stage that ends a step.
+#[inline(always)]
+fn finish<const V: usize>(row: Row<'_>, sixth: f64, sum: &Many, reached: &mut Many) {
+    let slope = row.slope::<V>();
+    for v in 0..V {
+        for lane in 0..VECTOR {
+            reached[v][lane] += sixth * (sum[v][lane] + slope[v][lane]);
+        }
+    }
 }
 
 impl ColumnSteps {
-    /// Begin with zeros; the number of groups of columns.
-    pub(crate) fn begin(&mut self, n_states: usize, n_columns: usize) -> usize {
-        let n_groups = n_columns.div_ceil(GROUP);
-        let width = |group: usize| (n_columns - group * GROUP).min(GROUP);
-        self.widths.clear();
-        self.widths.extend((0..n_groups).map(|g| width(g).div_ceil(VECTOR) * VECTOR));
-        self.reached.clear();
-        self.reached.resize(n_groups * n_states, [0.0; GROUP]);
-        for buffer in [&mut self.moved, &mut self.slope, &mut self.plain, &mut self.sum] {
+    /// Begin from derivatives of the state (n_states × columns).
+    pub(crate) fn begin(&mut self, flow: &Flow, seeds: &[f64]) {
+        let n = flow.counts.len();
+        let n_groups = flow.places.len().div_ceil(GROUP);
+        let resized = |buffer: &mut Vec<Many>, length: usize| {
             buffer.clear();
-            buffer.resize(n_states, [0.0; GROUP]);
-        }
-        n_groups
-    }
-
-    /// K of one group of columns at a stage, from the moved sensitivities.
-    #[inline(always)]
-    fn stage_slopes<const W: usize>(&mut self, known: &Derivatives<'_>, at: Stage, group: usize) {
-        let lane = known.lane % BLOCK;
-        let stage = &known.stages[at.place][..];
-        let links = &known.pattern.by_state[..];
-        let mut first = 0;
-        for (row, slope) in self.slope.iter_mut().enumerate() {
-            let mut sum = [0.0; W];
-            while let Some(link) = links.get(first).filter(|link| link.row == row) {
-                let factor = stage[link.entry][lane];
-                let from = &self.moved[link.from];
-                (0..W).for_each(|column| sum[column] -= factor * from[column]);
-                first += 1;
-            }
-            slope[..W].copy_from_slice(&sum);
-        }
-        for force in &known.pattern.forces[group] {
-            // A delay acts through the rate of its input, everything else by itself.
-            let late = force.delayed.map_or(1.0, |input| at.rate.of(known.trajectory, input));
-            self.slope[force.row][force.lane] -= stage[force.entry][lane] * force.factor * late;
-        }
-        self.solve_slopes::<W>(known, at.place);
-    }
-
-    /// M⁻¹ times the slopes.
-    #[inline(always)]
-    fn solve_slopes<const W: usize>(&mut self, known: &Derivatives<'_>, place: usize) {
-        let Derivatives { trajectory, masses, .. } = known;
-        let (n, lane) = (trajectory.ode.n_states, known.lane % BLOCK);
-        if trajectory.ode.mass.is_one() {
-            return;
-        }
-        self.plain.copy_from_slice(&self.slope);
-        self.slope.iter_mut().for_each(|slope| slope[..W].fill(0.0));
-        let (slope, plain) = (&mut self.slope[..], &self.plain[..]);
-        let mut add = |row: usize, column: usize, weight: f64| {
-            let (to, from) = (&mut slope[row], &plain[column]);
-            (0..W).for_each(|place| to[place] += weight * from[place]);
+            buffer.resize(length, NONE);
         };
-        if let Mass::Fixed(_) = trajectory.ode.mass {
-            for &(row, column, weight) in &trajectory.setting.weights {
-                add(row, column, weight);
-            }
-        } else {
-            for (entry, weight) in masses[place].iter().enumerate() {
-                add(entry / n, entry % n, weight[lane]);
+        resized(&mut self.driven, n_groups * STAGES.len() * n);
+        resized(&mut self.sum, n);
+        let [even, odd] = &mut self.moved;
+        let by_group = [&mut self.reached, &mut self.slope, even, odd];
+        by_group.into_iter().for_each(|each| resized(each, n_groups * n));
+        for (state, seeds) in seeds.chunks_exact(flow.places.len().max(1)).enumerate() {
+            for (&place, &seed) in flow.places.iter().zip(seeds) {
+                self.reached[place / GROUP * n + state][place % GROUP / VECTOR][place % VECTOR] =
+                    seed;
             }
         }
     }
 
-    /// Take all columns over one step.
-    pub(crate) fn advance(&mut self, known: &Derivatives<'_>, sample: usize, part: usize) {
-        for group in 0..self.widths.len() {
-            widest(
-                #[inline(always)]
-                || match self.widths[group] {
-                    4 => self.follow::<4>(known, sample, part, group),
-                    8 => self.follow::<8>(known, sample, part, group),
-                    12 => self.follow::<12>(known, sample, part, group),
-                    _ => self.follow::<GROUP>(known, sample, part, group),
-                },
-            );
+    /// Derivative of a state by the column at a place.
+    pub(crate) fn at(&self, n_states: usize, state: usize, place: usize) -> f64 {
+        self.reached[place / GROUP * n_states + state][place % GROUP / VECTOR][place % VECTOR]
+    }
+
+    /// Take all columns over one step, whose stages are known for a sample of a block.
+    #[inline(always)]
+    pub(crate) fn advance(&mut self, flow: &Flow, stages: &[Folded], sample: usize, step_s: f64) {
+        let n = flow.counts.len();
+        for (stage, known) in stages.iter().enumerate() {
+            self.drive(flow, known, sample, stage);
+        }
+        for group in 0..flow.widths.len() / n.max(1) {
+            self.follow(flow, stages, sample, step_s, group);
+        }
+    }
+
+    /// Put what drives the columns of a stage where its rows begin their sums.
+    #[inline(always)]
+    fn drive(&mut self, flow: &Flow, known: &Folded, sample: usize, stage: usize) {
+        let (n, count) = (flow.counts.len(), flow.drives.len());
+        for (drive, &value) in flow.drives.iter().zip(&known.drives[sample * count..]) {
+            let (group, lane) = (drive.place / GROUP, drive.place % GROUP);
+            let row = &mut self.driven[(group * STAGES.len() + stage) * n + drive.row];
+            row[lane / VECTOR][lane % VECTOR] = value;
+        }
+    }
+
+    #[inline(always)]
+    fn follow(&mut self, flow: &Flow, stages: &[Folded], sample: usize, step_s: f64, group: usize) {
+        let n = flow.counts.len();
+        let own = group * n..(group + 1) * n;
+        let (begun, widths) = (&mut self.reached[own.clone()], &flow.widths[own.clone()]);
+        let [even, odd] = &mut self.moved;
+        let (even, odd) = (&mut even[own.clone()], &mut odd[own]);
+        for (stage, known) in stages.iter().enumerate() {
+            let driven = &self.driven[(group * STAGES.len() + stage) * n..][..n];
+            let (mut sources, mut values) = (&flow.sources[..], known.of(flow, sample));
+            // S moved to this stage is read, and that of the next is written, in turn.
+            let (from, next) =
+                if stage % 2 == 0 { (&*odd, &mut *even) } else { (&*even, &mut *odd) };
+            for row in 0..n {
+                let here;
+                (here, sources) = sources.split_at(flow.counts[row]);
+                let factors;
+                (factors, values) = values.split_at(flow.counts[row]);
+                let of = |from| Row { driven: &driven[row], sources: here, values: factors, from };
+                let sum = &mut self.sum[row];
+                match STAGES.get(stage + 1) {
+                    Some(next_stage) => {
+                        let row_of = if stage == 0 { of(&*begun) } else { of(from) };
+                        let moves = (stage, next_stage.1 * step_s);
+                        by_width!(
+                            widths[row],
+                            pass,
+                            row_of,
+                            moves,
+                            &begun[row],
+                            sum,
+                            &mut next[row]
+                        );
+                    }
+                    None => {
+                        by_width!(
+                            widths[row],
+                            finish,
+                            of(from),
+                            step_s / 6.0,
+                            sum,
+                            &mut begun[row]
+                        );
+                    }
+                }
+            }
         }
     }
 
     /// ẋ by the columns of a group at a sample itself, into `slope`: between no stages.
-    pub(crate) fn measured(
-        &mut self,
-        known: &Derivatives<'_>,
-        place: usize,
-        sample: usize,
-        group: usize,
-    ) {
-        let n = known.trajectory.ode.n_states;
-        self.moved.copy_from_slice(&self.reached[group * n..(group + 1) * n]);
-        self.stage_slopes::<GROUP>(known, Stage { place, rate: Rate::Sample(sample) }, group);
-    }
-
     #[inline(always)]
-    fn follow<const W: usize>(
-        &mut self,
-        known: &Derivatives<'_>,
-        sample: usize,
-        part: usize,
-        group: usize,
-    ) {
-        let Trajectory { ode, setting, .. } = known.trajectory;
-        let (n, h) = (ode.n_states, setting.step_s);
-        let step = sample * setting.substeps + part;
-        let own = group * n..(group + 1) * n;
-        self.moved.copy_from_slice(&self.reached[own.clone()]);
-        self.sum.fill([0.0; GROUP]);
-        for (stage, (place, _)) in STAGES.into_iter().enumerate() {
-            let rate = Rate::Step(step, place);
-            self.stage_slopes::<W>(known, Stage { place: 4 * part + stage, rate }, group);
-            let ahead = STAGES.get(stage + 1).map_or(0.0, |next| next.1) * h;
-            let begun = &self.reached[own.clone()];
-            let rows = self.moved.iter_mut().zip(&mut self.sum).zip(&self.slope).zip(begun);
-            for (((moved, sum), slope), begun) in rows {
-                for column in 0..W {
-                    sum[column] += WEIGHTS[stage] * slope[column];
-                    moved[column] = begun[column] + ahead * slope[column];
-                }
-            }
+    pub(crate) fn measured(&mut self, flow: &Flow, known: &Folded, sample: usize, group: usize) {
+        let n = flow.counts.len();
+        self.drive(flow, known, sample, 0);
+        let from = &self.reached[group * n..(group + 1) * n];
+        let driven = &self.driven[group * STAGES.len() * n..][..n];
+        let (mut sources, mut values) = (&flow.sources[..], known.of(flow, sample));
+        for (row, driven) in driven.iter().enumerate() {
+            let here;
+            (here, sources) = sources.split_at(flow.counts[row]);
+            let factors;
+            (factors, values) = values.split_at(flow.counts[row]);
+            let row_of = Row { driven, sources: here, values: factors, from };
+            let place = group * n + row;
+            by_width!(flow.widths[place], keep, row_of, &mut self.slope[place]);
         }
-        for (entry, sum) in self.reached[own].iter_mut().zip(&self.sum) {
-            (0..W).for_each(|column| entry[column] += h / 6.0 * sum[column]);
-        }
+    }
+}
+
+impl Folded {
+    /// Values of all links at a sample of the block.
+    #[inline(always)]
+    fn of(&self, flow: &Flow, sample: usize) -> &[f64] {
+        let count = flow.sources.len();
+        &self.links[sample * count..][..count]
     }
 }

@@ -3,8 +3,14 @@
 use crate::state_space::ode_model::OdeModel;
 use crate::tape::derivative_tape::Entry;
 
-/// Derivatives that are carried side by side.
-pub(crate) const GROUP: usize = 16;
+/// Samples whose derivatives are known side by side.
+pub(crate) const BLOCK: usize = 16;
+/// Columns that fit a vector register.
+pub(crate) const VECTOR: usize = 4;
+/// Of them in a group.
+pub(crate) const VECTORS: usize = 8;
+/// Columns that are carried side by side: what is summed of them stays in registers.
+pub(crate) const GROUP: usize = VECTOR * VECTORS;
 
 /// By what a trajectory is differentiated; columns in this order.
 #[derive(Debug, Clone, Copy)]
@@ -28,7 +34,7 @@ impl Directions<'_> {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Force {
     pub(crate) row: usize,
-    pub(crate) lane: usize,
+    pub(crate) column: usize,
     /// Place among the entries.
     pub(crate) entry: usize,
     pub(crate) factor: f64,
@@ -50,15 +56,13 @@ pub(crate) struct Pattern {
     pub(crate) by_rate: Vec<Link>,
     /// Row after row.
     pub(crate) by_state: Vec<Link>,
-    /// By group of columns.
-    pub(crate) forces: Vec<Vec<Force>>,
+    pub(crate) forces: Vec<Force>,
 }
 
 pub(crate) struct Seeds<'a> {
     pub(crate) ode: &'a OdeModel,
     pub(crate) directions: &'a Directions<'a>,
     pub(crate) leaf_slopes: &'a [f64],
-    pub(crate) n_groups: usize,
 }
 
 impl Seeds<'_> {
@@ -68,7 +72,7 @@ impl Seeds<'_> {
         let (n, n_moving) = (ode.n_states, ode.n_moving());
         let count = self.directions.parameters.len();
         let first_shift = count + self.directions.n_initial;
-        let mut pattern = Pattern { forces: vec![Vec::new(); self.n_groups], ..Pattern::default() };
+        let mut pattern = Pattern::default();
         for (place, entry) in entries.iter().enumerate() {
             let link = |from| Link { row: entry.row, from, entry: place };
             match entry.column {
@@ -115,7 +119,6 @@ impl Pattern {
         factor: f64,
         delayed: Option<usize>,
     ) {
-        let force = Force { row, lane: column % GROUP, entry, factor, delayed };
-        self.forces[column / GROUP].push(force);
+        self.forces.push(Force { row, column, entry, factor, delayed });
     }
 }

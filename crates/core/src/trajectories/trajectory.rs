@@ -30,21 +30,3 @@ impl Trajectory<'_> {
         &self.states[place..place + n]
     }
 }
-
-/// Where the derivative of an input by its delay is taken.
-#[derive(Debug, Clone, Copy)]
-pub(crate) enum Rate {
-    Step(usize, usize),
-    Sample(usize),
-}
-
-impl Rate {
-    /// That derivative.
-    pub(crate) fn of(self, trajectory: &Trajectory<'_>, input: usize) -> f64 {
-        let held = &trajectory.setting.held[input];
-        match self {
-            Self::Step(step, place) => held.steps[step].at(place).1,
-            Self::Sample(sample) => held.samples[sample].1,
-        }
-    }
-}

@@ -135,6 +135,58 @@ fn derivatives_match_differences() {
 }
 
 #[test]
+fn many_columns_side_by_side_are_each_of_them_alone() {
+    let n = 37;
+    let states: Vec<String> = (0..n).map(|k| format!("x{k}")).collect();
+    let equation = |k: usize| match k {
+        0 => ("m*x0'".to_string(), "f - c*x0 + 0.1*x3".to_string()),
+        7 => ("x7' + 0.2*x8'".to_string(), "-k*x7^3".to_string()),
+        _ => (format!("x{k}'"), format!("x{} - sin(x{k})", k - 1)),
+    };
+    let model = ModelText {
+        equations: (0..n).map(equation).collect(),
+        outputs: ["x36 + x5", "x3'", "x20*x7 + tau*f"].map(String::from).to_vec(),
+        delays: vec!["tau".to_string()],
+        states,
+        ..text(&[], &[])
+    };
+    let ode = OdeModel::new(&ModelTape::new(&model).unwrap()).unwrap();
+    let inputs = wave(41, 0.05);
+    let initial: Vec<f64> = (0..n).map(|k| 0.3 * (k as f64).sin()).collect();
+    let (mut setting, mut states) = (Setting::default(), Vec::new());
+    setting.prepare(&ode, &VALUES, &course(&inputs, 0.05, 2)).unwrap();
+    setting.run(&ode, 0..41, &initial, &[0.1], &mut states, None).unwrap();
+    let trajectory =
+        Trajectory { ode: &ode, setting: &setting, range: 0..41, states: &states, shift: &[0.1] };
+    // Columns: parameters, states, the shift.
+    let run = |parameters: &[usize], own: &[usize], shift: &[usize]| {
+        let directions = Directions { parameters, n_initial: own.len(), shift };
+        let count = directions.count();
+        let mut seeds = vec![0.0; n * count];
+        own.iter().enumerate().for_each(|(k, &i)| seeds[i * count + parameters.len() + k] = 1.0);
+        let mut rows = Vec::new();
+        let mut sink = |_: usize, block: &mut [f64]| rows.extend_from_slice(block);
+        let mut sensitivity = TrajectorySensitivity::default();
+        sensitivity.run(&trajectory, &VALUES, &directions, &seeds, count + 1, &mut sink).unwrap();
+        (rows, sensitivity.end(&ode, 8, 0))
+    };
+    let every: Vec<usize> = (0..n).collect();
+    let (together, _) = run(&[3, 0, 1, 2], &every, &[0]);
+    for column in 0..n + 5 {
+        let (alone, end) = match column {
+            0..4 => run(&[[3, 0, 1, 2][column]], &[], &[]),
+            _ if column < n + 4 => run(&[], &[column - 4], &[]),
+            _ => run(&[], &[], &[0]),
+        };
+        for (row, alone) in together.chunks_exact(n + 6).zip(alone.chunks_exact(2)) {
+            assert_eq!(row[0], alone[0]);
+            assert_eq!(row[1 + column], alone[1], "{column}");
+        }
+        assert!(end.is_finite());
+    }
+}
+
+#[test]
 fn part_of_a_record_is_what_the_whole_run_does_there() {
     let ode = ode(&PENDULUM, &["x", "v"]);
     let inputs = wave(41, 0.05);
