@@ -69,3 +69,23 @@ def test_two_rounds_of_products_bring_the_digits_of_like_columns_back(
     found = np.abs(triangle_of_rows(columns))
     assert_close(found, known, atol=1e-11, why="rounding of two ways")
     assert_close(found[2, 2], known[2, 2], rtol=1e-10, why="ten digits of what is left")
+
+
+def test_columns_that_repeat_another_leave_the_triangle_of_the_others(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # A bias of an output that is a state has the effect of that state's start, number by number.
+    columns = np.random.default_rng(3).standard_normal((2 * ROWS, 6))
+    columns[:, 4], columns[:, 5] = columns[:, 1], columns[:, 1]
+
+    def refused(_: object) -> None:
+        raise AssertionError("row by row")
+
+    monkeypatch.setattr(triangle, "_row_by_row", refused)
+    for found in (
+        triangle_of_rows(columns),
+        triangle_of_parts(lambda: np.array_split(columns, 3)),
+    ):
+        assert np.allclose(found.T @ found, columns.T @ columns, rtol=0.0, atol=1e-10)
+        assert np.array_equal(found, np.triu(found))
+        assert np.array_equal(np.diag(found) == 0.0, [False] * 4 + [True] * 2)

@@ -18,6 +18,8 @@ LEAST_DIAGONAL = 1e-3
 products of columns leaves ten good digits."""
 LEAST_REFINED = 1e-5
 """The same where a second triangle, of what the first leaves of columns, brings the digits back."""
+ALIKE = 1e-12
+"""Cosine below one at which two columns may be the same."""
 SIZES = 1e-100, 1e100
 """Lengths of columns whose products neither vanish nor overflow."""
 
@@ -69,6 +71,9 @@ def _of_products(
     scaled = products / np.outer(scale, scale)
     # Columns of zeros have an effect of zero on their own.
     scaled[empty, empty] = 1.0
+    twins = _twins(scaled, parts)
+    if twins:
+        return _with_twins(twins, products, parts)
     try:
         lower = np.linalg.cholesky(scaled)
     except np.linalg.LinAlgError:
@@ -78,6 +83,39 @@ def _of_products(
         return None
     found = np.asarray(lower.T * length)
     return found if least >= LEAST_DIAGONAL else _refined(found, parts)
+
+
+def _twins(scaled: Array, parts: Callable[[], Iterable[Array]]) -> dict[int, int]:
+    """Columns that repeat an earlier one number by number, and which.
+
+    The start of a state that no other state hears and the bias of an output that is that state do.
+    """
+    alike = np.argwhere(np.triu(scaled > 1.0 - ALIKE, 1))
+    found = {int(later): int(earlier) for earlier, later in alike[::-1]}
+    if not found:
+        return {}
+    same = dict.fromkeys(found, True)
+    for part in parts():
+        for later, earlier in found.items():
+            same[later] &= bool(np.array_equal(part[:, later], part[:, earlier]))
+    return {later: earlier for later, earlier in found.items() if same[later]}
+
+
+def _with_twins(
+    twins: dict[int, int], products: Array, parts: Callable[[], Iterable[Array]]
+) -> Array | None:
+    """The triangle of the other columns; of one that repeats another nothing is left."""
+    others = np.delete(np.arange(len(products)), list(twins))
+    inner = _of_products(
+        lambda: (part[:, others] for part in parts()), products[np.ix_(others, others)]
+    )
+    if inner is None:
+        return None
+    found = np.zeros_like(products)
+    found[np.ix_(others, others)] = inner
+    for later, earlier in twins.items():
+        found[:, later] = found[:, earlier]
+    return found
 
 
 def _refined(first: Array, parts: Callable[[], Iterable[Array]]) -> Array | None:
