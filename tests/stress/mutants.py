@@ -48,11 +48,16 @@ from tests.stress.mutations import (
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("logs", "inspection", "evidence", "uncertainty", "control/tuning")
-TESTS = ("tests/unit", "tests/truth", "tests/contract", "tests/guide", "src/flightid")
+TESTS = ("tests/unit", "tests/truth", "tests/contract", "tests/guide")
+"""And the examples of the packages."""
 SLOW = ("test_app_", "test_fleet_")
 """They try other packages, in processes of their own."""
-READERS = ("tests/contract/test_array_classes.py", "tests/contract/test_named_numbers.py")
-"""They read the source of classes and numbers: no line of it is run by them."""
+READERS = (
+    "tests/contract/test_array_classes.py",
+    "tests/contract/test_named_numbers.py",
+    "tests/unit/test_option_readers.py",
+)
+"""They read the source of classes, numbers and options: no line of it is run by them."""
 BUDGET_S, FILES_S, MOST_FILES = 60.0, 30.0, 3
 """Processor's seconds of tests that reach a mutant, and of the other tests of so many files."""
 FILE_S = 600.0
@@ -289,8 +294,9 @@ def main() -> None:
         tree, digest = copied(Path(folder))
         check_equivalent(tree)
         sample = drawn(asked, tree, kept)
-        words = [*asked.tests, *(f"--ignore-glob=*/{each}*" for each in SLOW)]
-        forks = Forks(tree, words, [f"src/flightid/{each}" for each in PACKAGES])
+        sources = [f"src/flightid/{each}" for each in PACKAGES]
+        words = [*asked.tests, *sources, *(f"--ignore-glob=*/{each}*" for each in SLOW)]
+        forks = Forks(tree, words, sources)
         known = reached(forks, tree, keep.with_suffix(".reach"))
         had = {each["name"]: each["end"] for each in kept if each["tree"] == digest}
         ends: list[tuple[Mutant, str]] = []
