@@ -6,7 +6,7 @@ Drawn by chance from all mutants of the packages that tell users what to believe
 (`mutations.EQUIVALENT` and its neighbours say what is left out). pytest collects the default suite
 once, each file of tests runs in a fork with coverage, and each mutant meets, in a fork of its own
 (`mutant_forks.py`): every test that reaches its statement, those of its module and short ones first
-(`BUDGET_S` seconds of them; where that is not all, its end says so), then the other tests of the
+(so many seconds of them; where that is not all, its end says so), then the other tests of the
 nearest files, which may take what a fixture or a cache made of that line for another. A mutant of
 what runs on import meets the tests that reach most of its file, and the contracts that read the
 source. One that no test notices is printed: mend the test, or delete what nothing needs.
@@ -58,8 +58,8 @@ READERS = (
     "tests/unit/test_option_readers.py",
 )
 """They read the source of classes, numbers and options: no line of it is run by them."""
-BUDGET_S, FILES_S, MOST_FILES = 60.0, 30.0, 3
-"""Processor's seconds of tests that reach a mutant, and of the other tests of so many files."""
+BUDGET_S, MOST_FILES = 40.0, 3
+"""Seconds of tests that reach a mutant, by default; the others of so many files get half of it."""
 FILE_S = 600.0
 """Processor's seconds that a file of tests may take with coverage."""
 UNNOTICED = ("survived", "not all run", "not reached", "not run")
@@ -151,9 +151,11 @@ def _packed(covered: Any, tree: Path, texts: Path) -> dict[str, Any]:
     return {"seconds": covered.seconds, "failed": covered.failed, "lines": lines}
 
 
-def end_of(forks: Any, mutant: Mutant, text: str, new: str, known: Reached) -> tuple[str, str]:
+def end_of(
+    forks: Any, mutant: Mutant, text: str, new: str, known: Reached, most_s: float
+) -> tuple[str, str]:
     """How a mutant ends, and which test noticed it."""
-    tests, others, left_out = chosen(forks, mutant, known, text)
+    tests, others, left_out = chosen(forks, mutant, known, text, most_s)
     if not tests:
         return "not reached", ""
     for names in (tests, others):
@@ -169,7 +171,7 @@ def end_of(forks: Any, mutant: Mutant, text: str, new: str, known: Reached) -> t
 
 
 def chosen(
-    forks: Any, mutant: Mutant, known: Reached, text: str
+    forks: Any, mutant: Mutant, known: Reached, text: str, most_s: float
 ) -> tuple[list[str], list[str], int]:
     """Tests that reach it, the others of the nearest files, and how many there was no time for."""
     at = known.of(mutant.path, statement(text, mutant.line))
@@ -197,7 +199,7 @@ def chosen(
         return not near, bool(readers) and breadth[test] < max(breadth.values()) / 2, seconds, test
 
     ranked = [*sorted(at, key=rank), *readers]
-    taken, left_out = _within(ranked, known, BUDGET_S)
+    taken, left_out = _within(ranked, known, most_s)
     files = list(dict.fromkeys(each.partition("::")[0] for each in taken))
     place = {each: k for k, each in enumerate(forks.tests)}
     tests = sorted(taken, key=lambda each: (files.index(each.partition("::")[0]), place[each]))
@@ -207,7 +209,7 @@ def chosen(
         for each in forks.tests
         if each.partition("::")[0] == file and each not in taken and each in known.seconds
     ]
-    return tests, _within(beside, known, FILES_S)[0], left_out
+    return tests, _within(beside, known, most_s / 2.0)[0], left_out
 
 
 def _within(names: Sequence[str], known: Reached, most_s: float) -> tuple[list[str], int]:
@@ -280,6 +282,7 @@ def main() -> None:
         "--only", nargs="+", help="all of files whose names hold one of these words"
     )
     parser.add_argument("--again", action="store_true", help="try anew what was not noticed")
+    parser.add_argument("--seconds", type=float, default=BUDGET_S, help="of tests for a mutant")
     parser.add_argument("--tests", nargs="+", default=TESTS)
     parser.add_argument("--keep", type=Path, required=True, help="file of what was found")
     asked = parser.parse_args()
@@ -309,7 +312,7 @@ def main() -> None:
                 continue
             end = had.get(name, "")
             if not end or asked.again:
-                end, by = end_of(forks, mutant, text, new, known)
+                end, by = end_of(forks, mutant, text, new, known, asked.seconds)
                 record = {"name": name, "end": end, "by": by, "tree": digest}
                 record |= {"line": mutant.line, "s": round(time.monotonic() - start, 1)}
                 with keep.open("a") as file:
