@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from flightid.errors import DataError, OptionError, UnknownNameError
 from flightid.frozen import dataclass
 from flightid.identification.frequency_domain.options import Band, Bands
+from flightid.identification.frequency_domain.steady_coherence import steady_coherence
 from flightid.identification.shared_work import shared
 from flightid.responses import FrequencyResponse, PairResponse
 from flightid.responses.bands import coherent_band, nearest
@@ -19,6 +21,7 @@ COST_POINTS = 20.0
 """The cost is scaled as if 20 frequencies were fitted, whatever their number."""
 MINIMUM_POINTS = 3
 _EDGE = 1e-9
+_BY_EXCITATION = "instrument"
 COHERENT_ALONE = (
     'fit the coherent responses alone: responses = "coherent" in a study, '
     "model.with_responses(*flightid.coherent_pairs(response).names) in Python"
@@ -123,8 +126,9 @@ def select_points(
 
     def choose() -> list[tuple[NDArray[np.intp], NDArray[np.float64]]]:
         chosen = []
-        for name, pair in zip(names, pairs, strict=True):
+        for name, measured in zip(names, pairs, strict=True):
             band = bands.get(name) if isinstance(bands, Mapping) else bands
+            pair = _steady(measured) if data.estimator.startswith(_BY_EXCITATION) else measured
             places = _places(pair, name, band, n_omega, minimum_coherence)
             weight = COST_POINTS / len(places) * coherence_weight(pair.coherence[places])
             chosen.append((places, weight))
@@ -132,7 +136,7 @@ def select_points(
 
     # All that places and weights depend on.
     options = repr((bands, n_omega, minimum_coherence))
-    arrays = data.omega_rad_s, data.coherence, np.abs(data.response) > 0.0
+    arrays = data.omega_rad_s, data.coherence, data.random_error, np.abs(data.response) > 0.0
     chosen = shared(
         lambda: (names, data.inputs, data.outputs, options, *(each.tobytes() for each in arrays)),
         choose,
@@ -141,6 +145,11 @@ def select_points(
         SelectedResponse(name, pair, places, weight_gain * weight, weight_phase * weight)
         for name, pair, (places, weight) in zip(names, pairs, chosen, strict=True)
     ]
+
+
+def _steady(pair: PairResponse) -> PairResponse:
+    known = steady_coherence(pair.omega_rad_s, pair.coherence, pair.random_error)
+    return replace(pair, coherence=known)
 
 
 def _places(
