@@ -44,6 +44,8 @@ def swept(
     *,
     noise: float = 1.0,
     window_s: str | list[float] = "auto",
+    estimator: str = "auto",
+    n_omega: int = 30,
 ) -> fid.FrequencyResponse:
     """Response estimated from a sweep of forty seconds."""
     time_s = np.arange(2000) * SAMPLE_TIME_S
@@ -51,4 +53,6 @@ def swept(
     phase = BAND[0] * 40.0 / ratio * np.expm1(time_s / 40.0 * ratio)
     moment = 0.03 * np.sin(phase) * np.minimum(1.0, np.minimum(time_s, 40.0 - time_s) / 2.0)
     flown = _flown(model, moment, seed, noise)
-    return fid.estimate_response(flown, band_rad_s=BAND, n_omega=30, window_s=window_s)
+    return fid.estimate_response(
+        flown, band_rad_s=BAND, n_omega=n_omega, window_s=window_s, estimator=estimator
+    )

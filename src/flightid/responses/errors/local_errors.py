@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from flightid.frozen import dataclass
 from flightid.responses.errors.noise import NoiseSpectrum
+from flightid.responses.errors.noise_levels import LevelProducts, LevelVariances
 from flightid.responses.errors.random_error import JointErrors, Points, union
 from flightid.responses.windows.local_fit import LocalFit
 
@@ -38,13 +39,52 @@ class LocalErrors(JointErrors):
         self, wanted: Sequence[Points], gains: Sequence[NDArray[np.float64]]
     ) -> NDArray[np.float64]:
         """See `JointErrors`."""
+        return self.combined_by_level(wanted, gains, 0)[0]
+
+    def combined_by_level(
+        self, wanted: Sequence[Points], gains: Sequence[NDArray[np.float64]], count: int
+    ) -> tuple[NDArray[np.float64], list[LevelVariances]]:
+        """See `LevelledErrors`: each frequency has a level of its own, what its fit leaves."""
         overlap = self._overlaps(*union(wanted))
         total = np.zeros(2 * (len(gains[0]),))
+        told = []
         for place, (one, left) in enumerate(zip(wanted, gains, strict=True)):
             for other, right in zip(wanted[: place + 1], gains[: place + 1], strict=True):
-                block = left @ self._block(overlap, wanted, one, other) @ right.T
+                moved = self._block(overlap, wanted, one, other) @ right.T
+                block = left @ moved
                 total += block if one is other else block + block.T
-        return total
+                if one is other and count:
+                    each = (left[:count].T * moved[:, :count]).reshape(_parts(one))
+                    told.append(LevelVariances(each.sum(axis=(0, 1)), self._freedom(one)))
+        return total, told
+
+    def by_level(
+        self, wanted: Sequence[Points], gains: Sequence[NDArray[np.float64]]
+    ) -> list[LevelProducts | None]:
+        """See `LevelledErrors`: two points share the root of both levels, so each half of it."""
+        overlap = self._overlaps(*union(wanted))
+        found: list[LevelProducts | None] = []
+        for one, gain in zip(wanted, gains, strict=True):
+            block = self._block(overlap, wanted, one, one)
+            moved, n_f = block @ gain.T, len(one.frequencies)
+            level = np.arange(len(block)) % n_f
+            products = np.zeros((n_f, *moved.shape))
+            for each in range(n_f):
+                mine = np.flatnonzero(level == each)
+                products[each] = 0.5 * block[:, mine] @ gain[:, mine].T
+                products[each, mine] += 0.5 * moved[mine]
+            found.append(LevelProducts(products, self._freedom(one)))
+        return found
+
+    def _freedom(self, wanted: Points) -> NDArray[np.float64]:
+        """Degrees of freedom of each frequency's level, as if levels were independent.
+
+        Fits that share bins share what is left of them: a level counts by what it has alone.
+        """
+        fits = [self.fits[frequency] for frequency in wanted.frequencies]
+        shared = np.array([[_shared_bins(one, other) for other in fits] for one in fits])
+        alike = shared.sum(axis=1) / np.diag(shared)
+        return np.asarray(2.0 * np.array([fit.freedom for fit in fits]) / alike)
 
     def _overlaps(
         self, inputs: NDArray[np.intp], frequencies: NDArray[np.intp]
@@ -85,6 +125,16 @@ class LocalErrors(JointErrors):
             len(rows) * len(first), len(columns) * len(second)
         )
         return np.asarray(0.5 * np.block([[found.real, -found.imag], [found.imag, found.real]]))
+
+
+def _parts(points: Points) -> tuple[int, int, int, int]:
+    """Shape of errors by part (real, imaginary), input, frequency and row of a gain."""
+    return 2, len(points.inputs), len(points.frequencies), -1
+
+
+def _shared_bins(first: LocalFit, second: LocalFit) -> int:
+    pairs = zip(first.places, second.places, strict=True)
+    return sum(max(min(a.stop, b.stop) - max(a.start, b.start), 0) for a, b in pairs)
 
 
 def _overlap(first: LocalFit, second: LocalFit) -> NDArray[np.complex128]:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from flightid.errors import DataError
 from flightid.frozen import dataclass
 from flightid.responses.errors.functional import Functional, one_by_one
+from flightid.responses.errors.noise_levels import LevelProducts, LevelVariances
 from flightid.responses.errors.random_error import CovarianceSource, JointErrors, Points
 
 Complex = NDArray[np.complex128]
@@ -153,6 +154,11 @@ class NoiseModel:
         return (self.blocks[-1][1] - 1) * self.sample_time_s
 
     @property
+    def freedom(self) -> float:
+        """Degrees of freedom of the innovations: equations of an output less their numbers."""
+        return float(sum(map(len, self.regressors)) - len(self.coefficients))
+
+    @property
     def n_outputs(self) -> int:
         """Number of outputs."""
         return int(self.coefficients.shape[1])
@@ -246,10 +252,34 @@ class PrewhitenedErrors(JointErrors):
 
     def combined(self, wanted: Sequence[Points], gains: Sequence[Real]) -> Real:
         """See `JointErrors`."""
+        return self.combined_by_level(wanted, gains, 0)[0]
+
+    def combined_by_level(
+        self, wanted: Sequence[Points], gains: Sequence[Real], count: int
+    ) -> tuple[Real, list[LevelVariances]]:
+        """See `LevelledErrors`: the innovations are one level, doubt bounds a bias and is known."""
         pairs = list(zip(gains, self._roots(wanted), strict=True))
         total = np.sum([gain @ root for gain, (_, root) in pairs], axis=0)
-        beside = sum((gain * self._beside(at)) @ gain.T for gain, (at, _) in pairs)
-        return np.asarray(total @ total.T + beside)
+        beside = np.asarray(sum((gain * self._beside(at)) @ gain.T for gain, (at, _) in pairs))
+        own = total @ total.T
+        if not count:
+            return own + beside, []
+        each = np.stack([np.diag(part)[:count] for part in (own, beside)])
+        return own + beside, [LevelVariances(each, self._freedom)]
+
+    def by_level(
+        self, wanted: Sequence[Points], gains: Sequence[Real]
+    ) -> list[LevelProducts | None]:
+        """See `LevelledErrors`."""
+        found: list[LevelProducts | None] = []
+        for gain, (at, root) in zip(gains, self._roots(wanted), strict=True):
+            products = root @ (gain @ root).T, self._beside(at)[:, None] * gain.T
+            found.append(LevelProducts(np.stack(products), self._freedom))
+        return found
+
+    @property
+    def _freedom(self) -> Real:
+        return np.array([self.model.freedom, np.inf])
 
     def _roots(self, wanted: Sequence[Points]) -> list[tuple[Points, Real]]:
         return [(each, self._root(each)) for each in wanted]
