@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from flightid.frozen import dataclass
 from flightid.responses.bands import allowed_coherence
 from flightid.responses.errors.linear_estimate import LinearEstimate
-from flightid.responses.errors.noise import AVERAGED, NoiseSpectrum, mean_spectrum
+from flightid.responses.errors.noise import NoiseSpectrum, mean_spectrum
 from flightid.responses.errors.pilot import Pilot
 from flightid.responses.errors.pilot_search import BEYOND_BAND
 from flightid.responses.errors.random_error import Points, covariances
@@ -184,6 +184,9 @@ def _errors(
     totals = iter(covariances(linear.errors_with(noise), wanted))
     least = _least_variances(linear, noise, omega, spread)
     beyond = _extrapolated(linear, spread)
+    student = [
+        np.tile(_widened(noise, row, omega), 2 * groups.shape[1]) for row in range(len(pilots))
+    ]
     found = []
     for group in groups:
         columns = linear.places[1][group]
@@ -194,7 +197,7 @@ def _errors(
             moving = np.flatnonzero(np.any(own, axis=1))  # no response has transients
             slopes, covariance = own[moving], pilot.covariance[np.ix_(moving, moving)]
             known = _onto(left, spread) + slopes.T @ covariance @ slopes
-            known *= _widened(pilot)
+            known *= np.outer(student[row], student[row])
             if least is not None:
                 needed = np.tile(least[row, group].ravel(), 2)
                 longer = _longer(needed, np.diag(known))
@@ -253,12 +256,13 @@ def _longer(needed: Real, known: Real) -> Real:
     return np.asarray(np.sqrt(np.maximum(ratio, 1.0)))
 
 
-def _widened(pilot: Pilot) -> float:
-    """Student's distribution over the normal one at 95 %, squared: noise is known from few bins."""
-    n_bins = sum(map(len, pilot.spent))
-    groups = max(1, n_bins // AVERAGED)
-    freedom = (2.0 * n_bins - len(pilot.covariance)) / groups
-    return (half_width(LEVEL, max(freedom, 1.0)) / half_width(LEVEL)) ** 2
+def _widened(noise: NoiseSpectrum, output: int, omega: Real) -> Real:
+    """Student's distribution over the normal one at 95 %: noise is known from few bins."""
+    levels = noise.levels_of(output)
+    if levels is None:
+        return np.ones(len(omega))
+    freedom = np.maximum(np.interp(omega, levels.omega_rad_s, levels.freedom), 1.0)
+    return np.array([half_width(LEVEL, float(each)) for each in freedom]) / half_width(LEVEL)
 
 
 def _real(slopes: Complex) -> Real:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from flightid.errors import DataError
 from flightid.frozen import dataclass
 from flightid.responses.errors.noise_levels import NoiseLevels
+from flightid.responses.errors.rising_noise import octaves, sure_slope
 from flightid.responses.windows.local_fit import (
     ORDER,
     Bins,
@@ -290,17 +291,48 @@ def mean_spectrum(
     inside = longest[longest <= highest_rad_s]
     size = sum(int(np.count_nonzero(bins.omega <= highest_rad_s)) for bins in records)
     n_groups = max(1, size // AVERAGED)
-    found = []
-    for group in np.array_split(inside, min(n_groups, len(inside))):
-        low, high = group[0] * (1 - 1e-9), group[-1] * (1 + 1e-9)
-        parts = [(b.omega >= low) & (b.omega <= high) for b in records]
-        values = np.concatenate([b.values[:, p] for b, p in zip(records, parts, strict=True)], 1)
-        taken = np.concatenate(
-            [each[:, p[: each.shape[1]]] for each, p in zip(spent, parts, strict=True)], axis=1
-        )
-        left = np.sqrt(values.shape[1] - taken.sum(axis=1))
-        found.append((0.5 * (low + high), values.conj() @ values.T / np.outer(left, left)))
-    return _gather(found)
+
+    groups = np.array_split(inside, min(n_groups, len(inside)))
+    pooled = _means(records, spent, groups)
+    omega, values, taken = _of_group(records, spent, groups[0])
+    slopes = sure_slope(omega, np.abs(values) ** 2 / (1.0 - taken))
+    if np.all(slopes == 0.0):
+        return pooled
+    split = _means(records, spent, [*octaves(groups[0]), *groups[1:]])
+    both = pooled.on(np.union1d(pooled.omega_rad_s, split.omega_rad_s))
+    density = np.where((slopes < 0.0)[:, None], split.at(both.omega_rad_s), both.density)
+    pairs = zip(slopes, split.levels, pooled.levels, strict=True)
+    levels = tuple(low if slope < 0.0 else one for slope, low, one in pairs)
+    return NoiseSpectrum(both.omega_rad_s, density, both.coherency, levels)
+
+
+def _means(records: Sequence[Bins], spent: Sequence[Real], groups: Sequence[Real]) -> NoiseSpectrum:
+    """Mean spectra over groups of bins, each output's by what was not spent on it."""
+    centres = np.array([0.5 * (group[0] + group[-1]) for group in groups])
+    matrices, freedom = [], []
+    for group in groups:
+        _, values, taken = _of_group(records, spent, group)
+        left = values.shape[1] - taken.sum(axis=1)
+        root = np.sqrt(left)
+        matrices.append(values.conj() @ values.T / np.outer(root, root))
+        freedom.append(2.0 * left)
+    found = NoiseSpectrum.of_matrices(centres, np.array(matrices))
+    levels = tuple(NoiseLevels(centres, each) for each in np.array(freedom).T)
+    return NoiseSpectrum(centres, found.density, found.coherency, levels)
+
+
+def _of_group(
+    records: Sequence[Bins], spent: Sequence[Real], group: Real
+) -> tuple[Real, Complex, Real]:
+    """Bins of all records within a group's span, their values, and what of them was spent."""
+    low, high = group[0] * (1 - 1e-9), group[-1] * (1 + 1e-9)
+    parts = [(b.omega >= low) & (b.omega <= high) for b in records]
+    each = list(zip(records, spent, parts, strict=True))
+    return (
+        np.concatenate([b.omega[p] for b, _, p in each]),
+        np.concatenate([b.values[:, p] for b, _, p in each], axis=1),
+        np.concatenate([taken[:, p[: taken.shape[1]]] for _, taken, p in each], axis=1),
+    )
 
 
 def _gather(found: Sequence[tuple[float, Complex]]) -> NoiseSpectrum:
