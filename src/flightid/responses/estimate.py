@@ -28,6 +28,7 @@ from flightid.responses.estimators.windowed import (
 )
 from flightid.responses.excited_band import end_findings
 from flightid.responses.feedback import feedback_findings, feedback_of
+from flightid.responses.injected_span import injected_span
 from flightid.responses.options import ResponseOptions
 from flightid.responses.response import FrequencyResponse
 from flightid.responses.windows.defaults import DEFAULT_FREQUENCIES, DEFAULT_OVERLAP, shifts_of
@@ -220,7 +221,7 @@ def _with_inputs(
         test = FeedbackTest("unknown", "noise model")
     else:
         test = feedback_of(samples, float(response.omega_rad_s[-1]), records, loop)
-    known = replace(response, loop=test)
+    known = replace(response, loop=test, injected_rad_s=injected_span(records))
     return replace(
         known,
         findings=(*response.findings, *feedback_findings(test), *end_findings(known)),

@@ -51,6 +51,10 @@ class ExcitedResponse(Protocol):
         """By two inputs and frequency."""
 
     @property
+    def injected_rad_s(self) -> tuple[float, float] | None:
+        """Lowest and highest frequency of what was injected; None where nobody knows."""
+
+    @property
     def loop(self) -> FeedbackTest | None:
         """Whether one was closed."""
 
@@ -71,9 +75,10 @@ def excited_to(response: ExcitedResponse, input: str) -> float:
     Returns
     -------
     float
-        Above it ω·S(ω) of the input stays 20 dB below its most; infinite where no loop was closed,
-        or without spectra. A loop that nobody declared and no test could rule out counts as closed:
-        above the excitation it would be all that is seen.
+        Above it ω·S(ω) of the input, or of what was injected where records hold that, stays 20 dB
+        below its most; infinite where no loop was closed, or without spectra. A loop that nobody
+        declared and no test could rule out counts as closed: above the excitation it would be all
+        that is seen.
 
     Example
     -------
@@ -89,7 +94,19 @@ def excited_to(response: ExcitedResponse, input: str) -> float:
     # Outputs without noise feed none back inside the excited band; above it a loop is as strong.
     if loop.loop == "open" and loop.source != "no noise":
         return math.inf
-    return excited_span(response, input)[1]
+    return min(excited_span(response, input)[1], injected_to(response))
+
+
+def injected_to(response: ExcitedResponse) -> float:
+    """Highest frequency of what was injected, rad/s: a fit takes nothing above it.
+
+    Leakage that excitation and outputs share is as coherent there as a loop. Infinite where nobody
+    knows what was injected, or the loop was open.
+    """
+    loop, known = response.loop, response.injected_rad_s
+    if known is None or loop is None or (loop.loop == "open" and loop.source != "no noise"):
+        return math.inf
+    return known[1]
 
 
 def excited_span(response: ExcitedResponse, input: str) -> tuple[float, float]:

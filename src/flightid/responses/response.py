@@ -81,6 +81,8 @@ class FrequencyResponse(
         What the records know of their inputs between samples.
     digests : sequence of RecordDigest
         Of the records that it was estimated from.
+    injected_rad_s : (float, float), optional
+        Lowest and highest frequency of what was injected, where records hold that.
     linear : LinearEstimate, optional
         The estimate as weights on the measured outputs, from which a fit computes its bias; None
         after arithmetic, from a file, and where it was given.
@@ -116,6 +118,7 @@ class FrequencyResponse(
     loop: FeedbackTest | None = None
     input_shape: InputShape = field(default_factory=InputShape)
     digests: Sequence[RecordDigest] = ()
+    injected_rad_s: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         sizes = {"o": len(self.outputs), "i": len(self.inputs), "f": len(self.omega_rad_s)}

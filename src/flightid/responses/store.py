@@ -8,7 +8,7 @@ covariance is built and kept where it exists and is small enough; what a reader 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -70,6 +70,7 @@ def write_response(response: FrequencyResponse, path: str | Path) -> Path:
         "loop": None if response.loop is None else response.loop.to_dict(),
         "input_shape": response.input_shape.to_dict(),
         "digests": [each.to_dict() for each in response.digests],
+        "injected_rad_s": response.injected_rad_s,
         "findings": [finding.to_dict() for finding in response.findings],
         "history": [
             {"operation": s.operation, "options": dict(s.options), "version": s.version}
@@ -138,6 +139,10 @@ def read_response(path: str | Path) -> FrequencyResponse:
         ) from error
 
 
+def _span(told: Sequence[float] | None) -> tuple[float, float] | None:
+    return None if told is None else (float(told[0]), float(told[1]))
+
+
 def _response(
     values: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]
 ) -> FrequencyResponse:
@@ -156,6 +161,7 @@ def _response(
         loop=FeedbackTest(**about["loop"]) if about.get("loop") else None,
         input_shape=InputShape(**about.get("input_shape", {})),
         digests=tuple(map(RecordDigest.from_dict, about.get("digests", ()))),
+        injected_rad_s=_span(about.get("injected_rad_s")),
         history=tuple(
             Step(one["operation"], one["options"], one["version"]) for one in about["history"]
         ),

@@ -15,7 +15,8 @@ from flightid.identification.frequency_domain.options import Band, Bands
 from flightid.identification.frequency_domain.steady_coherence import steady_coherence
 from flightid.identification.shared_work import shared
 from flightid.responses import FrequencyResponse, PairResponse
-from flightid.responses.bands import coherent_band, nearest
+from flightid.responses.bands import coherent_band, nearest, usable_band
+from flightid.responses.excited_band import injected_to
 
 COST_POINTS = 20.0
 """The cost is scaled as if 20 frequencies were fitted, whatever their number."""
@@ -123,19 +124,20 @@ def select_points(
                 needed=", ".join(names),
             )
     pairs = [data.pair(*name.split("/", 1)) for name in names]
+    end = injected_to(data)
 
     def choose() -> list[tuple[NDArray[np.intp], NDArray[np.float64]]]:
         chosen = []
         for name, measured in zip(names, pairs, strict=True):
             band = bands.get(name) if isinstance(bands, Mapping) else bands
             pair = _steady(measured) if data.estimator.startswith(_BY_EXCITATION) else measured
-            places = _places(pair, name, band, n_omega, minimum_coherence)
+            places = _places(pair, name, band, n_omega, minimum_coherence, end)
             weight = COST_POINTS / len(places) * coherence_weight(pair.coherence[places])
             chosen.append((places, weight))
         return chosen
 
     # All that places and weights depend on.
-    options = repr((bands, n_omega, minimum_coherence))
+    options = repr((bands, n_omega, minimum_coherence, end))
     arrays = data.omega_rad_s, data.coherence, data.random_error, np.abs(data.response) > 0.0
     chosen = shared(
         lambda: (names, data.inputs, data.outputs, options, *(each.tobytes() for each in arrays)),
@@ -158,18 +160,22 @@ def _places(
     band: Band | None,
     n_omega: int,
     minimum_coherence: float | None,
+    end: float,
 ) -> NDArray[np.intp]:
     grid = pair.omega_rad_s
     if band is None:
+        # What was injected ends the band that nobody gave, however coherent a loop is beyond it.
+        known = grid[grid <= end * (1.0 + _EDGE)]
+        coherence = pair.coherence[: len(known)]
         least = 0.0 if minimum_coherence is None else minimum_coherence
-        found = pair.usable_band(least)
+        found = usable_band(known, coherence, least)
         if found is not None and np.sum((grid >= found[0]) & (grid <= found[1])) < MINIMUM_POINTS:
             # A band of two points between gaps: all coherent ones, as `coherent_pairs` counts them.
-            found = coherent_band(grid, pair.coherence, least)[0]
+            found = coherent_band(known, coherence, least)[0]
         if found is None:
             raise DataError(
                 f"response {name} has no band to fit",
-                found=f"coherence of at most {pair.coherence.max():.2f}",
+                found=f"coherence of at most {coherence.max(initial=0.0):.2f}",
                 needed=f"neighbouring frequencies with at least {minimum_coherence}",
                 action=f"give band_rad_s and a lower minimum_coherence, or {COHERENT_ALONE}",
             )
