@@ -94,6 +94,9 @@ def test_what_a_user_wrote_is_no_option() -> None:
     with click.Context(command, parent=click.Context(program)):
         said = as_typed("'gyro=rate' and 'time_unit' of the files: time_unit='ms', or join_on=…")
     assert said == "'gyro=rate' and 'time_unit' of the files: --time-unit ms, or --join-on"
+    with click.Context(command, parent=click.Context(program)):
+        both = as_typed("take span_s=[4.51, 9.99]")
+    assert both == "take --span 4.51 9.99", "a bracket cannot be typed"
     assert as_key("'gyro=rate', declare hold='zero'") == "'gyro=rate', declare hold = \"zero\""
 
 

@@ -113,8 +113,12 @@ def _with_hole() -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_gap_is_refused_by_default() -> None:
-    with pytest.raises(DataError, match=r"'y' has a gap: found 1 gaps .* longest 0\.52"):
+    with pytest.raises(DataError, match=r"'y' has a gap: found 1 gaps .* longest 0\.52") as caught:
         to_uniform({"y": _with_hole()}, sample_time_s=0.01)
+    # The piece that it names can be taken, ends and all.
+    assert "(5.48 s: span_s=[4.51, 9.99])" in str(caught.value)
+    taken = to_uniform({"y": _with_hole()}, sample_time_s=0.01, span_s=(4.51, 9.99))
+    assert taken.only.samples["y"].size == 549
 
 
 def test_gap_splits_on_one_grid() -> None:

@@ -43,7 +43,12 @@ def test_a_review_ends_with_what_it_tells_and_what_is_next(review: fid.FlightRev
     assert "Next: flightid inspect flight.bin (why" in swept.answer
     assert "then flightid plan flight.bin" in swept.answer
     shaken = replace(review, findings=(Finding("vibration", Light.AMBER, "shaken"),))
-    assert "Next: mend what is said of motors and vibration first; then" in shaken.answer
+    assert "Next: mend what is said of vibration first; then" in shaken.answer
+    turned = Finding("motors-unbalanced", Light.AMBER, "a yaw moment")
+    both = replace(review, findings=(*shaken.findings, turned))
+    assert "Next: mend what is said of motors and vibration first; then" in both.answer
+    alone = replace(review, findings=(turned,))
+    assert "Next: mend what is said of motors first; then" in alone.answer, "nothing shook"
     assert "plan" not in replace(review, vehicle="rover").answer
 
 

@@ -114,6 +114,11 @@ def test_a_quiet_flight_says_what_to_fly(tmp_path: Path) -> None:
     assert still is not None
     assert "the set-point hardly moved: the step ends at 0.11" in still.reason
     assert "raise" not in still.action
+    # "the step ends at -5.33 (-465.5 to 0.9112)" told a pilot nothing.
+    wild = Estimate("r", -5.33, "", ends=DrawnEnds(np.linspace(-465.5, 0.91, 801)))
+    lost = refused(yaw, (wild, *read[1:]), 0.01, "")
+    assert lost is not None
+    assert "hardly moved: where the step ends cannot be told" in lost.reason
     sure = tuple(Estimate("r", value, "s", 0.05 * value) for value, _, _ in ends)
     assert refused(yaw, sure, 0.01, "") is None
 

@@ -41,5 +41,5 @@ def command(
 
     named, *of_files = parted(options, _fields())
     records, inputs, outputs = channels_of(files, named, of_files)
-    found = advise(records, inputs=inputs, outputs=only(outputs))
+    found = advise(records, inputs=inputs, outputs=only(outputs, files))
     show(found, "What the records support", as_json=as_json, html=html)

@@ -57,7 +57,7 @@ def channels_of(
     if not inputs or not outputs:
         raise click.UsageError(
             f"name the channels with --inputs and --outputs; {files[0].name} holds "
-            f"{', '.join(records[0].channels)}"
+            f"{', '.join(records[0].channels)}{_of_a_rate(files)}"
         )
     return records, as_channels(records[0], inputs), as_channels(records[0], outputs)
 
@@ -102,7 +102,7 @@ def structure_of(
     records, inputs, outputs = channels_of(files, named, (of_tables, of_logs))
     if kind == SUBSPACE:
         return InnovationsModel.subspace(inputs, outputs, **given[-1]), records
-    output = only(outputs)
+    output = only(outputs, files)
     if kind == NARX:
         if method is not None:
             raise click.UsageError("--method is no option of kind narx")
@@ -134,8 +134,8 @@ def _by_excitation(kind: str, method: str | None) -> str:
     return own
 
 
-def only(outputs: Sequence[str]) -> str:
-    """The one output.
+def only(outputs: Sequence[str], files: Sequence[Path] = ()) -> str:
+    """The one output of the files.
 
     Raises
     ------
@@ -143,8 +143,22 @@ def only(outputs: Sequence[str]) -> str:
         There are several.
     """
     if len(outputs) != 1:
-        raise click.UsageError(f"name one output with --outputs; found {', '.join(outputs)}")
+        raise click.UsageError(
+            f"name one output with --outputs; found {', '.join(outputs)}{_of_a_rate(files)}"
+        )
     return outputs[0]
+
+
+def _of_a_rate(files: Sequence[Path]) -> str:
+    """How a rate of a flight and its command are named; empty of other records."""
+    from flightid.inspection.axes import axes_of
+    from flightid.logs import is_log, read_log
+
+    log = next((each for each in files if each.is_file() and is_log(each)), None)
+    if log is None:
+        return ""
+    roll = axes_of(read_log(log).vehicle)["roll"]
+    return f". The roll rate and its command: --inputs {roll.command} --outputs {roll.rate}"
 
 
 def one_each(kind: str, orders: dict[str, Any]) -> dict[str, Any]:

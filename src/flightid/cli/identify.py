@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -88,7 +89,15 @@ def command(
     from flightid.uncertainty.quantiles import showing
 
     if (model_name is None) == (kind is None):
-        raise click.UsageError("name a model with equations by --model, or a --kind without")
+        from flightid.logs import is_log
+
+        logs = [quote(str(each)) for each in files if each.is_file() and is_log(each)]
+        whole = (
+            f"; flightid run {logs[0]} chooses them and the data of a log itself" if logs else ""
+        )
+        raise click.UsageError(
+            f"name a model with equations by --model, or a --kind without{whole}"
+        )
     with progress(3, "Identifying") as advance:
         if kind is not None:
             loop = options.pop("loop", None)

@@ -19,6 +19,8 @@ KEYED = re.compile(
     r"(?:(?P<yes>true\b)|\"(?P<word>[^\"\s]+)\"|\{ (?P<key>[^\s=]+) = \"(?P<own>[^\"]*)\" \})"
 )
 """An option as the key of a study has it, which what a study found says."""
+ENDS = re.compile(r"[\[(](-?[\d.]+), (-?[\d.]+)[\])]")
+"""Two ends of a span or a band, which a command takes one after the other."""
 VERB = re.compile(r"\b(?:flightid|fid)\.([a-z_]+)\b(?:\([^)]*\))?")
 
 
@@ -71,6 +73,8 @@ def _given(found: re.Match[str], known: dict[str, list[str]], program: click.Com
         return (flags[0] if flags != told else f"{told[-1]} {NONE}") + of
     if pair := PAIR.fullmatch(value):
         return f"{told[-1]} {pair['key']}={pair['value']}{of}"
+    if ends := ENDS.fullmatch(value):
+        return f"{told[-1]} {ends[1]} {ends[2]}{of}"
     plain = NONE if value == "None" else value.strip("'\"")
     return f"{told[-1]} {plain if ' ' not in plain else repr(plain)}{of}"
 

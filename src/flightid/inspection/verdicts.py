@@ -251,7 +251,7 @@ def _band(log: Log, band: AxisBand, swept: bool) -> Finding:
         )
     if width >= BAND_GOOD.value:
         return Finding(f"band-{band.axis}", Light.GREEN, text)
-    narrow = f"{text}; less than a decade, which tells gain, lag and delay apart"
+    narrow = f"{text}; gain, lag and delay are told apart by a whole decade"
     return Finding(f"band-{band.axis}", Light.AMBER, narrow, advice.excitation(log))
 
 

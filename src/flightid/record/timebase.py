@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from enum import StrEnum
 from typing import TypeVar
 
@@ -238,15 +239,6 @@ def _pieces(
     ]
     if not holes:
         return [(start, stop)]
-    if policy is not GapPolicy.SPLIT:
-        first, last, channel = max(holes, key=lambda hole: hole[1] - hole[0])
-        limit = GAP_FACTOR * channel.median_spacing_s if max_gap_s is None else max_gap_s
-        raise DataError(
-            f"channel {channel.name!r} has a gap",
-            found=f"{len(holes)} gaps in all, the longest {last - first:.6g} s at {first:.6f} s",
-            needed=f"spacings of at most {limit:.6g} s",
-            action="choose the gap policy 'split', or 'interpolate' with a longer max_gap_s",
-        )
     pieces = []
     begin = start
     for first, last, _ in sorted(holes, key=lambda hole: (hole[0], hole[1])):
@@ -255,7 +247,29 @@ def _pieces(
         begin = max(begin, last)
     if begin < stop:
         pieces.append((begin, stop))
+    if policy is not GapPolicy.SPLIT:
+        first, last, channel = max(holes, key=lambda hole: hole[1] - hole[0])
+        limit = GAP_FACTOR * channel.median_spacing_s if max_gap_s is None else max_gap_s
+        raise DataError(
+            f"channel {channel.name!r} has a gap",
+            found=f"{len(holes)} gaps in all, the longest {last - first:.6g} s at {first:.6f} s",
+            needed=f"spacings of at most {limit:.6g} s",
+            action=_longest(pieces) + "choose the gap policy 'split', or 'interpolate' with a "
+            "longer max_gap_s",
+        )
     return pieces
+
+
+def _longest(pieces: Sequence[tuple[float, float]]) -> str:
+    """The longest piece between gaps, as the option that takes it alone; empty where none is."""
+    if not pieces:
+        return ""
+    low, high = max(pieces, key=lambda piece: piece[1] - piece[0])
+    # Inside by a hundredth of a second: a rounded end shall not reach into the gap.
+    low, high = math.ceil(100.0 * low) / 100.0, math.floor(100.0 * high) / 100.0
+    if high <= low:
+        return ""
+    return f"take the longest piece without one ({high - low:.3g} s: span_s=[{low}, {high}]), or "
 
 
 def _stretch(

@@ -338,13 +338,10 @@ class FrequencyResponse(
         """
         known = self.shown
         columns = (
-            Column("output"),
-            Column("input"),
-            Column("unit"),
+            *map(Column, ("output", "input", "unit")),
             Column("usable from", "rad/s"),
             Column("to", "rad/s"),
-            Column("in Hz"),
-            Column("mean coherence"),
+            *map(Column, ("in Hz", "mean coherence")),
             Column("median random error", "%"),
         )
         rows = []

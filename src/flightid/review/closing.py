@@ -12,6 +12,8 @@ from flightid.review.loop_response import LoopResponse
 from flightid.surface import spoken
 
 AMISS = (Light.AMBER, Light.RED)
+SHAKEN = ("vibration", "accelerometer-clips")
+"""Beginnings of codes that tell of vibration; the other causes are motors."""
 PLANNED = ("copter", "plane")
 """Vehicles of ArduPilot for which sweeps can be planned."""
 
@@ -133,8 +135,10 @@ def _next(review: ReviewedFlight) -> str:
         why = f"flightid inspect {review.name} (why its sweeps carry no model)"
         planned = f", then flightid plan {review.name} (amplitude, band and axis of better ones)"
         return why + (planned if _plannable(review) else "")
-    mended = any(f.light in AMISS and f.code.startswith(CAUSES) for f in review.findings)
-    way = "mend what is said of motors and vibration first" if mended else ""
+    amiss = [f.code for f in review.findings if f.light in AMISS and f.code.startswith(CAUSES)]
+    shaken = [code for code in amiss if code.startswith(SHAKEN)]
+    parts = ["motors"] * (len(amiss) > len(shaken)) + ["vibration"] * bool(shaken)
+    way = f"mend what is said of {' and '.join(parts)} first" if parts else ""
     if _plannable(review):
         planned = f"flightid plan {review.name} (sweeps to fly, for models and gains)"
         way = "; then ".join(filter(None, (way, planned)))

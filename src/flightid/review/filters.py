@@ -104,7 +104,7 @@ class FilterReview:
         why = (
             "Phase where the fastest rate loop lags by 90 deg."
             if self.measured
-            else f"The flight tells no crossover: phase at {USUAL_HZ:g} Hz, where multirotors of "
+            else f"This log tells no crossover: phase at {USUAL_HZ:g} Hz, where multirotors of "
             "middle size cross over."
         )
         return Table("Filters as flown", columns, tuple(rows), (why, *self.unknown))

@@ -64,6 +64,8 @@ HARDLY = 0.1
 TRACKING = "tracking error, rms"
 FINER = 4.0
 """Times the usual samples, of a log that has them, where a step rises within too few."""
+UNTOLD = 2.0
+"""Half of an interval of a level, of the step, from which on its numbers tell nothing."""
 TOO_SLOW = "too slowly for a step"
 EVEN = 0.7
 """Least share of rows that may be there, of those that the median interval promises."""
@@ -335,7 +337,7 @@ def refused(
         )
     if told:
         return None
-    why = "" if half is None else f": the step ends at {level.text}"
+    why = "" if half is None else f": {_level_words(level)}"
     if half is not None and _is_late_or_early(readings):
         why += f", half way there after {readings[1].text}"
     if (begun.moved or 0.0) > LIVELY[begun.loop].value:
@@ -344,6 +346,14 @@ def refused(
     is_still = begun.moved is not None and begun.moved < HARDLY * LIVELY[begun.loop].value
     reason = f"not enough motion{', the set-point hardly moved' if is_still else ''}{why}"
     return replace(begun, reason=reason, action=what_to_fly(begun))
+
+
+def _level_words(level: Reading) -> str:
+    """Where a step ends; an interval beyond all that loops do says nothing, and is no number."""
+    half = level.half_width95
+    if half is not None and half >= UNTOLD:
+        return "where the step ends cannot be told"
+    return f"the step ends at {level.text}"
 
 
 def _is_late_or_early(readings: tuple[Reading, ...]) -> bool:
