@@ -8,8 +8,9 @@ once, each file of tests runs in a fork with coverage, and each mutant meets, in
 (`mutant_forks.py`): every test that reaches its statement, those of its module and short ones first
 (so many seconds of them; where that is not all, its end says so), then the other tests of the
 nearest files, which may take what a fixture or a cache made of that line for another. A mutant of
-what runs on import meets the tests that reach most of its file, and the contracts that read the
-source. One that no test notices is printed: mend the test, or delete what nothing needs.
+what runs on import meets the contracts that read the source, the tests of files that import its
+module, and those that reach its file. One that no test notices is printed: mend the test, or delete
+what nothing needs.
 
 What tests reach is kept beside the file by the text of the test file; of a source that changed
 since, lines that stand elsewhere take their tests with them. Ends are kept for a tree that is the
@@ -24,6 +25,7 @@ import hashlib
 import json
 import os
 import random
+import re
 import shutil
 import subprocess
 import tempfile
@@ -176,11 +178,14 @@ def chosen(
     """Tests that reach it, the others of the nearest files, and how many there was no time for."""
     at = known.of(mutant.path, statement(text, mutant.line))
     here = known.lines.get(mutant.path, {})
-    readers = []
+    readers: list[str] = []
     if not at:
-        # What runs on import belongs to no test: those of the whole file stand for it, and where
-        # all of the file runs so, those of the files that take from it.
+        # What runs on import belongs to no test: those of files that import the module, and those
+        # of its whole file, stand for it; where all of the file runs so, those of its takers.
         readers = [each for each in forks.tests if each.partition("::")[0] in READERS]
+        readers = [
+            each for each in (*readers, *_importers(forks, mutant.path)) if each in known.seconds
+        ]
         if not any(here.values()):
             module = ".".join(Path(mutant.path).with_suffix("").parts[1:])
             takers = [
@@ -189,16 +194,16 @@ def chosen(
                 if module in (forks.tree / file).read_text("utf-8")
             ]
             here = {k: names for k, of in enumerate(takers) for names in of.values()}
-        at = set().union(*here.values())
+        at = set().union(*here.values()) - set(readers)
     breadth = Counter(each for names in here.values() for each in names)
-    stem = Path(mutant.path).stem.rstrip("s")
+    most, stem = max(breadth.values(), default=0), Path(mutant.path).stem.rstrip("s")
 
     def rank(test: str) -> tuple[bool, bool, float, str]:
         near = stem in test.partition("::")[0]
         seconds = known.seconds.get(test, 0.0)
-        return not near, bool(readers) and breadth[test] < max(breadth.values()) / 2, seconds, test
+        return not near, bool(readers) and breadth[test] < most / 2, seconds, test
 
-    ranked = [*sorted(at, key=rank), *readers]
+    ranked = [*sorted(dict.fromkeys(readers), key=rank), *sorted(at, key=rank)]
     taken, left_out = _within(ranked, known, most_s)
     files = list(dict.fromkeys(each.partition("::")[0] for each in taken))
     place = {each: k for k, each in enumerate(forks.tests)}
@@ -210,6 +215,22 @@ def chosen(
         if each.partition("::")[0] == file and each not in taken and each in known.seconds
     ]
     return tests, _within(beside, known, most_s / 2.0)[0], left_out
+
+
+def _importers(forks: Any, path: str) -> list[str]:
+    """Tests of the files that import a module by its name."""
+    package, _, stem = ".".join(Path(path).with_suffix("").parts[1:]).rpartition(".")
+    asked = re.compile(
+        rf"\b{re.escape(package)}\.{stem}\b"
+        rf"|from {re.escape(package)} import (?:\([^)]*|[^(\n]*)\b{stem}\b"
+    )
+    files = dict.fromkeys(each.partition("::")[0] for each in forks.tests)
+    known = {
+        file
+        for file in files
+        if file.startswith("tests/") and asked.search((forks.tree / file).read_text("utf-8"))
+    }
+    return [each for each in forks.tests if each.partition("::")[0] in known]
 
 
 def _within(names: Sequence[str], known: Reached, most_s: float) -> tuple[list[str], int]:

@@ -13,9 +13,10 @@ from flightid.control.tuning.controller_options import ControllerOptions
 from flightid.control.tuning.filter_choice import AxisFilters, FilterChoice, _cutoffs
 from flightid.control.tuning.gain_search import CHUNK, _chunks, _Space, _starts
 from flightid.control.tuning.gain_steps import TunedGain, reached
+from flightid.control.tuning.requirements import TuningRequirements
 from flightid.control.tuning.sampled_plants import SampledPlants, loop_grid
 from flightid.control.tuning.standing_error import judge_standing, slow_gain, standing_errors
-from flightid.control.tuning.tune_controller import _gains_given, _loop, _scaled
+from flightid.control.tuning.tune_controller import _gains_given, _loop, _scaled, _turn
 from flightid.control.tuning.tune_pid import _require_right_way, noise_density
 from flightid.control.tuning.tuned_filters import TunedFilters
 from flightid.errors import ModelError, OptionError
@@ -287,3 +288,25 @@ def test_white_noise_of_a_gyro_is_a_density_up_to_half_the_rate() -> None:
     variance = np.trapezoid(density, frequency) / (2.0 * math.pi)
     assert_close(variance, 0.02**2, rtol=1e-9, why="per hertz")
     assert_close(frequency[[0, -1]], [0.0, math.pi / 0.0025], rtol=1e-12, why="half the rate")
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_crossover_is_looked_for_where_the_phase_leaves_45_deg(sign: float) -> None:
+    """Of k exp(-L s)/s at pi/4/L, whichever way it answers."""
+    plant = LinearSystem(
+        np.zeros((1, 1)), np.full((1, 1), 3.0 * sign), np.eye(1), np.zeros((1, 1)), ("u",), ("y",),
+        delays_s=[0.05],
+    )  # fmt: skip
+    need = TuningRequirements(band_factor=3.0)
+    for band, rate, wanted in (
+        (None, 100.0, math.pi / 4.0 / 0.05), ((0.1, 60.0), None, math.pi / 4.0 / 0.05),
+        ((0.1, 30.0), 100.0, 10.0), ((0.1, 300.0), 9.0, 3.0 * math.pi),
+    ):  # fmt: skip
+        evidence: Any = SimpleNamespace(estimate=plant, band_rad_s=band)
+        assert_close(_turn(evidence, "y", "u", rate, need), wanted, rtol=5e-3, why="4,000 points")
+    lag = _system([[-2.0]], [3.0 * sign], [1.0])
+    evidence = SimpleNamespace(estimate=lag, band_rad_s=None)
+    with pytest.raises(ModelError, match="no lag that would bound its gains"):
+        _turn(evidence, "y", "u", None, need)
+    evidence = SimpleNamespace(estimate=lag, band_rad_s=(0.1, 60.0))
+    assert _turn(evidence, "y", "u", None, need) == 20.0
