@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from flightid.inspection import divergence, excitation_found, saturation, stamps
 from flightid.inspection import flight_phases as phases
-from flightid.inspection import saturation, stamps
 from flightid.inspection.actuators import Actuators, _ardupilot
+from flightid.inspection.excitation_found import FoundExcitation
 from flightid.inspection.saturation import LimitContact, _command_limit, _motors, saturations
 from flightid.inspection.signals import Signal
 from tests.closeness import assert_close
@@ -300,3 +301,37 @@ def test_the_span_of_a_log_is_of_its_longest_believable_message() -> None:
     assert stamps.log_span(log) == (1.0, 9.0)
     log.messages = {"A": told[0]}
     assert stamps.log_span(log) == (0.0, 0.0)
+
+
+def test_spans_of_injected_runs_are_asked_for_nothing_else(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[tuple[str, tuple[float, float]]] = []
+    for name, found in (
+        ("_chirped", [FoundExcitation("chirp", "roll", 1.0, 9.0, "")]),
+        ("_autotune", [FoundExcitation("autotune", "yaw", 40.0, 45.0, "")]),
+    ):
+        monkeypatch.setattr(excitation_found, name, lambda _, f=found: f)
+    monkeypatch.setattr(excitation_found, "find", lambda *_: None)
+
+    def moved(_: Any, axis: str, span: tuple[float, float], *__: str) -> FoundExcitation | None:
+        asked.append((axis, span))
+        return FoundExcitation("pilot", axis, *span, "") if axis == "yaw" else None
+
+    monkeypatch.setattr(excitation_found, "_motion", moved)
+    log: Any = SimpleNamespace(sid_runs=(), vehicle="copter", events=())
+    spans = ((0.0, 1.0), (0.5, 1.1), (8.9, 20.0), (9.0, 40.0), (20.0, 30.0), (44.0, 60.0))
+    made = excitation_found.excitations(log, spans)
+    kept = (spans[0], spans[3], spans[4])
+    assert asked == [(axis, span) for axis in ("roll", "pitch", "yaw") for span in kept]
+    assert [each.kind for each in made] == ["chirp", "autotune", "pilot", "pilot", "pilot"]
+
+
+def test_a_signal_diverges_from_its_set_point_or_its_middle(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    seen: list[np.ndarray] = []
+    monkeypatch.setattr(divergence, "_grown", lambda _t, error, _w: seen.append(error))
+    values = 5.0 + np.sin(TENTHS)
+    assert divergence.divergence(TENTHS, values) is None
+    assert_close(seen[0], values - np.median(values), rtol=1e-12, why="its middle")
+    assert divergence.divergence(TENTHS, values, 0.5 * TENTHS) is None
+    assert_close(seen[-1], values - 0.5 * TENTHS, rtol=1e-12, why="its set-point")

@@ -49,37 +49,25 @@ def test_a_span_that_channels_miss_by_more_than_three_steps_is_left_as_it_is() -
         assert_close(to_record._snapped(found, "tau", asked) or (), kept, rtol=1e-9, why="stamps")
 
 
-@pytest.mark.parametrize(
-    ("step_s", "interval_s", "loop_s", "hold"),
-    [
-        (0.01, 0.01, None, "zero"),
-        (0.01, 0.01, 0.01, "zero"),
-        (0.01, 0.01, 0.0092, "zero"),
-        (0.01, 0.01, 0.0090, None),
-        (0.01, 0.01, 0.0112, None),
-        (0.01, 0.010009, None, "zero"),
-        (0.01, 0.01002, None, None),
-        (0.01, 0.00998, None, None),
-    ],
-)
 def test_inputs_hold_what_the_map_knows_where_all_loops_were_logged(
     monkeypatch: pytest.MonkeyPatch,
-    step_s: float,
-    interval_s: float,
-    loop_s: float | None,
-    hold: str | None,
 ) -> None:
-    monkeypatch.setattr(to_record, "loop_step_s", lambda _: loop_s)
     log, chosen = SimpleNamespace(parameters={}), SimpleNamespace(hold="zero")
-    inputs = [_item("a", 0.0, 1.0, 0.01), _item("b", 0.0, 1.0, interval_s)]
     other = _item("y", 0.0, 1.0, 0.5)
     other.channel.role = Role.OUTPUT
-    told: Any = (log, InputShape(), chosen, [*inputs, other], step_s)
-    assert to_record._input_shape(*told).hold == hold
-    declared: Any = (log, InputShape(hold="first"), chosen, inputs, step_s)
-    assert to_record._input_shape(*declared).hold == "first"
-    unknown: Any = (log, InputShape(), SimpleNamespace(hold=None), inputs, step_s)
-    assert to_record._input_shape(*unknown).hold is None
+    for interval_s, loop_s, hold in (
+        (0.01, None, "zero"), (0.01, 0.01, "zero"), (0.01, 0.0092, "zero"), (0.01, 0.0090, None),
+        (0.01, 0.0112, None), (0.010009, None, "zero"), (0.01002, None, None),
+        (0.00998, None, None),
+    ):  # fmt: skip
+        monkeypatch.setattr(to_record, "loop_step_s", lambda _, told=loop_s: told)
+        inputs = [_item("a", 0.0, 1.0, 0.01), _item("b", 0.0, 1.0, interval_s)]
+        told: Any = (log, InputShape(), chosen, [*inputs, other], 0.01)
+        assert to_record._input_shape(*told).hold == hold, (interval_s, loop_s)
+        declared: Any = (log, InputShape(hold="first"), chosen, inputs, 0.01)
+        assert to_record._input_shape(*declared).hold == "first"
+        unknown: Any = (log, InputShape(), SimpleNamespace(hold=None), inputs, 0.01)
+        assert to_record._input_shape(*unknown).hold is None
 
 
 def test_a_record_has_the_rate_that_is_asked(tmp_path: Path) -> None:
