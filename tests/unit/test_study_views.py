@@ -138,6 +138,8 @@ def test_the_page_says_what_a_comparison_left_to_fly_as_the_command_does(
     """Twenty numbers as promised, one loop not judged: nothing "of it could be judged", it said."""
     log: Any = SimpleNamespace(sid_runs=[1])
     monkeypatch.setattr(compare_work, "kept_log", lambda _: log)
+    monkeypatch.setattr(compare_work, "inspect_log", lambda _: "inspected")
+    monkeypatch.setattr(compare_work, "carried_axes", {"inspected": ("roll",)}.__getitem__)
     action = "fly a minute of quick moves of the roll stick by 13 deg at once"
     beyond = Finding("beyond", Light.UNKNOWN, "roll attitude: not compared", f"{action}, and …")
     loop = SimpleNamespace(name="roll attitude", action=action)
