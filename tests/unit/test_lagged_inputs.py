@@ -8,7 +8,7 @@ import pytest
 from flightid.uncertainty import triangle
 from flightid.uncertainty.lagged_inputs import LaggedInputs
 from flightid.uncertainty.lagged_products import explained
-from flightid.uncertainty.triangle import ROWS, triangle_of_parts, triangle_of_rows
+from flightid.uncertainty.triangle import ROWS, orthonormal, triangle_of_parts, triangle_of_rows
 from tests.closeness import assert_close
 
 
@@ -89,3 +89,14 @@ def test_columns_that_repeat_another_leave_the_triangle_of_the_others(
         assert np.allclose(found.T @ found, columns.T @ columns, rtol=0.0, atol=1e-10)
         assert np.array_equal(found, np.triu(found))
         assert np.array_equal(np.diag(found) == 0.0, [False] * 4 + [True] * 2)
+
+
+@pytest.mark.parametrize("apart", [1.0, 1e-4, 1e-9])
+def test_orthonormal_columns_are_so_however_alike_the_columns_are(apart: float) -> None:
+    columns = np.random.default_rng(4).standard_normal((3 * ROWS, 4)) * [1.0, 1e5, 1e-5, 1.0]
+    columns[:, 3] = columns[:, 0] + apart * columns[:, 3]
+    basis, found = orthonormal(columns)
+    assert_close(basis.T @ basis, np.eye(4), atol=1e-14, why="rounding")
+    assert np.array_equal(found, np.triu(found))
+    left = (basis @ found - columns) / np.linalg.norm(columns, axis=0)
+    assert_close(left, np.zeros_like(left), atol=1e-14, why="rounding")

@@ -14,6 +14,7 @@ from flightid.uncertainty.estimated_levels import EstimatedLevels
 from flightid.uncertainty.fitted_directions import FittedDirections
 from flightid.uncertainty.parts import LEAST_INFORMATION, RecordParts
 from flightid.uncertainty.residual_noise import Autoregression
+from flightid.uncertainty.triangle import orthonormal
 
 Array = NDArray[np.float64]
 AT_ONCE = 4096
@@ -67,7 +68,7 @@ class RecordBlock:
         """From sensitivities by shared parameters and by own numbers, (n_outputs, n_samples, k)."""
         rows = residual.size
         shared, own = shared.reshape(rows, -1), own.reshape(rows, -1)
-        basis, triangle = np.linalg.qr(own)
+        basis, triangle = orthonormal(own)
         on_own = basis.T @ shared
         projected = shared - basis @ on_own if own.size else shared
         return cls(projected, on_own, basis, triangle, residual)

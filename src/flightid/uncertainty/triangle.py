@@ -18,6 +18,8 @@ LEAST_DIAGONAL = 1e-3
 products of columns leaves ten good digits."""
 LEAST_REFINED = 1e-5
 """The same where a second triangle, of what the first leaves of columns, brings the digits back."""
+NEAR_UNIT = 0.1
+"""Largest entry by which products of all but orthonormal columns differ from the unit matrix."""
 ALIKE = 1e-12
 """Cosine below one at which two columns may be the same."""
 SIZES = 1e-100, 1e100
@@ -125,7 +127,7 @@ def _refined(first: Array, parts: Callable[[], Iterable[Array]]) -> Array | None
     inverse = np.triu(np.linalg.inv(first))
     turned = (part @ inverse for part in parts())
     products = np.sum([part.T @ part for part in turned], axis=0)
-    if not np.max(np.abs(products - np.eye(len(products)))) < 0.1:
+    if not np.max(np.abs(products - np.eye(len(products)))) < NEAR_UNIT:
         return None
     return np.asarray(np.linalg.cholesky(products).T @ first)
 
@@ -167,3 +169,42 @@ def triangle_of_parts(parts: Callable[[], Iterable[Array]], products: Array | No
     if found is None:
         found = _row_by_row(parts())
     return found
+
+
+def orthonormal(columns: Array) -> tuple[Array, Array]:
+    """Q and R of columns = QR; the signs of R's rows are as they come.
+
+    By products of columns, once more of what the first round leaves, where these keep enough
+    digits; else by reflections, which cost four times as much.
+
+    Parameters
+    ----------
+    columns : ndarray, shape (n, k)
+
+    Returns
+    -------
+    tuple of ndarray, shapes (n, k) and (k, k)
+
+    Reference
+    ---------
+    Yamamoto, Nakatsukasa, Yanagisawa & Fukaya (2015), Roundoff error analysis of the CholeskyQR2
+    algorithm, *ETNA* 44.
+
+    Example
+    -------
+    >>> basis, triangle = orthonormal(np.array([[3.0], [4.0]]))
+    >>> np.abs(basis).ravel(), np.abs(triangle).ravel()
+    (array([0.6, 0.8]), array([5.]))
+    """
+    first = _of_products(lambda: [columns]) if len(columns) >= ROWS else None
+    if first is None or np.any(np.diag(first) == 0.0):
+        return np.linalg.qr(columns)
+    basis = columns @ np.triu(np.linalg.inv(first))
+    products = basis.T @ basis
+    if not np.max(np.abs(products - np.eye(len(products))), initial=0.0) < NEAR_UNIT:
+        return np.linalg.qr(columns)
+    second = np.linalg.cholesky(products).T
+    inverse = np.triu(np.linalg.inv(second))
+    for begin in range(0, len(basis), CACHED):
+        basis[begin : begin + CACHED] = basis[begin : begin + CACHED] @ inverse
+    return basis, np.asarray(second @ first)
