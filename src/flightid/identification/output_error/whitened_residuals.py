@@ -61,7 +61,10 @@ def unforetold(rows: Sequence[Array], inputs: Sequence[Array]) -> list[Array]:
         crossed = products_with_past(rows, padded, reach + 1)[::-1].reshape(count, -1)
         own = np.sum([each @ each.T for each in rows], axis=0)
         products = np.block([[products, crossed], [crossed.T, own]])
-    weights, _ = _regressed(beside, products, count, ROUNDING)
+    if products is None:
+        weights, _ = _regressed(beside, None, count, ROUNDING)
+    else:
+        weights = _of_directions(products, count)
     left = [each.copy() for each in rows]
     for k, part, lags in pieces():
         left[k][:, part] -= weights @ lags
@@ -127,6 +130,18 @@ def _regressed(
     root = triangle_of_parts(lambda: (piece.T for piece in pieces()), products)
     weights = np.linalg.lstsq(root[:count, :count], root[:count, count:], rcond=rounding)[0]
     return np.asarray(weights.T), np.asarray(np.sum(root[count:, count:] ** 2, axis=0))
+
+
+def _of_directions(products: Array, count: int) -> Array:
+    """The same weights from products alone, along directions of inputs above `ROUNDING`.
+
+    Squares of these keep three digits, and what a direction so small answers for is smaller still.
+    Smooth inputs have others below it, which a triangle of all samples would be built for.
+    """
+    sizes, axes = np.linalg.eigh(products[:count, :count])
+    told = sizes > ROUNDING**2 * sizes[-1]
+    along = axes[:, told]
+    return np.asarray((along @ ((along.T @ products[:count, count:]) / sizes[told, None])).T)
 
 
 def _even_products(records: Sequence[Array], longest: int) -> Array | None:
