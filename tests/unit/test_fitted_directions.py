@@ -9,23 +9,25 @@ import numpy as np
 import pytest
 from benchmarks.output_error import N, two_rates, two_rates_record
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 import flightid as fid
 from flightid.identification.output_error import distinct
 from flightid.identification.output_error.distinct import run_with_slopes
 from flightid.identification.records.options import RecordOptions
 from flightid.identification.records.setup import prepare_records
-from flightid.uncertainty import residual_noise
+from flightid.uncertainty import residual_noise, taken_noise
 from flightid.uncertainty.fitted_directions import (
     FittedDirections,
-    WhiteNoiseLoss,
     slow_transforms,
 )
-from flightid.uncertainty.residual_noise import noise_models
+from flightid.uncertainty.residual_noise import Autoregression, noise_models
+from flightid.uncertainty.taken_noise import TakenNoise
+from flightid.uncertainty.transformed_columns import transforms
 from tests.closeness import assert_close
 
 Array = NDArray[np.float64]
-SEED = 3
+SEED = 8
 """Of noise without slow power, by chance."""
 
 
@@ -69,9 +71,15 @@ def test_lags_and_power_are_those_of_the_covariance_that_is_left() -> None:
             lags[o] += [np.trace(block, offset=lag) for lag in range(n_lags)]
             waves = np.exp(-2j * np.pi * np.outer(np.arange(9), np.arange(n)) / length)
             power[o] += np.einsum("bt,ts,bs->b", waves, block, waves.conj()).real
-    found = WhiteNoiseLoss.of(taken, length, n_lags, 9).of_levels(levels)
-    assert_close(found[0], lags, atol=1e-12, why="rounding")
-    assert_close(found[1], power, atol=1e-11, why="rounding of sums of 40 samples")
+    noise = TakenNoise(taken, length, n_lags, 9)
+    models = [Autoregression(np.array([level]), np.empty(0), 63, length) for level in levels]
+    forms = noise.forms(models)
+    for o, (level, model) in enumerate(zip(levels, models, strict=True)):
+        found = noise.of_white(o, level, forms)
+        assert_close(found[0], lags[o], atol=1e-12, why="rounding")
+        assert_close(found[1], power[o], atol=1e-11, why="rounding of sums of 40 samples")
+        whole = noise.at_all_bins(o, model, forms)
+        assert_close(whole[:9], power[o], atol=1e-11, why="rounding of sums of 40 samples")
 
 
 @pytest.mark.parametrize("n", [1, 700, 120_001])
@@ -83,21 +91,32 @@ def test_slow_bins_are_those_of_the_whole_transform(n: int) -> None:
     assert_close(found, whole, atol=1e-11 * np.sqrt(n), why="terms of the series that are left out")
 
 
+@pytest.mark.parametrize("coloured", [False, True])
 def test_white_noise_has_the_models_that_all_transforms_give(
-    monkeypatch: pytest.MonkeyPatch,
+    monkeypatch: pytest.MonkeyPatch, coloured: bool
 ) -> None:
-    taken, random = _directions((900, 2500), 2, 2, 4), np.random.default_rng(SEED)
-    residuals = [random.standard_normal((2, n)) for n in (900, 2500)]
+    """Also beside an output with colour: of white ones no transform is asked for."""
+    taken, random = _directions((900, 2500), 3, 2, 4), np.random.default_rng(SEED)
+    residuals = [random.standard_normal((3, n)) for n in (900, 2500)]
+    if coloured:
+        for each in residuals:
+            each[1] = lfilter([1.0], [1.0, -0.8], each[1])
+    asked: list[int] = []
+
+    def counted(columns: Array, length: int) -> Array:
+        asked.append(len(columns))
+        return transforms(columns, length)
+
     with monkeypatch.context() as patch:
-        patch.delattr(residual_noise, "_lost")  # transforms of all directions are not asked for
+        patch.setattr(taken_noise, "transforms", counted)
         found = noise_models(residuals, taken)
+    assert sorted(asked) == ([900, 2500] if coloured else [])
     with monkeypatch.context() as patch:
-        patch.setattr(residual_noise, "_white_models", lambda *_: None)
+        patch.setattr(residual_noise, "_white", lambda *_: None)
         expected = noise_models(residuals, taken)
-    for one, other in zip(found, expected, strict=True):
-        assert one.is_white
-        assert other.is_white
-        assert_close(one.lags, other.lags, atol=1e-13, why="rounding of two ways")
+    for o, (one, other) in enumerate(zip(found, expected, strict=True)):
+        assert one.is_white == other.is_white == (not coloured or o != 1)
+        assert_close(one.lags, other.lags, rtol=1e-12, atol=1e-13, why="rounding of two ways")
 
 
 def test_a_record_is_fitted_in_less_than_five_times_its_sensitivities() -> None:

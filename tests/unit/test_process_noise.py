@@ -286,7 +286,7 @@ def test_a_gust_below_the_noise_of_every_sensor_is_named() -> None:
 
 
 def test_what_inputs_foretell_is_least_squares_on_their_neighbours() -> None:
-    """Of white inputs and of smooth ones, whose products keep three digits of what is kept least."""
+    """Of white inputs, and of smooth ones: products keep three digits of what is kept least."""
     random = np.random.default_rng(4)
     noise = random.standard_normal((2, 900))
     rows = [noise[:, :500], noise[:, 500:]]

@@ -1,13 +1,6 @@
-"""Directions along which a fit takes noise out of residuals, and what of white noise they hold.
-
-A white noise model of an output is judged by the first lags of its periodogram and by the power of
-its slowest bins. Both follow from sums over the columns themselves, span by span: of long records
-the transforms of all sensitivities would be most of the time and of the memory.
-"""
+"""Directions along which a fit takes noise out of residuals, and sums over these span by span."""
 
 from __future__ import annotations
-
-from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,77 +27,6 @@ class FittedDirections:
 
     own: Array
     shared: Array
-
-    @property
-    def together(self) -> list[Array]:
-        """Own and shared directions side by side, by output: each (n, n_own + n_shared)."""
-        if not self.own.shape[2]:
-            return list(self.shared)
-        pairs = zip(self.own, self.shared, strict=True)
-        return [np.concatenate(pair, axis=1) for pair in pairs]
-
-
-@dataclass(frozen=True, eq=False)
-class WhiteNoiseLoss:
-    """What fits take of white noise of each output, at the first lags and the slowest bins.
-
-    Attributes
-    ----------
-    parts : list of list of ndarray, shape (n, k)
-        Directions by record and output.
-    n_own : list of int
-        How many of them belong to each record alone.
-    squares : list of ndarray, shape (n_outputs, k, k)
-        Their products.
-    slow : list of list of ndarray, shape (n_bins, k)
-        Their transforms at the slowest bins.
-    n_lags : int
-    """
-
-    parts: list[list[Array]]
-    n_own: list[int]
-    squares: list[Array]
-    slow: list[list[NDArray[np.complex128]]]
-    n_lags: int
-
-    @classmethod
-    def of(
-        cls, taken: Sequence[FittedDirections], length: int, n_lags: int, n_bins: int
-    ) -> WhiteNoiseLoss:
-        """Of directions by record, for periodograms of transforms of one length."""
-        parts = [each.together for each in taken]
-        return cls(
-            parts,
-            [each.own.shape[2] for each in taken],
-            [np.array([part.T @ part for part in each]) for each in parts],
-            [[slow_transforms(part, length, n_bins) for part in each] for each in parts],
-            n_lags,
-        )
-
-    def of_levels(self, levels: Array) -> tuple[Array, Array]:
-        """Autocovariance and power that are lost, summed over all samples.
-
-        Parameters
-        ----------
-        levels : ndarray, shape (n_outputs,)
-            Variances of the noise.
-
-        Returns
-        -------
-        tuple of ndarray, shapes (n_outputs, n_lags) and (n_outputs, n_bins)
-            Of 2 Re F(Ω q) F(q)* - F(q) Qᵀ Ω Q F(q)*, see `residual_noise`.
-        """
-        inner = [np.tensordot(levels, square, axes=1) for square in self.squares]
-        shared = sum(each[m:, m:] for each, m in zip(inner, self.n_own, strict=True))
-        lags = np.zeros((len(levels), self.n_lags))
-        power = np.zeros((len(levels), len(self.slow[0][0])))
-        for parts, slow, each, m in zip(self.parts, self.slow, inner, self.n_own, strict=True):
-            each[m:, m:] = shared
-            for o, (part, turned, level) in enumerate(zip(parts, slow, levels, strict=True)):
-                form = 2.0 * level * np.eye(len(each)) - each
-                lags[o] += lags_of_form(part, form, self.n_lags)
-                power[o] += np.einsum("bk,kl,bl->b", turned, form, turned.conj()).real
-        return lags, power
 
 
 def lags_of_form(columns: Array, form: Array, n_lags: int) -> Array:

@@ -21,7 +21,7 @@ from flightid._native import autoregression_weights, drift_beside
 from flightid.frozen import dataclass
 from flightid.recursive_filter import filtered_from, state_after
 from flightid.uncertainty.driven_noise import driven_products
-from flightid.uncertainty.fitted_directions import FittedDirections, WhiteNoiseLoss
+from flightid.uncertainty.fitted_directions import FittedDirections
 from flightid.uncertainty.periodograms import (
     LONGEST_TABLE,
     cosines,
@@ -29,7 +29,6 @@ from flightid.uncertainty.periodograms import (
     leaking,
     pooled,
     transform_length,
-    twice,
 )
 from flightid.uncertainty.slow_drift import (
     SETTLED,
@@ -40,7 +39,7 @@ from flightid.uncertainty.slow_drift import (
     parted,
     turns,
 )
-from flightid.uncertainty.transformed_columns import of_both, powers_of, squares_of, transforms
+from flightid.uncertainty.taken_noise import TakenNoise
 
 Array = NDArray[np.float64]
 LARGEST_ORDER = 20
@@ -296,89 +295,40 @@ def noise_models(
     total, length, n_outputs = sum(lengths), transform_length(max(lengths)), residuals[0].shape[0]
     outputs = range(n_outputs)
     seen = np.array([pooled([each[o][:, None] for each in residuals], length) for o in outputs])
-    if known is None and (white := _white_models(seen, taken, total, length)) is not None:
-        return white
-    directions = [[transforms(part, length) for part in each.together] for each in taken]
-    lost = np.zeros_like(seen)
-    models: list[Autoregression] = []
-    for round_ in range(RESTORATIONS + 1):
-        models = [
-            autoregression(power, total, None if known is None else known[o], length)
-            for o, power in enumerate(seen + lost)
-        ]
-        if round_ == RESTORATIONS:
-            break
-        lost = _lost(models, directions, lengths, [each.own.shape[2] for each in taken])
-        for o, model in enumerate(models):
-            # White noise has one lag, which ends with no record.
-            if not model.is_white:
-                spectrum = model.spectrum()
-                lost[o] += spectrum - leaking(spectrum, lengths, length)
-    return models
-
-
-def _white_models(
-    seen: Array, taken: Sequence[FittedDirections], total: int, length: int
-) -> list[Autoregression] | None:
-    """The rounds of `noise_models` where all noise is white in each of them; else None.
-
-    First lags and slowest bins of a periodogram tell a white model.
-    """
     count, bins = min(LARGEST_ORDER, total // 20) + 1, n_slow_bins(total, length)
-    lags = np.array([first_lags(power, length, count - 1) for power in seen])
-    slow, directions = seen[:, :bins], None
-    models = _all_white(lags, slow, total, length)
+    noise = TakenNoise(taken, length, count, min(bins, seen.shape[1]))
+
+    def modelled(output: int, before: Autoregression | None) -> Autoregression:
+        """Of what is seen, and of what the fit took of the model of the round before."""
+        power = seen[output]
+        if known is None and (before is None or before.is_white):
+            # First lags and slowest bins tell a white model.
+            lags, slow = first_lags(power, length, count - 1), power[:bins]
+            if before is not None:
+                more, lower = noise.of_white(output, float(before.lags[0]), forms)
+                lags, slow = lags + more / total, slow + lower / total
+            if (white := _white(lags, slow, total, length)) is not None:
+                return white
+        if before is not None:
+            power = power + noise.at_all_bins(output, before, forms) / total
+            # White noise has one lag, which ends with no record.
+            if not before.is_white:
+                spectrum = before.spectrum()
+                power = power + (spectrum - leaking(spectrum, lengths, length))
+        return autoregression(power, total, None if known is None else known[output], length)
+
+    forms: list[Array] = []
+    models = [modelled(output, None) for output in outputs]
     for _ in range(RESTORATIONS):
-        if models is None:
-            return None
-        directions = directions or WhiteNoiseLoss.of(taken, length, count, slow.shape[1])
-        more, lower = directions.of_levels(np.array([model.lags[0] for model in models]))
-        models = _all_white(lags + more / total, slow + lower / total, total, length)
+        forms = noise.forms(models)
+        models = [modelled(output, before) for output, before in enumerate(models)]
     return models
 
 
-def _all_white(lags: Array, slow: Array, n: int, length: int) -> list[Autoregression] | None:
-    models = []
-    for own, power in zip(lags, slow, strict=True):
-        weights, sound = autoregression_weights(own, n)
-        level = max(float(own[0]), np.finfo(float).tiny)
-        if weights.size or not sound or is_slow(power / level, n, length):
-            return None
-        models.append(Autoregression(own, weights, n, length))
-    return models
-
-
-def _lost(
-    models: Sequence[Autoregression],
-    directions: Sequence[Sequence[Array]],
-    lengths: Sequence[int],
-    n_own: Sequence[int],
-) -> Array:
-    """Mean periodogram of noise less that of what a fit leaves of it.
-
-    With orthonormal directions Q it leaves w - Q Qᵀ w, whose mean periodogram lies below that of w
-    by 2 Re F(Ω q) F(q)* - F(q) Qᵀ Ω Q F(q)*, F the transform over an output's samples.
-    """
-    length = models[0].length
-    spectra = [model.spectrum() for model in models]
-    weights = [of_both(twice(length) * each / length) for each in spectra]
-    inner = [
-        np.sum(
-            [squares_of(e, w, m.is_white) for e, w, m in zip(parts, weights, models, strict=True)],
-            axis=0,
-        )
-        for parts in directions
-    ]
-    shared = sum(each[m:, m:] for each, m in zip(inner, n_own, strict=True))
-    lost = np.zeros((len(models), len(spectra[0])))
-    for parts, each, m, n in zip(directions, inner, n_own, lengths, strict=True):
-        each[m:, m:] = shared
-        for o, (part, spectrum, model) in enumerate(zip(parts, spectra, models, strict=True)):
-            if model.is_white:
-                lost[o] += powers_of(2.0 * spectrum[0] * np.eye(len(part)) - each, part)
-                continue
-            shaped = part * of_both(spectrum)  # which ends with the record
-            ended = scipy.fft.irfft(shaped.view(np.complex128), length)[:, :n]
-            met = np.einsum("kb,kb->b", scipy.fft.rfft(ended, length).view(np.float64), part)
-            lost[o] += 2.0 * (met[::2] + met[1::2]) - powers_of(each, part)
-    return lost / sum(lengths)
+def _white(lags: Array, slow: Array, n: int, length: int) -> Autoregression | None:
+    """The model of these lags and slowest bins where it is white; else None."""
+    weights, sound = autoregression_weights(lags, n)
+    level = max(float(lags[0]), np.finfo(float).tiny)
+    if weights.size or not sound or is_slow(slow / level, n, length):
+        return None
+    return Autoregression(lags, weights, n, length)

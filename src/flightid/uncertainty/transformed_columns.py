@@ -21,15 +21,9 @@ def powers_of(form: Array, part: Array) -> Array:
     return found
 
 
-def squares_of(part: Array, weights: Array, is_white: bool) -> Array:
-    """Products of transforms with the weights of their bins; of white noise, twice the middle's."""
-    if not is_white:
-        return np.asarray((part * weights) @ part.T)
-    ends = [place for place in (0, 1, -2, -1) if weights[place] != weights[2]]
-    return np.asarray(
-        weights[2] * (part @ part.T)
-        + (part[:, ends] * (weights[ends] - weights[2])) @ part[:, ends].T
-    )
+def squares_of(part: Array, weights: Array) -> Array:
+    """Products of transforms with the weights of their bins."""
+    return np.asarray((part * weights) @ part.T)
 
 
 def transforms(columns: Array, length: int) -> Array:
