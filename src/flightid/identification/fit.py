@@ -18,7 +18,7 @@ from flightid.identification.fitted_record import FittedRecord
 from flightid.identification.fitted_response import FittedResponse
 from flightid.identification.held_stable import held_stable
 from flightid.identification.local_minimum import LocalMinimum
-from flightid.identification.model_error import ModelErrorBound, model_errors
+from flightid.identification.model_error import LeftOver, ModelErrorBound, model_errors
 from flightid.identification.training import TrainingChannel, training_channels
 from flightid.models import EstimateProvenance, Model
 from flightid.models.linear.linear_system import LinearSystem
@@ -67,6 +67,7 @@ class Fit(
         "prediction_errors": "time histories",
         "input_correlations": "residual_tests tells them",
         "excited": "time histories",
+        "left": "model_errors holds them",
     },
 ):
     """Result of `flightid.identify`.
@@ -127,6 +128,8 @@ class Fit(
         Of inputs with residuals, by what the fit leaves of noise; empty where it is not known.
     excited : tuple of Record
         Behind direct responses: see `LinearEstimate.excited`.
+    left : LeftByModel or None
+        Behind responses whose estimator's bias is taken out: errors of the structure.
 
     Example
     -------
@@ -169,6 +172,7 @@ class Fit(
     agreement: Agreement | None = None
     input_correlations: tuple[FittedCorrelation, ...] = ()
     excited: tuple[Record, ...] = ()
+    left: LeftOver | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         return {**vars(self), "evidence": self.evidence}
@@ -196,7 +200,9 @@ class Fit(
     def model_errors(self) -> dict[str, ModelErrorBound]:
         """How far the model lies from its data by frequency, by ``"output/input"``."""
         filtered = self.residual_horizon != "free_run" and not self.prediction_errors
-        return model_errors(self.model, self.responses, self.records, filtered=filtered)
+        return model_errors(
+            self.model, self.responses, self.records, filtered=filtered, left=self.left
+        )
 
     def linear_system(self) -> LinearSystem:
         """The linear system of the fitted model; ModelError with the reason where there is none."""

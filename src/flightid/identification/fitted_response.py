@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from flightid.frozen import dataclass
 from flightid.responses import PairResponse
-from flightid.responses.estimators.by_window import NarrowResidual
 
 
 @dataclass(frozen=True)
@@ -26,8 +25,6 @@ class FittedResponse:
         Frequencies that were fitted, rad/s.
     model : ndarray of complex, shape (n_f,)
         The fitted model at every measured frequency.
-    narrow : tuple of NarrowResidual
-        By window length; empty where the weights of the estimate are not known.
 
     Example
     -------
@@ -45,7 +42,6 @@ class FittedResponse:
     measured: PairResponse
     omega_rad_s: NDArray[np.float64]
     model: NDArray[np.complex128]
-    narrow: tuple[NarrowResidual, ...] = ()
 
     @property
     def band_rad_s(self) -> tuple[float, float]:

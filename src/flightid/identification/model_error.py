@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +41,30 @@ TRACE = 1e-9
 """Share of an output that is left of it where the model leaves nothing."""
 MOST = 0.9
 """Growth ends here: a model that nothing shows is not known to 5 dB upwards and 20 dB down."""
+
+
+class BySize(Protocol):
+    """Share of a response that hangs on the size of the motion, by frequency."""
+
+    @property
+    def omega_rad_s(self) -> Array:
+        """Of the share, rad/s."""
+
+    @property
+    def share(self) -> Array:
+        """Of the response."""
+
+
+class LeftOver(Protocol):
+    """What a model leaves of the records behind its responses, by ``"output/input"``."""
+
+    @property
+    def narrow(self) -> Mapping[str, Sequence[NarrowResidual]]:
+        """By single windows."""
+
+    @property
+    def by_size(self) -> Mapping[str, BySize]:
+        """Of answers that hang on the size of the motion beyond chance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,6 +145,7 @@ def model_errors(
     records: Sequence[FittedRecord],
     *,
     filtered: bool = False,
+    left: LeftOver | None = None,
 ) -> dict[str, ModelErrorBound]:
     """Errors of a fitted model by ``"output/input"``, from what it was fitted to.
 
@@ -136,6 +161,8 @@ def model_errors(
         Used where there are no responses.
     filtered : bool
         Whether the records' modelled outputs are no free run.
+    left : LeftOver, optional
+        What else is known of the responses.
 
     Returns
     -------
@@ -160,8 +187,19 @@ def model_errors(
         ratio = each.measured.response[inside] / each.model[inside]
         spread = each.measured.random_error[inside] * np.abs(ratio)
         made = _named(each.name, omega[inside], ratio - 1.0, spread)
-        found |= {name: reaching(bound, each.narrow) for name, bound in made.items()}
+        found |= {name: _with_left(bound, name, left) for name, bound in made.items()}
     return found or _of_records(model, records, filtered)
+
+
+def _with_left(bound: ModelErrorBound, name: str, left: LeftOver | None) -> ModelErrorBound:
+    if left is None:
+        return bound
+    reached = reaching(bound, left.narrow.get(name, ()))
+    sized = left.by_size.get(name)
+    if sized is None:
+        return reached
+    more = np.interp(bound.omega_rad_s, sized.omega_rad_s, sized.share)
+    return ModelErrorBound(bound.omega_rad_s, reached.bound + more)
 
 
 def reaching(bound: ModelErrorBound, narrow: Iterable[NarrowResidual]) -> ModelErrorBound:

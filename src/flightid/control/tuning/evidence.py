@@ -9,6 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.control.tuning.size_findings import answers_by_size
 from flightid.control.tuning.structure_error import Band, errors_of, identified_band, no_band
 from flightid.conventions import Light
 from flightid.dynamics.continuous import to_continuous
@@ -144,7 +145,7 @@ def gather(
     if band is None and needs_band:
         refusals.append(no_band(errors, pairs))
     findings = [_accepted(each, accept_red=accept_red) for each in refusals]
-    findings += [*choice, *_judged(source)]
+    findings += [*choice, *_judged(source), *answers_by_size(source, pairs, band)]
     if not uncertain.known and nominal:
         findings.append(
             Finding(

@@ -8,6 +8,7 @@ of the estimate to the model's sensitivities.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -17,11 +18,12 @@ from numpy.typing import NDArray
 from flightid.errors import DataError, ModelError, OptionError, SingularError
 from flightid.frozen import dataclass
 from flightid.identification.delay_cells import DIFFERENCE, DelayCells
+from flightid.identification.frequency_domain.answer_by_size import SizeTerm, size_terms
 from flightid.identification.frequency_domain.model_residuals import ModelResiduals
 from flightid.models import GreyBoxModel, Parameter
 from flightid.responses import FrequencyResponse
 from flightid.responses.errors.functional import Functional
-from flightid.responses.errors.linear_estimate import LinearEstimate
+from flightid.responses.errors.linear_estimate import LinearEstimate, WindowedWeights
 from flightid.responses.errors.random_error import CovarianceSource
 from flightid.responses.estimators.by_window import WindowResidual, residuals_by_window
 from flightid.responses.estimators.prewhitened import PREWHITENED
@@ -36,6 +38,10 @@ Places = NDArray[np.intp]
 OUTSIDE = (DataError, ModelError, OptionError, SingularError)
 """Ends of models that cannot be followed over the records, delays without bounds among them."""
 OCTAVE = 2.0
+LEAK = 0.1
+"""Of a term's integral, over the lowest frequency, at least: a mean would drift away."""
+MEMORY = 0.5
+"""Of the longest window, within which a closed loop has answered."""
 TOGETHER = 64
 """Outputs of moved models that are transformed at once: more leave the caches."""
 
@@ -174,6 +180,34 @@ class Correction:
         omega = self.data.omega_rad_s
         return [*residuals_by_window(linear, omega, left, band_rad_s, resonant)]
 
+    def size_terms(self, model: GreyBoxModel, low_rad_s: float) -> list[SizeTerm]:
+        """Of each output, whether its answer depends on its size; none where nobody can tell.
+
+        Nobody can of a direct response in a loop: noise reaches its instruments, the inputs.
+
+        Raises as `apply`.
+        """
+        linear, loop = self._linear, self.data.loop
+        weights = linear.weights
+        if not isinstance(weights, WindowedWeights) or loop is None:
+            return []
+        if not (loop.is_taken_care_of or loop.loop == "open"):
+            return []
+        found = size_terms(
+            weights.errors.windows.instruments,
+            linear.output_records,
+            self._records.of(model),
+            linear.sample_time_s,
+            max(self.data.window_s) * MEMORY,
+            max(LEAK * low_rad_s, slowest_decay(model)),
+        )
+        return found or []
+
+    def estimated(self, terms: Sequence[Sequence[Array]]) -> Complex:
+        """The estimate of outputs, by output and record, as of those that were measured."""
+        records = [np.array(each) for each in zip(*terms, strict=True)]
+        return self._weights(np.arange(len(self.data.omega_rad_s)))(records)
+
     def errors(self, model: GreyBoxModel) -> CovarianceSource | None:
         """Errors of a corrected response: their noise is what the model leaves.
 
@@ -257,6 +291,13 @@ def resonant_up_to(model: GreyBoxModel, width_rad_s: float) -> float:
     every = np.concatenate(poles)
     narrow = every[(every.imag > 0.0) & (-2.0 * every.real < width_rad_s)]
     return OCTAVE * float(np.max(np.abs(narrow), initial=0.0))
+
+
+def slowest_decay(model: GreyBoxModel) -> float:
+    """Of the real poles of a model the slowest stable one, rad/s; 0 without any."""
+    every = np.concatenate([np.linalg.eigvals(each.matrices[0]) for each in systems_of(model)])
+    real = -every[(every.imag == 0.0) & (every.real < 0.0)].real
+    return float(np.min(real, initial=np.inf)) if real.size else 0.0
 
 
 def _middle(rows: Array) -> int:

@@ -39,9 +39,9 @@ from flightid.identification.frequency_domain.feedback_findings import (
     judge_feedback,
     why_bent,
 )
+from flightid.identification.frequency_domain.left_by_model import LeftByModel
 from flightid.identification.frequency_domain.longer_windows import judge_windows
 from flightid.identification.frequency_domain.model_curves import curves_of
-from flightid.identification.frequency_domain.narrow_errors import with_narrow_residuals
 from flightid.identification.frequency_domain.noise_cost import noise_costs
 from flightid.identification.frequency_domain.opened import opened
 from flightid.identification.frequency_domain.options import FrequencyDomainOptions
@@ -112,8 +112,6 @@ def _fit_selected(
             selected, errors, fitted = list(done.selected), done.errors, done.model
             curves = done.estimates
     responses = compare_responses(fitted, selected)
-    if curves is not None and judged():
-        responses = with_narrow_residuals(responses, without, fitted)
     points = [each.model[chosen.places] for each, chosen in zip(responses, selected, strict=True)]
     compared = points if curves is None else curves
     sensitivity = _sensitivity(selected, errors, options, compared) if judged() else None
@@ -138,7 +136,8 @@ def _fit_selected(
     setup += [*bent, *judge_windows(fitted, data)]
     noise = noise_costs(selected, points, by_noise) if judged() else {}
     fit = _assemble(fitted, options, data, groups, responses, found, setup, noise)
-    fit = replace(fit, provenance={**fit.provenance, "estimator_bias": correction})
+    left = None if curves is None else LeftByModel(without, fitted, band_of(responses))
+    fit = replace(fit, provenance={**fit.provenance, "estimator_bias": correction}, left=left)
     reason = why_misfit(fit.average_cost, noise) or why_bent(data, found.bias, bent)
     return without_intervals(fit, reason) if reason and not withheld else fit
 
@@ -260,6 +259,12 @@ def compare_responses(
         )
         result.append(FittedResponse(each.name, cost, each.measured, each.omega_rad_s, curve))
     return tuple(result)
+
+
+def band_of(responses: Sequence[FittedResponse]) -> tuple[float, float]:
+    """Lowest and highest frequency of any of them, rad/s."""
+    lows, highs = zip(*(each.band_rad_s for each in responses), strict=True)
+    return min(lows), max(highs)
 
 
 def _assemble(

@@ -41,13 +41,14 @@ from flightid.identification.frequency_domain.feedback_findings import (
     why_bent,
 )
 from flightid.identification.frequency_domain.fit import (
+    band_of,
     check_channels,
     check_start,
     compare_responses,
     select_by,
 )
+from flightid.identification.frequency_domain.left_by_model import LeftByModel
 from flightid.identification.frequency_domain.model_curves import curves_of, slopes_of
-from flightid.identification.frequency_domain.narrow_errors import with_narrow_residuals
 from flightid.identification.frequency_domain.noise_cost import noise_costs
 from flightid.identification.frequency_domain.opened import opened
 from flightid.identification.frequency_domain.options import FrequencyDomainOptions
@@ -288,8 +289,9 @@ def _with_responses(
 ) -> Fit:
     """The fit of the records with its responses beside them."""
     compared = compare_responses(fit.model, points.selected)
-    if outcome.applied and judged():
-        compared = with_narrow_residuals(compared, Correction(response, hold), fit.model)
+    left = None
+    if outcome.applied:
+        left = LeftByModel(Correction(response, hold), fit.model, band_of(compared))
     costs = {each.name: each.cost for each in compared}
     total = sum(costs.values())
     source = points.errors.source
@@ -299,6 +301,7 @@ def _with_responses(
         average_cost=total / len(costs),
         costs={**costs, **fit.costs},
         responses=compared,
+        left=left,
         intervals_from=f"{source} and {fit.intervals_from}",
         findings=(
             *fit.findings,
