@@ -116,3 +116,28 @@ def test_a_response_that_needs_no_other_way_knows_no_records(flights: list[fid.R
     assert excited(flights, "instrument") == 0
     bare = [each.select(["tau_phi", "p"]) for each in flights]
     assert excited([flights[0], bare[1]]) == 0
+
+
+def test_a_prewhitened_fit_that_fails_is_served_by_the_excitation_too() -> None:
+    """No loop biases it; but one without errors carries no gains."""
+    model = fid.load_model("rate_first_order")
+    time_s = np.arange(3000) * 0.02
+    sweep = 0.1 * np.sin(0.06 * time_s**2)
+    flown_by = fid.Record.from_arrays(time_s, inputs={"tau_phi": sweep}, hold="zero")
+    moved = fid.simulate(model, flown_by, units={"p": "rad/s"}, noise=fid.Noise(sensor={"p": 0.02}))
+    record = fid.Record.from_arrays(
+        time_s,
+        inputs={"tau_phi": sweep},
+        outputs={"p": moved["p"]},
+        excitations={"injected": sweep},
+        units={"p": "rad/s"},
+        hold="zero",
+    )
+    response = fid.estimate_response(record, estimator="prewhitened")
+    fit = fid.identify(model, response)
+    assert fit.covariance is not None
+    assert instrument_fit(fit) is None, "it stands by itself"
+    served = instrument_fit(replace(fit, covariance=None))
+    assert served is not None
+    assert served.reason.startswith("the response to what was injected in place of a prewhitened")
+    assert served.fit.covariance is not None

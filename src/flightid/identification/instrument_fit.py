@@ -6,18 +6,21 @@ from typing import Any
 
 from flightid.conventions import Light
 from flightid.errors import FlightidError
-from flightid.evidence.evidence import LOOP
+from flightid.evidence.evidence import LOOP, Check
 from flightid.frozen import dataclass
 from flightid.identification.fit import Fit
 from flightid.identification.identify import identify
 from flightid.models import StateSpaceModel, TransferFunctionModel
 from flightid.record import Record
 from flightid.responses import estimate_response
+from flightid.uncertainty.feedback_result import FeedbackTest
 
 DIRECT = ("output_error", "equation_error", "fourier_regression", "fourier_output_error")
 """Methods without a model of the noise that a loop feeds back."""
 OF_RESPONSES = ("frequency_domain", "joint")
 """Methods that have none where a response goes straight from inputs to outputs."""
+WHITENED = str(FeedbackTest("unknown", "noise model"))
+"""What the evidence says of the loop of a prewhitened response, which no loop biases."""
 KEPT = ("starts", "seed", "maximum_iterations", "hold")
 """Options that mean the same to a fit of a response, whatever the method was."""
 
@@ -55,7 +58,8 @@ def instrument_fit(fit: Fit) -> InstrumentFit | None:
     -------
     InstrumentFit or None
         None where the evidence of the fit says that the loop was open, the records lack an
-        excitation for each input, the new fit cannot be made, or it is red or without errors.
+        excitation for each input, the new fit cannot be made, or it is red or without errors; of a
+        prewhitened response, which no loop biases, where its fit is neither red nor without errors.
 
     Assumes
     -------
@@ -82,7 +86,7 @@ def instrument_fit(fit: Fit) -> InstrumentFit | None:
     if not records:
         return None
     loop = fit.evidence.check(LOOP)
-    if loop is None or loop.light is Light.GREEN:
+    if loop is None or not _needs_it(fit, loop):
         return None
     told: dict[str, Any] = dict(fit.provenance.get("told", {}))  # type: ignore[call-overload]
     kept = (*told,) if fit.method == OF_RESPONSES[0] else KEPT
@@ -96,9 +100,19 @@ def instrument_fit(fit: Fit) -> InstrumentFit | None:
         return None
     if made.covariance is None or made.evidence.light is Light.RED:
         return None
+    if loop.what == WHITENED:
+        why = f"a prewhitened one, whose fit fails: {fit.evidence.verdict.message}"
+        return InstrumentFit(made, f"the response to what was injected in place of {why}")
     way = "the direct response" if fit.method == OF_RESPONSES[0] else fit.method.replace("_", " ")
     reason = f"{way}, which feedback of noise biases ({loop.what})"
     return InstrumentFit(made, f"the response to what was injected in place of {reason}")
+
+
+def _needs_it(fit: Fit, loop: Check) -> bool:
+    """Whether a loop may bias the fit; of one by a model of its noise, whether it fails."""
+    if loop.what == WHITENED:
+        return fit.covariance is None or fit.evidence.light is Light.RED
+    return loop.light is not Light.GREEN
 
 
 def _injected(fit: Fit) -> list[Record]:

@@ -178,7 +178,7 @@ def estimate_response(
             covariance=covariance,
             loop=loop,
         )
-        return _with_inputs(response, samples, listed, loop)
+        return _with_excited(_with_inputs(response, samples, listed, loop), listed)
     response = _with_inputs(response, samples, listed, loop)
     if not covariance:
         return response
@@ -232,9 +232,10 @@ def _with_inputs(
 
 def _with_excited(response: FrequencyResponse, records: Sequence[Record]) -> FrequencyResponse:
     """A direct estimate that knows its records, where they hold an excitation for each input."""
-    linear, loop = response.linear, response.loop
+    linear = response.linear
     least = min(len(each.excitations) for each in records)
-    if linear is None or least < len(response.inputs) or (loop and loop.is_taken_care_of):
+    by_instrument = response.estimator.startswith("instrument")
+    if linear is None or least < len(response.inputs) or by_instrument:
         return response
     return replace(response, linear=replace(linear, excited=tuple(records)))
 
