@@ -152,6 +152,8 @@ def test_a_wrong_command_names_the_right_one(
     for typed, meant in {
         "help": "flightid --help",
         "analyze": "flightid run LOG",
+        "gains": "flightid tune LOG",
+        "tune a.param": "a.param holds parameters and no flight",
         "plan quadrotor": "flightid plan --vehicle quad\n",
         "tune flight.bin": "flightid tune flight.BIN\n",
         "fleet run flight.BIN": "one log: flightid run flight.BIN",

@@ -67,7 +67,8 @@ def test_a_rate_of_logging_says_where_a_model_ends(rate_hz: float, code: str, wo
 
 
 NARROW = ": too narrow for more than a gain"
-LESS = "; less than a decade, which tells gain, lag and delay apart"
+LESS = "; gain, lag and delay are told apart by a whole decade"
+LOOP = "; not swept: what hangs together may be the loop alone"
 
 
 @pytest.mark.parametrize(
@@ -77,6 +78,7 @@ LESS = "; less than a decade, which tells gain, lag and delay apart"
         ((1.0, 3.01), True, "amber", "usable from 2.01 to 3.01 Hz (12.6 to 18.9 rad/s)", LESS),
         ((1.0, 9.9), False, "amber", "coherent from 2.01 to 9.9 Hz (12.6 to 62.2 rad/s)", LESS),
         ((1.0, 10.1), True, "green", "usable from 2.01 to 10.1 Hz (12.6 to 63.5 rad/s)", ""),
+        ((1.0, 10.1), False, "green", "coherent from 2.01 to 10.1 Hz (12.6 to 63.5 rad/s)", LOOP),
     ],
 )
 def test_a_band_is_called_by_its_width(

@@ -12,6 +12,9 @@ MEANT = {
     "analyze": "flightid run LOG",
     "analyse": "flightid run LOG",
     "fit": "flightid run LOG",
+    "gains": "flightid tune LOG",
+    "pid": "flightid tune LOG",
+    "sweep": "flightid plan LOG",
     "open": "flightid app",
     "gui": "flightid app",
 }

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from flightid.cli.hints import PARAMETERS
 from flightid.cli.option_fields import OptionsCommand, parted
 from flightid.cli.output import (
     WRITTEN,
@@ -122,6 +123,7 @@ def command(
     if target is not None and not target.parent.is_dir():
         raise click.UsageError(f"--write: there is no folder {target.parent}: make it first")
     _require_free(target, overwrite)
+    _require_no_parameters(files)
     study = None
     missed: tuple[Finding, ...] = ()
     *parts, data = parted(options, _fields())
@@ -172,6 +174,15 @@ def command(
     if study is not None and not as_json:
         show_answer(study, written)
     leave_by_verdict((*missed, *tuning.findings))
+
+
+def _require_no_parameters(files: Sequence[Path]) -> None:
+    """Refuse files of gains, which are no records of a rig."""
+    if given := next((each for each in files if each.suffix in PARAMETERS), None):
+        raise click.UsageError(
+            f"{given} holds parameters and no flight: name the log that flew them, "
+            "flightid tune LOG"
+        )
 
 
 def _require_free(target: Path | None, overwrite: bool) -> None:

@@ -250,7 +250,8 @@ def _band(log: Log, band: AxisBand, swept: bool) -> Finding:
             advice.excitation(log),
         )
     if width >= BAND_GOOD.value:
-        return Finding(f"band-{band.axis}", Light.GREEN, text)
+        alone = "" if swept else "; not swept: what hangs together may be the loop alone"
+        return Finding(f"band-{band.axis}", Light.GREEN, f"{text}{alone}")
     narrow = f"{text}; gain, lag and delay are told apart by a whole decade"
     return Finding(f"band-{band.axis}", Light.AMBER, narrow, advice.excitation(log))
 

@@ -99,7 +99,7 @@ def _told(review: ReviewedFlight) -> str:
     words = {
         Light.GREEN: "nothing is against {0}",
         Light.AMBER: "{0} {1} in doubt",
-        Light.UNKNOWN: "{0} {1} too uncertain to judge",
+        Light.UNKNOWN: "{0} {1} not judged",
     }
     parts = [
         said.format(_listed(groups[light]), "is" if len(groups[light]) == 1 else "are")

@@ -60,7 +60,7 @@ def with_other_axes(
             others.append(UntouchedAxis(each.axis, "not swept"))
         elif reason := why_no_model(inspection, band):
             swept = f"it was swept, but carries no model: {reason}"
-            judged = (e for e in inspection.findings if e.code == f"band-{each.axis}")
+            judged = (e for e in inspection.findings if e.code.endswith(f"band-{each.axis}"))
             refused.append(RefusedAxis(each.axis, swept, next((e.action for e in judged), "")))
         else:
             others.append(UntouchedAxis(each.axis, "no model of it in this study"))
