@@ -229,6 +229,9 @@ def test_numbers_are_stored_within_the_limits_of_their_storage() -> None:
     _, multipliers, _ = standard_tables()
     divisors = [layout.divisor(each, multipliers) for each in "tcCeELB"]
     assert divisors == [1e6, 100.0, 100.0, 100.0, 100.0, 1e7, 1.0]
+    plain = MessageLayout("TEST", 1, "BBB", "a,b,c", "---", "-XF")
+    told = {"-": 0.0, "F": 1e-6}  # No multiplier, one that nobody knows, and a known one.
+    assert_close([plain.divisor(each, told) for each in "abc"], [1.0, 1.0, 1e6], rtol=1e-9, why="")
     byte = np.dtype("u1")
     assert stored([0, 255], byte, 1.0, "B").tolist() == [0, 255]
     assert stored([2.54], byte, 100.0, "B").tolist() == [254.0]
