@@ -24,7 +24,7 @@ from flightid.identification.output_error.whitened_residuals import (
 )
 from tests.closeness import assert_close
 from tests.strangers.noises import ar1
-from tests.strangers.turbulence import CASES
+from tests.strangers.turbulence import CASES, YAW, flight
 
 A = np.array([[0.97, 0.02], [-0.06, 0.95]])
 C = np.eye(2)
@@ -342,3 +342,15 @@ def test_short_manoeuvres_of_one_input_each_are_asked_no_coherence() -> None:
     checks = {check.name: check for check in fit.evidence.checks}
     assert {checks[name].light.value for name in ("excitation band", "coherence")} == {"green"}
     assert "the free run explains" in checks["excitation band"].what
+
+
+@pytest.mark.parametrize("seed", [61, 162])
+def test_motion_behind_a_mode_is_not_left_to_a_sensor(seed: int) -> None:
+    """Gusts as large as a Dutch roll, one output: a long autoregression says them as well.
+
+    By their colour two and three of four intervals missed.
+    """
+    record = flight(seed, YAW, gust=1.0, time_s=0.3, level=0.05)
+    fit = fid.identify(YAW.model(), record, method="output_error")
+    assert [each.light for each in fit.findings if each.code == "process-noise"] == [Light.RED]
+    assert fit.covariance is None
