@@ -128,7 +128,7 @@ def test_units_of_estimates_that_are_missing_are_those_that_are_asked() -> None:
 
 def test_what_misses_a_requirement_is_told_by_plant_and_size() -> None:
     (margin, *_, peak) = limits(TuningRequirements(), ["rate loop"], None)
-    slack = np.array([0.1, -0.2, -0.1])
+    slack = np.array([0.0, -0.2, -0.1])
     assert _short("phase margin", 36.04, " deg", margin, slack) == (
         "phase margin 36 deg, 9 deg short of ≥ 45 (2 of 3 plants)"
     )
