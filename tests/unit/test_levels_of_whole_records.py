@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ import flightid as fid
 from flightid.responses.errors.local_errors import LocalErrors
 from flightid.responses.errors.prewhitened import PrewhitenedErrors
 from flightid.responses.errors.random_error import LevelledErrors, Points
+from flightid.responses.store import read_response, write_response
 from flightid.uncertainty.quantiles import half_width
 from tests.closeness import assert_close
 from tests.joint_flights import BAND, lag, swept
@@ -98,3 +100,18 @@ def test_a_fit_has_students_quantile(estimator: str) -> None:
             rtol=1e-9,
             why="rounding",
         )
+
+
+def test_a_fit_says_that_a_file_holds_no_levels(tmp_path: Path) -> None:
+    measured = response("composite")
+    read = read_response(write_response(measured, tmp_path / "p.nc"))
+    said = []
+    for each in (measured, read):
+        fit = fid.identify(lag(), each, band_rad_s=BAND)
+        said.append([one for one in fit.findings if one.code == "noise-taken-for-known"])
+        freedom = [one.freedom for one in fit.parameters.values() if one.interval95]
+        assert freedom
+        assert all((one is None or np.isinf(one)) == bool(said[-1]) for one in freedom)
+    assert not said[0]
+    assert len(said[1]) == 1
+    assert "take that noise for known" in said[1][0].message

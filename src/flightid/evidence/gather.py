@@ -67,7 +67,9 @@ WINDOWS_SHORT = "windows-short"
 """Of a response whose windows a mode outlasts: its leakage is corrected, its coherence is lost."""
 WINDOWS_LENGTHENED = "windows-lengthened"
 """Of a response whose windows come from the damping that a first fit found."""
-LIMITS = (ON_A_WORD, WINDOWS_SHORT, WINDOWS_LENGTHENED)
+NOISE_KNOWN = "noise-taken-for-known"
+"""Of a response that does not tell from how much noise its errors are."""
+LIMITS = (ON_A_WORD, WINDOWS_SHORT, WINDOWS_LENGTHENED, NOISE_KNOWN)
 PROCESS_NOISE = "process-noise"
 """Of residuals that hold noise on the states."""
 OVERFIT = "overfit"

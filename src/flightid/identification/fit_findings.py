@@ -17,6 +17,7 @@ from flightid.evidence.gather import (
     INSENSITIVE,
     MINIMUM_DOUBTED,
     MORE_STEPS,
+    NOISE_KNOWN,
 )
 from flightid.findings import Finding, told_apart
 from flightid.frozen import dataclass
@@ -294,8 +295,27 @@ def judge_search(groups: Sequence[Sequence[End]], near: float | None = None) -> 
     return found
 
 
-def judge_intervals(source: str, *, outputs_apart: bool) -> list[Finding]:
+def judge_intervals(
+    source: str, *, outputs_apart: bool, noise_taken_for_known: bool = False
+) -> list[Finding]:
     """Verdict on where the 95 % intervals come from."""
+    taken = [
+        Finding(
+            NOISE_KNOWN,
+            Light.GREEN,
+            "the response does not tell from how much noise its errors were estimated (one from a "
+            "file or arithmetic does not), so 95 % intervals take that noise for known: of few "
+            "bins they are a little short",
+            "fit the response as estimated from records",
+        )
+    ]
+    return [
+        *_judge_source(source, outputs_apart=outputs_apart),
+        *(taken if noise_taken_for_known else ()),
+    ]
+
+
+def _judge_source(source: str, *, outputs_apart: bool) -> list[Finding]:
     if outputs_apart:
         return [
             Finding(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from flightid.evidence.gather import OF_PARAMETERS
+from flightid.evidence.gather import NOISE_KNOWN, OF_PARAMETERS
 from flightid.identification.fit import Fit
 from flightid.identification.fit_findings import (
     UNKNOWN,
@@ -17,6 +17,7 @@ _OF_INTERVALS = {
     "residuals-coloured",
     "intervals-by-output",
     "intervals-approximate",
+    NOISE_KNOWN,
     "at-bound",
     *OF_PARAMETERS,
 }

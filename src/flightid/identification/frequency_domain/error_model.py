@@ -89,6 +89,15 @@ class ErrorModel:
             len(self.runs) > 1 and self.known is not None and not knows_between_outputs(self.known)
         )
 
+    @property
+    def noise_taken_for_known(self) -> bool:
+        """Whether errors are known, but not from how much noise: of a file, or of arithmetic."""
+        if self.known is None or not self.runs:
+            return False
+        points = self.runs[0].points
+        size = 2 * len(points.inputs) * len(points.frequencies)
+        return by_level(self.known, [points], [np.zeros((1, size))])[0] is None
+
     @cached_property
     def covariances(self) -> tuple[Array, ...]:
         """Of the points of each run, shape (2 m, 2 m): one output at a time."""

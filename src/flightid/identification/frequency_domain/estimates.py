@@ -52,6 +52,8 @@ class Statistics:
         Where the intervals come from.
     outputs_apart : bool
         Whether errors of different outputs were taken as independent for want of knowledge.
+    noise_taken_for_known : bool
+        Whether nobody knows from how much noise the errors of points were estimated.
     withheld : str
         Why there are no intervals though errors are known; empty where there are.
     agreement : Agreement or None
@@ -66,6 +68,7 @@ class Statistics:
     correlation: Array
     source: str
     outputs_apart: bool
+    noise_taken_for_known: bool
     withheld: str = ""
     agreement: Agreement | None = None
     bias: Array | None = None
@@ -135,6 +138,7 @@ def statistics(
         correlation,
         source,
         errors.outputs_apart,
+        errors.noise_taken_for_known,
         withheld,
         agreement,
         moved,

@@ -290,7 +290,11 @@ def _assemble(
         *(
             ()
             if found.withheld
-            else judge_intervals(found.source, outputs_apart=found.outputs_apart)
+            else judge_intervals(
+                found.source,
+                outputs_apart=found.outputs_apart,
+                noise_taken_for_known=found.noise_taken_for_known,
+            )
         ),
     )
     minima = local_minima(groups, free)

@@ -306,7 +306,11 @@ def _with_responses(
         findings=(
             *fit.findings,
             *judge_cost(costs, total / len(costs), noise),
-            *judge_intervals(source, outputs_apart=points.errors.outputs_apart),
+            *judge_intervals(
+                source,
+                outputs_apart=points.errors.outputs_apart,
+                noise_taken_for_known=points.errors.noise_taken_for_known,
+            ),
         ),
         provenance={
             **fit.provenance,
