@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import flightid as fid
+from flightid.identification.frequency_domain import model_curves
 
 OMEGA = np.geomspace(1.0, 50.0, 60)
 MODEL = fid.load_model("rate_first_order").with_values({"Lp": -6.0, "Ltphi": 180.0})
@@ -39,6 +40,20 @@ def test_each_fit_is_that_of_its_data_alone() -> None:
         fid.identify(MODEL, s, n_omega=15).to_dict() for s in sets
     ]
     assert len({f.parameters["Lp"].value for f in fits}) == len(sets)
+
+
+def test_responses_of_the_start_are_evaluated_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    joined, evaluated = model_curves.Grids.joined, []
+
+    def counted(
+        grids: model_curves.Grids, model: fid.GreyBoxModel, free: np.ndarray | None = None
+    ) -> np.ndarray:
+        evaluated.append(model is MODEL and free is None)
+        return joined(grids, model, free)
+
+    monkeypatch.setattr(model_curves.Grids, "joined", counted)
+    fid.identify_each(MODEL, [_drawn(seed, 0.9) for seed in range(3)], correct_bias=False)
+    assert sum(evaluated) == 1
 
 
 def test_an_error_says_of_which_data_set() -> None:

@@ -1,7 +1,9 @@
 """Minima by which a search from elsewhere is known to come to the same."""
 
 import numpy as np
+import pytest
 
+from flightid.identification.frequency_domain import search
 from flightid.identification.frequency_domain.known_minimum import KnownMinimum
 from flightid.identification.multistart import DenseEnd
 
@@ -29,3 +31,29 @@ def test_what_is_no_minimum_or_leaves_combinations_open_holds_nothing() -> None:
     assert KnownMinimum.of(ended(alike)) is None
     assert KnownMinimum.of(ended(np.eye(10)[:, :2], "iterations")) is None
     assert KnownMinimum.of(ended(np.eye(10)[:, [0, 0]] * [1.0, 0.0])) is None
+
+
+def test_starts_that_one_step_takes_to_a_known_minimum_go_no_further(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """One lands at once, one after three steps; the last leads to a minimum of its own."""
+    one, three, other = np.array([1.0, 0.0]), np.array([3.0, 0.0]), np.array([9.0, 9.0])
+    jacobian = np.vstack([2.0 * np.eye(2), np.zeros((8, 2))])
+    followed: list[tuple[int, list[float]]] = []
+
+    def follow(_: object, begin: np.ndarray, steps: int, light: float = 1.0) -> list[DenseEnd]:
+        if len(begin):
+            followed.append((steps, [float(start[0]) for start in begin]))
+        ends = []
+        for start in begin:
+            lands = steps >= start[0] and start[0] < other[0]
+            x = np.zeros(2) if lands else start
+            why = "cost" if steps > search.FIRST_STEPS else "iterations"
+            ends.append(DenseEnd(x, 10.0, steps, why, np.ones(10), jacobian))
+        return ends
+
+    monkeypatch.setattr(search._Descent, "follow", follow)
+    descent = search._Descent(None, [], [])
+    found = descent._apart(np.array([one, three, other]), [ended(jacobian)], 50)
+    assert followed == [(1, [1.0]), (1, [3.0, 9.0]), (3, [3.0, 9.0]), (47, [9.0])]
+    assert [end.x.tolist() for end in found] == [[9.0, 9.0]]

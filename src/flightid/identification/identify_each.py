@@ -27,7 +27,8 @@ def identify_each(
 
     Each fit is what `identify` makes of that data set alone, digit by digit. What they have in
     common is worked out once: the model's equations and, of responses with the same frequencies
-    and coherences, as redrawn ones have, which points are fitted, their weights and their order.
+    and coherences, as redrawn ones have, which points are fitted, their weights, their order, and
+    the model's responses there at the starts.
 
     Parameters
     ----------

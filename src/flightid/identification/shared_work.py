@@ -13,6 +13,30 @@ MOST = 64
 _KEPT: ContextVar[dict[Hashable, object] | None] = ContextVar("kept", default=None)
 
 
+class Itself:
+    """A thing as part of a key, equal to itself alone; it lives as long as the key does.
+
+    Example
+    -------
+    >>> thing = {"a": 1}
+    >>> Itself(thing) == Itself(thing), Itself(thing) == Itself({"a": 1})
+    (True, False)
+    """
+
+    __slots__ = ("thing",)
+
+    def __init__(self, thing: object) -> None:
+        self.thing = thing
+
+    def __eq__(self, other: object) -> bool:
+        """Whether it is the same thing."""
+        return isinstance(other, Itself) and other.thing is self.thing
+
+    def __hash__(self) -> int:
+        """As the thing's identity."""
+        return id(self.thing)
+
+
 @contextmanager
 def shared_work() -> Iterator[None]:
     """Inside, what `shared` made for the same key is taken again.

@@ -41,7 +41,7 @@ from flightid.identification.frequency_domain.feedback_findings import (
 )
 from flightid.identification.frequency_domain.left_by_model import LeftByModel
 from flightid.identification.frequency_domain.longer_windows import judge_windows
-from flightid.identification.frequency_domain.model_curves import curves_of
+from flightid.identification.frequency_domain.model_curves import curves_of, start_curves
 from flightid.identification.frequency_domain.noise_cost import noise_costs
 from flightid.identification.frequency_domain.opened import opened
 from flightid.identification.frequency_domain.options import FrequencyDomainOptions
@@ -193,7 +193,7 @@ def check_start(model: GreyBoxModel, selected: Sequence[SelectedResponse]) -> li
     """
     looked: list[Start] = []
     try:
-        starts = curves_of(model, [each.omega_rad_s for each in selected])
+        starts = start_curves(model, [each.omega_rad_s for each in selected])
     except DataError:
         return []  # no value at the start: the search will say so if no start has one
     for each, start in zip(selected, starts, strict=True):

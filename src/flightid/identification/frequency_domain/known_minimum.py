@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -40,18 +42,25 @@ class KnownMinimum:
     def of(cls, end: DenseEnd) -> KnownMinimum | None:
         """Where a search ended; None at no minimum, or where data leave combinations open."""
         n_residuals, n = end.jacobian.shape
-        lengths = np.linalg.norm(end.jacobian, axis=0)
-        if not end.is_converged or n_residuals <= n or np.min(lengths) == 0.0:
+        if not end.is_converged or n_residuals <= n:
             return None
-        scaled = end.jacobian / lengths
+        products = end.jacobian.T @ end.jacobian
+        lengths = np.sqrt(np.diagonal(products))
+        if np.min(lengths) == 0.0:
+            return None
         try:
-            triangle = np.linalg.cholesky(scaled.T @ scaled)
+            triangle = np.linalg.cholesky(products / np.outer(lengths, lengths))
         except np.linalg.LinAlgError:
             return None
         if np.min(np.diagonal(triangle)) < TOLD:
             return None
         variance = float(end.residuals @ end.residuals) / (n_residuals - n)
         return cls(end, NEAR**2 * variance)
+
+    @classmethod
+    def all_of(cls, ends: Iterable[DenseEnd]) -> list[KnownMinimum]:
+        """Those among where searches ended."""
+        return [each for end in ends if (each := cls.of(end)) is not None]
 
     def holds(self, x: Array) -> bool:
         """Whether values lie within half a standard error of the minimum."""

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.errors import DataError
 from flightid.frozen import dataclass
+from flightid.identification.shared_work import Itself, shared
 from flightid.models import GreyBoxModel
 
 Array = NDArray[np.float64]
@@ -68,6 +71,27 @@ def curves_of(model: GreyBoxModel, grids: Sequence[Array]) -> list[Complex]:
     """
     known = Grids(grids)
     return known.apart(known.joined(model))
+
+
+def curves_at(model: GreyBoxModel, starts: Array, grids: Sequence[Array]) -> Complex:
+    """Responses for free parameters in each row of `starts`, one grid after another in a row.
+
+    NaN in rows where the model has no response at one of the frequencies.
+    """
+    known = Grids(grids)
+    found = np.full((len(starts), len(known.places)), np.nan, dtype=np.complex128)
+    for row, start in zip(found, starts, strict=True):
+        with suppress(DataError), np.errstate(all="ignore"):
+            row[:] = known.joined(model, start)
+    return found
+
+
+def start_curves(model: GreyBoxModel, grids: Sequence[Array]) -> list[Complex]:
+    """`curves_of` a model that many fits have in common: evaluated once for all of them."""
+    return shared(
+        lambda: ("curves", Itself(model), *(each.tobytes() for each in grids)),
+        lambda: curves_of(model, grids),
+    )
 
 
 def log_slopes_of(model: GreyBoxModel, grids: Sequence[Array]) -> list[Complex]:

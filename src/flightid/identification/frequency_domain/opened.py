@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from flightid.conventions import Light
 from flightid.errors import FlightidError
 from flightid.findings import Finding
-from flightid.identification.frequency_domain.model_curves import curves_of
+from flightid.identification.frequency_domain.model_curves import start_curves
 from flightid.identification.frequency_domain.selection import SelectedResponse
 from flightid.models import GreyBoxModel
 
@@ -64,6 +64,6 @@ def _curves(
 ) -> list[NDArray[np.complex128]]:
     """Responses at the points; none where the model has no value at one of them."""
     try:
-        return curves_of(model, [each.omega_rad_s for each in selected])
+        return start_curves(model, [each.omega_rad_s for each in selected])
     except FlightidError:
         return []

@@ -3,24 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.errors import DataError
 from flightid.frozen import dataclass
 from flightid.identification.fit_findings import EXCELLENT_COST
 from flightid.identification.frequency_domain.error_model import ErrorModel, whitening
 from flightid.identification.frequency_domain.known_minimum import KnownMinimum
-from flightid.identification.frequency_domain.model_curves import Grids
+from flightid.identification.frequency_domain.model_curves import curves_at
 from flightid.identification.frequency_domain.selection import SelectedResponse
 from flightid.identification.multistart import DenseEnd, collect, draw_starts
+from flightid.identification.shared_work import Itself, shared
 from flightid.models import GreyBoxModel
 from flightid.uncertainty.response_errors import DECIBEL, DEGREE
 
 Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 LIGHT = 0.1
 """Factor of the decibels' residuals while the phase leads."""
 LEADING_ITERATIONS = 10
@@ -65,15 +66,9 @@ class _Descent:
         """Where so many steps lead from each start, or why nowhere; decibels weigh by `light`."""
         if not len(begin):
             return []
-        measured = [
-            (
-                each.omega_rad_s,
-                each.response,
-                light * np.sqrt(each.weight_db),
-                np.sqrt(each.weight_deg),
-            )
-            for each in self.selected
-        ]
+        measured = self._measured
+        if light != 1.0:
+            measured = [(omega, found, light * db, deg) for omega, found, db, deg in measured]
         parameters = self.model.parameters
         low = np.array([parameter.minimum for parameter in parameters.free])
         high = np.array([parameter.maximum for parameter in parameters.free])
@@ -109,44 +104,65 @@ class _Descent:
     def _apart(self, begin: Array, known: list[DenseEnd], steps: int) -> list[DenseEnd]:
         """Ends of starts that after their first steps are at no minimum that is known or found.
 
-        The first start goes ahead: most of the others come to its end.
+        The first start goes ahead: most of the others come to its end. The first step alone takes
+        most of those there that begin near.
         """
         found: list[DenseEnd] = []
         for wave in (begin[:1], begin[1:]):
-            minima = [
-                each for end in (*known, *found) if (each := KnownMinimum.of(end)) is not None
-            ]
+            minima = KnownMinimum.all_of([*known, *found]) if len(wave) else []
             if not minima:
                 found += self._ends(wave, steps)
                 continue
-            early = self._ends(wave, min(FIRST_STEPS, steps))
-            others = [end for end in early if not any(each.holds(end.x) for each in minima)]
+            elsewhere, _ = self._elsewhere(wave, minima, 1)
+            _, others = self._elsewhere(elsewhere, minima, min(FIRST_STEPS, steps))
             further = [end.x for end in others if not end.is_converged]
             found += [end for end in others if end.is_converged]
             found += self._ends(np.ascontiguousarray(further), max(steps - FIRST_STEPS, 1))
         return found
+
+    def _elsewhere(
+        self, begin: Array, minima: Sequence[KnownMinimum], steps: int
+    ) -> tuple[Array, list[DenseEnd]]:
+        """Starts that so many steps take to none of the minima, and where these steps end."""
+        kept = [
+            (start, end)
+            for start, end in zip(begin, self.follow(begin, steps), strict=True)
+            if not isinstance(end, str) and not any(each.holds(end.x) for each in minima)
+        ]
+        return np.ascontiguousarray([start for start, _ in kept]), [end for _, end in kept]
 
     def _costs(self, starts: Array) -> Array:
         """Weighted dB and degrees at each start; infinite where it has no response."""
         measured = np.concatenate([each.response for each in self.selected])
         weight_db = np.concatenate([each.weight_db for each in self.selected])
         weight_deg = np.concatenate([each.weight_deg for each in self.selected])
-        found, grids = np.full(len(starts), np.inf), Grids(self._grids)
-        for place, start in enumerate(starts):
-            with suppress(DataError), np.errstate(all="ignore"):
-                ratio = grids.joined(self.model, start) / measured
-                gain, phase = DECIBEL * np.log(np.abs(ratio)), DEGREE * np.angle(ratio)
-                cost = weight_db @ gain**2 + weight_deg @ phase**2
-                found[place] = cost if np.isfinite(cost) else np.inf
-        return found
+        grids = [each.omega_rad_s for each in self.selected]
+        curves = shared(
+            lambda: (
+                "nearby",
+                Itself(self.model),
+                starts.tobytes(),
+                *(each.tobytes() for each in grids),
+            ),
+            lambda: curves_at(self.model, starts, grids),
+        )
+        with np.errstate(all="ignore"):
+            ratio = curves / measured
+            gain, phase = DECIBEL * np.log(np.abs(ratio)), DEGREE * np.angle(ratio)
+            costs = gain**2 @ weight_db + phase**2 @ weight_deg
+        return np.where(np.isfinite(costs), costs, np.inf)
 
     def _costs_after(self, starts: Array, steps: int) -> Array:
         ends = self.follow(starts, steps)
         return np.array([np.inf if isinstance(end, str) else end.cost for end in ends])
 
-    @property
-    def _grids(self) -> list[Array]:
-        return [each.omega_rad_s for each in self.selected]
+    @cached_property
+    def _measured(self) -> list[tuple[Array, Complex, Array, Array]]:
+        """Frequencies, values and square roots of both weights of each response."""
+        return [
+            (each.omega_rad_s, each.response, np.sqrt(each.weight_db), np.sqrt(each.weight_deg))
+            for each in self.selected
+        ]
 
     def _ends(self, begin: Array, steps: int, light: float = 1.0) -> list[DenseEnd]:
         return [end for end in self.follow(begin, steps, light) if not isinstance(end, str)]
@@ -167,12 +183,8 @@ def _thinned(response: SelectedResponse, stride: int) -> SelectedResponse:
     kept = slice(None, None, max(min(stride, count // POINTS), 1))
     places = response.places[kept]
     share = count / len(places)
-    return replace(
-        response,
-        places=places,
-        weight_db=share * response.weight_db[kept],
-        weight_deg=share * response.weight_deg[kept],
-    )
+    weights = share * response.weight_db[kept], share * response.weight_deg[kept]
+    return SelectedResponse(response.name, response.measured, places, *weights)
 
 
 def minimise(
@@ -218,7 +230,11 @@ def minimise(
     best = min((end.cost for end in known), default=np.inf)
     settled = [end for end in known if end.cost == best and end.is_converged]
     if settled and cost != "likelihood" and best > LEAVES * len(selected):
-        lower = descent.lower(draw_starts(free, NEARBY, seed)[1:], best, maximum_iterations)
+        near = shared(
+            lambda: ("starts", Itself(model), NEARBY, seed),
+            lambda: draw_starts(free, NEARBY, seed)[1:],
+        )
+        lower = descent.lower(near, best, maximum_iterations)
         if lower:
             lowest = min(lower, key=lambda end: end.cost)
             outcomes, best = [*outcomes, lowest], lowest.cost
