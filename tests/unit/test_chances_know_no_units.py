@@ -285,7 +285,7 @@ def test_a_noisy_sensor_explains_a_loop_in_any_units() -> None:
     assert_close(shares[0], 0.01, rtol=0.4, why="chance of 2,400 samples")
     found = np.array(shares, dtype=float)
     assert_close(found[2:], found[:2], rtol=1e-9, why="units")
-    assert_close(found[1], found[0], rtol=0.05, why="long runs of noise cross no record's end")
+    assert_close(found[1], found[0], rtol=1e-9, why="long runs of noise cross no record's end")
 
 
 def test_feedback_that_no_test_sees_bends_an_estimate_alike_in_any_units() -> None:

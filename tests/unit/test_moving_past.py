@@ -171,12 +171,14 @@ def test_directions_are_weighed_as_a_wiener_filter_does() -> None:
 def test_the_scatter_of_sums_has_bartletts_weights() -> None:
     rows = np.random.default_rng(2).standard_normal((40, 2)) + 5.0
     for span in (1, 4):
-        centred = rows - rows.mean(axis=0)
-        known = np.zeros((2, 2))
-        for s in range(40):
-            for t in range(40):
-                known += max(1.0 - abs(s - t) / span, 0.0) * np.outer(centred[s], centred[t])
-        assert _long_run(rows, span) == pytest.approx(known, abs=1e-9)
+        for lengths in ([40], [25, 12, 3]):
+            centred, of = rows - rows.mean(axis=0), np.repeat(np.arange(len(lengths)), lengths)
+            known = np.zeros((2, 2))
+            for s in range(40):
+                for t in range(40):
+                    weight = max(1.0 - abs(s - t) / span, 0.0) * (of[s] == of[t])
+                    known += weight * np.outer(centred[s], centred[t])
+            assert _long_run(rows, span, lengths) == pytest.approx(known, abs=1e-9)
 
 
 def test_the_past_of_an_input_beside_a_noisy_one_is_a_plain_regression() -> None:
@@ -228,7 +230,8 @@ def test_the_past_of_an_input_beside_a_noisy_one_is_a_plain_regression() -> None
         ]
         found = error @ past - variance * len(error) * np.array(shared)
         beside = past - asked.own.columns @ asked.own.weights(past, variance)
-        scatter = _long_run(error[:, None] * beside, order + 1)
+        counts = [length - lags for length in asked.lengths]
+        scatter = _long_run(error[:, None] * beside, order + 1, counts)
         known = found @ np.linalg.solve(scatter, found)
         assert asked.chi_square(variance) == pytest.approx(known, rel=1e-6)
 

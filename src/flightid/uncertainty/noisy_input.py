@@ -198,7 +198,8 @@ class _NoisyPast:
         known = variance * len(left) * np.ravel(shared @ ways)
         found = left @ heard - known
         beside = heard - self.own.columns @ self.own.weights(heard, variance)
-        scatter = _long_run(left[:, None] * beside, len(ways))
+        counts = [length - self.lags for length in self.lengths]
+        scatter = _long_run(left[:, None] * beside, len(ways), counts)
         return float(found @ np.linalg.lstsq(scatter, found, rcond=RANK)[0])
 
 
@@ -210,9 +211,14 @@ def _whitened(outputs: Sequence[Array], order: int) -> list[Array]:
     return [rows - each @ ways for rows, each in zip(now, columns, strict=True)]
 
 
-def _long_run(rows: Array, span: int) -> Array:
-    """Covariance of the sum of rows that remember less than a span (Bartlett's weights)."""
-    rows = rows - np.mean(rows, axis=0)
-    sums = np.cumsum(np.pad(rows, ((span + 1, span), (0, 0))), axis=0)
-    moved = sums[span:] - sums[:-span]
-    return np.asarray(moved.T @ moved / span)
+def _long_run(rows: Array, span: int, lengths: Sequence[int]) -> Array:
+    """Covariance of the sum of rows that remember less than a span (Bartlett's weights).
+
+    No row remembers one of another record: each of them, of so many rows, ends by itself.
+    """
+    found = np.zeros((rows.shape[1], rows.shape[1]))
+    for own in np.split(rows - np.mean(rows, axis=0), np.cumsum(lengths)[:-1]):
+        sums = np.cumsum(np.pad(own, ((span + 1, span), (0, 0))), axis=0)
+        moved = sums[span:] - sums[:-span]
+        found += moved.T @ moved / span
+    return found
