@@ -14,8 +14,10 @@ import numpy as np
 import pytest
 
 from flightid.conventions import Light
+from flightid.evidence import residual_check
 from flightid.evidence.spans import Span, judge_span
 from flightid.identification.fit_findings import DETERMINED
+from flightid.identification.records.findings import judge_fit
 from flightid.inspection.thresholds import BAND_LEAST
 from flightid.study.proposal.of_records import study_of_records
 from flightid.study.proposal.stretches import RICHER
@@ -91,6 +93,35 @@ def test_a_failure_is_worth_what_it_misses(
     found = residual_findings((bad, *passed))[0]
     assert found.light is light
     assert "fails: p = " in found.message
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_the_worst_output_is_told_in_any_order(order: int) -> None:
+    costs = dict([("p", 15.0), ("r", 35.0), ("ay", 38.0)][::order])
+    # Of what ay leaves its own white noise makes most.
+    said = judge_fit(costs, (1.0, 1.0), {"ay": 25.0})
+    assert [each.message.split(":")[0] for each in said[:3]] == ["r", "p", "ay"]
+    random = np.random.default_rng(1)
+    u, y = random.standard_normal((2, 400))
+    (test,) = (
+        each
+        for each in residual_tests(y, u, horizon="one step ahead").tests
+        if each.kind is Kind.INDEPENDENCE
+    )
+    # What it is worth, by how sure a failure is; a size that is not known comes last of one light.
+    failures = [("p", 20.0, 1e-9), ("r", 60.0, 1e-5), ("q", None, 1e-12), ("ay", 60.0, 1e-6)]
+    made = [
+        replace(
+            test, output=output, verdict=Verdict.FAIL, counts=True, p_value=p, worth_percent=worth
+        )
+        for output, worth, p in failures[::order]
+    ]
+    found = residual_findings(tuple(made))
+    assert {each.light for each in found} == {Light.RED}
+    words = residual_check(found).what
+    assert words == found[0].message
+    assert words.endswith("worth 60 % of ay")
+    assert [each.message.rsplit(" ", 1)[1] for each in found[:3]] == ["ay", "r", "p"]
 
 
 @pytest.mark.parametrize("rising", [True, False])

@@ -65,7 +65,7 @@ def judge_fit(
     colour: tuple[float, float],
     noise: Mapping[str, float] | None = None,
 ) -> list[Finding]:
-    """Verdicts on what the model explains, and on the colour of the residuals.
+    """Verdicts on what the model explains, the worst first, and on the colour of the residuals.
 
     Parameters
     ----------
@@ -76,9 +76,13 @@ def judge_fit(
     noise : mapping of str to float, optional
         Percent that white noise of the measurements makes, which is no misfit.
     """
-    found = []
-    for name, cost in costs.items():
-        by_noise = min(cost, (noise or {}).get(name, 0.0))
+    found, made = (
+        [],
+        {name: min(cost, (noise or {}).get(name, 0.0)) for name, cost in costs.items()},
+    )
+    # A check tells its first finding: of outputs with one light that is the worst.
+    for name in sorted(costs, key=lambda name: made[name] - costs[name]):
+        cost, by_noise = costs[name], made[name]
         missed = cost - by_noise
         light = (
             Light.GREEN

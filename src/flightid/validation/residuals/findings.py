@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from flightid.conventions import Light
 from flightid.evidence.gather import LEADS
-from flightid.findings import Finding
+from flightid.findings import GRAVITY, Finding
 from flightid.uncertainty.foretold import NEGLIGIBLE_PERCENT, is_material
 from flightid.uncertainty.residual_correlation import LEVEL
 from flightid.validation.residuals.correlation_result import CorrelationTest, Kind, Verdict
@@ -47,7 +47,8 @@ def residual_findings(tests: tuple[CorrelationTest, ...]) -> tuple[Finding, ...]
 
     Notes where chance does it, of as many tests as were made, or where the part that is missed
     lies below `NEGLIGIBLE_PERCENT` of an output that is known; amber below `MATERIAL_PERCENT`.
-    Beside a linear test that fails those of squares and products show no nonlinearity.
+    Beside a linear test that fails those of squares and products show no nonlinearity. The worst
+    comes first: by light, then by the part of the output that is missed, then by chance.
 
     Example
     -------
@@ -55,9 +56,10 @@ def residual_findings(tests: tuple[CorrelationTest, ...]) -> tuple[Finding, ...]
     'residuals-not-testable'
     """
     made = [test for test in tests if test.counts and test.verdict is not Verdict.NOT_TESTABLE]
-    failed = [test for test in made if test.verdict is Verdict.FAIL]
-    found = [_failure(test, len(made)) for test in failed]
-    found = _linear_first(failed, found)
+    failures = [(test, _failure(test, len(made))) for test in made if test.verdict is Verdict.FAIL]
+    failures.sort(key=lambda each: _rank(*each))
+    failed = [test for test, _ in failures]
+    found = _linear_first(failed, [said for _, said in failures])
     if made and not failed:
         found.append(
             Finding(
@@ -79,6 +81,11 @@ def residual_findings(tests: tuple[CorrelationTest, ...]) -> tuple[Finding, ...]
     if not tests:
         found.append(Finding("residuals-not-testable", Light.UNKNOWN, "there are no tests"))
     return tuple(found)
+
+
+def _rank(test: CorrelationTest, said: Finding) -> tuple[int, float, float]:
+    """Place of a failure among all: no order of channels decides which of them a check tells."""
+    return GRAVITY.index(said.light), -(test.worth_percent or 0.0), test.p_value or 0.0
 
 
 def _linear_first(failed: Sequence[CorrelationTest], found: Sequence[Finding]) -> list[Finding]:
