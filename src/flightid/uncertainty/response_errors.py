@@ -12,6 +12,7 @@ from itertools import pairwise
 from typing import TypeAlias
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from flightid.frozen import dataclass
@@ -150,8 +151,12 @@ def estimator_gain(
     require_influence(scale)
     q, triangle = np.linalg.qr(jacobian / scale)
     require_apart(np.diag(triangle))
-    moved = triangle if total is None else q.T @ (total / scale)
-    return np.asarray(np.linalg.solve(moved, q.T @ sensitivity) / scale[:, None])
+    projected = q.T @ sensitivity
+    if total is None:
+        moved = scipy.linalg.solve_triangular(triangle, projected, check_finite=False)
+    else:
+        moved = np.linalg.solve(q.T @ (total / scale), projected)
+    return np.asarray(moved / scale[:, None])
 
 
 def decibel_phase_sensitivity(

@@ -247,18 +247,19 @@ def compare_responses(
     fitted: GreyBoxModel, selected: Sequence[SelectedResponse]
 ) -> tuple[FittedResponse, ...]:
     """Measured and fitted responses side by side, each with its cost J."""
-    result = []
     curves = curves_of(fitted, [each.measured.omega_rad_s for each in selected])
-    for each, curve in zip(selected, curves, strict=True):
-        ratio = curve[each.places] / each.response
-        cost = float(
-            np.sum(
-                each.weight_db * (DECIBEL * np.log(np.abs(ratio))) ** 2
-                + each.weight_deg * (DEGREE * np.angle(ratio)) ** 2
-            )
-        )
-        result.append(FittedResponse(each.name, cost, each.measured, each.omega_rad_s, curve))
-    return tuple(result)
+    points = [curve[each.places] for each, curve in zip(selected, curves, strict=True)]
+    ratio = np.concatenate(points) / np.concatenate([each.response for each in selected])
+    weight_db = np.concatenate([each.weight_db for each in selected])
+    weight_deg = np.concatenate([each.weight_deg for each in selected])
+    missed = weight_db * (DECIBEL * np.log(np.abs(ratio))) ** 2
+    missed += weight_deg * (DEGREE * np.angle(ratio)) ** 2
+    first = np.cumsum([0, *map(len, points)])[:-1]
+    costs = np.add.reduceat(missed, first).tolist()
+    return tuple(
+        FittedResponse(each.name, cost, each.measured, each.omega_rad_s, curve)
+        for each, cost, curve in zip(selected, costs, curves, strict=True)
+    )
 
 
 def band_of(responses: Sequence[FittedResponse]) -> tuple[float, float]:

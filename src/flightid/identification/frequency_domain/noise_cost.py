@@ -52,40 +52,51 @@ def noise_costs(
     sensitivity = coherence_sensitivity(selected, curves, errors)
     ends = np.cumsum([0, *(len(each.places) for each in selected)])
     spans = [slice(*span) for span in pairwise(ends)]
-    found, first = {}, 0
+    # Of responses by their number of points, which are worked out together.
+    alike: dict[int, list[tuple[int, Array, Array]]] = {}
+    first = 0
     shares = _believed(errors.covariances, curves)
     for run, covariance, believed in zip(errors.runs, errors.covariances, shares, strict=True):
+        parts = covariance.reshape(2, half := len(covariance) // 2, 2, half)
         for place in range(run.first, run.first + run.count):
             own = sensitivity.columns[spans[place]] - first
+            span = slice(own[0, 0], own[0, 0] + len(own))
             turned = sensitivity.slopes[spans[place]] * believed[own][:, None]
-            part = _carried(turned, covariance, own)
-            deviation = float(np.sqrt(2.0 * np.sum(part * part)))
-            trace = float(np.einsum("ipip->", part))
-            found[selected[place].name] = NoiseCost(trace, deviation)
+            block = parts[:, span, :, span].transpose(1, 0, 3, 2)
+            alike.setdefault(len(own), []).append((place, turned, block))
         first += len(covariance)
-    return found
+    found: dict[int, NoiseCost] = {}
+    for each in alike.values():
+        places, slopes, blocks = zip(*each, strict=True)
+        part = _carried(np.stack(slopes), np.stack(blocks))
+        deviations = np.sqrt(2.0 * np.sum(part * part, axis=(1, 2)))
+        costs = map(NoiseCost, np.trace(part, axis1=1, axis2=2).tolist(), deviations.tolist())
+        found |= zip(places, costs, strict=True)
+    return {selected[place].name: found[place] for place in sorted(found)}
 
 
-def _carried(slopes: Array, covariance: Array, own: NDArray[np.intp]) -> Array:
+def _carried(slopes: Array, covariances: Array) -> Array:
     """Covariance of pairs of residuals, each of which answers to two of the data alone.
 
     Parameters
     ----------
-    slopes : ndarray, shape (n, 2, 2)
-        Of each pair by its data.
-    covariance : ndarray, shape (m, m)
-        Of all data.
-    own : ndarray of int, shape (n, 2)
-        Data of each pair.
+    slopes : ndarray, shape (r, n, 2, 2)
+        Of each pair by its data, of r responses.
+    covariances : ndarray, shape (r, n, 2, n, 2)
+        Of the data of each response.
 
     Returns
     -------
-    ndarray, shape (n, 2, n, 2)
+    ndarray, shape (r, 2 n, 2 n)
     """
-    n = len(own)
-    half = slopes @ covariance[own[:, :, None], own.ravel()]
-    whole = slopes @ half.reshape(2 * n, n, 2).transpose(1, 2, 0)
-    return whole.reshape(n, 2, n, 2)
+    r, n = slopes.shape[:2]
+    half = _by_pairs(slopes, covariances.reshape(r, n, 2, 2 * n)).reshape(r, 2 * n, n, 2)
+    return _by_pairs(slopes, half.transpose(0, 2, 3, 1)).reshape(r, 2 * n, 2 * n)
+
+
+def _by_pairs(slopes: Array, data: Array) -> Array:
+    """``slopes @ data`` of many small matrices, all at once."""
+    return np.asarray(slopes[..., :1] * data[..., :1, :] + slopes[..., 1:] * data[..., 1:, :])
 
 
 def _believed(covariances: Sequence[Array], curves: Sequence[Complex]) -> list[Array]:
