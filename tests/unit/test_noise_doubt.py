@@ -9,6 +9,7 @@ import scipy.linalg
 import flightid as fid
 from flightid.identification.filter_error.noise_doubt import noise_doubt
 from flightid.identification.filter_error.problem import innovations_problem
+from flightid.identification.filter_error.unseen_noise import unseen_noises
 from flightid.identification.multistart import DenseEnd
 from flightid.identification.regression.options import FilterErrorOptions
 from tests.closeness import assert_close
@@ -34,13 +35,13 @@ def _model() -> fid.StateSpaceModel:
     )
 
 
-def _record(seed: int) -> fid.Record:
+def _record(seed: int, gusts: float = 0.02) -> fid.Record:
     drawn = np.random.default_rng(seed)
     u = 0.1 * np.sign(np.sin(np.arange(N) * STEP_S * 1.3))
     keep, push = np.exp(DAMPING * STEP_S), np.expm1(DAMPING * STEP_S) / DAMPING
     p = np.zeros(N)
     for k in range(N - 1):
-        p[k + 1] = keep * p[k] + push * 4.0 * u[k] + 0.02 * drawn.standard_normal()
+        p[k + 1] = keep * p[k] + push * 4.0 * u[k] + gusts * drawn.standard_normal()
     return fid.Record.from_arrays(
         np.arange(N) * STEP_S,
         inputs={"u": u},
@@ -94,6 +95,51 @@ def test_it_is_what_dense_matrices_make_of_the_noise(level: float) -> None:
     lacking = 0.5 * SPREAD[1, 1] * whole
     assert_close(np.log(found.factor[0]), 0.5 * own * lacking, rtol=1e-3, why=why)
     assert found.factor[0] > 1.01
+
+
+def _misfit(record: fid.Record, process: float, measured: float) -> float:
+    """-2 ln p by dense matrices, level of all noises and what is linear at their best."""
+    u, y = record.matrix(["u"])[0], record.matrix(["rate"])[0]
+    keep, push = np.exp(DAMPING * STEP_S), np.expm1(DAMPING * STEP_S) / DAMPING
+    drive = process * np.expm1(2.0 * DAMPING * STEP_S) / (2.0 * DAMPING)
+    moved = np.zeros((N, N))
+    moved[1:] = scipy.linalg.toeplitz(keep ** np.arange(N), np.zeros(N))[:-1]
+    first = keep ** np.arange(N)
+    noise = drive * moved @ moved.T + measured * np.eye(N)
+    lower = np.linalg.cholesky(noise)
+    table = np.column_stack([moved @ (push * u), first, np.ones(N), y])
+    white = scipy.linalg.solve_triangular(lower, table, lower=True)
+    rest = white[:, 3] - white[:, :3] @ np.linalg.lstsq(white[:, :3], white[:, 3])[0]
+    return float(N * np.log(rest @ rest) + 2.0 * np.sum(np.log(np.diag(lower))))
+
+
+def test_noise_that_came_out_as_none_may_be_there() -> None:
+    """What is possible of it by the likelihood itself, and its share of bars by dense matrices."""
+    record = _record(3, 0.0)
+    options = FilterErrorOptions(hold="zero", process_noise=("p",))
+    problem = innovations_problem(_model(), [record], options)
+    (measured,) = problem.noise(np.array([4.0, 0.0]))[1]
+    scale = float(problem.process_scale[0] ** 2)
+    value = fid.identify(_model(), record, method="filter_error").parameters["Ld"].value
+    x = np.array([value, -problem.reach[0]])
+    residuals, jacobian = problem.residuals(x, with_slopes=True)
+    end = DenseEnd(x, float(residuals @ residuals), 1, "gradient", residuals, jacobian)
+    columns = np.array([True, False])
+    (found,) = unseen_noises(problem, end)
+    # Steps of deviation up to a tenth of the motion, all as likely before.
+    levels = np.linspace(0.0, 1.0, 61) ** 2
+    misfit = np.array([_misfit(record, level * scale, measured) for level in levels])
+    chance = np.exp(0.5 * (misfit[0] - misfit))
+    assert np.argmax(chance) == 0
+    mean = np.sum(levels * chance) / np.sum(chance)
+    assert_close(found.mean, mean, rtol=0.1, why="parameters stay at their values")
+    made = noise_doubt(problem, end, columns, SPREAD[:1, :1])
+    none, some = (_dense(record, q * scale, measured)[0] for q in (1e-9, 1e-5))
+    grown = 1.0 + found.mean * (some - none) / 1e-5
+    assert_close(made.factor[0] ** 2, grown, rtol=1e-2, why="two ways to one slope")
+    assert made.factor[0] > 1.02
+    doubt = (grown - 1.0) * found.deviation / found.mean / grown
+    assert_close(made.variance[0], doubt**2, rtol=0.1, why="two ways to one slope")
 
 
 def test_bars_of_a_short_record_know_that_it_tells_its_noise() -> None:

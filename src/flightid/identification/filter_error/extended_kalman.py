@@ -79,7 +79,7 @@ class ExtendedProblem(InnovationsProblem):
         return cls(
             problem.model, problem.data, problem.noisy, problem.process_scale,
             problem.output_scale, problem.output_bias, problem.input_bias, problem.hold,
-            substeps=tuple(substeps), state_scale=state_scale,
+            reference=problem.reference, substeps=tuple(substeps), state_scale=state_scale,
         )  # fmt: skip
 
     def records(self, unknowns: Array, *, with_slopes: bool) -> list[Filtered]:
@@ -148,8 +148,7 @@ class ExtendedProblem(InnovationsProblem):
             densities[place, state] = 2.0 * process[state]
         begun = np.zeros((count, *prior.shape))
         seen = first_outputs(self.model, data.inputs, data.outputs)
-        for output in range(1, p):
-            place = self.n_free + len(self.noisy) + output - 1
+        for place, output in enumerate(self.measured, self.n_free + len(self.noisy)):
             variances[place, output] = 2.0 * variance[output]
             begun[place, :n, :n] = WIDE * seen.noise(np.diag(variances[place]))
         return values, begun, densities, variances

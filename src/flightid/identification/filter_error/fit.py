@@ -24,7 +24,13 @@ from flightid.identification.filter_error.innovation_covariance import innovatio
 from flightid.identification.filter_error.innovations import InnovationsProblem, RecordInnovations
 from flightid.identification.filter_error.noise_doubt import noise_doubt
 from flightid.identification.filter_error.problem import innovations_problem
-from flightid.identification.filter_error.search import NEAR, across_jumps, minimise, with_gust
+from flightid.identification.filter_error.search import (
+    NEAR,
+    across_jumps,
+    anchored,
+    minimise,
+    with_gust,
+)
 from flightid.identification.fit import Fit
 from flightid.identification.fitted_record import FittedRecord
 from flightid.identification.innovation_tests import innovation_tests
@@ -82,10 +88,10 @@ def fit_filter_error(
     tried = options.gust_states and not isinstance(problem, ExtendedProblem) and judged()
     # Ends of several starts are compared with each other: those are searched to the last.
     groups = cluster(_search(problem, options, NEAR if tried and options.starts == 1 else 0.0))
+    limits = limits_of(model, options.maximum_iterations)[1]
     if tried:
-        problem, groups = with_gust(
-            problem, groups, limits_of(model, options.maximum_iterations)[1]
-        )
+        problem, groups = with_gust(problem, groups, limits)
+    problem, groups = anchored(problem, groups, limits)
     end = groups[0][0]
     inner = Inner.of(model, end.x[: problem.n_free])
     filtered = [found for found, _ in problem.records(end.x, with_slopes=False)]

@@ -53,21 +53,34 @@ def innovation_covariance(
         n, p = each.innovations.shape
         rows = slice(first, first + n * p)
         first = rows.stop
-        basis = _by_output(each.space, n, p)
+        turn = _own_outputs(each.filter.innovation)
+        basis = _by_output(each.space, n, p, turn)
         blocks.append(
             RecordBlock(
-                _by_output(jacobian[rows], n, p),
+                _by_output(jacobian[rows], n, p, turn),
                 np.zeros((basis.shape[1], jacobian.shape[1])),
                 basis,
                 np.eye(basis.shape[1]),
-                np.ascontiguousarray(residuals[rows].reshape(n, p).T),
+                np.ascontiguousarray(turn @ residuals[rows].reshape(n, p).T),
             )
         )
     still = jacobian[first:]
     return residual_covariance(blocks, JointResiduals(still, still, measured=False))
 
 
-def _by_output(rows: Array, n_samples: int, n_outputs: int) -> Array:
-    """Rows of samples after samples as rows of outputs after outputs."""
-    turned = rows.reshape(n_samples, n_outputs, -1).swapaxes(0, 1)
+def _own_outputs(innovation: Array) -> Array:
+    """Turns innovations that a triangle whitened to those that a symmetric root whitens.
+
+    A triangle takes the first outputs out of the last; the root of correlations, by each output's
+    own deviation, knows no order and no units, and so does the colour of what it leaves.
+    """
+    triangle = np.linalg.cholesky(innovation)
+    size = np.sqrt(np.diag(innovation))
+    values, along = np.linalg.eigh(innovation / np.outer(size, size))
+    return np.asarray((along / np.sqrt(values)) @ along.T @ (triangle / size[:, None]))
+
+
+def _by_output(rows: Array, n_samples: int, n_outputs: int, turn: Array) -> Array:
+    """Rows of samples after samples, turned, as rows of outputs after outputs."""
+    turned = np.tensordot(turn, rows.reshape(n_samples, n_outputs, -1), axes=(1, 1))
     return np.ascontiguousarray(turned).reshape(n_samples * n_outputs, -1)

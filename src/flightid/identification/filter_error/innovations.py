@@ -92,8 +92,8 @@ class InnovationsProblem:
     """A model and its records; unknowns are θ, then log deviations of the noises.
 
     Process noise acts on the derivatives of `noisy` states with density exp(2 λ) times that
-    state's `process_scale`²; outputs have deviation exp(ρ) times `output_scale`. The first output's
-    ρ is zero: one common factor of all noises is known from the sum of squares.
+    state's `process_scale`²; outputs have deviation exp(ρ) times `output_scale`. The ρ of the
+    output `reference` is zero: one common factor of all noises is known from the sum of squares.
 
     Attributes
     ----------
@@ -108,6 +108,8 @@ class InnovationsProblem:
     hold : str
     gust : Gust or None
         Its logarithms are the last two unknowns, its state the last of all states.
+    reference : int
+        Output whose noise the factor is told by: not one whose noise may be none.
     """
 
     model: StateSpaceModel
@@ -119,6 +121,7 @@ class InnovationsProblem:
     input_bias: bool
     hold: str
     gust: Gust | None = None
+    reference: int = 0
 
     @property
     def n_free(self) -> int:
@@ -149,13 +152,18 @@ class InnovationsProblem:
         """Innovations of all records, and one row for each output of each record."""
         return self.n_measured + sum(len(each.outputs) for each in self.data)
 
+    @property
+    def measured(self) -> tuple[int, ...]:
+        """Outputs whose noises are unknowns, in their order."""
+        return tuple(k for k in range(len(self.model.outputs)) if k != self.reference)
+
     def noise(self, unknowns: Array) -> tuple[Array, Array]:
         """Process densities by state and output variances, relative to the common factor."""
         process = np.zeros(len(self.model.states))
         count = len(self.noisy)
         driven, rest = np.split(unknowns[self.n_free :], [count])
         process[list(self.noisy)] = self.process_scale**2 * np.exp(2.0 * driven)
-        logs = np.concatenate([[0.0], rest[: len(self.model.outputs) - 1]])
+        logs = np.insert(rest[: len(self.model.outputs) - 1], self.reference, 0.0)
         if self.gust is not None:
             process = self.gust.process(process, unknowns[-GUST_UNKNOWNS:])
         return process, self.output_scale**2 * np.exp(2.0 * logs)
@@ -185,7 +193,7 @@ class InnovationsProblem:
             density = np.zeros((n, n))
             density[state, state] = 2.0 * process[state]
             slopes.append(ContinuousPoint(*still, density, none_r))
-        for output in range(1, p):
+        for output in self.measured:
             wider = np.zeros((p, p))
             wider[output, output] = 2.0 * variance[output]
             slopes.append(ContinuousPoint(*still, none_w, wider))

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.identification.filter_error.innovations import InnovationsProblem
+from flightid.identification.filter_error.unseen_noise import unseen_noises
 from flightid.identification.multistart import DenseEnd
 
 Array = NDArray[np.float64]
@@ -20,6 +21,9 @@ LEAST_STEP, LARGEST_STEP = 0.02, 1.0
 """Logarithms by which a noise is moved: its standard error, but no less and no more."""
 FARTHEST = 1.0
 """Logarithm by which noises may be too small; beyond it nothing is known of them."""
+
+FAINT = -6.0
+"""Logarithm of a process noise that adds nothing yet; slopes by its square are exact there."""
 
 
 class NoiseDoubt(NamedTuple):
@@ -57,7 +61,8 @@ def noise_doubt(
 
     Assumes
     -------
-    Noises within about a standard error of the truth; those that came out as none stay none.
+    Noises within about a standard error of the truth. Process noise that came out as none may be
+    there by what the record leaves possible (`unseen_noises`); other noises at a bound stay there.
 
     Reference
     ---------
@@ -87,8 +92,32 @@ def noise_doubt(
                 break
     by_noise, whole = slopes[:, :count], slopes[:, count]
     lacking = np.clip(0.5 * spread @ whole, -FARTHEST, FARTHEST)
-    variance = np.einsum("ik,ij,jk->k", by_noise, spread, by_noise)
-    return NoiseDoubt(np.exp(0.5 * by_noise.T @ lacking), np.asarray(variance))
+    longer, variance = _by_unseen(problem, end, columns, here[:count])
+    variance += np.einsum("ik,ij,jk->k", by_noise, spread, by_noise)
+    return NoiseDoubt(np.exp(0.5 * (by_noise.T @ lacking + longer)), variance)
+
+
+def _by_unseen(
+    problem: InnovationsProblem, end: DenseEnd, columns: NDArray[np.bool_], here: Array
+) -> tuple[Array, Array]:
+    """What process noises at zero add to the logarithms of variances, and their doubt of it.
+
+    Weights of a filter without them stay: variances grow with each density as at zero, for a filter
+    that knew of it would do better than this one.
+    """
+    places = np.flatnonzero(columns)[: len(here)]
+    grown, square = np.ones_like(here), np.zeros_like(here)
+    for noise in unseen_noises(problem, end):
+        x = end.x.copy()
+        x[noise.place] = FAINT
+        residuals, jacobian = problem.residuals(x, with_slopes=True)
+        if not np.all(np.isfinite(jacobian)):
+            continue
+        there = _sizes(problem, x, jacobian, float(residuals @ residuals), places)[:-1]
+        slope = np.maximum(there - here, 0.0) / np.exp(2.0 * FAINT)
+        grown += slope * noise.mean
+        square += (slope * noise.deviation) ** 2
+    return np.log(grown), square / grown**2
 
 
 def _sizes(

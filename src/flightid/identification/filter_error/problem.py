@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flightid.errors import UnknownNameError
 from flightid.identification.filter_error.extended_kalman import (
@@ -27,12 +28,17 @@ from flightid.record import Record
 
 _FIRST_SHARE = 0.1
 _FLOOR = 1e-6
+_NONE = 1e-5
+"""Share of an output's size below which its white noise is what rounding leaves."""
 
 
 def innovations_problem(
     model: StateSpaceModel, records: Sequence[Record], options: FilterErrorOptions
 ) -> InnovationsProblem:
     """What is searched: noises begin at a tenth of the motion, and at the outputs' white levels.
+
+    The noises' common factor is told by the output whose white noise is the least part of it, in
+    any order of outputs: what gusts shake at each sample has some that the filter takes off.
 
     Parameters
     ----------
@@ -76,11 +82,13 @@ def innovations_problem(
     found = [white_levels(each.outputs) for each in data]
     level = np.sqrt(np.mean([levels**2 for levels in found], axis=0))
     reach = sizes_of_states(point, spread)
+    scale = np.maximum(level, _FLOOR * spread + 1e-300)
     made = replace(
         blank,
         noisy=noisy,
         process_scale=_FIRST_SHARE * reach[list(noisy)],
-        output_scale=np.maximum(level, _FLOOR * spread + 1e-300),
+        output_scale=scale,
+        reference=_reference(scale / np.maximum(spread, 1e-300)),
     )
     if not varies:
         return made
@@ -90,6 +98,12 @@ def innovations_problem(
     prepared = prepare_records(model, records, own)
     require_distinct(model, prepared, equation_runs(model, prepared))
     return ExtendedProblem.along(made, steps, reach)
+
+
+def _reference(share: NDArray[np.float64]) -> int:
+    """Output of the least white noise over its own size, of those in which some is seen."""
+    seen = share > _NONE
+    return int(np.argmin(np.where(seen | ~seen.any(), share, np.inf)))
 
 
 def _places(names: Sequence[str], states: list[str]) -> tuple[int, ...]:

@@ -216,6 +216,35 @@ def _gained(problem: InnovationsProblem, end: DenseEnd, tried: DenseEnd) -> floa
     return problem.n_measured * math.log(end.cost / tried.cost)
 
 
+def anchored(
+    problem: InnovationsProblem, groups: list[list[DenseEnd]], limits: SearchBounds
+) -> tuple[InnovationsProblem, list[list[DenseEnd]]]:
+    """The problem and its ends, all noises told by one that is there.
+
+    Where the output that tells the common factor has no noise after all, all other noises run to
+    the upper ends of their reach: the search goes on from there by the loudest output.
+    """
+    end, reach = groups[0][0], problem.reach
+    noises = end.x[problem.n_free :]
+    first = len(problem.noisy)
+    rest = noises[first : first + len(problem.measured)]
+    if not np.any(noises >= reach - 1e-6) or not np.any(rest > 0.0):
+        return problem, groups
+    loudest = int(np.argmax(rest))
+    logs = np.insert(rest, problem.reference, 0.0)
+    told = replace(problem, reference=problem.measured[loudest])
+    moved = noises - rest[loudest]
+    moved[first : first + len(rest)] = logs[list(told.measured)] - rest[loudest]
+    if problem.gust is not None:
+        moved[-1] = noises[-1]
+    start = np.concatenate([end.x[: problem.n_free], np.clip(moved, -reach, reach)])
+    found = minimise(told, start, inside_cell(problem, end, limits))
+    if not found.cost <= end.cost * (1.0 + 1e-9):
+        return problem, groups
+    found = replace(found, iterations=end.iterations + found.iterations)
+    return told, [[found, *groups[0][1:]], *groups[1:]]
+
+
 def _followed(
     problem: InnovationsProblem, groups: list[list[DenseEnd]], limits: SearchBounds
 ) -> list[list[DenseEnd]]:
