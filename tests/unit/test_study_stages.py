@@ -440,8 +440,8 @@ def test_gains_to_fly_next_stand_beside_those_that_flew() -> None:
     assert table.shown() == [["roll", "P", "0.1", "0.2", "0.4", "4"]]
 
 
-def test_lights_of_models_are_of_what_their_lines_say() -> None:
-    """The reason of three ambers stood apart, and left three amber lines that say nothing amber."""
+def test_lines_of_models_keep_their_lights_where_a_reason_stands_apart() -> None:
+    """The reason of two ambers stood apart, and left two green lines of models that are amber."""
 
     def model(name: str, predicted: Light) -> SimpleNamespace:
         checks = (
@@ -454,11 +454,14 @@ def test_lights_of_models_are_of_what_their_lines_say() -> None:
 
     items = [model("p", Light.GREEN), model("q", Light.GREEN)]
     lines = models_in_short(items).findings  # type: ignore[arg-type]
-    assert [each.light for each in lines] == [Light.GREEN, Light.GREEN, Light.AMBER]
-    assert lines[-1].message == "p, q: flown once"
+    lights = [item.fit.evidence.light for item in items]
+    assert [each.light for each in lines[:-1]] == lights == [Light.AMBER, Light.AMBER]
+    assert lines[0].message.endswith("predicts p; amber for what is said of both below")
+    assert (lines[-1].message, lines[-1].light) == ("p, q: flown once", Light.AMBER)
     assert lines[-1].action == "repeat it"
     (alone,) = models_in_short(items[:1]).findings  # type: ignore[arg-type]
     assert (alone.light, "flown once" in alone.message) == (Light.AMBER, True)
+    assert "below" not in alone.message
 
 
 def test_no_model_is_none_to_use() -> None:

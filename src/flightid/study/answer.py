@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from flightid.conventions import Light
 from flightid.errors import FlightidError
-from flightid.evidence.evidence import GUIDELINES, LOOP, PREDICTION, Check
+from flightid.evidence.evidence import LOOP, Check
 from flightid.findings import Finding, counted, said_once, worst
 from flightid.frozen import dataclass
 from flightid.models import NarxModel
@@ -105,30 +105,25 @@ def in_short(item: ModelResults) -> Finding:
 def models_in_short(items: Sequence[ModelResults]) -> Lights:
     """One line about each model; a last reason that several share, and its action, is said once.
 
-    What is left of a line then has the light of what it says, not of the reason that went.
+    What is left of a line keeps the light of its model, and says where the reason stands.
     """
     lines = [in_short(item) for item in items]
-    groups: dict[tuple[str, str, str], list[int]] = {}
+    groups: dict[tuple[Light, str, str], list[int]] = {}
     for place, line in enumerate(lines):
         _, found, reason = line.message.rpartition("; ")
         if found:
             groups.setdefault((line.light, reason, line.action), []).append(place)
     for (light, reason, action), places in groups.items():
         if len(places) > 1:
+            whose = "both" if len(places) == 2 else f"all {len(places)}"
+            where = f"; {light.words} for what is said of {whose} below"
             for place in places:
                 said = lines[place].message.removesuffix(f"; {reason}")
-                left = _said_light(items[place])
-                lines[place] = replace(lines[place], message=said, action="", light=left)
+                told = "" if light is Light.GREEN else where
+                lines[place] = replace(lines[place], message=said + told, action="")
             names = ", ".join(items[place].name for place in places)
-            lines.append(Finding("model", Light(light), f"{names}: {reason}", action))
+            lines.append(Finding("model", light, f"{names}: {reason}", action))
     return Lights(tuple(lines), repeats=True)
-
-
-def _said_light(item: ModelResults) -> Light:
-    """The light of what a line says of a fit beside its reason: cost and prediction."""
-    checks = () if item.fit is None else map(item.fit.evidence.check, (PREDICTION, GUIDELINES))
-    told = tuple(check.finding for check in checks if check is not None)
-    return worst(told) if told else Light.UNKNOWN
 
 
 def short_document(
