@@ -16,6 +16,7 @@ from flightid.inspection import Inspection
 from flightid.record import Record
 from flightid.responses import FrequencyResponse
 from flightid.study.identified import ModelResults
+from flightid.study.kept_runs import agreement_of_kept
 from flightid.study.stages import NOT_TESTED
 from flightid.validation import Verification
 from flightid.validation.verification.of_the_fit import SEEN
@@ -58,6 +59,7 @@ def examined(fit: Fit, item: ModelResults, inspection: Inspection | None) -> Fit
         checks.append(Check(PREDICTION, worst(tuple(said)), seen[0].message, seen[0].action))
     checks += _bands(fit, item, checks)
     checks += _found_once(fit, checks)
+    checks += agreement_of_kept(fit, item.on_unseen, checks, inspection)
     checks += _guidelines(fit.evidence, item.findings_of_choice)
     return replace(fit, evidence=fit.evidence.with_checks(checks))
 

@@ -27,7 +27,7 @@ def swept_band(asked: GroupScans) -> tuple[float, float] | None:
     low, high = _resolved(*parts[0])
     for name in asked.scans.injected:
         moved = [(r[name][at], r.sample_rate_hz) for r, at in parts if _moves(r, at, name)]
-        ends = [_reached(*each) for each in moved]
+        ends = [reached(*each) for each in moved]
         if ends:
             low = max(low, min(first for first, _ in ends))
             high = min(high, max(last for _, last in ends))
@@ -106,7 +106,7 @@ def _is_of(injected: str, channel: str) -> bool:
     return injected == channel or injected.endswith(f"_{channel}")
 
 
-def _reached(samples: NDArray[np.float64], rate_hz: float) -> tuple[float, float]:
+def reached(samples: NDArray[np.float64], rate_hz: float) -> tuple[float, float]:
     """Frequencies between which all but `REACHED` at either end of a channel's power lies."""
     power = np.abs(np.fft.rfft(samples - np.mean(samples))) ** 2
     share = np.cumsum(power) / np.sum(power)
