@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scipy.linalg
+import scipy.signal
 
 import flightid as fid
 from flightid.identification.filter_error.noise_doubt import noise_doubt
@@ -148,3 +149,47 @@ def test_bars_of_a_short_record_know_that_it_tells_its_noise() -> None:
     assert freedom is not None
     # The innovations alone would tell some 240.
     assert 5.0 < freedom < 120.0
+
+
+@pytest.mark.parametrize("seed", [3, 9])
+def test_a_noise_that_is_nearly_none_leaves_bars_of_a_size(seed: int) -> None:
+    """Its logarithm, which the record does not tell, made bars of 1e114 or of no number at all."""
+    drawn, step_s, damped = np.random.default_rng(seed), 0.04, 0.95
+    u = np.zeros(250)
+    for begin in (25, 117):
+        u[begin : begin + 63] = np.repeat([1.0, -1.0, 1.0, -1.0], [27, 18, 9, 9])
+    a, b = np.array([[-1.3, 1.0], [-7.0, -1.8]]), np.array([[0.0], [-9.0]])
+    held = scipy.signal.cont2discrete((a, b, np.eye(2), np.zeros((2, 1))), step_s)
+    _, y, _ = scipy.signal.dlsim(held, u)
+    white = drawn.standard_normal((450, 2))
+    noise = scipy.signal.lfilter([np.sqrt(1.0 - damped**2)], [1.0, -damped], white, axis=0)[200:]
+    y = y + 0.08 * y.std(axis=0) * noise
+    model = fid.StateSpaceModel.from_dict(
+        {
+            "name": "short period",
+            "states": {"alpha": "rad", "q": "rad/s"},
+            "inputs": {"de": "1"},
+            "outputs": {"alpha": "alpha", "q": "q"},
+            "parameters": {
+                "Za": {"value": -1.0, "unit": "1/s"},
+                "Ma": {"value": -5.0, "unit": "1/s^2"},
+                "Mq": {"value": -1.2, "unit": "1/s"},
+                "Mde": {"value": -6.0, "unit": "1/s^2"},
+            },
+            "equations": {"alpha'": "Za*alpha + q", "q'": "Ma*alpha + Mq*q + Mde*de"},
+        }
+    )
+    record = fid.Record.from_arrays(
+        np.arange(250) * step_s,
+        inputs={"de": u},
+        outputs={"alpha": y[:, 0], "q": y[:, 1]},
+        units={"de": "1", "alpha": "rad", "q": "rad/s"},
+        hold="zero",
+    )
+    fit = fid.identify(model, record, method="filter_error")
+    for name, true in {"Za": -1.3, "Ma": -7.0, "Mq": -1.8, "Mde": -9.0}.items():
+        found = fit.parameters[name]
+        assert found.interval95 is not None and found.stderr is not None
+        low, high = found.interval95
+        assert low < true < high
+        assert high - low < 20.0 * found.stderr

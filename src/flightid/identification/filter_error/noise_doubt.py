@@ -93,7 +93,10 @@ def noise_doubt(
     by_noise, whole = slopes[:, :count], slopes[:, count]
     lacking = np.clip(0.5 * spread @ whole, -FARTHEST, FARTHEST)
     longer, variance = _by_unseen(problem, end, columns, here[:count])
-    variance += np.einsum("ik,ij,jk->k", by_noise, spread, by_noise)
+    # What a noise that is nearly none does to a parameter ends where the noise is gone, however
+    # little the record tells of its logarithm: slopes reach as far as noises were moved.
+    near = by_noise * np.minimum(1.0, LARGEST_STEP / np.sqrt(np.diag(spread)))[:, None]
+    variance += np.einsum("ik,ij,jk->k", near, spread, near)
     return NoiseDoubt(np.exp(0.5 * (by_noise.T @ lacking + longer)), variance)
 
 
