@@ -43,6 +43,11 @@ from flightid.identification.frequency_domain.left_by_model import LeftByModel
 from flightid.identification.frequency_domain.longer_windows import judge_windows
 from flightid.identification.frequency_domain.model_curves import curves_of, start_curves
 from flightid.identification.frequency_domain.noise_cost import noise_costs
+from flightid.identification.frequency_domain.noisy_points import (
+    judge_weights,
+    why_weighed_by_chance,
+    without_vague,
+)
 from flightid.identification.frequency_domain.opened import opened
 from flightid.identification.frequency_domain.options import FrequencyDomainOptions
 from flightid.identification.frequency_domain.response_parts import PartComparison
@@ -133,13 +138,16 @@ def _fit_selected(
         bias=bias_of_points(fitted, data, errors, options.hold) if judged() else None,
     )
     bent = judge_feedback(found.names, found.covariance, found.bias)
-    setup += [*bent, *judge_windows(fitted, data)]
+    chance = why_weighed_by_chance(data, selected, options.cost)
+    setup += [*bent, *judge_weights(chance), *judge_windows(fitted, data)]
     noise = noise_costs(selected, points, by_noise) if judged() else {}
     fit = _assemble(fitted, options, data, groups, responses, found, setup, noise)
     left = None if curves is None else LeftByModel(without, fitted, band_of(responses))
     fit = replace(fit, provenance={**fit.provenance, "estimator_bias": correction}, left=left)
-    reason = why_misfit(fit.average_cost, noise) or why_bent(data, found.bias, bent)
-    return without_intervals(fit, reason) if reason and not withheld else fit
+    reason = why_misfit(fit.average_cost, noise) or why_bent(data, found.bias, bent) or chance
+    if withheld:
+        return fit
+    return without_intervals(fit, reason) if reason else without_vague(fit, data, selected)
 
 
 def select_by(

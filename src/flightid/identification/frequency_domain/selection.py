@@ -22,7 +22,8 @@ COST_POINTS = 20.0
 """The cost is scaled as if 20 frequencies were fitted, whatever their number."""
 MINIMUM_POINTS = 3
 _EDGE = 1e-9
-_BY_EXCITATION = "instrument"
+BY_EXCITATION = "instrument"
+"""How estimates by way of a logged excitation begin their name."""
 COHERENT_ALONE = (
     'fit the coherent responses alone: responses = "coherent" in a study, '
     "model.with_responses(*flightid.coherent_pairs(response).names) in Python"
@@ -130,7 +131,7 @@ def select_points(
         chosen = []
         for name, measured in zip(names, pairs, strict=True):
             band = bands.get(name) if isinstance(bands, Mapping) else bands
-            pair = _steady(measured) if data.estimator.startswith(_BY_EXCITATION) else measured
+            pair = _steady(measured) if data.estimator.startswith(BY_EXCITATION) else measured
             places = _places(pair, name, band, n_omega, minimum_coherence, end)
             weight = COST_POINTS / len(places) * coherence_weight(pair.coherence[places])
             chosen.append((places, weight))
