@@ -13,8 +13,11 @@ import pytest
 import flightid as fid
 from flightid.control.margins import gain_limits
 from flightid.control.margins.loop_source import read_loop
+from flightid.control.margins.low_mode_slack import MOST_LOWERED_DB, LowModeSlack
 from flightid.control.margins.margins import margins_of
 from flightid.control.margins.resonance_slack import TAKEN
+from flightid.control.tuning.axis_tuning import held_by_hand
+from flightid.control.tuning.findings import verdict
 from flightid.conventions import Light
 from flightid.evidence.evidence import Check, Evidence
 from flightid.uncertainty.shown_bands import shown_words
@@ -54,7 +57,7 @@ def test_a_frame_above_the_band_takes_no_promised_gain_margin() -> None:
     values = {NAMES[n]: v for n, v in {"p": 0.05, "i": 0.05, "d": 7e-4, "angle_p": 4.0}.items()}
     loop = fid.axis_loop("arducopter", "roll", loop_rate_hz=1 / hover.STEP_S)
     asked = {"gains": loop.with_gains(values), "gyro": "raw", "nominal": True, "draws": 1}
-    design = fid.tune_pid(plant, band_rad_s=(1.0, 64.0), **asked)
+    design = fid.tune_pid(plant, band_rad_s=(0.1, 64.0), **asked)
     promised = {
         name: design.worst_case("rate loop", name).worst
         for name in ("gain margin", "sensitivity peak")
@@ -189,7 +192,46 @@ def test_of_a_phase_that_is_read_below_the_band_nothing_is_promised(
     asked = {"band_rad_s": (low, 100.0), "nominal": True, "by_hand": kept}
     design = fid.tune_pid(plant, gains=flown, **asked)  # type: ignore[arg-type]
     assert 1.0 < design.worst_case("angle loop", "crossover").nominal < 4.0  # type: ignore[operator]
-    said = [each.light for each in design.findings if each.code == "margin-below-band"]
-    assert said == ([] if promised else [Light.AMBER])
+    said = [each for each in design.findings if each.code == "margin-below-band"]
+    assert [each.light for each in said] == ([] if promised else [Light.AMBER])
     assert (design.worst_case("angle loop", "phase margin").worst is not None) is promised
     assert design.worst_case("rate loop", "phase margin").worst is not None
+    found = replace(held_by_hand(design.problem, _gains_of(design)), exists=True)
+    light = verdict(found, np.ones(300, dtype=bool), 300, design.worst_cases, (low, 100.0))
+    assert light.light is (Light.GREEN if promised else Light.AMBER)
+    assert f"requirement in the band shown, {low:g} to 100 rad/s: at least" in light.message
+    if not promised:
+        for name in ("gain margin", "sensitivity peak", "crossover", "delay margin"):
+            case = design.worst_case("angle loop", name)
+            assert (case.worst, case.estimate.interval95) == (None, None)
+        assert "sweep from 1.3 rad/s or lower" in said[0].action
+
+
+@pytest.mark.parametrize("shift", [0.9, 1.12])
+def test_a_pendulum_below_the_band_takes_no_promised_number(shift: float) -> None:
+    """Pole beside zero at 4.55 rad/s: the loop falls towards the zero and may turn there."""
+    w = np.geomspace(0.1, 500.0, 200_000)
+    s, low = 1j * w, w < 5.78
+    model = 120.0 / s * 60.0 / (s + 60.0)
+    zero, pole = 4.55, 4.55 * shift
+    mode = (s**2 + 0.06 * zero * s + zero**2) / (s**2 + 0.06 * pole * s + pole**2)
+    assert np.abs(mode).min() > 10.0 ** (-MOST_LOWERED_DB / 20.0)
+    angle = [3.0 / s * r / (1.0 + r) for r in (model, model * mode)]
+    slack = LowModeSlack.below(model[low])
+    assert slack.left_db == pytest.approx(20.0 * np.log10(np.abs(model[low]).min()) - 20.0)
+    around = LowModeSlack.below_around(angle[0][low], model[low])
+    assert np.abs(model * mode)[low].min() >= 10.0 ** (slack.left_db / 20.0)
+    assert np.abs(angle[1])[low].min() >= 10.0 ** (around.left_db / 20.0)
+    peak = (1.0 / np.abs(1.0 + model * mode))[low].max()
+    assert peak <= slack.edge("sensitivity_peak")  # type: ignore[operator]
+    assert around.takes_all(6.0), "the angle loop is at one there"
+    assert not slack.takes_all(6.0)
+    weak = LowModeSlack.below(model[low] / 15.0)
+    assert np.abs(model * mode / 15.0)[low].min() < 1.0
+    assert weak.takes_all(6.0)
+    assert weak.takes("gain_margin_db", 6.0)
+    assert LowModeSlack().edge("sensitivity_peak") is None
+
+
+def _gains_of(design: fid.PidDesign) -> np.ndarray:
+    return np.asarray(design.problem.paths.gains_of(design.loop))  # type: ignore[attr-defined]

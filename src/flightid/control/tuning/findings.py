@@ -10,13 +10,15 @@ from numpy.typing import NDArray
 from flightid.control.autopilots import AxisLoop
 from flightid.control.gyro import Gyro
 from flightid.control.margins.findings import COHERENCE
+from flightid.control.margins.low_mode_slack import MOST_LOWERED_DB, TAKEN_BELOW
 from flightid.control.tuning.axis_tuning import AxisResult
 from flightid.control.tuning.gain_search import INTEGRAL, LOW_END
 from flightid.control.tuning.gain_search_result import NO_GAINS, GainSearchResult
 from flightid.control.tuning.gain_steps import Stage, TunedGain
 from flightid.control.tuning.limits import ANGLE
+from flightid.control.tuning.margins_below import BELOW_BAND
 from flightid.control.tuning.order_statistics import ENOUGH, least_share
-from flightid.control.tuning.worst_cases import BELOW_BAND
+from flightid.control.tuning.worst_cases import WorstCase
 from flightid.conventions import Light
 from flightid.findings import Finding, at_least
 
@@ -39,7 +41,13 @@ ADVICE = {
 }
 
 
-def verdict(found: GainSearchResult, met: NDArray[np.bool_], drawn: int) -> Finding:
+def verdict(
+    found: GainSearchResult,
+    met: NDArray[np.bool_],
+    drawn: int,
+    worst_cases: Sequence[WorstCase] = (),
+    band_rad_s: tuple[float, float] | None = None,
+) -> Finding:
     """Whether there are gains, and for how many plants: the one light of gains, wherever it shows.
 
     Parameters
@@ -50,6 +58,10 @@ def verdict(found: GainSearchResult, met: NDArray[np.bool_], drawn: int) -> Find
         Which fresh plants meet every requirement.
     drawn : int
         How many were drawn, those that were left out among them; 0: none.
+    worst_cases : sequence of WorstCase
+        What is promised: plants speak of no frequency at which nothing was shown.
+    band_rad_s : tuple of float or None
+        Where the model was shown to hold, rad/s.
     """
     if not found.exists:
         return _no_gains(found)
@@ -60,13 +72,17 @@ def verdict(found: GainSearchResult, met: NDArray[np.bool_], drawn: int) -> Find
         said = f"gains found for the model alone; {_bound(found)}"
         return Finding("gains", Light.AMBER, said)
     good, share = int(met.sum()), least_share(int(met.sum()), drawn)
+    low = bool(_at_one_below(worst_cases))
+    shown = ""
+    if band_rad_s is not None:
+        shown = f" in the band shown, {band_rad_s[0]:.3g} to {band_rad_s[1]:.3g} rad/s"
     return Finding(
         "gains",
-        Light.GREEN if share >= ENOUGH else Light.AMBER,
-        f"{good} of {drawn} fresh plants meet every requirement: at least "
+        Light.GREEN if share >= ENOUGH and not low else Light.AMBER,
+        f"{good} of {drawn} fresh plants meet every requirement{shown}: at least "
         f"{at_least(100.0 * share, 1)} % of those that the data allow (95 % confidence); "
         f"{_bound(found)}",
-        "" if share >= ENOUGH else "draw more plants for the search",
+        "draw more plants for the search" if share < ENOUGH else _sweep(band_rad_s) if low else "",
     )
 
 
@@ -245,7 +261,7 @@ def _behind_rate_loop(result: AxisResult, omega: Array, coherence: Array) -> Arr
 
 
 def below_band(result: AxisResult, band_rad_s: tuple[float, float] | None) -> Iterator[Finding]:
-    """Amber where a loop passes one below the band: its phase margin there is the model's word.
+    """Amber where a loop is at one below the band, as a light mode there may take all it has.
 
     Parameters
     ----------
@@ -253,13 +269,44 @@ def below_band(result: AxisResult, band_rad_s: tuple[float, float] | None) -> It
     band_rad_s : tuple of float or None
         Where the model was shown to hold, rad/s; nothing is said where that is not known.
     """
-    found = [e.loop for e in result.worst_cases if e.required and e.estimate.reason == BELOW_BAND]
-    if band_rad_s is None or not found:
+    if band_rad_s is None:
         return
-    yield Finding(
-        "margin-below-band",
-        Light.AMBER,
-        f"{' and '.join(dict.fromkeys(found))}: the gain passes one below the {band_rad_s[0]:.3g} "
-        "rad/s from which the model was shown to hold: nothing is promised of the phase there",
-        f"sweep from {band_rad_s[0] / SLOWER:.2g} rad/s or lower, with more amplitude there",
-    )
+    if found := _at_one_below(result.worst_cases):
+        yield Finding(
+            "margin-below-band",
+            Light.AMBER,
+            f"{' and '.join(found)}: the gain is at one below the {band_rad_s[0]:.3g} rad/s from "
+            "which the model was shown to hold: a light mode there, such as a pendulum, may take "
+            "margins and stability, and no margin, peak or bandwidth is promised",
+            _sweep(band_rad_s),
+        )
+    lowered = _named(result.worst_cases, TAKEN_BELOW)
+    if rest := [name for name in lowered if name not in found]:
+        yield Finding(
+            "mode-below-band",
+            Light.GREEN,
+            f"{' and '.join(rest)}: nothing is known below {band_rad_s[0]:.3g} rad/s: a light mode "
+            f"there that lowers the response by up to {MOST_LOWERED_DB:g} dB may take "
+            f"{', '.join(_taken(result.worst_cases, rest))}, and none is promised",
+            _sweep(band_rad_s),
+        )
+
+
+def _at_one_below(cases: Sequence[WorstCase]) -> list[str]:
+    """Loops that are at one below the band, or nearer to it than is asked."""
+    return _named(cases, BELOW_BAND)
+
+
+def _named(cases: Sequence[WorstCase], reason: str) -> list[str]:
+    return [*dict.fromkeys(each.loop for each in cases if each.estimate.reason == reason)]
+
+
+def _taken(cases: Sequence[WorstCase], loops: Sequence[str]) -> list[str]:
+    taken = (e.name for e in cases if e.loop in loops and e.estimate.reason == TAKEN_BELOW)
+    return [*dict.fromkeys(taken)]
+
+
+def _sweep(band_rad_s: tuple[float, float] | None) -> str:
+    """From where to sweep, so that loops are at one inside the band."""
+    start = "lower" if band_rad_s is None else f"{band_rad_s[0] / SLOWER:.2g} rad/s or lower"
+    return f"sweep from {start}, with more amplitude there"

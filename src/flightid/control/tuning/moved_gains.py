@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import cast
 
@@ -122,7 +122,7 @@ def move_gains(
     made_of = {name: loop.gains[name] for name in paths.names}
     return MovedGains(
         made_of,
-        _verdict(design, made_of, held_by_hand(problem, gains, judged), met),
+        _verdict(design, made_of, held_by_hand(problem, gains, judged), met, made),
         beside,
         met,
         short,
@@ -135,14 +135,19 @@ def move_gains(
 
 
 def _verdict(
-    design: PidDesign, values: Mapping[str, float], held: GainSearchResult, met: NDArray[np.bool_]
+    design: PidDesign,
+    values: Mapping[str, float],
+    held: GainSearchResult,
+    met: NDArray[np.bool_],
+    made: Sequence[WorstCase],
 ) -> Finding:
     """Of the design where its gains are these, else of gains by hand."""
     if values == design.gains:
         return next(each for each in design.findings if each.code in GAINS)
     known = bool(design.provenance.get("draws"))
     left = cast(int, design.provenance.get("left_out", 0))
-    return verdict(held, met, len(met) + left if known else 0)
+    band = cast("tuple[float, float] | None", design.provenance.get("band_rad_s"))
+    return verdict(held, met, len(met) + left if known else 0, made, band)
 
 
 def _bands(design: PidDesign, loop: object) -> tuple[ResponseBand, ...]:

@@ -293,7 +293,7 @@ def design_of(
     closed = ClosedPlants(shown, place, setting.gyro)
     bands = response_bands(closed, new, steady) if exists else ()
     count = len(result.met)
-    drawn = count + setting.evidence.left_out
+    drawn, band = count + setting.evidence.left_out, setting.evidence.band_rad_s
     return PidDesign(
         flown,
         result.loop if exists else flown,
@@ -309,11 +309,11 @@ def design_of(
         count,
         result.problem,
         (
-            verdict(result.found, result.met, drawn if known else 0),
+            verdict(result.found, result.met, drawn if known else 0, result.worst_cases, band),
             *remarks(result, flown, changes, stages, couplings, setting.gyro),
             *low_coherence(result, setting.coherence_of(place)),
-            *beyond_findings(result.beyond, setting.evidence.band_rad_s),
-            *below_band(result, setting.evidence.band_rad_s),
+            *beyond_findings(result.beyond, band),
+            *below_band(result, band),
             *setting.evidence.findings,
         ),
         {
@@ -322,7 +322,7 @@ def design_of(
             "draws": len(setting.evidence.draws),
             "fresh_draws": len(setting.evidence.fresh),
             "seed": seed,
-            "band_rad_s": setting.evidence.band_rad_s,
+            "band_rad_s": band,
             "rate": setting.gyro,
             "hold_in_model": setting.evidence.hold_in_model,
             "left_out": setting.evidence.left_out,

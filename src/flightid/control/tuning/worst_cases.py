@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.control.autopilots import AxisLoop
+from flightid.control.margins.low_mode_slack import TAKEN_BELOW, LowModeSlack
 from flightid.control.margins.resonance_slack import TAKEN, ResonanceSlack
 from flightid.control.tuning.limits import ANGLE, Limit, limits, noise_limit
 from flightid.control.tuning.loop_problem import FULL, LoopAssessment, LoopProblem
+from flightid.control.tuning.margins_below import BELOW_BAND, lows_left, passes_below
 from flightid.control.tuning.margins_beyond import rooms_left
 from flightid.findings import SHOWN_DIGITS as DIGITS
 from flightid.findings import held
@@ -20,7 +22,6 @@ from flightid.uncertainty.estimate import Estimate, Reading
 from flightid.uncertainty.uneven import DrawnEnds, Reaching
 
 Array = NDArray[np.float64]
-BELOW_BAND = "read below the identified band"
 FEWEST_PLANTS = 3
 """An interval needs more than the estimate and one other."""
 
@@ -36,9 +37,9 @@ class WorstCase:
         Of the estimated plant, with the middle of all plants as its interval; no value where there
         is no such crossing, no interval where there is one plant, or a crossing is missing.
     worst : float or None
-        Of all plants, on the side of its limit, and no better than a resonance above the identified
-        band may leave it; none where one of them reads it there, or such a resonance may leave less
-        than is required, nor of the phase where a loop passes one below the band.
+        Of all plants, on the side of its limit, and no better than a mode outside the identified
+        band may leave it; none where one of them reads it above, or such a mode may leave less
+        than is required, nor of a loop that is at one below the band.
     flown, flown_worst : float or None
         The same with the gains of the log; None where they are not stable either.
     required : str
@@ -131,17 +132,15 @@ class _Kind:
     more: bool
     place: str = ""
     """Field that says at which frequency it is read, where that may lie above the band."""
-    slow: str = ""
-    """The same, where it may lie below: what crosses one there rests on the model's form."""
 
 
 NOISE = _Kind("noise", "noise", "1", False)
 KINDS = (
-    _Kind("crossover_rad_s", "crossover", "rad/s", True, slow="crossover_rad_s"),
-    _Kind("phase_margin_deg", "phase margin", "deg", True, slow="crossover_rad_s"),
+    _Kind("crossover_rad_s", "crossover", "rad/s", True),
+    _Kind("phase_margin_deg", "phase margin", "deg", True),
     _Kind("gain_margin_db", "gain margin", "dB", True, "phase_crossover_rad_s"),
     _Kind("gain_reduction_margin_db", "gain reduction margin", "dB", True),
-    _Kind("delay_margin_s", "delay margin", "s", True, slow="delay_crossover_rad_s"),
+    _Kind("delay_margin_s", "delay margin", "s", True),
     _Kind("sensitivity_peak", "sensitivity peak", "1", False, "sensitivity_peak_rad_s"),
     _Kind("disturbance_bandwidth_rad_s", "disturbance bandwidth", "rad/s", True),
     _Kind("disturbance_peak_db", "disturbance peak", "dB", False),
@@ -205,19 +204,25 @@ def worst_cases(
     """
     new = problem.judge(gains[None]) if judged is None else judged
     left = rooms_left(problem, gains, band_rad_s)
-    made = []
+    lows = lows_left(problem, gains, band_rad_s)
+    least_db, made = problem.requirements.gain_margin_db, []
     for loop, usual in _wanted(new):
         asked = _asked(problem, new, loop, usual)
         kind = replace(usual, more=_more_is_better(new, asked, usual))
         values = np.asarray(getattr(new.metrics[loop], kind.field))[0]
         before = None if old is None else np.asarray(getattr(old.metrics[loop], kind.field))[0]
         steady = old is not None and bool(old.stable[0, 0])
+        low, room = lows.get(loop, LowModeSlack()), left.get(loop, ResonanceSlack())
         unknown = _beyond(new, loop, kind, band_rad_s)
-        room = left.get(loop, ResonanceSlack())
-        edge = room.edge(kind.field)
-        bound = (np.inf if kind.more else -np.inf) if edge is None else edge
-        if room.takes(kind.field, problem.requirements.gain_margin_db):
+        if low.takes_all(least_db):
+            unknown = unknown or BELOW_BAND
+        if room.takes(kind.field, least_db):
             unknown = unknown or TAKEN
+        if low.takes(kind.field, least_db):
+            unknown = unknown or TAKEN_BELOW
+        there = bool(np.isfinite(values).any())
+        edges = [room.edge(kind.field), low.edge(kind.field) if there else None]
+        bound = _edge(edges, kind.more)
         worst = (
             None if unknown else _worst(np.append(_asked_of(new, asked, values), bound), kind.more)
         )
@@ -229,7 +234,10 @@ def worst_cases(
                 worst,
                 _number(before[0]) if steady and before is not None else None,
                 _worst(before, kind.more)
-                if before is not None and old is not None and bool(old.stable.all())
+                if before is not None
+                and old is not None
+                and bool(old.stable.all())
+                and not _beyond(old, loop, kind, band_rad_s)
                 else None,
                 *_requirement(new, asked, values, worst),
             )
@@ -351,9 +359,15 @@ def _beyond(
     metrics = judged.metrics[loop]
     if kind.place and np.any(getattr(metrics, kind.place)[0] > band_rad_s[1]):
         return "read above the identified band"
-    if kind.slow and np.any(getattr(metrics, kind.slow)[0] < band_rad_s[0]):
-        return BELOW_BAND
-    return ""
+    return BELOW_BAND if passes_below(judged, loop, band_rad_s) else ""
+
+
+def _edge(edges: list[float | None], more: bool) -> float:
+    """The worst of what modes outside the band may leave; no bound where they touch nothing."""
+    known = [each for each in edges if each is not None]
+    if more:
+        return min(known, default=np.inf)
+    return max(known, default=-np.inf)
 
 
 def _number(value: float) -> float | None:
