@@ -20,6 +20,7 @@ from flightid.uncertainty.estimate import Estimate, Reading
 TO_SEE_IT = 1.3
 """Band beyond the frequency of a margin from which the model is known about it."""
 BEYOND = "read above the band to which the model was shown to hold"
+AT_ONE_BELOW = "the loop is at one below the band from which the model was shown to hold"
 PLACES = READ_AT | {
     "phase_crossover_rad_s": "phase_crossover_rad_s",
     "gain_reduction_rad_s": "gain_reduction_rad_s",
@@ -124,10 +125,16 @@ class OutsideBand:
     highest_rad_s: float = 0.0
     room: ResonanceSlack = field(default_factory=ResonanceSlack)
 
+    @property
+    def is_at_one_below(self) -> bool:
+        """Whether the loop passes one below the band."""
+        return "crossover_rad_s" in self.below or "delay_margin_s" in self.below
+
     def promised(self, number: Reading, of: str, least_db: float) -> Reading:
         """A number as far as it can be promised.
 
-        Without an interval where it is read above the band, or where a resonance there may leave
+        Without an interval where it is read above the band, where the loop passes one below it,
+        as a light mode there may take every number, or where a resonance above may leave
         less than a gain margin of `least_db`; with one that reaches what a resonance may leave.
 
         Parameters
@@ -138,6 +145,8 @@ class OutsideBand:
         least_db : float
             Gain margin that is asked for.
         """
+        if number.value is not None and self.is_at_one_below:
+            return Estimate(number.name, number.value, number.unit, None, AT_ONE_BELOW)
         if number.value is not None and of in self.above:
             return Estimate(number.name, number.value, number.unit, None, BEYOND)
         return self.room.reached(number, of, least_db)
@@ -189,10 +198,15 @@ def outside_band_findings(
         yield from beyond_findings([beyond], band)
     if named := [said for name, said in SAID_BELOW.items() if name in found.below]:
         lowest = min(found.below[name] for name in SAID_BELOW if name in found.below)
+        taken = (
+            ": a light mode there, such as a pendulum, may take margins and stability, and no "
+            "number of this loop is promised"
+        )
         yield Finding(
             "margin-below-band",
-            Light.UNKNOWN,
+            Light.AMBER if found.is_at_one_below else Light.UNKNOWN,
             f"{loop.name}: {', '.join(named)} down to {lowest:.3g} rad/s, below the {band[0]:.3g} "
-            "rad/s from which the model was shown to hold: they rest on its form there",
-            "sweep from lower, where they matter",
+            "rad/s from which the model was shown to hold"
+            + (taken if found.is_at_one_below else ": they rest on its form there"),
+            f"sweep from {lowest / TO_SEE_IT:.2g} rad/s or lower",
         )
