@@ -19,6 +19,7 @@ from flightid.control.tuning.gain_search_result import GainSearchResult
 from flightid.control.tuning.gain_steps import Stage, TunedGain
 from flightid.control.tuning.limits import ANGLE
 from flightid.control.tuning.loop_problem import LoopAssessment, LoopProblem, Plants
+from flightid.control.tuning.margins_below import lows_left
 from flightid.control.tuning.margins_beyond import margins_beyond
 from flightid.control.tuning.order_statistics import MOST
 from flightid.control.tuning.requirements import TuningRequirements
@@ -314,7 +315,9 @@ def _judged(
     own = ControllerPaths(flown[place], setting.gyro, setting.with_angle)
     plants = setting.judged.axis(place, flown, setting.gyro)
     around = problem_of(setting, plants, own, limit)
-    return fresh, around.judge(own.gains_of(flown[place])[None])
+    gains = own.gains_of(flown[place])
+    lows = lows_left(around, gains, setting.evidence.band_rad_s)
+    return fresh, replace(around.judge(gains[None]), lows=lows)
 
 
 def axis_steps(setting: Setting, loop: AxisLoop) -> int:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Iterator, Mapping
+from dataclasses import field, replace
 from functools import cached_property
 from typing import Protocol
 
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.control.margins.loop_metrics import LoopMetrics, loop_metrics
+from flightid.control.margins.low_mode_slack import LowModeSlack
 from flightid.control.margins.stability_count import unstable_poles
 from flightid.control.tuning.limits import ANGLE, WHOLE, limits, noise_limit, present
 from flightid.control.tuning.requirements import TuningRequirements
@@ -138,6 +139,8 @@ class LoopAssessment:
     peaks : ndarray, shape (n_loops, n_candidates, n_plants, n_bands)
         Slack of the sensitivity peak by bands of frequency: where two peaks are equally high, the
         highest alone has an edge that a search would stick to.
+    lows : mapping of str to LowModeSlack
+        What a light mode below the identified band leaves of each loop, where that was asked.
     """
 
     names: tuple[str, ...]
@@ -147,6 +150,7 @@ class LoopAssessment:
     stable: NDArray[np.bool_]
     noise: Array
     peaks: Array
+    lows: Mapping[str, LowModeSlack] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

@@ -204,7 +204,7 @@ def worst_cases(
     """
     new = problem.judge(gains[None]) if judged is None else judged
     left = rooms_left(problem, gains, band_rad_s)
-    lows = lows_left(problem, gains, band_rad_s)
+    new = replace(new, lows=lows_left(problem, gains, band_rad_s))
     least_db, made = problem.requirements.gain_margin_db, []
     for loop, usual in _wanted(new):
         asked = _asked(problem, new, loop, usual)
@@ -212,17 +212,12 @@ def worst_cases(
         values = np.asarray(getattr(new.metrics[loop], kind.field))[0]
         before = None if old is None else np.asarray(getattr(old.metrics[loop], kind.field))[0]
         steady = old is not None and bool(old.stable[0, 0])
-        low, room = lows.get(loop, LowModeSlack()), left.get(loop, ResonanceSlack())
-        unknown = _beyond(new, loop, kind, band_rad_s)
-        if low.takes_all(least_db):
-            unknown = unknown or BELOW_BAND
+        low, room = new.lows.get(loop, LowModeSlack()), left.get(loop, ResonanceSlack())
+        unknown = _beyond(new, loop, kind, band_rad_s, least_db)
         if room.takes(kind.field, least_db):
             unknown = unknown or TAKEN
-        if low.takes(kind.field, least_db):
-            unknown = unknown or TAKEN_BELOW
-        there = bool(np.isfinite(values).any())
-        edges = [room.edge(kind.field), low.edge(kind.field) if there else None]
-        bound = _edge(edges, kind.more)
+        there = np.isfinite(values).any()
+        bound = _edge([room.edge(kind.field), low.edge(kind.field) if there else None], kind.more)
         worst = (
             None if unknown else _worst(np.append(_asked_of(new, asked, values), bound), kind.more)
         )
@@ -237,7 +232,7 @@ def worst_cases(
                 if before is not None
                 and old is not None
                 and bool(old.stable.all())
-                and not _beyond(old, loop, kind, band_rad_s)
+                and not _beyond(old, loop, kind, band_rad_s, least_db)
                 else None,
                 *_requirement(new, asked, values, worst),
             )
@@ -351,23 +346,28 @@ def _noise(problem: LoopProblem, new: LoopAssessment, old: LoopAssessment | None
 
 
 def _beyond(
-    judged: LoopAssessment, loop: str, kind: _Kind, band_rad_s: tuple[float, float] | None
+    judged: LoopAssessment,
+    loop: str,
+    kind: _Kind,
+    band_rad_s: tuple[float, float] | None,
+    least_db: float,
 ) -> str:
-    """Why nothing is promised: a plant reads a number outside the band; empty where none does."""
+    """Why nothing is promised: a plant reads it above the band, or a mode below may take it."""
     if band_rad_s is None:
         return ""
-    metrics = judged.metrics[loop]
-    if kind.place and np.any(getattr(metrics, kind.place)[0] > band_rad_s[1]):
+    low = judged.lows.get(loop, LowModeSlack())
+    place = getattr(judged.metrics[loop], kind.place)[0] if kind.place else 0.0
+    if np.any(place > band_rad_s[1]):
         return "read above the identified band"
-    return BELOW_BAND if passes_below(judged, loop, band_rad_s) else ""
+    if low.takes_all(least_db) or passes_below(judged, loop, band_rad_s):
+        return BELOW_BAND
+    return TAKEN_BELOW if low.takes(kind.field, least_db) else ""
 
 
 def _edge(edges: list[float | None], more: bool) -> float:
     """The worst of what modes outside the band may leave; no bound where they touch nothing."""
     known = [each for each in edges if each is not None]
-    if more:
-        return min(known, default=np.inf)
-    return max(known, default=-np.inf)
+    return min(known, default=np.inf) if more else max(known, default=-np.inf)
 
 
 def _number(value: float) -> float | None:
