@@ -27,6 +27,11 @@ def test_gusts_that_the_loop_answers_are_no_band(seed: int, tmp_path: Path) -> N
     (roll,) = (each for each in found.bands if each.axis == "roll")
     assert roll.reason == LOOP_ALONE
     assert roll.largest_coherence is not None
+    assert roll.injected_coherence is not None
+    assert roll.injected_coherence < roll.largest_coherence
+    said = next(each.message for each in found.findings if each.code == "no-usable-band")
+    told = f"of the rate with what was injected: roll {roll.injected_coherence:.2f}"
+    assert told in said, "not the coherence of 0.99 that a loop makes"
     assert roll.largest_coherence > 0.9, "command and rate hang together all the same"
 
 

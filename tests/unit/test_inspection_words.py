@@ -288,7 +288,9 @@ def test_axes_share_a_reason_and_each_has_its_number(shared_data: Path) -> None:
     messages = {each.code: each.message for each in found.findings}
     assert "roll, pitch, yaw: nothing was injected, and no sweep was flown." in found.to_text(
     ).replace("\n", " ")  # fmt: skip
-    assert "(largest found: roll 0.52, pitch 0.63, yaw 0.80)" in messages["no-usable-band"]
+    assert messages["no-band-roll"].endswith("partial coherence stays below 0.6 (largest 0.52)")
+    assert {"unswept-pitch", "unswept-yaw"} <= messages.keys(), "coherent by their loops alone"
+    assert set(found.usable_band_rad_s.values()) == {None}
     assert "is at its mixer limit 1 for 26 % of the flight" in messages["saturated-yaw"]
     assert "RCOU.C3 is at its lower limit" in messages["saturated"]
 

@@ -107,7 +107,7 @@ def test_several_fitted_records_speak_for_themselves() -> None:
 def test_one_sweep_of_a_log_names_the_plan_of_another() -> None:
     once = agreement_check(Agreement(1, None, None, np.ones(1)))
     fit = Fitted(Evidence((once,)), Agreement(1, None, None, np.ones(1)), LOGGED)
-    found = SimpleNamespace(axis="roll", kind="sid", is_injected=True)
+    found = SimpleNamespace(axis="roll", kind="sid", is_sweep=True)
     log = SimpleNamespace(vehicle="copter", name="one.BIN", excitations=(found,))
     (check,) = agreement_of_kept(fit, {}, (), log)  # type: ignore[arg-type]
     assert check.what == once.what

@@ -47,7 +47,9 @@ def _log(swept: str = "", reason: str = "", action: str = "") -> Any:
         )
         for axis in ("roll", "pitch", "yaw")
     ]  # fmt: skip
-    flown = [SimpleNamespace(axis=axis, kind="sid") for axis in ("yaw", *swept.split())]
+    flown = [
+        SimpleNamespace(axis=axis, kind="sid", is_sweep=True) for axis in ("yaw", *swept.split())
+    ]
     judged = [Finding("no-band-roll", Light.AMBER, "roll: no usable band", action)]
     return SimpleNamespace(bands=bands, excitations=flown, findings=judged)
 

@@ -17,7 +17,7 @@ from flightid.inspection.inspection import Inspection
 from flightid.inspection.rates import StreamRate
 from flightid.inspection.saturation import Saturation
 from flightid.inspection.skew import StreamSkew
-from flightid.inspection.usable_band import AxisBand, _fitted
+from flightid.inspection.usable_band import UNSWEPT, AxisBand, _fitted
 
 LOG: Any = None
 HERTZ = math.tau
@@ -68,30 +68,39 @@ def test_a_rate_of_logging_says_where_a_model_ends(rate_hz: float, code: str, wo
 
 NARROW = ": too narrow for more than a gain"
 LESS = "; gain, lag and delay are told apart by a whole decade"
-LOOP = "; not swept: what hangs together may be the loop alone"
 
 
 @pytest.mark.parametrize(
-    ("ends_hz", "swept", "light", "said", "why"),
+    ("ends_hz", "light", "said", "why"),
     [
-        ((1.0, 2.99), True, "amber", "coherent from 1 to 2.99 Hz (6.28 to 18.8 rad/s)", NARROW),
-        ((1.0, 3.01), True, "amber", "usable from 2.01 to 3.01 Hz (12.6 to 18.9 rad/s)", LESS),
-        ((1.0, 9.9), False, "amber", "coherent from 2.01 to 9.9 Hz (12.6 to 62.2 rad/s)", LESS),
-        ((1.0, 10.1), True, "green", "usable from 2.01 to 10.1 Hz (12.6 to 63.5 rad/s)", ""),
-        ((1.0, 10.1), False, "green", "coherent from 2.01 to 10.1 Hz (12.6 to 63.5 rad/s)", LOOP),
+        ((1.0, 2.99), "amber", "coherent from 1 to 2.99 Hz (6.28 to 18.8 rad/s)", NARROW),
+        ((1.0, 3.01), "amber", "usable from 2.01 to 3.01 Hz (12.6 to 18.9 rad/s)", LESS),
+        ((1.0, 9.9), "amber", "usable from 2.01 to 9.9 Hz (12.6 to 62.2 rad/s)", LESS),
+        ((1.0, 10.1), "green", "usable from 2.01 to 10.1 Hz (12.6 to 63.5 rad/s)", ""),
     ],
 )
 def test_a_band_is_called_by_its_width(
-    ends_hz: tuple[float, float], light: str, said: str, why: str, *, swept: bool
+    ends_hz: tuple[float, float], light: str, said: str, why: str
 ) -> None:
     whole = f"roll: {said}, mean coherence 0.88"
-    (found,) = _told([verdicts._band(LOG, _band(*ends_hz), swept)])
+    (found,) = _told([verdicts._band(LOG, _band(*ends_hz))])
     assert found == ("narrow-band-roll" if why == NARROW else "band-roll", light, whole + why)
     ends = _band(*ends_hz, excited_to_rad_s=HERTZ * ends_hz[1])
-    ended = verdicts._band(LOG, ends, swept).message
+    ended = verdicts._band(LOG, ends).message
     assert ended == f"{whole}, up to where the power of the sweep ends{why}"
     without = replace(ends, coherent_rad_s=None, band_rad_s=None, reason="nothing was flown")
-    assert verdicts._band(LOG, without, swept).message == "roll: no usable band: nothing was flown"
+    assert verdicts._band(LOG, without).message == "roll: no usable band: nothing was flown"
+
+
+def test_coherence_of_an_axis_that_nobody_swept_is_no_green() -> None:
+    """A hover's roll read green, "coherent from 0.329 to 38.4 Hz": it was the controller's."""
+    still = _band(1.0, 20.0, coherent_rad_s=None, band_rad_s=None, reason=UNSWEPT)
+    (said,) = verdicts._bands(LOG, replace(SEEN, bands=(still,)))
+    assert (said.code, said.light) == ("unswept-roll", Light.UNKNOWN)
+    assert said.message.startswith("roll: no usable band: in a loop without a sweep")
+    found = replace(SEEN, bands=(still,), findings=(said,))
+    assert found.verdict is Light.GREEN, "of what was flown for a model nothing is in doubt"
+    assert found.findings_on(()) == ()
 
 
 def test_without_a_band_the_largest_coherence_is_told_by_axis() -> None:
@@ -106,6 +115,12 @@ def test_without_a_band_the_largest_coherence_is_told_by_axis() -> None:
     assert verdicts._bands(LOG, replace(SEEN, bands=(replace(pitch, rate_hz=0.0),)))[0].code == (
         "no-usable-band"
     )
+    weak = replace(pitch, largest_coherence=0.99, injected_coherence=0.234)
+    last = verdicts._bands(LOG, replace(SEEN, bands=(roll, weak)))[-1]
+    assert last.message.endswith(
+        "needed (largest found of the rate with what was injected: pitch 0.23; largest found: "
+        "roll 0.52)"
+    ), "coherence that nobody asked for is high, and none of what lacks"
     wide = _band(1.0, 20.0)
     assert [e.code for e in verdicts._bands(LOG, replace(SEEN, bands=(wide,)))] == ["band-roll"]
 

@@ -44,8 +44,6 @@ class InspectedLog(Protocol):
 
 NOT_SWEPT = "nothing was injected, and no sweep was flown"
 """Why most axes of a log carry no model: nobody meant them to."""
-SEARCHED = ("sid", "chirp", "sweep", "autotune")
-"""Excitations from which a model may be tried."""
 
 
 def why_no_model(inspection: InspectedLog, band: AxisBand) -> str:
@@ -63,7 +61,7 @@ def why_no_model(inspection: InspectedLog, band: AxisBand) -> str:
 
 def is_swept(inspection: InspectedLog, axis: str) -> bool:
     """Whether anything was flown about an axis that a model may be tried from."""
-    return any(e.axis == axis and e.kind in SEARCHED for e in inspection.excitations)
+    return any(e.axis == axis and e.is_sweep for e in inspection.excitations)
 
 
 def carried_axes(inspection: InspectedLog) -> tuple[str, ...]:

@@ -32,6 +32,8 @@ AUTOMATIC = {
 """Modes in which no stick moves the vehicle, besides those named AUTO_…, of all autopilots."""
 PLANE_AUTOMATIC = {"LOITER", "TAKEOFF", "QLAND", "QRTL", "THERMAL", "LOITER_ALT_QLAND"}
 """ArduPlane's own: a copter's LOITER is flown by stick."""
+SEARCHED = ("sid", "chirp", "sweep", "autotune")
+"""Excitations from which a model may be tried."""
 WORDS = {"sid": "injected sweep", "steps": "steps", "flying": "plain flying", "hand": "by hand"}
 SWEEP_RATIO, SWEEP_CYCLES, SWEEP_ORDER = 3.0, 8, 0.9
 """Last frequency over the first, cycles and rank correlation from which a set-point sweeps."""
@@ -71,6 +73,11 @@ class FoundExcitation:
     def is_injected(self) -> bool:
         """Whether the autopilot made it, so that it is independent of what the sensors read."""
         return self.kind in ("sid", "autotune", "chirp")
+
+    @property
+    def is_sweep(self) -> bool:
+        """Whether a model may be tried from it."""
+        return self.kind in SEARCHED
 
     @property
     def is_plain(self) -> bool:

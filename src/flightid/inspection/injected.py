@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import FlightidError
+from flightid.frozen import dataclass
 from flightid.inspection.excitation_found import FoundExcitation
 from flightid.inspection.signals import Signal, Span, inside
 from flightid.inspection.thresholds import (
@@ -33,10 +34,26 @@ LEAST_SAMPLES = 64
 """Samples of a run that is looked at."""
 
 
-def injected_ratio(
+@dataclass(frozen=True)
+class InjectedShare:
+    """What an injection explains of a rate.
+
+    Attributes
+    ----------
+    width : float
+        Highest over lowest frequency of the widest coherent band; 1 without one.
+    largest : float
+        Largest coherence at any frequency.
+    """
+
+    width: float
+    largest: float
+
+
+def injected_share(
     log: Log, axis: str, excited: Iterable[FoundExcitation], rate: Signal, highest_rad_s: float
-) -> float | None:
-    """Width of the widest band in which a rate is coherent with what was injected into its axis.
+) -> InjectedShare | None:
+    """How far a rate is coherent with what was injected into its axis.
 
     Parameters
     ----------
@@ -51,8 +68,8 @@ def injected_ratio(
 
     Returns
     -------
-    float or None
-        Highest over lowest frequency; 1 without a band. None where nothing was injected whose
+    InjectedShare or None
+        None where nothing was injected whose
         waveform was logged, or too little of it to tell.
 
     Reference
@@ -84,7 +101,8 @@ def injected_ratio(
     except FlightidError:
         return None
     parts = coherent_parts(omega, coherence, MINIMUM_COHERENCE.value)
-    return max((last / first for first, last in parts), default=1.0)
+    width = max((last / first for first, last in parts), default=1.0)
+    return InjectedShare(width, float(np.max(coherence)))
 
 
 def _even(waveform: Signal, rate: Signal, span: Span, step_s: float) -> Array:

@@ -13,7 +13,7 @@ from flightid.frozen import dataclass
 from flightid.inspection.axes import AxisChannels, axes_of
 from flightid.inspection.excitation_found import FoundExcitation
 from flightid.inspection.excited_to import excited_to
-from flightid.inspection.injected import injected_ratio
+from flightid.inspection.injected import injected_share
 from flightid.inspection.signals import Signal, Span, find
 from flightid.inspection.stretches import FlightStretches, packed
 from flightid.inspection.thresholds import (
@@ -37,6 +37,8 @@ LOOP_ALONE = (
     "what was injected explains too little of the rate (coherence of 0.6 in no half decade), so "
     "that what hangs together with the command may be gusts that the loop answers"
 )
+UNSWEPT_CODE = "unswept"
+UNSWEPT = "in a loop without a sweep what hangs together with the command is the loop's own"
 NARROW = "too narrow for more than a gain"
 N_OMEGA = 60
 """Frequencies at which coherence is computed."""
@@ -77,6 +79,8 @@ class AxisBand:
         windows and ten samples a cycle, and that ends where the power of the sweeps does, rad/s.
     rates_hz : tuple of float, or None
         Rates of input and output, Hz; None where one is missing.
+    injected_coherence : float or None
+        Largest coherence of the rate with what was injected, where that leaves no band.
     """
 
     axis: str
@@ -90,6 +94,7 @@ class AxisBand:
     excited_to_rad_s: float = math.inf
     coherent_rad_s: tuple[float, float] | None = None
     rates_hz: tuple[float, float] | None = None
+    injected_coherence: float | None = None
 
     @property
     def logged(self) -> str:
@@ -178,6 +183,7 @@ def axis_bands(
     """Usable band of each axis, with all mixer commands as inputs.
 
     An axis with injected runs is judged by them alone: windows without excitation are no evidence.
+    One that nobody swept has none: command and rate hang together by the controller.
     """
     axes = axes_of(log.vehicle)
     held = packed(_found(log, [name for names in axes.values() for name in names[:2]]))
@@ -203,7 +209,7 @@ def axis_bands(
         explained = known[chosen]
         slowest = min(command.rate_hz, motion.rate_hz)
         labels = (command.label, motion.label)
-        coherent, coherence, largest, why = None, None, None, ""
+        coherent, coherence, largest, injected, why = None, None, None, None, ""
         highest = excited_to(log, axis, excited)
         if isinstance(explained, str):
             why = explained
@@ -216,10 +222,13 @@ def axis_bands(
         if coherent is not None and band is None:
             why = f"coherence reaches 0.6 from {hertz_words(coherent)} alone: too narrow for a fit"
         if band is not None:
-            wide = injected_ratio(log, axis, excited, motion, highest)
-            if wide is not None and wide < BAND_LEAST.value:
-                band, coherent, why = None, None, LOOP_ALONE
-        told = band, coherence, why, largest, highest, coherent, (command.rate_hz, motion.rate_hz)
+            share = injected_share(log, axis, excited, motion, highest)
+            if share is not None and share.width < BAND_LEAST.value:
+                band, coherent, why, injected = None, None, LOOP_ALONE, share.largest
+        if coherent is not None and not any(e.axis == axis and e.is_sweep for e in excited):
+            band, coherent, coherence, why = None, None, largest, UNSWEPT
+        rates_hz = command.rate_hz, motion.rate_hz
+        told = band, coherence, why, largest, highest, coherent, rates_hz, injected
         found.append(AxisBand(axis, labels[0], labels[1], slowest, *told))
     return tuple(found)
 

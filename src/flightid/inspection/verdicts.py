@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from flightid.conventions import Light
@@ -21,7 +22,14 @@ from flightid.inspection.thresholds import (
     SATURATED_SHARE,
     SKEW,
 )
-from flightid.inspection.usable_band import NARROW, AxisBand, hertz_words, lowest_hz
+from flightid.inspection.usable_band import (
+    NARROW,
+    UNSWEPT,
+    UNSWEPT_CODE,
+    AxisBand,
+    hertz_words,
+    lowest_hz,
+)
 from flightid.logs import Log
 from flightid.logs.scale_check import check_scales
 
@@ -204,13 +212,9 @@ def _excitation(log: Log, found: Inspection, scales: list[Finding]) -> list[Find
 
 
 def _bands(log: Log, found: Inspection) -> list[Finding]:
-    findings = [
-        _band(log, band, is_swept(found, band.axis)) for band in found.bands if band.rate_hz > 0
-    ]
-    if not any(finding.code.startswith("band") for finding in findings):
-        measured = [b for b in found.bands if b.largest_coherence is not None]
-        largest = ", ".join(f"{b.axis} {b.largest_coherence:.2f}" for b in measured)
-        seen = f"largest found: {largest}" if measured else "none could be measured"
+    findings = [_band(log, band) for band in found.bands if band.rate_hz > 0]
+    if not any(finding.code.startswith(("band", UNSWEPT_CODE)) for finding in findings):
+        seen = _largest(found.bands) or "none could be measured"
         findings.append(
             Finding(
                 "no-usable-band",
@@ -223,8 +227,24 @@ def _bands(log: Log, found: Inspection) -> list[Finding]:
     return findings
 
 
-def _band(log: Log, band: AxisBand, swept: bool) -> Finding:
+def _largest(bands: Iterable[AxisBand]) -> str:
+    """Of which coherence a band would need more: of what was injected, where that is too little."""
+    injected, moved = [], []
+    for band in bands:
+        if band.injected_coherence is not None:
+            injected.append(f"{band.axis} {band.injected_coherence:.2f}")
+        elif band.largest_coherence is not None:
+            moved.append(f"{band.axis} {band.largest_coherence:.2f}")
+    of_rate = "largest found of the rate with what was injected: "
+    both = (of_rate, injected), ("largest found: ", moved)
+    return "; ".join(words + ", ".join(each) for words, each in both if each)
+
+
+def _band(log: Log, band: AxisBand) -> Finding:
     coherent = band.coherent_rad_s or band.band_rad_s
+    if coherent is None and band.reason == UNSWEPT:
+        said = f"{band.axis}: no usable band: {band.reason}"
+        return Finding(f"{UNSWEPT_CODE}-{band.axis}", Light.UNKNOWN, said)
     if coherent is None:
         return Finding(
             f"no-band-{band.axis}",
@@ -234,8 +254,7 @@ def _band(log: Log, band: AxisBand, swept: bool) -> Finding:
         )
     width = coherent[1] / coherent[0]
     shown = band.told_rad_s or coherent
-    # Of plain flying a band is coherent, and carries nothing.
-    word = "usable" if band.is_usable and swept else "coherent"
+    word = "usable" if band.is_usable else "coherent"
     text = (
         f"{band.axis}: {word} from {hertz_words(shown)} ({shown[0]:.3g} to {shown[1]:.3g} rad/s), "
         f"mean coherence {band.coherence:.2f}"
@@ -250,8 +269,7 @@ def _band(log: Log, band: AxisBand, swept: bool) -> Finding:
             advice.excitation(log),
         )
     if width >= BAND_GOOD.value:
-        alone = "" if swept else "; not swept: what hangs together may be the loop alone"
-        return Finding(f"band-{band.axis}", Light.GREEN, f"{text}{alone}")
+        return Finding(f"band-{band.axis}", Light.GREEN, text)
     narrow = f"{text}; gain, lag and delay are told apart by a whole decade"
     return Finding(f"band-{band.axis}", Light.AMBER, narrow, advice.excitation(log))
 
@@ -264,7 +282,7 @@ def _loop(log: Log, found: Inspection) -> list[Finding]:
             "closed-loop",
             Light.AMBER,
             "the loops are closed and no injected signal is logged: a direct estimate from command "
-            "to rate is biased towards the inverse of the controller wherever coherence is low",
+            "to rate is drawn to the inverse of the controller by gusts, however coherent",
             advice.excitation(log),
         )
     ]

@@ -13,7 +13,7 @@ from flightid.excitation import Excitation, ardupilot_chirp
 from flightid.findings import Finding
 from flightid.frozen import dataclass
 from flightid.inspection import Inspection, inspect_log
-from flightid.inspection.carried import SEARCHED, carried_axes, why_no_model
+from flightid.inspection.carried import carried_axes, why_no_model
 from flightid.inspection.excitation_found import excitations
 from flightid.inspection.flight_phases import FlightPhases
 from flightid.inspection.usable_band import AxisBand
@@ -115,12 +115,12 @@ def flown_sweeps(log: Log, phases: FlightPhases) -> FlownSweeps:
         found = excitations(log, phases.airborne)
         carried: tuple[str, ...] = ()
         unfit: dict[str, str] = {}
-        if any(each.kind in SEARCHED for each in found):
+        if any(each.is_sweep for each in found):
             inspection = inspect_log(log)
             carried = () if inspection.verdict is Light.RED else carried_axes(inspection)
             unfit = {band.axis: _why(inspection, band) for band in inspection.bands}
         injected = tuple(each.axis for each in found if each.is_injected)
-        moved = tuple(each.axis for each in found if each.kind in SEARCHED)
+        moved = tuple(each.axis for each in found if each.is_sweep)
         _KNOWN[log] = FlownSweeps(injected, carried, moved, unfit)
     return _KNOWN[log]
 
