@@ -12,6 +12,7 @@ import pytest
 import flightid as fid
 from flightid.app.gain_work import _small_moves
 from flightid.control.autopilots import axis_loop
+from flightid.control.tuning.margins_below import BELOW_BAND
 from flightid.control.tuning.worst_cases import WorstCase
 from flightid.conventions import Light, Role
 from flightid.errors import FlightidError
@@ -416,7 +417,15 @@ def test_margins_below_what_is_asked_and_columns_left_out_are_told() -> None:
     shown = margin_table((roll,)).shown()  # type: ignore[arg-type]
     assert shown == [["roll", "loop", "44.6", "60"]], "44.66 is not 44.7, nor 60.078 60.1"
     notes = margin_table((roll,)).notes  # type: ignore[arg-type]
-    assert notes[1].startswith("gain margin: not promised")
+    assert notes[1].startswith("gain margin: not promised, for what lies above the band in which")
+    low = Estimate("m", None, "deg", reason=BELOW_BAND)
+    slow = WorstCase("angle loop", "phase margin", low, None, None, 60.078)
+    cases = (*worst, slow)
+    for found, where in ((beyond,), "above the band"), ((), "below the band"):
+        mixed = SimpleNamespace(**{**vars(roll), "worst_cases": cases, "findings": found})
+        (_, note) = margin_table((mixed,)).notes  # type: ignore[arg-type]
+        assert f": not promised, for what lies {where}" in note
+        assert "(phase margin of angle loop)" in note, "it was called above the band"
     flown = axis_loop("arducopter", "roll", loop_rate_hz=400.0)
     angle = SimpleNamespace(axis="roll", flown=flown, loop=flown.with_gains(ATC_ANG_RLL_P=9.0))
     (small,) = small_angles([angle])  # type: ignore[list-item]

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from flightid.control.tuning.limits import ANGLE
+from flightid.control.tuning.margins_below import BELOW_BAND
 from flightid.control.tuning.pid_design import PidDesign
 from flightid.control.tuning.responses import ResponseBand
+from flightid.control.tuning.unpromised import outside_words
 from flightid.control.tuning.worst_cases import WorstCase
 from flightid.plot import graph_objects as go
 from flightid.plot import look
@@ -174,9 +176,11 @@ def margins_caption(designs: Sequence[PidDesign]) -> str:
     parts = [
         f"Margins of the worst {_what(designs)} that the data allow; upright: what was required"
     ]
-    shown = (each for each in cases if each.name in PANELS)
-    if any(each.worst is None and each.estimate.value is not None for each in shown):
-        parts.append("not promised: what lies above the band to which the model was shown")
+    shown = [each for each in cases if each.name in PANELS]
+    unread = (e for e in shown if e.worst is None and e.estimate.value is not None)
+    above = any(each.estimate.reason != BELOW_BAND for each in unread)
+    if outside := outside_words(shown, above=above):
+        parts.append(f"not promised: {outside}")
     bare = [name for name in named if not any(each.worst is not None for each in named[name])]
     if len(bare) < len(PANELS):
         parts += [_without_bars(name, named[name], what=_what(designs)) for name in bare]
@@ -204,7 +208,7 @@ def _without_bars(
 
 
 def _say_what_is_not_promised(made: go.PlotFigure, column: int, rows: Sequence[str]) -> None:
-    """Words in place of a bar, where a margin lies above the band to which the model was shown."""
+    """Words in place of a bar, where a margin is read outside the band of the model."""
     if rows:
         words = go.Scatter(
             x=[0.0] * len(rows), y=list(rows), mode="text", text=[" not promised"] * len(rows),

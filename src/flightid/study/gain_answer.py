@@ -13,6 +13,7 @@ from flightid.control.autopilots.parameter_files import parameter_suffix
 from flightid.control.autopilots.pid_loop import PidLoop
 from flightid.control.tuning.limits import ANGLE
 from flightid.control.tuning.result import untouched_finding
+from flightid.control.tuning.unpromised import outside_words
 from flightid.conventions import Light
 from flightid.findings import MOST_DIGITS, Finding, at_least, counted, worst
 from flightid.table import Cell, Column, Table
@@ -221,14 +222,14 @@ def margin_table(designs: tuple[PidDesign, ...]) -> Table:
     angle = f" ({asked.angle_phase_margin_deg:g} deg of the angle loop)" if angled else ""
     note = f"Required: {asked.phase_margin_deg:g} deg{angle} and {asked.gain_margin_db:g} dB."
     notes = [note]
-    if any(f.code == "margin-beyond-band" for each in designs for f in each.findings):
+    beyond = any(f.code == "margin-beyond-band" for each in designs for f in each.findings)
+    cases = (e for design in designs for e in design.worst_cases if e.name in MARGINS)
+    if outside := outside_words(cases, above=beyond):
         shown = [[row[2 + 2 * place] for row in rows] for place in range(len(MARGINS))]
         gone = [name for name, cells in zip(MARGINS, shown, strict=True) if {*cells} == {None}]
         dashed = any(None in cells and {*cells} != {None} for cells in shown)
         what = " and ".join(["–"] * (dashed or not gone) + gone)
-        notes.append(
-            f"{what}: not promised, for what lies above the band to which the model was shown."
-        )
+        notes.append(f"{what}: not promised, for {outside}.")
     what = "rig" if any(isinstance(each.loop, PidLoop) for each in designs) else "vehicle"
     title = f"Margins of the worst {what} that the data allow"
     return Table(title, tuple(columns), tuple(rows), tuple(notes)).without_empty_columns()

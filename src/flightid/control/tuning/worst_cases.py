@@ -22,6 +22,7 @@ from flightid.uncertainty.estimate import Estimate, Reading
 from flightid.uncertainty.uneven import DrawnEnds, Reaching
 
 Array = NDArray[np.float64]
+ABOVE_BAND = "read above the identified band"
 FEWEST_PLANTS = 3
 """An interval needs more than the estimate and one other."""
 
@@ -358,7 +359,7 @@ def _beyond(
     low = judged.lows.get(loop, LowModeSlack())
     place = getattr(judged.metrics[loop], kind.place)[0] if kind.place else 0.0
     if np.any(place > band_rad_s[1]):
-        return "read above the identified band"
+        return ABOVE_BAND
     if low.takes_all(least_db) or passes_below(judged, loop, band_rad_s):
         return BELOW_BAND
     return TAKEN_BELOW if low.takes(kind.field, least_db) else ""
