@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 import flightid as fid
 from flightid import _native
+from flightid.conventions import Light
 from flightid.errors import (
     DataError,
     LogFormatError,
@@ -144,6 +145,17 @@ def test_damage_is_reported(tmp_path: Path) -> None:
     log = fid.read_log(path)
     assert sum(item.size for item in log.skipped) >= 60
     assert [finding.code for finding in log.findings] == ["bytes-skipped"]
+
+
+def test_a_log_that_is_cut_inside_a_message_says_so(tmp_path: Path) -> None:
+    """A cut ULog said it, a cut DataFlash log nowhere; `flight` said it of neither."""
+    path = tmp_path / "a.bin"
+    path.write_bytes(_writer().to_bytes()[:-5])
+    log = fid.read_log(path)
+    (cut,) = log.findings
+    assert (cut.code, cut.light) == ("log-cut", Light.AMBER)
+    assert cut.message.startswith("the file ends inside a message")
+    assert cut in fid.review_flight(log).findings
 
 
 def test_columns_that_are_not_there_are_refused(log: fid.Log) -> None:

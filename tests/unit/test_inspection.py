@@ -158,7 +158,7 @@ def test_a_sweep_that_was_broken_off_is_a_sweep(tmp_path: Path) -> None:
     """It was said that none was flown; what of it is wide enough gives a model."""
     log = SweepFlight().write(tmp_path)
     content = log.read_bytes()
-    for share, said in ((0.2, "roll: the band of its sweep that"), (0.3, "carry a model of roll.")):
+    for share, said in ((0.2, "roll: the band of its sweep that"), (0.3, "carry a model of roll,")):
         log.write_bytes(content[: int(share * len(content))])
         found = fid.inspect_log(log)
         assert found.excitations[0].detail.endswith("broken off")

@@ -32,6 +32,10 @@ OF_SIZES = ("unit-assumed", "unit-of-counts", "settings-unknown")
 """Codes of findings of a log that say what its numbers, and so those of its flight, are worth."""
 
 
+LOG_CUT = "log-cut"
+"""Code: the file ends inside a record, so that the flight may have gone on."""
+
+
 def judge_flight(review: FlightReview, of_log: Iterable[Finding] = ()) -> tuple[Finding, ...]:
     """All verdicts, the worst and then a fall last, where eyes are on a terminal.
 
@@ -41,7 +45,8 @@ def judge_flight(review: FlightReview, of_log: Iterable[Finding] = ()) -> tuple[
     of_log : iterable of Finding
         What its log was found to be.
     """
-    own = (each for each in of_log if each.code in OF_SIZES or each.code.startswith(DIVERGES))
+    whole = (*OF_SIZES, LOG_CUT)
+    own = (each for each in of_log if each.code in whole or each.code.startswith(DIVERGES))
     # Of equals the first stays ahead of the others: it leads to them.
     return worst_last((*own, *_all(review)))
 

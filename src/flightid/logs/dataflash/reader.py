@@ -35,6 +35,7 @@ from flightid.logs.source import (
 )
 from flightid.units import DIMENSIONLESS
 
+CUT = "the file ends inside"
 GAP_S = 0.2
 """Silence of all messages together that counts as a gap, s: even the slowest standard log bitmask
 writes the inertial sensors at 25 Hz."""
@@ -316,7 +317,7 @@ class DataflashSource:
         return [*self._loss(), *self._dropped(), *self._doubts()]
 
     def _loss(self) -> Iterator[Finding]:
-        harmless = ("filled with", "the file ends inside")
+        harmless = ("filled with", CUT)
         lost = [r for r in self.skipped if not r.reason.startswith(harmless)]
         if self._bad_lines:
             yield Finding(
@@ -324,6 +325,13 @@ class DataflashSource:
                 Light.AMBER,
                 f"{counted(self._bad_lines, 'line')} of the text log are no message of its own",
                 "hand in the .bin file that it was made from, if it still exists",
+            )
+        if any(r.reason.startswith(CUT) for r in self.skipped):
+            yield Finding(
+                "log-cut",
+                Light.AMBER,
+                f"{CUT} a message: the log was cut short, or its writing was",
+                "copy the log from the card again; what came before is read",
             )
         if lost:
             size, places = sum(r.size for r in lost), counted(len(lost), "place")
