@@ -113,7 +113,9 @@ def excitation(log: Log) -> str:
     """Manoeuvre that excites the axes; its numbers come from the flight plan of that very log."""
     repeats = "two runs an axis, one of them with the opposite sign, the other axes quiet"
     piloted = "fly piloted frequency sweeps of 90 s an axis from 0.3 Hz up"
-    sized = f"{repeats}: flightid plan {log.path.name} writes amplitude, settings and a card"
+    sized = (
+        f"{repeats}: flightid plan {log.path.name} writes amplitude, a card and, of a go, settings"
+    )
     if log.kind == "px4":
         tunes = [name for name in ("MC_AT_START", "FW_AT_START") if name in log.parameters]
         autotune = f", or the autotune ({' or '.join(tunes)})" if tunes else ""

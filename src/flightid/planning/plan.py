@@ -45,7 +45,10 @@ ENOUGH_COHERENCE, SMALLEST_SHARE = 0.95, 0.5
 what the limits allow, for the day may be windier than that of the log."""
 WAIT_S = {"mode": 31.0, "stick": 20.0, "autotune": 15.0, "chirp": 10.0}
 """Rest before and behind a run, s."""
-UNSURE = f"what the axis does is not known yet: the log of {SMALLER} tells"
+UNSURE = (
+    f"what the axis does is not known yet: the log of {SMALLER} tells "
+    "(settings in spite of a no-go: --write-no-go)"
+)
 QUADPLANE = {"Q_A_RAT_": "ATC_RAT_", "Q_A_ANG_": "ATC_ANG_", "Q_A_ACCEL_": "ATC_ACCEL_"}
 
 
