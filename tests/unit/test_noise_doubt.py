@@ -189,7 +189,8 @@ def test_a_noise_that_is_nearly_none_leaves_bars_of_a_size(seed: int) -> None:
     fit = fid.identify(model, record, method="filter_error")
     for name, true in {"Za": -1.3, "Ma": -7.0, "Mq": -1.8, "Mde": -9.0}.items():
         found = fit.parameters[name]
-        assert found.interval95 is not None and found.stderr is not None
+        assert found.interval95 is not None
+        assert found.stderr is not None
         low, high = found.interval95
         assert low < true < high
         assert high - low < 20.0 * found.stderr

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from flightid.control.tuning.margins_below import BELOW_BAND, TAKEN_BELOW
+from flightid.control.margins.low_mode_slack import TAKEN_BELOW
+from flightid.control.tuning.margins_below import BELOW_BAND
 from flightid.control.tuning.worst_cases import ABOVE_BAND, WorstCase
 
 BAND = "the band in which the model was shown to hold"
