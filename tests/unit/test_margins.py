@@ -84,7 +84,11 @@ def test_all_crossings_are_kept():
 
 
 def test_low_coherence_at_the_crossover_is_told():
-    assert codes(fid.margins(measured(coherence=0.4)))["coherence-at-crossover"] == "amber"
+    # One point that chance made less coherent than its neighbours is read, and said.
+    dipped = measured(error=0.3, coherence=np.where(np.arange(60) == 28, 0.5, 0.7))
+    assert codes(fid.margins(dipped))["coherence-at-crossover"] == "amber"
+    with pytest.raises(DataError, match="too few coherent frequencies"):
+        fid.margins(measured(coherence=0.4))
 
 
 def test_open_poles_of_a_measurement_are_asked_for():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import field
+from dataclasses import field, replace
 from typing import Literal
 
 import numpy as np
@@ -166,3 +166,36 @@ class LogarithmicEnds:
         """Lower and upper end at a level."""
         factor = float(np.exp(half_width(level) * self.relative))
         return self.value / factor, self.value * factor
+
+
+@dataclass(frozen=True)
+class FromZero:
+    """Ends of a number that cannot be negative: the lower one is zero at the least.
+
+    Example
+    -------
+    >>> FromZero(DrawnEnds(np.arange(-100.0, 101.0)))(0.95)
+    (0.0, 95.0)
+    """
+
+    ends: Callable[[float], Interval | None]
+
+    def __call__(self, level: float) -> Interval | None:
+        """Lower and upper end at a level."""
+        found = self.ends(level)
+        return found and (max(found[0], 0.0), found[1])
+
+
+def frequency_from_zero(number: Reading) -> Reading:
+    """A frequency whose interval holds no negative one; other numbers as they are.
+
+    Clipped, not bent: the truth is positive, so that the interval holds it as often as before.
+
+    Example
+    -------
+    >>> frequency_from_zero(Estimate("crossover", 8.0, "rad/s", 5.0))
+    Estimate(crossover = 8 (0 to 17.8) rad/s)
+    """
+    if number.unit != "rad/s" or number.value is None or number.stderr is None:
+        return number
+    return replace(number, ends=FromZero(number.interval))

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.control.margins.crossings import level_crossings
-from flightid.control.margins.findings import guide_finding, stability_findings
+from flightid.control.margins.findings import guide_finding, stability_findings, unread_findings
 from flightid.control.margins.gain_limits import measured_up
 from flightid.control.margins.loop_metrics import DISTURBANCE_LEVEL_DB
 from flightid.control.margins.loop_source import Controller, Given, read_loop
@@ -22,6 +22,7 @@ from flightid.result import Result
 from flightid.table import Table
 from flightid.uncertainty.estimate import Reading, estimate_table
 from flightid.uncertainty.quantiles import shown
+from flightid.uncertainty.uneven import frequency_from_zero
 
 Array = NDArray[np.float64]
 PEAK_GUIDE_DB = 5.0
@@ -138,13 +139,15 @@ def disturbance_rejection(
     ModelError
         The loop has no frequency response.
     DataError
-        A measurement with fewer than three frequencies, or a loop that is zero or not finite.
+        A measurement with fewer than three neighbouring coherent frequencies, or a loop that is
+        zero or not finite.
     ShapeError
         A controller that does not fit.
 
     Assumes
     -------
-    A linear loop. The peak of a noisy measurement is biased upwards: it is the highest of many
+    A linear loop. Of a measurement the widest band of coherence 0.6 is read, and nothing beyond it.
+    The peak of a noisy measurement is biased upwards: it is the highest of many
     points. Leakage and resolution are taken out of a response that was estimated from records, not
     of one from a file or arithmetic. Intervals are carried by first order; the peak's is promised
     above the band of a fit as in `margins`.
@@ -185,7 +188,11 @@ def disturbance_rejection(
 
     carried, outside = loop.uncertain.carried_together(all_of), outside_band(loop)
     made = {
-        key: outside.promised(carried.number(place, name, unit, NO_BANDWIDTH), field, GAIN_GUIDE_DB)
+        key: outside.promised(
+            frequency_from_zero(carried.number(place, name, unit, loop.unread or NO_BANDWIDTH)),
+            field,
+            GAIN_GUIDE_DB,
+        )
         for place, (key, name, field, unit) in enumerate(QUANTITIES)
     }
     errors = carried.stderr
@@ -194,7 +201,7 @@ def disturbance_rejection(
     level -= np.log(10.0) / 20.0 * DISTURBANCE_LEVEL_DB
     found = [*stability_findings(loop, metrics)]
     found += _guides(made, bandwidth_guide_rad_s, peak_guide_db)
-    found += loop.uncertain.findings
+    found += [*unread_findings(loop), *loop.uncertain.findings]
     found += outside_band_findings(loop, outside, GAIN_GUIDE_DB)
     if not loop.uncertain.known:
         found.append(
@@ -220,7 +227,7 @@ def _guides(made: dict[str, Reading], bandwidth: float | None, peak: float) -> l
             Finding(
                 "no-disturbance-bandwidth",
                 Light.UNKNOWN,
-                NO_BANDWIDTH,
+                made["bandwidth"].reason or NO_BANDWIDTH,
                 "begin the band lower; a loop without gain at low frequency rejects nothing",
             )
         )

@@ -100,7 +100,9 @@ def margin_findings(
             Finding(
                 "no-crossover",
                 Light.UNKNOWN,
-                "the gain does not pass one in the band: there is no phase margin to speak of",
+                "the gain does not pass one in the band"
+                + (f" ({loop.unread})" if loop.unread else "")
+                + ": there is no phase margin to speak of",
                 "widen the band, if the loop is meant to act there",
             )
         )
@@ -120,6 +122,7 @@ def margin_findings(
         found.append(
             Finding("no-intervals", Light.UNKNOWN, f"no intervals: {loop.uncertain.reason}")
         )
+    found += unread_findings(loop)
     if loop.measured:
         found.append(_verdict_of_band(loop))
     return tuple(found)
@@ -142,6 +145,21 @@ def source_findings(loop: BrokenLoop, crossover: Reading) -> list[Finding]:
     ]
 
 
+def unread_findings(loop: BrokenLoop) -> list[Finding]:
+    """What of a measured loop is not read, for want of coherence; nothing where all is."""
+    if not loop.unread:
+        return []
+    return [
+        Finding(
+            "not-read",
+            Light.UNKNOWN,
+            f"crossings and turns about −1 that are {loop.unread}",
+            "excite what lies beyond better; band_rad_s chooses another coherent band; or fit a "
+            "model",
+        )
+    ]
+
+
 def _verdict_of_band(loop: BrokenLoop) -> Finding:
     low, high = loop.omega_rad_s[[0, -1]]
     return Finding(
@@ -153,10 +171,31 @@ def _verdict_of_band(loop: BrokenLoop) -> Finding:
     )
 
 
+def _ends_open(loop: BrokenLoop) -> bool:
+    """Whether reading ends, for want of coherence, where the loop may still turn about −1."""
+    if not loop.unread:
+        return False
+    last = loop.of(loop.uncertain.value, loop.omega_rad_s)[-1]
+    return bool(abs(last) >= 1.0)
+
+
 def stability_findings(loop: BrokenLoop, metrics: LoopMetrics) -> list[Finding]:
     """What the Nyquist criterion says, where it does not say that all is well."""
     count = round(float(metrics.unstable_poles))
     open_poles = f"{loop.unstable_poles} unstable poles of the open"
+    if _ends_open(loop):
+        high = loop.omega_rad_s[-1]
+        seen = f"turns up to there make {count} unstable poles" if count else "none is seen so far"
+        return [
+            Finding(
+                "stability-not-read",
+                Light.AMBER if count else Light.UNKNOWN,
+                f"whether the closed loop is stable cannot be told: the gain is above one at "
+                f"{high:.3g} rad/s, and what follows is {loop.unread}; {seen}, "
+                f"from {open_poles} loop",
+                "excite higher frequencies until the gain has passed one, or fit a model",
+            )
+        ]
     if count > 0:
         return [
             Finding(

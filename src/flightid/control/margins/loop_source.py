@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from flightid.control.margins.loop_grid import loop_grid, roots_of, whole_grid
 from flightid.control.margins.loop_metrics import LoopMetrics, loop_metrics
+from flightid.control.margins.usable_points import read_band, unread
 from flightid.errors import DataError, ModelError, OptionError, ShapeError, UnknownNameError
 from flightid.frozen import dataclass
 from flightid.identification.uncertain_of import uncertain_of
@@ -62,6 +63,8 @@ class BrokenLoop:
         Of the closed loop, counted over all frequencies where the band holds only some of them.
     whole_rad_s : ndarray, shape (n_f,), or None
         All frequencies of a model's loop that the band cuts off, so that no limit is missed.
+    unread : str
+        What of a measurement is not read, for want of coherence; empty where all is.
     """
 
     name: str
@@ -73,6 +76,7 @@ class BrokenLoop:
     end_rad_s: float = np.inf
     closed_unstable_poles: int | None = None
     whole_rad_s: Array | None = None
+    unread: str = ""
 
     @property
     def measured(self) -> bool:
@@ -146,6 +150,8 @@ def _measured(
         raise DataError(
             "too few frequencies to find margins", found=pair.n_frequencies, needed="three or more"
         )
+    band = read_band(pair)
+    said = unread(pair.omega_rad_s, band)
     pair = unbiased(pair, refined=True) or pair
     if given == "closed":
         pair = open_loop(pair, 1.0)
@@ -154,6 +160,9 @@ def _measured(
     if controller is not None:
         pair = apply_known(pair, known_values(controller, pair.omega_rad_s))
         unstable_poles += roots_of(controller).n_unstable
+    if said:
+        # Last of all: a controller given as values has one at every frequency.
+        pair = pair.select(band_rad_s=band)
 
     def of(thing: FrequencyResponse, omega: Array) -> Complex:
         del omega  # a measurement has its own
@@ -166,6 +175,7 @@ def _measured(
         of,
         unstable_poles,
         pair.coherence[0, 0],
+        unread=said,
     )
 
 

@@ -25,6 +25,7 @@ from flightid.result import Result
 from flightid.table import Column, Table
 from flightid.uncertainty.estimate import Reading, estimate_table
 from flightid.uncertainty.quantiles import shown
+from flightid.uncertainty.uneven import frequency_from_zero
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -232,13 +233,15 @@ def margins(
     ModelError
         The loop has no frequency response.
     DataError
-        A measurement with fewer than three frequencies, or a loop that is zero or not finite.
+        A measurement with fewer than three neighbouring coherent frequencies, or a loop that is
+        zero or not finite.
     ShapeError
         A controller that does not fit.
 
     Assumes
     -------
-    A linear loop. Intervals are those of the estimate's covariance carried by first order, by draws
+    A linear loop. Of a measurement the widest band of coherence 0.6 is read, and nothing beyond it.
+    Intervals are those of the estimate's covariance carried by first order, by draws
     where a margin hangs on two crossings that change places, and leave out what a model lacks.
     Numbers that are read above the band to which a fit was shown to hold have none, and intervals
     of gain margin, modulus margin and sensitivity peak reach what a resonance of 20 dB above that
@@ -335,8 +338,13 @@ def _carried(loop: BrokenLoop, omega: Array) -> tuple[list[tuple[Any, Reading]],
 
     carried = loop.uncertain.carried_together(all_of)
     missing = MISSING | (dict.fromkeys(GAIN_LIMITS, UNSEEN) if loop.measured else {})
+    if loop.unread:
+        missing = dict.fromkeys(MISSING, loop.unread)
     quantities = [
-        (each, carried.number(place, each[0], each[2], missing.get(each[1], "")))
+        (
+            each,
+            frequency_from_zero(carried.number(place, each[0], each[2], missing.get(each[1], ""))),
+        )
         for place, each in enumerate(QUANTITIES)
     ]
     stderr, count = carried.stderr, len(names)
