@@ -275,7 +275,7 @@ def test_what_outputs_share_in_their_errors_is_carried():
     rng = np.random.default_rng(7)
     n = 3000
     inputs = rng.standard_normal((2, n))
-    gust = 0.5 * rng.standard_normal(n)
+    gust = 0.3 * rng.standard_normal(n)
     outputs = [0.8 * inputs[0] + gust, 0.6 * inputs[1] + 0.9 * gust]
     record = fid.Record.from_arrays(
         np.arange(n) * 0.02,

@@ -58,6 +58,17 @@ def test_disturbance_rejection_ends_with_the_coherence():
     assert "not read: coherence falls below 0.6 under" in none.bandwidth.reason
 
 
+def test_a_disk_margin_ends_with_the_coherence():
+    half = np.full(len(OMEGA), 0.5 + 0j)
+    for controller, loop in ((None, TRUE), (half, 0.5 * TRUE)):
+        found = fid.disk_margin(measured(15.0), controller=controller)
+        assert found.omega_rad_s[-1] <= 15.0
+        assert codes(found)["not-read"] == "unknown"
+        assert "closed-loop-unstable" not in codes(found)
+        sizes = np.abs((1.0 - loop) / (1.0 + loop))[OMEGA <= 15.0] / 2.0
+        assert found.alpha.value == pytest.approx(1.0 / np.max(sizes), rel=0.01)
+
+
 def test_stability_is_not_told_where_reading_ends_above_one():
     found = fid.margins(measured(3.0))
     assert codes(found)["stability-not-read"] == "unknown"

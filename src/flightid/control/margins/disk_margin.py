@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.control.margins.disk_geometry import gain_limits, phase_limit_deg
-from flightid.control.margins.findings import guide_finding
+from flightid.control.margins.findings import guide_finding, unread_findings
 from flightid.control.margins.loop_grid import zoomed
 from flightid.control.margins.loop_metrics import loop_metrics
 from flightid.control.margins.loop_source import Controller
@@ -196,7 +196,7 @@ def disk_margin(
         unstable_poles=unstable_poles,
     )
     omega, alphas, count = _over_frequency(loops, skew)
-    findings = [*_stability(count), *loops.uncertain.findings]
+    findings = [*_stability(count), *unread_findings(loops.unread), *loops.uncertain.findings]
     if count > 0:
         none = {key: Estimate(name, None, unit, None, UNSTABLE) for key, name, unit in QUANTITIES}
         return DiskMargin(

@@ -201,7 +201,7 @@ def disturbance_rejection(
     level -= np.log(10.0) / 20.0 * DISTURBANCE_LEVEL_DB
     found = [*stability_findings(loop, metrics)]
     found += _guides(made, bandwidth_guide_rad_s, peak_guide_db)
-    found += [*unread_findings(loop), *loop.uncertain.findings]
+    found += [*unread_findings(loop.unread), *loop.uncertain.findings]
     found += outside_band_findings(loop, outside, GAIN_GUIDE_DB)
     if not loop.uncertain.known:
         found.append(

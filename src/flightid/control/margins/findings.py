@@ -122,7 +122,7 @@ def margin_findings(
         found.append(
             Finding("no-intervals", Light.UNKNOWN, f"no intervals: {loop.uncertain.reason}")
         )
-    found += unread_findings(loop)
+    found += unread_findings(loop.unread)
     if loop.measured:
         found.append(_verdict_of_band(loop))
     return tuple(found)
@@ -145,17 +145,16 @@ def source_findings(loop: BrokenLoop, crossover: Reading) -> list[Finding]:
     ]
 
 
-def unread_findings(loop: BrokenLoop) -> list[Finding]:
+def unread_findings(unread: str) -> list[Finding]:
     """What of a measured loop is not read, for want of coherence; nothing where all is."""
-    if not loop.unread:
+    if not unread:
         return []
     return [
         Finding(
             "not-read",
             Light.UNKNOWN,
-            f"crossings and turns about −1 that are {loop.unread}",
-            "excite what lies beyond better; band_rad_s chooses another coherent band; or fit a "
-            "model",
+            f"crossings and turns about −1 that are {unread}",
+            "excite what lies beyond better, look at another band, or fit a model",
         )
     ]
 

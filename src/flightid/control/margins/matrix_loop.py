@@ -17,6 +17,7 @@ from flightid.control.margins.loop_source import (
     closed_count,
     known_values,
 )
+from flightid.control.margins.usable_points import read_band_of_all, unread
 from flightid.errors import DataError, ModelError, OptionError, ShapeError, UnknownNameError
 from flightid.frozen import dataclass
 from flightid.identification.uncertain_of import uncertain_of
@@ -51,6 +52,8 @@ class MatrixLoop:
     measured : bool
     closed_unstable_poles : int or None
         Of the closed loops, counted over all frequencies where a band holds only some of them.
+    unread : str
+        What of a measurement is not read, for want of coherence; empty where all is.
     """
 
     channels: tuple[str, ...]
@@ -60,6 +63,7 @@ class MatrixLoop:
     unstable_poles: int
     measured: bool
     closed_unstable_poles: int | None = None
+    unread: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +117,7 @@ def read_loops(
         uncertain = _unweighed(_without_leakage(source))
     else:
         uncertain = uncertain_of(source)
-    thing = uncertain.value
+    thing: Any = uncertain.value
     if not measured and not isinstance(thing, ResponseSource):
         raise ModelError(
             "the loop has no frequency response",
@@ -121,6 +125,10 @@ def read_loops(
             needed="a model, a fit, a system, or a measurement",
         )
     rows, columns = _chosen(thing, outputs, inputs, controller)
+    said = ""
+    if isinstance(source, FrequencyResponse):
+        thing, controller, said = _read_part(source.select(outputs=rows), thing, controller)
+        uncertain = _unweighed(thing)
     known = tuple(thing.outputs), tuple(thing.inputs)
     places = np.ix_([known[0].index(n) for n in rows], [known[1].index(n) for n in columns])
 
@@ -150,7 +158,23 @@ def read_loops(
             return equivalent_loop(of(thing, at_))
 
         closed = closed_count(one_loop, whole_grid(one_loop, roots, band_rad_s), count)
-    return MatrixLoop(names, uncertain, omega, of, count, measured, closed)
+    return MatrixLoop(names, uncertain, omega, of, count, measured, closed, said)
+
+
+def _read_part(
+    measured: FrequencyResponse, clean: FrequencyResponse, controller: ResponseSource | None
+) -> tuple[FrequencyResponse, ResponseSource | None, str]:
+    """What is coherent of a measurement, a controller's values there, and what is not read."""
+    omega = measured.omega_rad_s
+    low, high = read_band_of_all(measured)
+    said = unread(omega, (low, high))
+    if not said:
+        return clean, controller, said
+    if isinstance(controller, KnownLaw) and isinstance(controller.law, np.ndarray | list | tuple):
+        inside = (omega >= low) & (omega <= high)
+        law = np.asarray(controller.law)
+        controller = KnownLaw(law[inside]) if law.shape == omega.shape else controller
+    return clean.select(band_rad_s=(low, high)), controller, said
 
 
 def _without_leakage(response: FrequencyResponse) -> FrequencyResponse:

@@ -12,6 +12,7 @@ from flightid.responses.bands import COHERENT, usable_band
 
 LEAST_POINTS = 3
 """Fewer do not show how a loop turns."""
+Array = NDArray[np.float64]
 Band = tuple[float, float]
 
 
@@ -42,8 +43,36 @@ def read_band(pair: FrequencyResponse) -> Band:
     >>> read_band(FrequencyResponse.from_values(omega, [4.0, 2.0, 1.0, 0.5], **known))
     (1.0, 3.0)
     """
-    omega, coherence = pair.omega_rad_s, pair.coherence[0, 0]
-    error = pair.random_error[0, 0]
+    return _coherent(pair.omega_rad_s, pair.coherence[0, 0], pair.random_error[0, 0])
+
+
+def read_band_of_all(response: FrequencyResponse) -> Band:
+    """The same of several pairs: where the inputs together explain each output.
+
+    A pair that hardly couples has no coherence of its own, and need not.
+
+    Parameters
+    ----------
+    response : FrequencyResponse
+        As measured.
+
+    Raises
+    ------
+    DataError
+        Fewer than three neighbouring frequencies are coherent.
+
+    Example
+    -------
+    >>> omega = [1.0, 2.0, 3.0, 4.0]
+    >>> known = dict(inputs=["u"], outputs=["y"], coherence=[0.9, 0.9, 0.8, 0.1])
+    >>> read_band_of_all(FrequencyResponse.from_values(omega, [4.0, 2.0, 1.0, 0.5], **known))
+    (1.0, 3.0)
+    """
+    least = np.min(response.multiple_coherence, axis=0)
+    return _coherent(response.omega_rad_s, least, np.min(response.random_error, axis=(0, 1)))
+
+
+def _coherent(omega: Array, coherence: Array, error: Array) -> Band:
     # A point without any coherence has no error that chance could explain: it stands as it is.
     known = steady_coherence(omega, coherence, np.where(np.isfinite(error), error, 0.0))
     band = usable_band(omega, known)
@@ -62,7 +91,7 @@ def read_band(pair: FrequencyResponse) -> Band:
     return band
 
 
-def unread(omega: NDArray[np.float64], band: Band) -> str:
+def unread(omega: Array, band: Band) -> str:
     """What is not read and why, empty where all is.
 
     Parameters
@@ -86,5 +115,5 @@ def unread(omega: NDArray[np.float64], band: Band) -> str:
     return f"not read: coherence falls below {COHERENT:g} {place} rad/s"
 
 
-def _inside(omega: NDArray[np.float64], band: Band) -> NDArray[np.bool_]:
+def _inside(omega: Array, band: Band) -> NDArray[np.bool_]:
     return np.asarray((omega >= band[0]) & (omega <= band[1]))
