@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import flightid as fid
 from flightid.identification.innovation_tests import InnovationTests, innovation_tests
@@ -19,6 +21,20 @@ CODES = {"errors-not-white", "inputs-in-errors"}
 
 def _codes(fit: fid.Fit) -> set[str]:
     return CODES & {finding.code for finding in fit.findings}
+
+
+def _short(n: int, noise: Callable[[int], np.ndarray], seed: int = 0) -> fid.Record:
+    """Steps of two levels through (q⁻² + 0.5 q⁻³) / (1 - 1.5 q⁻¹ + 0.7 q⁻²), and noise."""
+    u = np.repeat(np.sign(np.random.default_rng(seed).standard_normal(n // 3 + 1)), 3)[:n]
+    x = lfilter([0.0, 0.0, 1.0, 0.5], [1.0, -1.5, 0.7], u)
+    return fid.Record.from_arrays(
+        np.arange(n) * 0.1,
+        inputs={"u": u},
+        outputs={"y": x + noise(n)},
+        units={"u": "1", "y": "1"},
+        hold="zero",
+        loop="open",
+    )
 
 
 def test_tests_tell_white_coloured_and_driven_errors_apart() -> None:
@@ -76,6 +92,36 @@ def test_one_step_models_have_intervals_in_their_own_noise_alone(structure: obje
     assert bad.evidence.light != "green"
     assert all(p.interval95 is None for p in bad.parameters.values())
     assert all(gain.interval95 is None for gain in bad.details.gains.values())
+
+
+@pytest.mark.parametrize(
+    "structure",
+    [
+        fid.PolynomialModel.arx("u", "y", na=2, nb=2, nk=2),
+        fid.PolynomialModel.arx("u", "y", na=2, nb=2, nk=2, method="iv4"),
+        fid.PolynomialModel.oe("u", "y", nb=2, nf=2, nk=2),
+        fid.PolynomialModel.bj("u", "y", nb=2, nf=2, nc=1, nd=1, nk=2),
+    ],
+    ids=lambda structure: f"{structure.kind} {structure.method}",
+)
+def test_a_fit_without_noise_has_no_bars_and_says_so(structure: object) -> None:
+    """Rounding made them: 5e-17 long, with the truth 7e-16 away, green."""
+    fit = fid.identify(structure, _short(1000, lambda _: np.zeros(1000)))
+    assert fit.covariance is None
+    assert fit.evidence.light == "amber"
+    assert "exact-fit" in {each.code for each in fit.findings}
+    for each in (*fit.parameters.values(), *fit.details.gains.values()):
+        assert each.interval95 is None
+        assert each.stderr is None
+        assert each.reason
+
+
+def test_noise_of_a_millionth_keeps_its_bars() -> None:
+    noise = partial(np.random.default_rng(5).normal, 0.0, 1e-6)
+    structure = fid.PolynomialModel.oe("u", "y", nb=2, nf=2, nk=2)
+    fit = fid.identify(structure, _short(1000, lambda n: noise(size=n)))
+    assert "exact-fit" not in {each.code for each in fit.findings}
+    assert all(1e-10 < each.stderr < 1e-6 for each in fit.parameters.values())
 
 
 def test_box_jenkins_keeps_the_vehicle_and_not_its_noise_model() -> None:

@@ -27,6 +27,8 @@ DOUBTED = (CONTRADICTED, "hold-unknown")
 OUTPUT_ERROR = "output_error"
 NOTHING = "what inputs explain of the outputs is within chance: nothing of the vehicle is told"
 
+EXACT = "residuals are at rounding, so no noise is there that bars could tell"
+
 
 def with_residuals_judged(fit: Fit) -> Fit:
     """The fit without intervals where its residuals refute them; as it is elsewhere.
@@ -116,6 +118,12 @@ def nothing_told(reason: str) -> list[Finding]:
     """The finding that goes with the reason `NOTHING`; none with any other."""
     action = "excite the vehicle more, or fly longer"
     return [Finding("nothing-told", Light.RED, NOTHING, action)] if reason == NOTHING else []
+
+
+def exact_fit(reason: str) -> list[Finding]:
+    """The finding that goes with the reason `EXACT`; none with any other."""
+    action = "fit a record with the noise of its sensor: a simulation without noise has no errors"
+    return [Finding("exact-fit", Light.AMBER, EXACT, action)] if reason == EXACT else []
 
 
 def in_doubt(findings: tuple[Finding, ...]) -> bool:

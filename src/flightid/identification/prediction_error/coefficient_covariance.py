@@ -24,7 +24,7 @@ from flightid.identification.prediction_error.findings import ELSEWHERE, NOISE_A
 from flightid.identification.prediction_error.likelihoods import ALIKE
 from flightid.identification.prediction_error.part_blocks import errors_at, part_blocks
 from flightid.identification.prediction_error.roots import farthest
-from flightid.identification.residual_evidence import NOTHING, least_gain
+from flightid.identification.residual_evidence import EXACT, NOTHING, least_gain
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.models.sampled.channels import SampledChannels
 from flightid.uncertainty.agreement import Agreement
@@ -116,11 +116,12 @@ def compared(
 ) -> SearchResult:
     """Covariance of the coefficients after parts of the data were compared.
 
-    By the colour of residuals where no noise model answers for it; none where estimates are biased.
+    By the colour of residuals where no noise model answers for it; none where estimates are biased,
+    and none where residuals are rounding: its sums of squares tell no error of the estimates.
     """
     plain = found.covariance
-    if plain is None:
-        return found
+    if plain is None or _ratio(data, errors) <= ROUNDING:
+        return found if plain is None else replace(found, covariance=None, reason=EXACT)
     if found.agreement is None and not has_noise_model(structure) and structure.kernel is None:
         known = output_error_covariance(structure, data, found.theta, errors, found.skip)
         found = replace(
@@ -210,13 +211,17 @@ def _tells_nothing(data: SampledChannels, errors: Array, plain: Array) -> bool:
     return gain < least_gain(len(plain))
 
 
+def _ratio(data: SampledChannels, errors: Array) -> float:
+    """Size of the errors over that of the output about its means."""
+    about = np.concatenate([data.output[span] - data.output[span].mean() for span in data.spans])
+    return float(np.sqrt(errors @ errors / max(about @ about, np.finfo(float).tiny)))
+
+
 def judged_tests(
     tests: InnovationTests, data: SampledChannels, found: SearchResult, errors: Array
 ) -> InnovationTests:
     """The tests as they count: by the fit's own projection where errors are coloured."""
-    spans = data.spans
-    about = np.concatenate([data.output[span] - data.output[span].mean() for span in spans])
-    ratio = float(np.sqrt(errors @ errors / max(about @ about, np.finfo(float).tiny)))
+    ratio, spans = _ratio(data, errors), data.spans
     seen = found.correlations if ratio > ROUNDING else ()
     made = tests.fitted(seen, [ratio]).beside(found.agreement)
     told = independent_samples([errors[span] for span in spans])

@@ -48,7 +48,7 @@ from flightid.identification.prediction_error.roots import (
 )
 from flightid.identification.prediction_error.sampling_rate import sampling_findings
 from flightid.identification.prediction_error.search import optimum
-from flightid.identification.residual_evidence import nothing_told
+from flightid.identification.residual_evidence import exact_fit, nothing_told
 from flightid.models.polynomial.model import PolynomialModel
 from flightid.models.polynomial.prediction import free_run
 from flightid.models.polynomial.structure import PolynomialStructure
@@ -137,6 +137,7 @@ def _assemble(
             *colour_findings(*found.colour, has_bars=found.covariance is not None),
             *tests.findings(biased=biased, times=tests.widening(biased=biased)),
             *nothing_told(found.reason),
+            *exact_fit(found.reason),
             *sampling_findings(model, roots, max(each.duration_s for each in records)),
         ),
         provenance=provenance_of(
