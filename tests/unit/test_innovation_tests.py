@@ -13,6 +13,7 @@ from scipy.signal import lfilter
 import flightid as fid
 from flightid.identification.innovation_tests import InnovationTests, innovation_tests
 from flightid.identification.multistart import End, best_first
+from flightid.identification.prediction_error.own_past import with_own_past
 from tests.strangers import black_boxes as flights
 from tests.strangers import rig_gains
 
@@ -114,6 +115,59 @@ def test_a_fit_without_noise_has_no_bars_and_says_so(structure: object) -> None:
         assert each.interval95 is None
         assert each.stderr is None
         assert each.reason
+
+
+def _coloured(pole: float, share: float, seed: int) -> Callable[[int], np.ndarray]:
+    """Noise of one pole, so much of the answer's size (7)."""
+    random = np.random.default_rng(1000 + seed)
+
+    def drawn(n: int) -> np.ndarray:
+        noise = lfilter([1.0], [1.0, -pole], random.standard_normal(n))
+        return share * 7.0 * noise / noise.std()
+
+    return drawn
+
+
+@pytest.mark.parametrize(("pole", "samples", "missed"), [(0.9, 150, 7), (0.7, 200, 0)])
+def test_short_regressions_in_noise_not_their_own_are_told(
+    pole: float, samples: int, missed: int
+) -> None:
+    """Correlations at all lags told 3 and 6 of 12; 24 of 48 and 18 of 24 bars missed."""
+    structure, truth = fid.PolynomialModel.arx("u", "y", na=2, nb=2, nk=2), (-1.5, 0.7, 1.0, 0.5)
+    told, held, shown = 0, 0, 0
+    for seed in range(12):
+        fit = fid.identify(structure, _short(samples, _coloured(pole, 0.5, seed), seed))
+        told += bool(_codes(fit))
+        bars = [each.interval95 for each in fit.parameters.values()]
+        shown += sum(each is not None for each in bars)
+        held += sum(b[0] <= t <= b[1] for b, t in zip(bars, truth, strict=True) if b is not None)
+    assert told >= 10
+    assert shown - held <= missed
+
+
+def test_short_regressions_in_their_own_noise_stay_untold() -> None:
+    structure, told = fid.PolynomialModel.arx("u", "y", na=2, nb=2, nk=2), 0
+    for seed in range(20):
+        random = np.random.default_rng(2000 + seed)
+        own = partial(lambda r, n: lfilter([1.0], [1.0, -1.5, 0.7], r.standard_normal(n)), random)
+        fit = fid.identify(structure, _short(150, own, seed))
+        assert fit.covariance is not None
+        told += bool(_codes(fit))
+    assert told <= 1
+
+
+def test_past_errors_beside_regressors_tell_what_the_fit_hid() -> None:
+    """Coefficients whiten what they can; errors of two records do not reach across their ends."""
+    e = np.random.default_rng(7).standard_normal((2, 60))
+    sound, lengths = InnovationTests(0.5, 0.5, 0.0, 0.0), [60, 60]
+    slopes = np.random.default_rng(8).standard_normal((120, 2))
+    assert with_own_past(sound, slopes, e.ravel(), lengths, 0.1).white == 1.0
+    red = lfilter([1.0], [1.0, -0.6], e).ravel()
+    told = with_own_past(sound, slopes, red, lengths, 0.1)
+    assert not told.is_white
+    assert told.excess[0] > 20.0
+    assert told.past_percent > 2.0
+    assert with_own_past(sound, slopes[:8], red[:8], [8], 0.1) is sound
 
 
 def test_noise_of_a_millionth_keeps_its_bars() -> None:

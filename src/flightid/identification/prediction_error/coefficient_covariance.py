@@ -22,6 +22,7 @@ from flightid.identification.prediction_error.coloured_errors import (
 from flightid.identification.prediction_error.excited_inputs import noise_free_inputs
 from flightid.identification.prediction_error.findings import ELSEWHERE, NOISE_AT_CIRCLE
 from flightid.identification.prediction_error.likelihoods import ALIKE
+from flightid.identification.prediction_error.own_past import with_own_past
 from flightid.identification.prediction_error.part_blocks import errors_at, part_blocks
 from flightid.identification.prediction_error.roots import farthest
 from flightid.identification.residual_evidence import EXACT, NOTHING, least_gain
@@ -49,6 +50,8 @@ Reference: Dickey & Fuller (1979), J. American Statistical Association 74, 427-4
 
 SLOW = 0.05
 """Independent samples over samples below which noise seems to follow inputs: AR(0.95)."""
+SHORT = 2000
+"""Samples up to which past errors are asked beside the regressors; correlations tell beyond it."""
 FAR = 5.0
 """Bars between two minima beyond which neither's hold the other."""
 
@@ -88,15 +91,28 @@ def is_white(structure: PolynomialStructure, tests: InnovationTests) -> bool:
 
 
 def tests_of(
-    structure: PolynomialStructure, data: SampledChannels, counted: Sequence[Array], skip: int
+    structure: PolynomialStructure,
+    data: SampledChannels,
+    counted: Sequence[Array],
+    found: SearchResult,
 ) -> InnovationTests:
     """Whiteness of the errors that count, and their independence of the inputs."""
-    return innovation_tests(
+    skip = found.skip
+    tests = innovation_tests(
         [row[None] for row in counted],
         [data.external[:, span][:, skip:] for span in data.spans],
         [data.output[None, span] for span in data.spans],
         spent(structure),
     )
+    errors, lengths = np.concatenate(counted), [row.size for row in counted]
+    ratio = _ratio(data, errors)
+    asked = shares_poles(structure) and structure.kernel is None
+    if not asked or errors.size > SHORT or found.covariance is None or ratio <= ROUNDING:
+        return tests
+    at = partial(errors_at, structure, data, found.memory)
+    blocks = part_blocks(at, data, found.theta, skip)
+    slopes = np.concatenate([each.projected for each in blocks])
+    return with_own_past(tests, slopes, errors, lengths, ratio)
 
 
 def spent(structure: PolynomialStructure) -> tuple[int, int]:

@@ -84,7 +84,7 @@ def _assemble(
     data = about_levels(structure, data, found.memory, found.theta)
     errors = errors_at(structure, data, found.memory, found.theta)
     counted = tuple(errors[span][found.skip :] for span in data.spans)
-    tests = tests_of(structure, data, counted, found.skip)
+    tests = tests_of(structure, data, counted, found)
     found = compared(structure, data, found, errors, tests)
     tests, biased = judged_tests(tests, data, found, errors), shares_poles(structure)
     squares = float(sum(row @ row for row in counted))
