@@ -24,6 +24,7 @@ from flightid.logs.dataflash.field_units import (
     UNITS,
     undeclared_units,
 )
+from flightid.logs.log_cut import INSIDE, log_cut
 from flightid.logs.source import (
     ByteRange,
     Event,
@@ -35,7 +36,6 @@ from flightid.logs.source import (
 )
 from flightid.units import DIMENSIONLESS
 
-CUT = "the file ends inside"
 GAP_S = 0.2
 """Silence of all messages together that counts as a gap, s: even the slowest standard log bitmask
 writes the inertial sensors at 25 Hz."""
@@ -317,30 +317,22 @@ class DataflashSource:
         return [*self._loss(), *self._dropped(), *self._doubts()]
 
     def _loss(self) -> Iterator[Finding]:
-        harmless = ("filled with", CUT)
-        lost = [r for r in self.skipped if not r.reason.startswith(harmless)]
+        lost = [r for r in self.skipped if not r.reason.startswith(("filled with", INSIDE))]
         if self._bad_lines:
             yield Finding(
-                "lines-skipped",
-                Light.AMBER,
+                "lines-skipped", Light.AMBER,
                 f"{counted(self._bad_lines, 'line')} of the text log are no message of its own",
                 "hand in the .bin file that it was made from, if it still exists",
-            )
-        if any(r.reason.startswith(CUT) for r in self.skipped):
-            yield Finding(
-                "log-cut",
-                Light.AMBER,
-                f"{CUT} a message: the log was cut short, or its writing was",
-                "copy the log from the card again; what came before is read",
-            )
+            )  # fmt: skip
+        if any(r.reason.startswith(INSIDE) for r in self.skipped):
+            yield log_cut("a message")
         if lost:
             size, places = sum(r.size for r in lost), counted(len(lost), "place")
             yield Finding(
-                "bytes-skipped",
-                Light.AMBER,
+                "bytes-skipped", Light.AMBER,
                 f"{size} of {self._file.size()} bytes, in {places}, are no message",
                 "copy the log from the vehicle again; look for gaps in the span you use",
-            )
+            )  # fmt: skip
 
     def _dropped(self) -> Iterator[Finding]:
         if self._has("DSF", "Dp"):

@@ -16,12 +16,14 @@ from numpy.typing import NDArray
 from flightid import _native
 from flightid.conventions import Light
 from flightid.findings import Finding, counted
+from flightid.logs.log_cut import INSIDE, log_cut
 from flightid.logs.source import ByteRange, Event, Gap, MessageInfo, ParameterChange
 from flightid.logs.ulog.names import AIRFRAMES, ARMED, LEVELS, MODES, VEHICLE_TYPES, changes_of
 
 STAMP = "timestamp"
 MICROSECONDS = "µs"
-CUT = "the file ends inside a record"
+RECORD = "a record"
+CUT = f"{INSIDE} {RECORD}"
 """Reason of the native half (`framing.rs`) for the bytes after the last whole record."""
 DEFAULT_KINDS = {1: "system", 2: "airframe"}
 
@@ -159,14 +161,7 @@ class UlogSource:
         found = []
         damaged = [part for part in self.skipped if part.reason != CUT]
         if len(damaged) < len(self.skipped):
-            found.append(
-                Finding(
-                    "log-cut",
-                    Light.AMBER,
-                    f"{CUT}: the log was cut short, or its writing was",
-                    "copy the log from the card again; what came before is read",
-                )
-            )
+            found.append(log_cut(RECORD))
         if damaged:
             lost = sum(part.size for part in damaged)
             found.append(
