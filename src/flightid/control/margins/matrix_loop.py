@@ -102,16 +102,7 @@ def read_loops(
     ShapeError
         Numbers of channels that do not fit.
     """
-    if at not in PLACES:
-        raise OptionError("at is not known", found=repr(at), needed="one of " + ", ".join(PLACES))
-    if controller is None and at != "outputs":
-        raise OptionError(
-            "loops without a controller are broken where they are", found=at, needed="controller=…"
-        )
-    if controller is not None and not isinstance(controller, ResponseSource):
-        controller = KnownLaw(controller)
-    if band_rad_s is not None and not 0.0 < band_rad_s[0] < band_rad_s[1] < np.inf:
-        raise OptionError("band_rad_s has no meaning", found=band_rad_s, needed="0 < low < high")
+    controller = _asked(controller, at, band_rad_s)
     measured = isinstance(source, FrequencyResponse)
     if isinstance(source, FrequencyResponse):
         uncertain = _unweighed(_without_leakage(source))
@@ -159,6 +150,23 @@ def read_loops(
 
         closed = closed_count(one_loop, whole_grid(one_loop, roots, band_rad_s), count)
     return MatrixLoop(names, uncertain, omega, of, count, measured, closed, said)
+
+
+def _asked(
+    controller: Controller | None, at: At, band_rad_s: tuple[float, float] | None
+) -> ResponseSource | None:
+    """The controller as a source of responses, once what was asked has a meaning."""
+    if at not in PLACES:
+        raise OptionError("at is not known", found=repr(at), needed="one of " + ", ".join(PLACES))
+    if controller is None and at != "outputs":
+        raise OptionError(
+            "loops without a controller are broken where they are", found=at, needed="controller=…"
+        )
+    if band_rad_s is not None and not 0.0 < band_rad_s[0] < band_rad_s[1] < np.inf:
+        raise OptionError("band_rad_s has no meaning", found=band_rad_s, needed="0 < low < high")
+    if controller is None or isinstance(controller, ResponseSource):
+        return controller
+    return KnownLaw(controller)
 
 
 def _read_part(
