@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 import flightid as fid
 from flightid.cli.program import run
 from flightid.control.margins.margins import margins
-from flightid.control.margins.outside_band import AT_ONE_BELOW, BEYOND
+from flightid.control.margins.outside_band import BEYOND
 from flightid.conventions import Light
 from flightid.errors import DataError
 from flightid.plot.compared_loops import compared_loops
@@ -72,7 +72,7 @@ def test_what_is_read_above_the_band_of_the_fit_is_not_judged() -> None:
     (said,) = (each for each in alone.findings if each.code == "margin-beyond-band")
     assert "above the 20 rad/s to which" in said.message
     within = margins(replace(band, valid_rad_s=(15.0, 1e3)), controller=0.3)
-    assert (within.gain_margin.interval95, within.gain_margin.reason) == (None, AT_ONE_BELOW)
+    assert within.gain_margin.interval95 is not None
     (low,) = (each for each in within.findings if each.code == "margin-below-band")
     assert "phase margin, delay margin down to 11.3 rad/s, below the 15 rad/s" in low.message
     assert (low.light, low.action) == (Light.AMBER, "sweep from 8.7 rad/s or lower")

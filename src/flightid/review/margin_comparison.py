@@ -248,7 +248,7 @@ def _changes(
             found.promised(each, field, GAIN_GUIDE_DB)
             for each, found in zip((one, two), outside, strict=True)
         )
-        beyond = any(field in found.above or found.is_at_one_below for found in outside)
+        beyond = any(field in found.above for found in outside)
         if apart is None or beyond or one.value is None or two.value is None:
             yield change_of(name, one, two)
         else:

@@ -20,7 +20,6 @@ from flightid.uncertainty.estimate import Estimate, Reading
 TO_SEE_IT = 1.3
 """Band beyond the frequency of a margin from which the model is known about it."""
 BEYOND = "read above the band to which the model was shown to hold"
-AT_ONE_BELOW = "the loop is at one below the band from which the model was shown to hold"
 PLACES = READ_AT | {
     "phase_crossover_rad_s": "phase_crossover_rad_s",
     "gain_reduction_rad_s": "gain_reduction_rad_s",
@@ -133,8 +132,7 @@ class OutsideBand:
     def promised(self, number: Reading, of: str, least_db: float) -> Reading:
         """A number as far as it can be promised.
 
-        Without an interval where it is read above the band, where the loop passes one below it,
-        as a light mode there may take every number, or where a resonance above may leave
+        Without an interval where it is read above the band, or where a resonance there may leave
         less than a gain margin of `least_db`; with one that reaches what a resonance may leave.
 
         Parameters
@@ -145,8 +143,6 @@ class OutsideBand:
         least_db : float
             Gain margin that is asked for.
         """
-        if number.value is not None and self.is_at_one_below:
-            return Estimate(number.name, number.value, number.unit, None, AT_ONE_BELOW)
         if number.value is not None and of in self.above:
             return Estimate(number.name, number.value, number.unit, None, BEYOND)
         return self.room.reached(number, of, least_db)
@@ -199,8 +195,8 @@ def outside_band_findings(
     if named := [said for name, said in SAID_BELOW.items() if name in found.below]:
         lowest = min(found.below[name] for name in SAID_BELOW if name in found.below)
         taken = (
-            ": a light mode there, such as a pendulum, may take margins and stability, and no "
-            "number of this loop is promised"
+            ": intervals of this loop rest on its form there, and a light mode, such as a "
+            "pendulum, may take margins and stability"
         )
         yield Finding(
             "margin-below-band",
