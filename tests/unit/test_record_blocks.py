@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flightid.uncertainty import blocks
-from flightid.uncertainty.blocks import RecordBlock
+from flightid.uncertainty.blocks import RecordBlock, flights_of
 from flightid.uncertainty.parts import RecordParts, chance_alike, chance_where_seen, larger
 from flightid.uncertainty.residual_noise import Autoregression
 
@@ -143,3 +143,13 @@ def test_freedom_is_that_of_the_outputs_that_an_estimate_hears() -> None:
     found = blocks.freedom_of(shared, variances, models, [block()[0]], np.eye(3))
     known = [16.0 / (1.0 / 500.0 + 9.0 / 300.0), 6.25 / (4.0 / 500.0 + 0.25 / 300.0), np.inf]
     assert found == pytest.approx(known)
+
+
+def test_a_record_that_tells_no_parameter_has_parts_of_no_size() -> None:
+    """Every parameter of a joint fit stood at a bound: a `ValueError` of an ambiguous shape."""
+    made, shared, own = block()
+    bare = RecordBlock.of(shared[:, :, :0], own, made.residual)
+    own_count = bare.basis.shape[1]
+    (flight,) = flights_of([np.eye(own_count)[None]], [bare])
+    assert flight.scores.shape == (2, 0)
+    assert flight.noise.shape == (2, 0, 2, 0)

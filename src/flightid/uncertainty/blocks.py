@@ -260,7 +260,7 @@ def _flight(answers: Array, block: RecordBlock) -> RecordParts:
             scores[place] += residual[rows] @ shared[rows]
             square[place] += shared[rows].T @ answer[rows]
             on_own[:, place] += own[rows].T @ shared[rows]
-    turn = np.vstack([-on_own.reshape(-1, 2 * count), np.eye(2 * count)])
+    turn = np.vstack([-on_own.reshape(len(on_own), 2 * count), np.eye(2 * count)])
     return RecordParts(scores, square, (turn.T @ answers @ turn).reshape(2, count, 2, count))
 
 
