@@ -54,13 +54,15 @@ def test_gains_rest_on_it_and_say_so(biased: fid.Fit) -> None:
     assert flown.broken_promise(design, flight, SEED) == ""
 
 
-def test_an_open_loop_or_nothing_injected_keeps_the_fit() -> None:
-    model = fid.load_model("rate_first_order")
-    time_s = np.arange(2000) * 0.02
-    sweep = 0.1 * np.sin(0.1 * time_s**2)
+def _swept(
+    model: fid.TransferFunctionModel, *, n: int, rate_rad_s2: float
+) -> tuple[fid.Record, fid.Record]:
+    """A sweep of an open loop as simulated, and as a log holds it: with what was injected."""
+    time_s = np.arange(n) * 0.02
+    sweep = 0.1 * np.sin(rate_rad_s2 * time_s**2)
     bare = fid.Record.from_arrays(time_s, inputs={"tau_phi": sweep}, hold="zero")
     bare = fid.simulate(model, bare, units={"p": "rad/s"}, noise=fid.Noise(sensor={"p": 0.02}))
-    quiet = fid.Record.from_arrays(
+    logged = fid.Record.from_arrays(
         time_s,
         inputs={"tau_phi": sweep},
         outputs={"p": bare["p"]},
@@ -68,6 +70,12 @@ def test_an_open_loop_or_nothing_injected_keeps_the_fit() -> None:
         units={"p": "rad/s"},
         hold="zero",
     )
+    return bare, logged
+
+
+def test_an_open_loop_or_nothing_injected_keeps_the_fit() -> None:
+    model = fid.load_model("rate_first_order")
+    bare, quiet = _swept(model, n=2000, rate_rad_s2=0.1)
     assert instrument_fit(fid.identify(model, quiet, loop="open")) is None
     assert instrument_fit(fid.identify(model, bare, loop="closed")) is None
     both = fid.identify(model, quiet, loop="closed")
@@ -121,18 +129,7 @@ def test_a_response_that_needs_no_other_way_knows_no_records(flights: list[fid.R
 def test_a_prewhitened_fit_that_fails_is_served_by_the_excitation_too() -> None:
     """No loop biases it; but one without errors carries no gains."""
     model = fid.load_model("rate_first_order")
-    time_s = np.arange(3000) * 0.02
-    sweep = 0.1 * np.sin(0.06 * time_s**2)
-    flown_by = fid.Record.from_arrays(time_s, inputs={"tau_phi": sweep}, hold="zero")
-    moved = fid.simulate(model, flown_by, units={"p": "rad/s"}, noise=fid.Noise(sensor={"p": 0.02}))
-    record = fid.Record.from_arrays(
-        time_s,
-        inputs={"tau_phi": sweep},
-        outputs={"p": moved["p"]},
-        excitations={"injected": sweep},
-        units={"p": "rad/s"},
-        hold="zero",
-    )
+    _, record = _swept(model, n=3000, rate_rad_s2=0.06)
     response = fid.estimate_response(record, estimator="prewhitened")
     fit = fid.identify(model, response)
     assert fit.covariance is not None
