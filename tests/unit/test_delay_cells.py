@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 import flightid as fid
 from flightid.evidence.gather import CONVERGED
@@ -102,3 +103,54 @@ def test_a_cell_ends_where_an_input_reaches_another_sample(model: fid.StateSpace
     assert np.allclose([each[2] for each in around], [STEP_S, 2.0 * STEP_S], atol=1e-7)
     assert np.all(np.isinf([each[:2] for each in around]))
     assert DelayCells((STEP_S,), "first").around(model) is None
+
+
+ROLL = {
+    "name": "roll",
+    "states": {"p": "rad/s"},
+    "inputs": {"lat": "1"},
+    "outputs": {"p": "p"},
+    "parameters": {
+        "Lp": {"value": -3.0, "unit": "1/s"},
+        "Llat": {"value": 8.0, "unit": "1/s^2"},
+        "tau": {"value": 0.03, "min": 0.0, "max": 0.3, "unit": "s"},
+    },
+    "equations": {"p'": "Lp*p+Llat*lat"},
+    "delays": {"lat": "tau"},
+}
+
+
+def gusty_roll(seed: int, delay_s: float = 0.047, damping: float = -4.0) -> fid.Record:
+    """Ten seconds of 3-2-1-1 in steps of 40 ms, in a gust of an own lag and white noise."""
+    rng, step_s, parts, n = np.random.default_rng(seed), 0.04, 20, 250
+    fine_s = step_s / parts
+    lat = np.zeros(n)
+    for k in (25, 117):
+        lat[k : k + 63] = np.repeat([1.0, -1.0, 1.0, -1.0], [27, 18, 9, 9])
+    moved = np.concatenate([[0.0], np.cumsum(lat) * step_s])
+    late = np.interp(np.arange(n * parts + 1) * fine_s - delay_s, np.arange(n + 1) * step_s, moved)
+    wind = np.sqrt(1.0 - np.exp(-2.0 * fine_s)) * rng.standard_normal(n * parts)
+    gust = lfilter([1.0], [1.0, -np.exp(-fine_s)], wind)
+    decay = np.exp(damping * fine_s)
+    lag = [0.0, (decay - 1.0) / damping], [1.0, -decay]
+    p, shaken = (lfilter(*lag, each)[::parts] for each in (np.diff(late) / fine_s * 10.0, gust))
+    noise = 0.4 * p.std() / shaken.std() * shaken + 0.03 * p.std() * rng.standard_normal(n)
+    return fid.Record.from_arrays(
+        np.arange(n) * step_s,
+        inputs={"lat": lat},
+        outputs={"p": p + noise},
+        units={"lat": "1", "p": "rad/s"},
+        hold="zero",
+    )
+
+
+def test_a_filter_passes_whole_samples_of_what_a_state_feels() -> None:
+    """Its cost has a kink there: the delay ended at 36 ms, the damping at -3.28, without bars."""
+    fit = fid.identify(
+        fid.StateSpaceModel.from_dict(ROLL), gusty_roll(seed=19), method="filter_error"
+    )
+    assert fit.cost < 0.3
+    for name, truth in (("tau", 0.047), ("Lp", -4.0), ("Llat", 10.0)):
+        interval = fit.parameters[name].interval95
+        assert interval is not None
+        assert interval[0] < truth < interval[1]

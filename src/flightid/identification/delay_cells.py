@@ -1,7 +1,9 @@
 """Delays of held inputs that outputs feel at once, and the whole samples at which a cost jumps.
 
 A step that is held and fed straight through moves an output by a whole sample when its delay
-passes one. A search that goes by slopes ends in front of such a jump, or just behind one.
+passes one. A search that goes by slopes ends in front of such a jump, or just behind one. What a
+filter predicts is one sample ahead, where any held step acts through one sample or the next: its
+cost has a kink at whole samples, where noises and derivatives settle for a delay that is none.
 """
 
 from __future__ import annotations
@@ -51,6 +53,8 @@ class DelayCells:
     sample_times_s : tuple of float
         Of the records, each once.
     hold : {"band_limited", "first", "zero"}
+    kinks : bool
+        Whether delays count that are not fed straight through: of predictions one sample ahead.
 
     Example
     -------
@@ -61,13 +65,17 @@ class DelayCells:
 
     sample_times_s: tuple[float, ...]
     hold: str
+    kinks: bool = False
 
     def delays(self, model: GreyBoxModel) -> Array:
-        """Delays of held inputs that are fed straight through, s."""
+        """Delays of held inputs at whose whole samples a cost jumps or has a kink, s."""
         if self.hold != "zero":
             return np.zeros(0)
+        systems = systems_of(model)
+        if self.kinks:
+            return np.concatenate([each.delays_s for each in systems])
         return np.concatenate(
-            [each.delays_s[np.any(each.matrices[3] != 0.0, axis=0)] for each in systems_of(model)]
+            [each.delays_s[np.any(each.matrices[3] != 0.0, axis=0)] for each in systems]
         )
 
     def lags(self, model: GreyBoxModel) -> Array:

@@ -92,6 +92,7 @@ def fit_filter_error(
     if tried:
         problem, groups = with_gust(problem, groups, limits)
     problem, groups = anchored(problem, groups, limits)
+    groups = [across_jumps(problem, groups[0], limits, kinks=True), *groups[1:]]
     end = groups[0][0]
     inner = Inner.of(model, end.x[: problem.n_free])
     filtered = [found for found, _ in problem.records(end.x, with_slopes=False)]

@@ -90,9 +90,16 @@ def minimise(
 
 
 def across_jumps(
-    problem: InnovationsProblem, ends: list[DenseEnd], limits: SearchBounds
+    problem: InnovationsProblem,
+    ends: list[DenseEnd],
+    limits: SearchBounds,
+    *,
+    kinks: bool = False,
 ) -> list[DenseEnd]:
-    """Ends of all starts, the best of them followed across whole samples of delays."""
+    """Ends of all starts, the best of them followed across whole samples of delays.
+
+    Across `kinks` once gusts are decided on: before, a delay takes the blame for what they do.
+    """
 
     def search(
         end: DenseEnd, x: Array, bounds: tuple[Array, Array], iterations: int | None
@@ -109,7 +116,7 @@ def across_jumps(
         return minimise(problem, start, inside, iterations=iterations)
 
     edges = -problem.reach, problem.reach
-    cells, outer = _cells(problem), (limits.lower, limits.upper)
+    cells, outer = _cells(problem, kinks=kinks), (limits.lower, limits.upper)
     return [beyond_jumps(ends[0], problem.model, cells, outer, search), *ends[1:]]
 
 
@@ -124,8 +131,9 @@ def inside_cell(problem: InnovationsProblem, end: DenseEnd, limits: SearchBounds
     return replace(limits, lower=lower, upper=upper)
 
 
-def _cells(problem: InnovationsProblem) -> DelayCells:
-    return DelayCells(tuple({each.sample_time_s for each in problem.data}), problem.hold)
+def _cells(problem: InnovationsProblem, *, kinks: bool = False) -> DelayCells:
+    steps = tuple({each.sample_time_s for each in problem.data})
+    return DelayCells(steps, problem.hold, kinks=kinks)
 
 
 def _along_valley(end: DenseEnd, moved: Array) -> Array:
