@@ -81,6 +81,23 @@ def test_damaged_frame_is_left_out_and_said(tmp_path: Path) -> None:
     assert {f.code for f in log.findings} == {"telemetry", "bytes-skipped"}
 
 
+@pytest.mark.parametrize("how", [{}, {"old": True}, {"signed": True}])
+def test_a_frame_that_the_end_of_the_file_cuts_is_no_damage(
+    tmp_path: Path, how: dict[str, bool]
+) -> None:
+    """A ground station that is switched off ends its file so: "look for gaps" was said of it."""
+    content = _telemetry(n=20, **how)
+    last = len(content) - content.rindex(content[:4])
+    for kept in (*range(1, 13), last - 14, last - 1):
+        log = _open(tmp_path, content[: len(content) - last + kept])
+        assert [f.code for f in log.findings] == ["telemetry", "log-cut"], kept
+    assert log.findings[1].message == "the file ends inside a frame"
+    damaged = _telemetry(n=20, damage=7, **how)
+    for stray in (damaged, damaged[:-3]):
+        codes = [f.code for f in _open(tmp_path, stray).findings]
+        assert codes == ["telemetry", "bytes-skipped"]
+
+
 def _run(n: int, started_s: float, first_ms: int, roll: float) -> bytes:
     """A run of attitude, airspeed and outputs, whose clock began `started_s` after the first's."""
     link, out = mavlink.MAVLink(None, srcSystem=1, srcComponent=1), []

@@ -22,6 +22,7 @@ from flightid.findings import FIRST, Finding, in_order
 from flightid.fleet.catalogue.schema import FAILED, REFUSED
 from flightid.fleet.reasons import STOPPED
 from flightid.inspection import Inspection, inspect_log
+from flightid.inspection.log_end import is_aside
 from flightid.logs import Log
 from flightid.study.proposal import Proposal
 
@@ -136,7 +137,7 @@ def _inspected(log: Log) -> tuple[Finding, ...]:
 def against(inspection: Inspection | None) -> tuple[Finding, ...]:
     """Findings that are not green, a fall first, for it comes before all that follows from it."""
     seen = () if inspection is None else inspection.findings
-    return in_order(f for f in seen if f.light is not Light.GREEN)
+    return in_order(f for f in seen if f.light is not Light.GREEN and not is_aside(f))
 
 
 def decisive(seen: Sequence[Finding]) -> Finding | None:

@@ -86,7 +86,7 @@ def flight_phases(log: Log, actuators: Actuators | None) -> FlightPhases:
         return FlightPhases((), ran, None, "motor outputs")
     plane = log.vehicle == "plane"
     carrying = find(log, "airspeed" if plane else "thrust") or _mean_motor(log, actuators)
-    flying = _landing_detector(log)
+    flying = landing_detector(log)
     if carrying is None and flying is None:
         return _untold(log, ran)
     spans, evidence, tipped = [(-np.inf, np.inf)], [], None
@@ -176,7 +176,7 @@ def _common(first: list[Span], second: list[Span]) -> list[Span]:
     return [span for span in both if span[1] > span[0]]
 
 
-def _landing_detector(log: Log) -> tuple[NDArray[np.float64], NDArray[np.bool_]] | None:
+def landing_detector(log: Log) -> tuple[NDArray[np.float64], NDArray[np.bool_]] | None:
     """Stamps and whether the autopilot held itself for flying; None where it does not log it."""
     if log.kind == "px4":
         name = "vehicle_land_detected"

@@ -13,10 +13,11 @@ from flightid.inspection.carried import carried_axes, carried_sentence
 from flightid.inspection.excitation_found import FoundExcitation
 from flightid.inspection.flight_phases import FlightPhases
 from flightid.inspection.log_clock import logged_words
+from flightid.inspection.log_end import is_aside
 from flightid.inspection.rates import StreamRate
 from flightid.inspection.saturation import Saturation
 from flightid.inspection.skew import StreamSkew
-from flightid.inspection.usable_band import NARROW, UNSWEPT_CODE, AxisBand
+from flightid.inspection.usable_band import NARROW, AxisBand
 from flightid.inspection.verdict_lines import WIDTH, verdict_lines
 from flightid.result import Result
 from flightid.table import Column, Table
@@ -88,8 +89,8 @@ class Inspection(Result, schema="flightid.inspection/1"):
 
     @property
     def verdict(self) -> Light:
-        """Worst light of all findings but those of axes that nobody swept: others may be sound."""
-        return worst([f for f in self.findings if not f.code.startswith(UNSWEPT_CODE)])
+        """Worst light of all findings but those that leave the rest of the log as it is."""
+        return worst([f for f in self.findings if not is_aside(f)])
 
     @property
     def usable_band_rad_s(self) -> dict[str, tuple[float, float] | None]:
@@ -111,8 +112,7 @@ class Inspection(Result, schema="flightid.inspection/1"):
             Canonical names, for example ``"q"``; none of any axis: all findings count.
         """
         # Who fits a model all the same is judged by its evidence, not by what `run` would try.
-        own = ("no-model", UNSWEPT_CODE)
-        kept = tuple(f for f in self.findings if not f.code.startswith(own))
+        kept = tuple(f for f in self.findings if f.code != "no-model" and not is_aside(f))
         wanted = set(channels)
         names = axes_of(self.vehicle)
         others = {axis for axis, own in names.items() if not wanted & set(own)}

@@ -11,6 +11,7 @@ from flightid.inspection import advice
 from flightid.inspection.carried import carried_axes, is_swept
 from flightid.inspection.divergence import divergence_findings
 from flightid.inspection.gap_findings import gap_findings
+from flightid.inspection.log_end import end_judged
 from flightid.inspection.saturation import Saturation
 from flightid.inspection.signals import map_of
 from flightid.inspection.thresholds import (
@@ -41,7 +42,7 @@ def judge(log: Log, found: Inspection) -> tuple[Finding, ...]:
     """All verdicts on a log: what comes before all advice, then the worst."""
     # Sizes mean nothing until units do: what contradicts these comes first.
     scales = _scales(log, found)
-    findings = [*scales, *log.findings, *_flight(log, found)]
+    findings = [*scales, *end_judged(log, found.phases, log.findings), *_flight(log, found)]
     if found.phases.airborne:
         findings += divergence_findings(log, found.phases.airborne)
         findings += [*_length(found), *_bands(log, found), *_loop(log, found)]

@@ -12,6 +12,7 @@ from flightid.inspection.carried import carried_axes
 from flightid.inspection.divergence import divergence_findings
 from flightid.inspection.excitation_found import injected_spans
 from flightid.inspection.flight_phases import flight_phases
+from flightid.inspection.log_end import end_judged
 from flightid.inspection.signals import find
 from flightid.inspection.stamps import log_span
 from flightid.logs import Log, read_log
@@ -75,6 +76,8 @@ def review_flight(
     actuators = find_actuators(opened)
     start_s, stop_s = log_span(opened)
     phases = flight_phases(opened, actuators)
+    until_s = math.inf if span_s is None else span_s[1]
+    of_log = end_judged(opened, phases, opened.findings, until_s)
     if span_s is not None:
         cuts = [(-math.inf, span_s[0]), (span_s[1], math.inf)]
         phases = replace(phases, airborne=without(phases.airborne, cuts))
@@ -102,5 +105,5 @@ def review_flight(
         carried=carried_axes(inspection or inspect_log(opened)) if swept else (),
         ranges=flown_ranges(opened, loops),
     )
-    of_log = (*opened.findings, *divergence_findings(opened, phases.airborne))
+    of_log += tuple(divergence_findings(opened, phases.airborne))
     return replace(found, findings=judge_flight(found, of_log))

@@ -8,6 +8,7 @@ from dataclasses import replace
 from flightid.conventions import Light
 from flightid.findings import DIVERGES, Finding, worst_last
 from flightid.inspection.advice import LOGGING
+from flightid.logs.log_cut import LOG_CUT
 from flightid.review.filter_findings import filter_findings
 from flightid.review.loop_response import LoopResponse
 from flightid.review.motors import LIMITS, MotorUse
@@ -32,10 +33,6 @@ OF_SIZES = ("unit-assumed", "unit-of-counts", "settings-unknown")
 """Codes of findings of a log that say what its numbers, and so those of its flight, are worth."""
 
 
-LOG_CUT = "log-cut"
-"""Code: the file ends inside a record, so that the flight may have gone on."""
-
-
 def judge_flight(review: FlightReview, of_log: Iterable[Finding] = ()) -> tuple[Finding, ...]:
     """All verdicts, the worst and then a fall last, where eyes are on a terminal.
 
@@ -43,7 +40,7 @@ def judge_flight(review: FlightReview, of_log: Iterable[Finding] = ()) -> tuple[
     ----------
     review : FlightReview
     of_log : iterable of Finding
-        What its log was found to be.
+        What its log was found to be, its end judged (`end_judged`).
     """
     whole = (*OF_SIZES, LOG_CUT)
     own = (each for each in of_log if each.code in whole or each.code.startswith(DIVERGES))

@@ -21,6 +21,7 @@ from flightid.logs.blackbox.firmware import BETAFLIGHT, INAV, REVISION, firmware
 from flightid.logs.blackbox.loop_rows import LOOP, gaps_of, with_set_points
 from flightid.logs.blackbox.scales import scales_of
 from flightid.logs.blackbox.settings import settings_of
+from flightid.logs.log_cut import log_cut
 from flightid.logs.source import ByteRange, Event
 from flightid.logs.table_source import Array, MessageRows, TableSource
 from flightid.reading import bounded_bytes, memory_budget, within_memory
@@ -160,9 +161,4 @@ def _findings(
             "save each flight to its own file to read the others",
         )
     if not ended:
-        yield Finding(
-            "log-cut",
-            Light.AMBER,
-            "the log does not end as the firmware ends it: it was cut, or the power was",
-            "what came before is read",
-        )
+        yield log_cut("the log does not end as the firmware ends it (cut, or without power)")

@@ -325,7 +325,7 @@ class DataflashSource:
                 "hand in the .bin file that it was made from, if it still exists",
             )  # fmt: skip
         if any(r.reason.startswith(INSIDE) for r in self.skipped):
-            yield log_cut("a message")
+            yield log_cut(f"{INSIDE} a message")
         if lost:
             size, places = sum(r.size for r in lost), counted(len(lost), "place")
             yield Finding(

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.logs.dataflash.reader import GAP_S, DataflashSource, open_dataflash
+from flightid.logs.log_cut import LOG_CUT
 from flightid.logs.source import Event, Gap, LogSource
 from flightid.logs.table_source import MessageRows, TableSource
 from flightid.logs.ulog.names import AIRFRAMES, ARMED, changes_of
@@ -108,7 +109,7 @@ def _table_source(source: DataflashSource) -> TableSource:
             Gap(float(clock_s[i]), float(clock_s[i + 1]), "no message of any kind")
             for i in np.flatnonzero(np.diff(clock_s) > GAP_S)
         ],
-        findings=[each for each in source.findings if each.code == "bytes-skipped"],
+        findings=[each for each in source.findings if each.code in ("bytes-skipped", LOG_CUT)],
     )
 
 

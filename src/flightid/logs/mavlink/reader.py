@@ -20,6 +20,7 @@ from flightid.conventions import Light
 from flightid.errors import LogFormatError
 from flightid.findings import Finding
 from flightid.logs.dataflash.events import mode_text
+from flightid.logs.log_cut import INSIDE, log_cut
 from flightid.logs.mavlink.messages import TelemetryMessage, telemetry_messages
 from flightid.logs.source import Event, changes_among
 from flightid.logs.table_source import Array, MessageRows, TableSource
@@ -39,6 +40,10 @@ LATEST_BOOT_S = 1e8
 """Stamps beyond it, s, count from 1970, not from the start of the autopilot."""
 RESTART_S = 5.0
 """Fall of the autopilot's clock that no order of arrival explains: it started anew."""
+STAMP, CHECKSUM, SIGNED = 8, 2, 1
+"""Bytes of the ground station's stamp and of a frame's checksum; flag of a frame with signature."""
+HEADS = {0xFE: (6, 0), 0xFD: (10, 13)}
+"""Bytes of a frame's head and of its signature, by its first byte (MAVLink 1 and 2)."""
 SEVERITIES = ("emergency", "alert", "critical", "error", "warning", "notice", "info", "debug")
 Table = NDArray[np.void]
 
@@ -87,7 +92,7 @@ def open_telemetry(path: Path) -> TableSource:
         {name: value for _, name, value in values},
         changes_among(values),
         sorted(events, key=attrgetter("time_s")),
-        findings=tuple(_findings(lost, len(data), len(starts))),
+        findings=tuple(_findings(data, lost, len(starts))),
     )
 
 
@@ -209,7 +214,7 @@ def _events(tables: Mapping[str, MessageRows], vehicle: str | None) -> Iterator[
             yield Event(float(time_s), "text", f"{name}: {text}")
 
 
-def _findings(lost: int, size: int, runs: int) -> Iterator[Finding]:
+def _findings(data: bytes, lost: int, runs: int) -> Iterator[Finding]:
     yield Finding(
         "telemetry",
         Light.AMBER,
@@ -224,10 +229,37 @@ def _findings(lost: int, size: int, runs: int) -> Iterator[Finding]:
             f"the autopilot starts anew in this log, {runs} runs in all: the longest is read",
             "save each run to its own file to read the others",
         )
-    if lost:
+    if _ends_inside(data, lost):
+        yield log_cut(f"{INSIDE} a frame")
+    elif lost:
         yield Finding(
             "bytes-skipped",
             Light.AMBER,
-            f"{lost} of {size} bytes are in no frame whose checksum holds",
+            f"{lost} of {len(data)} bytes are in no frame whose checksum holds",
             "look for gaps in the span you use",
         )
+
+
+def _ends_inside(data: bytes, lost: int) -> bool:
+    """Whether all bytes in no frame are of one that the file's end cuts.
+
+    Frames are walked by their lengths: inside of one that is cut others may seem to begin.
+    """
+    at, end = 0, len(data)
+    while lost and at < end:
+        rest = data[at + STAMP : at + STAMP + 3]
+        size = _frame_size(rest)
+        if len(rest) > 2 and not size:
+            return False
+        if not size or at + STAMP + size > end:
+            return lost <= end - at
+        at += STAMP + size
+    return False
+
+
+def _frame_size(begun: bytes) -> int:
+    """Bytes of a frame by its first three; 0 where they are none of one, or too few to tell."""
+    if len(begun) < 3 or begun[0] not in HEADS:
+        return 0
+    head, signature = HEADS[begun[0]]
+    return head + begun[1] + CHECKSUM + (signature if begun[2] & SIGNED else 0)

@@ -22,8 +22,7 @@ from flightid.logs.ulog.names import AIRFRAMES, ARMED, LEVELS, MODES, VEHICLE_TY
 
 STAMP = "timestamp"
 MICROSECONDS = "µs"
-RECORD = "a record"
-CUT = f"{INSIDE} {RECORD}"
+CUT = f"{INSIDE} a record"
 """Reason of the native half (`framing.rs`) for the bytes after the last whole record."""
 DEFAULT_KINDS = {1: "system", 2: "airframe"}
 
@@ -161,7 +160,7 @@ class UlogSource:
         found = []
         damaged = [part for part in self.skipped if part.reason != CUT]
         if len(damaged) < len(self.skipped):
-            found.append(log_cut(RECORD))
+            found.append(log_cut(CUT))
         if damaged:
             lost = sum(part.size for part in damaged)
             found.append(
