@@ -146,7 +146,7 @@ FLEETS = tuple(
     )
     for name, (flight, fit, truth) in WAYS.items()
     for scatter in (0.0, SCATTER)
-    for count in (1, 3, 8)
+    for count in (1, 2, 3, 8)
 )
 CHANGES = tuple(
     Case(

@@ -48,6 +48,7 @@ from flightid.record.hold import Loop
 from flightid.responses import FrequencyResponse
 from flightid.uncertainty.agreement import Agreement
 from flightid.uncertainty.feedback_result import FeedbackTest, declared_loop
+from flightid.uncertainty.unseen_scatter import UnseenScatter
 
 LEADS = "residuals-lead-input"
 """Of a residual that goes with inputs to come, beyond chance: feedback, or dynamics missing."""
@@ -128,6 +129,8 @@ class FitFacts:
         Inputs that a sampled model answers within the same sample.
     free_runs : sequence of ExplainedRun
         Of equations through the records that they were fitted to, where the fit made such.
+    unseen : UnseenScatter or None
+        What records that agree cannot exclude; None where coefficients have no scale of their own.
     """
 
     data: Sequence[FrequencyResponse | Record]
@@ -142,6 +145,7 @@ class FitFacts:
     values: NDArray[np.float64] | None = None
     at_once: tuple[str, ...] = ()
     free_runs: Sequence[ExplainedRun] = ()
+    unseen: UnseenScatter | None = None
 
 
 def gather_evidence(made: FitFacts) -> Evidence:
@@ -169,7 +173,7 @@ def gather_evidence(made: FitFacts) -> Evidence:
     if loop is not None:
         checks.append(not_turned_round(unless_hidden(loop, made.free_runs), made.at_once))
     if made.agreement is not None:
-        check = agreement_check(made.agreement, made.values)
+        check = agreement_check(made.agreement, made.values, made.unseen)
         disturbed = any(each.code == PROCESS_NOISE for each in made.findings)
         checks.append(beside_disturbances(check) if disturbed else check)
     if made.signs:

@@ -11,6 +11,7 @@ from flightid.conventions import Light
 from flightid.evidence.evidence import AGREEMENT, Check
 from flightid.uncertainty.agreement import FEWEST_RECORDS, Agreement
 from flightid.uncertainty.foretold import MATERIAL_PERCENT
+from flightid.uncertainty.unseen_scatter import FLOWN_APART, UnseenScatter
 
 ONE = "One record does not tell how far flights differ: what is known is of that flight alone"
 ALONE = (
@@ -21,6 +22,16 @@ DOUBT = (
     "{} records agree, but not beyond doubt (p = {:.2g}): intervals are up to {:.2g} times as long "
     "as by noise alone"
 )
+UNSEEN = (
+    "{} records agree, as {} of 100 such sets of flights {:.2g} % apart would: what is known is of "
+    "these flights alone, and intervals of their kind would be up to {:.2g} times as long"
+)
+EXCLUDED = 0.05
+"""Chance below which records as alike as these are not of flights that differ."""
+HIDDEN = 1.1
+"""Factor of bars that scatter would ask for, from which it is said: they would hold 93 %."""
+DOUBLED = 2.0
+"""The same from which the light is amber: they would hold 67 %."""
 SHOWN = 1.05
 """Factor from which longer bars are said."""
 ONCE = "flown once: nothing shows whether a second flight would agree"
@@ -30,6 +41,9 @@ HALVES_ACTION = (
     "do not use one set of numbers: look for a vehicle, trim or wind that changed, for a faulty "
     "stretch, or for dynamics that the model lacks, and fit the parts by themselves"
 )
+UNSEEN_ACTION = (
+    "fly the manoeuvre once or twice more, or take the intervals as those of these flights alone"
+)
 RECORDS_ACTION = (
     "the estimates are of the mean vehicle: fit the records by themselves and look for what sets "
     "them apart (mass, trim, condition)"
@@ -38,19 +52,27 @@ DISTURBED = "; noise on the states, which the residuals hold, makes parts differ
 DISTURBED_ACTION = "compare parts by a method that knows that noise (method='filter_error')"
 
 
-def agreement_check(found: Agreement, values: NDArray[np.float64] | None = None) -> Check:
+def agreement_check(
+    found: Agreement,
+    values: NDArray[np.float64] | None = None,
+    unseen: UnseenScatter | None = None,
+) -> Check:
     """The light of a comparison.
 
     Red where halves of a record differ, or two records do, unless the intervals, widened by that,
     still lie within `MATERIAL_PERCENT` of the estimates: a quiet record tells halves apart that
     are alike for every use. Amber where three or more records differ: their scatter tells how
-    well the mean of such vehicles is known.
+    well the mean of such vehicles is known. Records that agree are amber, too, where flights that
+    differ by a few percent would look as alike (5 % or more of them), and bars be half as long as
+    they need: a line beside the light says so from 1.1 times on.
 
     Parameters
     ----------
     found : Agreement
     values : ndarray, optional
         Estimates, in the order of its standard errors.
+    unseen : UnseenScatter, optional
+        What records that agree cannot exclude.
 
     Example
     -------
@@ -66,8 +88,12 @@ def agreement_check(found: Agreement, values: NDArray[np.float64] | None = None)
     limit = ONE if found.tested and needs_another(found.n_records) else ""
     if found.tested and found.told_once:
         limit = ALONE.format(found.told_once, len(found.by_noise))
-    doubt = _doubt(found)
-    return replace(_compared(found, apart), limit=". ".join(filter(None, (limit, doubt))))
+    check, hidden, limits = _compared(found, apart), _hidden(found, unseen), [limit, _doubt(found)]
+    if check.light is Light.GREEN and unseen is not None and _is_open(unseen, DOUBLED):
+        check = replace(check, light=Light.AMBER, what=hidden, action=UNSEEN_ACTION)
+    else:
+        limits.append(hidden)
+    return replace(check, limit=". ".join(filter(None, limits)))
 
 
 def _doubt(found: Agreement) -> str:
@@ -75,6 +101,19 @@ def _doubt(found: Agreement) -> str:
     if not found.agree or found.records is None or found.factor < SHOWN:
         return ""
     return DOUBT.format(found.n_records, found.records, found.factor)
+
+
+def _hidden(found: Agreement, unseen: UnseenScatter | None) -> str:
+    """What flights that these records cannot exclude would ask for."""
+    if unseen is None or not found.agree or not _is_open(unseen, HIDDEN):
+        return ""
+    share, apart = round(100.0 * unseen.chance), 100.0 * FLOWN_APART
+    return UNSEEN.format(unseen.n_records, share, apart, unseen.longer)
+
+
+def _is_open(unseen: UnseenScatter, factor: float) -> bool:
+    """Whether flights that differ would look as alike, and need bars longer by so much."""
+    return unseen.chance >= EXCLUDED and unseen.longer > factor
 
 
 def beside_disturbances(check: Check) -> Check:

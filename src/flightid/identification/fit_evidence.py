@@ -27,6 +27,7 @@ from flightid.models.parameters import Parameters
 from flightid.models.polynomial.model import PolynomialModel
 from flightid.record.hold import Loop
 from flightid.uncertainty.estimate import Estimate
+from flightid.uncertainty.unseen_scatter import UnseenScatter
 
 FILTER_ERROR = "filter_error"
 """The method whose records hold predictions one sample ahead."""
@@ -60,6 +61,7 @@ def evidence_of(fit: Fit, data: Sequence[Any], loop: Loop | None = None) -> Evid
             _compared(fit),
             _at_once(fit.model),
             _free_runs(fit),
+            _unseen(fit) if isinstance(asked, Parameters) else None,
         )
     )
 
@@ -119,12 +121,26 @@ def _at_once(model: object) -> tuple[str, ...]:
 
 def _compared(fit: Fit) -> NDArray[np.float64] | None:
     """Estimates whose parts were compared; None where it is not known which those are."""
+    compared = _estimates(fit)
+    return None if compared is None else np.array([each.value for each in compared])
+
+
+def _unseen(fit: Fit) -> UnseenScatter | None:
+    """What records that agree cannot exclude, beside the bars that are shown."""
+    compared = _estimates(fit)
+    if compared is None or fit.agreement is None or fit.agreement.compared is None:
+        return None
+    stderr = np.array([each.stderr or 0.0 for each in compared])
+    return fit.agreement.compared.unseen(np.array([each.value for each in compared]), stderr)
+
+
+def _estimates(fit: Fit) -> list[Estimate] | None:
     if fit.agreement is None:
         return None
     free = tuple(name for name, each in fit.parameters.items() if each.status == "free")
     for names in (fit.names, free):
         if len(names) == fit.agreement.by_noise.size:
-            return np.array([fit.parameters[name].value for name in names])
+            return [fit.parameters[name] for name in names]
     return None
 
 

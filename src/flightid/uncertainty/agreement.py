@@ -15,9 +15,10 @@ from flightid.uncertainty.parts import (
     chance_where_seen,
     larger,
     scatter,
-    told_once,
+    told_alone,
 )
 from flightid.uncertainty.quantiles import LEVEL, half_width
+from flightid.uncertainty.unseen_scatter import ComparedRecords, compared_records
 
 Array = NDArray[np.float64]
 FALSE_ALARM = 0.005
@@ -56,6 +57,8 @@ class Agreement:
     reach : ndarray, shape (2, n), or None
         Half-widths of 95 % intervals by the noise within records, and as they stand; None where
         nothing is carried on.
+    compared : ComparedRecords or None
+        What tells scatter that records do not show; None where they are not compared.
 
     Example
     -------
@@ -71,6 +74,7 @@ class Agreement:
     freedom: Array | None = None
     told_once: int = 0
     reach: Array | None = None
+    compared: ComparedRecords | None = None
 
     @property
     def tested(self) -> bool:
@@ -134,6 +138,7 @@ class Agreement:
             None if self.freedom is None else self.freedom[:count],
             min(self.told_once, count),
             None if self.reach is None else self.reach[:, :count],
+            None if self.compared is None else self.compared.of(count),
         )
 
     def to_dict(self) -> dict[str, object]:
@@ -207,22 +212,23 @@ def compare_parts(
     compared = flights if by_halves else ()
     halves = _combined([chance_alike([flight], level) for flight in compared])
     records = chance_where_seen(whole, level) if by_records else None
-    once = told_once(whole, solve, covariance) if by_records else 0
+    once = int(np.sum(told_alone(whole, solve, covariance))) if by_records else 0
     by_noise = np.sqrt(np.diag(covariance))
-    plain = Agreement(len(flights), halves, records, by_noise, told_once=once)
+    apart = None if records is None else compared_records(whole, solve, covariance)
+    plain = Agreement(len(flights), halves, records, by_noise, told_once=once, compared=apart)
     if plain.agree and not (records is not None and records < DOUBT):
         return AgreementTest(covariance, freedom, plain)
     parts = whole if by_records else _halved(flights[0])
     found = scatter([*parts, *([] if rest is None else [rest])], solve, covariance)
-    apart = np.sqrt(np.diag(found.covariance))
+    lies = np.sqrt(np.diag(found.covariance))
     student = found.freedom if by_records else None
     if student is not None and not _differ(records):
         student = _in_doubt(student, freedom)
     both = larger(covariance, found.covariance)
     stderr = np.sqrt(np.diag(both))
-    stated = freedom if student is None else _of_wider(stderr, freedom, apart, student)
+    stated = freedom if student is None else _of_wider(stderr, freedom, lies, student)
     reach = np.array([_lengths(by_noise, freedom), _lengths(stderr, stated)])
-    agreement = replace(plain, by_scatter=apart, freedom=student, reach=reach)
+    agreement = replace(plain, by_scatter=lies, freedom=student, reach=reach)
     return AgreementTest(both, stated, agreement)
 
 

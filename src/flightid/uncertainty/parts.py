@@ -129,23 +129,42 @@ def chance_where_seen(parts: Sequence[RecordParts], freedom: float) -> float | N
     >>> chance_where_seen(parts, np.inf) is None, round(chance_alike(parts, np.inf), 3)
     (True, 0.0)
     """
+    seen = seen_by_all(parts)
+    return None if not seen else _chance([each and each[:2] for each in seen], freedom)
+
+
+def seen_by_all(parts: Sequence[RecordParts]) -> list[tuple[Array, Array, Array] | None]:
+    """Scores of unit variance by what each part sees about as well as any other, see `SEEN_ALIKE`.
+
+    Parameters
+    ----------
+    parts : sequence of RecordParts
+        Each as one part.
+
+    Returns
+    -------
+    list
+        By part: scores, their slopes by directions of unit information, and by the part's own
+        parameters; None of noise that has no finite size. Empty without parameters.
+    """
     total = np.sum([each.information[0] for each in parts], axis=0)
     if not len(total):
-        return None
+        return []
     size = np.sqrt(np.maximum(np.diag(total), np.finfo(float).tiny))
     sizes, turned = np.linalg.eigh(_scaled(total))
     kept = sizes > LEAST_INFORMATION * sizes[-1]
     root = turned[:, kept] / np.sqrt(sizes[kept]) / size[:, None]
     shares = [root.T @ each.information[0] @ root for each in parts]
-    seen = []
+    seen: list[tuple[Array, Array, Array] | None] = []
     for each, share in zip(parts, shares, strict=True):
         own, axes = np.linalg.eigh(0.5 * (share + share.T))
         most = np.max([np.sum(axes * (other @ axes), axis=0) for other in shares], axis=0)
         axes = root @ axes[:, own >= SEEN_ALIKE * most]
         noise = np.einsum("ij,ip,pj->j", axes, each.noise[0, :, 0], axes)
         axes = axes / np.sqrt(np.where(noise > 0.0, noise, 1.0))
-        seen.append(_whitened(each.along(axes), axes.T @ each.information @ root))
-    return _chance(seen, freedom)
+        white = _whitened(each.along(axes), axes.T @ each.information)
+        seen.append(None if white is None else (white[0], white[1] @ root, white[1]))
+    return seen
 
 
 def _whitened(part: RecordParts, slopes: Array) -> tuple[Array, Array] | None:
@@ -251,19 +270,19 @@ def _root(solve: Array) -> tuple[Array, Array]:
     return size[:, None] * axes * np.sqrt(own), (axes / np.sqrt(own)).T / size
 
 
-def told_once(parts: Sequence[RecordParts], solve: Array, spread: Array) -> int:
-    """How many estimates are told by one part alone: no other sees them about as well.
+def told_alone(parts: Sequence[RecordParts], solve: Array, spread: Array) -> NDArray[np.bool_]:
+    """Which estimates are told by one part alone: no other sees them about as well.
 
     Example
     -------
     >>> parts = [RecordParts(np.zeros((1, 2)), np.diag(h)[None], np.diag(h)[None, :, None])
     ...          for h in ([1.0, 1.0], [0.01, 1.0])]
-    >>> told_once(parts, np.diag([1 / 1.01, 0.5]), np.diag([1 / 1.01, 0.5]))
-    1
+    >>> told_alone(parts, np.diag([1 / 1.01, 0.5]), np.diag([1 / 1.01, 0.5])).tolist()
+    [True, False]
     """
     size = np.maximum(np.diag(spread), np.finfo(float).tiny)
     shares = [np.diag(solve @ part.information[0] @ spread) / size for part in parts]
-    return int(np.count_nonzero(np.max(shares, axis=0) > 1.0 / (1.0 + SEEN_ALIKE)))
+    return np.asarray(np.max(shares, axis=0) > 1.0 / (1.0 + SEEN_ALIKE))
 
 
 def _freedom(weights: Array) -> float:
