@@ -7,6 +7,7 @@ import pytest
 
 import flightid as fid
 from flightid.control.margins.usable_points import read_band, unread
+from flightid.uncertainty.uncertain import uncertain_numbers
 
 OMEGA = np.geomspace(0.5, 40.0, 120)
 TRUE = 4.0 * np.exp(-0.02j * OMEGA) / (1j * OMEGA)
@@ -82,7 +83,12 @@ def test_stability_is_not_told_where_reading_ends_above_one():
         outputs=["y"],
         coherence=np.where(OMEGA <= 30.0, 0.9, 0.1).reshape(1, 1, -1),
     )
-    assert codes(fid.margins(wound))["stability-not-read"] == "amber"
+    turned = fid.margins(wound)
+    assert codes(turned)["stability-not-read"] == "amber"
+    for each in (found, turned):
+        assert each.is_stable is None
+        assert each.to_dict()["stable"] is None
+        assert "stability not known" in repr(each)
 
 
 def test_values_of_a_controller_stand_at_all_frequencies_of_the_measurement():
@@ -120,3 +126,20 @@ def test_chance_between_coherent_neighbours_does_not_end_the_band():
     assert read_band(with_dip(0.02, 0.01)) == (OMEGA[0], OMEGA[59])
     assert unread(OMEGA, (OMEGA[0], OMEGA[-1])) == ""
     assert unread(OMEGA, (1.0, 10.0)).endswith("beyond 1 to 10 rad/s")
+
+
+def test_a_disk_that_is_least_at_an_end_has_no_bar_of_zero_for_its_place():
+    """No error moves that place to first order: 12.45 ± 0 rad/s stood there."""
+    ended = fid.disk_margin(measured(6.0, gain=0.6), controller=np.full(len(OMEGA), 1.0 + 0j))
+    assert ended.frequency.value == pytest.approx(ended.omega_rad_s[-1])
+    assert ended.frequency.interval95 is None
+    assert "at an end of the frequencies" in ended.frequency.reason
+    inside = fid.disk_margin(measured(30.0))
+    assert inside.omega_rad_s[0] < inside.frequency.value < inside.omega_rad_s[-1]
+    assert "at an end" not in inside.frequency.reason
+
+
+def test_a_number_that_no_error_moves_has_no_bar_of_zero():
+    carried = uncertain_numbers([1.0], np.eye(1)).carried(lambda x: [x[0], 3.0])
+    assert carried.number(0, "moved").stderr == pytest.approx(1.0)
+    assert carried.number(1, "still").interval95 is None

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from flightid.errors import OptionError
 from flightid.findings import Finding
 from flightid.frozen import dataclass
-from flightid.uncertainty.estimate import Estimate, Reading
+from flightid.uncertainty.estimate import UNHEARD, Estimate, Reading
 from flightid.uncertainty.quantiles import LEVEL, half_width
 from flightid.uncertainty.shown_bands import Band, covered_band, responses_about
 
@@ -137,6 +137,8 @@ class Uncertain(Generic[T]):
         error = float(self.stderr[place])
         if not np.isfinite(error):
             return Estimate(name, value, unit, None, LOST)
+        if not error > 0.0:
+            return Estimate(name, value, unit, None, UNHEARD)
         return Estimate(name, value, unit, error)
 
     def __repr__(self) -> str:

@@ -47,6 +47,7 @@ QUANTITIES = (
     ("frequency", "critical frequency", "rad/s"),
 )
 UNSTABLE = "the closed loop is unstable"
+AT_END = "the disk is least at an end of the frequencies that were read, and may be less beyond"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -282,6 +283,10 @@ def _carried(
         key: carried.number(place, name, unit, "the disk sets no limit")
         for place, (key, name, unit) in enumerate(QUANTITIES)
     }
+    if np.argmin(alphas) in (0, len(alphas) - 1):
+        # No error moves a least that lies at an end to first order: the zero is no bar.
+        frequency = made["frequency"]
+        made["frequency"] = Estimate(frequency.name, frequency.value, frequency.unit, None, AT_END)
     if uncertain.known:
         return made, []
     return made, [Finding("no-intervals", Light.UNKNOWN, f"no intervals: {uncertain.reason}")]

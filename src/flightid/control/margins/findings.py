@@ -12,6 +12,9 @@ from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.uncertainty.estimate import Reading
 
+UNREAD, CONTRADICTED = "stability-not-read", "nyquist-criterion-contradicted"
+"""Of loops whose stability is unknown: reading ends before the gain has passed one for good, or the
+response turns as no loop of that many unstable poles does."""
 COHERENCE = 0.6
 """Below this a measured response near crossover says little."""
 
@@ -187,7 +190,7 @@ def stability_findings(loop: BrokenLoop, metrics: LoopMetrics) -> list[Finding]:
         seen = f"turns up to there make {count} unstable poles" if count else "none is seen so far"
         return [
             Finding(
-                "stability-not-read",
+                UNREAD,
                 Light.AMBER if count else Light.UNKNOWN,
                 f"whether the closed loop is stable cannot be told: the gain is above one at "
                 f"{high:.3g} rad/s, and what follows is {loop.unread}; {seen}, "
@@ -209,7 +212,7 @@ def stability_findings(loop: BrokenLoop, metrics: LoopMetrics) -> list[Finding]:
     if count < 0:
         return [
             Finding(
-                "nyquist-criterion-contradicted",
+                CONTRADICTED,
                 Light.AMBER,
                 f"the response turns about −1 as if it had more than {open_poles} loop",
                 "give unstable_poles, or begin the band lower",

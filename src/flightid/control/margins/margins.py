@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.control.margins.crossings import gain_crossings, phase_crossings
-from flightid.control.margins.findings import margin_findings
+from flightid.control.margins.findings import CONTRADICTED, UNREAD, margin_findings
 from flightid.control.margins.gain_limits import (
     GAIN_LIMITS,
     UNSEEN,
@@ -119,7 +119,7 @@ class Margins(Result, schema="flightid.margins/1"):
     phase_crossovers : tuple of Crossing
         All passages of the negative real axis within 40 dB of −1.
     unstable_poles : int
-        Of the closed loop, by the Nyquist criterion.
+        Of the closed loop, by the Nyquist criterion; of a measurement as far as it is read.
     curve : LoopCurve
     findings : tuple of Finding
 
@@ -148,9 +148,14 @@ class Margins(Result, schema="flightid.margins/1"):
     findings: tuple[Finding, ...] = ()
 
     @property
-    def is_stable(self) -> bool:
-        """Whether the closed loop has no unstable pole, by the Nyquist criterion."""
-        return self.unstable_poles == 0
+    def is_stable(self) -> bool | None:
+        """Whether the closed loop has no unstable pole, by the Nyquist criterion.
+
+        None where that is unknown: a measurement that ends where it may still turn about −1, or
+        that turns as no loop with so many open unstable poles does.
+        """
+        unknown = any(each.code in (UNREAD, CONTRADICTED) for each in self.findings)
+        return None if unknown else self.unstable_poles == 0
 
     @property
     def quantities(self) -> tuple[Reading, ...]:
@@ -162,6 +167,7 @@ class Margins(Result, schema="flightid.margins/1"):
     def __repr__(self) -> str:
         """Verdict, phase and gain margin on one line."""
         verdict = "" if self.is_stable else f"unstable with {self.unstable_poles} poles, "
+        verdict = "stability not known, " if self.is_stable is None else verdict
         return (
             f"Margins({self.name}: {verdict}phase {self.phase_margin.text}, "
             f"gain {self.gain_margin.text})"
