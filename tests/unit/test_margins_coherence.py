@@ -133,7 +133,7 @@ def test_a_disk_that_is_least_at_an_end_has_no_bar_of_zero_for_its_place():
     ended = fid.disk_margin(measured(6.0, gain=0.6), controller=np.full(len(OMEGA), 1.0 + 0j))
     assert ended.frequency.value == pytest.approx(ended.omega_rad_s[-1])
     assert ended.frequency.interval95 is None
-    assert "at an end of the frequencies" in ended.frequency.reason
+    assert "at an end of what was read" in ended.frequency.reason
     inside = fid.disk_margin(measured(30.0))
     assert inside.omega_rad_s[0] < inside.frequency.value < inside.omega_rad_s[-1]
     assert "at an end" not in inside.frequency.reason
@@ -143,3 +143,19 @@ def test_a_number_that_no_error_moves_has_no_bar_of_zero():
     carried = uncertain_numbers([1.0], np.eye(1)).carried(lambda x: [x[0], 3.0])
     assert carried.number(0, "moved").stderr == pytest.approx(1.0)
     assert carried.number(1, "still").interval95 is None
+
+
+def test_a_peak_at_an_end_of_what_was_read_is_no_peak():
+    """1.1 ± 2.5 dB stood where the peak of 25 dB lay beyond the coherence, and held 4 of 100."""
+    ended = fid.disturbance_rejection(measured(3.9))
+    assert ended.peak.value is not None
+    assert ended.peak.interval95 is None
+    assert ended.peak.reason == "worst at an end of what was read, and may be worse beyond"
+    assert codes(ended)["disturbance-peak"] == "unknown"
+    margins = fid.margins(measured(3.9))
+    assert margins.modulus_margin.interval95 is None
+    assert margins.sensitivity_peak.interval95 is None
+    assert fid.margins(measured(40.0)).modulus_margin.interval95 is not None
+    whole = fid.disturbance_rejection(measured(40.0))
+    assert whole.peak.interval95 is not None
+    assert codes(whole)["disturbance-peak"] == "green"

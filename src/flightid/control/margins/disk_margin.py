@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.control.margins.disk_geometry import gain_limits, phase_limit_deg
-from flightid.control.margins.findings import guide_finding, unread_findings
+from flightid.control.margins.findings import as_far_as_read, guide_finding, unread_findings
 from flightid.control.margins.loop_grid import zoomed
 from flightid.control.margins.loop_metrics import loop_metrics
 from flightid.control.margins.loop_source import Controller
@@ -47,7 +47,6 @@ QUANTITIES = (
     ("frequency", "critical frequency", "rad/s"),
 )
 UNSTABLE = "the closed loop is unstable"
-AT_END = "the disk is least at an end of the frequencies that were read, and may be less beyond"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -283,10 +282,8 @@ def _carried(
         key: carried.number(place, name, unit, "the disk sets no limit")
         for place, (key, name, unit) in enumerate(QUANTITIES)
     }
-    if np.argmin(alphas) in (0, len(alphas) - 1):
-        # No error moves a least that lies at an end to first order: the zero is no bar.
-        frequency = made["frequency"]
-        made["frequency"] = Estimate(frequency.name, frequency.value, frequency.unit, None, AT_END)
+    if loops.measured:
+        made = {key: as_far_as_read(each, alphas) for key, each in made.items()}
     if uncertain.known:
         return made, []
     return made, [Finding("no-intervals", Light.UNKNOWN, f"no intervals: {uncertain.reason}")]

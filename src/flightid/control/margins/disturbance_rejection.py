@@ -9,7 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.control.margins.crossings import level_crossings
-from flightid.control.margins.findings import guide_finding, stability_findings, unread_findings
+from flightid.control.margins.findings import (
+    as_far_as_read,
+    guide_finding,
+    stability_findings,
+    unread_findings,
+)
 from flightid.control.margins.gain_limits import measured_up
 from flightid.control.margins.loop_metrics import DISTURBANCE_LEVEL_DB
 from flightid.control.margins.loop_source import Controller, Given, read_loop
@@ -197,7 +202,11 @@ def disturbance_rejection(
     }
     errors = carried.stderr
     parts = (None, None) if errors is None else np.split(errors[len(QUANTITIES) :], 2)
-    level = -np.log(np.abs(1.0 + loop.of(loop.uncertain.value, omega)))
+    estimate = loop.of(loop.uncertain.value, omega)
+    level = -np.log(np.abs(1.0 + estimate))
+    if loop.measured:
+        for key in ("peak", "peak_frequency"):
+            made[key] = as_far_as_read(made[key], -level, float(np.abs(estimate[-1])))
     level -= np.log(10.0) / 20.0 * DISTURBANCE_LEVEL_DB
     found = [*stability_findings(loop, metrics)]
     found += _guides(made, bandwidth_guide_rad_s, peak_guide_db)

@@ -5,16 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flightid.control.margins.loop_metrics import LoopMetrics
 from flightid.control.margins.loop_source import BrokenLoop
 from flightid.conventions import Light
 from flightid.findings import Finding
-from flightid.uncertainty.estimate import Reading
+from flightid.uncertainty.estimate import Estimate, Reading
 
 UNREAD, CONTRADICTED = "stability-not-read", "nyquist-criterion-contradicted"
 """Of loops whose stability is unknown: reading ends before the gain has passed one for good, or the
 response turns as no loop of that many unstable poles does."""
+AT_END = "worst at an end of what was read, and may be worse beyond"
+"""Of a peak or a least distance of a measurement."""
 COHERENCE = 0.6
 """Below this a measured response near crossover says little."""
 
@@ -52,6 +55,9 @@ def guide_finding(
     text += f"{guide:g} {quantity.unit}"
     if sign * (quantity.value - guide) < 0.0:
         return Finding(code, Light.RED, f"{text}: missed", action)
+    if quantity.reason == AT_END:
+        wider = "measure a wider band, or fit a model"
+        return Finding(code, Light.UNKNOWN, f"{text}: kept as far as was read", wider)
     if quantity.interval95 is None:
         return Finding(code, Light.GREEN, f"{text}: kept by the estimate, without interval")
     end = quantity.interval95[0 if at_least else 1]
@@ -59,6 +65,34 @@ def guide_finding(
         reach = f"{text}: the interval reaches beyond it, to {end:.3g}"
         return Finding(code, Light.AMBER, reach, f"{action}, or measure it better")
     return Finding(code, Light.GREEN, f"{text}: kept in the whole interval")
+
+
+def as_far_as_read(
+    reading: Reading, distance: NDArray[np.float64], gain_at_end: float = 0.0
+) -> Reading:
+    """A worst value of a measurement, without interval where it may be worse beyond its ends.
+
+    Parameters
+    ----------
+    reading : Estimate
+    distance : ndarray, shape (n_f,)
+        Distance from what is worst, over frequency.
+    gain_at_end : float
+        Of the loop at the highest frequency: from one on it has still to pass −1.
+
+    Example
+    -------
+    >>> from flightid.uncertainty.estimate import Estimate
+    >>> peak = Estimate("peak", 1.1, "dB", 0.5)
+    >>> as_far_as_read(peak, np.array([9.0, 3.0, 0.9, 1.1])).interval95 is None
+    False
+    >>> as_far_as_read(peak, np.array([9.0, 3.0, 1.1, 0.9])).reason
+    'worst at an end of what was read, and may be worse beyond'
+    """
+    inside = 0 < np.argmin(distance) < len(distance) - 1
+    if reading.value is None or (inside and gain_at_end < 1.0):
+        return reading
+    return Estimate(reading.name, reading.value, reading.unit, None, AT_END)
 
 
 def margin_findings(

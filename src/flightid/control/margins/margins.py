@@ -9,7 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.control.margins.crossings import gain_crossings, phase_crossings
-from flightid.control.margins.findings import CONTRADICTED, UNREAD, margin_findings
+from flightid.control.margins.findings import (
+    CONTRADICTED,
+    UNREAD,
+    as_far_as_read,
+    margin_findings,
+)
 from flightid.control.margins.gain_limits import (
     GAIN_LIMITS,
     UNSEEN,
@@ -300,6 +305,10 @@ def margins_of(
         name.replace("-", "_").replace(" ", "_"): outside.promised(each, field, gain_guide_db)
         for (name, field, _), each in quantities
     }
+    if loop.measured:
+        for key in ("modulus_margin", "sensitivity_peak"):
+            last = float(np.abs(estimate[-1]))
+            made[key] = as_far_as_read(made[key], np.abs(1.0 + estimate), last)
     findings = margin_findings(
         loop,
         metrics,
