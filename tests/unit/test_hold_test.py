@@ -272,8 +272,9 @@ def test_likelihood_under_another_hold_is_what_a_fit_under_it_finds(
 
     monkeypatch.setattr(hold_likelihood, "run_with_slopes", counted)
     here, there = held_outputs(fit.model, [record], {}, ["zero", "first"])
-    # Slopes stay where the first step leads nowhere; half a sample is 140 standard errors.
-    assert sloped == [True, False, True, True]
+    # Slopes stay where the first step leads nowhere; half a sample is 140 standard errors, which
+    # both begin without: the delay of the other is moved by it.
+    assert sloped == [True, False, True, False]
     # The fit itself is where least squares on its records lead, so it is not made again.
     as_fitted, spread = HeldOutputs.of(fit), [fit.parameters[n].stderr or 0.0 for n in fit.names]
     assert np.all(np.abs(as_fitted.values - here.values) < 1e-2 * np.array(spread))
@@ -329,6 +330,16 @@ def test_a_black_box_has_no_hold_to_forget() -> None:
     structure = fid.PolynomialModel.arx(("de",), "q", na=2, nb=2, nk=1)
     fit = fid.identify(structure, holds.flight(0, "steps", told=False))
     assert fit.evidence.check("input hold") is None
+
+
+def test_a_wrong_word_beside_gusts_is_not_green() -> None:
+    """Two steps from half a sample away had ended short of it: the truth was ruled out by e⁻³⁰."""
+    flown = holds.flight(10, "held", told="first", gust=True)
+    fit = fid.identify(holds.model(), flown, method="filter_error")
+    other = fit.provenance["other_holds"]["zero"]
+    assert other["gain"] > -1.0
+    assert_close(other["shift"]["tau"], -0.025, atol=0.002, why="half a sample of 50 ms")
+    assert str(fit.evidence.light) == "amber"
 
 
 @pytest.mark.nightly

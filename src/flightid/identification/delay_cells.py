@@ -113,6 +113,48 @@ class DelayCells:
         return lower, np.maximum(lower, np.minimum(limits[1], around[1]))
 
 
+def later_by(model: GreyBoxModel, time_s: float) -> Array:
+    """Values of the free parameters with all delays longer by so much, as far as they are free.
+
+    Parameters
+    ----------
+    model : TransferFunctionModel or StateSpaceModel
+    time_s : float
+        Below zero: shorter. Bounds are kept.
+
+    Returns
+    -------
+    ndarray, shape (n_free,)
+
+    Raises
+    ------
+    FlightidError
+        Equations without linearisation at their trim.
+
+    Example
+    -------
+    >>> from flightid import load_model
+    >>> model = load_model("rate_first_order")
+    >>> (later_by(model, 0.01) - later_by(model, 0.0)).round(6).tolist()
+    [0.0, 0.0, 0.01]
+    """
+    free = model.parameters.free
+    values = np.array([parameter.value or 0.0 for parameter in free])
+    delays = _delays_of(model)
+    slopes = np.zeros((len(delays), len(free)))
+    for place, parameter in enumerate(free):
+        change = DIFFERENCE * (abs(values[place]) or 1.0)
+        moved = _delays_of(model.with_values({parameter.name: values[place] + change}))
+        slopes[:, place] = (moved - delays) / change
+    moves = np.linalg.lstsq(slopes, np.full(len(delays), time_s))[0] if slopes.size else 0.0
+    lower, upper = (np.array([getattr(p, end) for p in free]) for end in ("minimum", "maximum"))
+    return np.asarray(np.clip(values + moves, lower, upper), dtype=np.float64)
+
+
+def _delays_of(model: GreyBoxModel) -> Array:
+    return np.concatenate([np.ravel(each.delays_s) for each in systems_of(model)])
+
+
 def beyond_jumps(
     end: E,
     model: GreyBoxModel,

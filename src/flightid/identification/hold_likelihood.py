@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from flightid.errors import DataError, FlightidError
 from flightid.frozen import dataclass
-from flightid.identification.delay_cells import DelayCells
+from flightid.identification.delay_cells import DelayCells, later_by
 from flightid.identification.fit import Fit
 from flightid.identification.output_error.distinct import run_with_slopes
 from flightid.identification.output_error.equation_records import (
@@ -48,8 +48,11 @@ AT_ONCE = 1 << 16
 """Rows that are turned into a triangle together."""
 LAGS = 20
 """Of the filters that take colour out."""
-STEPS = 2
-"""Of Gauss and Newton: what a delay moves by half a sample bends by less than the second tells."""
+STEPS, COLOURED_STEPS = 2, 8
+"""Of Gauss and Newton: what a delay moves by half a sample bends by less than the second tells.
+Where colour is taken out, quick errors count most, and half a sample is half a turn of those."""
+SETTLED = 0.1
+"""Squared changes of outputs by all numbers, over what is left, from which on no step follows."""
 SHORT = 1000.0
 """Squared changes of outputs by shared parameters, over what is left of outputs, up to which slopes
 stay: some 30 bars. At 10 the second step then ends within 0.04 of one of where full steps do."""
@@ -129,6 +132,7 @@ def held_outputs(
     holds: Sequence[InputHold],
     *,
     coloured: bool = False,
+    assumed: InputHold | None = None,
 ) -> list[HeldOutputs]:
     """Records beside a model near whose values the estimates lie, under each of some holds.
 
@@ -142,6 +146,8 @@ def held_outputs(
     holds : sequence of {"zero", "first", "band_limited"}
     coloured : bool
         Take out the colour of what is left under the first of them.
+    assumed : {"zero", "first", "band_limited"}, optional
+        Hold that the estimates were made under; left out: the first of them.
 
     Raises
     ------
@@ -161,8 +167,25 @@ def held_outputs(
         first = replace(prepared, hold=holds[0])
         filters = _whitening(_under(first, runs_of, None, cells.get(holds[0])).left)
     return [
-        _under(replace(prepared, hold=hold), runs_of, filters, cells.get(hold)) for hold in holds
+        _under(_begun(prepared, hold, assumed or holds[0]), runs_of, filters, cells.get(hold))
+        for hold in holds
     ]
+
+
+def _begun(prepared: RecordSet, hold: InputHold, assumed: InputHold) -> RecordSet:
+    """Records under a hold, delays begun where it leaves the inputs' mean delay as it was."""
+    later = np.mean([dt for _, _, dt in prepared.arrays]) / 2.0
+    later *= float(assumed == "zero") - float(hold == "zero")
+    begun = replace(prepared, hold=hold)
+    if not later:
+        return begun
+    try:
+        values = later_by(prepared.model, float(later))
+    except FlightidError:
+        return begun
+    names = [parameter.name for parameter in prepared.model.parameters.free]
+    model = prepared.model.with_values(dict(zip(names, map(float, values), strict=True)))
+    return replace(begun, model=model)
 
 
 def _cell(prepared: RecordSet) -> tuple[Array, Array] | None:
@@ -208,7 +231,7 @@ def _under(
     largest = FAR * sizes
     samples = sum(each[1].size for each in prepared.arrays)
     slopes: list[Array] = []
-    for round_ in range(STEPS):
+    for round_ in range(STEPS if filters is None else COLOURED_STEPS):
         if round_:
             model = prepared.model.with_values(dict(zip(free, map(float, values), strict=True)))
             prepared = replace(prepared, model=model)
@@ -233,12 +256,15 @@ def _under(
         moved = [_squares(each, sizes) for each in changes]
         if any(size > most for size, (_, most) in zip(moved, parts, strict=True)):
             slopes = []
+        ended = sum(moved) < SETTLED
         values = values + steps[0][: len(free)]
         own = [
             numbers.filled(_free_values(numbers) + step[len(free) :])
             for numbers, step in zip(prepared.own, steps, strict=True)
         ]
         prepared = replace(prepared, own=own)
+        if ended:
+            break
     return HeldOutputs(values, left)
 
 

@@ -187,7 +187,14 @@ class Rivals:
 
     def _held(self, holds: Sequence[InputHold]) -> list[HeldOutputs]:
         coloured = not self.is_likeliest
-        return held_outputs(self.fit.model, self.records, self.given, holds, coloured=coloured)
+        return held_outputs(
+            self.fit.model,
+            self.records,
+            self.given,
+            holds,
+            coloured=coloured,
+            assumed=self.assumed,
+        )
 
     def _beside(
         self, here: HeldOutputs, holds: Sequence[InputHold], others: Sequence[HeldOutputs]
