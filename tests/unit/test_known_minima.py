@@ -39,11 +39,13 @@ def test_starts_that_one_step_takes_to_a_known_minimum_go_no_further(
     """One lands at once, one after three steps; the last leads to a minimum of its own."""
     one, three, other = np.array([1.0, 0.0]), np.array([3.0, 0.0]), np.array([9.0, 9.0])
     jacobian = np.vstack([2.0 * np.eye(2), np.zeros((8, 2))])
-    followed: list[tuple[int, list[float]]] = []
+    followed: list[tuple[int, bool, list[float]]] = []
 
-    def follow(_: object, begin: np.ndarray, steps: int, light: float = 1.0) -> list[DenseEnd]:
+    def follow(
+        _: object, begin: np.ndarray, steps: int, light: float = 1.0, *, slopes: bool = True
+    ) -> list[DenseEnd]:
         if len(begin):
-            followed.append((steps, [float(start[0]) for start in begin]))
+            followed.append((steps, slopes, [float(start[0]) for start in begin]))
         ends = []
         for start in begin:
             lands = steps >= start[0] and start[0] < other[0]
@@ -55,5 +57,7 @@ def test_starts_that_one_step_takes_to_a_known_minimum_go_no_further(
     monkeypatch.setattr(search._Descent, "follow", follow)
     descent = search._Descent(None, [], [])
     found = descent._apart(np.array([one, three, other]), [ended(jacobian)], 50)
-    assert followed == [(1, [1.0]), (1, [3.0, 9.0]), (3, [3.0, 9.0]), (47, [9.0])]
+    # Where one step leads is asked, not the slopes there.
+    looks = [(1, False, [1.0]), (1, False, [3.0, 9.0])]
+    assert followed == [*looks, (3, True, [3.0, 9.0]), (47, True, [9.0])]
     assert [end.x.tolist() for end in found] == [[9.0, 9.0]]

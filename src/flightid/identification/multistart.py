@@ -60,7 +60,7 @@ class End:
 
 @dataclass(frozen=True)
 class DenseEnd(End):
-    """An end with its residuals and Jacobian."""
+    """An end with its residuals and Jacobian, both empty where no slopes were asked for."""
 
     residuals: Array
     jacobian: Array

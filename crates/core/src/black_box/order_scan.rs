@@ -232,6 +232,7 @@ fn refine(
         gradient_tolerance: 1e-6,
         step_tolerance: 1e-7,
         cost_tolerance: FINEST / problem.n_residuals().max(1) as f64,
+        ..Options::default()
     };
     let proceed = &mut |_: &Progress<'_>| !stop();
     let found = minimise(&mut problem, &theta, &low, &high, &options, proceed).ok()?;

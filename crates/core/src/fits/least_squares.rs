@@ -85,6 +85,9 @@ pub struct Options {
     pub step_tolerance: f64,
     /// Smallest relative reduction of the sum of squares.
     pub cost_tolerance: f64,
+    /// Whether the point that the last of the most steps reaches is linearised: where nobody asks for
+    /// its slopes, a search of few steps saves one Jacobian of them.
+    pub last_slopes: bool,
 }
 
 impl Default for Options {
@@ -94,6 +97,7 @@ impl Default for Options {
             gradient_tolerance: 1e-10,
             step_tolerance: 1e-12,
             cost_tolerance: 1e-15,
+            last_slopes: true,
         }
     }
 }
@@ -147,11 +151,12 @@ pub struct Minimum {
     pub x: Vec<f64>,
     /// Sum of squared residuals.
     pub cost: f64,
-    /// Residuals at `x`.
+    /// Residuals at `x`; empty where that was not linearised.
     pub residuals: Vec<f64>,
-    /// Jacobian at `x`, row-major; empty from a problem that makes the triangle itself.
+    /// Jacobian at `x`, row-major; empty from a problem that makes the triangle itself, and where `x`
+    /// was not linearised.
     pub jacobian: Vec<f64>,
-    /// Triangle R of the Jacobian at `x`, (n × n), column-major.
+    /// Triangle R of the Jacobian at `x`, (n × n), column-major; empty where `x` was not linearised.
     pub triangle: Vec<f64>,
     /// Steps tried.
     pub iterations: usize,

@@ -28,7 +28,7 @@ pub struct Found {
     pub x: Vec<f64>,
     /// Sum of squares there.
     pub cost: f64,
-    /// Triangle of the Jacobian there, n × n, columns contiguous.
+    /// Triangle of the Jacobian there, n × n, columns contiguous; empty where it was not asked for.
     pub triangle: Vec<f64>,
     /// Steps tried.
     pub iterations: usize,
@@ -51,6 +51,10 @@ pub fn minimise<P: Problem>(
 ) -> Result<Minimum, CoreError> {
     let mut dense = Dense::new(problem);
     let found = search(&mut dense, start, lower, upper, options, proceed)?;
+    if found.triangle.is_empty() {
+        dense.residuals.clear();
+        dense.jacobian.clear();
+    }
     Ok(Minimum {
         x: found.x,
         cost: found.cost,
@@ -243,14 +247,20 @@ impl<'a> Search<'a> {
         self.damping *= (1.0 - (2.0 * ratio - 1.0).powi(3)).clamp(1.0 / 10.0, 2.0);
         self.damping = self.damping.max(1e-20);
         self.growth = 2.0;
-        self.linearise(objective)?;
-        Ok(if small {
+        let reason = if small {
             Some(Termination::Step)
         } else if flat {
             Some(Termination::Cost)
         } else {
             None
-        })
+        };
+        if options.last_slopes || self.iterations < options.maximum_iterations {
+            self.linearise(objective)?;
+            return Ok(reason);
+        }
+        self.cost = cost;
+        self.point.triangle.clear();
+        Ok(Some(reason.unwrap_or(Termination::Iterations)))
     }
 
     fn refuse(&mut self, small: bool, predicted: f64, options: &Options) -> Option<Termination> {

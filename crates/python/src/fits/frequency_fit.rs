@@ -32,6 +32,8 @@ pub struct Search<'py> {
     pub upper: RowMajor1<'py, f64>,
     /// Most steps of each start.
     pub maximum_iterations: usize,
+    /// Whether the slopes where the last of them leads are asked for.
+    pub last_slopes: bool,
 }
 
 /// Measured responses, copied out of NumPy.
@@ -143,7 +145,11 @@ pub fn search<'py>(
     let starts: Vec<_> =
         search.starts.as_slice()?.chunks_exact(width).map(<[f64]>::to_vec).collect();
     let (lower, upper) = (search.lower.as_slice()?, search.upper.as_slice()?);
-    let options = Options { maximum_iterations: search.maximum_iterations, ..Options::default() };
+    let options = Options {
+        maximum_iterations: search.maximum_iterations,
+        last_slopes: search.last_slopes,
+        ..Options::default()
+    };
     let work =
         |stop: interrupt::Stop<'_>| minimise_from(&fit, &starts, lower, upper, &options, stop);
     let found = if starts.len() == 1 {

@@ -131,6 +131,7 @@ pub fn fit<'py, T: Trajectories>(
         gradient_tolerance: 1e-8,
         step_tolerance: 1e-10,
         cost_tolerance: 1e-14,
+        ..Options::default()
     };
     let Some(written) = written else {
         return fit_beside(py, trajectories, data, noise, beside, search, &exact);

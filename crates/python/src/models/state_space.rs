@@ -219,10 +219,11 @@ impl StateSpace {
         log_gradients(py, &self.prepared(values.as_slice()?, &free, omega, true)?, omega)
     }
 
-    /// fit(self, values: NDArray[np.float64], free: Sequence[int], data: Sequence[tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.float64], NDArray[np.float64]]], whitening: Sequence[tuple[int, int, NDArray[np.float64]]], starts: NDArray[np.float64], lower: NDArray[np.float64], upper: NDArray[np.float64], maximum_iterations: int) -> list[tuple[NDArray[np.float64], float, NDArray[np.float64], NDArray[np.float64], int, str] | str]
+    /// fit(self, values: NDArray[np.float64], free: Sequence[int], data: Sequence[tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.float64], NDArray[np.float64]]], whitening: Sequence[tuple[int, int, NDArray[np.float64]]], starts: NDArray[np.float64], lower: NDArray[np.float64], upper: NDArray[np.float64], maximum_iterations: int, last_slopes: bool = ...) -> list[tuple[NDArray[np.float64], float, NDArray[np.float64], NDArray[np.float64], int, str] | str]
     ///
     /// As `TransferFunctions.fit`.
     #[allow(clippy::too_many_arguments)]
+    #[pyo3(signature = (values, free, data, whitening, starts, lower, upper, maximum_iterations, last_slopes = true))]
     fn fit<'py>(
         &self,
         py: Python<'py>,
@@ -234,13 +235,14 @@ impl StateSpace {
         lower: RowMajor1<'py, f64>,
         upper: RowMajor1<'py, f64>,
         maximum_iterations: usize,
+        last_slopes: bool,
     ) -> PyResult<Vec<Bound<'py, PyAny>>> {
         let data = measured(data)?;
         let omega = data.iter().flat_map(|each| each.omega.iter().copied());
         let values = values.as_slice()?;
         let model = FreeStateSpace::new(&self.tape, &self.pairs, &self.point, values, &free, omega)
             .map_err(from_core)?;
-        let wanted = Search { starts, lower, upper, maximum_iterations };
+        let wanted = Search { starts, lower, upper, maximum_iterations, last_slopes };
         search(py, model, &data, whitening, &wanted)
     }
 

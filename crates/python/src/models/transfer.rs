@@ -97,12 +97,14 @@ impl TransferFunctions {
         log_gradients(py, &model, omega_rad_s.as_slice()?)
     }
 
-    /// fit(self, values: NDArray[np.float64], free: Sequence[int], data: Sequence[tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.float64], NDArray[np.float64]]], whitening: Sequence[tuple[int, int, NDArray[np.float64]]], starts: NDArray[np.float64], lower: NDArray[np.float64], upper: NDArray[np.float64], maximum_iterations: int) -> list[tuple[NDArray[np.float64], float, NDArray[np.float64], NDArray[np.float64], int, str] | str]
+    /// fit(self, values: NDArray[np.float64], free: Sequence[int], data: Sequence[tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.float64], NDArray[np.float64]]], whitening: Sequence[tuple[int, int, NDArray[np.float64]]], starts: NDArray[np.float64], lower: NDArray[np.float64], upper: NDArray[np.float64], maximum_iterations: int, last_slopes: bool = ...) -> list[tuple[NDArray[np.float64], float, NDArray[np.float64], NDArray[np.float64], int, str] | str]
     ///
     /// Minimum from each start (x, cost, residuals, Jacobian, iterations, termination), or the words
     /// of the error that stopped it. Data are (omega, response, weight of dB, weight of degrees), the
-    /// weights as square roots; without whitening runs the cost is that of decibels and degrees.
+    /// weights as square roots; without whitening runs the cost is that of decibels and degrees. Where
+    /// the last slopes are not asked for, an end after the most steps has neither residuals nor Jacobian.
     #[allow(clippy::too_many_arguments)]
+    #[pyo3(signature = (values, free, data, whitening, starts, lower, upper, maximum_iterations, last_slopes = true))]
     fn fit<'py>(
         &self,
         py: Python<'py>,
@@ -114,10 +116,11 @@ impl TransferFunctions {
         lower: RowMajor1<'py, f64>,
         upper: RowMajor1<'py, f64>,
         maximum_iterations: usize,
+        last_slopes: bool,
     ) -> PyResult<Vec<Bound<'py, PyAny>>> {
         let model =
             FreeTransfer::new(&self.functions, values.as_slice()?, &free).map_err(from_core)?;
-        let wanted = Search { starts, lower, upper, maximum_iterations };
+        let wanted = Search { starts, lower, upper, maximum_iterations, last_slopes };
         search(py, model, &measured(data)?, whitening, &wanted)
     }
 

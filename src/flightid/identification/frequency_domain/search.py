@@ -62,8 +62,13 @@ class _Descent:
     selected: Sequence[SelectedResponse]
     white: list[tuple[int, int, Array]]
 
-    def follow(self, begin: Array, steps: int, light: float = 1.0) -> list[DenseEnd | str]:
-        """Where so many steps lead from each start, or why nowhere; decibels weigh by `light`."""
+    def follow(
+        self, begin: Array, steps: int, light: float = 1.0, *, slopes: bool = True
+    ) -> list[DenseEnd | str]:
+        """Where so many steps lead from each start, or why nowhere; decibels weigh by `light`.
+
+        Without slopes an end after that many steps has no residuals and no Jacobian.
+        """
         if not len(begin):
             return []
         measured = self._measured
@@ -73,7 +78,8 @@ class _Descent:
         low = np.array([parameter.minimum for parameter in parameters.free])
         high = np.array([parameter.maximum for parameter in parameters.free])
         values, places = parameters.independent_values(), parameters.free_indices
-        found = self.model.native.fit(values, places, measured, self.white, begin, low, high, steps)
+        where = begin, low, high, steps, slopes
+        found = self.model.native.fit(values, places, measured, self.white, *where)
         return [each if isinstance(each, str) else DenseEnd.of_native(each) for each in found]
 
     def lower(self, near: Array, best: float, maximum_iterations: int) -> list[DenseEnd]:
@@ -84,7 +90,8 @@ class _Descent:
             some = self._thinned(points // (POINTS_OF_PARAMETER * n_free))
             near = near[some._costs(near) < FAR * best]
             near = near[some._costs_after(near, FIRST_STEPS) < HOPELESS * best]
-        early = [e.x for e in self._ends(near, EARLY_ITERATIONS) if e.cost < PROMISING * best]
+        looks = self._ends(near, EARLY_ITERATIONS, slopes=False)
+        early = [end.x for end in looks if end.cost < PROMISING * best]
         around = self._ends(np.ascontiguousarray(early), maximum_iterations)
         return [end for end in around if end.cost < best * (1.0 - LOWER)]
 
@@ -113,7 +120,7 @@ class _Descent:
             if not minima:
                 found += self._ends(wave, steps)
                 continue
-            elsewhere, _ = self._elsewhere(wave, minima, 1)
+            elsewhere, _ = self._elsewhere(wave, minima, 1, slopes=False)
             _, others = self._elsewhere(elsewhere, minima, min(FIRST_STEPS, steps))
             further = [end.x for end in others if not end.is_converged]
             found += [end for end in others if end.is_converged]
@@ -121,12 +128,12 @@ class _Descent:
         return found
 
     def _elsewhere(
-        self, begin: Array, minima: Sequence[KnownMinimum], steps: int
+        self, begin: Array, minima: Sequence[KnownMinimum], steps: int, *, slopes: bool = True
     ) -> tuple[Array, list[DenseEnd]]:
         """Starts that so many steps take to none of the minima, and where these steps end."""
         kept = [
             (start, end)
-            for start, end in zip(begin, self.follow(begin, steps), strict=True)
+            for start, end in zip(begin, self.follow(begin, steps, slopes=slopes), strict=True)
             if not isinstance(end, str) and not any(each.holds(end.x) for each in minima)
         ]
         return np.ascontiguousarray([start for start, _ in kept]), [end for _, end in kept]
@@ -153,7 +160,7 @@ class _Descent:
         return np.where(np.isfinite(costs), costs, np.inf)
 
     def _costs_after(self, starts: Array, steps: int) -> Array:
-        ends = self.follow(starts, steps)
+        ends = self.follow(starts, steps, slopes=False)
         return np.array([np.inf if isinstance(end, str) else end.cost for end in ends])
 
     @cached_property
@@ -164,8 +171,11 @@ class _Descent:
             for each in self.selected
         ]
 
-    def _ends(self, begin: Array, steps: int, light: float = 1.0) -> list[DenseEnd]:
-        return [end for end in self.follow(begin, steps, light) if not isinstance(end, str)]
+    def _ends(
+        self, begin: Array, steps: int, light: float = 1.0, *, slopes: bool = True
+    ) -> list[DenseEnd]:
+        found = self.follow(begin, steps, light, slopes=slopes)
+        return [end for end in found if not isinstance(end, str)]
 
     def _thinned(self, stride: int) -> _Descent:
         """The same cost by the points that are so far apart."""
@@ -241,7 +251,7 @@ def minimise(
     if cost == "likelihood" or best <= LEAVES * len(selected):
         return collect(outcomes)
     if best > EXCELLENT_COST * len(selected):
-        led = [end.x for end in descent._ends(drawn, LEADING_ITERATIONS, LIGHT)]
+        led = [end.x for end in descent._ends(drawn, LEADING_ITERATIONS, LIGHT, slopes=False)]
         outcomes = [*outcomes, *descent.follow(np.array(led), maximum_iterations)]
     if len(selected) > 1:
         ends = [end for end in outcomes if not isinstance(end, str)]

@@ -45,6 +45,49 @@ fn rosenbrock_at_a_bound() {
     assert!((-400.0 * x * (1.5 - x * x) - 2.0 * (1.0 - x)).abs() < 1e-6);
 }
 
+/// Counts the Jacobians that a search asks for.
+struct Counted(usize);
+
+impl Problem for Counted {
+    fn n_parameters(&self) -> usize {
+        2
+    }
+    fn n_residuals(&self) -> usize {
+        2
+    }
+    fn residuals(&mut self, x: &[f64], r: &mut [f64]) -> Result<(), CoreError> {
+        Rosenbrock.residuals(x, r)
+    }
+    fn jacobian(&mut self, x: &[f64], j: &mut [f64]) -> Result<(), CoreError> {
+        self.0 += 1;
+        Rosenbrock.jacobian(x, j)
+    }
+}
+
+#[test]
+fn a_last_point_that_nobody_asks_slopes_of_is_the_same_without_them() {
+    let ends = |maximum_iterations: usize, last_slopes: bool| {
+        let mut problem = Counted(0);
+        let options = Options { maximum_iterations, last_slopes, ..Options::default() };
+        let (low, go) = ([f64::NEG_INFINITY; 2], &mut |_: &Progress| true);
+        let found = minimise(&mut problem, &[-1.2, 1.0], &low, &OPEN, &options, go).unwrap();
+        (found, problem.0)
+    };
+    for most in 1..8 {
+        let (whole, asked) = ends(most, true);
+        let (bare, fewer) = ends(most, false);
+        assert_eq!((&whole.x, whole.iterations), (&bare.x, bare.iterations));
+        assert_eq!((whole.cost, whole.termination), (bare.cost, bare.termination));
+        // A step that was refused leaves the slopes that there were.
+        let saved = usize::from(bare.triangle.is_empty());
+        assert_eq!((asked, bare.jacobian.len()), (fewer + saved, 4 * (1 - saved)));
+        assert_eq!(bare.residuals.len(), 2 * (1 - saved));
+    }
+    assert_eq!((ends(1, true).1, ends(1, false).1), (2, 1));
+    // A search that ends by itself knows its slopes.
+    assert_eq!(ends(200, false).0.jacobian.len(), 4);
+}
+
 /// Two nearly parallel columns whose free minimum (-9, 10) lies across both bounds.
 struct Parallel;
 
