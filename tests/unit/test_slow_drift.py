@@ -16,10 +16,11 @@ from flightid.uncertainty.periodograms import first_lags, periodogram, transform
 from flightid.uncertainty.residual_noise import (
     Autoregression,
     _fitted,
+    _likelihood,
     _rounds,
     autoregression,
 )
-from flightid.uncertainty.slow_drift import FASTEST, SLOWEST, Drift, is_slow, parted
+from flightid.uncertainty.slow_drift import FASTEST, SLOWEST, Drift, is_slow, parted, whittle
 from tests.closeness import assert_close
 from tests.strangers import noises, output_error
 
@@ -137,6 +138,9 @@ def test_native_rounds_are_those_of_the_models_themselves() -> None:
             assert_close(native[0].weights, own[0].weights, why="rounding", rtol=1e-8)
             assert_close(native[1].variance, own[1].variance, why="rounding", rtol=1e-9)
             assert native[1].corner == own[1].corner
+            whole_spectrum = own[0].spectrum() + own[1].spectrum(length)
+            found, told = _likelihood(n, length, whole, own), whittle(whole_spectrum, whole, n)
+            assert_close(found, told, why="rounding", rtol=1e-9)
 
 
 @pytest.mark.parametrize("length", [64, 65])

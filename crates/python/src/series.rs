@@ -79,6 +79,27 @@ fn drift_beside<'py>(
     Ok((found.lags.into_pyarray(py), found.weights.into_pyarray(py), found.variance))
 }
 
+/// drift_likelihood(power: NDArray[np.float64], tables: tuple[NDArray[np.float64], NDArray[np.float64]], sizes: tuple[int, int], parts: tuple[NDArray[np.float64], NDArray[np.float64], float], corner: float, sharpest: float) -> float
+///
+/// Twice Whittle's likelihood of an autoregression and the drift beside it, as `drift_beside` has them.
+#[pyfunction]
+fn drift_likelihood(
+    py: Python<'_>,
+    power: RowMajor1<'_, f64>,
+    tables: (RowMajor2<'_, f64>, RowMajor1<'_, f64>),
+    sizes: (usize, usize),
+    parts: (RowMajor1<'_, f64>, RowMajor1<'_, f64>, f64),
+    corner: f64,
+    sharpest: f64,
+) -> PyResult<f64> {
+    let (cosines, turns) = (tables.0.as_slice()?, tables.1.as_slice()?);
+    let (power, length, n) = (power.as_slice()?, sizes.0, sizes.1);
+    let (lags, weights) = (parts.0.as_slice()?.to_vec(), parts.1.as_slice()?.to_vec());
+    let parts = Parts { lags, weights, variance: parts.2 };
+    let spectrum = Spectrum { power, cosines, turns, length, n };
+    py.detach(|| spectrum.likelihood(&parts, corner, sharpest)).map_err(from_core)
+}
+
 /// folded_frames(samples: NDArray[np.float64], length: int, hop: int, width: int) -> list[NDArray[np.float64]]
 ///
 /// Even parts of windows of channels by distance from their middles, and odd ones with the sign of
@@ -104,6 +125,7 @@ fn folded_frames<'py>(
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(composite, module)?)?;
     module.add_function(wrap_pyfunction!(drift_beside, module)?)?;
+    module.add_function(wrap_pyfunction!(drift_likelihood, module)?)?;
     module.add_function(wrap_pyfunction!(folded_frames, module)?)?;
     module.add_function(wrap_pyfunction!(autoregression_weights, module)?)
 }

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,6 +13,8 @@ from flightid.frozen import dataclass
 Array = NDArray[np.float64]
 TURN, TERMS = 0.5, 12
 """Largest phase (rad) over half of a span of samples, and terms of its series: 5e-13 is left."""
+AT_ONCE = 8192
+"""Rows that are turned together: they stay in the cache."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +53,11 @@ def lags_of_form(columns: Array, form: Array, n_lags: int) -> Array:
     >>> lags_of_form(np.array([[1.0], [2.0], [3.0]]), np.eye(1), 2)
     array([14.,  8.])
     """
-    return _native.lags_of_form(columns, form, n_lags)
+    found = np.zeros(n_lags)
+    for begin in range(0, len(columns), AT_ONCE):
+        turned = columns[begin : begin + AT_ONCE] @ form
+        found += _native.lagged_sums(turned, columns[begin:][: AT_ONCE + n_lags], n_lags)
+    return found
 
 
 def slow_transforms(columns: Array, length: int, n_bins: int) -> NDArray[np.complex128]:
@@ -86,11 +94,20 @@ def slow_transforms(columns: Array, length: int, n_bins: int) -> NDArray[np.comp
         last = np.zeros((1, span, m))
         last[0, : n - whole] = columns[whole:]
         moments = np.concatenate([moments, powers @ last])
-    middles = np.arange(len(moments)) * span + 0.5 * (span - 1)
-    turns = np.outer(omega, middles)
-    cosines, sines = np.cos(turns), np.sin(turns)
-    found, series = np.zeros((n_bins, m), complex), np.ones(n_bins, complex)
-    for k, rows in enumerate(np.ascontiguousarray(moments.transpose(1, 0, 2))):
-        found += series[:, None] * (cosines @ rows - 1j * (sines @ rows))
-        series = series * (-1j * omega * span) / (k + 1)
+    # One product serves cosines and sines of all moments: (2, n_bins, terms, m).
+    sums = _turns(length, n_bins, span, len(moments)) @ moments.reshape(len(moments), -1)
+    even, odd = sums.reshape(2, n_bins, len(powers), m)
+    series = np.ones((n_bins, len(powers)), complex)
+    for k in range(1, len(powers)):
+        series[:, k] = series[:, k - 1] * (-1j * omega * span) / k
+    return np.asarray(np.sum(series[:, :, None] * (even - 1j * odd), axis=1))
+
+
+@lru_cache(maxsize=2)
+def _turns(length: int, n_bins: int, span: int, count: int) -> Array:
+    """Cosines, then sines, of bins' phases at the middles of spans, (2 n_bins, n_spans)."""
+    middles = np.arange(count) * span + 0.5 * (span - 1)
+    turns = np.outer(2.0 * np.pi * np.arange(n_bins) / length, middles)
+    found = np.concatenate([np.cos(turns), np.sin(turns)])
+    found.flags.writeable = False
     return found

@@ -17,7 +17,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from flightid._native import autoregression_weights, drift_beside
+from flightid._native import autoregression_weights, drift_beside, drift_likelihood
 from flightid.frozen import dataclass
 from flightid.recursive_filter import filtered_from, state_after
 from flightid.uncertainty.driven_noise import driven_products
@@ -38,6 +38,7 @@ from flightid.uncertainty.slow_drift import (
     n_slow_bins,
     parted,
     turns,
+    whittle,
 )
 from flightid.uncertainty.taken_noise import TakenNoise
 
@@ -223,7 +224,8 @@ def autoregression(
     length = transform_length(n) if length is None else length
     model = _fitted(power, n, length)
     if known is None:
-        fast, drift = apart(model, power, n, length, partial(_rounds, n, length))
+        rounds, likelihood = partial(_rounds, n, length), partial(_likelihood, n, length)
+        fast, drift = apart(model, power, n, length, rounds, likelihood)
         return replace(fast, drift=drift)
     for _ in range(SEPARATIONS):
         own = model.spectrum()
@@ -264,6 +266,16 @@ def _rounds(
     return Autoregression(lags, weights, n, length), replace(drift, variance=variance)
 
 
+def _likelihood(n: int, length: int, whole: Array, pair: tuple[Autoregression, Drift]) -> float:
+    """`whittle` of autoregression and drift, natively where a transform is not long."""
+    fast, drift = pair
+    if length > LONGEST_TABLE:
+        return whittle(fast.spectrum() + drift.spectrum(length), whole, n)
+    tables = cosines(length, min(LARGEST_ORDER, n // 20)), turns(length)
+    parts = fast.lags, fast.weights, drift.variance
+    return drift_likelihood(whole, tables, (length, n), parts, drift.corner, SHARPEST)
+
+
 def noise_models(
     residuals: Sequence[Array], taken: Sequence[FittedDirections], known: Array | None = None
 ) -> list[Autoregression]:
@@ -297,13 +309,15 @@ def noise_models(
     seen = np.array([pooled([each[o][:, None] for each in residuals], length) for o in outputs])
     count, bins = min(LARGEST_ORDER, total // 20) + 1, n_slow_bins(total, length)
     noise = TakenNoise(taken, length, count, min(bins, seen.shape[1]))
+    # What is seen is the same in all rounds.
+    begun = [first_lags(power, length, count - 1) for power in seen if known is None]
 
     def modelled(output: int, before: Autoregression | None) -> Autoregression:
         """Of what is seen, and of what the fit took of the model of the round before."""
         power = seen[output]
         if known is None and (before is None or before.is_white):
             # First lags and slowest bins tell a white model.
-            lags, slow = first_lags(power, length, count - 1), power[:bins]
+            lags, slow = begun[output], power[:bins]
             if before is not None:
                 more, lower = noise.of_white(output, float(before.lags[0]), forms)
                 lags, slow = lags + more / total, slow + lower / total

@@ -106,9 +106,18 @@ class Spectral(Protocol):
 M = TypeVar("M", bound=Spectral)
 Rounds = Callable[[Array, tuple[M, Drift], int], tuple[M, Drift]]
 """Of expectation and maximisation."""
+Likelihood = Callable[[Array, tuple[M, Drift]], float]
+"""Twice Whittle's, of a power, for both parts together."""
 
 
-def apart(plain: M, power: Array, n: int, length: int, rounds: Rounds[M]) -> tuple[M, Drift | None]:
+def apart(
+    plain: M,
+    power: Array,
+    n: int,
+    length: int,
+    rounds: Rounds[M],
+    likelihood: Likelihood[M] | None = None,
+) -> tuple[M, Drift | None]:
     """Noise and the drift beside it; the noise as it was where nothing speaks for a drift.
 
     Expectation and maximisation over the spectrum, at corners a factor apart; Whittle's likelihood
@@ -126,6 +135,8 @@ def apart(plain: M, power: Array, n: int, length: int, rounds: Rounds[M]) -> tup
     rounds : callable
         Takes a power, a noise with the drift beside it and a number of rounds; gives both after
         these.
+    likelihood : callable, optional
+        `whittle` of a power for a noise with the drift beside it; default: by their spectra.
 
     Reference
     ---------
@@ -143,8 +154,12 @@ def apart(plain: M, power: Array, n: int, length: int, rounds: Rounds[M]) -> tup
 
     def worth(pair: tuple[M, Drift]) -> float:
         fast, drift = pair
-        both = fast.spectrum() + drift.spectrum(length)
-        return _criterion(both, fast.weights.size + NUMBERS, whole, n)
+        told = (
+            whittle(fast.spectrum() + drift.spectrum(length), whole, n)
+            if likelihood is None
+            else likelihood(whole, pair)
+        )
+        return _criterion(told, fast.weights.size + NUMBERS, n)
 
     found = [
         rounds(whole, (plain, Drift(start, corner)), LOOKS)
@@ -155,7 +170,7 @@ def apart(plain: M, power: Array, n: int, length: int, rounds: Rounds[M]) -> tup
     if len(close) > 1:
         close = [rounds(whole, pair, RACE) for pair in close]
     best = rounds(whole, max(close, key=worth), ROUNDS)
-    alone = _criterion(level, plain.weights.size, whole, n)
+    alone = _criterion(whittle(level, whole, n), plain.weights.size, n)
     return best if worth(best) > alone else (plain, None)
 
 
@@ -204,10 +219,20 @@ def parted(
     return fast, replace(drift, variance=variance)
 
 
-def _criterion(spectrum: Array, numbers: int, whole: Array, n: int) -> float:
-    """Twice Whittle's likelihood less what its numbers cost."""
-    fit = np.log(spectrum) + whole / spectrum
-    return float(-n * np.mean(fit) - numbers * np.log(n))
+def whittle(spectrum: Array, power: Array, n: int) -> float:
+    """Twice Whittle's likelihood of n samples with a power, for a spectrum at the same bins.
+
+    Example
+    -------
+    >>> whittle(np.ones(3), np.ones(3), 10)
+    -10.0
+    """
+    return float(-n * np.mean(np.log(spectrum) + power / spectrum))
+
+
+def _criterion(likelihood: float, numbers: int, n: int) -> float:
+    """Twice a likelihood less what its numbers cost."""
+    return likelihood - numbers * float(np.log(n))
 
 
 def n_slow_bins(n: int, length: int) -> int:

@@ -96,7 +96,7 @@ class TakenNoise:
             part = _kept(self._parts, (k, output), self._together)
             slow = _kept(self._slow, (k, output), self._slowest)
             lags += lags_of_form(part, form, self._n_lags)
-            power += np.einsum("bk,kl,bl->b", slow, form, slow.conj()).real
+            power += np.sum((slow @ form) * slow.conj(), axis=1).real
         return lags, power
 
     def at_all_bins(self, output: int, model: ModelledNoise, forms: Sequence[Array]) -> Array:

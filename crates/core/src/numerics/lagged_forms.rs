@@ -1,55 +1,49 @@
-//! Quadratic forms of rows with later rows, summed over a record. (Python side:
+//! Products of rows with later rows of another series, summed over a record. (Python side:
 //! uncertainty/fitted_directions.py)
 
 use super::widest::widest;
 
-/// Rows that are turned together: they and those behind them stay in the nearest cache.
-const SPAN: usize = 192;
+/// Numbers of rows that all lags meet together: they and those behind them stay in the nearest cache.
+const SPAN: usize = 1536;
 /// Running sums of a product, so that additions need not wait for one another.
 const LANES: usize = 8;
-/// Lags that one reading of the turned rows serves.
+/// Lags that one reading of the earlier rows serves.
 const TOGETHER: usize = 4;
 
-/// Σ q(t)ᵀ M q(t + k) for the rows q, `width` numbers each, and lags k from zero on.
+/// Σ p(t)ᵀ q(t + k) for the rows p of `earlier` and q of `later`, `width` numbers each, and lags k
+/// from zero on.
 ///
-/// Numbers beyond whole rows, and a form of another size, count as none.
-pub fn lags_of_form(columns: &[f64], width: usize, form: &[f64], n_lags: usize) -> Vec<f64> {
+/// Numbers beyond whole rows count as none; `later` may go on where `earlier` ends.
+pub fn lagged_sums(earlier: &[f64], later: &[f64], width: usize, n_lags: usize) -> Vec<f64> {
     let mut found = vec![0.0; n_lags];
-    if width > 0 && form.len() == width * width {
+    if width > 0 {
+        let [earlier, later] = [earlier, later].map(|rows| &rows[..rows.len() / width * width]);
         widest(
             #[inline(always)]
-            || add_forms(columns, width, form, &mut found),
+            || add_sums(earlier, later, width, &mut found),
         );
     }
     found
 }
 
 #[inline(always)]
-fn add_forms(columns: &[f64], width: usize, form: &[f64], found: &mut [f64]) {
-    let columns = &columns[..columns.len() / width * width];
-    let mut turned = vec![0.0; SPAN * width];
-    for (place, rows) in columns.chunks(SPAN * width).enumerate() {
-        let turned = &mut turned[..rows.len()];
-        turned.fill(0.0);
-        for (into, row) in turned.chunks_exact_mut(width).zip(rows.chunks_exact(width)) {
-            for (&value, line) in row.iter().zip(form.chunks_exact(width)) {
-                into.iter_mut().zip(line).for_each(|(sum, weight)| *sum += value * weight);
-            }
-        }
-        let later = &columns[place * SPAN * width..];
+fn add_sums(earlier: &[f64], later: &[f64], width: usize, found: &mut [f64]) {
+    let span = SPAN.div_ceil(width) * width;
+    for (place, rows) in earlier.chunks(span).enumerate() {
+        let later = later.get(place * span..).unwrap_or(&[]);
         for (first, sums) in found.chunks_mut(TOGETHER).enumerate() {
             let behind = |lag: usize| later.get((first * TOGETHER + lag) * width..).unwrap_or(&[]);
             match sums {
-                [a, b, c, d] if behind(TOGETHER - 1).len() >= turned.len() => {
+                [a, b, c, d] if behind(TOGETHER - 1).len() >= rows.len() => {
                     let parts = [behind(0), behind(1), behind(2), behind(3)];
-                    let [p, q, r, s] = products(turned, parts);
+                    let [p, q, r, s] = products(rows, parts);
                     (*a, *b, *c, *d) = (*a + p, *b + q, *c + r, *d + s);
                 }
                 _ => {
                     for (lag, sum) in sums.iter_mut().enumerate() {
                         let part = behind(lag);
-                        let count = part.len().min(turned.len());
-                        *sum += products(&turned[..count], [part])[0];
+                        let count = part.len().min(rows.len());
+                        *sum += products(&rows[..count], [part])[0];
                     }
                 }
             }
@@ -85,25 +79,24 @@ mod tests {
     use crate::numerics::random::Random;
 
     #[test]
-    fn forms_are_the_sums_that_they_say() {
+    fn sums_are_those_that_they_say() {
         let mut source = Random::new(3);
-        for (n, width) in [(1, 1), (5, 3), (191, 2), (192, 3), (401, 5)] {
-            let rows: Vec<f64> = (0..n * width).map(|_| source.normal()).collect();
-            let form: Vec<f64> = (0..width * width).map(|_| source.normal()).collect();
-            let found = lags_of_form(&rows, width, &form, 11);
+        for (n, width) in [(1, 1), (5, 3), (191, 2), (768, 2), (769, 3), (1601, 5)] {
+            let mut drawn = || (0..n * width).map(|_| source.normal()).collect::<Vec<f64>>();
+            let (earlier, later) = (drawn(), drawn());
+            let found = lagged_sums(&earlier, &later, width, 11);
             for (lag, value) in found.iter().enumerate() {
-                let mut wanted = 0.0;
-                for t in 0..n.saturating_sub(lag) {
-                    for i in 0..width {
-                        for j in 0..width {
-                            let later = rows[(t + lag) * width + j];
-                            wanted += rows[t * width + i] * form[i * width + j] * later;
-                        }
-                    }
-                }
+                let behind = later.iter().skip(lag * width);
+                let wanted: f64 = earlier.iter().zip(behind).map(|(a, b)| a * b).sum();
                 assert!((value - wanted).abs() < 1e-10, "{n} {width} {lag}: {value} {wanted}");
             }
         }
-        assert_eq!(lags_of_form(&[1.0], 2, &[1.0], 2), [0.0, 0.0]);
+        // The number beyond whole rows meets nothing.
+        assert_eq!(lagged_sums(&[1.0, 2.0, 9.0], &[1.0, 2.0, 9.0], 2, 2), [5.0, 0.0]);
+        assert_eq!(lagged_sums(&[1.0], &[1.0], 0, 1), [0.0]);
+        // Either may be the longer.
+        let (short, long) = ([1.0, 2.0], [1.0, 10.0, 100.0, 1000.0]);
+        assert_eq!(lagged_sums(&short, &long, 1, 3), [21.0, 210.0, 2100.0]);
+        assert_eq!(lagged_sums(&long, &short, 1, 3), [21.0, 2.0, 0.0]);
     }
 }

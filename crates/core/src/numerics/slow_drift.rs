@@ -9,6 +9,8 @@ use crate::numerics::widest::widest;
 
 /// Bins that are worked on side by side.
 const LANES: usize = 8;
+/// Significands below two that are multiplied before a logarithm is taken of them.
+const FACTORS: usize = 1000;
 
 /// A periodogram, and what its bins are weighted by.
 pub struct Spectrum<'a> {
@@ -87,10 +89,7 @@ impl Spectrum<'_> {
             let needed = self.length / 2 + 1;
             return Err(CoreError::Shape { what: "bins of a spectrum", found: n_bins, needed });
         }
-        let pole = 1.0 - corner;
-        let drive = 1.0 - pole * pole;
-        let under = |turn: &f64| drive / (corner * corner + 2.0 * pole * turn);
-        let shape: Vec<f64> = self.turns.iter().map(under).collect();
+        let shape = self.shape(corner);
         let mut parts = begun;
         let mut rest = vec![0.0; n_bins];
         for _ in 0..rounds.most {
@@ -107,6 +106,40 @@ impl Spectrum<'_> {
             }
         }
         Ok(parts)
+    }
+
+    /// Spectrum of a drift of unit variance.
+    fn shape(&self, corner: f64) -> Vec<f64> {
+        let pole = 1.0 - corner;
+        let drive = 1.0 - pole * pole;
+        let under = |turn: &f64| drive / (corner * corner + 2.0 * pole * turn);
+        self.turns.iter().map(under).collect()
+    }
+
+    /// Twice Whittle's likelihood of two parts: −n times the mean of ln S + P / S.
+    ///
+    /// # Errors
+    /// `Shape` where there is not one of everything for each bin.
+    pub fn likelihood(&self, parts: &Parts, corner: f64, sharpest: f64) -> Result<f64, CoreError> {
+        let (n_bins, needed) = (self.power.len(), self.length / 2 + 1);
+        if !self.fits(parts.lags.len()) || parts.weights.len() >= parts.lags.len() {
+            return Err(CoreError::Shape { what: "bins of a spectrum", found: n_bins, needed });
+        }
+        let level = Level::of(parts, self.length, sharpest);
+        let mut whole = self.shape(corner);
+        let sum = widest(
+            #[inline(always)]
+            || {
+                for (own, turn) in whole.chunks_mut(LANES).zip(self.turns.chunks(LANES)) {
+                    let mut turns = [0.0; LANES];
+                    turns[..turn.len()].copy_from_slice(turn);
+                    let other = level.at(&turns);
+                    own.iter_mut().zip(other).for_each(|(s, o)| *s = o + parts.variance * *s);
+                }
+                logarithms(&whole) + ratios(self.power, &whole)
+            },
+        );
+        Ok(-(self.n as f64) * sum / n_bins as f64)
     }
 
     /// What each part is expected to hold: the autoregression's power, and the drift's variance.
@@ -185,6 +218,47 @@ impl<'a> Level<'a> {
     }
 }
 
+/// Σ ln of positive numbers: of the product of their significands, and their exponents.
+#[inline(always)]
+fn logarithms(values: &[f64]) -> f64 {
+    const EXPONENT: u64 = 0x7ff << 52;
+    const ONE: u64 = 1023 << 52;
+    let (mut sum, mut exponents, mut normal) = (0.0, [0_u64; LANES], true);
+    for part in values.chunks(FACTORS * LANES) {
+        let mut products = [1.0; LANES];
+        let (chunks, rest) = part.as_chunks::<LANES>();
+        for chunk in chunks {
+            for k in 0..LANES {
+                let bits = chunk[k].to_bits();
+                normal &= bits.wrapping_sub(1 << 52) < EXPONENT - (1 << 52);
+                exponents[k] += bits >> 52;
+                products[k] *= f64::from_bits((bits & !EXPONENT) | ONE);
+            }
+        }
+        sum += products.iter().chain(rest).map(|each| each.ln()).sum::<f64>();
+    }
+    if !normal {
+        return values.iter().map(|each| each.ln()).sum();
+    }
+    let count = values.len() - values.len() % LANES;
+    let turns = exponents.iter().sum::<u64>() as f64 - 1023.0 * count as f64;
+    sum + turns * std::f64::consts::LN_2
+}
+
+/// Σ a / b.
+#[inline(always)]
+fn ratios(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; LANES];
+    let (whole, more) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
+    let rest: f64 = whole.remainder().iter().zip(more.remainder()).map(|(x, y)| x / y).sum();
+    for (x, y) in whole.zip(more) {
+        for k in 0..LANES {
+            sums[k] += x[k] / y[k];
+        }
+    }
+    sums.iter().sum::<f64>() + rest
+}
+
 #[inline(always)]
 fn product(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 2 * LANES];
@@ -245,6 +319,33 @@ mod tests {
         let (there, here) =
             [other, begun].map(|each| spectrum.apart(each, corner, rounds).unwrap()).into();
         assert!((there.variance / here.variance - 1.0).abs() < 1e-5, "{there:?} {here:?}");
+    }
+
+    /// −n (mean of ln S + P / S) by its terms, over numbers of any size.
+    #[test]
+    fn a_likelihood_is_the_sum_of_its_terms() {
+        let (length, corner) = (34_003, 0.01);
+        let n_bins = length / 2 + 1;
+        let angle = 2.0 * std::f64::consts::PI / length as f64;
+        let turns: Vec<f64> = (0..n_bins).map(|bin| 1.0 - (angle * bin as f64).cos()).collect();
+        let power: Vec<f64> = (0..n_bins).map(|bin| 1.0 + (bin % 7) as f64).collect();
+        let cosines = vec![0.0; n_bins];
+        let spectrum = Spectrum { power: &power, cosines: &cosines, turns: &turns, length, n: 900 };
+        for scale in [1.0, 1e-300, 1e280, 0.0] {
+            let parts = Parts { lags: vec![2.0 * scale], weights: vec![], variance: 3.0 * scale };
+            let found = spectrum.likelihood(&parts, corner, 1e6).unwrap();
+            let pole: f64 = 1.0 - corner;
+            let terms = turns.iter().zip(&power).map(|(turn, p)| {
+                let drift = (1.0 - pole * pole) / (corner * corner + 2.0 * pole * turn);
+                let s = 2.0 * scale + 3.0 * scale * drift;
+                s.ln() + p / s
+            });
+            let wanted = -900.0 * terms.sum::<f64>() / n_bins as f64;
+            let close = (found - wanted).abs() <= 1e-12 * wanted.abs();
+            assert!(close || (found.is_nan() && wanted.is_nan()), "{scale}: {found} {wanted}");
+        }
+        let short = Parts { lags: vec![], weights: vec![], variance: 0.0 };
+        assert!(spectrum.likelihood(&short, corner, 1e6).is_err());
     }
 
     #[test]
