@@ -13,7 +13,9 @@ from flightid.conventions import Light
 from flightid.identification import hold_likelihood
 from flightid.identification.hold_likelihood import (
     HeldOutputs,
+    _columns,
     _products,
+    _squares_of,
     _steps,
     _weighed,
     held_outputs,
@@ -406,9 +408,11 @@ def test_products_of_a_step_are_those_of_its_columns() -> None:
     left, slopes = random.standard_normal((2, 700)), random.standard_normal((2, 700, 5))
     weights = np.array([0.5, 3.0])
     rows = np.concatenate(list(_weighed(left, slopes, weights, 3)))
-    assert_close(
-        _products(left, slopes, weights, 3), rows.T @ rows, rtol=1e-12, why="rounding of two ways"
-    )
+    found = _products(left, slopes, _squares_of(slopes), weights, 3)
+    assert_close(found, rows.T @ rows, rtol=1e-12, why="rounding of two ways")
+    some = np.concatenate(list(_columns(left, slopes, 3, [5, 0, 4])))
+    weighed = np.repeat(weights, 700)[:, None] * some
+    assert_close(weighed, rows[:, [5, 0, 4]], rtol=1e-15, why="the same numbers")
 
 
 def test_own_numbers_of_one_effect_take_nothing_from_shared_parameters() -> None:
@@ -420,7 +424,8 @@ def test_own_numbers_of_one_effect_take_nothing_from_shared_parameters() -> None
         slopes[0, :, 2:], slopes[1, :, 2:] = [1.0, 0.0, 1.0], [0.0, 1.0, 0.0]
         records.append((10.0 * random.standard_normal((2, n)), slopes))
     left, slopes = zip(*records, strict=True)
-    found = _steps(left, slopes, np.array([2.0, 0.5]), 2, None)
+    squares = [_squares_of(each) for each in slopes]
+    found = _steps(left, slopes, squares, np.array([2.0, 0.5]), 2, None)
     whole, target = np.zeros((1500, 8)), np.concatenate([each.ravel() for each in left])
     weights = np.concatenate([np.repeat([0.5, 2.0], n) for n in (300, 450)])
     for place, (first, each) in enumerate(zip((0, 600), slopes, strict=True)):

@@ -231,6 +231,7 @@ def _under(
     largest = FAR * sizes
     samples = sum(each[1].size for each in prepared.arrays)
     slopes: list[Array] = []
+    squares: list[Array] = []
     for round_ in range(STEPS if filters is None else COLOURED_STEPS):
         if round_:
             model = prepared.model.with_values(dict(zip(free, map(float, values), strict=True)))
@@ -242,30 +243,43 @@ def _under(
         left = [each[1] - run[0] for each, run in zip(prepared.arrays, runs, strict=True)]
         _require_near(left, [slope for _, slope in runs], largest)
         left = [_whitened(each, filters) for each in left]
-        slopes = slopes or [_whitened(slope, filters) for _, slope in runs]
+        if not slopes:
+            slopes = [_whitened(slope, filters) for _, slope in runs]
+            squares = [_squares_of(slope) for slope in slopes]
         del runs  # whose slopes would stand beside the next ones
         limits = None if cell is None else (cell[0] - values, cell[1] - values)
-        steps = _steps(left, slopes, sizes, len(free), limits)
-        parts = [(slice(None, len(free)), SHORT), (slice(len(free), None), NEAR * samples)]
-        changes = [
-            [slope[:, :, part] @ step[part] for slope, step in zip(slopes, steps, strict=True)]
-            for part, _ in parts
-        ]
-        left = [rest - shared - own for rest, shared, own in zip(left, *changes, strict=True)]
+        steps = _steps(left, slopes, squares, sizes, len(free), limits)
+        changes = [_changes(*pair, len(free)) for pair in zip(slopes, steps, strict=True)]
+        left = [rest - shared - own for rest, (shared, own) in zip(left, changes, strict=True)]
         sizes = np.sqrt(np.mean(np.concatenate(left, axis=1) ** 2, axis=1))
-        moved = [_squares(each, sizes) for each in changes]
-        if any(size > most for size, (_, most) in zip(moved, parts, strict=True)):
+        shared, own = ([each[place] for each in changes] for place in (0, 1))
+        moved = _squares(shared, sizes), _squares(own, sizes)
+        if moved[0] > SHORT or moved[1] > NEAR * samples:
             slopes = []
         ended = sum(moved) < SETTLED
         values = values + steps[0][: len(free)]
-        own = [
+        begun = [
             numbers.filled(_free_values(numbers) + step[len(free) :])
             for numbers, step in zip(prepared.own, steps, strict=True)
         ]
-        prepared = replace(prepared, own=own)
+        prepared = replace(prepared, own=begun)
         if ended:
             break
     return HeldOutputs(values, left)
+
+
+def _squares_of(slopes: Array) -> Array:
+    """Products of slopes by all numbers with all, of each output, (n_outputs, k, k)."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return np.array([slope.T @ slope for slope in slopes])
+
+
+def _changes(slopes: Array, step: Array, n_free: int) -> tuple[Array, Array]:
+    """What a step changes of outputs by the shared parameters, and by the record's own numbers."""
+    apart = np.zeros((len(step), 2))
+    apart[:n_free, 0], apart[n_free:, 1] = step[:n_free], step[n_free:]
+    found = slopes @ apart
+    return found[:, :, 0], found[:, :, 1]
 
 
 def _squares(changes: Sequence[Array], sizes: Array) -> float:
@@ -297,6 +311,7 @@ def _require_near(left: Sequence[Array], slopes: Sequence[Array], largest: Array
 def _steps(
     left: Sequence[Array],
     slopes: Sequence[Array],
+    squares: Sequence[Array],
     sizes: Array,
     n_free: int,
     limits: tuple[Array, Array] | None,
@@ -306,9 +321,11 @@ def _steps(
     # Triangles hold all that least squares ask, of as many rows as there are numbers.
     triangles = [
         triangle_of_parts(
-            partial(_weighed, rest, slope, weights, n_free), _products(rest, slope, weights, n_free)
+            partial(_weighed, rest, slope, weights, n_free),
+            _products(rest, slope, square, weights, n_free),
+            partial(_columns, rest, slope, n_free),
         )
-        for rest, slope in zip(left, slopes, strict=True)
+        for rest, slope, square in zip(left, slopes, squares, strict=True)
     ]
     seen = [_told_apart(each, each.shape[1] - n_free - 1) for each in triangles]
     triangles = [each for each, _ in seen]
@@ -352,18 +369,34 @@ def _inside(step: Array, triangle: Array, limits: tuple[Array, Array]) -> Array:
     return np.clip(clipped, *limits)
 
 
-def _products(left: Array, slopes: Array, weights: Array, n_free: int) -> Array:
-    """Products of the columns that `_weighed` gives, without a copy of long slopes."""
+def _products(left: Array, slopes: Array, squares: Array, weights: Array, n_free: int) -> Array:
+    """Products of the columns that `_weighed` gives, without a copy of long slopes.
+
+    Those of slopes, `squares` by output, are the same in steps that keep them.
+    """
     count = slopes.shape[2]
     found = np.zeros((count + 1, count + 1))
     with np.errstate(over="ignore", invalid="ignore"):
-        for rest, slope, weight in zip(left, slopes, weights, strict=True):
-            found[:count, :count] += weight**2 * (slope.T @ slope)
+        for rest, slope, square, weight in zip(left, slopes, squares, weights, strict=True):
+            found[:count, :count] += weight**2 * square
             found[:count, count] += weight**2 * (slope.T @ rest)
             found[count, count] += weight**2 * (rest @ rest)
     found[count, :count] = found[:count, count]
-    places = [*range(n_free, count), *range(n_free), count]
+    places = _order(count, n_free)
     return np.asarray(found[np.ix_(places, places)])
+
+
+def _order(count: int, n_free: int) -> list[int]:
+    """Own numbers' slopes, the shared ones', what is left, as they stand in slopes and left."""
+    return [*range(n_free, count), *range(n_free), count]
+
+
+def _columns(left: Array, slopes: Array, n_free: int, places: Sequence[int]) -> Iterator[Array]:
+    """Some columns of `_weighed`, by output and without its weights."""
+    order = _order(slopes.shape[2], n_free)
+    for rest, slope in zip(left, slopes, strict=True):
+        whole = [rest if order[k] == slope.shape[1] else slope[:, order[k]] for k in places]
+        yield np.column_stack(whole)
 
 
 def _weighed(left: Array, slopes: Array, weights: Array, n_free: int) -> Iterator[Array]:

@@ -117,15 +117,13 @@ class FitResponse:
         ]
         squares = [u.squares for u in lagged]
         plain, found = np.asarray(sum(squares)), []
+        everywhere = [
+            [_heard(block, output) for output in range(len(self.models))] for block in self.blocks
+        ]
+        met_everywhere = [_met(*pair) for pair in zip(lagged, everywhere, strict=True)]
         for output, noise in enumerate(self.models):
-            heard = [
-                [x for x in (*block.of_output(output), block.residual[output][:, None]) if x.size]
-                for block in self.blocks
-            ]
-            met = [
-                np.concatenate([u.products(x) for x in parts])
-                for u, parts in zip(lagged, heard, strict=True)
-            ]
+            heard = [each[output] for each in everywhere]
+            met = [each[output] for each in met_everywhere]
             scale = np.diag(plain)
             if noise.is_white:
                 raw, covariance = score = self._of_output(output, met, squares)
@@ -220,6 +218,17 @@ class FitResponse:
                 min(max(share, 0.0), 1.0),
             )
         ]
+
+
+def _heard(block: RecordBlock, output: int) -> list[Array]:
+    """Columns of one output: own numbers' basis, sensitivities, residual."""
+    return [x for x in (*block.of_output(output), block.residual[output][:, None]) if x.size]
+
+
+def _met(inputs: LaggedInputs, everywhere: Sequence[Sequence[Array]]) -> list[Array]:
+    """[X, e]ᵀU of each output: the lags of the inputs are laid out once for all."""
+    found = iter(inputs.products([x for parts in everywhere for x in parts]))
+    return [np.concatenate([next(found) for _ in parts]) for parts in everywhere]
 
 
 def _chance(raw: Array, covariance: Array, squares: Array) -> tuple[float, int, float] | None:

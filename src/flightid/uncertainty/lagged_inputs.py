@@ -6,13 +6,14 @@ themselves.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.frozen import dataclass
-from flightid.uncertainty.lagged_products import lagged_products, products_with_past
+from flightid.uncertainty.lagged_products import at_lags, lagged_products
 
 Array = NDArray[np.float64]
 
@@ -62,11 +63,15 @@ class LaggedInputs:
         found = found.transpose(1, 0, 3, 2).reshape(size, size)
         return np.asarray(found - np.outer(self._totals, self._totals) / self.centred.shape[1])
 
-    def products(self, columns: Array) -> Array:
-        """XᵀU for columns X (n, k)."""
+    def products(self, parts: Sequence[Array]) -> list[Array]:
+        """XᵀU for each of some columns X (n, k)."""
         if self.formed:
-            return np.asarray(columns.T @ self.columns)
-        return self._with_lags(columns) - np.outer(columns.mean(axis=0), self._totals)
+            return [np.asarray(columns.T @ self.columns) for columns in parts]
+        totals = self._totals
+        return [
+            found - np.outer(columns.mean(axis=0), totals)
+            for columns, found in zip(parts, self._with_lags(parts), strict=True)
+        ]
 
     @cached_property
     def _totals(self) -> Array:
@@ -79,6 +84,11 @@ class LaggedInputs:
     def _padded(self) -> Array:
         return np.concatenate([np.zeros((len(self.centred), self.n_lags - 1)), self.centred], 1)
 
-    def _with_lags(self, columns: Array) -> Array:
-        found = products_with_past([columns.T], [self._padded], self.n_lags - 1)
-        return np.asarray(found.transpose(2, 1, 0).reshape(columns.shape[1], -1))
+    def _with_lags(self, parts: Sequence[Array]) -> list[Array]:
+        count, n = self.centred.shape
+        found = [np.zeros((columns.shape[1], self.n_lags * count)) for columns in parts]
+        for piece, lags in at_lags(self._padded, n, self.n_lags - 1):
+            for each, columns in zip(found, parts, strict=True):
+                np.add(each, columns[piece].T @ lags.T, out=each)
+        by_input = [each.reshape(-1, self.n_lags, count).transpose(0, 2, 1) for each in found]
+        return [each.reshape(len(each), -1) for each in by_input]

@@ -6,7 +6,7 @@ first lag and the samples at both ends, without the columns.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import product
 
 import numpy as np
@@ -17,8 +17,8 @@ Array = NDArray[np.float64]
 Places = NDArray[np.intp]
 RIDGE = 1e-11
 """Added to columns of unit length: noise 110 dB below each channel."""
-AT_ONCE = 8192
-"""Samples that are met by all lags together: they stay in the cache."""
+AT_ONCE = 2048
+"""Samples that all lags meet in one product: their copies at each lag stay in the cache."""
 UNEVEN = 1e-3
 """Share of a channel's largest power at any lag below which one of it is rounding of the others."""
 
@@ -146,15 +146,41 @@ def products_with_past(news: Sequence[Array], records: Sequence[Array], longest:
     -------
     ndarray, shape (longest + 1, n_channels, n_news)
     """
-    found = np.zeros((longest + 1, len(records[0]), len(news[0])))
+    found = np.zeros(((longest + 1) * len(records[0]), len(news[0])))
     for new, rows in zip(news, records, strict=True):
-        ahead = rows.shape[1] - new.shape[1]
-        for begin in range(0, new.shape[1], AT_ONCE):
-            here = np.ascontiguousarray(new[:, begin : begin + AT_ONCE].T)
-            first = ahead + begin
-            for lag in range(longest + 1):
-                found[lag] += rows[:, first - lag : first - lag + len(here)] @ here
-    return found
+        for part, lags in at_lags(rows, new.shape[1], longest):
+            found += lags @ new[:, part].T
+    return found.reshape(longest + 1, len(records[0]), len(news[0]))
+
+
+def at_lags(rows: Array, count: int, longest: int) -> Iterator[tuple[slice, Array]]:
+    """The last samples of rows at all lags, piece by piece of samples.
+
+    Parameters
+    ----------
+    rows : ndarray, shape (n_channels, n_samples)
+    count : int
+        Of the samples.
+    longest : int
+        Longest lag.
+
+    Yields
+    ------
+    tuple of slice and ndarray
+        Which of these samples, and all channels there at lag 0, all at lag 1 and so on, shape
+        ((longest + 1) n_channels, n_samples of the piece).
+
+    Example
+    -------
+    >>> [(part, lags)] = at_lags(np.array([[1.0, 2.0, 3.0]]), 2, 1)
+    >>> lags
+    array([[2., 3.],
+           [1., 2.]])
+    """
+    for begin in range(0, count, AT_ONCE):
+        part = slice(begin, min(begin + AT_ONCE, count))
+        first, last = (rows.shape[1] - count + each for each in (part.start, part.stop))
+        yield part, np.concatenate([rows[:, first - k : last - k] for k in range(longest + 1)])
 
 
 def past(rows: Array, first: int, lags: range) -> Array:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Columns = Callable[[Sequence[int]], Iterable[Array]]
+"""Some columns of all rows, part by part."""
 ROWS = 256
 """From which products of columns are tried."""
 CACHED, PANEL = 2048, 8
@@ -57,9 +59,12 @@ def triangle_of_rows(columns: Array) -> Array:
 
 
 def _of_products(
-    parts: Callable[[], Iterable[Array]], products: Array | None = None
+    parts: Callable[[], Iterable[Array]],
+    products: Array | None = None,
+    columns: Columns | None = None,
 ) -> Array | None:
     """The triangle of all rows by products of columns; None where these lost too many digits."""
+    some = columns or (lambda places: (part[:, places] for part in parts()))
     with np.errstate(over="ignore", invalid="ignore"):
         if products is None:
             products = np.sum([part.T @ part for part in parts()], axis=0)
@@ -73,9 +78,9 @@ def _of_products(
     scaled = products / np.outer(scale, scale)
     # Columns of zeros have an effect of zero on their own.
     scaled[empty, empty] = 1.0
-    twins = _twins(scaled, parts)
+    twins = _twins(scaled, some)
     if twins:
-        return _with_twins(twins, products, parts)
+        return _with_twins(twins, products, parts, some)
     try:
         lower = np.linalg.cholesky(scaled)
     except np.linalg.LinAlgError:
@@ -87,7 +92,7 @@ def _of_products(
     return found if least >= LEAST_DIAGONAL else _refined(found, parts)
 
 
-def _twins(scaled: Array, parts: Callable[[], Iterable[Array]]) -> dict[int, int]:
+def _twins(scaled: Array, columns: Columns) -> dict[int, int]:
     """Columns that repeat an earlier one number by number, and which.
 
     The start of a state that no other state hears and the bias of an output that is that state do.
@@ -96,20 +101,24 @@ def _twins(scaled: Array, parts: Callable[[], Iterable[Array]]) -> dict[int, int
     found = {int(later): int(earlier) for earlier, later in alike[::-1]}
     if not found:
         return {}
-    same = dict.fromkeys(found, True)
-    for part in parts():
-        for later, earlier in found.items():
-            same[later] &= bool(np.array_equal(part[:, later], part[:, earlier]))
-    return {later: earlier for later, earlier in found.items() if same[later]}
+    same = np.ones(len(found), dtype=bool)
+    for part in columns([*found, *found.values()]):
+        same &= np.all(part[:, : len(found)] == part[:, len(found) :], axis=0)
+    return {later: found[later] for later, is_twin in zip(found, same, strict=True) if is_twin}
 
 
 def _with_twins(
-    twins: dict[int, int], products: Array, parts: Callable[[], Iterable[Array]]
+    twins: dict[int, int],
+    products: Array,
+    parts: Callable[[], Iterable[Array]],
+    columns: Columns,
 ) -> Array | None:
     """The triangle of the other columns; of one that repeats another nothing is left."""
     others = np.delete(np.arange(len(products)), list(twins))
     inner = _of_products(
-        lambda: (part[:, others] for part in parts()), products[np.ix_(others, others)]
+        lambda: (part[:, others] for part in parts()),
+        products[np.ix_(others, others)],
+        lambda places: columns([int(others[place]) for place in places]),
     )
     if inner is None:
         return None
@@ -150,7 +159,11 @@ def _row_by_row(parts: Iterable[Array]) -> Array:
     return np.zeros((0, 0)) if found is None else found
 
 
-def triangle_of_parts(parts: Callable[[], Iterable[Array]], products: Array | None = None) -> Array:
+def triangle_of_parts(
+    parts: Callable[[], Iterable[Array]],
+    products: Array | None = None,
+    columns: Columns | None = None,
+) -> Array:
     """The same of rows that come part by part, so that long columns need not stand anywhere.
 
     Parameters
@@ -159,13 +172,16 @@ def triangle_of_parts(parts: Callable[[], Iterable[Array]], products: Array | No
         Gives them, each shape (n, k), and once more where their products lost too many digits.
     products : ndarray, shape (k, k), optional
         Of all columns with all, where they are known.
+    columns : callable, optional
+        Takes places of columns and gives these alone, part by part, each shape (n, k): columns
+        that may repeat one another are compared so. Their rows may be weighed in other ways.
 
     Example
     -------
     >>> triangle_of_parts(lambda: [np.array([[3.0]]), np.array([[4.0]])])
     array([[5.]])
     """
-    found = _of_products(parts, products)
+    found = _of_products(parts, products, columns)
     if found is None:
         found = _row_by_row(parts())
     return found
