@@ -12,6 +12,7 @@ import scipy
 from flightid.uncertainty import periodograms, residual_noise, slow_drift
 from flightid.uncertainty.residual_noise import Autoregression
 from flightid.uncertainty.slow_drift import Drift
+from tests.drift_rounds import parted
 
 Array = np.ndarray
 
@@ -145,14 +146,14 @@ def test_rounds_part_a_drift_from_white_noise() -> None:
     for length in (100, 101):
         power = 1.0 + Drift(2.0, 0.1).spectrum(length)
         begun = Level(power), Drift(1.0, 0.1)
-        fast, drift = slow_drift.parted(Level, power, length, begun, 1)
+        fast, drift = parted(Level, power, length, begun, 1)
         own = begun[1].spectrum(length)
         share = own / (own + begun[0].level)
         slow = share**2 * power + share * begun[0].level
         assert drift.variance == pytest.approx(whole(slow, length).sum() / length)
         rest = (1.0 - share) ** 2 * power + share * begun[0].level
         assert fast.level[0] == pytest.approx(np.mean(rest))
-        fast, drift = slow_drift.parted(Level, power, length, begun, 2000)
+        fast, drift = parted(Level, power, length, begun, 2000)
         assert (fast.level[0], drift.variance) == (
             pytest.approx(1.0, rel=3e-3),
             pytest.approx(2.0, rel=3e-3),
@@ -174,7 +175,7 @@ def test_rounds_part_a_drift_from_white_noise() -> None:
             before, after, rounds = after, whole(slow, 1000).sum() / 1000, rounds + 1
         calls.clear()
         pair: Any = (Level(np.ones(501)), Drift(variance, 0.1))
-        slow_drift.parted(fitted, power, 1000, pair, 50)
+        parted(fitted, power, 1000, pair, 50)
         assert len(calls) == rounds
 
 

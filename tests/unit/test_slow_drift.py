@@ -20,8 +20,9 @@ from flightid.uncertainty.residual_noise import (
     _rounds,
     autoregression,
 )
-from flightid.uncertainty.slow_drift import FASTEST, SLOWEST, Drift, is_slow, parted, whittle
+from flightid.uncertainty.slow_drift import FASTEST, SLOWEST, Drift, is_slow, whittle
 from tests.closeness import assert_close
+from tests.drift_rounds import parted
 from tests.strangers import noises, output_error
 
 N = 1500
@@ -122,15 +123,15 @@ def test_rounds_end_where_more_of_them_would(seed: int) -> None:
 
 
 def test_native_rounds_are_those_of_the_models_themselves() -> None:
-    """White, coloured and nearly a line; few samples, where rounds meet what is no power."""
-    for n, pole in ((N, 0.0), (N, 0.7), (N, -0.95), (60, 0.5)):
+    """White, coloured and nearly a line; few samples, where rounds meet what is no power; many."""
+    for n, pole in ((N, 0.0), (N, 0.7), (N, -0.95), (60, 0.5), (20_000, 0.7)):
         random = np.random.default_rng(n)
         power = periodogram(noises.drift(random, n)[:, None] + noises.ar1(random, n, pole)[:, None])
         power[1:] -= 0.9 * power[:-1].min()
         length, whole = transform_length(n), np.maximum(power, 0.0)
         model = partial(_fitted, n=n, length=length)
         begun = model(whole), Drift(0.3 * float(whole.mean()), 0.02)
-        for rounds in (1, 6, 300):
+        for rounds in (1, 6, 300 if n < 2 * N else 20):
             native = _rounds(n, length, whole, begun, rounds)
             own = parted(model, whole, length, begun, rounds)
             assert native[0].weights.size == own[0].weights.size

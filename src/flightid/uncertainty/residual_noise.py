@@ -36,7 +36,6 @@ from flightid.uncertainty.slow_drift import (
     apart,
     is_slow,
     n_slow_bins,
-    parted,
     turns,
     whittle,
 )
@@ -255,11 +254,11 @@ def _fitted(power: Array, n: int, length: int, *, often: bool = False) -> Autore
 def _rounds(
     n: int, length: int, whole: Array, pair: tuple[Autoregression, Drift], rounds: int
 ) -> tuple[Autoregression, Drift]:
-    """`parted` of autoregressions, natively by the tables of a transform that is not long."""
-    if length > LONGEST_TABLE:
-        return parted(partial(_fitted, n=n, length=length, often=True), whole, length, pair, rounds)
+    """Rounds for `apart`, natively; by a table of cosines where that stays in the cache."""
     fast, drift = pair
-    tables = cosines(length, min(LARGEST_ORDER, n // 20)), turns(length)
+    none = np.empty((0, 0))
+    table = none if length > LONGEST_TABLE else cosines(length, min(LARGEST_ORDER, n // 20))
+    tables = table, turns(length)
     begun = fast.lags, fast.weights, drift.variance
     ends = rounds, SETTLED, SHARPEST, CUT
     lags, weights, variance = drift_beside(whole, tables, (length, n), begun, drift.corner, ends)

@@ -7,7 +7,6 @@ autoregression of few samples does not see these, and slow sensitivities look no
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from functools import lru_cache
 from typing import Protocol, TypeVar
 
@@ -35,7 +34,6 @@ NUMBERS = 2
 """Variance and corner."""
 STARTED = 0.3
 """Share of the mean power that a drift begins with."""
-_TINY = float(np.finfo(float).tiny)
 SEEN, OCTAVES = 1.5, (4, 8, 16, 32)
 """Standard deviations by which the power of so many half cycles makes a drift worth a look."""
 
@@ -172,51 +170,6 @@ def apart(
     best = rounds(whole, max(close, key=worth), ROUNDS)
     alone = _criterion(whittle(level, whole, n), plain.weights.size, n)
     return best if worth(best) > alone else (plain, None)
-
-
-def parted(
-    fitted: Callable[[Array], M], whole: Array, length: int, pair: tuple[M, Drift], rounds: int
-) -> tuple[M, Drift]:
-    """Both models after some rounds, or fewer where these change nothing any more.
-
-    Parameters
-    ----------
-    fitted : callable
-        Makes a model of a power.
-    whole : ndarray, shape (n_bins,)
-        Power at the bins of a real transform of `length`.
-    length : int
-    pair : tuple of model and Drift
-    rounds : int
-        Most of them.
-
-    Example
-    -------
-    >>> class White:
-    ...     weights = np.zeros(0)
-    ...     def __init__(self, power): self.level = np.full(power.shape, np.mean(power))
-    ...     def spectrum(self): return self.level
-    >>> whole = 1.0 + Drift(2.0, 0.01).spectrum(1000)
-    >>> fast, slow = parted(White, whole, 1000, (White(whole), Drift(1.0, 0.01)), 500)
-    >>> round(float(fast.level[0]), 2), round(slow.variance, 2)
-    (1.0, 2.0)
-    """
-    fast, drift = pair
-    ends = 1.0 if length % 2 == 0 else 2.0
-    variance, (power, under) = drift.variance, drift._parts(length)
-    shape = power / under
-    for _ in range(rounds):
-        other, own = fast.spectrum(), variance * shape
-        share = own / np.maximum(other + own, _TINY)
-        mixed = share * other
-        slow = share * share * whole + mixed
-        rest = 1.0 - share
-        fast = fitted(rest * rest * whole + mixed)
-        total = 2.0 * np.sum(slow) - slow[0] - (2.0 - ends) * slow[-1]
-        before, variance = variance, float(total) / length
-        if abs(variance - before) <= SETTLED * before:
-            break
-    return fast, replace(drift, variance=variance)
 
 
 def whittle(spectrum: Array, power: Array, n: int) -> float:

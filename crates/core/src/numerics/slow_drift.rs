@@ -17,6 +17,7 @@ pub struct Spectrum<'a> {
     /// Power at the bins of a real transform, none negative.
     pub power: &'a [f64],
     /// Rows of the inverse of that transform, (n_lags, n_bins): the first holds the weights of bins.
+    /// Empty where the transform is long: then they follow from `turns`, lag by lag.
     pub cosines: &'a [f64],
     /// One less the cosine of each bin's angle.
     pub turns: &'a [f64],
@@ -56,12 +57,48 @@ impl Spectrum<'_> {
         let n_bins = self.length / 2 + 1;
         count > 0
             && [self.power.len(), self.turns.len()] == [n_bins; 2]
-            && self.cosines.len() >= count * n_bins
+            && (self.cosines.is_empty() || self.cosines.len() >= count * n_bins)
     }
 
     fn lags_of(&self, power: &[f64], count: usize) -> Vec<f64> {
+        if self.cosines.is_empty() {
+            return widest(
+                #[inline(always)]
+                || self.lags_by_turns(power, count),
+            );
+        }
         let rows = self.cosines.chunks_exact(self.power.len()).take(count);
         rows.map(|row| widest(|| product(row, power))).collect()
+    }
+
+    /// The same without a table: cos kω = 2 cos ω cos (k − 1)ω − cos (k − 2)ω.
+    #[inline(always)]
+    fn lags_by_turns(&self, power: &[f64], count: usize) -> Vec<f64> {
+        let mut sums = vec![[0.0; LANES]; count];
+        for begin in (0..power.len()).step_by(LANES) {
+            let taken = LANES.min(power.len() - begin);
+            let [mut weighted, mut twice, mut now] = [[0.0; LANES]; 3];
+            for k in 0..taken {
+                weighted[k] = self.weight(begin + k) * power[begin + k];
+                now[k] = 1.0 - self.turns[begin + k];
+                twice[k] = 2.0 * now[k];
+            }
+            let mut before = [1.0; LANES];
+            for sum in &mut sums {
+                for k in 0..LANES {
+                    sum[k] += weighted[k] * before[k];
+                    (before[k], now[k]) = (now[k], twice[k] * now[k] - before[k]);
+                }
+            }
+        }
+        sums.iter().map(|sum| sum.iter().sum()).collect()
+    }
+
+    /// How often a bin stands in the whole transform, over its length.
+    #[inline(always)]
+    fn weight(&self, bin: usize) -> f64 {
+        let ends = bin == 0 || 2 * bin == self.length;
+        (if ends { 1.0 } else { 2.0 }) / self.length as f64
     }
 
     /// The autoregression of a power; its valleys are raised where its lags are no autocovariance.
@@ -151,14 +188,11 @@ impl Spectrum<'_> {
             let count = LANES.min(n_bins - begin);
             // Beyond the last bin weights of zero add nothing.
             let [mut power, mut weight, mut turn, mut own, mut left] = [[0.0; LANES]; 5];
-            for (to, from) in [
-                (&mut power, self.power),
-                (&mut weight, self.cosines),
-                (&mut turn, self.turns),
-                (&mut own, shape),
-            ] {
+            for (to, from) in [(&mut power, self.power), (&mut turn, self.turns), (&mut own, shape)]
+            {
                 to[..count].copy_from_slice(&from[begin..begin + count]);
             }
+            (0..count).for_each(|k| weight[k] = self.weight(begin + k));
             let other = level.at(&turn);
             for k in 0..LANES {
                 let own = variance * own[k];
@@ -346,6 +380,28 @@ mod tests {
         }
         let short = Parts { lags: vec![], weights: vec![], variance: 0.0 };
         assert!(spectrum.likelihood(&short, corner, 1e6).is_err());
+    }
+
+    #[test]
+    fn no_table_gives_what_the_table_gives() {
+        for length in [1000, 1001] {
+            let n_bins = length / 2 + 1;
+            let power: Vec<f64> = (0..n_bins).map(|k| 2.0 + (k as f64).sin()).collect();
+            let angle = 2.0 * std::f64::consts::PI / length as f64;
+            let turns: Vec<f64> = (0..n_bins).map(|bin| 1.0 - (angle * bin as f64).cos()).collect();
+            let table = cosines(length, 21);
+            let [with, without] = [&table[..], &[]].map(|cosines| {
+                let spectrum = Spectrum { power: &power, cosines, turns: &turns, length, n: 500 };
+                let begun = Parts { lags: vec![0.0; 21], weights: vec![0.3], variance: 1.0 };
+                (spectrum.lags_of(&power, 21), spectrum.apart(begun, 0.02, ROUNDS).unwrap())
+            });
+            let same = |a: &[f64], b: &[f64]| {
+                a.iter().zip(b).for_each(|(a, b)| assert!((a - b).abs() < 1e-12, "{a} {b}"));
+            };
+            same(&with.0, &without.0);
+            same(&with.1.lags, &without.1.lags);
+            assert!((with.1.variance / without.1.variance - 1.0).abs() < 1e-10);
+        }
     }
 
     #[test]
