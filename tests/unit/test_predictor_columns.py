@@ -45,8 +45,7 @@ def test_columns_of_a_predictor_are_what_each_number_adds(n_samples, monkeypatch
     kept = whole[[*range(n * m), *range(n * m + p * m, n * m + p * m + n), -1]]
     assert_close(some.T @ some, kept @ kept.T, why="same products", rtol=1e-10, atol=1e-9)
     own = predictor_columns.OwnColumns(closed, c, k, np.eye(p), True, True)
-    found = np.zeros((p, n_samples, own.count))
-    own.filled(found)
+    found = own.columns(n_samples)
     expected = np.moveaxis(np.array(by[-own.count :]), 0, 2)
     assert_close(found, expected, why="the same numbers", rtol=1e-10, atol=1e-12)
     assert not found[:, 600:, :n].any()

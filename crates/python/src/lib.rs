@@ -37,6 +37,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     simulation::drift_errors::register(module)?;
     simulation::extended_kalman::register(module)?;
     simulation::linear_recursion::register(module)?;
+    simulation::predictor_products::register(module)?;
     simulation::recursive_filter::register(module)?;
     simulation::slope_recursion::register(module)?;
     simulation::linear_simulation::register(module)?;

@@ -82,10 +82,13 @@ class DenseEnd(End):
         n_residuals: int,
         maximum_iterations: int,
         stop: Callable[[float], bool] | None = None,
+        triangle: Callable[[Array], Array | None] | None = None,
     ) -> DenseEnd:
         """Of bounded Levenberg–Marquardt on callables, their Jacobian in any order of memory.
 
         `stop` is asked after each step, with the least cost so far, whether that is near enough.
+        `triangle` may make that of the Jacobian and the residuals, a column a row, without them:
+        the end then has no Jacobian.
         """
 
         def by_rows(x: Array) -> Array:
@@ -93,7 +96,7 @@ class DenseEnd(End):
             return np.ascontiguousarray(jacobian(x))
 
         found = _native.least_squares(
-            residuals, by_rows, start, lower, upper, n_residuals, maximum_iterations, stop
+            residuals, by_rows, start, lower, upper, n_residuals, maximum_iterations, stop, triangle
         )
         end = cls.of_native(found)
         return replace(end, termination="cost") if end.termination == "interrupted" else end

@@ -27,13 +27,21 @@ pub struct Slopes<'a> {
 
 impl Slopes<'_> {
     fn check(&self, signals: &[f64], n_samples: usize) -> Result<(), CoreError> {
+        let (found, needed) = (signals.len(), self.sizes[2] * n_samples);
+        if found != needed {
+            return Err(CoreError::Shape { what: "signals", found, needed });
+        }
+        self.check_matrices()
+    }
+
+    /// Whether every matrix has its size.
+    pub(crate) fn check_matrices(&self) -> Result<(), CoreError> {
         let [n, p, q] = self.sizes;
         for (what, found, needed) in [
             ("transition matrix", self.transition.len(), n * n),
             ("output matrix", self.output.len(), p * n),
             ("forces", self.forced.len(), self.count * n * q),
             ("direct parts", self.direct.len(), self.count * p * q),
-            ("signals", signals.len(), q * n_samples),
         ] {
             if found != needed {
                 return Err(CoreError::Shape { what, found, needed });
@@ -42,8 +50,22 @@ impl Slopes<'_> {
         Ok(())
     }
 
+    /// Of each group of unknowns, what acts on their states, and on what they show.
+    pub(crate) fn by_group<const L: usize>(&self) -> (Vec<Acting<L>>, Vec<Acting<L>>) {
+        let (unknowns, [n, p, _]): (Vec<usize>, _) = ((0..self.count).collect(), self.sizes);
+        let all = |matrix: &[f64], rows: usize| {
+            unknowns.chunks(L).flat_map(|group| self.acting(matrix, rows, group)).collect()
+        };
+        (all(self.forced, n), all(self.direct, p))
+    }
+
     /// Of one group of unknowns, the signals that act on each of so many rows.
-    fn acting(&self, matrix: &[f64], rows: usize, group: &[usize]) -> Vec<Acting<LANES>> {
+    fn acting<const L: usize>(
+        &self,
+        matrix: &[f64],
+        rows: usize,
+        group: &[usize],
+    ) -> Vec<Acting<L>> {
         let q = self.sizes[2];
         let weight = |lane: usize, row: usize, signal: usize| {
             group.get(lane).map_or(0.0, |unknown| matrix[(unknown * rows + row) * q + signal])
@@ -64,46 +86,78 @@ impl Slopes<'_> {
 /// # Errors
 /// `Shape` where lengths do not fit, `NotFinite` where a slope runs away.
 pub fn slopes(of: Slopes<'_>, signals: &[f64], n_samples: usize) -> Result<Vec<f64>, CoreError> {
+    let (states, found) = run(of, signals, n_samples)?;
+    match states.iter().position(|value| !value.is_finite()) {
+        Some(index) => Err(CoreError::NotFinite { what: "slopes of a linear recursion", index }),
+        None => Ok(found),
+    }
+}
+
+/// As `slopes`, of those that run away as far as they are finite.
+///
+/// # Errors
+/// `Shape` where lengths do not fit.
+pub fn slopes_anyhow(
+    of: Slopes<'_>,
+    signals: &[f64],
+    n_samples: usize,
+) -> Result<Vec<f64>, CoreError> {
+    Ok(run(of, signals, n_samples)?.1)
+}
+
+/// States after the last block, and the slopes.
+fn run(
+    of: Slopes<'_>,
+    signals: &[f64],
+    n_samples: usize,
+) -> Result<(Vec<f64>, Vec<f64>), CoreError> {
     of.check(signals, n_samples)?;
+    // One run alone, as errors of a predictor are, leaves no lanes empty.
+    Ok(match of.count {
+        1 => through::<1>(of, signals, n_samples),
+        _ => through::<LANES>(of, signals, n_samples),
+    })
+}
+
+fn through<const L: usize>(
+    of: Slopes<'_>,
+    signals: &[f64],
+    n_samples: usize,
+) -> (Vec<f64>, Vec<f64>) {
     let [n, p, _] = of.sizes;
-    let unknowns: Vec<usize> = (0..of.count).collect();
-    let groups: Vec<&[usize]> = unknowns.chunks(LANES).collect();
-    let forced: Vec<_> = groups.iter().flat_map(|group| of.acting(of.forced, n, group)).collect();
-    let direct: Vec<_> = groups.iter().flat_map(|group| of.acting(of.direct, p, group)).collect();
+    let (forced, direct) = of.by_group::<L>();
+    let n_groups = of.count.div_ceil(L);
     let mut found = vec![0.0; n_samples * p * of.count];
-    let mut states = vec![[0.0; LANES]; groups.len() * n];
-    let (mut sources, mut lines) = (Vec::new(), vec![[[0.0; LANES]; BLOCK]; groups.len() * n]);
+    let mut states = vec![[0.0; L]; n_groups * n];
+    let (mut sources, mut lines) = (Vec::new(), vec![[[0.0; L]; BLOCK]; n_groups * n]);
     for (block, into) in found.chunks_mut((BLOCK * p * of.count).max(1)).enumerate() {
         gather(&mut sources, signals, n_samples, block * BLOCK);
         widest(
             #[inline(always)]
             || {
                 for (line, acting) in lines.iter_mut().zip(&forced) {
-                    *line = [[0.0; LANES]; BLOCK];
+                    *line = [[0.0; L]; BLOCK];
                     acting.drive(line, &sources, 0);
                 }
                 carry(of.transition, &mut states, &mut lines);
                 for (at, acting) in direct.iter().enumerate() {
                     let (group, row) = (at / p, at % p);
-                    let mut shown = [[0.0; LANES]; BLOCK];
+                    let mut shown = [[0.0; L]; BLOCK];
                     acting.drive(&mut shown, &sources, 0);
                     let factors = &of.output[row * n..(row + 1) * n];
                     for (factor, line) in factors.iter().zip(&lines[group * n..]) {
                         take(&mut shown, *factor, line);
                     }
-                    put(into, &shown, of.count, groups[group], (row, p));
+                    put(into, &shown, (row * of.count + group * L, of.count), p);
                 }
             },
         );
     }
-    match states.as_flattened().iter().position(|value| !value.is_finite()) {
-        Some(index) => Err(CoreError::NotFinite { what: "slopes of a linear recursion", index }),
-        None => Ok(found),
-    }
+    (states.into_flattened(), found)
 }
 
 /// One block of each signal; zeros after the last sample.
-fn gather(sources: &mut Vec<Line<1>>, signals: &[f64], n_samples: usize, first: usize) {
+pub(crate) fn gather(sources: &mut Vec<Line<1>>, signals: &[f64], n_samples: usize, first: usize) {
     sources.clear();
     sources.extend(
         signals
@@ -112,8 +166,9 @@ fn gather(sources: &mut Vec<Line<1>>, signals: &[f64], n_samples: usize, first: 
     );
 }
 
+/// Less a factor times another line.
 #[inline(always)]
-fn take(from: &mut Line<LANES>, factor: f64, line: &Line<LANES>) {
+pub(crate) fn take<const L: usize>(from: &mut Line<L>, factor: f64, line: &Line<L>) {
     for (sums, values) in from.iter_mut().zip(line) {
         for (sum, value) in sums.iter_mut().zip(values) {
             *sum -= factor * value;
@@ -121,18 +176,17 @@ fn take(from: &mut Line<LANES>, factor: f64, line: &Line<LANES>) {
     }
 }
 
+/// What a group shows of one row goes to its place, `count` unknowns a row, p rows a sample.
 #[inline(always)]
-fn put(
+fn put<const L: usize>(
     into: &mut [f64],
-    shown: &Line<LANES>,
-    count: usize,
-    unknowns: &[usize],
-    (row, p): (usize, usize),
+    shown: &Line<L>,
+    (first, count): (usize, usize),
+    p: usize,
 ) {
+    let lanes = L.min(count - first % count);
     for (sample, values) in into.chunks_exact_mut(p * count).zip(shown) {
-        for (unknown, value) in unknowns.iter().zip(values) {
-            sample[row * count + unknown] = *value;
-        }
+        sample[first..first + lanes].copy_from_slice(&values[..lanes]);
     }
 }
 

@@ -27,7 +27,12 @@ pub type Ending<'py> = (
 /// # Errors
 /// NumPy's own.
 pub fn ending<'py>(py: Python<'py>, found: Minimum) -> PyResult<Ending<'py>> {
-    let shape = [found.residuals.len(), found.x.len()];
+    // No rows where the problem made the triangle itself.
+    let rows = match found.jacobian.is_empty() {
+        true if !found.x.is_empty() => 0,
+        _ => found.residuals.len(),
+    };
+    let shape = [rows, found.x.len()];
     Ok((
         found.x.into_pyarray(py),
         found.cost,
@@ -46,6 +51,7 @@ pub type WrittenResiduals<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, usize);
 pub struct Callback {
     residuals: Arc<Py<PyAny>>,
     jacobian: Arc<Py<PyAny>>,
+    triangle: Option<Arc<Py<PyAny>>>,
     n_parameters: usize,
     n_residuals: usize,
     raised: Arc<Mutex<Option<PyErr>>>,
@@ -60,7 +66,14 @@ impl Callback {
         n_parameters: usize,
     ) -> Self {
         let (residuals, jacobian) = (Arc::new(residuals.unbind()), Arc::new(jacobian.unbind()));
-        Self { residuals, jacobian, n_parameters, n_residuals, raised: Arc::default() }
+        let triangle = None;
+        Self { residuals, jacobian, triangle, n_parameters, n_residuals, raised: Arc::default() }
+    }
+
+    /// The same with what may make the triangle of Jacobian and residuals without them.
+    #[must_use]
+    pub fn with_triangle(self, triangle: Option<Bound<'_, PyAny>>) -> Self {
+        Self { triangle: triangle.map(|each| Arc::new(each.unbind())), ..self }
     }
 
     /// What the residuals or their Jacobian raised.
@@ -123,14 +136,30 @@ impl Problem for Callback {
         });
         self.copy(call, jacobian)
     }
+
+    fn triangle(&mut self, x: &[f64], triangle: &mut [f64]) -> Result<bool, CoreError> {
+        self.ready()?;
+        let Some(written) = self.triangle.clone() else { return Ok(false) };
+        let call = Python::attach(|py| {
+            let result = written.bind(py).call1((PyArray1::from_slice(py, x),))?;
+            // By rows in Python, by columns here: it comes transposed.
+            let result: Option<RowMajor2<'_, f64>> = result.extract()?;
+            result.map(|columns| Ok(columns.to_vec()?)).transpose()
+        });
+        match call.transpose() {
+            None => Ok(false),
+            Some(found) => self.copy(found, triangle).map(|()| true),
+        }
+    }
 }
 
-/// least_squares(residuals: Callable[[NDArray[np.float64]], NDArray[np.float64]], jacobian: Callable[[NDArray[np.float64]], NDArray[np.float64]], start: NDArray[np.float64], lower: NDArray[np.float64], upper: NDArray[np.float64], n_residuals: int, maximum_iterations: int, stop: Callable[[float], bool] | None = None) -> tuple[NDArray[np.float64], float, NDArray[np.float64], NDArray[np.float64], int, str]
+/// least_squares(residuals: Callable[[NDArray[np.float64]], NDArray[np.float64]], jacobian: Callable[[NDArray[np.float64]], NDArray[np.float64]], start: NDArray[np.float64], lower: NDArray[np.float64], upper: NDArray[np.float64], n_residuals: int, maximum_iterations: int, stop: Callable[[float], bool] | None = None, triangle: Callable[[NDArray[np.float64]], NDArray[np.float64] | None] | None = None) -> tuple[NDArray[np.float64], float, NDArray[np.float64], NDArray[np.float64], int, str]
 ///
 /// Bounded Levenberg–Marquardt on callables: x, cost, residuals, Jacobian, iterations, termination.
-/// `stop` is asked after each step with the least cost so far.
+/// `stop` is asked after each step with the least cost so far. `triangle` may give that of Jacobian
+/// and residuals, a column of it a row, or None where the Jacobian is to be taken.
 #[pyfunction]
-#[pyo3(signature = (residuals, jacobian, start, lower, upper, n_residuals, maximum_iterations, stop=None))]
+#[pyo3(signature = (residuals, jacobian, start, lower, upper, n_residuals, maximum_iterations, stop=None, triangle=None))]
 #[allow(clippy::too_many_arguments)]
 fn least_squares<'py>(
     py: Python<'py>,
@@ -142,9 +171,11 @@ fn least_squares<'py>(
     n_residuals: usize,
     maximum_iterations: usize,
     stop: Option<&Bound<'py, PyAny>>,
+    triangle: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Ending<'py>> {
     let start = start.as_slice()?;
-    let mut problem = Callback::new((residuals, jacobian, n_residuals), start.len());
+    let written = (residuals, jacobian, n_residuals);
+    let mut problem = Callback::new(written, start.len()).with_triangle(triangle);
     let options = Options { maximum_iterations, ..Options::default() };
     let mut signal = None;
     let ask = |cost: f64| {

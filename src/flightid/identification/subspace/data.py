@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError
 from flightid.frozen import dataclass
+from flightid.identification.subspace.hankel_products import hankel_products
 from flightid.models.innovations.structure import SubspaceStructure
 from flightid.models.sampled.channels import SampledChannels, gather_channels
 from flightid.record import Record
@@ -19,6 +21,8 @@ Array = NDArray[np.float64]
 USUAL_HORIZON = 15
 BLOCK = 20_000
 """Columns that go into the triangular factor at a time."""
+LONG = 50
+"""Samples for each block row from which products of rows are made of those of one lag."""
 ROUNDING = 60.0
 """Minus the logarithm of a share of the outputs' power that is rounding."""
 POOR = 1e-9
@@ -43,6 +47,11 @@ class SubspaceData:
     inputs: tuple[Array, ...]
     scales: Array
     channels: SampledChannels
+
+    @cached_property
+    def signals(self) -> tuple[Array, ...]:
+        """Inputs, then outputs of each record, (m + p, n_samples)."""
+        return tuple(np.vstack([u, y]) for y, u in zip(self.outputs, self.inputs, strict=True))
 
     @property
     def n_outputs(self) -> int:
@@ -100,13 +109,27 @@ class SubspaceData:
             Rows in the order of the factor, of u then y at one time, time by time. What is
             constant in a record is taken out.
         """
-        return triangle_of_parts(lambda: self._hankel_parts(blocks, rows))
+        return triangle_of_parts(
+            lambda: self._hankel_parts(blocks, rows), self._hankel_products(blocks, rows)
+        )
+
+    def _hankel_products(self, blocks: int, rows: NDArray[np.int64]) -> Array | None:
+        """Products of columns of the factored matrix; None where they are to be made of these."""
+        levels, found = self.channels.levels, np.zeros(2 * (blocks * len(self.signals[0]),))
+        for joint in self.signals:
+            if joint.shape[1] < LONG * blocks:
+                return None
+            made = hankel_products(joint, blocks, levels=levels)
+            if made is None:
+                return None
+            found += made
+        return found[np.ix_(rows, rows)]
 
     def _hankel_parts(self, blocks: int, rows: NDArray[np.int64]) -> Iterator[Array]:
         """Columns of the Hankel matrices some at a time, as rows; of short records none."""
         yield np.zeros((0, len(rows)))
-        for y, u in zip(self.outputs, self.inputs, strict=True):
-            joint, columns = np.vstack([u, y]), y.shape[1] - blocks + 1
+        for joint in self.signals:
+            columns = joint.shape[1] - blocks + 1
             means = np.zeros((blocks * len(joint), 1))
             if self.channels.levels and columns > 0:
                 spans = [joint[:, first : first + columns] for first in range(blocks)]

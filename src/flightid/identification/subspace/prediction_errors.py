@@ -16,6 +16,7 @@ from flightid.identification.subspace.data import SubspaceData
 from flightid.identification.subspace.determinant import Goal, log_determinant
 from flightid.identification.subspace.matrices import STABLE
 from flightid.identification.subspace.predictor_columns import AT_ONCE, OwnColumns
+from flightid.identification.subspace.slopes import SlopeDrives, triangle_of_products
 from flightid.models.sampled.recursion import run_recursion, spectral_radius
 from flightid.progress import progress
 from flightid.uncertainty.agreement import Agreement
@@ -103,42 +104,51 @@ class Predictor:
         return np.concatenate([matrix.ravel() for matrix in free])
 
     def errors(self, matrices: Matrices, whiten: Array) -> list[Array]:
-        """Whitened errors of each record and, in further columns, what its own numbers make."""
+        """Whitened errors of each record from rest, shape (p, n_samples)."""
         a, b, c, d, k = matrices
-        closed, shown, found = a - k @ c, whiten @ c, []
-        levels = self.data.channels.levels
-        own = OwnColumns(closed, shown, k, whiten, self.free_initial, levels)
-        for y, u in zip(self.data.outputs, self.data.inputs, strict=True):
-            made = np.zeros((*y.shape, 1 + own.count))
-            with np.errstate(over="ignore", invalid="ignore"):
-                state = run_recursion(closed, (b - k @ d) @ u + k @ y)
-                np.subtract(whiten @ (y - d @ u), shown @ state, out=made[:, :, 0])
-                own.filled(made[:, :, 1:])
-            found.append(made.reshape(y.size, -1))
-        return found
+        forced = np.hstack([b - k @ d, k])[None]
+        direct = whiten @ np.hstack([-d, np.eye(len(c))])
+        run = a - k @ c, whiten @ c, forced, direct[None]
+        made = [_native.slope_recursion(*run, each, anyhow=True) for each in self.data.signals]
+        return [np.ascontiguousarray(each[:, :, 0].T) for each in made]
 
     def states(self, matrices: Matrices, own: Sequence[Array]) -> list[Array]:
         """States of each record with its own numbers."""
         a, b, c, d, k = matrices
-        n, p, found = len(a), len(c), []
+        p, found = len(c), []
         for y, u, values in zip(self.data.outputs, self.data.inputs, own, strict=True):
-            start = values[:n] if self.free_initial and len(values) else np.zeros(n)
             forcing = (b - k @ d) @ u + k @ (y - self._level(values, p)[:, None])
-            found.append(run_recursion(a - k @ c, forcing, start))
+            found.append(run_recursion(a - k @ c, forcing, self._start(values, len(a))))
         return found
+
+    def _start(self, own: Array, n: int) -> Array:
+        return own[:n] if self.free_initial and len(own) else np.zeros(n)
 
     def _level(self, own: Array, p: int) -> Array:
         return own[-p:] if self.data.channels.levels and len(own) else np.zeros(p)
 
     def residuals(self, matrices: Matrices, whiten: Array) -> tuple[list[Array], list[Nuisance]]:
-        """Whitened errors of each record after its own numbers, and what was taken out."""
-        out, found = [], []
-        for made in self.errors(matrices, whiten):
+        """Whitened errors of each record after its own numbers, and what was taken out.
+
+        Own numbers show in the first samples alone where no level is free.
+        """
+        a, _, c, _, k = matrices
+        levels = self.data.channels.levels
+        own = OwnColumns(a - k @ c, whiten @ c, k, whiten, self.free_initial, levels)
+        out, found = self.errors(matrices, whiten), []
+        for place, made in enumerate(out):
+            with np.errstate(over="ignore", invalid="ignore"):
+                columns = own.columns(made.shape[1])
             # Where a run has no end, nothing is taken out of errors without end.
-            kept = made if np.all(np.isfinite(made)) else np.full((len(made), 1), np.inf)
-            own = NuisanceDirections.of(kept[:, 1:]).best(kept[:, 0])
-            out.append(own.removed_from(kept[:, 0]))
-            found.append(own)
+            if not (np.all(np.isfinite(made)) and np.all(np.isfinite(columns))):
+                out[place] = np.full(made.shape, np.inf)
+                columns = columns[:, :0, :0]
+            shown = out[place][:, : columns.shape[1]]
+            taken = NuisanceDirections.of(columns.reshape(shown.size, columns.shape[2])).best(
+                shown.ravel()
+            )
+            shown[:] = taken.removed_from(shown.ravel()).reshape(shown.shape)
+            found.append(taken)
         return out, found
 
     def levels(self, matrices: Matrices, whiten: Array) -> list[Array]:
@@ -151,10 +161,7 @@ class Predictor:
     def fitted_errors(self, matrices: Matrices, whiten: Array) -> tuple[Array, ...]:
         """Errors of each record with its initial state, in the outputs' units."""
         rows, _ = self.residuals(matrices, whiten)
-        return tuple(
-            np.asarray(np.linalg.solve(whiten, row.reshape(y.shape)), dtype=np.float64)
-            for row, y in zip(rows, self.data.outputs, strict=True)
-        )
+        return tuple(np.asarray(np.linalg.solve(whiten, row), dtype=np.float64) for row in rows)
 
     def jacobian(
         self,
@@ -172,47 +179,43 @@ class Predictor:
         _, _, c, d, _ = matrices
         found = self.residuals(matrices, whiten)[1] if found is None else found
         states = self.states(matrices, [own.values for own in found])
+        drives = SlopeDrives.of(matrices, whiten, basis, self.shapes)
         parts = []
         for own, state, y, u in zip(
             found, states, self.data.outputs, self.data.inputs, strict=True
         ):
             error = y - self._level(own.values, len(c))[:, None] - c @ state - d @ u
-            made = self._slopes(matrices, whiten, basis, (error, state, u))
-            along = own.space.T @ made
-            for first in range(0, len(made), AT_ONCE):
-                made[first : first + AT_ONCE] -= own.space[first : first + AT_ONCE] @ along
+            made = drives.columns(state, error, u)
+            rows, n_own = made.reshape(len(c), y.shape[1], -1), own.space.shape[1]
+            space = own.space.reshape(len(c), len(own.space) // len(c), n_own)
+            pairs = [(row[: len(each)], each) for row, each in zip(rows, space, strict=True)]
+            along = np.sum([each.T @ row for row, each in pairs], axis=0)
+            for row, each in pairs:
+                for first in range(0, len(row), AT_ONCE):
+                    row[first : first + AT_ONCE] -= each[first : first + AT_ONCE] @ along
             parts.append(made)
         return parts[0] if len(parts) == 1 else np.vstack(parts)
 
-    def _slopes(
+    def triangle(
         self,
         matrices: Matrices,
         whiten: Array,
         basis: Array,
-        signals: tuple[Array, Array, Array],
-    ) -> Array:
-        """De = -C (q - A + K C)⁻¹ (dA x + dB u + dK e - K dC x - K dD u) - dC x - dD u, whitened.
+        left: Sequence[Array],
+        found: Sequence[Nuisance],
+    ) -> Array | None:
+        """Triangle of `jacobian` and `residuals`, a column of it a row; neither is held.
 
-        Shape (p · n_samples, n_basis), output after output.
+        None where products of slopes lost too many digits. `left` and `found` are what
+        `residuals` gave at these matrices.
         """
-        a, _, c, _, k = matrices
-        error, state, u = signals
-        by = iter(np.split(basis, np.cumsum([r * w for r, w in self.shapes])[:-1]))
-        slopes = [
-            np.moveaxis(each.reshape(*s, -1), 2, 0) for each, s in zip(by, self.shapes, strict=True)
-        ]
-        da, db, dc, dk = *slopes[:3], slopes[-1]
-        dd = slopes[3] if self.direct else np.zeros((len(dc), len(c), len(u)))
-        forced = np.concatenate([da - k @ dc, dk, db - k @ dd], axis=2)
-        shown = -np.concatenate([dc, np.zeros((len(dc), len(c), len(c))), dd], axis=2)
-        made = _native.slope_recursion(
-            a - k @ c,
-            whiten @ c,
-            forced,
-            whiten @ shown,
-            np.concatenate([state, error, u]),
-        )
-        return made.swapaxes(0, 1).reshape(error.size, -1)
+        drives, parts = SlopeDrives.of(matrices, whiten, basis, self.shapes), []
+        for joint, errors, own in zip(self.data.signals, left, found, strict=True):
+            level, m = self._level(own.values, len(errors)), self.data.n_inputs
+            about = np.vstack([joint[:m], joint[m:] - level[:, None]]) if np.any(level) else joint
+            start = self._start(own.values, len(matrices[0]))
+            parts.append(drives.products(about, start, errors, own))
+        return triangle_of_products(parts, basis.shape[1])
 
 
 def refine(
@@ -330,7 +333,7 @@ def _search(
     basis = _tangent(predictor, matrices)
     origin = predictor.pack(matrices)
     rows = sum(y.size for y in predictor.data.outputs)
-    last: dict[bytes, tuple[Matrices, list[Nuisance]]] = {}
+    last: dict[bytes, tuple[Matrices, list[Array], list[Nuisance]]] = {}
 
     def residuals(step: Array) -> Array:
         trial = predictor.unpack(origin + basis @ step)
@@ -338,21 +341,35 @@ def _search(
             return np.full(rows, np.inf)
         if predictor.stable and spectral_radius(trial[0]) >= STABLE:
             return np.full(rows, np.inf)
-        found, own = predictor.residuals(trial, whiten)
+        left, own = predictor.residuals(trial, whiten)
         last.clear()
-        last[step.tobytes()] = trial, own
-        return np.concatenate(found)
+        last[step.tobytes()] = trial, left, own
+        return np.concatenate([each.ravel() for each in left])
 
     def jacobian(step: Array) -> Array:
         known = last.get(step.tobytes())
         if known is None:
             return predictor.jacobian(predictor.unpack(origin + basis @ step), whiten, basis)
-        return predictor.jacobian(known[0], whiten, basis, known[1])
+        return predictor.jacobian(known[0], whiten, basis, known[2])
+
+    def triangle(step: Array) -> Array | None:
+        known = last.get(step.tobytes())
+        if known is None or rows <= 2 * basis.shape[1]:
+            return None
+        return predictor.triangle(known[0], whiten, basis, known[1], known[2])
 
     free = np.full(basis.shape[1], np.inf)
     known = None if goal is None else partial(goal.is_decided, predictor.data.n_outputs)
     end = DenseEnd.searched(
-        residuals, jacobian, np.zeros(len(free)), -free, free, rows, maximum_iterations, known
+        residuals,
+        jacobian,
+        np.zeros(len(free)),
+        -free,
+        free,
+        rows,
+        maximum_iterations,
+        known,
+        triangle,
     )
     return predictor.unpack(origin + basis @ end.x), end.iterations, end.termination
 
@@ -370,10 +387,11 @@ def _covariance(
     if np.any(np.abs(np.diag(triangle)) <= 1e-11 * np.maximum(lengths, 1e-300)):
         return None, None
     root = np.linalg.inv(triangle)
+    np.negative(jacobian, out=jacobian)
     ends = np.cumsum([each.size for each in errors])[:-1]
     blocks = [
         RecordBlock.of(part, np.zeros((len(part), 0)), (whiten @ each))
-        for part, each in zip(np.split(-jacobian, ends), errors, strict=True)
+        for part, each in zip(np.split(jacobian, ends), errors, strict=True)
     ]
     agreed = white_covariance(blocks, root @ root.T, degrees)
     return np.asarray(basis @ agreed.covariance @ basis.T), agreed.agreement

@@ -12,16 +12,15 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid import _native
 from flightid.errors import DataError
 from flightid.frozen import dataclass
-from flightid.models.sampled.recursion import run_recursion
+from flightid.models.sampled.recursion import run_recursion, spent_after
 from flightid.uncertainty.triangle import triangle_of_parts, triangle_of_rows
 
 Array = NDArray[np.float64]
 AT_ONCE = 1 << 14
 """Samples that are run and met with each other while they are in the cache."""
-SPENT = 1e-20
-"""Largest entry of a transition's power that leaves nothing of a state."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,11 +53,11 @@ class OwnColumns:
         """Columns: initial states, then levels."""
         return self.start * len(self.closed) + self.levels * len(self.shown)
 
-    def filled(self, into: Array) -> None:
-        """Columns over the samples of a record, shape (p, n_samples, count), zeros before."""
-        n_samples = into.shape[1]
+    def columns(self, n_samples: int) -> Array:
+        """Columns over the samples of a record in which they show, shape (p, n_shown, count)."""
+        lasting = spent_after(self.closed, n_samples) if self.start else 0
+        into = np.zeros((len(self.shown), n_samples if self.levels else lasting, self.count))
         if self.start:
-            lasting = spent_after(self.closed, n_samples)
             rest = np.zeros((len(self.shown), len(self.closed), lasting))
             begun = run_recursion(self.closed.T, rest, self.shown)
             into[:, :lasting, : len(self.closed)] = begun.swapaxes(1, 2)
@@ -67,6 +66,7 @@ class OwnColumns:
             answers = run_recursion(self.closed.T, held)
             first = self.count - len(self.shown)
             into[:, :, first:] = self.scale[:, None] - answers.swapaxes(1, 2) @ self.gain
+        return into
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,22 +100,17 @@ class InputColumns:
         """
         n_samples = y.shape[1]
         if n_samples <= AT_ONCE:
-            return triangle_of_rows(np.concatenate([part.T for part, _ in self._parts(y, u)]))
-        products = None
-        for part, kept in self._parts(y, u):
-            if products is None:
-                products = np.zeros(2 * (len(part),))
-            # Most of a record shows nothing of its start: those columns are zeros.
-            shown = part if kept.size == len(part) else part[kept]
-            with np.errstate(over="ignore", invalid="ignore"):
-                products[np.ix_(kept, kept)] += shown @ shown.T
-        return triangle_of_parts(lambda: (part.T for part, _ in self._parts(y, u)), products)
+            return triangle_of_rows(np.concatenate([part.T for part in self._parts(y, u)]))
+        lasting = spent_after(self.closed, n_samples)
+        run = np.ascontiguousarray(self.closed.T), self.c, self.gain
+        products = _native.input_products(run, y, u, self.direct, self.levels, lasting)
+        return triangle_of_parts(lambda: (part.T for part in self._parts(y, u)), products)
 
-    def _parts(self, y: Array, u: Array) -> Iterator[tuple[Array, NDArray[np.intp]]]:
-        """Columns of each output over some samples, and which of them are more than zeros."""
+    def _parts(self, y: Array, u: Array) -> Iterator[Array]:
+        """Columns of each output over some samples."""
         (p, n), m = self.c.shape, len(u)
         n_free = n * m + p * m * self.direct
-        every = np.arange(n_free + n + p * self.levels + 1)
+        count = n_free + n + p * self.levels + 1
         lasting = spent_after(self.closed, y.shape[1])
         begun, driven, state = self.c, np.zeros((p, m + self.levels, n)), np.zeros(n)
         for first in range(0, y.shape[1], AT_ONCE):
@@ -125,13 +120,11 @@ class InputColumns:
                 signals = np.concatenate([signals, np.ones((1, signals.shape[1]))])
             answers, driven = self._run(self.closed.T, self._pushes(signals), driven)
             own, state = self._run(self.closed, self.gain @ outputs, state)
-            rests = first >= lasting
             starts = np.zeros((p, n, outputs.shape[1]))
-            if not rests:
+            if first < lasting:
                 starts, begun = self._run(self.closed.T, starts, begun)
-            kept = np.delete(every, slice(n_free, n_free + n)) if rests else every
             for output in range(p):
-                rows = np.zeros((every.size, outputs.shape[1]))
+                rows = np.zeros((count, outputs.shape[1]))
                 rows[: n * m] = answers[output, :m].swapaxes(0, 1).reshape(n * m, -1)
                 if self.direct:
                     turned = self.gain.T @ answers[output, :m]
@@ -142,7 +135,7 @@ class InputColumns:
                     rows[n_free + n : -1] = -self.gain.T @ answers[output, m]
                     rows[n_free + n + output] += 1.0
                 rows[-1] = outputs[output] - self.c[output] @ own
-                yield rows, kept
+                yield rows
 
     def _pushes(self, signals: Array) -> Array:
         """cᵀ s of each output and signal, (p, n_signals, n, n_samples)."""
@@ -158,18 +151,3 @@ class InputColumns:
         if not np.all(np.isfinite(last)):
             raise DataError("a predictor runs away", needed="poles inside the unit circle")
         return states.reshape(pushes.shape), last.reshape(pushes.shape[:-1])
-
-
-def spent_after(closed: Array, most: int) -> int:
-    """Samples after which nothing is left of a state, to rounding; `most` where it goes on.
-
-    Example
-    -------
-    >>> spent_after(np.array([[0.5]]), 1000), spent_after(np.array([[1.0]]), 1000)
-    (128, 1000)
-    """
-    samples, power = 1, closed
-    with np.errstate(over="ignore", invalid="ignore"):
-        while samples < most and not np.abs(power).max(initial=0.0) < SPENT:
-            samples, power = 2 * samples, power @ power
-    return min(samples, most)

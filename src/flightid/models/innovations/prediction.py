@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid import _native
 from flightid.models.innovations.form import InnovationsForm
-from flightid.models.sampled.recursion import run_recursion
+from flightid.models.sampled.recursion import run_recursion, spent_after
 
 Array = NDArray[np.float64]
 RANK = 1e-10
@@ -16,7 +17,8 @@ RANK = 1e-10
 def forced_run(model: InnovationsForm, u: Array) -> Array:
     """Response to the inputs alone, shape (p, n_samples), from rest."""
     a, b, c, d, _ = model.matrices
-    return np.asarray(c @ run_recursion(a, b @ u) + d @ u)
+    made = _native.slope_recursion(a, -c, b[None], d[None], np.asarray(u, float), anyhow=True)
+    return np.ascontiguousarray(made[:, :, 0].T)
 
 
 def free_run(model: InnovationsForm, y: Array, u: Array, *, initial_state: str) -> Array:
@@ -25,24 +27,31 @@ def free_run(model: InnovationsForm, y: Array, u: Array, *, initial_state: str) 
     run = forced_run(model, u)
     if initial_state == "zero" or not np.all(np.isfinite(run)):
         return run
-    motion = free_motion(a, c, y.shape[1])
+    # Beyond these samples nothing is left of any start.
+    count = spent_after(a, y.shape[1])
+    motion = free_motion(a, c, count)
     if not np.all(np.isfinite(motion)):
         return run
-    return run + _best(motion, y - run)
+    run[:, :count] += _best(motion, y[:, :count] - run[:, :count])
+    return run
 
 
 def one_step_errors(model: InnovationsForm, y: Array, u: Array, initial_state: str) -> Array:
     """Prediction errors one step ahead, shape (p, n_samples)."""
     a, b, c, d, k = model.matrices
-    state = run_recursion(a - k @ c, (b - k @ d) @ u + k @ y)
-    errors = y - c @ state - d @ u
+    forced, direct = np.hstack([b - k @ d, k])[None], np.hstack([-d, np.eye(len(c))])[None]
+    signals = np.vstack([u, y])
+    made = _native.slope_recursion(a - k @ c, c, forced, direct, signals, anyhow=True)
+    errors = np.ascontiguousarray(made[:, :, 0].T)
     if initial_state == "zero":
-        return np.asarray(errors)
+        return errors
     # The state is as uncertain as the outputs: each counts by its innovations.
     r = model.noise_covariance
     whiten = np.eye(len(y)) if r is None else np.linalg.inv(np.linalg.cholesky(r))
-    motion = free_motion(a - k @ c, whiten @ c, y.shape[1])
-    return np.asarray(errors - np.linalg.solve(whiten, _best(motion, whiten @ errors)))
+    count = spent_after(a - k @ c, y.shape[1])
+    motion = free_motion(a - k @ c, whiten @ c, count)
+    errors[:, :count] -= np.linalg.solve(whiten, _best(motion, whiten @ errors[:, :count]))
+    return errors
 
 
 def free_motion(a: Array, c: Array, n_samples: int) -> Array:
@@ -53,8 +62,10 @@ def free_motion(a: Array, c: Array, n_samples: int) -> Array:
 
 def motion_from(a: Array, c: Array, start: Array, n_samples: int) -> Array:
     """C Aᵗ x(0) for t = 0, 1, …, shape (p, n_samples)."""
-    state = run_recursion(a, np.zeros((len(a), n_samples)), start)
-    return np.asarray(c @ state)
+    found = np.zeros((len(c), n_samples))
+    count = spent_after(a, n_samples)
+    found[:, :count] = c @ run_recursion(a, np.zeros((len(a), count)), start)
+    return found
 
 
 def _best(motion: Array, errors: Array) -> Array:

@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 from flightid import _native
 
 Array = NDArray[np.float64]
+SPENT = 1e-20
+"""Largest entry of a transition's power that leaves nothing of a state."""
 
 
 def spectral_radius(a: Array) -> float:
@@ -43,3 +45,18 @@ def run_recursion(a: Array, forcing: Array, initial: Array | None = None) -> Arr
     # One that runs away is wanted as far as it is finite.
     found = _native.linear_recursion(matrix, forced, begun, anyhow=True)
     return found.swapaxes(1, 2).reshape(forcing.shape)
+
+
+def spent_after(closed: Array, most: int) -> int:
+    """Samples after which nothing is left of a state, to rounding; `most` where it goes on.
+
+    Example
+    -------
+    >>> spent_after(np.array([[0.5]]), 1000), spent_after(np.array([[1.0]]), 1000)
+    (128, 1000)
+    """
+    samples, power = 1, closed
+    with np.errstate(over="ignore", invalid="ignore"):
+        while samples < most and not np.abs(power).max(initial=0.0) < SPENT:
+            samples, power = 2 * samples, power @ power
+    return min(samples, most)
