@@ -3,8 +3,9 @@
 One process has collected all tests. A change inside a function is tried in a fork of it, where that
 function takes the changed code; one of what runs on import in a fork of the process that has the
 libraries imported but nothing of this project. The changed text stands in the file meanwhile, for
-tests that read it or start processes. Every fork has a limit of its processor's time, and of its
-wall time, for loops that wait.
+tests that read it or start processes. No test begins once those before it have taken so much of the
+processor's time, of their own processes too. Every fork has a limit of that time besides, and of
+its wall time, for loops that wait.
 """
 
 from __future__ import annotations
@@ -46,10 +47,14 @@ CLOCK = count(1)
 
 
 class Ended(NamedTuple):
-    """How a try ended: a test noticed, none did, or no answer came in time."""
+    """How a try ended: a test noticed, none did, or no answer came in time.
+
+    With how many tests there was no time for.
+    """
 
     end: str
     by: str = ""
+    left_out: int = 0
 
 
 class Covered(NamedTuple):
@@ -133,19 +138,21 @@ class Forks:
         found = self._asked.recv()
         return found and Covered(*found)
 
-    def tried(self, path: str, text: str, tests: Sequence[str], cpu_s: float) -> Ended:
-        """Run those with that text in the file."""
+    def tried(
+        self, path: str, text: str, tests: Sequence[str], most_s: float, cpu_s: float
+    ) -> Ended:
+        """Run those with that text in the file, until they took `most_s`; `cpu_s` is a limit."""
         before = (self.tree / path).read_text(encoding="utf-8")
         with standing(self.tree / path, text):
-            self._asked.send(("try", path, (before, text), list(tests), cpu_s))
+            self._asked.send(("try", path, (before, text), list(tests), most_s, cpu_s))
             ended = self._asked.recv()
             if ended is None:
-                ended = in_a_fork(lambda: _cold(self.tree, tests), cpu_s + 60.0)
+                ended = in_a_fork(lambda: _cold(self.tree, tests, most_s), cpu_s + 60.0)
         return Ended(*(ended or ("endless",)))
 
-    def unchanged(self, tests: Sequence[str], cpu_s: float) -> bool:
+    def unchanged(self, tests: Sequence[str], most_s: float, cpu_s: float) -> bool:
         """Whether those pass as things stand, in a process that imports anew."""
-        ended = in_a_fork(lambda: _cold(self.tree, tests), cpu_s + 60.0)
+        ended = in_a_fork(lambda: _cold(self.tree, tests, most_s), cpu_s + 60.0)
         return ended is not None and ended[0] == "survived"
 
     def end(self) -> None:
@@ -223,9 +230,9 @@ class _Server:
         items = [self.items[each] for each in tests]
         for item, later in zip(items, [*items[1:], None], strict=True):
             each_before(item.nodeid)
-            start = sum(os.times()[:4])
+            start = spent_s()
             item.config.hook.pytest_runtest_protocol(item=item, nextitem=later)
-            yield sum(os.times()[:4]) - start
+            yield spent_s() - start
 
     def _cover(self, tests: Sequence[str], cpu_s: float) -> Any:
         def work() -> tuple[Any, ...]:
@@ -238,7 +245,9 @@ class _Server:
 
         return in_a_fork(work, cpu_s)
 
-    def _try(self, path: str, texts: Sequence[str], tests: Sequence[str], cpu_s: float) -> Any:
+    def _try(
+        self, path: str, texts: Sequence[str], tests: Sequence[str], most_s: float, cpu_s: float
+    ) -> Any:
         """How it ended; None where it is not to be tried in a fork of this process."""
         place = str(self.tree / path)
         codes = []
@@ -259,13 +268,17 @@ class _Server:
                 return None
             swaps += [(each, new) for each in found]
 
-        def work() -> tuple[str, str]:
+        def work() -> tuple[str, str, int]:
             for function, code in swaps:
                 function.__code__ = code
-            for _ in self._run(tests, lambda _: None):
+            spent = 0.0
+            for k, took in enumerate(self._run(tests, lambda _: None), start=1):
                 if self.failed:
-                    return "killed", self.failed[0]
-            return "survived", ""
+                    return "killed", self.failed[0], 0
+                spent += took
+                if spent > most_s:
+                    return "survived", "", len(tests) - k
+            return "survived", "", 0
 
         return in_a_fork(work, cpu_s) or ("endless", "")
 
@@ -286,23 +299,41 @@ def _serve(tree: Path, words: Sequence[str], sources: Sequence[str], asked: Conn
 
 
 class _Noted:
-    """Whether a test, or the collection, failed."""
+    """Whether a test, or the collection, failed, and how many were left out when time was up."""
 
-    failed = ""
+    def __init__(self, most_s: float) -> None:
+        self.most_s, self.failed, self.left_out = most_s, "", 0
+
+    def pytest_collection_finish(self, session: pytest.Session) -> None:
+        self.session, self.start_s, self.begun = session, spent_s(), 0
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         if report.failed and not self.failed:
             self.failed = report.nodeid
+
+    def pytest_runtest_logfinish(self) -> None:
+        self.begun += 1
+        left_out = len(self.session.items) - self.begun
+        if left_out and spent_s() - self.start_s > self.most_s:
+            self.left_out, self.session.shouldstop = left_out, "time is up"
 
     def pytest_collectreport(self, report: pytest.CollectReport) -> None:
         if report.failed and not self.failed:
             self.failed = f"collecting {report.nodeid}"
 
 
-def _cold(tree: Path, tests: Sequence[str]) -> tuple[str, str]:
-    noted = _Noted()
+def spent_s() -> float:
+    """Processor's time of this process and of those that it started and waited for."""
+    return sum(os.times()[:4])
+
+
+def _cold(tree: Path, tests: Sequence[str], most_s: float) -> tuple[str, str, int]:
+    noted = _Noted(most_s)
     base = tree / f"tmp.cold{next(CLOCK)}"
     code = pytest.main(["-x", *WORDS, f"--basetemp={base}", *tests], plugins=[noted])
-    if noted.failed or code in (1, 2, 4):
-        return "killed", noted.failed or f"pytest's end {int(code)}"
-    return ("survived", "") if code == 0 else ("not run", f"pytest's end {int(code)}")
+    if noted.failed or (code in (1, 2, 4) and not noted.left_out):
+        return "killed", noted.failed or f"pytest's end {int(code)}", 0
+    ended = code == 0 or noted.left_out
+    return (
+        ("survived", "", noted.left_out) if ended else ("not run", f"pytest's end {int(code)}", 0)
+    )

@@ -6,8 +6,9 @@ Drawn by chance from all mutants of the packages that tell users what to believe
 (`mutations.EQUIVALENT` and its neighbours say what is left out). pytest collects the default suite
 once, each file of tests runs in a fork with coverage, and each mutant meets, in a fork of its own
 (`mutant_forks.py`): every test that reaches its statement, those of its module and short ones first
-(so many seconds of them; where that is not all, its end says so), then the other tests of the
-nearest files, which may take what a fixture or a cache made of that line for another. A mutant of
+(so many seconds of its processor's time; where that is not all, its end says so), then the other
+tests of the nearest files, which may take what a fixture or a cache made of that line for another.
+A mutant of
 what runs on import meets the contracts that read the source, the tests of files that import its
 module, and those that reach its file. One that no test notices is printed: mend the test, or delete
 what nothing needs.
@@ -61,7 +62,12 @@ READERS = (
 )
 """They read the source of classes, numbers and options: no line of it is run by them."""
 BUDGET_S, MOST_FILES = 40.0, 3
-"""Seconds of tests that reach a mutant, by default; the others of so many files get half of it."""
+"""Processor's seconds that tests of a mutant may take, by default; the others of so many files get
+half of it. A busy machine takes longer, but tries as many tests."""
+PIECES, OFFERED = 5, 6.0
+"""Tests of a file run together, for what they share, in so many pieces of that time: else one long
+file would stand before the short tests of all others. So many times that time are offered: what
+tests take with coverage is more than they take without."""
 FILE_S = 600.0
 """Processor's seconds that a file of tests may take with coverage."""
 UNNOTICED = ("survived", "not all run", "not reached", "not run")
@@ -160,15 +166,18 @@ def end_of(
     tests, others, left_out = chosen(forks, mutant, known, text, most_s)
     if not tests:
         return "not reached", ""
-    for names in (tests, others):
+    for names, limit_s in ((tests, most_s), (others, most_s / 2.0)):
         if not names:
             continue
-        cpu_s = 30.0 + 3.0 * sum(known.seconds.get(each, 1.0) for each in names)
-        ended = forks.tried(mutant.path, new, names, cpu_s)
-        if ended.end == "endless" and not forks.unchanged(names, cpu_s):
+        longest_s = max(known.seconds.get(each, 1.0) for each in names)
+        cpu_s = 30.0 + 3.0 * (limit_s + longest_s)
+        ended = forks.tried(mutant.path, new, names, limit_s, cpu_s)
+        if ended.end == "endless" and not forks.unchanged(names, limit_s, cpu_s):
             return "not run", "nor do these tests end without it"
         if ended.end != "survived":
             return ended.end, ended.by
+        if names is tests:
+            left_out += ended.left_out
     return ("not all run", f"{left_out} left out") if left_out else ("survived", "")
 
 
@@ -204,17 +213,31 @@ def chosen(
         return not near, bool(readers) and breadth[test] < most / 2, seconds, test
 
     ranked = [*sorted(dict.fromkeys(readers), key=rank), *sorted(at, key=rank)]
-    taken, left_out = _within(ranked, known, most_s)
-    files = list(dict.fromkeys(each.partition("::")[0] for each in taken))
-    place = {each: k for k, each in enumerate(forks.tests)}
-    tests = sorted(taken, key=lambda each: (files.index(each.partition("::")[0]), place[each]))
+    tests, left_out = _within(ranked, known, OFFERED * most_s)
+    files = list(dict.fromkeys(each.partition("::")[0] for each in tests))[:MOST_FILES]
     beside = [
         each
-        for file in files[:MOST_FILES]
+        for file in files
         for each in forks.tests
-        if each.partition("::")[0] == file and each not in taken and each in known.seconds
+        if each.partition("::")[0] == file and each not in tests and each in known.seconds
     ]
-    return tests, _within(beside, known, most_s / 2.0)[0], left_out
+    pieces = _pieces(tests, forks.tests, known, most_s / PIECES)
+    return pieces, _within(beside, known, OFFERED * most_s / 2.0)[0], left_out
+
+
+def _pieces(
+    ranked: Sequence[str], every: Sequence[str], known: Reached, piece_s: float
+) -> list[str]:
+    """Those tests with each file's together within a piece, in pytest's order there."""
+    place = {each: k for k, each in enumerate(every)}
+    found: list[str] = []
+    left = list(ranked)
+    while left:
+        piece, _ = _within(left, known, piece_s)
+        left = left[len(piece) :]
+        files = list(dict.fromkeys(each.partition("::")[0] for each in piece))
+        found += sorted(piece, key=lambda e: (files.index(e.partition("::")[0]), place[e]))
+    return found
 
 
 def _importers(forks: Any, path: str) -> list[str]:
@@ -303,7 +326,9 @@ def main() -> None:
         "--only", nargs="+", help="all of files whose names hold one of these words"
     )
     parser.add_argument("--again", action="store_true", help="try anew what was not noticed")
-    parser.add_argument("--seconds", type=float, default=BUDGET_S, help="of tests for a mutant")
+    parser.add_argument(
+        "--seconds", type=float, default=BUDGET_S, help="processor's, of tests for a mutant"
+    )
     parser.add_argument("--tests", nargs="+", default=TESTS)
     parser.add_argument("--keep", type=Path, required=True, help="file of what was found")
     asked = parser.parse_args()

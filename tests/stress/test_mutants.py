@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from tests.stress.mutants import Reached, share
+from pathlib import Path
+
+from tests.stress.mutant_forks import _cold, in_a_fork
+from tests.stress.mutants import Reached, _pieces, share
 from tests.stress.mutations import functions_changed, moved, statement, told
 
 TEXT = """
@@ -61,3 +64,37 @@ def test_a_change_is_told_by_its_lines_and_a_share_by_its_interval() -> None:
     )
     assert share(1, 10) == "10.0 % (0.3 to 44.5) of 10"
     assert share(0, 3) == "0.0 % (0.0 to 70.8) of 3"
+
+
+WAITING = """
+import time
+
+def test_waits(): time.sleep(0.3)
+
+def test_works():
+    start = time.process_time()
+    while time.process_time() < start + 0.1: pass
+
+def test_is_left(): pass
+"""
+
+
+def test_no_test_begins_after_so_much_of_the_processors_time(tmp_path: Path) -> None:
+    """A busy machine makes tests wait: they waited 0.3 s here, and did not end for that."""
+    place = tmp_path / "test_waiting.py"
+    place.write_text(WAITING)
+    wrong = tmp_path / "test_wrong.py"
+    wrong.write_text("def test_fails(): assert False")
+    for file, most_s, ended in (
+        (place, 0.09, ("survived", "", 1)),
+        (place, 5.0, ("survived", "", 0)),
+        (wrong, 0.0, ("killed", "test_wrong.py::test_fails", 0)),
+    ):
+        told = in_a_fork(lambda file=file, most_s=most_s: _cold(tmp_path, [str(file)], most_s), 60)
+        assert (told[0], told[1].rpartition("/")[2], told[2]) == ended
+
+
+def test_tests_of_a_file_stand_together_within_a_piece_of_the_time() -> None:
+    known = Reached(seconds={"a::1": 0.1, "b::1": 0.1, "a::2": 0.1, "a::3": 2.0, "b::2": 3.0})
+    every = ["a::3", "a::2", "a::1", "b::2", "b::1"]
+    assert _pieces([*known.seconds], every, known, 1.0) == ["a::2", "a::1", "b::1", "a::3", "b::2"]
