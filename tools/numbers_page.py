@@ -20,7 +20,7 @@ AREAS = {
     "uncertainty": "Intervals and tests",
     "control/tuning": "Gains",
 }
-LONGEST = 120
+LONGEST = 160
 """Letters of a number's expression: longer ones are tables of a format, no limits."""
 HEAD = """# Named numbers
 
@@ -41,7 +41,6 @@ def numbers(path: Path) -> Iterator[tuple[str, str, str]]:
             target, value = each.target, each.value
         else:
             continue
-        told = " ".join((ast.get_source_segment(text, value) or "").split())
         if isinstance(value, ast.Call) and ast.unparse(value.func) == "Threshold":
             limit, unit, source = map(ast.unparse, value.args)
             unit = ast.literal_eval(unit)
@@ -50,7 +49,11 @@ def numbers(path: Path) -> Iterator[tuple[str, str, str]]:
                 f"{limit} {unit}".removesuffix(" 1"),
                 ast.literal_eval(source),
             )
-        elif is_number(value) and len(told) <= LONGEST:
+        elif is_number(value):
+            # Of numbers alone: a segment splits the whole text.
+            told = " ".join((ast.get_source_segment(text, value) or "").split())
+            if len(told) > LONGEST:
+                continue
             meaning = after.value if isinstance(after, ast.Expr) else None
             if isinstance(meaning, ast.Constant) and isinstance(meaning.value, str):
                 names = ast.unparse(target).strip("()")
@@ -65,7 +68,7 @@ def is_number(value: ast.expr) -> bool:
         return is_number(value.operand)
     if isinstance(value, ast.BinOp):
         return is_number(value.left) or is_number(value.right)
-    if isinstance(value, ast.Tuple):
+    if isinstance(value, ast.Tuple | ast.List):
         return any(map(is_number, value.elts))
     if isinstance(value, ast.Dict):
         return any(map(is_number, value.values))

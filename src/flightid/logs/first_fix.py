@@ -11,6 +11,7 @@ from flightid.logs.log import Log
 from flightid.units import DIMENSIONLESS, convert
 
 GPS_EPOCH = datetime.datetime(1980, 1, 6)
+"""Begin of the weeks that GPS counts (IS-GPS-200)."""
 LEAP_S = 18
 """GPS time before UTC since 2017, s."""
 UNIX_GPS = (("vehicle_gps_position", "time_utc_usec"), ("sensor_gps", "time_utc_usec"))

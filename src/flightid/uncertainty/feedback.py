@@ -48,6 +48,7 @@ LARGEST_ORDER = 20
 MAXIMUM_SAMPLES = 20_000
 """Of all records together that a test looks at."""
 PAST = range(1, LAGS + 1)
+"""Samples before an input's that may move it."""
 SAMPLES_PER_NUMBER = 10
 """Samples for each number of a model."""
 FEWEST_FREE = 30

@@ -44,6 +44,7 @@ held have a long past, and what a shorter one misses outputs tell."""
 RANK = 1e-10
 """Singular values below this share of the largest are rounding."""
 GOLDEN = (5.0**0.5 - 1.0) / 2.0
+"""Share of an interval that each step of the search for a minimum keeps."""
 
 
 def explaining_noise(pairs: Sequence[Pair], place: int, order: int, lags: int) -> float | None:

@@ -47,6 +47,7 @@ LARGEST_ORDER = 20
 SEPARATIONS = 20
 """Rounds in which a known part is told from the rest."""
 RESTORATIONS = 2
+"""Times that models of the noise are made with what a fit took away by those before."""
 SHARPEST = 1e6
 """Power of one line over the whole power that no sound model reaches."""
 CUT = 1e-6

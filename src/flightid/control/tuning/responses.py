@@ -41,6 +41,7 @@ SHOWN_S = {
     "disturbance": 4.0,
     CONTROL: 2.0,
 }
+"""Time of a response that charts show, s."""
 PLAIN = {"rate step": "step", "disturbance to rate": "disturbance", CONTROL: CONTROL}
 """The same of a loop that holds no rate."""
 UNITS = {

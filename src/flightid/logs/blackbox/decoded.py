@@ -41,6 +41,7 @@ LARGEST_HEADING = 1 << 20
 """Bytes in which a decoded file ends its first line, and of the file of its headers."""
 HEADERS = ".headers.csv"
 A_SECOND = {"us": 1e6, "ms": 1e3, "s": 1.0, "": 1e6}
+"""Counts of the column of time in a second, by the unit behind its name."""
 WORTH = {"deg/s": 1.0, "rad/s": float(np.degrees(1.0)), "g": 1.0, "m/s/s": 1.0 / 9.80665,
          "m/s2": 1.0 / 9.80665, "V": 1.0, "mV": 1e-3, "A": 1.0, "mA": 1e-3}  # fmt: skip
 """Of the units that decoders write behind a name, those that a field may have: deg/s, g, V, A."""

@@ -29,6 +29,7 @@ from flightid.reading import bounded_bytes, memory_budget, within_memory
 PRODUCT = b"H Product:Blackbox flight data recorder"
 EVENTS = {0: "beep", 15: "disarmed", 255: "end of log"}
 DISARMED, FLIGHT_MODE = 15, 30
+"""Events of Betaflight and INAV (`blackbox_fielddefs.h`)."""
 MODES = {1: "ANGLE", 2: "HORIZON"}
 """Bits of Betaflight's active modes that tell what levels the vehicle (`rc_modes.h`)."""
 INAV_MODES = {

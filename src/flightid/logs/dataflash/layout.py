@@ -21,8 +21,8 @@ STORAGE: dict[str, str] = {
     "e": "<i4", "E": "<u4", "L": "<i4", "n": "S4", "N": "S16", "Z": "S64", "a": "(32,)<i2",
 }  # fmt: skip
 OWN_DIVISOR = {"c": 100.0, "C": 100.0, "e": 100.0, "E": 100.0, "L": 1e7}
-MAXIMUM_FIELDS = 16
-MAXIMUM_SIZE = 255
+MAXIMUM_FIELDS, MAXIMUM_SIZE = 16, 255
+"""Characters of a format, bytes of a message: FMT has 16 of the one, a byte for the other."""
 
 
 @dataclass(frozen=True)

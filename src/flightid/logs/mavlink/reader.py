@@ -28,12 +28,13 @@ from flightid.logs.ulog.names import starts_of
 from flightid.reading import bounded_bytes, memory_budget, within_memory
 
 ARDUPILOT = 3
+"""Of MAV_AUTOPILOT."""
 AUTOPILOTS = {ARDUPILOT: "ArduPilot", 12: "PX4"}
 VEHICLES = {1: "plane", 2: "copter", 3: "copter", 4: "copter", 10: "rover", 13: "copter",
             14: "copter", 15: "copter", 29: "copter"}  # fmt: skip
 """MAV_TYPE of vehicles whose channels are known."""
-ARMED = 0x80
-NO_AUTOPILOT = 8
+ARMED, NO_AUTOPILOT = 0x80, 8
+"""MAV_MODE_FLAG_SAFETY_ARMED; MAV_AUTOPILOT of ground stations and cameras (common.xml)."""
 STAMPS = {"time_boot_ms": 1e3, "time_usec": 1e6}
 """Stamps of messages that tell when they were made, and their counts a second."""
 LATEST_BOOT_S = 1e8
