@@ -135,7 +135,7 @@ class Check:
         )
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True)
 class Evidence(Result, schema="flightid.evidence/1"):
     """Checks of a result, and its light.
 

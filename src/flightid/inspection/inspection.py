@@ -31,7 +31,7 @@ WORDS = {
 }
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True)
 class Inspection(Result, schema="flightid.inspection/1"):
     """What a log holds, and whether it can support identification.
 

@@ -44,7 +44,7 @@ class FieldSeries:
         return self.values[np.isfinite(self.values)]
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False)
 class FieldPlot(
     Result, schema="flightid.field_plot/1", untold={"series": "samples of the log; see rows"}
 ):

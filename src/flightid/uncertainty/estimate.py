@@ -33,7 +33,7 @@ class Ends(Protocol):
         ...
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True)
 class Estimate(Generic[Number_co]):
     """An estimated number: a fitted parameter, a margin, a mode's damping, a clock's skew.
 

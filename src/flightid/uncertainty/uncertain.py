@@ -39,7 +39,7 @@ MISSED = 0.05
 LOST = "not determined everywhere within its uncertainty"
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False)
 class Uncertain(Generic[T]):
     """Numbers with their covariance, and the thing that they make.
 

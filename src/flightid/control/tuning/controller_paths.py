@@ -23,7 +23,7 @@ LEAST_SHARE = 1e-3
 """Of the upper end of a range: the least P, I or angle gain that a logarithm can start from."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class ControllerPaths:
     """Paths of one axis for plants that already hold the output and, maybe, the gyro filter.
 

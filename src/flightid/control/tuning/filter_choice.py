@@ -67,7 +67,7 @@ class AxisFilters:
         return self.phase_new_deg - self.phase_flown_deg
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False)
 class FilterChoice(
     Result,
     schema="flightid.filter_choice/1",

@@ -27,7 +27,7 @@ from flightid.table import Cell, Column, Table
 from flightid.uncertainty.quantiles import interval_words, shown
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False)
 class PidDesign(
     Result,
     schema="flightid.pid_design/1",

@@ -78,7 +78,7 @@ def untouched_finding(axes: Sequence[UntouchedAxis]) -> Finding:
     return Finding("axis-untouched", Light.GREEN, f"{told}, gains left as flown")
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False)
 class Tuning(Result, schema="flightid.tuning/1"):
     """Result of `flightid.tune`.
 

@@ -27,7 +27,7 @@ FEWEST_PLANTS = 3
 """An interval needs more than the estimate and one other."""
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True)
 class WorstCase:
     """One number of one loop.
 
