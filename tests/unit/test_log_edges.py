@@ -112,7 +112,9 @@ def test_an_autopilot_starts_anew_where_its_clock_falls_by_more_than_five_second
     heard["HEARTBEAT"] = beats, np.zeros(5, KNOWN["HEARTBEAT"].layout)
     kept = _longest_run(heard, starts)["HEARTBEAT"][0]
     assert kept.tolist() == (beats if runs == 1 else beats[2:]).tolist()
-    assert ("autopilot-restarted" in [each.code for each in _findings(0, 9, runs)]) is (runs > 1)
+    assert ("autopilot-restarted" in [each.code for each in _findings(bytes(9), 0, runs)]) is (
+        runs > 1
+    )
 
 
 def test_the_first_of_runs_that_are_as_long_is_read_and_arrivals_begin_with_it() -> None:
