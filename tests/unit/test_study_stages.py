@@ -390,6 +390,13 @@ def test_margins_below_what_is_asked_and_columns_left_out_are_told() -> None:
         said = gains_finding(parted, "study.toml").message  # type: ignore[arg-type]
         assert said.startswith("gains of roll keep at least 44°"), said
         assert said.endswith(f", and are to be flown; {kept}"), said
+    # Of a sweep cut short no margin of phase was promised, and the answer ended in a fault.
+    none = SimpleNamespace(**{**vars(roll), "worst_cases": worst[1:]})
+    unpromised = SimpleNamespace(**{**vars(tuning), "sound": [none]})
+    said = gains_finding(unpromised, "study.toml").message  # type: ignore[arg-type]
+    assert said.startswith(
+        "gains of roll keep their limits in the band shown, with no phase margin"
+    )
     way = gains_finding(tuning, "study.toml").action  # type: ignore[arg-type]
     assert way.startswith("flightid tune study.toml --write gains.params writes them")
     done = gains_finding(tuning, "study.toml", ["g-1.params"], "out").action  # type: ignore[arg-type]

@@ -68,6 +68,38 @@ def study(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.parametrize("form", [[], ["--json"]])
+def test_gains_whose_answer_fails_are_not_written(
+    form: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Three files of gains were there already, and JSON ended well, where the screen failed."""
+    target, log = tmp_path / "gains.param", tmp_path / "flight.BIN"
+    log.touch()
+
+    def write(_: object, path: Path, *__: object, **___: object) -> tuple[Path, ...]:
+        path.touch()
+        return (path,)
+
+    def fail(*_: object) -> None:
+        raise ValueError("no answer")
+
+    tuning = SimpleNamespace(to_dict=dict, sound=(1,), left_out={}, findings=())
+    study = SimpleNamespace(
+        tuning=tuning,
+        faults=(),
+        output=tmp_path,
+        document=None,
+        settings=SimpleNamespace(level=0.95),
+    )
+    monkeypatch.setattr("flightid.cli.tune.taken_study", lambda *_, **__: (log, None, ()))
+    monkeypatch.setattr("flightid.cli.tune._without_gains", lambda _: False)
+    monkeypatch.setattr("flightid.study.run_study", lambda *_, **__: study)
+    monkeypatch.setattr("flightid.cli.tune._write", write)
+    monkeypatch.setattr("flightid.study.answer.short_document", fail)
+    assert run(["--quiet", "tune", str(log), "--write", str(target), *form]) == Exit.FAULT
+    assert not target.exists()
+
+
 @pytest.mark.nightly
 def test_a_study_is_tuned_from_its_log_and_its_models_beside_it(
     study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]

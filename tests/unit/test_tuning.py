@@ -124,6 +124,10 @@ def test_responses_settle_at_the_set_point(design: fid.PidDesign) -> None:
 
 def test_the_result_shows_itself(design: fid.PidDesign) -> None:
     assert repr(design).startswith("PidDesign(roll: ATC_RAT_RLL_P")
+    rest = tuple(each for each in design.worst_cases if each.name != "phase margin")
+    assert repr(dataclasses.replace(design, worst_cases=rest)).endswith(
+        "; no phase margin promised)"
+    )
     assert design.to_dict()["schema"] == "flightid.pid_design/1"
     assert "Binding: " in str(design.summary())
     assert "95 % confidence" in str(design.worst_case_table())

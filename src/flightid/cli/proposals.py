@@ -127,7 +127,12 @@ def show_study(result: Study, *, whole: bool, as_json: bool) -> None:
 
 
 def show_answer(result: Study, written: Sequence[Path] = ()) -> None:
-    """Print one screen of a study, its verdict and the next step last.
+    """Print one screen of a study; see `answer_text`."""
+    click.echo(answer_text(result, written), nl=False)
+
+
+def answer_text(result: Study, written: Sequence[Path] = ()) -> str:
+    """One screen of a study, its verdict and the next step last.
 
     `written` are files of its gains, the first to fly first, which need no command any more.
     """
@@ -137,5 +142,4 @@ def show_answer(result: Study, written: Sequence[Path] = ()) -> None:
 
     with showing(result.settings.level):
         names, place = [str(path) for path in written], quote(str(result.output))
-        short = short_document(result, result.document, names, place)
-    click.echo(to_text(short), nl=False)
+        return to_text(short_document(result, result.document, names, place))

@@ -20,7 +20,7 @@ from flightid.cli.output import (
     level_option,
     note,
 )
-from flightid.cli.proposals import is_study, of_data, show_answer, taken_study
+from flightid.cli.proposals import answer_text, is_study, of_data, show_answer, taken_study
 from flightid.cli.records import FILES, FilesArgument
 from flightid.errors import OptionError
 
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from flightid.control.tuning.result import Tuning
     from flightid.findings import Finding
     from flightid.options import Options
+    from flightid.study import Study
     from flightid.study.tuning import TuneSettings
 
 
@@ -161,10 +162,7 @@ def command(
             raise click.exceptions.Exit(Exit.RED)
         nothing = "there is no model of a rate that can be tuned"
         raise click.ClickException("; ".join(refused) or nothing)
-    if as_json:
-        emit_values(tuning.to_dict())
-    elif study is None or whole or level is not None:
-        _show(tuning, level)
+    _tell(tuning, study, level, whole=study is None or whole or level is not None, as_json=as_json)
     if study is not None:
         note(f"Wrote {study.output / 'report.html'}")
     written: Sequence[Path] = ()
@@ -249,6 +247,19 @@ def _is_flown(file: Path) -> bool:
     from flightid.record.formats.sniff import is_bag
 
     return is_bag(file) if file.is_dir() else is_log(file)
+
+
+def _tell(
+    tuning: Tuning, study: Study | None, level: float | None, *, whole: bool, as_json: bool
+) -> None:
+    """Tell of the gains all that goes before their files."""
+    if study is not None:
+        # Gains of which the answer fails are not to be loaded, and JSON ends as the screen does.
+        answer_text(study)
+    if as_json:
+        emit_values(tuning.to_dict())
+    elif whole:
+        _show(tuning, level)
 
 
 def _show(tuning: Tuning, level: float | None) -> None:

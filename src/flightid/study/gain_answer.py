@@ -52,8 +52,9 @@ def gains_finding(
         for each in design.worst_cases
         if each.name == "phase margin" and each.worst is not None
     ]
-    promise = f" keep at least {at_least(min(least))}° of phase margin"
-    if not least:
+    if least:
+        promise = f" keep at least {at_least(min(least))}° of phase margin"
+    else:
         promise = " keep their limits in the band shown, with no phase margin promised,"
     steps = max(len(design.stages) for design in designs)
     axes = ", ".join(design.axis for design in designs)

@@ -157,7 +157,12 @@ class PidDesign(
             if each.name == "phase margin" and each.worst is not None
         ]
         gains = ", ".join(f"{name} {value:.4g}" for name, value in self.gains.items())
-        return f"PidDesign({self.axis}: {gains}; worst phase margin {held(min(margins)):.3g} deg)"
+        promise = (
+            f"worst phase margin {held(min(margins)):.3g} deg"
+            if margins
+            else "no phase margin promised"
+        )
+        return f"PidDesign({self.axis}: {gains}; {promise})"
 
     def gain_table(self) -> Table:
         """Gains before and after."""
