@@ -7,7 +7,9 @@ import pytest
 from scipy.signal import lfilter
 
 import flightid as fid
+from flightid.conventions import Light
 from flightid.errors import DataError, FitError, OptionError
+from flightid.identification.advice.delays import delays_to_scan
 from flightid.identification.prediction_error.linear_regression import (
     LinearRegression,
     regress,
@@ -131,6 +133,58 @@ def test_advice_on_a_good_record():
     assert "excitation order 50" in repr(advice)
     assert advice.to_dict()["schema"] == "flightid.advice/1"
     assert "No loop seen: past noise of the outputs" in advice.summary().to_text()
+
+
+def held(kind: str) -> fid.Record:
+    """A rate that a controller steadies, late by a sample: three later it answers, or never."""
+    random, n = np.random.default_rng(5), 3000
+    gust = 0.02 * lfilter([1.0], [1.0, -0.97], random.standard_normal(n))
+    seen = 0.002 * random.standard_normal(n)
+    y, u = np.zeros(n), np.zeros(n)
+    for k in range(3, n):
+        y[k] = 0.95 * y[k - 1] + 0.05 * u[k - 3] + gust[k] if kind == "late" else 0.0
+        u[k] = -2.0 * (y[k - 1] if kind == "late" else seen[k])
+    return fid.Record.from_arrays(0.01 * np.arange(n), inputs={"u": u}, outputs={"y": y + seen})
+
+
+@pytest.mark.parametrize("kind", ["late", "bench"])
+def test_no_delay_or_rate_is_told_of_a_controller_turned_round(kind: str) -> None:
+    """Green: "after 0 samples: nk = 0", "sampled too slowly", of three samples or of none."""
+    record = held(kind)
+    advice = fid.advise(record)
+    codes = _codes(advice)
+    assert advice.feedback.may_turn_round, advice.feedback
+    assert advice.delays == {"u": None}
+    assert "answer-untold" in codes
+    assert not codes & {"delay", "delay-unsure", "sampling-rate", "sampled-slowly"}
+    assert Light.GREEN not in {each.light for each in advice.findings}
+    found = fid.impulse_response(record)
+    assert found.delays == {"u": None}
+    assert str(found.feedback) in found.summary().to_text()
+    assert fid.impulse_response(record, loop="open").delays["u"] is not None
+    assert min(delays_to_scan([record], ("u",), "y")) == 1
+
+
+def test_no_rate_is_told_of_an_output_that_answers_nothing() -> None:
+    """Green: "170 times the bandwidth", of an output that had nothing to do with the input."""
+    random = np.random.default_rng(1)
+    noise = lfilter([1.0], [1.0, -0.97], random.standard_normal(3000))
+    unmoved = {"u": random.standard_normal(3000)}
+    advice = fid.advise(
+        fid.Record.from_arrays(0.01 * np.arange(3000), inputs=unmoved, outputs={"y": noise})
+    )
+    assert _codes(advice) == {"no-response"}
+
+
+def test_a_delay_of_a_loop_that_is_not_known_holds_if_it_was_open() -> None:
+    random = np.random.default_rng(1)
+    u = random.standard_normal(1500)
+    y = lfilter([0.5, 0.3], [1.0, -0.6], u) + 0.3 * random.standard_normal(1500)
+    record = fid.Record.from_arrays(0.01 * np.arange(1500), inputs={"u": u}, outputs={"y": y})
+    (told,) = [each for each in fid.advise(record).findings if each.code == "delay"]
+    assert (told.light, told.message[:25]) == (Light.AMBER, "if the loop was open: 'y'")
+    (told,) = [e for e in fid.advise(record, loop="open").findings if e.code == "delay"]
+    assert told.light is Light.GREEN
 
 
 def test_advice_sees_poor_related_silent_and_fast_channels():

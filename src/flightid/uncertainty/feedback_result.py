@@ -89,6 +89,11 @@ class FeedbackTest:
         """Whether outputs leave nothing else that moves an input: a model may be a controller."""
         return self.source == "same sample" and (self.share or 0.0) >= NEARLY
 
+    @property
+    def may_turn_round(self) -> bool:
+        """Whether an answer of outputs to inputs is as well that of a controller to outputs."""
+        return self.is_closed or self.is_function_of_outputs
+
     def __str__(self) -> str:
         """What is known and how, in a sentence."""
         words = {

@@ -159,23 +159,29 @@ def advise(
     reason = ""
     try:
         response = impulse_response(
-            listed, outputs=name, inputs=names, n_lags=n_lags, negative_lags=LAGS_BEFORE
+            listed, outputs=name, inputs=names, n_lags=n_lags, negative_lags=LAGS_BEFORE, loop=loop
         )
     except DataError as error:
         reason = str(error)
-    acts = (
-        dict(zip(names, find_delays(data, n_lags - 1), strict=True))
-        if response is None
-        else dict(response.acts_after)
-    )
-    feedback = feedback_test(listed, inputs=names, outputs=(name,), loop=loop)
+    if response is None:
+        feedback = feedback_test(listed, inputs=names, outputs=(name,), loop=loop)
+        acts = dict.fromkeys(names, InputDelay())
+        if not feedback.may_turn_round:
+            acts = dict(zip(names, find_delays(data, n_lags - 1), strict=True))
+    else:
+        feedback, acts = response.feedback, dict(response.acts_after)
+    answers = any(each.interval is not None for each in acts.values())
     findings = (
-        *_excitation(orders),
+        *_excitation(orders, feedback),
         *_related(names, data),
         *_pulse(reason),
-        *_delays(name, acts, data.sample_time_s),
+        *_delays(name, acts, data.sample_time_s, feedback),
         *_feedback(feedback),
-        *(_sampling(name, data) or _poles(name, names, listed)),
+        # Without an answer, or along a loop, poles are those of noise, or of the controller.
+        *(
+            _sampling(name, data)
+            or (_poles(name, names, listed) if answers and feedback.loop == "open" else ())
+        ),
         *_levels(names, data),
     )
     return Advice(
@@ -197,8 +203,10 @@ def excitation_order(row: Array, data: SampledChannels) -> int:
     return int(np.sum(values > floor * values[-1]))
 
 
-def _excitation(orders: Mapping[str, int]) -> list[Finding]:
+def _excitation(orders: Mapping[str, int], test: FeedbackTest) -> list[Finding]:
     found = []
+    # What a loop feeds back counts to the order, and excites nothing.
+    fit = "" if test.may_turn_round else "fit at most {} coefficients, or "
     for name, order in orders.items():
         if order < POOR_ORDER:
             light = Light.RED if order < 4 else Light.AMBER
@@ -207,7 +215,7 @@ def _excitation(orders: Mapping[str, int]) -> list[Finding]:
                     "poor-excitation",
                     light,
                     f"input {name!r} is persistently exciting of order {order} only",
-                    f"fit at most {order} coefficients, or fly a sweep, multisine or PRBS",
+                    f"{fit.format(order)}fly a sweep, multisine or PRBS",
                 )
             )
     return found
@@ -239,8 +247,21 @@ def _pulse(reason: str) -> list[Finding]:
     return [Finding("no-pulse-response", Light.AMBER, f"no pulse response: {reason}", action)]
 
 
-def _delays(output: str, acts: Mapping[str, InputDelay], sample_time_s: float) -> list[Finding]:
+def _delays(
+    output: str, acts: Mapping[str, InputDelay], sample_time_s: float, test: FeedbackTest
+) -> list[Finding]:
+    if test.may_turn_round:
+        message = (
+            f"how late {output!r} answers {', '.join(map(repr, acts))}, and by which poles, cannot "
+            "be told: in a loop what is seen may be the controller turned round"
+        )
+        action = (
+            "log what is injected, and fit by way of it (excitations), comparing nk from 1 on; or "
+            "record with the loop open"
+        )
+        return [Finding("answer-untold", Light.AMBER, message, action)]
     found = []
+    if_open = "" if test.is_known else "if the loop was open: "
     for name, each in acts.items():
         if each.interval is None:
             message = f"no response of {output!r} to {name!r} stands out of the noise"
@@ -248,15 +269,20 @@ def _delays(output: str, acts: Mapping[str, InputDelay], sample_time_s: float) -
             found.append(Finding("no-response", Light.RED, message, action))
         elif each.samples is None:
             low, high = each.interval
-            message = f"{output!r} answers {name!r} after {low} to {high} samples: nk is unsure"
+            message = (
+                f"{if_open}{output!r} answers {name!r} after {low} to {high} samples: nk is unsure"
+            )
             action = "fit each of them and compare (scan_orders), or excite higher frequencies"
             found.append(Finding("delay-unsure", Light.AMBER, message, action))
         else:
             message = (
-                f"{output!r} answers {name!r} after {each.samples} samples "
+                f"{if_open}{output!r} answers {name!r} after {each.samples} samples "
                 f"({each.samples * sample_time_s:.4g} s): nk = {each.samples}"
             )
-            found.append(Finding("delay", Light.GREEN, message))
+            light, action = Light.GREEN, ""
+            if not test.is_known:
+                light, action = Light.AMBER, "declare the loop before this delay is used"
+            found.append(Finding("delay", light, message, action))
     return found
 
 

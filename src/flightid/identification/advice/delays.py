@@ -13,6 +13,7 @@ import scipy
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from flightid.evidence.feedback import loop_seen
 from flightid.frozen import dataclass
 from flightid.identification.advice.delayed_output_error import (
     DelayedSignals,
@@ -52,7 +53,7 @@ LONGEST = 39
 BEFORE, BEHIND = 2, 1
 """Delays of a scan on either side of what the data do not refuse: weak first samples drown."""
 UNTOLD = (1, 2, 3)
-"""Delays of a scan where no effect stands out."""
+"""Delays of a scan where no effect stands out, or a controller's may."""
 
 
 @dataclass(frozen=True)
@@ -177,6 +178,8 @@ def delays_to_scan(
 ) -> tuple[int, ...]:
     """Delays that a scan has to try, alike for all inputs: about those that data do not refuse.
 
+    Along a loop data refuse what the controller does not do, turned round: from one on then.
+
     Parameters
     ----------
     records : sequence of Record
@@ -190,7 +193,9 @@ def delays_to_scan(
     """
     data = gather_channels(list(records), output, tuple(inputs), "mean")
     data.require_change()
-    ends = [each.interval for each in find_delays(data, LONGEST) if each.interval is not None]
+    ends: list[tuple[int, int]] = []
+    if not loop_seen(tuple(records), tuple(inputs), (output,)).may_turn_round:
+        ends = [each.interval for each in find_delays(data, LONGEST) if each.interval is not None]
     if not ends:
         return UNTOLD
     low, high = min(end[0] for end in ends), max(end[1] for end in ends)

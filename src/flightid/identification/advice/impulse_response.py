@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError, OptionError
+from flightid.evidence import FeedbackTest, feedback_test
 from flightid.frozen import dataclass
 from flightid.identification.advice.delays import InputDelay, find_delays
 from flightid.identification.advice.vanishing_tail import vanishes
@@ -23,6 +24,7 @@ from flightid.identification.prediction_error.linear_regression import (
 from flightid.models.polynomial.structure import KERNELS
 from flightid.models.sampled.channels import SampledChannels, gather_channels
 from flightid.record import Record
+from flightid.record.hold import Loop
 from flightid.record.several import as_records
 from flightid.recursive_filter import filtered
 from flightid.result import Result
@@ -68,6 +70,8 @@ class ImpulseResponse(
         Lags that were fitted: more than those asked for, where the response outlasts them.
     reason : str
         Why there is no covariance; else empty.
+    feedback : FeedbackTest
+        Whether a loop was closed: along one no delay is told.
 
     Example
     -------
@@ -87,10 +91,16 @@ class ImpulseResponse(
     units: Mapping[str, str] = field(default_factory=dict)
     fitted_lags: int = 0
     reason: str = ""
+    feedback: FeedbackTest = FeedbackTest("unknown", "too short")
 
     @cached_property
     def acts_after(self) -> dict[str, InputDelay]:
-        """Samples until each input acts, from structures with every delay."""
+        """Samples until each input acts, from structures with every delay; untold in a loop.
+
+        There an answer within a sample is the controller's, turned round.
+        """
+        if self.feedback.may_turn_round:
+            return dict.fromkeys(self.inputs, InputDelay())
         longest = max(int(self.lags[-1]), 0)
         return dict(zip(self.inputs, find_delays(self.channels, longest), strict=True))
 
@@ -149,7 +159,8 @@ class ImpulseResponse(
                     None if errors is None else float(half_width() * errors[i, -1]),
                 )
             )
-        notes = ("delay: first lag that chance does not explain", self.reason)
+        told = "delay: first lag that chance does not explain"
+        notes = (str(self.feedback) if self.feedback.may_turn_round else told, self.reason)
         return Table(repr(self), columns, tuple(rows), tuple(filter(None, notes)))
 
     def _computed(self) -> dict[str, object]:
@@ -185,6 +196,7 @@ def impulse_response(
     negative_lags: int = 0,
     kernel: str | None = None,
     offsets: str = "mean",
+    loop: Loop | None = None,
 ) -> ImpulseResponse:
     """Estimate pulse responses from all inputs to one output, with their covariance.
 
@@ -205,6 +217,9 @@ def impulse_response(
     kernel : {"tc", "dc"}, optional
         Decaying prior for few or poor data; not with negative lags.
     offsets : {"mean", "trim", "none"}
+    loop : {"open", "closed"}, optional
+        Whether anything moved the inputs after what the outputs did; default: what the records
+        know, else a test.
 
     Raises
     ------
@@ -265,6 +280,7 @@ def impulse_response(
         data.units,
         fitted,
         "" if ended else OUTLASTS.format(fitted),
+        feedback_test(listed, inputs=names, outputs=(name,), loop=loop),
     )
 
 
