@@ -27,7 +27,14 @@ from flightid.review.apart import gains_between
 from flightid.review.deconvolution import closed_loop
 from flightid.review.gyro_noise import GyroNoise
 from flightid.review.loop_samples import LoopSamples
-from flightid.review.loops import IN_SWEEPS, _pair, loop_responses, refused, tracking_error
+from flightid.review.loops import (
+    IN_SWEEPS,
+    _pair,
+    _unless_short,
+    loop_responses,
+    refused,
+    tracking_error,
+)
 from flightid.review.motors import motor_use, turning, yaw_trim
 from flightid.review.verdicts import judge_flight
 from flightid.uncertainty.estimate import Estimate, Reading
@@ -141,11 +148,30 @@ def test_a_slow_log_says_what_to_log(tmp_path: Path) -> None:
     assert "logged at 10 Hz, too slowly" in loop.reason
     assert "LOG_BITMASK" in loop.action
     assert loop.tracking is not None
-    write_ordinary_log(tmp_path / "short.bin", every=8, duration_s=5.0)
-    short = fid.review_flight(tmp_path / "short.bin")["roll attitude"]
-    assert short.reason.startswith("too few samples")
-    assert "LOG_BITMASK" in short.action, "rows are few, whatever was flown"
-    assert "fly a minute" in short.action
+    write_ordinary_log(tmp_path / "few.bin", every=16, duration_s=5.0)
+    few = fid.review_flight(tmp_path / "few.bin")["roll attitude"]
+    assert few.reason.startswith("too few samples")
+    assert "LOG_BITMASK" in few.action, "rows are few, whatever was flown"
+    assert "fly a minute" in few.action
+
+
+def test_a_flight_that_is_short_is_not_asked_for_settings_of_its_log(tmp_path: Path) -> None:
+    """Bits of LOG_BITMASK were asked for of RATE at 400 Hz, which holds every row of the flight."""
+    needed = {}
+    for every in (8, 1):
+        write_ordinary_log(tmp_path / "short.bin", every=every, duration_s=5.0)
+        short = fid.review_flight(tmp_path / "short.bin")["roll attitude"]
+        assert short.reason.startswith("too little flight, 4.9"), short.reason
+        assert short.action.startswith("fly a minute"), short.action
+        needed[every] = float(short.reason.split("needed ")[1].split()[0])
+    assert_close(needed[1], needed[8], rtol=0.01, why="a faster log asks for as much flight")
+    piece = fid.Record.from_arrays(0.0025 * np.arange(1000), outputs={"measured": np.zeros(1000)})
+    few = replace(short, reason="too few samples, 2.5 s, needed 10.5 s", action="set bits")
+    swept = SimpleNamespace(sid_runs=[SimpleNamespace(point="mixer")])
+    told = _unless_short(few, swept, ((0.0, 2.5),), [piece])  # type: ignore[arg-type]
+    assert told.reason == "too little flight outside sweeps, 2.5 s, needed 10.5 s"
+    gap = _unless_short(few, swept, ((0.0, 9.0),), [piece])  # type: ignore[arg-type]
+    assert gap is few, "a pause of the log ended the piece"
 
 
 def test_a_tracking_error_of_one_wild_stretch_is_no_number() -> None:

@@ -137,15 +137,32 @@ def _loop(
     tracking = tracking_error(pieces, "rad/s" if loop == "rate" else "rad")
     begun = replace(blank, tracking=tracking, asked=_spread(pieces))
     law = bounded_law(log, axis) if loop == "attitude" else None
-    if law is None:
-        return _read(log, begun, pieces)
-    begun = replace(begun, proportional_rad=law.proportional_to_rad)
-    excess = excess_of(law, axis, pieces)
-    if excess is None:
-        return _read(log, begun, pieces)
-    excess = excess_of(law, axis, pieces, expected_errors(pieces, PACE["attitude"])) or excess
-    small = _pieces(pair, without(spans, list(excess.spans)))
-    return _in_proportion(log, begun, excess, pieces, small)
+    excess = None
+    if law is not None:
+        begun = replace(begun, proportional_rad=law.proportional_to_rad)
+        excess = excess_of(law, axis, pieces)
+    if law is None or excess is None:
+        made = _read(log, begun, pieces)
+    else:
+        excess = excess_of(law, axis, pieces, expected_errors(pieces, PACE["attitude"])) or excess
+        small = _pieces(pair, without(spans, list(excess.spans)))
+        made = _in_proportion(log, begun, excess, pieces, small)
+    return _unless_short(made, log, spans, pieces)
+
+
+def _unless_short(
+    made: LoopResponse, log: Log, spans: tuple[Span, ...], pieces: list[Record]
+) -> LoopResponse:
+    """A loop of too few samples, which lacks flight where the log holds all rows of what flew."""
+    slow = pieces[0].sample_rate_hz < FASTEST[made.loop].value
+    held_s = sum(piece.duration_s for piece in pieces)
+    gaps = held_s < EVEN * sum(end - begin for begin, end in spans)
+    if not made.reason.startswith(TOO_FEW) or slow or gaps:
+        return made
+    swept = any(run.point == "mixer" for run in log.sid_runs)
+    few = f"too little flight{' outside sweeps' if swept else ''}"
+    reason = made.reason.replace(TOO_FEW, few, 1)
+    return replace(made, reason=reason, action=what_to_fly(made))
 
 
 def _in_proportion(
