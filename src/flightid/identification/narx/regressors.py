@@ -11,6 +11,7 @@ from flightid.errors import DataError
 from flightid.frozen import dataclass
 from flightid.models.narx.scaling import Scaling
 from flightid.models.narx.structure import NarxStructure
+from flightid.models.sampled.channels import record_ends, still_words
 from flightid.record import Record
 
 Array = NDArray[np.float64]
@@ -39,7 +40,9 @@ def scaling_of(model: NarxStructure, records: Sequence[Record]) -> Scaling:
         if deviation[name] <= 1e-14 * abs(mean[name]):
             raise DataError(
                 f"channel {name!r} is constant",
-                found=f"{mean[name]:.6g} throughout",
+                found=" and ".join(
+                    still_words(mean[name], record_ends(record)) for record in records
+                ),
                 needed="a channel that changes",
                 action="leave the channel out or choose another record",
             )

@@ -53,6 +53,8 @@ class SampledChannels:
         Whether a constant of each record is left to be fitted: a mean is no trim.
     excitations : ndarray, shape (n_excitations, n_samples), or None
         What was injected into a closed loop, without its mean, where a fit goes by way of it.
+    ends_s : tuple of tuple of float
+        Time of the first and the last sample of each record.
 
     Example
     -------
@@ -70,6 +72,7 @@ class SampledChannels:
     sample_time_s: float
     levels: bool = False
     excitations: Array | None = None
+    ends_s: tuple[tuple[float, float], ...] = ()
 
     @property
     def external(self) -> Array:
@@ -102,12 +105,14 @@ class SampledChannels:
             moved = max(float(np.ptp(row[span])) for span in self.spans)
             if moved <= 1e-14 * np.max(np.abs(row)):
                 values = [
-                    f"{row[span.start] + offset[name]:.6g}"
-                    for span, offset in zip(self.spans, self.offsets, strict=True)
+                    still_words(row[span.start] + offset[name], ends)
+                    for span, offset, ends in zip(
+                        self.spans, self.offsets, self.ends_s, strict=True
+                    )
                 ]
                 raise DataError(
                     f"channel {name!r} is constant",
-                    found=f"{' and '.join(dict.fromkeys(values))} throughout",
+                    found=" and ".join(dict.fromkeys(values)),
                     needed="a channel that changes within a record",
                     action="leave the channel out or choose another record",
                 )
@@ -159,8 +164,31 @@ def gather_channels(
     stacked = np.array(rows[1:]).reshape(len(inputs), rows[0].size)
     lengths = tuple(record.n_samples for record in records)
     return SampledChannels(
-        rows[0], stacked, lengths, removed, units, first.sample_time_s, offsets == "mean"
+        rows[0],
+        stacked,
+        lengths,
+        removed,
+        units,
+        first.sample_time_s,
+        offsets == "mean",
+        ends_s=tuple(map(record_ends, records)),
     )
+
+
+def record_ends(record: Record) -> tuple[float, float]:
+    """Time of the first and the last sample, s."""
+    return float(record.time_s[0]), float(record.time_s[-1])
+
+
+def still_words(value: float, ends_s: tuple[float, float]) -> str:
+    """What a channel stays at, and from when to when: a record may be a part of what was read.
+
+    Example
+    -------
+    >>> still_words(-3.1, (20.0, 59.99))
+    '-3.1 from 20 to 59.99 s'
+    """
+    return f"{value:.6g} from {ends_s[0]:.6g} to {ends_s[1]:.6g} s"
 
 
 def require_same(model: SampledModel, units: Mapping[str, str], sample_time_s: float) -> None:
