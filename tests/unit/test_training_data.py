@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +10,18 @@ import pytest
 
 import flightid as fid
 from flightid.cli.program import run
+from flightid.conventions import Light
 from flightid.errors import DataError
-from flightid.record.digest import MARKS, RecordDigest, _smallest, digest_of, record_sha256
+from flightid.evidence import Check, Evidence
+from flightid.record.digest import (
+    MARKS,
+    MOST_MARKS,
+    SPACING,
+    RecordDigest,
+    _smallest,
+    digest_of,
+    record_sha256,
+)
 from flightid.validation.verification.of_the_fit import SEEN
 from tests.closeness import assert_close
 from tests.contract.test_kinds import STRUCTURES, fit, record
@@ -73,7 +84,11 @@ def test_marks_are_few_and_still_samples_make_none() -> None:
     still = np.where(np.arange(5000) < 2500, 0.0, noise)
     base = fid.Record.from_arrays(np.arange(5000) * 0.01, outputs={"y": noise, "z": still})
     made = digest_of(base, ["y", "z"])
-    assert {name: len(text) for name, text in made.marks.items()} == dict.fromkeys("yz", 16 * MARKS)
+    assert {name: len(text) // 16 for name, text in made.marks.items()} == {"y": 199, "z": 100}
+    few = digest_of(base.segment(0.0, 8.0), ["y"]).marks["y"]
+    assert len(few) == 16 * MARKS, "of a short record as many as ever"
+    long = fid.Record.from_arrays(np.arange(40_000) * 0.01, outputs={"y": np.tile(noise, 8)})
+    assert len(digest_of(long, ["y"]).marks["y"]) <= 16 * MOST_MARKS
     flat = base.segment(0.0, 20.0).replace({"y": 0 * noise[:2000]})
     assert digest_of(flat, ["y"]).marks["y"] == ""
     assert made.shared(flat, ["z"]) == 0.0
@@ -119,4 +134,27 @@ def test_marks_are_the_smallest_hashes_each_once() -> None:
         even = random.integers(0, 2**64 - 1, size, dtype=np.uint64, endpoint=True)
         few = random.choice(even, size) if size else even
         for hashes in (even, few, even[: size // 40].repeat(40), even >> np.uint64(40), ~even // 2):
-            assert np.array_equal(_smallest(hashes), np.unique(hashes)[:MARKS])
+            kept = np.clip(hashes.size // SPACING, MARKS, MOST_MARKS)
+            assert np.array_equal(_smallest(hashes), np.unique(hashes)[:kept])
+
+
+def test_a_short_piece_of_a_fitted_record_is_known_again() -> None:
+    """2.5 s of 60 s at 100 Hz held three of 64 marks by luck: at 240 to 260 samples none did."""
+    noise = np.random.default_rng(3).standard_normal(6000)
+    base = fid.Record.from_arrays(np.arange(6000) * 0.01, outputs={"y": noise})
+    made = digest_of(base, ["y"])
+    shares = [made.shared(base.segment(at, at + 2.4), ["y"]) for at in np.arange(0.0, 57.0, 2.4)]
+    assert np.mean(np.array(shares) == 1.0) > 0.95, shares
+
+
+def test_a_model_of_a_red_fit_says_so_where_its_run_is_good(tmp_path: Path) -> None:
+    checks = (Check("coherence", Light.RED, "least mean coherence .2", "sweep again"),)
+    plain = fit("transfer")
+    read = fid.load_model(fid.write_model(plain, tmp_path / "model.toml"))
+    assert read.estimated is not None
+    known = replace(read.estimated, evidence=Evidence(checks, ("coherence",)).to_dict())
+    model = replace(read, estimated=known)
+    (told,) = [e for e in fid.verify(model, record()).findings if e.code == "source-evidence"]
+    assert told.light is Light.AMBER
+    assert told.message.startswith("the model is of a fit that is red: least mean coherence .2")
+    assert "source-evidence" not in {e.code for e in fid.verify(plain, record()).findings}

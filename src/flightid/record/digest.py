@@ -18,7 +18,11 @@ from flightid.record.record import Record
 SPAN = 16
 """Samples of one mark: so many equal ones in a row are no chance in a measured channel."""
 MARKS = 64
-"""Marks of a channel: a tenth of its record holds some six of them."""
+"""Fewest marks of a channel that has as many spans: of a short one all are kept."""
+SPACING = 25
+"""Samples of a mark, on average: a piece of 250 holds some ten."""
+MOST_MARKS = 512
+"""Of a channel, 8 kB in a file."""
 TRAINING = "training_records"
 """Where the provenance of a fit keeps digests of its records."""
 FEWEST = 3
@@ -38,8 +42,8 @@ class RecordDigest:
     sha256 : str
         See `record_sha256`.
     marks : mapping of str to str
-        By channel: the `MARKS` smallest hashes of its spans of `SPAN` samples, 16 hexadecimal
-        digits each. A span that stands still makes none.
+        By channel: the smallest hashes of its spans of `SPAN` samples, one of `SPACING` but from
+        `MARKS` to `MOST_MARKS`, 16 hexadecimal digits each. A span that stands still makes none.
 
     Example
     -------
@@ -194,14 +198,15 @@ def _hashes(samples: NDArray[np.float64]) -> NDArray[np.uint64]:
 
 
 def _smallest(found: NDArray[np.uint64]) -> NDArray[np.uint64]:
-    """The `MARKS` smallest of some hashes, in order, each once."""
+    """The smallest of some hashes, in order, each once: so many that a short piece holds a few."""
+    kept = min(max(MARKS, found.size // SPACING), MOST_MARKS)
     # Hashes are spread evenly: of this share of their range about four times as many are left.
-    share = 4 * MARKS / max(found.size, 1)
+    share = 4 * kept / max(found.size, 1)
     if share < 1.0:
         few = np.unique(found[found < np.uint64(share * 2.0**64)])
-        if few.size >= MARKS:
-            return few[:MARKS]
-    return np.unique(found)[:MARKS]
+        if few.size >= kept:
+            return few[:kept]
+    return np.unique(found)[:kept]
 
 
 def _numbers(text: str) -> NDArray[np.uint64]:

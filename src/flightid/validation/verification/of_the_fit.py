@@ -15,6 +15,7 @@ from flightid.identification.filter_error.gusts import candidates
 from flightid.identification.fit import Fit
 from flightid.identification.prediction.remembered import provenance_entry, training_digests
 from flightid.identification.records.held_model import LinearPoint
+from flightid.identification.uncertain_of import evidence_behind
 from flightid.models import StateSpaceModel
 from flightid.record import Record
 from flightid.simulation import metrics
@@ -158,6 +159,19 @@ def weighed(
         else each
         for name, each in verdicts.items()
     }
+
+
+def fit_findings(source: object) -> tuple[Finding, ...]:
+    """That the fit behind a model's file is red: a piece of record that it runs well is no more.
+
+    A fit that is at hand shows its evidence itself.
+    """
+    examined = None if isinstance(source, Fit) else evidence_behind(source)
+    if examined is None or examined.verdict.light is not Light.RED:
+        return ()
+    verdict = examined.verdict
+    said = f"the model is of a fit that is red: {verdict.message}"
+    return (Finding("source-evidence", Light.AMBER, said, verdict.action),)
 
 
 def seen_findings(

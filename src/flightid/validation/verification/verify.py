@@ -39,6 +39,7 @@ from flightid.validation.verification.held_otherwise import hold_findings
 from flightid.validation.verification.judgement import THEIL_GUIDE, judge
 from flightid.validation.verification.muad import mismatch
 from flightid.validation.verification.of_the_fit import (
+    fit_findings,
     gust_errors,
     own_errors,
     seen_findings,
@@ -231,7 +232,8 @@ def verify(
         taken = remembered(each).assumed_hold
         again = partial(run, records=flown)
         said = hold_findings(held, judged, request, taken, again) if in_time else ()
-        said = (*seen_findings(each, flown, chosen), *said, *_at_mean(each, flown))
+        known = (*seen_findings(each, flown, chosen), *fit_findings(each))
+        said = (*known, *said, *_at_mean(each, flown))
         between = judged.hold if in_time else None
         results.append(replace(judged, hold=between, findings=(*judged.findings, *beside, *said)))
     if not isinstance(source, list | tuple):
