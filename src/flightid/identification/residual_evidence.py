@@ -63,7 +63,7 @@ def with_residuals_judged(fit: Fit) -> Fit:
     if tests.is_independent:
         return fit
     (said,) = tests.findings(biased=False, action=MISSING)
-    return _withheld(fit, tests.why_biased, said)
+    return _withheld(fit, said.message, said)
 
 
 def _is_foretold(found: Finding) -> bool:

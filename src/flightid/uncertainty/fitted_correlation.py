@@ -143,8 +143,8 @@ class FitResponse:
             )
             for place, j in enumerate(moving):
                 span = slice(place * lags.size, (place + 1) * lags.size)
-                chance = _chance(score[0][span], score[1][span, span], scale[span])
-                found += self._judged(
+                chance = chance_of_lags(score[0][span], score[1][span, span], scale[span])
+                found += judged_correlation(
                     (output, j),
                     (lags, chance),
                     raw[span],
@@ -184,40 +184,55 @@ class FitResponse:
             covariance = covariance + around + taken.T @ answer @ taken
         return np.asarray(raw), np.asarray(covariance)
 
-    def _judged(
-        self,
-        places: tuple[int, int],
-        tested: tuple[NDArray[np.int64], tuple[float, int, float] | None],
-        raw: Array,
-        covariance: Array,
-        plain: Array,
-        power: float,
-    ) -> list[FittedCorrelation]:
-        lags, score = tested
-        if score is None or not power > 0.0:
-            return []
-        statistic, degrees, p_value = score
-        size = np.sqrt(np.maximum(np.diag(plain), np.finfo(float).tiny))
-        sizes, turned = np.linalg.eigh(plain / np.outer(size, size))
-        sound = sizes > SMALLEST * sizes[-1]
-        seen = (turned[:, sound].T @ (raw / size)) ** 2
-        by_chance = np.sum(
-            turned[:, sound] * (covariance / np.outer(size, size) @ turned[:, sound]), axis=0
+
+def judged_correlation(
+    places: tuple[int, int],
+    tested: tuple[NDArray[np.int64], tuple[float, int, float] | None],
+    raw: Array,
+    covariance: Array,
+    plain: Array,
+    power: float,
+) -> list[FittedCorrelation]:
+    """One input with one output, from their products and these products' covariance.
+
+    Parameters
+    ----------
+    places : tuple of int
+        Of output and input.
+    tested : tuple
+        Lags, and what `chance_of_lags` says of them; none where that is None.
+    raw : ndarray, shape (n_lags,)
+        Products of the input at these lags with the residual.
+    covariance, plain : ndarray, shape (n_lags, n_lags)
+        Of these products by chance, and products of the lagged inputs with themselves.
+    power : float
+        Sum of squares of the residual.
+    """
+    lags, score = tested
+    if score is None or not power > 0.0:
+        return []
+    statistic, degrees, p_value = score
+    size = np.sqrt(np.maximum(np.diag(plain), np.finfo(float).tiny))
+    sizes, turned = np.linalg.eigh(plain / np.outer(size, size))
+    sound = sizes > SMALLEST * sizes[-1]
+    seen = (turned[:, sound].T @ (raw / size)) ** 2
+    by_chance = np.sum(
+        turned[:, sound] * (covariance / np.outer(size, size) @ turned[:, sound]), axis=0
+    )
+    share = float(np.sum((seen - by_chance) / sizes[sound])) / power
+    scale = size[0] * np.sqrt(power)
+    return [
+        FittedCorrelation(
+            *places,
+            lags,
+            raw / scale,
+            np.sqrt(np.maximum(np.diag(covariance), 0.0)) / scale,
+            statistic,
+            degrees,
+            p_value,
+            min(max(share, 0.0), 1.0),
         )
-        share = float(np.sum((seen - by_chance) / sizes[sound])) / power
-        scale = size[0] * np.sqrt(power)
-        return [
-            FittedCorrelation(
-                *places,
-                lags,
-                raw / scale,
-                np.sqrt(np.maximum(np.diag(covariance), 0.0)) / scale,
-                statistic,
-                degrees,
-                p_value,
-                min(max(share, 0.0), 1.0),
-            )
-        ]
+    ]
 
 
 def _heard(block: RecordBlock, output: int) -> list[Array]:
@@ -231,19 +246,28 @@ def _met(inputs: LaggedInputs, everywhere: Sequence[Sequence[Array]]) -> list[Ar
     return [np.concatenate([next(found) for _ in parts]) for parts in everywhere]
 
 
-def _chance(raw: Array, covariance: Array, squares: Array) -> tuple[float, int, float] | None:
+def chance_of_lags(
+    raw: Array, covariance: Array, squares: Array, freedom: float = np.inf
+) -> tuple[float, int, float] | None:
     """Form and degrees of all lags, and the chance of these and of the first ones together.
 
-    Bonferroni's rule with parts: chances over their parts are right together.
+    Bonferroni's rule with parts: chances over their parts are right together. `freedom` are
+    degrees of freedom of a noise level that was estimated beside.
     """
     whole = _quadratic(raw, covariance, squares)
     if whole is None:
         return None
     first = _quadratic(raw[:FIRST], covariance[:FIRST, :FIRST], squares[:FIRST])
-    chances = [float(scipy.special.chdtrc(whole[1], whole[0])) / (1.0 - SHARE_OF_FIRST)]
+    chances = [_beyond(*whole, freedom) / (1.0 - SHARE_OF_FIRST)]
     if first is not None:
-        chances.append(float(scipy.special.chdtrc(first[1], first[0])) / SHARE_OF_FIRST)
+        chances.append(_beyond(*first, freedom) / SHARE_OF_FIRST)
     return (*whole, min(*chances, 1.0))
+
+
+def _beyond(form: float, degrees: int, freedom: float) -> float:
+    if np.isinf(freedom):
+        return float(scipy.special.chdtrc(degrees, form))
+    return float(scipy.special.fdtrc(degrees, freedom, form / degrees))
 
 
 def _quadratic(raw: Array, covariance: Array, squares: Array) -> tuple[float, int] | None:

@@ -33,6 +33,11 @@ from flightid.identification.regression.fit import (
     limits_of,
     require_seen,
 )
+from flightid.identification.regression.foretold_rows import (
+    DrivenHarmonics,
+    leading,
+    of_centres,
+)
 from flightid.identification.regression.options import (
     EquationErrorOptions,
     FourierOptions,
@@ -83,8 +88,11 @@ def fit_equation_error(
     action = f"{APART}; output_bias=False where equations have constants of their own"
     require_seen(inner, stack([slopes for _, slopes in weighed]), action)
     constants = [_constants(each[0].shape, options.output_bias) for each in weighed]
+    width, pairs = options.half_width, zip(problem.motions, weighed, strict=True)
+    inputs = [leading(motion.inputs, width, each.shape[1]) for motion, (each, _) in pairs]
     coloured = residual_covariance(
-        [_block(*each, basis) for each, basis in zip(weighed, constants, strict=True)]
+        [_block(*each, basis) for each, basis in zip(weighed, constants, strict=True)],
+        inputs=inputs if judged() else None,
     )
     jacobian = stack([slopes for _, slopes in weighed])
     known = Knowledge(
@@ -94,6 +102,7 @@ def fit_equation_error(
         "coloured residuals",
         coloured.colour,
         coloured.agreement,
+        of_centres(coloured.correlations, width),
     )
     return _finish("equation error", problem, data, options, settled, limits, inner, known)
 
@@ -114,12 +123,17 @@ def fit_fourier_regression(
         return FourierRows(motion, options.band_rad_s)
 
     problem, start, limits = _problem(model, data, options, operator)
-    omegas = [each.grid.omega_rad_s for each in problem.operators if isinstance(each, FourierRows)]
+    grids = [each.grid for each in problem.operators if isinstance(each, FourierRows)]
+    omegas = [grid.omega_rad_s for grid in grids]
     count = len(problem.motions)
     settled = settle(problem, start, lambda rows: spectral_weights(rows, omegas), limits, count)
     inner = Inner.of(model, settled.end.x)
     action = f"{APART}; constants have no harmonic: method='equation_error', output_bias=False"
-    known = known_by_spectra(inner, settled.rows, settled.weights, omegas, action)
+    driven = [
+        DrivenHarmonics(grid, motion.inputs, ahead=1)
+        for grid, motion in zip(grids, problem.motions, strict=True)
+    ]
+    known = known_by_spectra(inner, settled.rows, settled.weights, driven, action)
     return _finish("Fourier regression", problem, data, options, settled, limits, inner, known)
 
 

@@ -112,7 +112,8 @@ class EquationRegression:
                 operator.values(np.moveaxis(sides.other_slopes, 2, 1)),
             ]
             moved = -np.concatenate(slopes)[self.used]
-            rows = Rows(residuals, np.moveaxis(moved, 1, 2).copy())
+            own = np.zeros((*residuals.shape, len(residuals)))
+            rows = Rows(residuals, np.moveaxis(moved, 1, 2).copy(), own)
             if isinstance(operator, FourierRows):
                 # Constants have no harmonic; what rounding leaves of them is no slope.
                 still = [_constant(each) for each in (sides.rate_slopes, sides.other_slopes)]
@@ -127,6 +128,8 @@ class EquationRegression:
                 continue
             weighed = direction * weights[row] ** 2
             weighed /= weighed @ direction
+            along = direction * weights[row]
+            rows.own[row, :, row] = along / np.linalg.norm(along)
             rows.residuals[row] -= direction * (weighed @ rows.residuals[row])
             before = np.linalg.norm(rows.slopes[row], axis=0)
             rows.slopes[row] -= np.multiply.outer(direction, weighed @ rows.slopes[row])

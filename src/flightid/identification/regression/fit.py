@@ -22,6 +22,7 @@ from flightid.identification.frequency_domain.estimates import (
 )
 from flightid.identification.multistart import DenseEnd, local_minima, require_free
 from flightid.identification.records.findings import judge_fit
+from flightid.identification.regression.foretold_rows import DrivenHarmonics, foretold_harmonics
 from flightid.identification.regression.options import RegressionOptions
 from flightid.identification.regression.rounds import Rows, SearchBounds, stack
 from flightid.identification.regression.weights import compared_covariance
@@ -31,6 +32,7 @@ from flightid.record.several import as_records
 from flightid.uncertainty import correlation as correlation_of
 from flightid.uncertainty.agreement import Agreement
 from flightid.uncertainty.cramer_rao import inverse_hessian
+from flightid.uncertainty.fitted_correlation import FittedCorrelation
 from flightid.units import require_match
 from flightid.version import VERSION
 
@@ -76,6 +78,8 @@ class Knowledge:
         Smallest and largest ratio of a standard error to that for white residuals.
     agreement : Agreement or None
         Of records and of their halves.
+    correlations : tuple of FittedCorrelation
+        Of inputs with residuals.
     """
 
     jacobian: Array
@@ -84,6 +88,7 @@ class Knowledge:
     source: str
     colour: tuple[float, float] = (1.0, 1.0)
     agreement: Agreement | None = None
+    correlations: tuple[FittedCorrelation, ...] = ()
 
 
 def check_records(model: StateSpaceModel, data: Record | Sequence[Record]) -> tuple[Record, ...]:
@@ -168,20 +173,21 @@ def known_by_spectra(
     inner: Inner,
     rows: Sequence[Rows],
     weights: Sequence[Array],
-    omegas: Sequence[Array],
+    driven: Sequence[DrivenHarmonics],
     action: str = APART,
 ) -> Knowledge:
     """What harmonics with weights say of the parameters inside their bounds."""
     kept = [replace(each, slopes=each.slopes[:, :, inner.mask]) for each in rows]
     jacobian = stack([each.slopes * w[:, :, None] for each, w in zip(kept, weights, strict=True)])
     require_seen(inner, jacobian, action)
-    agreed = compared_covariance(kept, weights, omegas)
+    agreed = compared_covariance(kept, weights, [each.grid.omega_rad_s for each in driven])
     return Knowledge(
         jacobian,
         agreed.covariance,
         agreed.freedom,
         "spectra of residuals",
         agreement=agreed.agreement,
+        correlations=foretold_harmonics(kept, weights, driven),
     )
 
 
@@ -236,6 +242,7 @@ def assemble(
         noise_covariance=noise_covariance,
         residual_horizon=residual_horizon,
         agreement=known.agreement,
+        input_correlations=known.correlations,
     )
 
 

@@ -163,7 +163,8 @@ class FourierOutputError:
         residuals = ends.removed_from((missing * weight).ravel()).reshape(weight.shape) / weight
         moving = -np.moveaxis(_split(found), 0, 2) * weight[:, :, None]
         kept = ends.removed_from(moving.reshape(flat.shape[0], -1)).reshape(moving.shape)
-        return Rows(residuals, kept / weight[:, :, None])
+        own = ends.space.reshape(*weight.shape, -1)
+        return Rows(residuals, kept / weight[:, :, None], own)
 
 
 def _solve(matrix: NDArray[Any], right: NDArray[Any]) -> Complex:

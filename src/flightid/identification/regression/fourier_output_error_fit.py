@@ -20,6 +20,7 @@ from flightid.identification.regression.fit import (
     require_linear,
     require_states,
 )
+from flightid.identification.regression.foretold_rows import DrivenHarmonics
 from flightid.identification.regression.fourier_output_error import (
     FourierOutputError,
     TransformedRecord,
@@ -55,7 +56,8 @@ def fit_fourier_output_error(
     groups = cluster(collect([each.end for each in settled]))
     best = next(each for each in settled if each.end is groups[0][0])
     inner = Inner.of(model, best.end.x)
-    known = known_by_spectra(inner, best.rows, best.weights, omegas)
+    driven = [DrivenHarmonics(each.grid, each.inputs) for each in transformed]
+    known = known_by_spectra(inner, best.rows, best.weights, driven)
     return assemble(
         "Fourier output error",
         inner,

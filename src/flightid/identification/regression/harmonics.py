@@ -112,6 +112,39 @@ class Harmonics:
         spectrum = scipy.fft.fft(samples[..., : self.n_samples - 1], axis=-1)[..., self.numbers]
         return np.asarray(self.sample_time_s * spectrum)
 
+    def lagged(self, samples: Array, n_lags: int) -> Array:
+        """`total` of samples that come later by 0, 1, ... of them, for the price of one.
+
+        What is before the first sample is taken to be it.
+
+        Parameters
+        ----------
+        samples : ndarray, shape (n, n_samples)
+        n_lags : int
+
+        Returns
+        -------
+        ndarray, shape (n, n_lags, 2 n_f)
+            Real parts, then imaginary parts.
+
+        Example
+        -------
+        >>> grid = Harmonics.inside(None, 101, 0.02)
+        >>> samples = np.random.default_rng(0).standard_normal((1, 101))
+        >>> late = np.concatenate([samples[:, :1], samples[:, :-1]], axis=1)
+        >>> one = grid.total(late)
+        >>> np.allclose(grid.lagged(samples, 2)[:, 1], np.concatenate([one.real, one.imag], 1))
+        True
+        """
+        period = self.n_samples - 1
+        found, now = [], self.total(samples)
+        for lag in range(n_lags):
+            found.append(np.concatenate([now.real, now.imag], axis=1))
+            # One sample enters at the start, another leaves at the end.
+            change = samples[:, 0] - samples[:, max(period - 1 - lag, 0)]
+            now = now / self.turn + self.sample_time_s * change[:, None]
+        return np.stack(found, axis=1)
+
     @property
     def turn(self) -> Complex:
         """exp(jωT): one sample ahead, shape (n_f,)."""

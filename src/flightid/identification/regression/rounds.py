@@ -29,10 +29,13 @@ class Rows:
         Measured minus computed, in the unit of the equation.
     slopes : ndarray, shape (n_equations, n_rows, n_free)
         Derivatives of the residuals.
+    own : ndarray, shape (n_equations, n_rows, n_own)
+        Orthonormal directions, weighed, along which numbers of the record alone are taken out.
     """
 
     residuals: Array
     slopes: Array
+    own: Array
 
 
 class Regression(Protocol):

@@ -200,7 +200,7 @@ def _of_fits(
         fitted_noise=max(noise for noise, _ in spent),
         fitted_input=max(count for _, count in spent),
         fitted={
-            (fit.model.outputs[each.output], fit.model.inputs[each.input]): each
+            (fit.records[0].outputs[each.output], fit.model.inputs[each.input]): each
             for fit in fits
             for each in fit.input_correlations
         },
