@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -246,6 +248,36 @@ def test_starts_are_systematic_first_then_random_and_reproducible():
     fit = fid.identify(asked, flown(ARMAX, 18, noise=0.5))
     assert sum(m.count for m in fit.minima) <= 6
     assert fit.minima[0].objective == min(m.objective for m in fit.minima)
+
+
+def test_output_error_of_a_slow_mode_ends_at_the_least_squares() -> None:
+    """In coarse noise regressions in lags all led to one minimum, 2 log L of 7 to 20 too low."""
+    above, below = [0.0, 0.3, 0.5], np.poly([0.9, 0.82 + 0.2j, 0.82 - 0.2j])
+    asked = P.oe("u", "y", nb=2, nf=3, nk=1)
+    for seed in (0, 3, 30, 38):
+        rng = np.random.default_rng(seed)
+        u = np.repeat(rng.choice([-1.0, 1.0], 51), 4)[:200]
+        clean = lfilter(above, below, u)
+        y = clean + 0.4 * clean.std() * rng.standard_normal(200)
+        record = fid.Record.from_arrays(
+            0.05 * np.arange(200), inputs={"u": u}, outputs={"y": y}, units={"u": "1", "y": "1"}
+        )
+        at_truth = fid.identify(
+            replace(asked, start=(0.3, 0.5, *map(float, below[1:])), starts=1), record
+        )
+        fit = fid.identify(asked, record)
+        assert fit.minima[0].objective <= at_truth.minima[0].objective * (1.0 + 1e-6)
+
+
+def test_output_error_has_as_many_starts_as_are_asked_for() -> None:
+    """20 starts had been two, the same as 4."""
+    asked = P.oe("u", "y", nb=2, nf=3, nk=1, starts=20)
+    data = gather_channels([flown(ARMAX, 18, noise=0.5)], "y", ("u",), "mean")
+    starts = polynomial_starts(asked, data)
+    assert starts.shape == (19, 5)
+    assert len({tuple(each) for each in starts}) == 19
+    for start in starts[2:]:
+        assert np.max(np.abs(np.roots([1.0, *start[2:]]))) < 1.0
 
 
 def test_a_start_that_comes_near_a_known_end_ends_there() -> None:

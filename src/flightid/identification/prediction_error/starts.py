@@ -1,4 +1,4 @@
-"""Starts of a prediction-error fit: two-stage least squares, reduced plants, random noise."""
+"""Starts of a prediction-error fit: two-stage least squares, reduced and drawn plants, noise."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from flightid.errors import FitError
 from flightid.frozen import dataclass
+from flightid.identification.prediction_error.drawn_denominators import drawn_plant
 from flightid.identification.prediction_error.linear_regression import (
     reflected,
     regress,
@@ -21,6 +22,11 @@ from flightid.models.sampled.channels import SampledChannels
 from flightid.recursive_filter import filtered
 
 Array = NDArray[np.float64]
+SYSTEMATIC = 3
+"""Plants that noise models are found for, one with drawn denominators among them."""
+LONG = 5000
+"""Samples from which denominators are drawn only where more starts are asked for: of 240 fits to
+200 and 500 samples with 40 % noise 26 ended at wrong minima without, of 120 longer ones one did."""
 ROUNDS = 8
 LARGEST = 1e100
 """Of the Steiglitz-McBride iteration, which a start need not finish."""
@@ -47,18 +53,22 @@ def polynomial_starts(structure: PolynomialStructure, data: SampledChannels) -> 
     Reference: Ljung, *System Identification*, 2nd ed., section 10.5 (eqs. 10.66 to 10.73);
     Hannan & Rissanen (1982), Biometrika 69; Steiglitz & McBride (1965), IEEE Trans. AC 10.
     """
-    innovations, long_a, long_b = _long_model(structure, data)
     found = [np.array(structure.start)] if structure.start else []
     if len(found) == structure.starts:
         return np.ascontiguousarray(found)
-    plants = _plants(structure, data, innovations, long_a, long_b)
-    for plant in plants:
-        noise = _noise(structure, data, plant)
-        found.append(_flat(plant, *noise))
-        if structure.nc or structure.nd:
-            found.append(_flat(plant, np.zeros(structure.nc), np.zeros(structure.nd)))
+    has_noise = structure.nc + structure.nd > 0
     generator = np.random.default_rng(structure.seed)
-    while len(found) < structure.starts and (structure.nc or structure.nd):
+    plants = _plants(structure, data)
+    # Output error keeps one start for whitened data, should these end at unlike minima.
+    wanted = min(structure.starts, SYSTEMATIC) if has_noise else structure.starts - len(found) - 1
+    asked = data.output.size <= LONG or structure.starts > SYSTEMATIC + 1
+    for _ in range(wanted - len(plants) if any(structure.nf) and asked else 0):
+        plants.append(_Plant(np.zeros(structure.na), *drawn_plant(structure, data, generator)))
+    found += [_flat(plant, *_noise(structure, data, plant)) for plant in plants]
+    if has_noise:
+        white = np.zeros(structure.nc), np.zeros(structure.nd)
+        found += [_flat(plant, *white) for plant in plants]
+    while len(found) < structure.starts and has_noise:
         noise = (_random(generator, structure.nc), _random(generator, structure.nd))
         found.append(_flat(plants[0], *noise))
     starts = np.array(found[: max(structure.starts, 1)])
@@ -100,13 +110,8 @@ def _long_model(
     return innovations, a, b
 
 
-def _plants(
-    structure: PolynomialStructure,
-    data: SampledChannels,
-    innovations: Array,
-    long_a: Array,
-    long_b: list[Array],
-) -> list[_Plant]:
+def _plants(structure: PolynomialStructure, data: SampledChannels) -> list[_Plant]:
+    innovations, long_a, long_b = _long_model(structure, data)
     if not any(structure.nf):
         return [_with_innovations(structure, data, innovations), _plain(structure, data)]
     every = range(len(structure.inputs))

@@ -78,7 +78,8 @@ class PolynomialStructure(Options):
     kernel : str or None
         Regularisation of an ARX model, ``"tc"`` or ``"dc"``, its size by marginal likelihood.
     starts : int
-        Number of starts of the iteration: the systematic ones, then random noise models.
+        Number of starts of the iteration: systematic ones, then random noise models, of output
+        error random denominators with the numerators that fit best.
     seed : int
         Of the random starts.
     maximum_iterations : int
@@ -124,7 +125,7 @@ class PolynomialStructure(Options):
     enforce_stability: bool = option(False, doc="Keep the roots of A inside the unit circle.")
     kernel: str | None = option(None, choices=KERNELS, doc="Regularisation of an ARX model.")
     starts: int = option(
-        4, minimum=1, doc="Starts of the iteration: systematic ones, then random noise models."
+        4, minimum=1, doc="Starts of the iteration: systematic ones, then random ones."
     )
     seed: int = option(0, minimum=0, doc="Seed of the random starts.")
     maximum_iterations: int = option(200, minimum=1, doc="Most steps of each start.")
