@@ -109,6 +109,14 @@ def injected_to(response: ExcitedResponse) -> float:
     return known[1]
 
 
+def injected_from(response: ExcitedResponse) -> float:
+    """Lowest frequency of what was injected, rad/s: by way of it nothing is told below.
+
+    Zero where nobody knows what was injected.
+    """
+    return 0.0 if response.injected_rad_s is None else response.injected_rad_s[0]
+
+
 def excited_span(response: ExcitedResponse, input: str) -> tuple[float, float]:
     """Lowest and highest frequency of an input's power, rad/s.
 

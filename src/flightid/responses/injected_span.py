@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flightid.record import Record
 from flightid.responses.excited_band import STRONG
@@ -12,13 +13,18 @@ from flightid.responses.excited_band import STRONG
 WINDOWS = 5
 """Windows that a record is cut into, each with half of the next."""
 LEAST_SAMPLES = 16
+BLUR = 3
+"""Lines by which a window of Hann spreads a sharp end of a spectrum down to 20 dB."""
+QUARTER = 0.25
+"""Of the power beside an end that a sweep has at the frequency where it begins or stops."""
 
 
 def injected_span(records: Sequence[Record]) -> tuple[float, float] | None:
     """Lowest and highest frequency of the excitations in records, rad/s.
 
     Beyond them ω·S(ω) of each stays 20 dB below its most, so that what hangs together there is the
-    loop, or leakage that excitation and outputs share. None where no record holds any.
+    loop, or leakage that excitation and outputs share; what a window spreads a sharp end by is
+    taken off. None where no record holds any.
 
     Parameters
     ----------
@@ -64,5 +70,14 @@ def _span(record: Record, name: str) -> tuple[float, float] | None:
     omega = 2.0 * np.pi * np.fft.rfftfreq(length, record.sample_time_s)
     level = omega * power.mean(axis=0)
     level[:2] = 0.0  # a trim and what the window blurs of it
-    strong = omega[level >= STRONG * level.max()]
-    return float(strong[0]), float(strong[-1])
+    strong = np.flatnonzero(level >= STRONG * level.max())
+    first, last = int(strong[0]), int(strong[-1])
+    low = first + _spread(level[first : last + 1])
+    high = last - _spread(level[first : last + 1][::-1])
+    return float(omega[min(low, high)]), float(omega[max(low, high)])
+
+
+def _spread(level: NDArray[np.float64]) -> int:
+    """Lines from the end of a spectrum to where a quarter of the power beside it is."""
+    beside = level[: BLUR + 1]
+    return int(np.argmax(beside >= QUARTER * beside.max()))

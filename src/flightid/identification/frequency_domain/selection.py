@@ -16,7 +16,7 @@ from flightid.identification.frequency_domain.steady_coherence import steady_coh
 from flightid.identification.shared_work import shared
 from flightid.responses import FrequencyResponse, PairResponse
 from flightid.responses.bands import coherent_band, nearest, usable_band
-from flightid.responses.excited_band import injected_to
+from flightid.responses.excited_band import injected_from, injected_to
 
 COST_POINTS = 20.0
 """The cost is scaled as if 20 frequencies were fitted, whatever their number."""
@@ -125,20 +125,21 @@ def select_points(
                 needed=", ".join(names),
             )
     pairs = [data.pair(*name.split("/", 1)) for name in names]
-    end = injected_to(data)
+    by_way = data.estimator.startswith(BY_EXCITATION)
+    ends = injected_from(data) if by_way else 0.0, injected_to(data)
 
     def choose() -> list[tuple[NDArray[np.intp], NDArray[np.float64]]]:
         chosen = []
         for name, measured in zip(names, pairs, strict=True):
             band = bands.get(name) if isinstance(bands, Mapping) else bands
-            pair = _steady(measured) if data.estimator.startswith(BY_EXCITATION) else measured
-            places = _places(pair, name, band, n_omega, minimum_coherence, end)
+            pair = _steady(measured) if by_way else measured
+            places = _places(pair, name, band, n_omega, minimum_coherence, ends)
             weight = COST_POINTS / len(places) * coherence_weight(pair.coherence[places])
             chosen.append((places, weight))
         return chosen
 
     # All that places and weights depend on.
-    options = repr((bands, n_omega, minimum_coherence, end))
+    options = repr((bands, n_omega, minimum_coherence, ends))
     arrays = data.omega_rad_s, data.coherence, data.random_error, np.abs(data.response) > 0.0
     chosen = shared(
         lambda: (names, data.inputs, data.outputs, options, *(each.tobytes() for each in arrays)),
@@ -161,13 +162,13 @@ def _places(
     band: Band | None,
     n_omega: int,
     minimum_coherence: float | None,
-    end: float,
+    ends: Band,
 ) -> NDArray[np.intp]:
     grid = pair.omega_rad_s
     if band is None:
         # What was injected ends the band that nobody gave, however coherent a loop is beyond it.
-        known = grid[grid <= end * (1.0 + _EDGE)]
-        coherence = pair.coherence[: len(known)]
+        injected = (grid >= ends[0] * (1.0 - _EDGE)) & (grid <= ends[1] * (1.0 + _EDGE))
+        known, coherence = grid[injected], pair.coherence[injected]
         least = 0.0 if minimum_coherence is None else minimum_coherence
         found = usable_band(known, coherence, least)
         if found is not None and np.sum((grid >= found[0]) & (grid <= found[1])) < MINIMUM_POINTS:
