@@ -42,6 +42,7 @@ def log(**fields: object) -> Any:
         "vehicle": "copter",
         "parameters": {},
         "gaps": (),
+        "sid_runs": (),
         "findings": (),
         "messages": ("vehicle_attitude",),
         "duration_s": 60.0,  # seconds, beyond which nothing was to come
@@ -148,6 +149,8 @@ def test_bits_of_the_logging_mask_are_those_of_the_vehicle() -> None:
     assert advice.logging(plane) == "set LOG_BITMASK 1114111 (now 65535; bit 20 is missing)"
     without_sid = log(kind="ardupilot", parameters={"LOG_BITMASK": 65535.0})
     assert "SID_AXIS" not in advice.excitation(without_sid)
+    swept = log(kind="ardupilot", parameters={"A": 1.0}, sid_runs=["a run"])
+    assert advice.excitation(swept).startswith("fly system identification mode"), "it has just been"
     with_sid = log(kind="ardupilot", parameters={"SID_AXIS": 0.0})
     assert "flightid plan flown.bin" in advice.excitation(with_sid)
 

@@ -9,9 +9,11 @@ from scipy import stats
 
 from flightid.conventions import Light
 from flightid.evidence import Check, Evidence
-from flightid.evidence.part_checks import agreement_check
+from flightid.evidence.data_checks import loop_check
+from flightid.evidence.part_checks import agreement_check, beside_loop
 from flightid.uncertainty.agreement import Agreement, _freedom_of, _in_doubt, compare_parts
 from flightid.uncertainty.blocks import RecordBlock, flights_of, noise_heard
+from flightid.uncertainty.feedback_result import FeedbackTest
 from flightid.uncertainty.parts import RecordParts, _freedom, chance_alike, larger, scatter
 from flightid.uncertainty.quantiles import LEVEL, half_width
 from flightid.uncertainty.residual_noise import Autoregression
@@ -97,6 +99,15 @@ def test_records_that_differ_carry_the_scatter_and_students_freedom() -> None:
     assert agreement_check(agreed.agreement).light is Light.AMBER
     two = compare_parts(flights[:1] + flights[2:], third, third, np.array([np.inf]))
     assert agreement_check(two.agreement).light is Light.RED
+    # "mass, trim" was said of one vehicle, whose loop bent each record by noise of its own.
+    looped = beside_loop(
+        agreement_check(two.agreement), loop_check(FeedbackTest("closed", "declared"))
+    )
+    assert looped.light is Light.RED
+    assert looped.what.endswith("bends each by its own noise, which alone may set them apart")
+    assert "mass" not in looped.action
+    calm = agreement_check(agreed.agreement)
+    assert beside_loop(calm, loop_check(FeedbackTest("open", "declared"))) == calm
 
 
 @pytest.mark.parametrize("informations", [[1.0, 1.0], [4.0, 1.0, 1.0, 1.0]])

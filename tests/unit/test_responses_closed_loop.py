@@ -63,6 +63,20 @@ def test_instrument_removes_the_bias_of_feedback() -> None:
     ]  # fmt: skip
 
 
+def test_excitations_that_are_named_are_used() -> None:
+    """`--excitations injected` alone stayed direct: red, and of two records "mass, trim"."""
+    record = _flight(noise=0.6, closed=True, n=6000)
+    asked = {"inputs": "u", "outputs": "y", "band_rad_s": BAND, "n_omega": 20}
+    made = estimate_response(record, excitations="r", **asked)
+    assert made.estimator.startswith("instrument")
+    told = estimate_response(record, estimator="instrument", **asked)
+    assert_close(made.response, told.response, rtol=1e-12, why="the same estimate")
+    for known in ({"excitations": "r", "loop": "open"}, {}):
+        assert estimate_response(record, **known, **asked).estimator.startswith("composite")
+    both = estimate_response(record, inputs=["u", "r"], outputs="y", excitations="r")
+    assert both.estimator.startswith("composite"), "one excitation is not enough for two inputs"
+
+
 @pytest.mark.parametrize("noise", [0.0, 0.01, 0.3])
 def test_an_open_loop_gives_no_alarm(noise: float) -> None:
     response = estimate_response(

@@ -29,6 +29,7 @@ SEEN = Inspection("a", "px4", "", "copter", 120.0, (), PHASES, (), (), (), ())
 def _advice(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(advice, "logging", lambda _: "log faster")
     monkeypatch.setattr(advice, "excitation", lambda _: "sweep")
+    monkeypatch.setattr(advice, "more_injected", lambda _: "inject more")
     monkeypatch.setattr(advice, "record_length", lambda *_: "fly longer")
 
 
@@ -121,6 +122,8 @@ def test_without_a_band_the_largest_coherence_is_told_by_axis() -> None:
         "needed (largest found of the rate with what was injected: pitch 0.23; largest found: "
         "roll 0.52)"
     ), "coherence that nobody asked for is high, and none of what lacks"
+    actions = [each.action for each in verdicts._bands(LOG, replace(SEEN, bands=(roll, weak)))]
+    assert actions == ["sweep", "inject more", "inject more"], "not a piloted sweep"
     wide = _band(1.0, 20.0)
     assert [e.code for e in verdicts._bands(LOG, replace(SEEN, bands=(wide,)))] == ["band-roll"]
 

@@ -34,7 +34,7 @@ from flightid.evidence.evidence import (
 )
 from flightid.evidence.explained import ExplainedRun, by_free_runs, unless_hidden
 from flightid.evidence.parameter_checks import declared_signs
-from flightid.evidence.part_checks import agreement_check, beside_disturbances
+from flightid.evidence.part_checks import agreement_check, beside_disturbances, beside_loop
 from flightid.evidence.spans import Span, judge_coherence, judge_span
 from flightid.findings import Finding, worst
 from flightid.frozen import dataclass
@@ -173,7 +173,7 @@ def gather_evidence(made: FitFacts) -> Evidence:
     if loop is not None:
         checks.append(not_turned_round(unless_hidden(loop, made.free_runs), made.at_once))
     if made.agreement is not None:
-        check = agreement_check(made.agreement, made.values, made.unseen)
+        check = beside_loop(agreement_check(made.agreement, made.values, made.unseen), loop)
         disturbed = any(each.code == PROCESS_NOISE for each in made.findings)
         checks.append(beside_disturbances(check) if disturbed else check)
     if made.signs:

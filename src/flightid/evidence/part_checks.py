@@ -52,6 +52,9 @@ DISTURBED = "; noise on the states, which the residuals hold, makes parts differ
 DISTURBED_ACTION = "compare parts by a method that knows that noise (method='filter_error')"
 
 
+LOOPED = "; the closed loop bends each by its own noise, which alone may set them apart"
+
+
 def agreement_check(
     found: Agreement,
     values: NDArray[np.float64] | None = None,
@@ -128,6 +131,28 @@ def beside_disturbances(check: Check) -> Check:
     if check.light not in (Light.RED, Light.AMBER):
         return check
     return replace(check, light=Light.UNKNOWN, what=check.what + DISTURBED, action=DISTURBED_ACTION)
+
+
+def beside_loop(check: Check, loop: Check | None) -> Check:
+    """A comparison of parts that a closed loop bends: one vehicle differs from part to part.
+
+    Parameters
+    ----------
+    check : Check
+        Of the parts.
+    loop : Check or None
+        Amber or red where a loop bends estimates.
+
+    Example
+    -------
+    >>> apart = agreement_check(Agreement(2, None, 0.001, np.ones(1)))
+    >>> beside_loop(apart, Check("loop", Light.AMBER, "loop closed", "inject")).action
+    'inject'
+    """
+    bends = loop is not None and loop.light in (Light.RED, Light.AMBER)
+    if loop is None or not bends or check.light not in (Light.RED, Light.AMBER):
+        return check
+    return replace(check, what=check.what + LOOPED, action=loop.action)
 
 
 def needs_another(n_records: int) -> bool:

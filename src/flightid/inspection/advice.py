@@ -127,12 +127,21 @@ def excitation(log: Log) -> str:
         )
     if log.kind == "inav":
         return f"{piloted}, in ANGLE; {sized}"
-    if log.vehicle == "copter" and "SID_AXIS" not in log.parameters and log.parameters:
+    unknown = "SID_AXIS" not in log.parameters and log.parameters and not log.sid_runs
+    if log.vehicle == "copter" and unknown:
         return f"{piloted}; {sized}"
     if log.vehicle == "copter":
         return f"fly system identification mode with {SID_MIXER}; {sized}"
     swept = "fly sweeps or 3-2-1-1 steps about each axis"
     return f"{swept}; {sized if log.vehicle == 'plane' else repeats}"
+
+
+def more_injected(log: Log) -> str:
+    """What to do where the rate answers gusts more than what was injected."""
+    return (
+        "inject with more amplitude, in less wind or for longer: flightid plan "
+        f"{log.path.name} writes the amplitude"
+    )
 
 
 def record_length(lowest_hz: float = LOWEST_OF_INTEREST.value) -> str:

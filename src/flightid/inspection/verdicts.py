@@ -60,7 +60,7 @@ def _without_model(log: Log, found: Inspection, told: list[Finding]) -> list[Fin
     swept = any(is_swept(found, band.axis) for band in found.bands)
     why = "none has a sweep in a band wide enough" if swept else "none was swept"
     what = f"no axis carries a model: {why}"
-    return [Finding("no-model", Light.RED, what, advice.excitation(log))]
+    return [Finding("no-model", Light.RED, what, _to_excite(log, found.bands))]
 
 
 def _scales(log: Log, found: Inspection) -> list[Finding]:
@@ -222,10 +222,16 @@ def _bands(log: Log, found: Inspection) -> list[Finding]:
                 Light.RED,
                 "no axis has a band that supports a model: half a decade with coherence of at "
                 f"least 0.6 is needed ({seen})",
-                advice.excitation(log),
+                _to_excite(log, found.bands),
             )
         )
     return findings
+
+
+def _to_excite(log: Log, bands: Iterable[AxisBand]) -> str:
+    """What to fly, or where what was injected was too weak, to do with more of it."""
+    weak = any(band.injected_coherence is not None for band in bands)
+    return advice.more_injected(log) if weak else advice.excitation(log)
 
 
 def _largest(bands: Iterable[AxisBand]) -> str:
@@ -251,7 +257,7 @@ def _band(log: Log, band: AxisBand) -> Finding:
             f"no-band-{band.axis}",
             Light.AMBER,
             f"{band.axis}: no usable band: {band.reason}",
-            advice.excitation(log),
+            _to_excite(log, [band]),
         )
     width = coherent[1] / coherent[0]
     shown = band.told_rad_s or coherent

@@ -79,10 +79,12 @@ def estimate_response(
         Window lengths, s; rounded to an even number of whole hops.
     excitations : str or iterable of str, optional
         Channels of injected signals that are independent of the noise; needed by "instrument".
-        Default for that method: the channels with the role excitation.
+        Default for that method: the channels with the role excitation. "auto" goes by way of those
+        that are named, one for each input, unless the loop is known to be open.
     estimator : {"auto", "composite", "instrument", "local_polynomial", "periodic", "prewhitened"}
         "auto": "periodic" where all inputs repeat exactly over three settled periods or more and
-        neither windows nor frequencies are asked for, else "composite".
+        neither windows nor frequencies are asked for, else "instrument" with excitations that are
+        named, else "composite".
         "composite": directly from inputs to outputs. "instrument": for records with a loop closed,
         by way of the excitation. "local_polynomial": without windows, for short records.
         "periodic": at the harmonics of inputs that repeat (`Record.period_s`), whole periods alone.
@@ -162,7 +164,11 @@ def estimate_response(
         if whole is not None:
             return _with_excited(_with_inputs(whole, samples, listed, loop), listed)
     if estimator == "auto":
-        options["estimator"] = estimator = "composite"
+        names = _by_way(samples, listed, excitations, loop)
+        options["estimator"] = estimator = "instrument" if names else "composite"
+        if names:
+            channels = samples.inputs, samples.outputs, names
+            samples = gather(listed, *channels, keep_mean=detrend == "none")
     plans = plan_windows(window_s, samples, float(omega[-1]), shifts_of(overlap))
     _require_motion_in_windows(samples, max(plan.length for plan in plans))
     lengths = ", ".join(f"{plan.length * samples.sample_time_s:.6g}" for plan in plans)
@@ -189,6 +195,18 @@ def estimate_response(
         return replace(response, findings=(*response.findings, missing))
     linear = LinearEstimate.of(samples, WindowedWeights(errors), omega)
     return _with_excited(replace(response, errors=errors, linear=linear), listed)
+
+
+def _by_way(
+    samples: Samples,
+    records: Sequence[Record],
+    excitations: Iterable[str] | str | None,
+    loop: Loop | None,
+) -> list[str]:
+    """Excitations that were named, by way of which a loop does not bias; none of an open one."""
+    names = [excitations] if isinstance(excitations, str) else list(excitations or ())
+    known = loop or common_loop([shape_of(record) for record in records])
+    return [] if known == "open" or len(names) < len(samples.inputs) else names
 
 
 def _of_whole_records(

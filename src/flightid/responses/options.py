@@ -26,7 +26,8 @@ class ResponseOptions(Options):
         doc="Lowest and highest frequency; default: what the records carry.",
     )
     excitations: tuple[str, ...] | None = option(
-        None, doc="Injected signals, independent of noise, for estimator 'instrument'."
+        None,
+        doc="Injected signals, independent of noise: for 'instrument', and for 'auto' where named.",
     )
     loop: Loop | None = option(
         None, choices=LOOPS, doc="Whether a loop was closed; default: a test decides."

@@ -227,8 +227,9 @@ def free_run_errors(
             )
             left -= motion_from(a, c, start, y.shape[1])
             squares.append(np.mean((left[:, skip:] / size) ** 2, axis=0))
-    joint = np.concatenate(squares)
-    return np.array([np.mean(part) for part in np.array_split(joint, STRETCHES)])
+        # A run of a state that grows may be finite, and its sum not.
+        parts = np.array_split(np.concatenate(squares), STRETCHES)
+        return np.array([np.mean(part) for part in parts])
 
 
 def simplest(errors: Sequence[Array], *, errors_apart: float = BEYOND_CHANCE) -> int:
