@@ -38,6 +38,8 @@ MEMORY = 12 << 30
 """Bytes of addresses: a changed size of an array is an error, not a swapping machine."""
 QUIET = ("no-data-collected", "module-not-measured", "already-imported", "module-not-imported")
 WORDS = ("-p", "no:cacheprovider", "-p", "no:terminal", "-s", "--doctest-modules")
+# A watchdog of a pytest that forked is no thread of the fork: to call it off would wait for ever.
+WORDS += ("-p", "no:faulthandler")
 WORDS += ("-W", "ignore::pytest.PytestAssertRewriteWarning")
 LIBRARIES = (
     *("numpy", "hypothesis.extra.numpy", "scipy.integrate", "scipy.interpolate", "scipy.linalg"),
