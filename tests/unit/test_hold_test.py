@@ -11,14 +11,13 @@ import pytest
 import flightid as fid
 from flightid.conventions import Light
 from flightid.identification import hold_likelihood
-from flightid.identification.hold_likelihood import (
-    HeldOutputs,
-    _columns,
-    _products,
-    _squares_of,
-    _steps,
-    _weighed,
-    held_outputs,
+from flightid.identification.hold_likelihood import HeldOutputs, held_outputs
+from flightid.identification.hold_steps import (
+    products_of,
+    some_columns,
+    squares_of,
+    steps_of,
+    weighed,
 )
 from flightid.identification.hold_test import judged
 from flightid.identification.rival_holds import OtherHold
@@ -288,6 +287,32 @@ def test_likelihood_under_another_hold_is_what_a_fit_under_it_finds(
     assert max(ratios) < 1.0
 
 
+def test_steps_beside_a_fit_begin_at_its_own_numbers_of_each_record(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    records = [holds.flight(seed, "steps", told="zero") for seed in (0, 1)]
+    for place, record in enumerate(records):
+        moved = {name: record[name] + 0.01 * (place + 1) for name in ("alpha", "q")}
+        records[place] = record.replace(moved)
+    fit = fid.identify(holds.model(), records, output_bias=True)
+    run, begun = hold_likelihood.run_with_slopes, list[Any]()
+
+    def seen(*given: Any, **how: bool) -> Any:
+        begun.append(given[4])
+        return run(*given, **how)
+
+    monkeypatch.setattr(hold_likelihood, "run_with_slopes", seen)
+    given = {"output_bias": True}
+    (here,) = held_outputs(fit.model, records, given, ["zero"], beside=fit)
+    for record, own in zip(fit.records, begun[:2], strict=True):
+        known = [record.bias[name].value for name in fit.model.outputs]
+        assert_close(own.bias, known, rtol=1e-12, why="the fit's own biases")
+        assert np.all(np.abs(own.bias) > 0.0)
+    # From its own minimum no step of a fit leads far: outputs weigh by their size in the first.
+    spread = np.array([fit.parameters[name].stderr for name in fit.names])
+    assert np.all(np.abs(here.values - HeldOutputs.of(fit).values) < 0.1 * spread)
+
+
 def test_lines_of_a_simulator_may_be_staircases() -> None:
     record = fid.simulate(
         holds.model().with_values(holds.TRUTH),
@@ -407,12 +432,12 @@ def test_products_of_a_step_are_those_of_its_columns() -> None:
     random = np.random.default_rng(0)
     left, slopes = random.standard_normal((2, 700)), random.standard_normal((2, 700, 5))
     weights = np.array([0.5, 3.0])
-    rows = np.concatenate(list(_weighed(left, slopes, weights, 3)))
-    found = _products(left, slopes, _squares_of(slopes), weights, 3)
+    rows = np.concatenate(list(weighed(left, slopes, weights, 3)))
+    found = products_of(left, slopes, squares_of(slopes), weights, 3)
     assert_close(found, rows.T @ rows, rtol=1e-12, why="rounding of two ways")
-    some = np.concatenate(list(_columns(left, slopes, 3, [5, 0, 4])))
-    weighed = np.repeat(weights, 700)[:, None] * some
-    assert_close(weighed, rows[:, [5, 0, 4]], rtol=1e-15, why="the same numbers")
+    some = np.concatenate(list(some_columns(left, slopes, 3, [5, 0, 4])))
+    taken = np.repeat(weights, 700)[:, None] * some
+    assert_close(taken, rows[:, [5, 0, 4]], rtol=1e-15, why="the same numbers")
 
 
 def test_own_numbers_of_one_effect_take_nothing_from_shared_parameters() -> None:
@@ -424,8 +449,8 @@ def test_own_numbers_of_one_effect_take_nothing_from_shared_parameters() -> None
         slopes[0, :, 2:], slopes[1, :, 2:] = [1.0, 0.0, 1.0], [0.0, 1.0, 0.0]
         records.append((10.0 * random.standard_normal((2, n)), slopes))
     left, slopes = zip(*records, strict=True)
-    squares = [_squares_of(each) for each in slopes]
-    found = _steps(left, slopes, squares, np.array([2.0, 0.5]), 2, None)
+    squares = [squares_of(each) for each in slopes]
+    found = steps_of(left, slopes, squares, np.array([2.0, 0.5]), 2, None)
     whole, target = np.zeros((1500, 8)), np.concatenate([each.ravel() for each in left])
     weights = np.concatenate([np.repeat([0.5, 2.0], n) for n in (300, 450)])
     for place, (first, each) in enumerate(zip((0, 600), slopes, strict=True)):

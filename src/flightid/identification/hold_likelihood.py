@@ -8,9 +8,8 @@ the same for every hold.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
-from functools import partial
 from typing import Any, Self
 
 import numpy as np
@@ -21,6 +20,7 @@ from flightid.errors import DataError, FlightidError
 from flightid.frozen import dataclass
 from flightid.identification.delay_cells import DelayCells, later_by
 from flightid.identification.fit import Fit
+from flightid.identification.hold_steps import changes_of, squares_of, squares_over, steps_of
 from flightid.identification.output_error.distinct import run_with_slopes
 from flightid.identification.output_error.equation_records import (
     EquationRuns,
@@ -35,17 +35,12 @@ from flightid.record.hold import InputHold
 from flightid.recursive_filter import filtered
 from flightid.responses import FrequencyResponse
 from flightid.uncertainty.foretold import expected_gain, likelihood_gain
-from flightid.uncertainty.triangle import triangle_of_parts, triangle_of_rows
 
 Array = NDArray[np.float64]
-ALIKE = 1e-9
-"""Share of an own number's effect that others of its record leave, up to which it is rounding."""
 RIDGE = 1e-9
 """Added to the power of what is left, as white noise."""
 FAR = 100.0
 """Residual over an output's deviation beyond which a model follows nothing."""
-AT_ONCE = 1 << 16
-"""Rows that are turned into a triangle together."""
 LAGS = 20
 """Of the filters that take colour out."""
 STEPS, COLOURED_STEPS = 2, 8
@@ -133,6 +128,7 @@ def held_outputs(
     *,
     coloured: bool = False,
     assumed: InputHold | None = None,
+    beside: Fit | None = None,
 ) -> list[HeldOutputs]:
     """Records beside a model near whose values the estimates lie, under each of some holds.
 
@@ -148,6 +144,9 @@ def held_outputs(
         Take out the colour of what is left under the first of them.
     assumed : {"zero", "first", "band_limited"}, optional
         Hold that the estimates were made under; left out: the first of them.
+    beside : Fit, optional
+        Whose estimates are those of least squares on these records: steps begin at its own numbers
+        of each.
 
     Raises
     ------
@@ -160,6 +159,8 @@ def held_outputs(
     runs_of = equation_runs(model, prepared)
     if runs_of is not None:
         prepared = segmented_starts(prepared, runs_of)
+    if beside is not None and (runs_of is None or not runs_of.is_segmented):
+        prepared = replace(prepared, own=_ended(prepared, beside))
     # Under the hold of the fit no whole sample of a delay is passed: its search tried their sides.
     cells = {prepared.hold: _cell(prepared)}
     filters = None
@@ -170,6 +171,20 @@ def held_outputs(
         _under(_begun(prepared, hold, assumed or holds[0]), runs_of, filters, cells.get(hold))
         for hold in holds
     ]
+
+
+def _ended(prepared: RecordSet, fit: Fit) -> list[OwnNumbers]:
+    """Own numbers of each record, the free ones as a fit left them."""
+    found = []
+    for numbers, record in zip(prepared.own, fit.records, strict=True):
+        kinds = (
+            (prepared.states, numbers.free_initial, record.initial_state),
+            (fit.model.inputs, numbers.free_shift, record.reference_shift),
+            (fit.model.outputs, numbers.free_bias, record.bias),
+        )
+        names = [(names[place], known) for names, places, known in kinds for place in places]
+        found.append(numbers.filled(np.array([known[name].value for name, known in names])))
+    return found
 
 
 def _begun(prepared: RecordSet, hold: InputHold, assumed: InputHold) -> RecordSet:
@@ -245,15 +260,15 @@ def _under(
         left = [_whitened(each, filters) for each in left]
         if not slopes:
             slopes = [_whitened(slope, filters) for _, slope in runs]
-            squares = [_squares_of(slope) for slope in slopes]
+            squares = [squares_of(slope) for slope in slopes]
         del runs  # whose slopes would stand beside the next ones
         limits = None if cell is None else (cell[0] - values, cell[1] - values)
-        steps = _steps(left, slopes, squares, sizes, len(free), limits)
-        changes = [_changes(*pair, len(free)) for pair in zip(slopes, steps, strict=True)]
+        steps = steps_of(left, slopes, squares, sizes, len(free), limits)
+        changes = [changes_of(*pair, len(free)) for pair in zip(slopes, steps, strict=True)]
         left = [rest - shared - own for rest, (shared, own) in zip(left, changes, strict=True)]
         sizes = np.sqrt(np.mean(np.concatenate(left, axis=1) ** 2, axis=1))
         shared, own = ([each[place] for each in changes] for place in (0, 1))
-        moved = _squares(shared, sizes), _squares(own, sizes)
+        moved = squares_over(shared, sizes), squares_over(own, sizes)
         if moved[0] > SHORT or moved[1] > NEAR * samples:
             slopes = []
         ended = sum(moved) < SETTLED
@@ -266,26 +281,6 @@ def _under(
         if ended:
             break
     return HeldOutputs(values, left)
-
-
-def _squares_of(slopes: Array) -> Array:
-    """Products of slopes by all numbers with all, of each output, (n_outputs, k, k)."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        return np.array([slope.T @ slope for slope in slopes])
-
-
-def _changes(slopes: Array, step: Array, n_free: int) -> tuple[Array, Array]:
-    """What a step changes of outputs by the shared parameters, and by the record's own numbers."""
-    apart = np.zeros((len(step), 2))
-    apart[:n_free, 0], apart[n_free:, 1] = step[:n_free], step[n_free:]
-    found = slopes @ apart
-    return found[:, :, 0], found[:, :, 1]
-
-
-def _squares(changes: Sequence[Array], sizes: Array) -> float:
-    """Sum of squares of changes of outputs, each over what is left of it."""
-    total = np.sum([np.sum(each**2, axis=1) for each in changes], axis=0)
-    return float(np.sum(total / np.where(sizes > 0.0, sizes, 1.0) ** 2))
 
 
 def _require_near(left: Sequence[Array], slopes: Sequence[Array], largest: Array) -> None:
@@ -306,106 +301,6 @@ def _require_near(left: Sequence[Array], slopes: Sequence[Array], largest: Array
             found=f"residuals above {FAR:g} times the outputs",
             needed="a model that follows them",
         )
-
-
-def _steps(
-    left: Sequence[Array],
-    slopes: Sequence[Array],
-    squares: Sequence[Array],
-    sizes: Array,
-    n_free: int,
-    limits: tuple[Array, Array] | None,
-) -> list[Array]:
-    """Least squares: changes of the shared parameters and of each record's own numbers."""
-    weights = 1.0 / np.where(sizes > 0.0, sizes, 1.0)
-    # Triangles hold all that least squares ask, of as many rows as there are numbers.
-    triangles = [
-        triangle_of_parts(
-            partial(_weighed, rest, slope, weights, n_free),
-            _products(rest, slope, square, weights, n_free),
-            partial(_columns, rest, slope, n_free),
-        )
-        for rest, slope, square in zip(left, slopes, squares, strict=True)
-    ]
-    seen = [_told_apart(each, each.shape[1] - n_free - 1) for each in triangles]
-    triangles = [each for each, _ in seen]
-    n_own = [each.shape[1] - n_free - 1 for each in triangles]
-    inner = [each[m:, m:] for each, m in zip(triangles, n_own, strict=True)]
-    whole = triangle_of_rows(np.concatenate(inner))
-    shared: Array = np.asarray(np.linalg.lstsq(whole[:, :-1], whole[:, -1])[0], dtype=np.float64)
-    if limits is not None:
-        shared = _inside(shared, whole, limits)
-    found = []
-    for each, (_, kept), m in zip(triangles, seen, n_own, strict=True):
-        rest = each[:m, -1] - each[:m, m:-1] @ shared
-        own = np.zeros(len(kept))
-        own[kept] = np.linalg.lstsq(each[:m, :m], rest)[0]
-        found.append(np.concatenate([shared, own]))
-    return found
-
-
-def _told_apart(triangle: Array, n_own: int) -> tuple[Array, NDArray[np.bool_]]:
-    """The triangle without own numbers that do what others of the record do, and which are left.
-
-    A bias of an output that is a state and the state's start may have one effect: rounding would
-    decide along what the second of them is eliminated, and take that from the shared parameters.
-    """
-    size = np.linalg.norm(triangle[:, :n_own], axis=0)
-    kept = np.abs(np.diag(triangle)[:n_own]) > ALIKE * size
-    if np.all(kept):
-        return triangle, kept
-    rest = np.ones(triangle.shape[1] - n_own, dtype=bool)
-    return triangle_of_rows(triangle[:, np.concatenate([kept, rest])]), kept
-
-
-def _inside(step: Array, triangle: Array, limits: tuple[Array, Array]) -> Array:
-    """The step, what would leave its limits held there and the rest solved again."""
-    clipped = np.clip(step, *limits)
-    rest = clipped == step
-    if np.all(rest):
-        return step
-    target = triangle[:, -1] - triangle[:, :-1][:, ~rest] @ clipped[~rest]
-    clipped[rest] = np.linalg.lstsq(triangle[:, :-1][:, rest], target)[0]
-    return np.clip(clipped, *limits)
-
-
-def _products(left: Array, slopes: Array, squares: Array, weights: Array, n_free: int) -> Array:
-    """Products of the columns that `_weighed` gives, without a copy of long slopes.
-
-    Those of slopes, `squares` by output, are the same in steps that keep them.
-    """
-    count = slopes.shape[2]
-    found = np.zeros((count + 1, count + 1))
-    with np.errstate(over="ignore", invalid="ignore"):
-        for rest, slope, square, weight in zip(left, slopes, squares, weights, strict=True):
-            found[:count, :count] += weight**2 * square
-            found[:count, count] += weight**2 * (slope.T @ rest)
-            found[count, count] += weight**2 * (rest @ rest)
-    found[count, :count] = found[:count, count]
-    places = _order(count, n_free)
-    return np.asarray(found[np.ix_(places, places)])
-
-
-def _order(count: int, n_free: int) -> list[int]:
-    """Own numbers' slopes, the shared ones', what is left, as they stand in slopes and left."""
-    return [*range(n_free, count), *range(n_free), count]
-
-
-def _columns(left: Array, slopes: Array, n_free: int, places: Sequence[int]) -> Iterator[Array]:
-    """Some columns of `_weighed`, by output and without its weights."""
-    order = _order(slopes.shape[2], n_free)
-    for rest, slope in zip(left, slopes, strict=True):
-        whole = [rest if order[k] == slope.shape[1] else slope[:, order[k]] for k in places]
-        yield np.column_stack(whole)
-
-
-def _weighed(left: Array, slopes: Array, weights: Array, n_free: int) -> Iterator[Array]:
-    """Rows of a record: own numbers' slopes, the shared ones', what is left."""
-    for rest, slope, weight in zip(left, slopes, weights, strict=True):
-        for begin in range(0, len(rest), AT_ONCE):
-            rows = slice(begin, begin + AT_ONCE)
-            parts = slope[rows, n_free:], slope[rows, :n_free], rest[rows]
-            yield weight * np.column_stack(parts)
 
 
 def _free_values(numbers: OwnNumbers) -> Array:

@@ -186,14 +186,14 @@ class Rivals:
         return known
 
     def _held(self, holds: Sequence[InputHold]) -> list[HeldOutputs]:
-        coloured = not self.is_likeliest
         return held_outputs(
             self.fit.model,
             self.records,
             self.given,
             holds,
-            coloured=coloured,
+            coloured=not self.is_likeliest,
             assumed=self.assumed,
+            beside=self.fit if self.is_likeliest else None,
         )
 
     def _beside(
