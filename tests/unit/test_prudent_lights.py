@@ -99,8 +99,11 @@ def test_a_failure_is_worth_what_it_misses(
 def test_the_worst_output_is_told_in_any_order(order: int) -> None:
     costs = dict([("p", 15.0), ("r", 35.0), ("ay", 38.0)][::order])
     # Of what ay leaves its own white noise makes most.
-    said = judge_fit(costs, (1.0, 1.0), {"ay": 25.0})
+    said = judge_fit(costs, (1.0, 1.0), lambda: {"ay": 25.0})
     assert [each.message.split(":")[0] for each in said[:3]] == ["r", "p", "ay"]
+    # Where no output is left more than any misfit may be, noise is not asked.
+    said = judge_fit({name: 0.2 * cost for name, cost in costs.items()}, (1.0, 1.0), lambda: {}[""])
+    assert [each.message.split(":")[0] for each in said[:3]] == ["ay", "r", "p"]
     random = np.random.default_rng(1)
     u, y = random.standard_normal((2, 400))
     (test,) = (

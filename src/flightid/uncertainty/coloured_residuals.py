@@ -159,6 +159,7 @@ def residual_covariance(
     *,
     coloured: bool = True,
     overwrite: bool = False,
+    triangle: Array | None = None,
 ) -> ResidualCovariance:
     """Covariance of estimates by the colour of their residuals.
 
@@ -177,6 +178,8 @@ def residual_covariance(
         False takes residuals for white, of the power that they have.
     overwrite : bool
         Whether the sensitivities of the blocks may be lost, which saves as much memory again.
+    triangle : ndarray, shape (n, n), optional
+        `triangle_of` these blocks and what is beside them, where it is known.
 
     Returns
     -------
@@ -203,7 +206,8 @@ def residual_covariance(
     >>> round(float(found.white[0, 0]), 4)
     0.0025
     """
-    triangle = triangle_of(blocks, None if beside is None else beside.slopes)
+    if triangle is None:
+        triangle = triangle_of(blocks, None if beside is None else beside.slopes)
     root = _inverse_root(triangle)
     # In directions of unit information squares keep their digits, however nearly singular it is.
     whitened = [block.along(root, overwrite=overwrite) for block in blocks]

@@ -86,9 +86,9 @@ class LaggedInputs:
 
     def _with_lags(self, parts: Sequence[Array]) -> list[Array]:
         count, n = self.centred.shape
-        found = [np.zeros((columns.shape[1], self.n_lags * count)) for columns in parts]
+        found = [np.zeros((self.n_lags * count, columns.shape[1])) for columns in parts]
         for piece, lags in at_lags(self._padded, n, self.n_lags - 1):
             for each, columns in zip(found, parts, strict=True):
-                np.add(each, columns[piece].T @ lags.T, out=each)
-        by_input = [each.reshape(-1, self.n_lags, count).transpose(0, 2, 1) for each in found]
-        return [each.reshape(len(each), -1) for each in by_input]
+                np.add(each, lags @ columns[piece], out=each)
+        by_lag = [each.reshape(self.n_lags, count, -1).transpose(2, 1, 0) for each in found]
+        return [each.reshape(len(each), -1) for each in by_lag]

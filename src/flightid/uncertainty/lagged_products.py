@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 Places = NDArray[np.intp]
 RIDGE = 1e-11
 """Added to columns of unit length: noise 110 dB below each channel."""
-AT_ONCE = 2048
+AT_ONCE = 1024
 """Samples that all lags meet in one product: their copies at each lag stay in the cache."""
 UNEVEN = 1e-3
 """Share of a channel's largest power at any lag below which one of it is rounding of the others."""

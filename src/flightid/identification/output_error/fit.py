@@ -193,7 +193,9 @@ def _assemble(
         *judge_search(groups, best.cost + _NEAR * prepared.n_samples * len(fitted.outputs)),
         *judge_parameters(found.parameters),
         *judge_correlation(found.names, found.correlation, found.parameters),
-        *judge_fit(costs, found.colour, explained_percent(prepared.records, fitted.outputs)),
+        *judge_fit(
+            costs, found.colour, lambda: explained_percent(prepared.records, fitted.outputs)
+        ),
         *noise,
     )
     return Fit(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -63,7 +63,7 @@ def judge_channels(prepared: RecordSet) -> list[Finding]:
 def judge_fit(
     costs: Mapping[str, float],
     colour: tuple[float, float],
-    noise: Mapping[str, float] | None = None,
+    noise: Callable[[], Mapping[str, float]] | None = None,
 ) -> list[Finding]:
     """Verdicts on what the model explains, the worst first, and on the colour of the residuals.
 
@@ -73,13 +73,14 @@ def judge_fit(
         Percent of each output's variance in the residuals.
     colour : tuple of float
         Smallest and largest ratio of a standard error to that for white residuals.
-    noise : mapping of str to float, optional
-        Percent that white noise of the measurements makes, which is no misfit.
+    noise : callable, optional
+        Gives the percent that white noise of the measurements makes, which is no misfit; asked
+        where more is left of an output than may be misfit.
     """
-    found, made = (
-        [],
-        {name: min(cost, (noise or {}).get(name, 0.0)) for name, cost in costs.items()},
-    )
+    asked = noise is not None and max(costs.values(), default=0.0) > GOOD_PERCENT
+    known = noise() if noise is not None and asked else {}
+    made = {name: min(cost, known.get(name, 0.0)) for name, cost in costs.items()}
+    found = []
     # A check tells its first finding: of outputs with one light that is the worst.
     for name in sorted(costs, key=lambda name: made[name] - costs[name]):
         cost, by_noise = costs[name], made[name]

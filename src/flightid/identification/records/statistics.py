@@ -130,7 +130,9 @@ def record_statistics(
     require_identifiable(names, triangle)
     inputs = [each[0] for each in prepared.arrays] if judged() else None
     held = _of_starts(starts, blocks, whitener)
-    known = residual_covariance(blocks, other, inputs=inputs, coloured=judged(), overwrite=True)
+    known = residual_covariance(
+        blocks, other, inputs=inputs, coloured=judged(), overwrite=True, triangle=triangle
+    )
     covariance = known.covariance + known.white @ held @ known.white.T
     moved = None
     if other is not None and other.bias is not None:

