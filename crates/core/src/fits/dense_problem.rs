@@ -16,14 +16,16 @@ pub(crate) struct Dense<'a, P> {
     trial: Vec<f64>,
     pub(crate) jacobian: Vec<f64>,
     work: Vec<f64>,
+    /// Whether the Jacobian is that of the point where the trial residuals are.
+    together: bool,
 }
 
 impl<'a, P: Problem> Dense<'a, P> {
     pub(crate) fn new(problem: &'a mut P) -> Self {
         let m = problem.n_residuals();
         let (residuals, trial) = (vec![0.0; m], vec![0.0; m]);
-        let jacobian = Vec::new();
-        Self { problem, residuals, trial, jacobian, work: Vec::new() }
+        let (jacobian, work, together) = (Vec::new(), Vec::new(), false);
+        Self { problem, residuals, trial, jacobian, work, together }
     }
 }
 
@@ -38,7 +40,13 @@ impl<P: Problem> Objective for Dense<'_, P> {
     }
 
     fn begin(&mut self, x: &[f64]) -> Result<(), CoreError> {
-        self.problem.residuals(x, &mut self.trial)?;
+        self.together = self.problem.makes_both();
+        if self.together {
+            self.jacobian.resize(self.trial.len() * x.len(), 0.0);
+            self.problem.both(x, &mut self.trial, &mut self.jacobian)?;
+        } else {
+            self.problem.residuals(x, &mut self.trial)?;
+        }
         match self.trial.iter().position(|value| !value.is_finite()) {
             Some(index) => Err(CoreError::NotFinite { what: "the residuals at the start", index }),
             None => Ok(()),
@@ -56,7 +64,7 @@ impl<P: Problem> Objective for Dense<'_, P> {
         let n = x.len();
         self.work.clear();
         self.work.resize((n + 1) * (n + 1), 0.0);
-        if !self.problem.triangle(x, &mut self.work)? {
+        if self.together || !self.problem.triangle(x, &mut self.work)? {
             return self.triangularise_jacobian(x, point);
         }
         if let Some(index) = self.work.iter().position(|value| !value.is_finite()) {
@@ -74,8 +82,10 @@ impl<P: Problem> Objective for Dense<'_, P> {
 impl<P: Problem> Dense<'_, P> {
     fn triangularise_jacobian(&mut self, x: &[f64], point: &mut Point) -> Result<(), CoreError> {
         let (n, m) = (x.len(), self.residuals.len());
-        self.jacobian.resize(m * n, 0.0);
-        self.problem.jacobian(x, &mut self.jacobian)?;
+        if !std::mem::take(&mut self.together) {
+            self.jacobian.resize(m * n, 0.0);
+            self.problem.jacobian(x, &mut self.jacobian)?;
+        }
         if let Some(index) = first_not_finite(&self.jacobian) {
             return Err(CoreError::NotFinite { what: "the Jacobian", index });
         }

@@ -18,6 +18,23 @@ pub trait Problem {
     /// # Errors
     /// Where the derivatives have no value at `x`.
     fn jacobian(&mut self, x: &[f64], jacobian: &mut [f64]) -> Result<(), CoreError>;
+    /// Whether `both` makes residuals beside the Jacobian for what that takes alone.
+    fn makes_both(&self) -> bool {
+        false
+    }
+    /// Residuals and Jacobian at `x`.
+    ///
+    /// # Errors
+    /// Where either has no value at `x`.
+    fn both(
+        &mut self,
+        x: &[f64],
+        residuals: &mut [f64],
+        jacobian: &mut [f64],
+    ) -> Result<(), CoreError> {
+        self.residuals(x, residuals)?;
+        self.jacobian(x, jacobian)
+    }
     /// Triangle of [Jacobian | residuals] at `x`, (n + 1 × n + 1), column-major, from a problem that
     /// makes it without keeping its long Jacobian; false: take the Jacobian.
     ///

@@ -230,16 +230,35 @@ impl<M: ResponseModel> Problem for FrequencyFit<'_, M> {
     fn residuals(&mut self, x: &[f64], residuals: &mut [f64]) -> Result<(), CoreError> {
         self.model.prepare(x, false)?;
         self.fill(Some(residuals), None);
-        match residuals.iter().position(|value| !value.is_finite()) {
-            Some(index) => Err(CoreError::NotFinite { what: "the model's response", index }),
-            None => Ok(()),
-        }
+        require_finite(residuals)
+    }
+
+    fn makes_both(&self) -> bool {
+        true
+    }
+
+    fn both(
+        &mut self,
+        x: &[f64],
+        residuals: &mut [f64],
+        jacobian: &mut [f64],
+    ) -> Result<(), CoreError> {
+        self.model.prepare(x, true)?;
+        self.fill(Some(residuals), Some(jacobian));
+        require_finite(residuals)
     }
 
     fn jacobian(&mut self, x: &[f64], jacobian: &mut [f64]) -> Result<(), CoreError> {
         self.model.prepare(x, true)?;
         self.fill(None, Some(jacobian));
         Ok(())
+    }
+}
+
+fn require_finite(residuals: &[f64]) -> Result<(), CoreError> {
+    match residuals.iter().position(|value| !value.is_finite()) {
+        Some(index) => Err(CoreError::NotFinite { what: "the model's response", index }),
+        None => Ok(()),
     }
 }
 

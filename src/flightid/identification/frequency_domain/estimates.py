@@ -256,10 +256,10 @@ def known_parameters(
     """
     errors = _standard_errors(fitted, names, covariance)
     degrees = {} if freedom is None else dict(zip(names, map(float, freedom), strict=True))
-    result = {}
+    result, told = {}, set(names)
     for name, parameter in fitted.parameters.items():
         value = float(parameter.value or 0.0)
-        left = parameter.free and name not in names
+        left = parameter.free and name not in told
         bound = left and at_bound(parameter)
         result[name] = Estimate(
             name,

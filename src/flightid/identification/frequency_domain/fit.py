@@ -41,7 +41,7 @@ from flightid.identification.frequency_domain.feedback_findings import (
 )
 from flightid.identification.frequency_domain.left_by_model import LeftByModel
 from flightid.identification.frequency_domain.longer_windows import judge_windows
-from flightid.identification.frequency_domain.model_curves import curves_of, start_curves
+from flightid.identification.frequency_domain.model_curves import curves_of, looks_of, start_curves
 from flightid.identification.frequency_domain.noise_cost import noise_costs
 from flightid.identification.frequency_domain.noisy_points import (
     judge_weights,
@@ -183,8 +183,10 @@ def check_channels(model: GreyBoxModel, data: FrequencyResponse) -> None:
         Data and model disagree on a unit.
     """
     require_free(model)
+    outputs, inputs = set(data.outputs), set(data.inputs)
     for response in model.responses:
-        data.pair(response.output, response.input)
+        if response.output not in outputs or response.input not in inputs:
+            data.pair(response.output, response.input)  # which says what there is
     # Outputs of a model that no fitted response needs may be missing from the data.
     needed = (name for each in model.responses for name in (each.output, each.input))
     for name in dict.fromkeys(needed):
@@ -204,15 +206,15 @@ def check_start(model: GreyBoxModel, selected: Sequence[SelectedResponse]) -> li
         starts = start_curves(model, [each.omega_rad_s for each in selected])
     except DataError:
         return []  # no value at the start: the search will say so if no start has one
-    for each, start in zip(selected, starts, strict=True):
-        if not np.any(start):
+    for each, start, seen, sound in zip(selected, starts, *looks_of(starts), strict=True):
+        if not seen:
             raise FitError(
                 f"the model has no response of {each.name}",
                 found="zero at every frequency with the start values",
                 needed="a path from this input to this output",
                 action="leave the pair out, or start its parameters away from zero",
             )
-        if np.all(np.isfinite(start)) and np.all(np.abs(start) > 0.0):
+        if sound:
             looked.append(Start(each.name, each.omega_rad_s, each.response, start))
     return check_setups(looked)
 

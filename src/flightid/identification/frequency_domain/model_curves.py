@@ -73,6 +73,22 @@ def curves_of(model: GreyBoxModel, grids: Sequence[Array]) -> list[Complex]:
     return known.apart(known.joined(model))
 
 
+def looks_of(curves: Sequence[Complex]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Of each curve, whether it is not zero throughout, and whether it has logarithms throughout.
+
+    Example
+    -------
+    >>> looks_of([np.array([0j, 1j]), np.array([0j]), np.array([2j])])
+    (array([ True, False,  True]), array([False, False,  True]))
+    """
+    if not curves:
+        return np.zeros(0, dtype=bool), np.zeros(0, dtype=bool)
+    joined, first = np.concatenate(curves), np.cumsum([0, *map(len, curves)])[:-1]
+    some = joined != 0.0
+    sound = some & np.isfinite(joined)
+    return np.logical_or.reduceat(some, first), np.logical_and.reduceat(sound, first)
+
+
 def curves_at(model: GreyBoxModel, starts: Array, grids: Sequence[Array]) -> Complex:
     """Responses for free parameters in each row of `starts`, one grid after another in a row.
 

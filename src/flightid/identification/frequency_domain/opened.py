@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from flightid.conventions import Light
 from flightid.errors import FlightidError
 from flightid.findings import Finding
-from flightid.identification.frequency_domain.model_curves import start_curves
+from flightid.identification.frequency_domain.model_curves import looks_of, start_curves
 from flightid.identification.frequency_domain.selection import SelectedResponse
 from flightid.models import GreyBoxModel
 
@@ -36,7 +36,8 @@ def opened(
     -------
     model, and list of Finding
     """
-    shut = [place for place, curve in enumerate(_curves(model, selected)) if not np.any(curve)]
+    seen, _ = looks_of(_curves(model, selected))
+    shut = np.flatnonzero(~seen).tolist()
     zero = [p for p in model.parameters.free if p.value == 0.0] if shut else []
     moved: dict[str, float] = {}
     for parameter in zero:

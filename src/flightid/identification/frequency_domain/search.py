@@ -185,7 +185,7 @@ class _Descent:
 def _relative(place: int, response: SelectedResponse) -> tuple[int, int, Array]:
     """Weights of a response's complex errors, as decibels of small ones weigh."""
     weight = DECIBEL * np.sqrt(response.weight_db) / np.abs(response.response)
-    return place, 1, np.tile(weight, 2)[None]
+    return place, 1, np.concatenate([weight, weight])[None]
 
 
 def _thinned(response: SelectedResponse, stride: int) -> SelectedResponse:

@@ -45,8 +45,13 @@ fn rosenbrock_at_a_bound() {
     assert!((-400.0 * x * (1.5 - x * x) - 2.0 * (1.0 - x)).abs() < 1e-6);
 }
 
-/// Counts the Jacobians that a search asks for.
-struct Counted(usize);
+/// Counts the Jacobians that a search asks for, and the residuals that come beside one.
+#[derive(Default)]
+struct Counted {
+    jacobians: usize,
+    residuals: usize,
+    beside: bool,
+}
 
 impl Problem for Counted {
     fn n_parameters(&self) -> usize {
@@ -56,22 +61,30 @@ impl Problem for Counted {
         2
     }
     fn residuals(&mut self, x: &[f64], r: &mut [f64]) -> Result<(), CoreError> {
+        self.residuals += 1;
         Rosenbrock.residuals(x, r)
     }
     fn jacobian(&mut self, x: &[f64], j: &mut [f64]) -> Result<(), CoreError> {
-        self.0 += 1;
+        self.jacobians += 1;
         Rosenbrock.jacobian(x, j)
+    }
+    fn makes_both(&self) -> bool {
+        self.beside
+    }
+    fn both(&mut self, x: &[f64], r: &mut [f64], j: &mut [f64]) -> Result<(), CoreError> {
+        self.jacobian(x, j)?;
+        Rosenbrock.residuals(x, r)
     }
 }
 
 #[test]
 fn a_last_point_that_nobody_asks_slopes_of_is_the_same_without_them() {
     let ends = |maximum_iterations: usize, last_slopes: bool| {
-        let mut problem = Counted(0);
+        let mut problem = Counted::default();
         let options = Options { maximum_iterations, last_slopes, ..Options::default() };
         let (low, go) = ([f64::NEG_INFINITY; 2], &mut |_: &Progress| true);
         let found = minimise(&mut problem, &[-1.2, 1.0], &low, &OPEN, &options, go).unwrap();
-        (found, problem.0)
+        (found, problem.jacobians)
     };
     let mut spared = 0;
     for most in 1..8 {
@@ -88,6 +101,20 @@ fn a_last_point_that_nobody_asks_slopes_of_is_the_same_without_them() {
     assert!(spared > 0 && spared < 7);
     // A search that ends by itself knows its slopes.
     assert_eq!(ends(200, false).0.jacobian.len(), 4);
+}
+
+#[test]
+fn residuals_of_the_start_come_beside_its_jacobian_where_a_problem_makes_both() {
+    let ends = |beside: bool| {
+        let mut problem = Counted { beside, ..Counted::default() };
+        let (low, go) = ([f64::NEG_INFINITY; 2], &mut |_: &Progress| true);
+        let options = Options::default();
+        let found = minimise(&mut problem, &[-1.2, 1.0], &low, &OPEN, &options, go).unwrap();
+        (found.x, found.residuals, found.jacobian, problem)
+    };
+    let ((x, r, j, one), (y, s, k, both)) = (ends(false), ends(true));
+    assert_eq!((x, r, j), (y, s, k));
+    assert_eq!((one.jacobians, one.residuals), (both.jacobians, both.residuals + 1));
 }
 
 /// Two nearly parallel columns whose free minimum (-9, 10) lies across both bounds.
