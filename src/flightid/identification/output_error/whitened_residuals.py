@@ -78,9 +78,10 @@ def colour_filters(rows: Sequence[Array]) -> list[Array] | None:
     solve (`residual_noise`), give filters whose inverse is stable and bend poles near the circle.
     """
     found = []
+    of_all = lagged_products(rows, LAGS, LAGS)
     for output in range(rows[0].shape[0]):
         own = [each[output : output + 1] for each in rows]
-        products = _even_products(own, LAGS)
+        products = _if_even(of_all[:, output : output + 1, :, output : output + 1])
         weights, left = _regressed(partial(_pasts, own), products, LAGS, None)
         if not np.all(np.isfinite(weights)) or left[0] <= 0.0:
             return None
@@ -150,7 +151,11 @@ def _even_products(records: Sequence[Array], longest: int) -> Array | None:
     They come as differences, which keep all digits where no channel's power changes much from lag
     to lag: one that grows does all at its end.
     """
-    found = lagged_products(records, longest, longest)
+    return _if_even(lagged_products(records, longest, longest))
+
+
+def _if_even(found: Array) -> Array | None:
+    """Products of lags, (n_lags, n_channels, n_lags, n_channels), where no power changes much."""
     power = np.einsum("iaia->ia", found)
     if not np.all(power.min(axis=0) > EVEN * power.max(axis=0)):
         return None
