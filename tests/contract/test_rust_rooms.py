@@ -177,6 +177,14 @@ def test_files_that_one_half_names_of_the_other_exist() -> None:
     assert not lost
 
 
+def test_what_runs_in_the_widest_registers_is_inlined_there() -> None:
+    """A closure that is not inlined into `widest` is compiled for the narrowest of all machines."""
+    narrow = re.compile(r"\bwidest\(\s*(?:move )?\|")
+    assert narrow.search("widest(|| work())"), "the rule can fail"
+    for path in rust_files():
+        assert not narrow.search(_code(path.read_text(encoding="utf-8"))), path
+
+
 def test_the_rules_can_fail() -> None:
     sources = {
         (): "pub mod a;\npub mod b;\n",

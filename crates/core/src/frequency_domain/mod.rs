@@ -1,5 +1,6 @@
 //! Models as frequency responses, and their fit to measured ones.
 
+pub(crate) mod bin_chunks;
 pub mod bordered_normal;
 pub mod composite;
 pub mod frequency_fit;

@@ -8,21 +8,17 @@
 use num_complex::Complex64;
 
 use crate::error::CoreError;
+use crate::frequency_domain::bin_chunks::{
+    ABREAST, CHUNK, Chunk, LANES, Sums, add_products, apart,
+};
 use crate::frequency_domain::bordered_normal::{BorderedNormal, Record, Unknowns};
 use crate::numerics::widest::widest;
 
-/// Bins that are worked on together; unused ones count nothing.
-const CHUNK: usize = 64;
-/// Running sums of one product, and products side by side.
-const LANES: usize = 8;
-const ABREAST: usize = 4;
 /// Share of the unknowns that a correction may move; a larger one finds the equations unsound.
 const MOST_MOVED: f64 = 1e-2;
 /// Share that a solution may still be off.
 const SETTLED: f64 = 1e-10;
 const CORRECTIONS: usize = 3;
-
-type Sums = [f64; LANES];
 
 /// Fourier bins of the inputs of some records, and the turns whose powers make a basis.
 #[derive(Debug, Clone)]
@@ -41,14 +37,6 @@ struct Wanted<'a> {
     output: &'a [Complex64],
     power: &'a [f64],
     pulled: &'a [Complex64],
-}
-
-/// Values of one chunk, each row `CHUNK` long.
-struct Chunk {
-    from: usize,
-    count: usize,
-    powers: [Vec<f64>; 2],
-    channels: [Vec<f64>; 2],
 }
 
 impl RationalBins {
@@ -113,12 +101,18 @@ impl RationalBins {
             }
         }
         let wanted = Wanted { output, power, pulled };
-        let records = widest(|| self.products(wanted));
+        let records = widest(
+            #[inline(always)]
+            || self.products(wanted),
+        );
         let Some(normal) = BorderedNormal::of(self.unknowns(), &records) else { return Ok(None) };
         let right: Vec<&[f64]> = records.iter().map(|each| each.right.as_slice()).collect();
         let (mut solved, mut off) = (normal.solve(&right), 1.0);
         for turn in 0..CORRECTIONS {
-            let left = widest(|| self.pulled_rest(wanted, &solved));
+            let left = widest(
+                #[inline(always)]
+                || self.pulled_rest(wanted, &solved),
+            );
             let rows: Vec<&[f64]> = left.iter().map(Vec::as_slice).collect();
             let change = normal.solve(&rows);
             let moved = normal.size(&change) / normal.size(&solved).max(f64::MIN_POSITIVE);
@@ -150,15 +144,22 @@ impl RationalBins {
         }
         let nothing = vec![Complex64::default(); self.size()];
         let mut found = nothing.clone();
-        widest(|| {
-            self.each_chunk(&nothing, |record, chunk| {
-                let (re, im) = self.values(record, chunk, coefficients);
-                let places = found[chunk.from..chunk.from + chunk.count].iter_mut();
-                for ((place, re), im) in places.zip(re).zip(im) {
-                    *place = Complex64::new(re, im);
-                }
-            });
-        });
+        widest(
+            #[inline(always)]
+            || {
+                self.each_chunk(
+                    &nothing,
+                    #[inline(always)]
+                    |record, chunk| {
+                        let (re, im) = self.values(record, chunk, coefficients);
+                        let places = found[chunk.from..chunk.from + chunk.count].iter_mut();
+                        for ((place, re), im) in places.zip(re).zip(im) {
+                            *place = Complex64::new(re, im);
+                        }
+                    },
+                );
+            },
+        );
         Ok(found)
     }
 
@@ -230,28 +231,32 @@ impl RationalBins {
         let n_pairs = n_channels * (n_channels + 1) / 2;
         let mut sums = vec![[0.0; LANES]; self.lengths.len() * (2 * n_pairs + n_channels) * rows];
         let size = (2 * n_pairs + n_channels) * rows;
-        self.each_chunk(wanted.output, |record, chunk| {
-            let (pairs, right) =
-                sums[record * size..(record + 1) * size].split_at_mut(2 * n_pairs * rows);
-            let mut power = [0.0; CHUNK];
-            power[..chunk.count]
-                .copy_from_slice(&wanted.power[chunk.from..chunk.from + chunk.count]);
-            let mut places = pairs.chunks_exact_mut(2 * rows);
-            for a in 0..n_channels {
-                for b in a..n_channels {
-                    let Some(place) = places.next() else { continue };
-                    let (re, im) = chunk.weighed_product(a, b, &power);
-                    let (first, second) = place.split_at_mut(rows);
-                    let apart = self.powers_of(a);
-                    add_products(&re, &chunk.powers[0], &mut first[..apart]);
-                    if a != b {
-                        add_products(&im, &chunk.powers[1], &mut second[..apart]);
+        self.each_chunk(
+            wanted.output,
+            #[inline(always)]
+            |record, chunk| {
+                let (pairs, right) =
+                    sums[record * size..(record + 1) * size].split_at_mut(2 * n_pairs * rows);
+                let mut power = [0.0; CHUNK];
+                power[..chunk.count]
+                    .copy_from_slice(&wanted.power[chunk.from..chunk.from + chunk.count]);
+                let mut places = pairs.chunks_exact_mut(2 * rows);
+                for a in 0..n_channels {
+                    for b in a..n_channels {
+                        let Some(place) = places.next() else { continue };
+                        let (re, im) = chunk.weighed_product(a, b, &power);
+                        let (first, second) = place.split_at_mut(rows);
+                        let apart = self.powers_of(a);
+                        add_products(&re, &chunk.powers[0], &mut first[..apart]);
+                        if a != b {
+                            add_products(&im, &chunk.powers[1], &mut second[..apart]);
+                        }
                     }
                 }
-            }
-            let pulled = apart(&wanted.pulled[chunk.from..chunk.from + chunk.count]);
-            chunk.pull(&pulled, right, rows, self.powers_of(1));
-        });
+                let pulled = apart(&wanted.pulled[chunk.from..chunk.from + chunk.count]);
+                chunk.pull(&pulled, right, rows, self.powers_of(1));
+            },
+        );
         let whole =
             |part: &[Sums]| part.iter().map(|lanes| lanes.iter().sum()).collect::<Vec<f64>>();
         sums.chunks_exact(size)
@@ -268,19 +273,23 @@ impl RationalBins {
         let rows = self.powers_of(0);
         let size = (self.n_inputs + 2) * rows;
         let mut sums = vec![[0.0; LANES]; self.lengths.len() * size];
-        self.each_chunk(wanted.output, |record, chunk| {
-            let (mut re, mut im) = self.values(record, chunk, coefficients);
-            let span = chunk.from..chunk.from + chunk.count;
-            let pulled = &wanted.pulled[span.clone()];
-            for (k, (power, pulled)) in wanted.power[span].iter().zip(pulled).enumerate() {
-                re[k] = pulled.re - power * re[k];
-                im[k] = pulled.im - power * im[k];
-            }
-            re[chunk.count..].fill(0.0);
-            im[chunk.count..].fill(0.0);
-            let into = &mut sums[record * size..(record + 1) * size];
-            chunk.pull(&[re, im], into, rows, self.powers_of(1));
-        });
+        self.each_chunk(
+            wanted.output,
+            #[inline(always)]
+            |record, chunk| {
+                let (mut re, mut im) = self.values(record, chunk, coefficients);
+                let span = chunk.from..chunk.from + chunk.count;
+                let pulled = &wanted.pulled[span.clone()];
+                for (k, (power, pulled)) in wanted.power[span].iter().zip(pulled).enumerate() {
+                    re[k] = pulled.re - power * re[k];
+                    im[k] = pulled.im - power * im[k];
+                }
+                re[chunk.count..].fill(0.0);
+                im[chunk.count..].fill(0.0);
+                let into = &mut sums[record * size..(record + 1) * size];
+                chunk.pull(&[re, im], into, rows, self.powers_of(1));
+            },
+        );
         sums.chunks_exact(size)
             .map(|each| {
                 let whole: Vec<f64> = each.iter().map(|lanes| lanes.iter().sum()).collect();
@@ -323,75 +332,6 @@ impl RationalBins {
             }
         }
         found
-    }
-}
-
-impl Chunk {
-    /// Power times the conjugate of one channel times another.
-    #[inline(always)]
-    fn weighed_product(
-        &self,
-        a: usize,
-        b: usize,
-        power: &[f64; CHUNK],
-    ) -> ([f64; CHUNK], [f64; CHUNK]) {
-        let mut found = ([0.0; CHUNK], [0.0; CHUNK]);
-        let [re, im] = &self.channels;
-        let (p, q) = (&re[a * CHUNK..][..CHUNK], &im[a * CHUNK..][..CHUNK]);
-        let (r, s) = (&re[b * CHUNK..][..CHUNK], &im[b * CHUNK..][..CHUNK]);
-        for k in 0..CHUNK {
-            found.0[k] = power[k] * (p[k] * r[k] + q[k] * s[k]);
-            found.1[k] = power[k] * (p[k] * s[k] - q[k] * r[k]);
-        }
-        found
-    }
-
-    /// Add the products of each channel's columns with values: `rows` of the first, `further` of others.
-    #[inline(always)]
-    fn pull(&self, values: &[[f64; CHUNK]; 2], sums: &mut [Sums], rows: usize, further: usize) {
-        for (channel, sums) in sums.chunks_exact_mut(rows).enumerate() {
-            let (re, im) =
-                (&self.channels[0][channel * CHUNK..], &self.channels[1][channel * CHUNK..]);
-            let mut made = ([0.0; CHUNK], [0.0; CHUNK]);
-            for k in 0..CHUNK {
-                made.0[k] = re[k] * values[0][k] + im[k] * values[1][k];
-                made.1[k] = re[k] * values[1][k] - im[k] * values[0][k];
-            }
-            let held = if channel == 0 { rows } else { further };
-            add_products(&made.0, &self.powers[0], &mut sums[..held]);
-            add_products(&made.1, &self.powers[1], &mut sums[..held]);
-        }
-    }
-}
-
-/// Real and imaginary parts, nothing behind their end.
-fn apart(values: &[Complex64]) -> [[f64; CHUNK]; 2] {
-    let mut found = [[0.0; CHUNK]; 2];
-    for (k, value) in values.iter().enumerate() {
-        (found[0][k], found[1][k]) = (value.re, value.im);
-    }
-    found
-}
-
-/// Add the products of one row with several: `ABREAST` at a time, so that no sum waits for another.
-#[inline(always)]
-fn add_products(row: &[f64; CHUNK], others: &[f64], sums: &mut [Sums]) {
-    let several = others.chunks_exact(ABREAST * CHUNK).zip(sums.chunks_exact_mut(ABREAST));
-    for (others, sums) in several {
-        let mut running = [[0.0; LANES]; ABREAST];
-        for at in (0..CHUNK).step_by(LANES) {
-            for (which, lanes) in running.iter_mut().enumerate() {
-                let other = &others[which * CHUNK + at..][..LANES];
-                for k in 0..LANES {
-                    lanes[k] += row[at + k] * other[k];
-                }
-            }
-        }
-        for (sum, lanes) in sums.iter_mut().zip(&running) {
-            for k in 0..LANES {
-                sum[k] += lanes[k];
-            }
-        }
     }
 }
 

@@ -4,6 +4,7 @@
 use crate::error::CoreError;
 use crate::linear::block_recursion::{BLOCK, Line, carry};
 use crate::linear::column_products::ColumnProducts;
+use crate::linear::slope_recursion::take;
 use crate::numerics::widest::widest;
 
 /// Signals that are run side by side.
@@ -143,43 +144,70 @@ impl InputColumns<'_> {
         packed: &[Line<LANES>],
         (count, sums): (usize, &mut ColumnProducts),
     ) {
-        let [n, p, m] = self.sizes;
-        let levels = usize::from(self.levels);
-        let answer = |signal: usize, state: usize, k: usize| {
-            lines[signal / LANES * n + state][k][signal % LANES]
-        };
-        let pushed = |signal: usize, k: usize| packed[signal / LANES][k][signal % LANES];
-        // What an output's gain makes of an answer.
-        let turned = |signal: usize, output: usize, k: usize| {
-            (0..n).map(|i| self.gain[i * p + output] * answer(signal, i, k)).sum::<f64>()
-        };
+        let ([n, p, m], levels) = (self.sizes, usize::from(self.levels));
+        let answer = |signal: usize, state: usize| &lines[signal / LANES * n + state];
+        let n_groups = packed.len();
+        // What each output's gain makes of the answers, by output and group.
+        let mut turned = vec![[[0.0; LANES]; BLOCK]; p * n_groups];
+        for (at, into) in turned.iter_mut().enumerate() {
+            let (output, group) = (at / n_groups, at % n_groups);
+            for state in 0..n {
+                take(into, -self.gain[state * p + output], &lines[group * n + state]);
+            }
+        }
+        let turned = |signal: usize, output: usize| &turned[output * n_groups + signal / LANES];
         let mut at = 0;
-        let mut put = |value: &mut dyn FnMut(usize) -> f64| {
-            let column = sums.column(at);
-            (0..count).for_each(|k| column[k] = value(k));
-            column[count..].fill(0.0);
-            at += 1;
-        };
         for state in 0..n {
-            (0..m).for_each(|input| put(&mut |k| answer(input, state, k)));
+            for input in 0..m {
+                lane(answer(input, state), input, sums.column(at));
+                at += 1;
+            }
         }
         for (output, input) in (0..p).flat_map(|o| (0..m).map(move |i| (o, i))) {
             if self.direct {
-                let own = f64::from(u8::from(output == row));
-                put(&mut |k| own * pushed(input, k) - turned(input, output, k));
+                let column = sums.column(at);
+                column.fill(0.0);
+                if output == row {
+                    lane(&packed[input / LANES], input, column);
+                }
+                less(turned(input, output), input, column);
+                at += 1;
             }
         }
         let none = self.n_signals() - 1;
-        (0..n).for_each(|state| put(&mut |k| answer(none, state, k)));
-        for output in 0..p * levels {
-            let own = f64::from(u8::from(output == row));
-            put(&mut |k| own - turned(m, output, k));
+        for state in 0..n {
+            lane(answer(none, state), none, sums.column(at));
+            at += 1;
         }
-        let y = m + levels;
-        put(&mut |k| {
-            pushed(y + row, k) - (0..p).map(|output| turned(y + output, output, k)).sum::<f64>()
-        });
+        for output in 0..p * levels {
+            let column = sums.column(at);
+            column.fill(if output == row { 1.0 } else { 0.0 });
+            less(turned(m, output), m, column);
+            at += 1;
+        }
+        let (y, column) = (m + levels, sums.column(at));
+        lane(&packed[(y + row) / LANES], y + row, column);
+        for output in 0..p {
+            less(turned(y + output, output), y + output, column);
+        }
+        (0..=at).for_each(|each| sums.column(each)[count..].fill(0.0));
         sums.add();
+    }
+}
+
+/// One signal of a line.
+#[inline(always)]
+fn lane(line: &Line<LANES>, signal: usize, into: &mut [f64; BLOCK]) {
+    for (value, values) in into.iter_mut().zip(line) {
+        *value = values[signal % LANES];
+    }
+}
+
+/// Less one signal of a line.
+#[inline(always)]
+fn less(line: &Line<LANES>, signal: usize, from: &mut [f64; BLOCK]) {
+    for (value, values) in from.iter_mut().zip(line) {
+        *value -= values[signal % LANES];
     }
 }
 

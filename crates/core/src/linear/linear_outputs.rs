@@ -74,17 +74,20 @@ pub fn outputs(
         n,
         p,
     };
-    let found = widest(|| match n.div_ceil(LANES) {
-        0 | 1 => driven.run::<1>(initial),
-        2 => driven.run::<2>(initial),
-        3 => driven.run::<3>(initial),
-        4 => driven.run::<4>(initial),
-        5 => driven.run::<5>(initial),
-        6 => driven.run::<6>(initial),
-        7 => driven.run::<7>(initial),
-        MOST_GROUPS => driven.run::<MOST_GROUPS>(initial),
-        _ => driven.run_long(initial),
-    });
+    let found = widest(
+        #[inline(always)]
+        || match n.div_ceil(LANES) {
+            0 | 1 => driven.run::<1>(initial),
+            2 => driven.run::<2>(initial),
+            3 => driven.run::<3>(initial),
+            4 => driven.run::<4>(initial),
+            5 => driven.run::<5>(initial),
+            6 => driven.run::<6>(initial),
+            7 => driven.run::<7>(initial),
+            MOST_GROUPS => driven.run::<MOST_GROUPS>(initial),
+            _ => driven.run_long(initial),
+        },
+    );
     match found.iter().position(|value| !value.is_finite()) {
         Some(index) => Err(CoreError::NotFinite { what: "simulated output", index }),
         None => Ok(found),
@@ -109,6 +112,7 @@ impl Driven<'_> {
     }
 
     /// As `run`, for systems whose step does not fit into registers.
+    #[inline(always)]
     fn run_long(&self, initial: &[f64]) -> Vec<f64> {
         let n = self.n;
         let rows: Vec<Vec<f64>> = (0..n).map(|row| self.row(row)).collect();

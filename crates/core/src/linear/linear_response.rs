@@ -99,7 +99,10 @@ impl<'a> Eights<'a> {
             keep(output, input, &value);
         };
         let block = self.pencil.factor(self.plan.as_ref(), here)?;
-        widest(|| around(system, n_inputs, self.plan.as_ref(), &block, &mut whole));
+        widest(
+            #[inline(always)]
+            || around(system, n_inputs, self.plan.as_ref(), &block, &mut whole),
+        );
         Ok(())
     }
 }

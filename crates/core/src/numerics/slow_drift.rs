@@ -68,7 +68,13 @@ impl Spectrum<'_> {
             );
         }
         let rows = self.cosines.chunks_exact(self.power.len()).take(count);
-        rows.map(|row| widest(|| product(row, power))).collect()
+        let lag = |row| {
+            widest(
+                #[inline(always)]
+                || product(row, power),
+            )
+        };
+        rows.map(lag).collect()
     }
 
     /// The same without a table: cos kω = 2 cos ω cos (k − 1)ω − cos (k − 2)ω.

@@ -151,7 +151,10 @@ impl Plan {
 
     /// Factor at eight frequencies; false where the planned pivots do not serve all of them.
     pub fn factor(&self, entry: impl Fn(usize, usize) -> Lanes, factors: &mut Factors) -> bool {
-        widest(|| self.factored(entry, factors))
+        widest(
+            #[inline(always)]
+            || self.factored(entry, factors),
+        )
     }
 
     #[inline(always)]
@@ -186,7 +189,10 @@ impl Plan {
 
     /// x = A⁻¹ b; b is overwritten.
     pub fn solve(&self, factors: &Factors, b: &mut [Lanes], x: &mut [Lanes]) {
-        widest(|| self.solved(factors, b, x));
+        widest(
+            #[inline(always)]
+            || self.solved(factors, b, x),
+        );
     }
 
     #[inline(always)]
@@ -208,7 +214,10 @@ impl Plan {
 
     /// y = A⁻ᵀ c (transposed, not conjugated); c is overwritten.
     pub fn solve_transposed(&self, factors: &Factors, c: &mut [Lanes], y: &mut [Lanes]) {
-        widest(|| self.solved_transposed(factors, c, y));
+        widest(
+            #[inline(always)]
+            || self.solved_transposed(factors, c, y),
+        );
     }
 
     #[inline(always)]
