@@ -14,7 +14,9 @@ from scipy import signal
 import flightid as fid
 from flightid.control.tuning.size_findings import answers_by_size
 from flightid.conventions import Light
+from flightid.identification.frequency_domain import answer_by_size
 from flightid.identification.frequency_domain.answer_by_size import size_terms
+from tests.closeness import assert_close
 
 STEP_S, INNER, RECORD_S = 0.02, 3, 60.0
 EFFECT, DAMPING, DRAG = 60.0, 2.0, 0.5
@@ -63,6 +65,16 @@ def test_a_linear_rate_has_none() -> None:
     ratios = [each[0] / each[1] for each in found if each is not None]
     assert np.max(np.abs(ratios)) < 3.0
     assert 0.3 < np.std(ratios) < 2.0
+
+
+def test_samples_are_left_out_behind_a_low_pass_without_phase() -> None:
+    """What is slow stays where it is; what would come back as slow is gone."""
+    k = np.arange(1201)
+    slow, fast = np.sin(0.1 * k), np.sin((2.0 * np.pi / 4.0 + 0.1) * k)
+    inside = slice(20, -20)  # the filter's reach at the ends
+    found = answer_by_size._thinned(np.array([slow, fast]), 4)
+    assert_close(found[0, inside], slow[::4][inside], why="its ripple", atol=0.005)
+    assert np.max(np.abs(found[1, inside])) < 0.005
 
 
 def test_more_inputs_than_samples_tell_are_not_asked() -> None:
