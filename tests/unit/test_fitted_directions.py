@@ -48,7 +48,11 @@ def _directions(lengths: tuple[int, ...], n_outputs: int, m: int, k: int) -> lis
     ]
 
 
-def test_lags_and_power_are_those_of_the_covariance_that_is_left() -> None:
+@pytest.mark.parametrize("at_once", [taken_noise.AT_ONCE, 9])
+def test_lags_and_power_are_those_of_the_covariance_that_is_left(
+    monkeypatch: pytest.MonkeyPatch, at_once: int
+) -> None:
+    monkeypatch.setattr(taken_noise, "AT_ONCE", at_once)
     lengths, n_outputs, m, k, n_lags, length = (40, 23), 2, 2, 3, 6, 128
     taken, levels = _directions(lengths, n_outputs, m, k), np.array([2.0, 0.3])
     whole = np.concatenate(

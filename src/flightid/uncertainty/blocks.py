@@ -64,13 +64,24 @@ class RecordBlock:
         return _of_output(self.basis, self, output), _of_output(self.projected, self, output)
 
     @classmethod
-    def of(cls, shared: Array, own: Array, residual: Array) -> RecordBlock:
-        """From sensitivities by shared parameters and by own numbers, (n_outputs, n_samples, k)."""
+    def of(
+        cls, shared: Array, own: Array, residual: Array, *, overwrite: bool = False
+    ) -> RecordBlock:
+        """From sensitivities by shared parameters and by own numbers, (n_outputs, n_samples, k).
+
+        With `overwrite` what is left of the shared ones takes their memory.
+        """
         rows = residual.size
+        # Columns of longer rows stay where they are.
         shared, own = shared.reshape(rows, -1), own.reshape(rows, -1)
         basis, triangle = orthonormal(own)
         on_own = basis.T @ shared
-        projected = shared - basis @ on_own if own.size else shared
+        projected = shared
+        if own.size:
+            projected = shared if overwrite else np.empty_like(shared)
+            for begin in range(0, rows, AT_ONCE):
+                here = slice(begin, begin + AT_ONCE)
+                np.subtract(shared[here], basis[here] @ on_own, out=projected[here])
         return cls(projected, on_own, basis, triangle, residual)
 
     def along(self, directions: Array, *, overwrite: bool = False) -> RecordBlock:

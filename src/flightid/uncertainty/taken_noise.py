@@ -21,6 +21,8 @@ from flightid.uncertainty.transformed_columns import of_both, powers_of, squares
 
 Array = NDArray[np.float64]
 T = TypeVar("T", bound=np.generic)
+AT_ONCE = 4096
+"""Samples whose directions stand side by side: all of them would take what slopes take."""
 Known = dict[tuple[int, int], NDArray[T]]
 """By record and output."""
 
@@ -58,7 +60,6 @@ class TakenNoise:
     ) -> None:
         self._taken, self._length = taken, length
         self._n_lags, self._n_bins = n_lags, n_bins
-        self._parts: Known[np.float64] = {}
         self._squares: Known[np.float64] = {}
         self._slow: Known[np.complex128] = {}
         self._transforms: Known[np.float64] = {}
@@ -93,9 +94,8 @@ class TakenNoise:
         lags, power = np.zeros(self._n_lags), np.zeros(self._n_bins)
         for k, each in enumerate(forms):
             form = 2.0 * level * np.eye(len(each)) - each
-            part = _kept(self._parts, (k, output), self._together)
             slow = _kept(self._slow, (k, output), self._slowest)
-            lags += lags_of_form(part, form, self._n_lags)
+            lags += self._lags(k, output, form)
             power += np.sum((slow @ form) * slow.conj(), axis=1).real
         return lags, power
 
@@ -128,20 +128,41 @@ class TakenNoise:
     def _transform(self, record: int, output: int) -> Array:
         return transforms(self._together(record, output), self._length)
 
+    def _lags(self, record: int, output: int, form: Array) -> Array:
+        """`lags_of_form` of all directions, side by side some samples at a time."""
+        found, n = np.zeros(self._n_lags), self._taken[record].shared.shape[1]
+        for first in range(0, n, AT_ONCE):
+            # Later samples are met by those of this span, and by each other in the next.
+            met = slice(first, min(first + AT_ONCE + self._n_lags - 1, n))
+            part = self._together(record, output, met)
+            found += lags_of_form(part, form, self._n_lags)
+            if len(part) > AT_ONCE:
+                found -= lags_of_form(part[AT_ONCE:], form, self._n_lags)
+        return found
+
     def _slowest(self, record: int, output: int) -> NDArray[np.complex128]:
-        part = _kept(self._parts, (record, output), self._together)
-        return slow_transforms(part, self._length, self._n_bins)
+        parts = [
+            slow_transforms(each, self._length, self._n_bins)
+            for each in self._apart(record, output)
+        ]
+        return np.concatenate(parts, axis=1)
 
     def _squared(self, record: int, output: int) -> Array:
-        part = _kept(self._parts, (record, output), self._together)
-        return np.asarray(part.T @ part)
+        own, shared = self._apart(record, output)
+        beside = own.T @ shared
+        return np.block([[own.T @ own, beside], [beside.T, shared.T @ shared]])
 
-    def _together(self, record: int, output: int) -> Array:
-        """Own and shared directions of an output side by side, (n, n_own + n_shared)."""
+    def _apart(self, record: int, output: int) -> tuple[Array, Array]:
+        """Own and shared directions of an output, (n, n_own) and (n, n_shared)."""
         taken = self._taken[record]
-        if not taken.own.shape[2]:
-            return np.asarray(taken.shared[output])
-        return np.asarray(np.concatenate([taken.own[output], taken.shared[output]], axis=1))
+        return taken.own[output], taken.shared[output]
+
+    def _together(self, record: int, output: int, samples: slice = slice(None)) -> Array:
+        """Own and shared directions of an output side by side, (n, n_own + n_shared)."""
+        own, shared = self._apart(record, output)
+        if not own.shape[1]:
+            return shared[samples]
+        return np.asarray(np.concatenate([own[samples], shared[samples]], axis=1))
 
 
 def _kept(

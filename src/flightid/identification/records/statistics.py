@@ -124,7 +124,9 @@ def record_statistics(
     ):
         residual = _limited(whitener @ (measured - outputs), limit)
         shared, rest = np.split(_whitened(whitener, slopes), [len(free)], axis=2)
-        blocks.append(RecordBlock.of(_kept(shared, inner), _kept(rest, np.array(kept)), residual))
+        own_slopes = _kept(rest, np.array(kept))
+        blocks.append(RecordBlock.of(_kept(shared, inner), own_slopes, residual, overwrite=True))
+        del slopes, shared, rest, own_slopes  # of which blocks hold what they need
     other = None if beside is None else beside.of(inner)
     triangle = triangle_of(blocks, None if other is None else other.slopes)
     require_identifiable(names, triangle)
