@@ -74,10 +74,13 @@ def test_gains_meet_every_requirement_for_fresh_plants(design: fid.PidDesign, dr
     paths = design.problem.paths
     assert isinstance(paths, ControllerPaths)
     judged = design.problem.judge(paths.gains_of(design.loop)[None])
+    # A mode above the band may take phase: what is asked of them holds inside it, and is promised
+    # of no loop.
     for loop in ("rate loop", "whole loop"):
-        assert (design.worst_case(loop, "phase margin").worst or 0.0) > 44.0
+        assert design.worst_case(loop, "phase margin").worst is None
+        assert judged.metrics[loop].phase_margin_deg.min() > 44.0
         assert judged.metrics[loop].sensitivity_peak.max() < 2.04
-    assert (design.worst_case("angle loop", "phase margin").worst or 0.0) > 59.0
+    assert judged.metrics["angle loop"].phase_margin_deg.min() > 59.0
     assert (design.worst_case("rate loop", "crossover").worst or 99.0) < 30.5
     assert design.binding
 
@@ -145,7 +148,7 @@ def test_a_target_is_reached_with_all_the_margin_there_is(fit: fid.Fit) -> None:
     crossover = design.worst_case("rate loop", "crossover")
     assert design.exists
     assert_close(crossover.worst or 0.0, 12.0, rtol=0.02, why="no more bandwidth than asked for")
-    assert (design.worst_case("rate loop", "phase margin").worst or 0.0) > 60.0
+    assert (design.worst_case("rate loop", "phase margin").nominal or 0.0) > 60.0
 
 
 @pytest.mark.nightly  # test_tuning_axes.py holds that none are written, in every run

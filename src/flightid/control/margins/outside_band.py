@@ -20,6 +20,8 @@ from flightid.uncertainty.estimate import Estimate, Reading
 TO_SEE_IT = 1.3
 """Band beyond the frequency of a margin from which the model is known about it."""
 BEYOND = "read above the band to which the model was shown to hold"
+RESTING = "no gain margin or peak is promised, and phase and delay margin rest on no such mode"
+LOWER = "put a notch on what spectra of the gyro show there, or lower the loop by filters or gains"
 PLACES = READ_AT | {
     "phase_crossover_rad_s": "phase_crossover_rad_s",
     "gain_reduction_rad_s": "gain_reduction_rad_s",
@@ -47,11 +49,22 @@ class MarginBeyond:
         Highest frequency at which one is read, rad/s: above the band, or inside it.
     room_db : float
         By how much a resonance above the band may raise the response before the loop passes one.
+    clear_rad_s : float
+        Where the loop is so low that no resonance beyond it leaves less than is asked, rad/s.
+    taken : str
+        What a resonance that passes one takes, in words.
     """
 
     loop: str
     omega_rad_s: float
     room_db: float
+    clear_rad_s: float = 0.0
+    taken: str = RESTING
+
+    @property
+    def is_near(self) -> bool:
+        """Whether a resonance of ordinary size would pass one."""
+        return self.room_db < MOST_RAISED_DB
 
     @property
     def words(self) -> str:
@@ -72,32 +85,24 @@ def beyond_findings(
     return [
         Finding(
             "margin-beyond-band",
-            Light.AMBER if _is_near(each, top) else Light.GREEN,
+            Light.AMBER if each.is_near else Light.GREEN,
             f"{each.loop}: margins are read up to {each.omega_rad_s:.3g} rad/s, "
             f"{_limit(each, top)}",
             "sweep to higher frequencies, and identify up to "
-            f"{TO_SEE_IT * max(each.omega_rad_s, top):.3g} rad/s or further",
+            f"{max(TO_SEE_IT * max(each.omega_rad_s, top), each.clear_rad_s):.3g} rad/s or further"
+            + (f"; or {LOWER}" if each.is_near else ""),
         )
         for each in found
     ]
 
 
-def _is_near(each: MarginBeyond, top_rad_s: float) -> bool:
-    """Whether a margin is read where a resonance of ordinary size would pass one.
-
-    Read inside the band it is the table that does not promise it: of 128 green gains of rigs and
-    hovers with modes above their bands (docs/tuning.md) none was broken.
-    """
-    return each.omega_rad_s > top_rad_s and each.room_db < MOST_RAISED_DB
-
-
 def _limit(each: MarginBeyond, top_rad_s: float) -> str:
     shown = f"the {top_rad_s:.3g} rad/s to which the model was shown to hold"
+    taken = each.taken if each.is_near else "no gain margin or peak is promised"
     if each.omega_rad_s > top_rad_s:
-        return f"above {shown}: {each.words}, and nothing is promised of those margins"
-    return (
-        f"but nothing is known above {shown}: {each.words}, and no gain margin or peak is promised"
-    )
+        said = f"above {shown}: {each.words}, and nothing is promised of those margins"
+        return f"{said}: {taken}" if each.is_near else said
+    return f"but nothing is known above {shown}: {each.words}, and {taken}"
 
 
 @dataclass(frozen=True)

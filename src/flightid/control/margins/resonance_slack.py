@@ -20,6 +20,8 @@ MORE_IS_BETTER = {
     "disturbance_peak_db": False,
 }
 """Numbers that a resonance moves even where the loop does not pass one at it."""
+AT_ONE = "phase_margin_deg", "delay_margin_s", "gain_reduction_margin_db"
+"""Numbers that a resonance leaves as they are until the loop passes one at it: with any phase."""
 TAKEN = "a resonance above the identified band may leave less"
 
 
@@ -50,6 +52,28 @@ class ResonanceSlack:
         """Of a loop's response above the band, of any shape."""
         return cls(room_above(loop) - MOST_RAISED_DB)
 
+    @classmethod
+    def above_around(cls, loop: ArrayLike, inner: ArrayLike) -> ResonanceSlack:
+        """Of a loop around a closed one, whose resonance that one raises further.
+
+        Raised by r, with any phase, the outer loop A₀/(1 + R) becomes at most |A₀| r/(1 − r |R|).
+
+        Parameters
+        ----------
+        loop, inner : array_like of complex, shape (…, n_f)
+            Outer loop, and the loop closed inside it, above the band.
+        """
+        most = 10.0 ** (MOST_RAISED_DB / 20.0)
+        left = 1.0 - most * np.abs(inner)
+        if np.any(left <= 0.0):
+            return cls(-np.inf)
+        return cls(room_above(np.abs(loop) * np.abs(1.0 + np.asarray(inner)) * most / left))
+
+    @property
+    def passes_one(self) -> bool:
+        """Whether a resonance may make the loop pass one, where it takes stability, too."""
+        return self.left_db < 0.0
+
     @property
     def room_db(self) -> float:
         """By how much a resonance may raise the response before the loop passes one, dB."""
@@ -73,10 +97,14 @@ class ResonanceSlack:
 
     def takes(self, field: str, least_db: float) -> bool:
         """Whether it may leave a number less than is asked: a gain margin of so many dB."""
+        if field in AT_ONE:
+            return self.passes_one
         return field in MORE_IS_BETTER and self.left_db < least_db
 
     def reached(self, number: Reading, field: str, least_db: float) -> Reading:
         """A number whose interval reaches what a resonance may make of it; none where it is taken.
+
+        Those at one are left as they are: their intervals rest on no resonance passing one.
 
         Parameters
         ----------

@@ -19,8 +19,8 @@ from flightid.control.tuning.gain_search_result import GainSearchResult
 from flightid.control.tuning.gain_steps import Stage, TunedGain
 from flightid.control.tuning.limits import ANGLE
 from flightid.control.tuning.loop_problem import LoopAssessment, LoopProblem, Plants
-from flightid.control.tuning.margins_below import lows_left
 from flightid.control.tuning.margins_beyond import margins_beyond
+from flightid.control.tuning.modes_outside import beside_modes
 from flightid.control.tuning.order_statistics import MOST
 from flightid.control.tuning.requirements import TuningRequirements
 from flightid.control.tuning.sampled_plants import (
@@ -316,8 +316,8 @@ def _judged(
     plants = setting.judged.axis(place, flown, setting.gyro)
     around = problem_of(setting, plants, own, limit)
     gains = own.gains_of(flown[place])
-    lows = lows_left(around, gains, setting.evidence.band_rad_s)
-    return fresh, replace(around.judge(gains[None]), lows=lows)
+    old = around.judge(gains[None])
+    return fresh, beside_modes(old, around, gains, setting.evidence.band_rad_s)
 
 
 def axis_steps(setting: Setting, loop: AxisLoop) -> int:

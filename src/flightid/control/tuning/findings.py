@@ -11,6 +11,7 @@ from flightid.control.autopilots import AxisLoop
 from flightid.control.gyro import Gyro
 from flightid.control.margins.findings import COHERENCE
 from flightid.control.margins.low_mode_slack import MOST_LOWERED_DB, TAKEN_BELOW
+from flightid.control.margins.resonance_slack import MOST_RAISED_DB, TAKEN
 from flightid.control.tuning.axis_tuning import AxisResult
 from flightid.control.tuning.gain_search import INTEGRAL, LOW_END
 from flightid.control.tuning.gain_search_result import NO_GAINS, GainSearchResult
@@ -27,6 +28,7 @@ NEAR = 2.0**0.5
 """Half an octave to either side."""
 SLOWER = 3.0
 """Ratio of a band's low end to where a sweep begins that brings a crossover just below into it."""
+HIGHER = f"sweep to higher frequencies, until the loop is {MOST_RAISED_DB:g} dB below one"
 GAINS = ("gains", NO_GAINS)
 """Codes of `verdict`."""
 ADVICE = {
@@ -72,17 +74,20 @@ def verdict(
         said = f"gains found for the model alone; {_bound(found)}"
         return Finding("gains", Light.AMBER, said)
     good, share = int(met.sum()), least_share(int(met.sum()), drawn)
-    low = bool(_at_one_below(worst_cases))
+    low, high = bool(_at_one_below(worst_cases)), _passes_above(worst_cases)
     shown = ""
     if band_rad_s is not None:
         shown = f" in the band shown, {band_rad_s[0]:.3g} to {band_rad_s[1]:.3g} rad/s"
+    if high:
+        shown += ", and say nothing of a light mode above it, which may take margins and stability"
+    where = [_sweep(band_rad_s)] * low + [HIGHER] * high
     return Finding(
         "gains",
-        Light.GREEN if share >= ENOUGH and not low else Light.AMBER,
+        Light.GREEN if share >= ENOUGH and not (low or high) else Light.AMBER,
         f"{good} of {drawn} fresh plants meet every requirement{shown}: at least "
         f"{at_least(100.0 * share, 1)} % of those that the data allow (95 % confidence); "
         f"{_bound(found)}",
-        "draw more plants for the search" if share < ENOUGH else _sweep(band_rad_s) if low else "",
+        "draw more plants for the search" if share < ENOUGH else "; ".join(where),
     )
 
 
@@ -295,6 +300,11 @@ def below_band(result: AxisResult, band_rad_s: tuple[float, float] | None) -> It
 def _at_one_below(cases: Sequence[WorstCase]) -> list[str]:
     """Loops that are at one below the band, or nearer to it than is asked."""
     return _named(cases, BELOW_BAND)
+
+
+def _passes_above(cases: Sequence[WorstCase]) -> bool:
+    """Whether a loop passes one above the band where a light mode has raised it."""
+    return any(e.name == "phase margin" and e.estimate.reason == TAKEN for e in cases)
 
 
 def _named(cases: Sequence[WorstCase], reason: str) -> list[str]:

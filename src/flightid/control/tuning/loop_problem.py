@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from flightid.control.margins.loop_metrics import LoopMetrics, loop_metrics
 from flightid.control.margins.low_mode_slack import LowModeSlack
+from flightid.control.margins.resonance_slack import ResonanceSlack
 from flightid.control.margins.stability_count import unstable_poles
 from flightid.control.tuning.limits import ANGLE, WHOLE, limits, noise_limit, present
 from flightid.control.tuning.requirements import TuningRequirements
@@ -141,6 +142,8 @@ class LoopAssessment:
         highest alone has an edge that a search would stick to.
     lows : mapping of str to LowModeSlack
         What a light mode below the identified band leaves of each loop, where that was asked.
+    rooms : mapping of str to ResonanceSlack
+        What a resonance above it leaves.
     """
 
     names: tuple[str, ...]
@@ -151,6 +154,7 @@ class LoopAssessment:
     noise: Array
     peaks: Array
     lows: Mapping[str, LowModeSlack] = field(default_factory=dict)
+    rooms: Mapping[str, ResonanceSlack] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,12 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.control.margins.outside_band import MarginBeyond
-from flightid.control.margins.resonance_slack import ResonanceSlack
+from flightid.control.margins.resonance_slack import MOST_RAISED_DB, ResonanceSlack
 from flightid.control.tuning.limits import ANGLE
 from flightid.control.tuning.loop_problem import LoopProblem
 
 PLACES = "phase_crossover_rad_s", "sensitivity_peak_rad_s", "delay_crossover_rad_s"
 """Where gain margin, sensitivity peak and delay margin are read."""
+NONE_PROMISED = "no margin or peak is promised"
 
 
 def rooms_left(
@@ -35,7 +36,13 @@ def rooms_left(
     if not above.any():
         return {}
     loops = problem.loops(gains[None], problem.plants.take([0]))
-    return {name: ResonanceSlack.above(loop[..., above]) for name, loop in loops.named()}
+    rate = loops.rate[..., above]
+    return {
+        name: ResonanceSlack.above_around(loop[..., above], rate)
+        if name == ANGLE
+        else ResonanceSlack.above(loop[..., above])
+        for name, loop in loops.named()
+    }
 
 
 def margins_beyond(
@@ -58,10 +65,13 @@ def margins_beyond(
     judged = problem.judge(gains[None])
     if not judged.stable.all():
         return ()
-    found = []
+    found, least_db = [], problem.requirements.gain_margin_db
+    loops = dict(problem.loops(gains[None], problem.plants.take([0])).named())
     for name, metrics in judged.metrics.items():
         highest = max(float(np.nanmax(getattr(metrics, at), initial=0.0)) for at in PLACES)
-        short = left[name].left_db < problem.requirements.gain_margin_db
-        if name != ANGLE and (short or highest > band_rad_s[1]):
-            found.append(MarginBeyond(name, highest, left[name].room_db))
+        if name != ANGLE and (left[name].left_db < least_db or highest > band_rad_s[1]):
+            asked = 10.0 ** (-(MOST_RAISED_DB + least_db) / 20.0)
+            reaching = problem.plants.omega_rad_s[np.abs(loops[name][0, 0]) > asked]
+            clear = float(reaching.max(initial=0.0))
+            found.append(MarginBeyond(name, highest, left[name].room_db, clear, NONE_PROMISED))
     return tuple(found)

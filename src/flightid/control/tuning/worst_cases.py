@@ -9,12 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.control.autopilots import AxisLoop
-from flightid.control.margins.low_mode_slack import TAKEN_BELOW, LowModeSlack
-from flightid.control.margins.resonance_slack import TAKEN, ResonanceSlack
 from flightid.control.tuning.limits import ANGLE, Limit, limits, noise_limit
 from flightid.control.tuning.loop_problem import FULL, LoopAssessment, LoopProblem
-from flightid.control.tuning.margins_below import BELOW_BAND, lows_left, passes_below
-from flightid.control.tuning.margins_beyond import rooms_left
+from flightid.control.tuning.modes_outside import Place, beside_modes, modes_outside
 from flightid.findings import SHOWN_DIGITS as DIGITS
 from flightid.findings import held
 from flightid.frozen import dataclass
@@ -22,7 +19,6 @@ from flightid.uncertainty.estimate import Estimate, Reading
 from flightid.uncertainty.uneven import DrawnEnds, Reaching
 
 Array = NDArray[np.float64]
-ABOVE_BAND = "read above the identified band"
 FEWEST_PLANTS = 3
 """An interval needs more than the estimate and one other."""
 
@@ -134,6 +130,10 @@ class _Kind:
     place: str = ""
     """Field that says at which frequency it is read, where that may lie above the band."""
 
+    def at(self, loop: str) -> Place:
+        """Of one loop."""
+        return Place(loop, self.field, self.place, self.more)
+
 
 NOISE = _Kind("noise", "noise", "1", False)
 KINDS = (
@@ -204,21 +204,13 @@ def worst_cases(
     tuple of tuple of WorstCase and ndarray of bool, shape (n_plants,)
     """
     new = problem.judge(gains[None]) if judged is None else judged
-    left = rooms_left(problem, gains, band_rad_s)
-    new = replace(new, lows=lows_left(problem, gains, band_rad_s))
+    new = beside_modes(new, problem, gains, band_rad_s)
     least_db, made = problem.requirements.gain_margin_db, []
     for loop, usual in _wanted(new):
         asked = _asked(problem, new, loop, usual)
         kind = replace(usual, more=_more_is_better(new, asked, usual))
-        values = np.asarray(getattr(new.metrics[loop], kind.field))[0]
-        before = None if old is None else np.asarray(getattr(old.metrics[loop], kind.field))[0]
-        steady = old is not None and bool(old.stable[0, 0])
-        low, room = new.lows.get(loop, LowModeSlack()), left.get(loop, ResonanceSlack())
-        unknown = _beyond(new, loop, kind, band_rad_s, least_db)
-        if room.takes(kind.field, least_db):
-            unknown = unknown or TAKEN
-        there = np.isfinite(values).any()
-        bound = _edge([room.edge(kind.field), low.edge(kind.field) if there else None], kind.more)
+        values = _values(new, loop, kind)
+        unknown, bound = modes_outside(new, kind.at(loop), band_rad_s, least_db)
         worst = (
             None if unknown else _worst(np.append(_asked_of(new, asked, values), bound), kind.more)
         )
@@ -228,18 +220,32 @@ def worst_cases(
                 kind.name,
                 _estimate(f"{loop}: {kind.name}", kind, values, unknown, bound),
                 worst,
-                _number(before[0]) if steady and before is not None else None,
-                _worst(before, kind.more)
-                if before is not None
-                and old is not None
-                and bool(old.stable.all())
-                and not _beyond(old, loop, kind, band_rad_s, least_db)
-                else None,
+                *_flown(old, loop, kind, band_rad_s, least_db),
                 *_requirement(new, asked, values, worst),
             )
         )
     made.append(_noise(problem, new, old))
     return tuple(made), np.asarray(new.slack[:, 0].min(axis=0) >= 0.0)
+
+
+def _values(judged: LoopAssessment, loop: str, kind: _Kind) -> Array:
+    return np.asarray(getattr(judged.metrics[loop], kind.field))[0]
+
+
+def _flown(
+    old: LoopAssessment | None,
+    loop: str,
+    kind: _Kind,
+    band_rad_s: tuple[float, float] | None,
+    least_db: float,
+) -> tuple[float | None, float | None]:
+    """A number with the gains that flew: of the estimate, and at worst as far as it is promised."""
+    if old is None or not bool(old.stable[0, 0]):
+        return None, None
+    values = _values(old, loop, kind)
+    unknown, bound = modes_outside(old, kind.at(loop), band_rad_s, least_db)
+    promised = bool(old.stable.all()) and not unknown
+    return _number(values[0]), _worst(np.append(values, bound), kind.more) if promised else None
 
 
 def _wanted(judged: LoopAssessment) -> Iterator[tuple[str, _Kind]]:
@@ -344,31 +350,6 @@ def _noise(problem: LoopProblem, new: LoopAssessment, old: LoopAssessment | None
         None if before is None or old is None or not old.stable.all() else _worst(before, False),
         *_requirement(new, asked, values, worst),
     )
-
-
-def _beyond(
-    judged: LoopAssessment,
-    loop: str,
-    kind: _Kind,
-    band_rad_s: tuple[float, float] | None,
-    least_db: float,
-) -> str:
-    """Why nothing is promised: a plant reads it above the band, or a mode below may take it."""
-    if band_rad_s is None:
-        return ""
-    low = judged.lows.get(loop, LowModeSlack())
-    place = getattr(judged.metrics[loop], kind.place)[0] if kind.place else 0.0
-    if np.any(place > band_rad_s[1]):
-        return ABOVE_BAND
-    if low.takes_all(least_db) or passes_below(judged, loop, band_rad_s):
-        return BELOW_BAND
-    return TAKEN_BELOW if low.takes(kind.field, least_db) else ""
-
-
-def _edge(edges: list[float | None], more: bool) -> float:
-    """The worst of what modes outside the band may leave; no bound where they touch nothing."""
-    known = [each for each in edges if each is not None]
-    return min(known, default=np.inf) if more else max(known, default=-np.inf)
 
 
 def _number(value: float) -> float | None:
