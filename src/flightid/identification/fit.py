@@ -68,6 +68,7 @@ class Fit(
         "input_correlations": "residual_tests tells them",
         "excited": "time histories",
         "left": "model_errors holds them",
+        "missed": "findings and reasons tell it",
     },
 ):
     """Result of `flightid.identify`.
@@ -130,6 +131,8 @@ class Fit(
         Behind direct responses: see `LinearEstimate.excited`.
     left : LeftByModel or None
         Behind responses whose estimator's bias is taken out: errors of the structure.
+    missed : str
+        What the model misses of responses beyond errors of their points; empty where nothing.
 
     Example
     -------
@@ -173,6 +176,7 @@ class Fit(
     input_correlations: tuple[FittedCorrelation, ...] = ()
     excited: tuple[Record, ...] = ()
     left: LeftOver | None = None
+    missed: str = ""
 
     def __getstate__(self) -> dict[str, Any]:
         return {**vars(self), "evidence": self.evidence}

@@ -51,6 +51,8 @@ CERTAIN = 1e-6
 CHANCE = 0.01
 """Share of flights of a model that is right whose noise costs more than noise explains."""
 
+MISSED_ACTION = "look for missing dynamics, a wrong hold, responses that stand out, more starts"
+"""What to do where a model misses what the data show."""
 STARTS_FIRST = "try more starts first (starts = 16), or start values from equation error"
 """What to do about a cost of responses: it costs least, and a wrong minimum looks like the rest."""
 
@@ -148,6 +150,30 @@ def why_misfit(average: float, noise: Mapping[str, NoiseCost]) -> str:
     )
 
 
+def judge_missed(findings: Sequence[Finding], average: float, missed: str) -> list[Finding]:
+    """The same verdicts where a model misses more than errors of the points and what they share.
+
+    Parameters
+    ----------
+    findings : sequence of Finding
+    average : float
+        Of the costs.
+    missed : str
+        What it misses.
+
+    Example
+    -------
+    >>> green = Finding("cost", Light.GREEN, "average cost 20, nearly indistinguishable")
+    >>> (said,) = judge_missed([green], 20.0, "the model misses q")
+    >>> said.light.value, said.message
+    ('amber', 'average cost 20: the model misses q, so there are no intervals')
+    """
+    what = f"average cost {average:.3g}: {missed}, so there are no intervals"
+    said = Finding("cost", Light.AMBER, what, MISSED_ACTION)
+    is_green = [each.code == "cost" and each.light is Light.GREEN for each in findings]
+    return [said if green else each for green, each in zip(is_green, findings, strict=True)]
+
+
 def _averaged(noise: Mapping[str, NoiseCost]) -> NoiseCost | None:
     """Of the average cost; errors of different responses may be one and the same."""
     if not noise:
@@ -178,7 +204,7 @@ def _judge_average(average: float, noise: NoiseCost | None, *, withheld: bool) -
             Light.RED if seen and average > FAR_RATIO * noise.mean else Light.AMBER,
             f"average cost {average:.3g}, of which random errors explain {noise.mean:.3g}: {words}"
             + (", so there are no intervals" if withheld else ""),
-            "look for missing dynamics, a wrong hold, responses that stand out, more starts",
+            MISSED_ACTION,
         )
     if average <= EXCELLENT_COST:
         words = f"average cost {average:.3g}, nearly indistinguishable"

@@ -11,7 +11,7 @@ from flightid.conventions import Light
 from flightid.evidence.gather import MINIMUM_DOUBTED, PROCESS_NOISE
 from flightid.findings import Finding
 from flightid.identification.fit import Fit
-from flightid.identification.fit_findings import STARTS_FIRST
+from flightid.identification.fit_findings import STARTS_FIRST, judge_missed
 from flightid.identification.innovation_tests import INPUTS_IN_ERRORS, ROUNDING, InnovationTests
 from flightid.identification.withheld_intervals import without_intervals
 from flightid.uncertainty.foretold import chance_share, likelihood_gain
@@ -48,6 +48,9 @@ def with_residuals_judged(fit: Fit) -> Fit:
     ---------
     Ljung, *System Identification*, 2nd ed., section 16.6.
     """
+    if fit.missed and fit.covariance is not None:
+        judged = judge_missed(fit.findings, fit.average_cost, fit.missed)
+        return without_intervals(replace(fit, findings=tuple(judged)), fit.missed)
     if fit.details is not None or not fit.records or fit.residual_horizon != "free_run":
         return fit
     if not fit.responses and _gain(fit) < least_gain(len(fit.names)):

@@ -29,7 +29,7 @@ TERMS = 4
 HARMONICS_A_TERM = 10
 """Of all records, for each of them."""
 ROUNDS = 12
-"""Most steps of Fisher scoring that fit a spectrum."""
+"""Most steps towards the likeliest spectrum."""
 FARTHEST = 2.0
 """Largest step of a term in one round."""
 FEWEST = 4.0

@@ -41,6 +41,7 @@ from flightid.identification.frequency_domain.feedback_findings import (
 )
 from flightid.identification.frequency_domain.left_by_model import LeftByModel
 from flightid.identification.frequency_domain.longer_windows import judge_windows
+from flightid.identification.frequency_domain.misfit import misfit_forms, why_missed
 from flightid.identification.frequency_domain.model_curves import curves_of, looks_of, start_curves
 from flightid.identification.frequency_domain.noise_cost import noise_costs
 from flightid.identification.frequency_domain.noisy_points import (
@@ -125,6 +126,7 @@ def _fit_selected(
         slopes = -sensitivity.solved(groups[0][0].jacobian)
         if data.linear is not None and data.linear.weights.tells_parts:
             compare = PartComparison(without, fitted, selected, errors, slopes).compare
+    bias = bias_of_points(fitted, data, errors, options.hold) if judged() else None
     found = statistics(
         fitted,
         selected,
@@ -135,15 +137,19 @@ def _fit_selected(
         weighs_errors=options.cost == "likelihood",
         withheld=withheld,
         compare=compare,
-        bias=bias_of_points(fitted, data, errors, options.hold) if judged() else None,
+        bias=bias,
     )
     bent = judge_feedback(found.names, found.covariance, found.bias)
     chance = why_weighed_by_chance(data, selected, options.cost)
     setup += [*bent, *judge_weights(chance), *judge_windows(fitted, data)]
     noise = noise_costs(selected, points, by_noise) if judged() else {}
+    missed = ""
+    if curves is not None and by_noise.known is not None and sensitivity is not None:
+        missed = why_missed(misfit_forms(groups[0][0], sensitivity, bias, by_noise, selected))
     fit = _assemble(fitted, options, data, groups, responses, found, setup, noise)
     left = None if curves is None else LeftByModel(without, fitted, band_of(responses))
     fit = replace(fit, provenance={**fit.provenance, "estimator_bias": correction}, left=left)
+    fit = replace(fit, missed=missed)
     reason = why_misfit(fit.average_cost, noise) or why_bent(data, found.bias, bent) or chance
     if withheld:
         return fit
