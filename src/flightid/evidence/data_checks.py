@@ -9,6 +9,7 @@ import numpy as np
 
 from flightid.conventions import Light
 from flightid.errors import FlightidError
+from flightid.evidence.copied_samples import judge_copies
 from flightid.evidence.evidence import BAND, COHERENCE, LOOP, SAMPLES, TIME, Check
 from flightid.evidence.feedback import KEPT, loop_seen
 from flightid.evidence.spans import judge_coherence, judge_span, spans_of
@@ -82,8 +83,8 @@ def time_checks(records: Sequence[Record]) -> list[Check]:
 def sample_findings(
     data: Sequence[Record | FrequencyResponse], channels: Collection[str]
 ) -> list[Finding]:
-    """All that was found in the samples of some channels, record by record."""
-    return [
+    """All that was found in the samples of some channels, of the records together, then of each."""
+    apart = [
         finding
         for each in data
         for finding in (
@@ -92,6 +93,7 @@ def sample_findings(
             else data_findings(each.history, channels)
         )
     ]
+    return [*judge_copies(data, channels), *apart]
 
 
 def sample_checks(
