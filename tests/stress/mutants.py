@@ -57,6 +57,7 @@ SLOW = ("test_app_", "test_fleet_")
 """They try other packages, in processes of their own."""
 READERS = (
     "tests/contract/test_array_classes.py",
+    "tests/contract/test_defaults.py",
     "tests/contract/test_named_numbers.py",
     "tests/unit/test_option_readers.py",
 )

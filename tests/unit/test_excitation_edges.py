@@ -11,6 +11,7 @@ import pytest
 from flightid.inspection import excitation_found, rate_chirps
 from flightid.inspection.excitation_found import FoundExcitation
 from flightid.inspection.signals import Signal
+from flightid.inspection.thresholds import RESTING_RATE
 from tests.handmade_log import HandmadeLog
 
 Array = np.ndarray
@@ -39,7 +40,9 @@ def test_sweeps_shrink_their_half_periods_steadily() -> None:
 def test_what_excited_a_span_is_told_in_words(monkeypatch: pytest.MonkeyPatch) -> None:
     t = np.arange(0.0, 12.0, 0.02)
     stairs = 0.2 * (np.floor(t / 3.0) % 2)
-    for kind, values in (("steps", stairs), (None, 0.4 * stairs)):
+    # Half of the time at 0.1 spreads by 0.05, the limit, with which it counts.
+    limit = np.where(stairs > 0.0, 2.0 * RESTING_RATE.value, 0.0)
+    for kind, values in (("steps", stairs), ("steps", limit), (None, 0.4 * stairs)):
         found = excitation_found._shape(
             Signal("p_ref", t, values, "rad/s", "x"), "roll", (0.0, 12.0)
         )

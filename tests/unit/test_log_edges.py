@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 from pathlib import Path
-from types import SimpleNamespace
+from types import MappingProxyType, SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from flightid.errors import DataError, OptionError
 from flightid.logs.dataflash.layout import MessageLayout, standard_tables, stored
 from flightid.logs.dataflash.sdlog2 import TOPICS, _vehicle
 from flightid.logs.dataflash.writer import DataflashWriter
+from flightid.logs.first_fix import log_start
 from flightid.logs.mavlink.messages import telemetry_messages
 from flightid.logs.mavlink.reader import (
     _clock,
@@ -275,3 +276,62 @@ def test_a_log_that_ends_within_a_row_keeps_all_rows_before(tmp_path: Path, lost
     path.write_bytes(path.read_bytes()[:-lost])
     cut = fid.read_log(path).table("EV")
     assert cut["Id"].tolist() == [0.0, 1.0, 2.0, 3.0]
+
+
+@pytest.mark.parametrize(
+    ("week", "ms", "start"),
+    [
+        ([0, 2400, 2401], [0.0, 86_418_000.0, 5.0], "2026-01-05 00:00:00"),
+        ([1], [18_000.0], "1980-01-13 00:00:00"),
+        ([0], [86_418_000.0], None),
+        ([99_999], [0.0], "3896-07-11 23:59:42"),
+        ([100_000], [0.0], None),
+    ],
+)
+def test_a_log_begins_so_long_before_its_first_fix_with_a_date(
+    week: list[int], ms: list[float], start: str | None
+) -> None:
+    """Stamps of 3 s and more: the log began 2 s before the first, and fixes count from there."""
+    time_s = 3.0 + np.arange(len(week))
+    at_first = int(np.argmax(np.array(week) > 0))
+    told = {"GWk": np.array(week), "GMS": np.array(ms) + 1e3 * (2.0 + at_first)}
+    for unit, scale in (("1", 1.0), ("s", 1e-3)):
+        rows = {"GWk": told["GWk"], "GMS": scale * told["GMS"]}
+        found = log_start(_dated("GPS", time_s, rows, {"GWk": "1", "GMS": unit}))
+        assert (found and str(found)) == start
+
+
+def test_a_log_of_px4_begins_by_the_clock_of_its_receiver() -> None:
+    stamps = np.array([0.0, 1_767_571_203_500_000.0])
+    for topic in ("vehicle_gps_position", "sensor_gps"):
+        for values, start in (
+            (stamps, "2026-01-05 00:00:00"), (0.0 * stamps, None), (stamps + 1e17, None),
+        ):  # fmt: skip
+            log = _dated(topic, np.array([3.0, 4.0]), {"time_utc_usec": values}, {})
+            found = log_start(log)
+            assert (found and str(found)) == start
+    assert log_start(_dated("other", np.array([3.0]), {"time_utc_usec": stamps[1:]}, {})) is None
+    empty: Any = {"time_utc_usec": stamps[:0]}
+    assert log_start(_dated("sensor_gps", stamps[:0], empty, {})) is None
+
+
+def _dated(name: str, time_s: Any, columns: dict[str, Any], units: dict[str, str]) -> Any:
+    """A log of one message that begins at 1 s."""
+
+    class Table(dict[str, Any]):
+        unit = staticmethod(units.get)
+
+    table = Table(columns)
+    table.time_s = time_s  # type: ignore[attr-defined]
+
+    class OneMessage:
+        first_s = 1.0
+        messages = MappingProxyType({name: SimpleNamespace(fields=list(columns))})
+
+        def __contains__(self, asked: str) -> bool:
+            return asked == name
+
+        def table(self, _: str) -> Any:
+            return table
+
+    return OneMessage()

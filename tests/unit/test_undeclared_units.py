@@ -45,6 +45,21 @@ def test_no_age_is_claimed_where_no_version_is_told(tmp_path: Path) -> None:
     path = write_old_log(tmp_path / "o.bin", "Mine", rate_scale=DEGREES, seconds=5.0)
     (said,) = (each for each in fid.read_log(path).findings if each.code == "no-units")
     assert "as Copter 3.4 stored them, for no version" in said.message
+    assert "hundredths" not in said.message
+
+
+def test_rates_in_hundredths_are_told_where_they_are_logged(tmp_path: Path) -> None:
+    firmware, words = "APM:Copter V3.3.3 (test)", "RATE in hundredths of a deg/s and its commands"
+    path = write_old_log(tmp_path / "o.bin", firmware, rate_scale=100.0 * DEGREES, seconds=2.0)
+    other = tmp_path / "other.bin"
+    other.write_bytes(path.read_bytes().replace(b"RATE", b"RATX"))
+    told = [
+        words in each.message
+        for log in (path, other)
+        for each in fid.read_log(log).findings
+        if each.code == "no-units"
+    ]
+    assert told == [True, False]
 
 
 @pytest.mark.parametrize("scale", [1.0, 1.1 * DEGREES])

@@ -25,6 +25,8 @@ FREQUENCIES = 40
 """Of the quick response."""
 LONGEST, SHORTEST = 1.0 / 3.0, 1.0 / 15.0
 """Windows of the quick response: shares of the longest record, if all together are as long."""
+FITTING = 1.5
+"""The longest window fits so often into all records together."""
 CLOSED_ACTION = (
     "use the injected excitation as instrument (steps or a sweep that is added to the set-point or "
     "the input, recorded as a column), a method with a noise model, or fly with the loop open; "
@@ -132,7 +134,7 @@ def loop_of_records(
 
 def _windows(records: Sequence[Record]) -> tuple[float, float]:
     durations = [record.n_samples * record.sample_time_s for record in records]
-    longest = min(max(durations), sum(durations) / 1.5)
+    longest = min(max(durations), sum(durations) / FITTING)
     return LONGEST * longest, SHORTEST * longest
 
 

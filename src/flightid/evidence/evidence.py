@@ -34,6 +34,8 @@ NAMES = (
 )  # fmt: skip
 ALWAYS = (BAND, COHERENCE, LOOP, SETTLED, AGREEMENT)
 """What every result needs before it may be green."""
+LONGEST = 200
+"""Letters of a reason why values are no evidence."""
 
 _ABSENT: Mapping[str, tuple[str, str]] = {
     INSPECTION: ("the log was not inspected", "run inspect_log, or `flightid inspect`"),
@@ -286,7 +288,7 @@ class Evidence(Result, schema="flightid.evidence/1"):
         except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
             raise DataError(
                 "these values are no evidence",
-                found=f"{type(error).__name__}: {error}"[:200],
+                found=f"{type(error).__name__}: {error}"[:LONGEST],
                 needed=f"what {cls.schema!r} holds",
             ) from error
 

@@ -19,6 +19,12 @@ FEWEST_SAMPLES = 5
 """Samples above the idle level that tell a motor."""
 DEFAULT_PWM = (1000.0, 2000.0)
 """Pulses, µs, of a log without parameters for them."""
+SERVOS, PX4_OUTPUTS, PX4_MOTORS, MOTORS = range(1, 15), range(8), range(12), range(8)
+"""Outputs of ArduPilot's RCOU; of PX4's actuator_outputs and actuator_motors; of a blackbox."""
+SPIN_MIN, SPIN_MAX = 0.15, 0.95
+"""Shares of the pulses between which ArduCopter's motors turn (MOT_SPIN_MIN, MOT_SPIN_MAX)."""
+ABOVE = 0.01
+"""Share of the range above its low end from which a motor runs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +58,7 @@ class Actuators:
 
         A single sample may be damage.
         """
-        above = self.values > self.low + 0.01 * (self.high - self.low)
+        above = self.values > self.low + ABOVE * (self.high - self.low)
         return bool(np.any(np.count_nonzero(above, axis=1) >= FEWEST_SAMPLES))
 
 
@@ -69,7 +75,7 @@ def _ardupilot(log: Log) -> Actuators | None:
     table = log.table("RCOU")
     motors = [
         f"C{number}"
-        for number in range(1, 15)
+        for number in SERVOS
         if parameters.get(f"SERVO{number}_FUNCTION") in MOTOR_FUNCTIONS and f"C{number}" in table
     ]
     if not motors:
@@ -80,21 +86,21 @@ def _ardupilot(log: Log) -> Actuators | None:
     return _made(
         table,
         table.arrays(motors),
-        least + span * parameters.get("MOT_SPIN_MIN", 0.15),
-        least + span * parameters.get("MOT_SPIN_MAX", 0.95),
+        least + span * parameters.get("MOT_SPIN_MIN", SPIN_MIN),
+        least + span * parameters.get("MOT_SPIN_MAX", SPIN_MAX),
     )
 
 
 def _px4(log: Log) -> Actuators | None:
     if "actuator_motors" in log:
         table = log.table("actuator_motors", log.messages["actuator_motors"].instances[0])
-        names = [f"control[{i}]" for i in range(12) if f"control[{i}]" in table]
+        names = [f"control[{i}]" for i in PX4_MOTORS if f"control[{i}]" in table]
         found = _moving(log, table, names, np.isfinite)
         return _made(table, found, 0.0, 1.0) if found else None
     if "actuator_outputs" not in log:
         return None
     table = log.table("actuator_outputs", log.messages["actuator_outputs"].instances[0])
-    names = [f"output[{i}]" for i in range(8) if f"output[{i}]" in table]
+    names = [f"output[{i}]" for i in PX4_OUTPUTS if f"output[{i}]" in table]
     found = _moving(log, table, names, lambda values: values > 0)
     low, high = _limits(log.parameters, ("PWM", "PWM_MAIN"), DEFAULT_PWM)
     return _made(table, found, low, high) if found else None
@@ -117,7 +123,7 @@ def _blackbox(log: Log) -> Actuators | None:
     if "main" not in log:
         return None
     table = log.table("main")
-    used = [f"motor[{i}]" for i in range(8) if f"motor[{i}]" in table]
+    used = [f"motor[{i}]" for i in MOTORS if f"motor[{i}]" in table]
     low, high = (log.parameters.get(f"motorOutput[{i}]", 0.0) for i in range(2))
     if not used or not 0.0 < low < high:
         return None

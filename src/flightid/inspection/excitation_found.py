@@ -37,6 +37,20 @@ SEARCHED = ("sid", "chirp", "sweep", "autotune")
 WORDS = {"sid": "injected sweep", "steps": "steps", "flying": "plain flying", "hand": "by hand"}
 SWEEP_RATIO, SWEEP_CYCLES, SWEEP_ORDER = 3.0, 8, 0.9
 """Last frequency over the first, cycles and rank correlation from which a set-point sweeps."""
+HALF_PERIOD = 0.3
+"""Share of the height that nine in ten stay below from which a half period counts."""
+ENDS = 8
+"""Of the half periods one in so many, at either end, tells where a sweep begins and ends."""
+FEWEST_ROWS = 20
+"""Samples of a set-point without which nothing is looked for."""
+GRID_S, FEWEST_ON_GRID = 0.02, 40
+"""Step in which jumps are looked for, s, and the shortest stretch in such steps."""
+WITHIN, HELD = 5, 15
+"""Steps of that grid within which a set-point jumps, and for which it then stands."""
+JUMP, STANDS = 0.4, 0.1
+"""Share of the whole height from which it jumps, and within which it stands."""
+MIDDLE = (2, 98)
+"""Percentiles between which a set-point's height is told: a spike is none."""
 
 
 @dataclass(frozen=True)
@@ -169,7 +183,7 @@ def _shape(signal: Signal | None, axis: str, span: Span) -> FoundExcitation | No
         return None
     part = place_of(signal.time_s, [span])
     stamps, values = signal.time_s[part], signal.values[part]
-    if stamps.size < 20 or np.std(values) < RESTING_RATE.value:
+    if stamps.size < FEWEST_ROWS or np.std(values) < RESTING_RATE.value:
         return None
     centred = values - np.median(values)
     sweep = _sweep(stamps, centred)
@@ -185,7 +199,7 @@ def _shape(signal: Signal | None, axis: str, span: Span) -> FoundExcitation | No
 
 def _sweep(stamps: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[float, float] | None:
     """First and last frequency, Hz, where the half periods shrink (or grow) steadily."""
-    level = 0.3 * float(np.percentile(np.abs(values), 90, overwrite_input=True))
+    level = HALF_PERIOD * float(np.percentile(np.abs(values), 90, overwrite_input=True))
     state = (values > level).astype(np.int8) - (values < -level)
     known = np.flatnonzero(state)
     turns = known[1:][np.diff(state[known]) != 0]
@@ -193,7 +207,7 @@ def _sweep(stamps: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[fl
         return None
     frequency = 0.5 / np.diff(stamps[turns])
     order = np.corrcoef(np.arange(frequency.size), np.argsort(np.argsort(frequency)))[0, 1]
-    tail = max(1, frequency.size // 8)
+    tail = max(1, frequency.size // ENDS)
     first, last = float(np.median(frequency[:tail])), float(np.median(frequency[-tail:]))
     if abs(order) < SWEEP_ORDER or max(first, last) < SWEEP_RATIO * min(first, last):
         return None
@@ -202,14 +216,14 @@ def _sweep(stamps: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[fl
 
 def _steps(stamps: NDArray[np.float64], values: NDArray[np.float64]) -> int:
     """Number of jumps within 0.1 s to a level that is then held for 0.3 s."""
-    grid = np.arange(stamps[0], stamps[-1], 0.02)
-    if grid.size < 40:
+    grid = np.arange(stamps[0], stamps[-1], GRID_S)
+    if grid.size < FEWEST_ON_GRID:
         return 0
     level = np.interp(grid, stamps, values)
-    height = float(np.ptp(np.percentile(level, [2, 98])))
-    jump = np.abs(level[5:] - level[:-5]) > 0.4 * height
-    ahead = np.lib.stride_tricks.sliding_window_view(level[5:], 15)
-    flat = np.ptp(ahead, axis=1) < 0.1 * height
+    height = float(np.ptp(np.percentile(level, MIDDLE)))
+    jump = np.abs(level[WITHIN:] - level[:-WITHIN]) > JUMP * height
+    ahead = np.lib.stride_tricks.sliding_window_view(level[WITHIN:], HELD)
+    flat = np.ptp(ahead, axis=1) < STANDS * height
     landed = jump[: flat.size] & flat
     return int(np.count_nonzero(np.diff(landed.astype(np.int8)) == 1))
 

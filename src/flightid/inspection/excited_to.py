@@ -24,6 +24,8 @@ PIECES = 8
 """Windows of a run in its spectrum, besides the half of one on each side of it."""
 LEAST_SAMPLES = 64
 """Samples of a run without which its spectrum tells nothing."""
+SHORTEST = 16
+"""Samples of the shortest piece."""
 
 
 def excited_to(log: Log, axis: str, excited: Iterable[FoundExcitation]) -> float:
@@ -102,7 +104,7 @@ def power_end(values: Array, sample_rate_hz: float) -> float:
     >>> round(float(end) / (2.0 * np.pi))                             # 0.2 to 5 Hz
     5
     """
-    window = max(values.size // PIECES, 16)
+    window = max(values.size // PIECES, SHORTEST)
     # Mirrored ends give the first and last samples the weight of all others, without a jump.
     padded = np.pad(values, window // 2, mode="reflect", reflect_type="odd")
     pieces = np.lib.stride_tricks.sliding_window_view(padded, window)[:: window // 2]

@@ -28,6 +28,8 @@ EV_LAND_COMPLETE, EV_NOT_LANDED = 18, 28
 """Ids of ArduPilot's EV message."""
 FALL_S = 5.0
 """A fall begins at most this long after the throttle went down, s."""
+GRID_S, MOST_ON_GRID = 0.1, 1_000_000
+"""Step in which states are told that last until the next one, s, and the most such steps."""
 
 
 @dataclass(frozen=True)
@@ -200,7 +202,7 @@ def _held(
     if time_s.size == 0:
         return None
     first, last = log_span(log)
-    grid = np.linspace(first, last, min(max(2, int((last - first) / 0.1)), 1_000_000))
+    grid = np.linspace(first, last, min(max(2, int((last - first) / GRID_S)), MOST_ON_GRID))
     index = np.searchsorted(time_s, grid, side="right") - 1
     return grid, np.where(index >= 0, flying[index], ~flying[0])
 

@@ -23,6 +23,8 @@ Array = NDArray[np.float64]
 PHASE = "debug[0]"
 PHASE_SCALE = 5000.0
 """Counts of the logged phase to a radian."""
+BESIDE = 0.1
+"""Beyond a turn, rad, from which the numbers are no phase."""
 SHORTEST_S, PAUSE_S = 2.0, 0.25
 """Shortest chirp, s, and the pause that ends one."""
 LEAST_CYCLES = 8.0
@@ -75,7 +77,7 @@ def chirps(log: Log) -> tuple[FoundChirp, ...]:
     table = log.table("main")
     good = believable(table.time_s)
     time_s, phase = table.time_s[good], table[PHASE][good] / PHASE_SCALE
-    if not (np.all(phase > -0.1) and np.all(phase < 2.0 * np.pi + 0.1)):
+    if not (np.all(phase > -BESIDE) and np.all(phase < 2.0 * np.pi + BESIDE)):
         return ()
     found = (_chirp(log, time_s, phase, rows) for rows in _active(time_s, phase))
     return tuple(each for each in found if each is not None)

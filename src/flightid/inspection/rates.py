@@ -17,6 +17,8 @@ FASTEST_HZ = 10_000.0
 """No autopilot samples anything faster: such spacing is that of the writing."""
 BURST = 3.0
 """Rate of the median interval over the mean rate from which uneven rows come in bursts."""
+SPREAD = (5, 95)
+"""Percentiles of the steps between which jitter is told."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +91,7 @@ def _of(message: str, instance: int | None, stamps: NDArray[np.float64]) -> Stre
     forward = np.diff(good)
     # Sorted in place: the steps of a large log are not held twice.
     middle = float(np.median(forward, overwrite_input=True))
-    low, high = np.percentile(forward, [5, 95], overwrite_input=True)
+    low, high = np.percentile(forward, SPREAD, overwrite_input=True)
     gaps = np.array([stop - start for start, stop in _gaps(good, middle)])
     return StreamRate(
         message,

@@ -68,8 +68,9 @@ def place_of(time_s: NDArray[np.float64], spans: Iterable[Span]) -> slice | NDAr
     spans = tuple(spans)
     if len(spans) != 1:
         return inside(time_s, spans)
-    first = np.searchsorted(time_s, spans[0][0], side="left")
-    return slice(int(first), int(np.searchsorted(time_s, spans[0][1], side="right")))
+    ((start, stop),) = spans
+    first = np.searchsorted(time_s, start, side="left")
+    return slice(int(first), int(np.searchsorted(time_s, stop, side="right")))
 
 
 def map_of(log: Log) -> ChannelMap:

@@ -22,6 +22,10 @@ ENOUGH_COARSE = 2_500
 """Samples that tell which coarse lag is near."""
 ENOUGH = 20_000
 """Samples that settle a correlation; more only cost time."""
+FEWEST = 50
+"""Samples of the slower stream without which nothing is compared."""
+RESOLVED = 0.1
+"""Share of the slower step below which a lag means nothing."""
 PARTS = 10
 """Stretches of equal length, each left out in turn, whose scatter makes the interval."""
 
@@ -85,7 +89,7 @@ def _skew(
     slow, fast = sorted((first, second), key=lambda signal: signal.rate_hz)
     part = place_of(slow.time_s, spans)
     stamps, values = slow.time_s[part], slow.values[part]
-    if stamps.size < 50 or np.ptp(values) == 0:
+    if stamps.size < FEWEST or np.ptp(values) == 0:
         return None
     every = max(1, stamps.size // ENOUGH)
     stamps, values = stamps[::every], values[::every]
@@ -98,9 +102,9 @@ def _skew(
     lags = np.linspace(near - step, near + step, FINE)
     correlations = _about_the_best(_Alike(stamps, values, fast), lags)
     best = max(correlations, key=correlations.__getitem__)
-    if not 0 < best < lags.size - 1 or correlations[best] < SKEW_CORRELATION.value:
+    left, middle, right = (correlations.get(best + side) for side in (-1, 0, 1))
+    if left is None or middle is None or right is None or middle < SKEW_CORRELATION.value:
         return None
-    left, middle, right = (correlations[best + side] for side in (-1, 0, 1))
     curvature = left - 2.0 * middle + right
     fraction = 0.5 * (left - right) / curvature if curvature < 0 else 0.0
     # The fast stream read `lag` later matches the slow one: the fast one is later by `lag`.
@@ -112,7 +116,7 @@ def _skew(
         second.label,
         later,
         float(middle),
-        0.1 / slow.rate_hz,
+        RESOLVED / slow.rate_hz,
         _half_width_s(values, stamps + lag, fast, float(lags[1] - lags[0])),
     )
 

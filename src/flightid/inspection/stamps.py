@@ -18,6 +18,8 @@ SLACK_S = 1.0
 """And so many seconds."""
 BLOCK = 1 << 16
 """Steps looked at together: stamps of a large log are not held twice."""
+INNER = (0.01, 0.99)
+"""Shares of the stamps below and above which some may be damage."""
 
 
 def believable(time_s: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -43,7 +45,7 @@ def believable(time_s: NDArray[np.float64]) -> NDArray[np.bool_]:
     mask = np.isfinite(time_s)
     if not np.any(mask):
         return mask
-    first, last = _limits(*np.percentile(time_s[mask], [1, 99]))
+    first, last = _limits(*np.percentile(time_s[mask], np.multiply(100.0, INNER)))
     mask &= (time_s >= first) & (time_s <= last)
     kept = np.flatnonzero(mask)
     if kept.size > 1 and np.any(np.diff(time_s[kept]) <= 0):
@@ -75,7 +77,7 @@ def _are_all_believable(time_s: NDArray[np.float64]) -> bool:
     """Tell by a pass without copies that stamps increase and none lies far from the others."""
     if time_s.size == 0 or not all(np.all(part[1:] > part[:-1]) for part in _parts(time_s)):
         return False
-    places = np.array([0.01, 0.99]) * (time_s.size - 1)
+    places = np.multiply(INNER, time_s.size - 1)
     # Percentiles of what is sorted, rounded to a stamp, to the side that finds fault.
     first, last = _limits(time_s[int(np.ceil(places[0]))], time_s[int(places[1])])
     return bool(first <= time_s[0] and time_s[-1] <= last)

@@ -44,6 +44,8 @@ N_OMEGA = 60
 """Frequencies at which coherence is computed."""
 SHORTENED = 6
 """Lengths of windows that are tried until enough of them are independent."""
+NARROWEST = 1.2
+"""Highest frequency over the lowest below which nothing is looked at."""
 ROUNDING = 1e-9
 """Share by which a record may be short of a window by rounding."""
 SAME_RATE = 1.01
@@ -292,7 +294,7 @@ def _of_windows(
     inputs, outputs = names
     low = CYCLES_IN_WINDOW.value * 2.0 * math.pi / window_s
     high = 2.0 * math.pi / (step_s * SAMPLES_PER_CYCLE_LEAST.value)
-    if high < 1.2 * low:
+    if high < NARROWEST * low:
         return (
             f"the windows reach down to {low / (2 * math.pi):.3g} Hz, the sampling up to "
             f"{high / (2 * math.pi):.3g} Hz: no band is left{cut}"

@@ -34,6 +34,9 @@ from flightid.inspection.usable_band import (
 from flightid.logs import Log
 from flightid.logs.scale_check import check_scales
 
+MOST_NAMED = 6
+"""Excitations that a finding names."""
+
 if TYPE_CHECKING:
     from flightid.inspection.inspection import Inspection
 
@@ -197,7 +200,7 @@ def _excitation(log: Log, found: Inspection, scales: list[Finding]) -> list[Find
         return []
     made = [e for e in found.excitations if not e.is_plain]
     if made:
-        text = "; ".join(f"{e.words} on {e.axis} ({e.detail})" for e in made[:6])
+        text = "; ".join(f"{e.words} on {e.axis} ({e.detail})" for e in made[:MOST_NAMED])
         return [Finding("excitation-found", Light.GREEN, f"excitation found: {text}")]
     axes = ", ".join(dict.fromkeys(e.axis for e in found.excitations))
     who = ", ".join(dict.fromkeys(e.detail.split(", ", 1)[1] for e in found.excitations))

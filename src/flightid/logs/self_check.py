@@ -36,6 +36,16 @@ EARLY = 0.2
 """Part of a loop by which a row may be stamped before the RATE row of its loop."""
 LOOPS = (-2.0, 4.0)
 """Delays that are searched, in loops."""
+HALF_A_LOOP = 0.5
+"""Between the delays that are tried, in loops."""
+COPTER_LOOP_HZ = 400.0
+"""Loops a second where a log tells none."""
+BEFORE_S = 0.05
+"""Before a run's first row, s: SIDD may be written a little earlier than SIDS."""
+FEWEST_ROWS = 10
+"""Rows in which a chirp may be found."""
+RELATED = 0.5
+"""Correlation of residual and chirp below which no axis is named."""
 
 
 @dataclass(frozen=True)
@@ -129,7 +139,7 @@ def check_injection(log: LogContents, run: SidRun) -> InjectionCheck:
     checked = [_check_axis(log, run, axis, loop_time_s) for axis in COMMANDS]
     axes = tuple(check for check in checked if check is not None)
     found = max(axes, key=lambda check: abs(check.correlation), default=None)
-    if found is not None and abs(found.correlation) < 0.5:
+    if found is not None and abs(found.correlation) < RELATED:
         found = None
     proven = _is_proven(run, axes, found)
     return InjectionCheck(
@@ -146,7 +156,7 @@ def loop_time(log: LogContents) -> float:
         median = float(np.median(log.table("ANG")["Dt"]))
         if median > 0:
             return median
-    return 1.0 / 400.0
+    return 1.0 / COPTER_LOOP_HZ
 
 
 def paired_rows(
@@ -168,7 +178,7 @@ def paired_rows(
 def chirp_clock(log: LogContents, run: SidRun) -> tuple[NDArray[np.float64], ...]:
     """Stamps, waveform clock and signal of a run's SIDD rows, s, s and run unit."""
     data = log.table("SIDD")
-    rows = (data.time_s >= run.start_s - 0.05) & (data.time_s <= run.stop_s)
+    rows = (data.time_s >= run.start_s - BEFORE_S) & (data.time_s <= run.stop_s)
     clock = data["Time"][rows]
     keep = np.concatenate([[True], np.diff(clock) > 0])
     return data.time_s[rows][keep], clock[keep], data["Targ"][rows][keep]
@@ -183,7 +193,7 @@ def _check_axis(log: LogContents, run: SidRun, axis: Axis, loop_time_s: float) -
     begin, end = run.delay_s, run.delay_s + run.record_s
     inside = (clock_s[of_chirp] > begin) & (clock_s[of_chirp] < end)
     left, at_s = residual[1][rows][inside], clock_s[of_chirp][inside]
-    if left.size < 10 or float(np.std(signal)) == 0.0:
+    if left.size < FEWEST_ROWS or float(np.std(signal)) == 0.0:
         return None
     rms = float(np.sqrt(np.mean(left**2)))
     if rms <= QUIET * float(np.std(signal)):
@@ -221,9 +231,9 @@ def _best_lag(
     def loss(loops: float) -> float:
         return -abs(_projection(left, spline(at_s - loops * loop_time_s))[0])
 
-    grid = np.arange(LOOPS[0], LOOPS[1] + 0.25, 0.5)
+    grid = np.arange(LOOPS[0], LOOPS[1] + HALF_A_LOOP, HALF_A_LOOP)
     best = float(grid[np.argmin([loss(float(loops)) for loops in grid])])
-    return minimum_between(loss, best - 0.5, best + 0.5) * loop_time_s
+    return minimum_between(loss, best - HALF_A_LOOP, best + HALF_A_LOOP) * loop_time_s
 
 
 def _projection(left: NDArray[np.float64], chirp: NDArray[np.float64]) -> tuple[float, float]:

@@ -17,6 +17,8 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 LARGEST_ORDER = 40
 """Past samples of every channel: noise is strongest where the band is lowest."""
+RANK = 1e-11
+"""Share of the largest product below which a combination of past samples is rounding."""
 
 
 def fed_noise_spectrum(
@@ -124,7 +126,7 @@ def _least_squares(
     columns = np.vstack(known)
     sizes = np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
     scaled = columns / sizes
-    inverse = np.linalg.pinv(scaled.T @ scaled, rcond=1e-11, hermitian=True)
+    inverse = np.linalg.pinv(scaled.T @ scaled, rcond=RANK, hermitian=True)
     inverse /= np.outer(sizes, sizes)
     found = inverse @ (columns.T @ np.vstack(targets))
     left = [y - x @ found for x, y in zip(known, targets, strict=True)]

@@ -14,6 +14,8 @@ LAGS = 4
 """Of a record's length over the longest lag at which errors are taken to be alike."""
 KNOWN = 2
 """Independent samples that a correlation's error takes away, levels known to be zero."""
+HIGHEST = 1.0 - 1e-12
+"""Correlation of which a score is still a number."""
 
 
 def excess_score(errors: Sequence[Array], others: Sequence[Array]) -> float:
@@ -61,7 +63,7 @@ def excess_score(errors: Sequence[Array], others: Sequence[Array]) -> float:
     size = math.sqrt(together) * math.sqrt(apart)
     if not size > 0.0:
         return 0.0
-    correlation = min(max(both / size, -1.0 + 1e-12), 1.0 - 1e-12)
+    correlation = min(max(both / size, -HIGHEST), HIGHEST)
     return math.atanh(correlation) * math.sqrt(max(count - KNOWN, 0.0))
 
 

@@ -44,6 +44,8 @@ from flightid.uncertainty.taken_noise import TakenNoise
 Array = NDArray[np.float64]
 LARGEST_ORDER = 20
 """Most coefficients of a model of noise."""
+SAMPLES_PER_NUMBER = 20
+"""Samples without which a model of noise has no further coefficient."""
 SEPARATIONS = 20
 """Rounds in which a known part is told from the rest."""
 RESTORATIONS = 2
@@ -242,7 +244,7 @@ def _fitted(power: Array, n: int, length: int, *, often: bool = False) -> Autore
     What is negative is cut off there; of a power all reflections are below one, and of one without
     valleys of nothing no rounding takes a pole over the circle.
     """
-    largest = min(LARGEST_ORDER, n // 20)
+    largest = min(LARGEST_ORDER, n // SAMPLES_PER_NUMBER)
     lags = first_lags(power, length, largest, often=often)
     weights, sound = autoregression_weights(lags, n)
     if not sound:
@@ -258,8 +260,8 @@ def _rounds(
     """Rounds for `apart`, natively; by a table of cosines where that stays in the cache."""
     fast, drift = pair
     none = np.empty((0, 0))
-    table = none if length > LONGEST_TABLE else cosines(length, min(LARGEST_ORDER, n // 20))
-    tables = table, turns(length)
+    most = min(LARGEST_ORDER, n // SAMPLES_PER_NUMBER)
+    tables = none if length > LONGEST_TABLE else cosines(length, most), turns(length)
     begun = fast.lags, fast.weights, drift.variance
     ends = rounds, SETTLED, SHARPEST, CUT
     lags, weights, variance = drift_beside(whole, tables, (length, n), begun, drift.corner, ends)
@@ -307,7 +309,7 @@ def noise_models(
     total, length, n_outputs = sum(lengths), transform_length(max(lengths)), residuals[0].shape[0]
     outputs = range(n_outputs)
     seen = np.array([pooled([each[o][:, None] for each in residuals], length) for o in outputs])
-    count, bins = min(LARGEST_ORDER, total // 20) + 1, n_slow_bins(total, length)
+    count, bins = min(LARGEST_ORDER, total // SAMPLES_PER_NUMBER) + 1, n_slow_bins(total, length)
     noise = TakenNoise(taken, length, count, min(bins, seen.shape[1]))
     # What is seen is the same in all rounds.
     begun = [first_lags(power, length, count - 1) for power in seen if known is None]

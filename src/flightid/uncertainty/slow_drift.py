@@ -18,6 +18,8 @@ from flightid.frozen import dataclass
 Array = NDArray[np.float64]
 SLOWEST = 1.5
 """Corner over the inverse of the number of samples, rad: below it a record knows no corner."""
+RANK = 1e-12
+"""Share of the largest information below which a direction of a drift is not known at all."""
 FASTEST = 0.05
 """Corner (rad per sample) from which on an autoregression serves."""
 STEP = 4.0
@@ -73,7 +75,7 @@ class Drift:
         # By the corner: a number times `own`, which is there, and one times this.
         slopes = np.array([fast, own, own * self.corner**2 / under]) / (fast + own)
         information = 0.5 * n * (slopes @ slopes.T) / len(fast)
-        inverse = np.linalg.pinv(information, rcond=1e-12, hermitian=True)
+        inverse = np.linalg.pinv(information, rcond=RANK, hermitian=True)
         return np.asarray(np.einsum("ib,ij,jb->b", slopes, inverse, slopes))
 
     def _parts(self, length: int) -> tuple[float, Array]:

@@ -16,6 +16,8 @@ SHARE = 0.3
 """Share of all frequencies that a spectrum is averaged over, to each side."""
 FEWEST = 10
 """Frequencies to each side that are averaged at least."""
+MOST_TAKEN = 0.9
+"""Share of a residual that a fit takes away: more is given back to none."""
 
 
 def neighbours(count: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -104,7 +106,7 @@ def spectral_covariance(jacobian: Complex, residuals: Complex) -> tuple[Array, f
     shape = (2, *jacobian.shape)
     unit = q.reshape(shape)[0] + 1j * q.reshape(shape)[1]
     # The fit bends towards each residual by its leverage: half of a complex row's two numbers.
-    taken = np.minimum(0.5 * np.sum(np.abs(unit) ** 2, axis=2), 0.9)
+    taken = np.minimum(0.5 * np.sum(np.abs(unit) ** 2, axis=2), MOST_TAKEN)
     freed = residuals / np.sqrt(1.0 - taken)
     cross = averaged(freed[:, None] * freed[None].conj())
     scores = np.einsum("ifp,ijf,jfq->pq", unit.conj(), cross, unit, optimize=True).real

@@ -38,6 +38,8 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 SEARCH_POINTS, JUDGED_POINTS = 200, 700
 """Frequencies of the loops that are searched, and of those that judge the gains."""
+SAME_GAIN = 1e-9
+"""Step by which a ratio may pass its limit: rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -355,7 +357,7 @@ def stages_of(
 ) -> tuple[Stage, ...]:
     """Steps from the flown gains to the new ones, no ratio above the limit, each judged."""
     ratios = [abs(np.log(c.ratio)) for c in changes if c.ratio]
-    count = max(1, int(np.ceil(max(ratios, default=0.0) / np.log(limit) - 1e-9)))
+    count = max(1, int(np.ceil(max(ratios, default=0.0) / np.log(limit) - SAME_GAIN)))
     paths = ControllerPaths(loops[place], setting.gyro, setting.with_angle)
     plants = setting.searched.axis(place, loops, setting.gyro)
     problem = problem_of(setting, plants, paths, None)

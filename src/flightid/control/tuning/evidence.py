@@ -34,6 +34,8 @@ CORNER = 2.0
 """Standard deviations from the estimate to the corners that a search begins with."""
 UNEXPLAINED_PERCENT = 20.0
 """Of an output's variance: beyond it no gains, whatever the residuals are."""
+SAME_STEP = 1e-6
+"""Relative difference of equal steps."""
 SIMPLER = "simpler-structure"
 """Code of gains for a simpler structure than the one that was asked for."""
 BY_INSTRUMENT = "instrument-fit"
@@ -338,7 +340,7 @@ def _linear(source: object, sample_time_s: float) -> LinearSystem:
     """Continuous system, or a recursion at the loop's own samples."""
     model = model_of(source)
     if isinstance(model, PolynomialModel | InnovationsModel):
-        if abs(model.sample_time_s / sample_time_s - 1.0) > 1e-6:
+        if abs(model.sample_time_s / sample_time_s - 1.0) > SAME_STEP:
             return to_continuous(model)
         return linear_system(model)
     return linear_system(source)

@@ -26,6 +26,8 @@ from flightid.findings import Finding, at_least
 Array = NDArray[np.float64]
 NEAR = 2.0**0.5
 """Half an octave to either side."""
+ABOUT = 21
+"""Frequencies about a crossover at which coherence is read."""
 SLOWER = 3.0
 """Ratio of a band's low end to where a sweep begins that brings a crossover just below into it."""
 HIGHER = f"sweep to higher frequencies, until the loop is {MOST_RAISED_DB:g} dB below one"
@@ -235,7 +237,7 @@ def low_coherence(result: AxisResult, measured: tuple[Array, Array] | None) -> I
     for each in result.worst_cases:
         if each.name != "crossover" or each.nominal is None:
             continue
-        near = np.geomspace(each.nominal / NEAR, each.nominal * NEAR, 21)
+        near = np.geomspace(each.nominal / NEAR, each.nominal * NEAR, ABOUT)
         points = np.interp(near, omega, coherence)
         known = float(np.mean(points))
         if each.loop == ANGLE:

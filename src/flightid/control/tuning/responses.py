@@ -59,6 +59,8 @@ AT_A_TIME = 16
 """Plants whose pulses are held at once."""
 FIRST_S, LONGEST = 8.0, 1 << 16
 """First length of a pulse response, s, and the most samples of one."""
+LONGER, LAST_PART = 4, 16
+"""Times as long as a response that has not settled the next one is; its last part of so many."""
 LIKE_ZERO = 1e-4
 """Share of the lowest frequency at which the limit towards zero is taken."""
 MOST_KEPT = 3
@@ -200,13 +202,15 @@ def closed_responses(
             for told, pulse in _pulses(some, loops, count):
                 steps.setdefault(told, []).append(np.cumsum(pulse[:, : shown(told)[1]], axis=1))
                 size = np.abs(pulse)
-                sizes.setdefault(told, []).append((size[:, -count // 16 :].max(), size.max()))
+                sizes.setdefault(told, []).append(
+                    (size[:, -count // LAST_PART :].max(), size.max())
+                )
             # What has not died away at the end stands in each sample that is summed and shown.
             ends = {told: np.max(each, axis=0) for told, each in sizes.items()}
             errors = [min(count, shown(told)[1]) * left / top for told, (left, top) in ends.items()]
             if max(errors) < SETTLED_SHARE or count >= LONGEST:
                 break
-            count *= 4
+            count *= LONGER
     found = {}
     for told, parts in steps.items():
         values = np.concatenate(parts)

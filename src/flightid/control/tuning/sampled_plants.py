@@ -33,6 +33,8 @@ ACROSS = np.array([-6.0, -3.0, -1.5, -0.75, 0.0, 0.75, 1.5, 3.0, 6.0])
 """Points over a resonance, in its damping ratio."""
 APART = 1e-7
 """Least relative distance of frequencies."""
+SAME_STEP, WHOLE = 1e-6, 1e-9
+"""Relative difference of equal steps; share of a step short of which a delay is whole steps."""
 
 
 def loop_grid(sample_time_s: float, points: int, resonances_rad_s: Array | None = None) -> Array:
@@ -175,7 +177,7 @@ def _sampled(
 ) -> tuple[LinearSystem, NDArray[np.int64], Array]:
     chosen = system.select(outputs=outputs, inputs=inputs)
     if chosen.sample_time_s is not None:
-        if abs(chosen.sample_time_s / step - 1.0) > 1e-6:
+        if abs(chosen.sample_time_s / step - 1.0) > SAME_STEP:
             raise ModelError(
                 "the model's samples are not those of the loop",
                 found=f"T = {chosen.sample_time_s:g} s",
@@ -187,7 +189,7 @@ def _sampled(
         return _with_sums(undelayed, step), whole, np.zeros(len(inputs))
     held = np.asarray(chosen.delays_s) - (0.5 * step if hold_in_model else 0.0)
     advance, late = np.maximum(-held, 0.0), np.maximum(held, 0.0)
-    whole = np.floor(late / step + 1e-9).astype(np.int64)
+    whole = np.floor(late / step + WHOLE).astype(np.int64)
     rest = np.maximum(late - whole * step, 0.0)
     return replace(_with_angles(chosen), delays_s=rest).sampled(step), whole, advance
 

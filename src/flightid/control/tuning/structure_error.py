@@ -15,6 +15,8 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 """Multiples of it, modulo one, fill the circle evenly however many are taken."""
+BESIDE = float(np.sqrt(2.0))
+"""By which each pair's turns are faster than those of the one before, in its own."""
 
 
 def errors_of(source: object) -> dict[str, ModelErrorBound]:
@@ -113,7 +115,7 @@ def perturbed(
             known = errors.get(f"{output}/{name}")
             if known is not None:
                 # Pairs turn at rates of their own, so that all combinations come about.
-                shares = turn + GOLDEN * (1.0 + np.sqrt(2.0) * place) * np.arange(1, count)
+                shares = turn + GOLDEN * (1.0 + BESIDE * place) * np.arange(1, count)
                 angle = 2.0 * np.pi * shares[:, None]
                 band = known.band_rad_s
                 aside = 1.0 if band is None else np.minimum(omega_rad_s / band[0], 1.0)

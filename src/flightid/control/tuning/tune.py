@@ -50,6 +50,8 @@ BESIDE = ("filters", "by_hand")
 """What is shared by axes and is no part of the evidence."""
 SETTLED = 0.02
 """Largest relative change of a gain from one round to the next that ends the rounds."""
+TINY_GAIN = 1e-9
+"""What a gain of zero counts as there."""
 
 
 @on_one_thread
@@ -218,7 +220,7 @@ def _tuned(
         return alone, []
     evidence = gather(
         fit,
-        1.0 / flown[0].loop_rate_hz,
+        max(1.0 / each.loop_rate_hz for each in flown),
         [f"{rate}/{command}" for command, rate in (each.channels for each in asked)],
         fresh=shared["draws"],
         verification=[verdict for each in asked for verdict in each.verdicts],
@@ -333,4 +335,4 @@ def _coupled(
 def _settled(setting: Setting, before: AxisLoop, after: AxisLoop) -> bool:
     paths = ControllerPaths(before, setting.gyro, setting.with_angle)
     old, new = paths.gains_of(before), paths.gains_of(after)
-    return bool(np.all(np.abs(new - old) <= SETTLED * np.maximum(np.abs(old), 1e-9)))
+    return bool(np.all(np.abs(new - old) <= SETTLED * np.maximum(np.abs(old), TINY_GAIN)))

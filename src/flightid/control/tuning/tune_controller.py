@@ -44,7 +44,9 @@ LOOKED_AT_RAD_S = (1e-4, 1e4)
 """Where the crossover of a plant alone is looked for, rad/s."""
 POINTS = 4000
 """Frequencies of that search."""
-WIDEST_P, HIGHEST_I, HIGHEST_D = (1e-3, 10.0), 50.0, 0.5
+BELOW = 1e-3
+"""Share of the highest frequency from which on they stand, at the highest."""
+WIDEST_P, LOWEST_I, HIGHEST_I, HIGHEST_D = (1e-3, 10.0), 1e-3, 50.0, 0.5
 """Ranges of P, over the gain that the plant's size tells; and of I and D, over P and time."""
 WEIGHTS_TRIED = np.linspace(1.0, 0.0, 21)
 """Weights of the set-point, the liveliest first."""
@@ -273,7 +275,7 @@ def _turn(
     if evidence.band_rad_s is not None and need.band_factor is not None:
         bounds.append(evidence.band_rad_s[1] / need.band_factor)
     top = min(bounds, default=LOOKED_AT_RAD_S[1])
-    omega = np.geomspace(min(LOOKED_AT_RAD_S[0], 1e-3 * top), top, POINTS)
+    omega = np.geomspace(min(LOOKED_AT_RAD_S[0], BELOW * top), top, POINTS)
     plant = _gain(evidence.estimate, output, input, omega)
     phase = np.degrees(np.unwrap(np.angle(plant)))
     # Of a plant that answers the other way the first 180° are its sign.
@@ -310,7 +312,7 @@ def _scaled(loop: PidLoop, turn: float, gain: complex) -> PidLoop:
     low, high = (share * size for share in WIDEST_P)
     ranges = {
         "p": GainRange(low, high, loop.unit_told("p")),
-        "i": GainRange(1e-3 * low / scale, HIGHEST_I * high / scale, loop.unit_told("i")),
+        "i": GainRange(LOWEST_I * low / scale, HIGHEST_I * high / scale, loop.unit_told("i")),
         "d": GainRange(0.0, HIGHEST_D * high * scale, loop.unit_told("d")),
     }
     named = {loop.names[role]: each for role, each in ranges.items() if role in loop.names}

@@ -13,6 +13,8 @@ from flightid.control.tuning.loop_problem import LoopProblem
 
 SHARES = (1.0, 0.97, 0.94, 0.9)
 """Of the gains found: where no neighbour meets every requirement, a smaller one may."""
+WHOLE = 1e-9
+"""Distance from a whole number below which a gain is one."""
 ROUNDED = "whole numbers"
 
 
@@ -33,7 +35,7 @@ def whole_gains(
     near = {
         tuple(map(float, each))
         for around in counts
-        for each in product(*zip(np.floor(around + 1e-9), np.ceil(around - 1e-9), strict=True))
+        for each in product(*zip(np.floor(around + WHOLE), np.ceil(around - WHOLE), strict=True))
     }
     candidates = np.clip(np.array(sorted(near)) * one, problem.low, problem.high)
     judged = problem.judge(candidates)

@@ -11,6 +11,8 @@ from flightid.logs.contents import LogContents
 
 COPTER_DELAY_S = 1.0
 """Silence before the chirp on ArduCopter (SYSTEM_ID_DELAY, mode_systemid.cpp); 0 on ArduPlane."""
+SHORT_S, BEFORE_S = 0.1, 0.05
+"""Missing of a chirp that is whole, s; by how much SIDD may be written before SIDS, s."""
 
 # SID_AXIS -> point of injection, axis, unit of the signal (ArduCopter/mode_systemid.cpp).
 _RATE, _ANGLE = "deg/s", "deg"
@@ -107,7 +109,7 @@ class SidRun:
     @property
     def is_complete(self) -> bool:
         """Whether the chirp ran to its end."""
-        return self.stop_s >= self.start_s + self.delay_s + self.record_s - 0.1
+        return self.stop_s >= self.start_s + self.delay_s + self.record_s - SHORT_S
 
     def __repr__(self) -> str:
         """Point and axis, span, band and amplitude on one line."""
@@ -161,7 +163,7 @@ def _rows_of_run(
     time_s: NDArray[np.float64], clock_s: NDArray[np.float64], start_s: float, after_s: float
 ) -> NDArray[np.intp]:
     # SIDS is written just before or after the first SIDD row of the same loop.
-    rows = np.flatnonzero((time_s >= start_s - 0.05) & (time_s < after_s - 0.05))
+    rows = np.flatnonzero((time_s >= start_s - BEFORE_S) & (time_s < after_s - BEFORE_S))
     jumps = np.flatnonzero(np.diff(clock_s[rows]) < 0)
     if jumps.size == 0:
         return rows

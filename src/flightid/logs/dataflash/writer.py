@@ -263,7 +263,7 @@ def _merged(blocks: list[tuple[NDArray[np.uint64], NDArray[np.void]]]) -> bytes:
     places = np.empty(stamps.size, np.int64)
     ends = np.cumsum(sizes[order])
     places[order] = ends - sizes[order]
-    content = np.empty(int(ends[-1]) if ends.size else 0, np.uint8)
+    content = np.empty(int(sizes.sum()), np.uint8)
     done = 0
     for _, rows in blocks:
         size = rows.dtype.itemsize

@@ -26,6 +26,8 @@ from flightid.record.formats.sniff import MCAP, ROSBAG, SQLITE
 STAMP, SAMPLED = "timestamp", "timestamp_sample"
 SAME_CLOCK_US = 0.5e6
 """Median lateness of stamps, µs, beyond which the sampled ones are of another clock."""
+MOST_NAMED = 6
+"""Topics, and reasons to leave some out, that an error or a finding names."""
 PEEKED = 1 << 20
 """Bytes at either end of a file that tell the types of its messages."""
 SIGNS = (PX4_TYPES.encode(), MAVROS_TYPES.encode(), b"px4_msgs::msg", b"/mavros/")
@@ -71,7 +73,7 @@ def open_bag(path: Path) -> TableSource:
     if not known:
         raise FileFormatError(
             f"{path.name} holds no topic of an autopilot with numbers",
-            found="; ".join([each.name for each in topics][:6] + said[:3]),
+            found="; ".join([each.name for each in topics][:MOST_NAMED] + said[:MOST_NAMED]),
             needed="messages of px4_msgs, or topics of MAVROS",
             action=f"read its columns: flightid run {path.name} --inputs … --outputs …",
         )
@@ -148,11 +150,12 @@ def _events(tables: dict[str, MessageRows]) -> Iterator[Event]:
 def _findings(
     said: list[str], sizes: dict[tuple[str, str], int], vehicle: str
 ) -> Iterator[Finding]:
+    more = len(said) - MOST_NAMED
     if said:
         yield Finding(
             "topics-left-out",
             Light.AMBER,
-            "; ".join(said[:6]) + ("" if len(said) <= 6 else f"; and {len(said) - 6} more"),
+            "; ".join([*said[:MOST_NAMED], *([f"and {more} more"] if more > 0 else [])]),
             "record with the definitions of all messages (MCAP), or leave such topics out",
         )
     if len(sizes) > 1:
