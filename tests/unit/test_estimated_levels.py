@@ -11,6 +11,8 @@ import flightid as fid
 from flightid.responses.errors.covariance import WindowedErrors
 from flightid.responses.errors.noise import NoiseSpectrum
 from flightid.responses.errors.random_error import Points
+from flightid.uncertainty.blocks import JointResiduals, RecordBlock
+from flightid.uncertainty.coloured_residuals import residual_covariance
 from flightid.uncertainty.estimated_levels import EstimatedLevels
 from flightid.uncertainty.quantiles import half_width
 from tests.closeness import assert_close
@@ -114,3 +116,22 @@ def test_a_joint_fit_is_as_sure_as_both_its_noises(response: fid.FrequencyRespon
         assert least is not None
         assert most is not None
         assert least < most < 1000.0
+
+
+@pytest.mark.parametrize("coloured", [False, True])
+def test_a_record_beside_a_response_bears_the_errors_of_its_weights(*, coloured: bool) -> None:
+    """Half of what is known is weighed by a level: Meier's 4 w (1 - w) / f of all of it."""
+    residual = np.random.default_rng(1).standard_normal((1, 400))
+    slopes, heard = np.ones((400, 1)), np.array([[[400.0]]])
+    for freedom in (10.0, 40.0):
+        plain, doubted = (
+            residual_covariance(
+                [RecordBlock.of(np.ones((1, 400, 1)), np.ones((1, 400, 0)), residual)],
+                JointResiduals(slopes, slopes, levels=levels),
+                coloured=coloured,
+            )
+            for levels in (None, EstimatedLevels(heard, heard, np.array([freedom])))
+        )
+        added = 800.0 * (doubted.covariance - plain.covariance)
+        assert_close(added, np.array([[1.0 / freedom]]), rtol=1e-9, why="rounding")
+        assert doubted.freedom < plain.freedom

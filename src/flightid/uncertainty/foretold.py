@@ -151,7 +151,7 @@ def chance_share(row: Array) -> float:
     >>> round(chance_share(white), 1), round(chance_share(1e200 * smooth), 2)
     (0.9, 0.03)
     """
-    lags = _own_lags(row, max(row.size // LONGEST, 2) - 1)
+    lags = own_lags(row, max(row.size // LONGEST, 2) - 1)
     return 1.0 / (2.0 * float(lags @ lags) / float(lags[0]) ** 2 - 1.0) if lags[0] > 0.0 else 1.0
 
 
@@ -172,7 +172,7 @@ def independent_samples(rows: Sequence[Array]) -> float:
 
 def _independent(row: Array) -> float:
     n = row.size
-    lags = _own_lags(row, n // 4)
+    lags = own_lags(row, n // 4)
     if not lags[0] > 0.0:
         return float(n)
     # What chance leaves of lags without correlation counts for none.
@@ -180,9 +180,24 @@ def _independent(row: Array) -> float:
     return n / (1.0 + 2.0 * float(np.sum(np.maximum(rho - 1.0 / n, 0.0))))
 
 
-def _own_lags(row: Array, last: int) -> Array:
-    """Sums of products with itself at lags 0 to `last`, over the square of the largest value."""
-    row = row / (np.max(np.abs(row), initial=0.0) or 1.0)
+def own_lags(row: Array, last: int) -> Array:
+    """Sums of products with itself at lags 0 to `last`, over that of a power of two about it.
+
+    Parameters
+    ----------
+    row : ndarray, shape (n,)
+    last : int
+
+    Example
+    -------
+    >>> bool(np.all(own_lags(np.zeros(9), 3) == 0.0))
+    True
+    >>> row = np.array([3.0, 1.0, 0.0, -2.0])
+    >>> [(16.0 * own_lags(size * row, 2)).round(9).tolist() for size in (1.0, 2.0**-600, 2.0**600)]
+    [[14.0, 3.0, -2.0], [14.0, 3.0, -2.0], [14.0, 3.0, -2.0]]
+    """
+    # Squares of very large and very small numbers are none.
+    row = np.ldexp(row, -np.frexp(np.max(np.abs(row), initial=0.0))[1])
     length = scipy.fft.next_fast_len(row.size + last, real=True)
     power = np.abs(scipy.fft.rfft(row, length)) ** 2
     return np.asarray(scipy.fft.irfft(power, length)[: last + 1])

@@ -6,8 +6,9 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
+
+from flightid.uncertainty.foretold import own_lags
 
 Array = NDArray[np.floating]
 LAGS = 4
@@ -76,7 +77,5 @@ def _memory(one: Array, other: Array) -> float:
 
 def _own_correlations(row: Array, last: int) -> Array:
     """Correlations at lags 1 to `last`; zero where there is nothing."""
-    row = row / (np.max(np.abs(row), initial=0.0) or 1.0)
-    length = scipy.fft.next_fast_len(row.size + last, real=True)
-    sums = scipy.fft.irfft(np.abs(scipy.fft.rfft(row, length)) ** 2, length)[: last + 1]
+    sums = own_lags(row, last)
     return np.asarray(sums[1:] / sums[0] if sums[0] > 0.0 else np.zeros(last))
