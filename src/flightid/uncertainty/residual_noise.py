@@ -273,7 +273,7 @@ def _likelihood(n: int, length: int, whole: Array, pair: tuple[Autoregression, D
     fast, drift = pair
     if length > LONGEST_TABLE:
         return whittle(fast.spectrum() + drift.spectrum(length), whole, n)
-    tables = cosines(length, min(LARGEST_ORDER, n // 20)), turns(length)
+    tables = cosines(length, min(LARGEST_ORDER, n // SAMPLES_PER_NUMBER)), turns(length)
     parts = fast.lags, fast.weights, drift.variance
     return drift_likelihood(whole, tables, (length, n), parts, drift.corner, SHARPEST)
 
