@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from flightid.uncertainty.foretold import own_lags
 
-Array = NDArray[np.floating]
+Array = NDArray[np.float64]
 LAGS = 4
 """Of a record's length over the longest lag at which errors are taken to be alike."""
 KNOWN = 2

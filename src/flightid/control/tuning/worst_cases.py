@@ -214,13 +214,15 @@ def worst_cases(
         worst = (
             None if unknown else _worst(np.append(_asked_of(new, asked, values), bound), kind.more)
         )
+        flown, flown_worst = _flown(old, loop, kind, band_rad_s, least_db)
         made.append(
             WorstCase(
                 loop,
                 kind.name,
                 _estimate(f"{loop}: {kind.name}", kind, values, unknown, bound),
                 worst,
-                *_flown(old, loop, kind, band_rad_s, least_db),
+                flown,
+                flown_worst,
                 *_requirement(new, asked, values, worst),
             )
         )
@@ -229,7 +231,8 @@ def worst_cases(
 
 
 def _values(judged: LoopAssessment, loop: str, kind: _Kind) -> Array:
-    return np.asarray(getattr(judged.metrics[loop], kind.field))[0]
+    values: Array = getattr(judged.metrics[loop], kind.field)[0]
+    return values
 
 
 def _flown(
