@@ -128,7 +128,7 @@ def _coloured(pole: float, share: float, seed: int) -> Callable[[int], np.ndarra
     return drawn
 
 
-@pytest.mark.parametrize(("pole", "samples", "missed"), [(0.9, 150, 7), (0.7, 200, 0)])
+@pytest.mark.parametrize(("pole", "samples", "missed"), [(0.9, 150, 1), (0.7, 200, 0)])
 def test_short_regressions_in_noise_not_their_own_are_told(
     pole: float, samples: int, missed: int
 ) -> None:
@@ -154,6 +154,30 @@ def test_short_regressions_in_their_own_noise_stay_untold() -> None:
         assert fit.covariance is not None
         told += bool(_codes(fit))
     assert told <= 1
+
+
+def test_few_samples_in_doubt_have_bars_that_hold_what_colour_would_bend() -> None:
+    long = InnovationTests(0.05, 0.5, 0.0, 90.0, (8.0, 0.0))
+    short = replace(long, is_short=True)
+    assert (long.widening(biased=True), short.widening(biased=True)) == (1.0, 3.0)
+    assert short.widening(biased=False) == 1.0
+    assert replace(short, white=0.2).widening(biased=True) == 1.0
+    (said,) = short.findings(biased=True, times=3.0)
+    assert (said.code, said.light.value) == ("errors-in-doubt", "green")
+    assert "may not be white (p = 0.05); intervals are 3 times as long" in said.message
+    assert not short.findings(biased=False, times=1.0)
+    assert not replace(short, white=0.2).findings(biased=True, times=1.0)
+
+
+def test_bars_of_short_regressions_hold_where_colour_is_in_doubt() -> None:
+    structure, truth = fid.PolynomialModel.arx("u", "y", na=2, nb=2, nk=2), (-1.5, 0.7, 1.0, 0.5)
+    held = []
+    for seed in (5, 11, 33):
+        fit = fid.identify(structure, _short(150, _coloured(0.9, 0.5, seed), seed))
+        assert "errors-in-doubt" in {each.code for each in fit.findings}
+        bars = [each.interval95 or (np.inf, -np.inf) for each in fit.parameters.values()]
+        held += [low <= value <= high for (low, high), value in zip(bars, truth, strict=True)]
+    assert sum(held) >= 11
 
 
 def test_past_errors_beside_regressors_tell_what_the_fit_hid() -> None:

@@ -93,6 +93,7 @@ BELONGS = {
     "output-unexplained": RESIDUALS,
     PROCESS_NOISE: RESIDUALS,
     "errors-not-white": RESIDUALS,
+    "errors-in-doubt": RESIDUALS,
     "inputs-in-errors": RESIDUALS,
     "excitation-refutes": RESIDUALS,
     "loop-biases": LOOP,

@@ -76,7 +76,7 @@ def with_own_past(
     chance = float(scipy.special.fdtrc(LAGS, free, statistic / LAGS))
     white = min(1.0, 2.0 * min(chance, 1.0 if tests.white is None else tests.white))
     if tests.white is not None and tests.white <= chance:
-        return replace(tests, white=white)
+        return replace(tests, white=white, is_short=True)
     foretold = float(np.sum((past @ weights) ** 2))
     share = max(0.0, foretold / noise - LAGS) * noise / float(errors @ errors)
     worth = percent_of_output(min(share, 1.0), ratio, 1.0) or 0.0
@@ -85,6 +85,7 @@ def with_own_past(
         white=white,
         past_percent=max(worth, tests.past_percent or 0.0),
         excess=(max(foretold / noise - LAGS, tests.excess[0]), tests.excess[1]),
+        is_short=True,
     )
 
 
