@@ -10,10 +10,14 @@ from scipy.linalg import solve_discrete_are
 
 import flightid as fid
 from flightid import _native
-from flightid.errors import FitError
+from flightid.errors import FitError, SingularError
 from flightid.identification.filter_error import gust_score, search
 from flightid.identification.filter_error.gust_score import Score, score
 from flightid.identification.filter_error.gusts import Gust
+from flightid.identification.filter_error.innovation_covariance import (
+    innovation_covariance,
+    told_noises,
+)
 from flightid.identification.filter_error.innovations import FilteredData, InnovationsProblem
 from flightid.identification.filter_error.steady_filter import ContinuousPoint, steady_filter
 from flightid.identification.multistart import DenseEnd
@@ -228,3 +232,16 @@ def _led_astray(scored: Score) -> Score:
     start = scored.start.copy()
     start[5:] = np.append(scored.problem.reach[:-2], [6.0, -6.0])
     return replace(scored, start=start)
+
+
+def test_a_noise_that_is_none_refuses_no_fit_and_a_parameter_is_named() -> None:
+    """A noise of nothing, "parameter 5 of 5", refused 6 flights of a stranger's gusty rolls."""
+    random = np.random.default_rng(1)
+    jacobian = random.standard_normal((40, 5))
+    jacobian[:, 3] *= 1e-5
+    jacobian[:, 4] = jacobian[:, 2]
+    assert told_noises(jacobian, 2).tolist() == [True, True, True, False, False]
+    assert told_noises(jacobian[:3], 2).tolist() == [True, True, True, False, False]
+    jacobian[:, 1] = jacobian[:, 0]
+    with pytest.raises(SingularError, match="found L_p; needed"):
+        innovation_covariance([], np.zeros(40), jacobian[:, :3], ["p_0", "L_p"])

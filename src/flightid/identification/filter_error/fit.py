@@ -20,7 +20,10 @@ from flightid.frozen import dataclass
 from flightid.identification.filter_error.extended_kalman import ExtendedProblem
 from flightid.identification.filter_error.gust_severity import judge_gust
 from flightid.identification.filter_error.gusts import GUST, GUST_UNKNOWNS, Gust
-from flightid.identification.filter_error.innovation_covariance import innovation_covariance
+from flightid.identification.filter_error.innovation_covariance import (
+    innovation_covariance,
+    told_noises,
+)
 from flightid.identification.filter_error.innovations import InnovationsProblem, RecordInnovations
 from flightid.identification.filter_error.noise_doubt import noise_doubt
 from flightid.identification.filter_error.problem import innovations_problem
@@ -99,9 +102,12 @@ def fit_filter_error(
     freedom = _freedom(problem, filtered)
     bounded = np.abs(end.x[problem.n_free :]) >= problem.reach - 1e-6
     columns = np.concatenate([inner.mask, ~bounded])
+    # A noise that came out as none is at its bound wherever the search left its logarithm.
+    columns[columns] = told_noises(end.jacobian[:, columns], len(inner.names))
     jacobian = end.jacobian[:, columns] / np.sqrt(end.cost / freedom)
     require_seen(inner, jacobian[:, : len(inner.names)])
-    found = innovation_covariance(filtered, end.residuals / np.sqrt(end.cost / freedom), jacobian)
+    residuals = end.residuals / np.sqrt(end.cost / freedom)
+    found = innovation_covariance(filtered, residuals, jacobian, inner.names)
     count = len(inner.names)
     covariance, degrees = found.covariance[:count, :count], found.freedom[:count]
     if judged():

@@ -11,12 +11,45 @@ from flightid.identification.filter_error.innovations import RecordInnovations
 from flightid.uncertainty.blocks import JointResiduals, RecordBlock
 from flightid.uncertainty.coloured_residuals import ResidualCovariance, residual_covariance
 from flightid.uncertainty.cramer_rao import inverse_hessian
+from flightid.uncertainty.triangle import triangle_of_rows
 
 Array = NDArray[np.float64]
+LEAST_TOLD = 1e-3
+"""Length of a noise's column, innovations of unit variance, from which its logarithm is told at
+all: below, its standard error is above 1,000."""
+LEAST_APART = 1e-8
+"""Share of a column that those before it leave, down to which squares keep a digit."""
+
+
+def told_noises(jacobian: Array, n_vehicle: int) -> NDArray[np.bool_]:
+    """Which unknowns of a filter move its innovations; a noise that is none does not.
+
+    Parameters
+    ----------
+    jacobian : ndarray, shape (n_rows, n)
+        The vehicle's parameters first, noises after them.
+    n_vehicle : int
+        Those stay, whatever they do: what refuses them tells their names.
+
+    Example
+    -------
+    >>> told_noises(np.array([[1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.0]]), 1)
+    array([ True,  True, False])
+    """
+    scale = np.linalg.norm(jacobian, axis=0)
+    diagonal = np.abs(np.diag(triangle_of_rows(jacobian / np.where(scale > 0.0, scale, 1.0))))
+    told: NDArray[np.bool_] = scale > LEAST_TOLD
+    told[: len(diagonal)] &= diagonal > LEAST_APART
+    told[len(diagonal) :] = False
+    told[:n_vehicle] = True
+    return told
 
 
 def innovation_covariance(
-    filtered: Sequence[RecordInnovations], residuals: Array, jacobian: Array
+    filtered: Sequence[RecordInnovations],
+    residuals: Array,
+    jacobian: Array,
+    names: Sequence[str],
 ) -> ResidualCovariance:
     """Covariance of parameters and noises, whether the innovations are white or not.
 
@@ -32,6 +65,9 @@ def innovation_covariance(
         the rows without residual that bring the curvature of the variances.
     jacobian : ndarray, shape (n_rows + n_still, n)
         Derivatives of `residuals`.
+    names : sequence of str
+        Of the vehicle's parameters, which come first; noises after them that move nothing are left
+        out before, see `told_noises`.
 
     Raises
     ------
@@ -47,7 +83,8 @@ def innovation_covariance(
     Ljung, *System Identification*, 2nd ed., eqs. 9.41 and 9.42; Morelli & Klein (1997), J.
     Guidance, Control and Dynamics 20(1), eqs. 19-25.
     """
-    inverse_hessian(jacobian)
+    noises = [f"noise {k + 1}" for k in range(jacobian.shape[1] - len(names))]
+    inverse_hessian(jacobian, [*names, *noises])
     blocks, first = [], 0
     for each in filtered:
         n, p = each.innovations.shape
