@@ -9,6 +9,7 @@ from scipy import stats
 
 from flightid.conventions import Light
 from flightid.evidence.part_checks import agreement_check
+from flightid.models.polynomial.gain_and_speed import gain_and_speed
 from flightid.uncertainty.agreement import Agreement, compare_parts
 from flightid.uncertainty.parts import RecordParts
 from flightid.uncertainty.unseen_scatter import (
@@ -19,7 +20,14 @@ from flightid.uncertainty.unseen_scatter import (
 )
 from tests.closeness import assert_close
 from tests.strangers.output_error import TRUTH
-from tests.strangers.parts import by_output_error, recorded, response, stepped
+from tests.strangers.parts import (
+    arx_flown,
+    by_arx,
+    by_output_error,
+    recorded,
+    response,
+    stepped,
+)
 
 Array = NDArray[np.float64]
 VALUES = np.array([-3.0, 20.0])
@@ -57,7 +65,7 @@ def test_a_fleet_agrees_as_often_and_needs_bars_as_long_as_is_said() -> None:
         known = vehicles + noises
         found = compared_records(_records(known), spread, spread)
         assert found is not None
-        unseen = found.unseen(VALUES, np.sqrt(np.diag(spread)))
+        unseen = found.unseen(np.diag(VALUES), np.sqrt(np.diag(spread)))
         chances.append(unseen.chance)
         longer = unseen.longer
         means.append(spread @ np.einsum("kij,kj->i", INFORMATIONS, known))
@@ -80,7 +88,7 @@ def test_units_and_order_of_records_change_nothing() -> None:
     ):
         found = compared_records(records, solve, solve)
         assert found is not None
-        unseen = found.unseen(values, np.sqrt(np.diag(solve)))
+        unseen = found.unseen(np.diag(values), np.sqrt(np.diag(solve)))
         told.append([unseen.chance, unseen.longer])
     assert_close(told[1], told[0], rtol=1e-9, why="rounding")
     assert_close(told[2], told[0], rtol=1e-6, why="rounding")
@@ -93,7 +101,7 @@ def test_what_one_record_tells_alone_asks_for_no_longer_bars() -> None:
     assert found is not None
     assert found.alone.tolist() == [True, False]
     assert_close(
-        found.unseen(VALUES, np.sqrt(np.diag(spread))).longer,
+        found.unseen(np.diag(VALUES), np.sqrt(np.diag(spread))).longer,
         np.sqrt(1.0 + (FLOWN_APART * 20.0) ** 2),
         rtol=1e-9,
         why="half of each variance over half of one",
@@ -115,7 +123,7 @@ def test_records_are_compared_once_and_less_of_them_where_less_is_asked() -> Non
     fewer = made.of(1).compared
     assert fewer is not None
     assert fewer.slopes.shape == (2, 2, 1)
-    assert fewer.unseen(VALUES[:1], made.by_noise[:1]).n_records == 2
+    assert fewer.unseen(np.diag(VALUES[:1]), made.by_noise[:1]).n_records == 2
 
 
 @pytest.mark.parametrize(
@@ -155,3 +163,25 @@ def test_a_pair_that_could_not_show_vehicles_apart_says_so() -> None:
     assert (
         check.light is Light.GREEN
     )  # Bars of 8 % would be 1.2 times as long: no more than a word.
+
+
+def test_a_black_box_goes_with_gain_and_speed_of_its_vehicle() -> None:
+    """Of an oscillator faster by a percent: poles of exp((-0.3 ± 2j) 0.1) to that power."""
+    poles = np.exp(0.1 * np.array([-0.3 + 2.0j, -0.3 - 2.0j]))
+    a, faster = (np.poly(poles**power)[1:].real for power in (1.0, 1.0 + 1e-4))
+    values = np.concatenate([a, [0.5, 0.2, 3.0]])
+    moves = gain_and_speed(["a1", "a2", "b1[u]", "b2[u]", "b1[v]"], values)
+    assert moves.shape == (5, 3)
+    assert moves[:, 0].tolist() == [0.0, 0.0, 0.5, 0.2, 0.0]
+    assert moves[:, 1].tolist() == [0.0, 0.0, 0.0, 0.0, 3.0]
+    assert_close(moves[:2, 2], (faster - a) / 1e-4, rtol=1e-3, why="a difference of 1e-4")
+
+
+def test_a_pair_of_short_regressions_says_what_it_cannot_show() -> None:
+    said = []
+    for seed in range(4):
+        random = np.random.default_rng(seed)
+        fit = by_arx([arx_flown(random, 0.0)[0] for _ in range(2)])
+        check = next(c for c in fit.evidence.checks if c.name == "agreement of parts")
+        said.append("2 records agree, as" in check.what + check.limit)
+    assert any(said)

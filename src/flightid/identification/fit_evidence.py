@@ -24,6 +24,7 @@ from flightid.models import StateSpaceModel
 from flightid.models.innovations.model import InnovationsModel
 from flightid.models.narx.model import NarxModel
 from flightid.models.parameters import Parameters
+from flightid.models.polynomial.gain_and_speed import gain_and_speed
 from flightid.models.polynomial.model import PolynomialModel
 from flightid.record.hold import Loop
 from flightid.uncertainty.estimate import Estimate
@@ -61,7 +62,7 @@ def evidence_of(fit: Fit, data: Sequence[Any], loop: Loop | None = None) -> Evid
             _compared(fit),
             _at_once(fit.model),
             _free_runs(fit),
-            _unseen(fit) if isinstance(asked, Parameters) else None,
+            _unseen(fit),
         )
     )
 
@@ -130,8 +131,15 @@ def _unseen(fit: Fit) -> UnseenScatter | None:
     compared = _estimates(fit)
     if compared is None or fit.agreement is None or fit.agreement.compared is None:
         return None
+    values = np.array([each.value for each in compared])
     stderr = np.array([each.stderr or 0.0 for each in compared])
-    return fit.agreement.compared.unseen(np.array([each.value for each in compared]), stderr)
+    if isinstance(fit.model, PolynomialModel):
+        moves = gain_and_speed(fit.model.structure.names, values)
+    elif isinstance(getattr(fit.structure, "parameters", None), Parameters):
+        moves = np.diag(values)
+    else:
+        return None
+    return fit.agreement.compared.unseen(moves, stderr)
 
 
 def _estimates(fit: Fit) -> list[Estimate] | None:

@@ -69,36 +69,39 @@ class ComparedRecords:
             self.alone[:count],
         )
 
-    def unseen(self, values: Array, stderr: Array, apart: float = FLOWN_APART) -> UnseenScatter:
+    def unseen(self, moves: Array, stderr: Array, apart: float = FLOWN_APART) -> UnseenScatter:
         """What flights that are so far apart would look like.
 
         Parameters
         ----------
-        values, stderr : ndarray, shape (p,)
-            Estimates and their standard errors, as they stand.
+        moves : ndarray, shape (p, k)
+            How the estimates go with each of k properties that scatter by themselves, for a whole
+            of it: coefficients of their own on the diagonal.
+        stderr : ndarray, shape (p,)
+            Standard errors of the estimates, as they stand.
         apart : float
-            Standard deviation of each coefficient from flight to flight, over its value.
+            Standard deviation of each property from flight to flight, over its value.
 
         Assumes
         -------
-        Coefficients that scatter by themselves, normally; a level of the noise that is known.
+        Properties that scatter normally; a level of the noise that is known.
 
         Example
         -------
         >>> # Two records of equal weight, standard errors of 1 each, apart by half of one.
         >>> pair = ComparedRecords(0.5**2 / 2, np.array([[[1.0], [-1.0]]]) / np.sqrt(2.0),
         ...                        np.full((2, 1, 1), 0.5), np.array([False]))
-        >>> hidden = pair.unseen(np.array([100.0]), np.array([np.sqrt(0.5)]))
+        >>> hidden = pair.unseen(np.array([[100.0]]), np.array([np.sqrt(0.5)]))
         >>> round(hidden.chance, 3), round(hidden.longer, 3)  # P(χ²₁ < 0.125 / 10), √10
         (0.089, 3.162)
         """
-        size = apart * np.abs(values)
+        size = apart * moves
         d, count = self.slopes.shape[:2]
-        moved = (self.slopes * size).reshape(d, -1)
+        moved = (self.slopes @ size).reshape(d, -1)
         scales = np.ones(d)
         found = np.linalg.svd(moved, compute_uv=False)
         scales[: found.size] += found**2
-        added = np.sum((self.weights * size) ** 2, axis=(0, 2))
+        added = np.sum((self.weights @ size) ** 2, axis=(0, 2))
         asked = (stderr > 0.0) & ~self.alone
         ratio = np.sqrt(1.0 + added[asked] / stderr[asked] ** 2)
         return UnseenScatter(
