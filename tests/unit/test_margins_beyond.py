@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from functools import partial
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,13 +14,22 @@ import pytest
 import flightid as fid
 from flightid.control.margins import gain_limits
 from flightid.control.margins.loop_source import read_loop
-from flightid.control.margins.low_mode_slack import MOST_LOWERED_DB, LowModeSlack
+from flightid.control.margins.low_mode_slack import (
+    LEAST_DAMPING,
+    MOST_LOWERED_DB,
+    TAKEN_BELOW,
+    LowModeSlack,
+    most_lowered_db,
+)
 from flightid.control.margins.margins import margins_of
 from flightid.control.margins.resonance_slack import TAKEN, ResonanceSlack
 from flightid.control.tuning.axis_tuning import held_by_hand
-from flightid.control.tuning.findings import verdict
+from flightid.control.tuning.findings import below_band, verdict
+from flightid.control.tuning.margins_below import lows_left
+from flightid.control.tuning.worst_cases import WorstCase
 from flightid.conventions import Light
 from flightid.evidence.evidence import Check, Evidence
+from flightid.uncertainty.estimate import Estimate
 from flightid.uncertainty.shown_bands import shown_words
 from flightid.uncertainty.uncertain import Uncertain
 from tests.strangers import hover
@@ -249,7 +259,8 @@ def test_of_a_phase_that_is_read_below_the_band_nothing_is_promised(
     said = [each for each in design.findings if each.code == "margin-below-band"]
     assert [each.light for each in said] == ([] if promised else [Light.AMBER])
     assert (design.worst_case("angle loop", "phase margin").worst is not None) is promised
-    assert design.worst_case("rate loop", "phase margin").worst is not None
+    # From 4 rad/s on a mode below may bring the rate loop through one too.
+    assert (design.worst_case("rate loop", "phase margin").worst is not None) is promised
     found = replace(held_by_hand(design.problem, _gains_of(design)), exists=True)
     light = verdict(found, np.ones(300, dtype=bool), 300, design.worst_cases, (low, 900.0))
     assert light.light is (Light.GREEN if promised else Light.AMBER)
@@ -285,6 +296,77 @@ def test_a_pendulum_below_the_band_takes_no_promised_number(shift: float) -> Non
     assert weak.takes_all(6.0)
     assert weak.takes("gain_margin_db", 6.0)
     assert LowModeSlack().edge("sensitivity_peak") is None
+
+
+def test_a_mode_that_the_band_hardly_shows_lowers_the_response_beside_it_little() -> None:
+    """Pole beside zero of any shape: the nearer to the band, the more of it stands in the band."""
+    draw = np.random.default_rng(11)
+    for _ in range(300):
+        zero = np.exp(draw.uniform(np.log(0.05), 0.0))
+        pole = zero * np.exp(draw.uniform(-0.6, 0.6) * draw.uniform() ** 2)
+        of_zero, of_pole = np.exp(draw.uniform(np.log(LEAST_DAMPING), np.log(0.7), 2))
+
+        def mode(w: np.ndarray) -> np.ndarray:
+            top = zero**2 - w**2 + 2j * of_zero * zero * w  # noqa: B023
+            return np.asarray(top / (pole**2 - w**2 + 2j * of_pole * pole * w))  # noqa: B023
+
+        below = np.append(np.geomspace(0.01, 0.999, 200), zero * np.linspace(0.97, 1.0, 21))
+        error = float(np.abs(mode(np.array([1.0])) - 1.0)[0])
+        lowered_db = -20.0 * np.log10(np.abs(mode(below)))
+        least = np.minimum(lowered_db, MOST_LOWERED_DB) - most_lowered_db(1.0 / below, error)
+        assert least.max() < 0.3, (zero, pole, of_zero, of_pole)
+    assert np.all(most_lowered_db([1.0, 1.1], np.inf) == MOST_LOWERED_DB)
+
+
+def test_a_loop_that_a_mode_brings_through_one_is_promised_no_phase_nor_delay() -> None:
+    """There it passes one with any phase: both were promised beside a gain margin that was not."""
+    through, clear = LowModeSlack(-0.5, 19.5), LowModeSlack(0.5, 20.5)
+    for field in ("phase_margin_deg", "delay_margin_s", "gain_margin_db"):
+        assert through.takes(field, 6.0), field
+        assert not clear.takes(field, 6.0), field
+    assert clear.takes("gain_reduction_margin_db", 6.0)
+    assert not LowModeSlack().takes("phase_margin_deg", 6.0)
+
+
+def test_what_a_mode_below_may_lower_is_judged_by_what_the_band_shows_at_its_end() -> None:
+    design = fid.tune_pid(
+        fid.load_model("rate_integrator", axis="roll").with_values({"Ltphi": 140.0, "tau": 0.03}),
+        gains=fid.axis_loop("arducopter", "roll", loop_rate_hz=400.0),
+        band_rad_s=(4.0, 100.0),
+        nominal=True,
+        by_hand={"ATC_ANG_RLL_P": 3.0},
+    )
+    plants = design.problem.plants
+    omega, gains = plants.omega_rad_s, _gains_of(design)
+    below = omega < 4.0
+    alone = lows_left(design.problem, gains, (4.0, 100.0))["rate loop"]
+    assert alone.left_db == pytest.approx(alone.own_db - MOST_LOWERED_DB)
+    loop = design.problem.loops(gains[None], plants).rate[0, 0, below]
+    three = {name: np.repeat(getattr(plants, name), 3, axis=0) for name in ("angle", "rest")}
+    for error, less in ((0.0, True), (0.1, True), (0.9, False)):
+        spread = plants.rate * (1.0 + error * np.array([0.0, 1.0, -1.0j])[:, None])
+        many = replace(plants, rate=spread, unstable=np.repeat(plants.unstable, 3), **three)
+        found = lows_left(design.problem.with_plants(many), gains, (4.0, 100.0))["rate loop"]
+        assert found.own_db == pytest.approx(alone.own_db)
+        left_db = 20.0 * np.log10(np.abs(loop)) - most_lowered_db(4.0 / omega[below], error)
+        assert found.left_db == pytest.approx(left_db.min())
+        assert (found.left_db > alone.left_db + 1.0) is less
+
+
+@pytest.mark.parametrize(("required", "light"), [("≥ 6", Light.AMBER), ("", Light.GREEN)])
+def test_what_was_asked_and_may_be_taken_is_a_check_that_was_not_made(
+    required: str, light: Light
+) -> None:
+    """Not green beside a requirement of which nothing is promised (docs/evidence.md)."""
+    reading = Estimate("rate loop: gain reduction margin", 15.0, "dB", reason=TAKEN_BELOW)
+    case = WorstCase("rate loop", "gain reduction margin", reading, None, None, None, required)
+    whole = Estimate("rate loop: phase margin", 60.0, "deg")
+    kept = WorstCase("rate loop", "phase margin", whole, 50.0, None, None, "≥ 45")
+    result = SimpleNamespace(worst_cases=(kept, case))
+    (said,) = below_band(result, (4.0, 100.0))  # type: ignore[arg-type]
+    assert (said.code, said.light) == ("mode-below-band", light)
+    assert "may take gain reduction margin, and none is promised" in said.message
+    assert said.action == "sweep from 1.3 rad/s or lower, with more amplitude there"
 
 
 def _gains_of(design: fid.PidDesign) -> np.ndarray:

@@ -10,7 +10,11 @@ from flightid.frozen import dataclass
 
 MOST_LOWERED_DB = MOST_RAISED_DB
 """By which no mode lowers a response between its pole and its zero, as none raises it by more."""
+LEAST_DAMPING = 0.02
+"""Damping ratio of a zero below the band that none has less of: a load on a line, a bare frame."""
 TAKEN_BELOW = "a light mode below the identified band may leave less"
+AT_ONE = "phase_margin_deg", "delay_margin_s", "gain_margin_db"
+"""Numbers that a loop leaves as they are until it passes one."""
 AT_BANDWIDTH_DB = float(20.0 * np.log10(1.0 + 2.0**0.5))
 """Least gain at which the sensitivity lies below −3 dB, whatever the phase."""
 
@@ -24,7 +28,8 @@ class LowModeSlack:
 
     Assumes
     -------
-    No mode lowers the response by more than `MOST_LOWERED_DB` under that of the model.
+    No mode lowers the response by more than `MOST_LOWERED_DB` under that of the model, nor by more
+    than `most_lowered_db`.
 
     Attributes
     ----------
@@ -44,22 +49,33 @@ class LowModeSlack:
     own_db: float = np.inf
 
     @classmethod
-    def below(cls, loop: ArrayLike) -> LowModeSlack:
-        """Of a loop's response below the band, of any shape."""
-        own = _least_db(np.abs(loop))
-        return cls(own - MOST_LOWERED_DB, own)
+    def below(cls, loop: ArrayLike, lowered_db: ArrayLike = MOST_LOWERED_DB) -> LowModeSlack:
+        """Of a loop's response below the band.
+
+        Parameters
+        ----------
+        loop : array_like of complex, shape (…, n_f)
+        lowered_db : array_like, shape (n_f,)
+            By which a mode may lower it at most, dB.
+        """
+        gain = np.abs(loop)
+        return cls(_least_db(gain * _factor(lowered_db)), _least_db(gain))
 
     @classmethod
-    def below_around(cls, loop: ArrayLike, inner: ArrayLike) -> LowModeSlack:
+    def below_around(
+        cls, loop: ArrayLike, inner: ArrayLike, lowered_db: ArrayLike = MOST_LOWERED_DB
+    ) -> LowModeSlack:
         """Of a loop around a closed one, which makes up for what its vehicle loses.
 
         Parameters
         ----------
-        loop, inner : array_like of complex
+        loop, inner : array_like of complex, shape (…, n_f)
             Outer loop, and the loop closed inside it, below the band.
+        lowered_db : array_like, shape (n_f,)
+            By which a mode may lower the inner one at most, dB.
         """
         inner = np.asarray(inner)
-        low = np.abs(inner) * 10.0 ** (-MOST_LOWERED_DB / 20.0)
+        low = np.abs(inner) * _factor(lowered_db)
         share = np.abs((1.0 + inner) / inner) * low / (1.0 + low)
         return cls(_least_db(np.abs(loop) * share), _least_db(np.abs(loop)))
 
@@ -83,9 +99,10 @@ class LowModeSlack:
     def takes(self, field: str, least_db: float) -> bool:
         """Whether it may leave a number less than is asked: a gain margin of so many dB.
 
-        Lowered through one it may pass −180° at any gain below one, too.
+        Lowered through one it passes one there with any phase, and may pass −180° at any gain
+        below one, too.
         """
-        if field == "gain_margin_db":
+        if field in AT_ONE:
             return self.left_db < 0.0
         if field == "disturbance_bandwidth_rad_s":
             return self.left_db < AT_BANDWIDTH_DB
@@ -94,6 +111,40 @@ class LowModeSlack:
     def takes_all(self, least_db: float) -> bool:
         """Whether the loop itself is at one below the band, or nearer to it than is asked."""
         return self.own_db < least_db
+
+
+def most_lowered_db(ratio: ArrayLike, error: float) -> NDArray[np.float64]:
+    """By which a mode that the low end of a band hardly shows may lower a response below it, dB.
+
+    Parameters
+    ----------
+    ratio : array_like
+        Low end of the band over a frequency below it, at least 1.
+    error : float
+        Largest relative error of the model at that end.
+
+    Notes
+    -----
+    A mode makes the response N/D of what the model has, N = ζ-damped zeros, D = poles. With
+    a(ω) = |N − D|, which rises with ω, it lowers by 1 + a/|N| at most, and at the band's end
+    a ≤ ε |N|/(1 − ε): together 1 + ε/(1 − ε) √((ρ² − 1)² + (2ζρ)²)/(2ζ) with zeros at ω and ρ the
+    ratio. The nearer to the band, the more a mode would have shown in it.
+
+    Example
+    -------
+    >>> most_lowered_db([1.0, 1.25, 2.0], 0.1).round(1).tolist()
+    [0.9, 8.2, 19.4]
+    """
+    at = np.asarray(ratio, dtype=np.float64)
+    if not error < 1.0:
+        return np.full(at.shape, MOST_LOWERED_DB)
+    nearness = np.hypot(at**2 - 1.0, 2.0 * LEAST_DAMPING * at) / (2.0 * LEAST_DAMPING)
+    lowered = 20.0 * np.log10(1.0 + error / (1.0 - error) * nearness)
+    return np.asarray(np.minimum(lowered, MOST_LOWERED_DB))
+
+
+def _factor(lowered_db: ArrayLike) -> NDArray[np.float64]:
+    return np.asarray(10.0 ** (-np.asarray(lowered_db, dtype=np.float64) / 20.0))
 
 
 def _least_db(gain: NDArray[np.float64]) -> float:

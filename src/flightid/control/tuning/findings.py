@@ -268,7 +268,7 @@ def _behind_rate_loop(result: AxisResult, omega: Array, coherence: Array) -> Arr
 
 
 def below_band(result: AxisResult, band_rad_s: tuple[float, float] | None) -> Iterator[Finding]:
-    """Amber where a loop is at one below the band, as a light mode there may take all it has.
+    """Amber where a loop is at one below the band, or a light mode there may take what was asked.
 
     Parameters
     ----------
@@ -289,9 +289,11 @@ def below_band(result: AxisResult, band_rad_s: tuple[float, float] | None) -> It
         )
     lowered = _named(result.worst_cases, TAKEN_BELOW)
     if rest := [name for name in lowered if name not in found]:
+        asked = [e for e in result.worst_cases if e.estimate.reason == TAKEN_BELOW and e.required]
         yield Finding(
             "mode-below-band",
-            Light.GREEN,
+            # What was asked and is not known to hold is a check that was not made.
+            Light.AMBER if any(each.loop in rest for each in asked) else Light.GREEN,
             f"{' and '.join(rest)}: nothing is known below {band_rad_s[0]:.3g} rad/s: a light mode "
             f"there that lowers the response by up to {MOST_LOWERED_DB:g} dB may take "
             f"{', '.join(_taken(result.worst_cases, rest))}, and none is promised",

@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.control.margins.low_mode_slack import LowModeSlack
+from flightid.control.margins.low_mode_slack import LowModeSlack, most_lowered_db
 from flightid.control.tuning.limits import ANGLE
-from flightid.control.tuning.loop_problem import LoopAssessment, LoopProblem
+from flightid.control.tuning.loop_problem import LoopAssessment, LoopProblem, Plants
 
 Band = tuple[float, float]
 BELOW_BAND = "at one below the identified band"
+FEWEST_PLANTS = 3
+"""A spread needs more than the estimate and one other."""
 CROSSINGS = "crossover_rad_s", "delay_crossover_rad_s"
 """Where a loop passes one."""
 
@@ -32,17 +34,28 @@ def lows_left(
     dict of str to LowModeSlack
         By loop. Empty where no band is known, or the loop's frequencies begin inside it.
     """
-    below = problem.plants.omega_rad_s < (0.0 if band_rad_s is None else band_rad_s[0])
-    if not below.any():
+    omega = problem.plants.omega_rad_s
+    below = omega < (0.0 if band_rad_s is None else band_rad_s[0])
+    if band_rad_s is None or not below.any():
         return {}
+    error = _error_at(problem.plants, band_rad_s[0])
+    lowered_db = most_lowered_db(band_rad_s[0] / omega[below], error)
     loops = problem.loops(gains[None], problem.plants.take([0]))
     rate = loops.rate[..., below]
     return {
-        name: LowModeSlack.below_around(loop[..., below], rate)
+        name: LowModeSlack.below_around(loop[..., below], rate, lowered_db)
         if name == ANGLE
-        else LowModeSlack.below(loop[..., below])
+        else LowModeSlack.below(loop[..., below], lowered_db)
         for name, loop in loops.named()
     }
+
+
+def _error_at(plants: Plants, omega_rad_s: float) -> float:
+    """Largest relative error of the estimate at a frequency; unknown where plants are few."""
+    if len(plants) < FEWEST_PLANTS:
+        return np.inf
+    at = min(int(np.searchsorted(plants.omega_rad_s, omega_rad_s)), len(plants.omega_rad_s) - 1)
+    return float(np.abs(plants.rate[:, at] / plants.rate[0, at] - 1.0).max())
 
 
 def passes_below(judged: LoopAssessment, loop: str, band_rad_s: Band | None) -> bool:
