@@ -9,6 +9,7 @@ from scipy.signal import lfilter
 import flightid as fid
 from flightid.conventions import Light
 from flightid.errors import DataError, FitError, OptionError
+from flightid.evidence import FeedbackTest
 from flightid.identification.advice.delays import delays_to_scan
 from flightid.identification.prediction_error.linear_regression import (
     LinearRegression,
@@ -16,6 +17,8 @@ from flightid.identification.prediction_error.linear_regression import (
     regress_lags,
 )
 from flightid.plot import polynomial as plot
+from flightid.record.history import Step
+from flightid.uncertainty.feedback_result import unless_logged
 from tests.closeness import assert_close
 from tests.polynomial_records import ARMAX, TWO_INPUTS, flown
 
@@ -223,6 +226,20 @@ def test_feedback_is_seen_and_its_absence_too():
     assert found == [False, True]
     assert "feedback" not in _codes(fid.advise(record, loop="open"))
     assert "feedback" in _codes(fid.advise(record.declare(loop="closed")))
+
+
+def test_advice_on_a_log_never_says_that_no_loop_is_seen():
+    """An autopilot flies in a loop; where too little noise was to be seen it said so of its log."""
+    record = flown(TWO_INPUTS, 0, n=600, noise=0.1)
+    assert fid.advise(record).feedback.loop != "closed"
+    logged = record.replace(step=Step("Log.record"))
+    found = fid.advise(logged)
+    assert (found.feedback.loop, found.feedback.source) == ("closed", "log")
+    assert "feedback" in _codes(found)
+    assert "Loop closed: in an autopilot's log" in found.summary().to_text()
+    assert fid.advise(logged, loop="open").feedback.source == "declared"
+    seen = FeedbackTest("closed", "test", 1e-9, "u", 0.2)
+    assert unless_logged(seen, [logged.history]) is seen
 
 
 def test_advice_on_a_short_record_says_what_it_left_out():

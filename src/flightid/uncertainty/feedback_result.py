@@ -10,7 +10,7 @@ import numpy as np
 
 from flightid.errors import OptionError
 from flightid.frozen import dataclass
-from flightid.record.history import Step, spread_channels
+from flightid.record.history import Step, is_of_log, spread_channels
 from flightid.record.hold import LOOPS
 
 LEVEL = 0.01
@@ -30,10 +30,11 @@ class FeedbackTest:
     Attributes
     ----------
     loop : {"open", "closed", "unknown"}
-    source : {"test", "declared", "repeats", "instrument", "noise model", "no noise", ...}
-        How it is known: the test of past noise; the user's word; inputs that repeat exactly, or
-        outputs without noise, which feed nothing back; an estimate by way of an excitation or of a
-        model of the noise, which a closed loop does not bias. Or why it is not ("same sample", "too
+    source : {"test", "declared", "log", "repeats", "instrument", "noise model", "no noise", ...}
+        How it is known: the test of past noise; the user's word; a log, whose autopilot closes it;
+        inputs that repeat exactly, or outputs without noise, which feed nothing back; an estimate
+        by way of an excitation or of a model of the noise, which a closed loop does not bias. Or
+        why it is not ("same sample", "too
         short", "filtered", "noisy input", "blind"): input and output go together within a sample;
         records too short to tell; samples made of later ones, which look like feedback, or noise of
         an input's sensor, which does too; a loop that bends estimates would not have been seen.
@@ -122,6 +123,8 @@ class FeedbackTest:
                 "errors"
             ),
             "too short": "whether a loop is closed cannot be told: the records are too short",
+            "log": "loop closed: in an autopilot's log controller and pilot move the inputs after "
+            "what the outputs do, whether a test sees it or not",
         }
         if self.source in words:
             return words[self.source]
@@ -173,6 +176,24 @@ def unless_spread(
     """A test of channels, "filtered" where some were without phase, which looks like feedback."""
     found = test.source == "test" and test.is_closed and spread_channels(histories, names)
     return replace(test, loop="unknown", source="filtered") if found else test
+
+
+def unless_logged(test: FeedbackTest, histories: Iterable[Iterable[Step]]) -> FeedbackTest:
+    """A test that sees no loop, closed where the data are of an autopilot's log.
+
+    Parameters
+    ----------
+    test : FeedbackTest
+    histories : iterable
+        Of the records.
+
+    Example
+    -------
+    >>> unless_logged(FeedbackTest("open", "test", 0.4), [[Step("Log.record")]]).loop
+    'closed'
+    """
+    said = test.source == "declared" or test.loop == "closed"
+    return test if said or not is_of_log(histories) else replace(test, loop="closed", source="log")
 
 
 def unless_blind(test: FeedbackTest) -> FeedbackTest:

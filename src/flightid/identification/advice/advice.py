@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 
 from flightid.conventions import Light
 from flightid.errors import DataError, FitError, SingularError
-from flightid.evidence import FeedbackTest, feedback_test
+from flightid.evidence import FeedbackTest
 from flightid.findings import Finding
 from flightid.frozen import dataclass
 from flightid.identification.advice.delays import InputDelay, find_delays
 from flightid.identification.advice.impulse_response import (
     ImpulseResponse,
     impulse_response,
+    loop_told,
     named_channels,
 )
 from flightid.identification.prediction_error.sampling_rate import SAMPLING
@@ -127,7 +128,7 @@ def advise(
         Lags of the pulse response behind the delay.
     loop : {"open", "closed"}, optional
         Whether anything moved the inputs after what the outputs did; default: what the records
-        know, else a test.
+        know (an autopilot's log flies closed), else a test.
 
     Raises
     ------
@@ -164,7 +165,7 @@ def advise(
     except DataError as error:
         reason = str(error)
     if response is None:
-        feedback = feedback_test(listed, inputs=names, outputs=(name,), loop=loop)
+        feedback = loop_told(listed, names, name, loop)
         acts = dict.fromkeys(names, InputDelay())
         if not feedback.may_turn_round:
             acts = dict(zip(names, find_delays(data, n_lags - 1), strict=True))

@@ -29,6 +29,7 @@ from flightid.record.several import as_records
 from flightid.recursive_filter import filtered
 from flightid.result import Result
 from flightid.table import Column, Table
+from flightid.uncertainty.feedback_result import unless_logged
 from flightid.uncertainty.quantiles import half_width
 
 Array = NDArray[np.float64]
@@ -280,8 +281,25 @@ def impulse_response(
         data.units,
         fitted,
         "" if ended else OUTLASTS.format(fitted),
-        feedback_test(listed, inputs=names, outputs=(name,), loop=loop),
+        loop_told(listed, names, name, loop),
     )
+
+
+def loop_told(
+    records: Sequence[Record], inputs: Sequence[str], output: str, loop: Loop | None
+) -> FeedbackTest:
+    """Whether a loop was closed, as the test sees it and an autopilot's log knows.
+
+    Parameters
+    ----------
+    records : sequence of Record
+    inputs : sequence of str
+    output : str
+    loop : {"open", "closed"} or None
+        The caller's word.
+    """
+    test = feedback_test(records, inputs=inputs, outputs=(output,), loop=loop)
+    return unless_logged(test, [each.history for each in records])
 
 
 def _until_ended(
