@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import flightid as fid
 from flightid.errors import DataError, FitError, OptionError
+from flightid.identification.joint import fit as joint
 from flightid.identification.output_error.search import searched
 from flightid.identification.records.options import RecordOptions
 from flightid.identification.records.setup import prepare_records
@@ -151,3 +155,56 @@ def test_what_written_residuals_raise_reaches_the_caller() -> None:
     assert_close(np.array(found, dtype=float), goal, rtol=1e-6, why="they outweigh the record")
     with pytest.raises(ZeroDivisionError, match="3"):
         searched(model, prepared, options, written=(residuals, broken, 3))
+
+
+@dataclass(frozen=True)
+class _Response:
+    """What a search with the estimator inside is asked of: its cost is 10 at the plain fit."""
+
+    model: object = None
+    selected: tuple[object, ...] = ()
+
+    @property
+    def correction(self) -> object:
+        """Of errors that the response was not measured with."""
+        return SimpleNamespace(data=SimpleNamespace(errors=None))
+
+    def residuals(self, _: object) -> np.ndarray:
+        return np.array([3.0, 1.0])
+
+    def at(self, x: float) -> float:
+        return x
+
+
+@pytest.mark.parametrize(
+    ("costs", "best", "kept"),
+    [
+        ((5.0,), 5.0, True),  # It did not rise: no further start.
+        ((9.0, 9.004, 12.0), 9.0, True),  # Another start meets it: nothing tells of a lower one.
+        ((9.0, 7.0, 11.0), 7.0, False),  # A lower one that still rose, and none meets it.
+        ((9.0, 5.2, 11.0), 5.2, True),  # One that costs no more than without.
+    ],
+)
+def test_a_joint_cost_that_rose_is_searched_again_as_that_of_a_response(
+    monkeypatch: pytest.MonkeyPatch, costs: tuple[float, ...], best: float, kept: bool
+) -> None:
+    """Negative log-likelihood 5 before, a response's cost of 10: from 5.5 on it rose by 10 %.
+
+    Refused by the rise alone, right minima were: a cost that rose tells no wrong one.
+    """
+    left = iter(costs)
+
+    def searched(*_: object) -> object:
+        return SimpleNamespace(cost=next(left), step=0.0, misfit=9.0)
+
+    monkeypatch.setattr(joint, "search_inside", searched)
+    monkeypatch.setattr(joint, "further_starts", lambda *_: [1.0] * (len(costs) - 1))
+    monkeypatch.setattr(joint, "curves_of", lambda *_: [])
+    free = SimpleNamespace(parameters=SimpleNamespace(free=()))
+    found = SimpleNamespace(fitted=free, groups=[[SimpleNamespace(cost=5.0)]])
+    ends = joint._ends_inside(found, SimpleNamespace(model=free), None, _Response())  # type: ignore[arg-type]
+    assert ends[0].cost == best
+    assert not [*left], "each start is searched"
+    reason = joint._why_worse(found, ends, _Response())  # type: ignore[arg-type]
+    assert (reason == "") is kept
+    assert kept or reason.endswith("no further start meets: there may be lower ones")

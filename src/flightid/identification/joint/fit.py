@@ -29,6 +29,7 @@ from flightid.identification.frequency_domain.bias_findings import (
     sizes,
 )
 from flightid.identification.frequency_domain.bias_objective import Curves, Objective, whitened
+from flightid.identification.frequency_domain.bias_starts import further_starts
 from flightid.identification.frequency_domain.error_model import ErrorModel, error_model, whitening
 from flightid.identification.frequency_domain.estimator_bias import (
     OUTSIDE,
@@ -53,7 +54,7 @@ from flightid.identification.frequency_domain.noise_cost import noise_costs
 from flightid.identification.frequency_domain.opened import opened
 from flightid.identification.frequency_domain.options import FrequencyDomainOptions
 from flightid.identification.frequency_domain.selection import SelectedResponse
-from flightid.identification.frequency_domain.without_bias import CHANCE, MISFIT, RISEN
+from flightid.identification.frequency_domain.without_bias import AGAIN, CHANCE, MISFIT, RISEN
 from flightid.identification.joint.estimator_inside import InsideEnd, again, search_inside
 from flightid.identification.joint.independence import judge_independence
 from flightid.identification.joint.options import JointOptions
@@ -74,6 +75,8 @@ from flightid.uncertainty.response_errors import PointSensitivity
 Array = NDArray[np.float64]
 MARGIN, MOST_RIVALS = 50.0, 4
 """Log-likelihood from which on a minimum lies too far below the best, and most that are tried."""
+SAME_LIKELIHOOD = 0.01
+"""Log-likelihood by which searches that end at one minimum differ at most."""
 
 
 @dataclass(frozen=True)
@@ -231,8 +234,9 @@ def _corrected(
     if reason:
         return not_done(reason, possible=False)
     try:
-        end = _best_end(found.fitted, prepared, once, objective)
-        reason = _why_worse(found, end, objective) or ("" if end.step <= TOLERABLE else end.reason)
+        ends = _ends_inside(found, prepared, once, objective)
+        end = ends[0]
+        reason = _why_worse(found, ends, objective) or ("" if end.step <= TOLERABLE else end.reason)
         if reason:
             return not_done(reason)
         known = without.errors(end.found.fitted)
@@ -250,32 +254,53 @@ def _corrected(
     return _UnbiasedSearch(end.found, ChosenPoints(after, objective.errors), end.extra, outcome)
 
 
-def _best_end(
-    fitted: GreyBoxModel, prepared: RecordSet, options: JointOptions, objective: Objective
-) -> InsideEnd:
-    """From the fit without correction and, where that ends badly, from the model's own values."""
-    first = search_inside(fitted, prepared, options, objective)
-    if first.step <= TOLERABLE and first.misfit <= MISFIT:
-        return first
-    with suppress(FitError, *OUTSIDE):
-        own = search_inside(prepared.model, prepared, options, objective)
-        if (own.step > TOLERABLE, own.cost) < (first.step > TOLERABLE, first.cost):
-            return own
-    return first
+def _ends_inside(
+    found: SearchEnd, prepared: RecordSet, options: JointOptions, objective: Objective
+) -> list[InsideEnd]:
+    """Ends with the estimator inside, best first.
+
+    From the fit without correction and, where that ends badly, from the model's own values; where
+    the best costs more than without, from values around both too, as fits of responses alone.
+    """
+    ends = [search_inside(found.fitted, prepared, options, objective)]
+    if ends[0].step > TOLERABLE or ends[0].misfit > MISFIT:
+        with suppress(FitError, *OUTSIDE):
+            ends.append(search_inside(prepared.model, prepared, options, objective))
+    if _rise(found, min(ends, key=_worth), objective) is not None:
+        own = replace(objective, model=prepared.model)
+        fitted = np.array([parameter.value or 0.0 for parameter in found.fitted.parameters.free])
+        for start in further_starts(own, fitted):
+            with suppress(FitError, *OUTSIDE):
+                ends.append(search_inside(own.at(start), prepared, options, objective))
+    return sorted(ends, key=_worth)
 
 
-def _why_worse(found: SearchEnd, end: InsideEnd, objective: Objective) -> str:
-    """Why an end with the estimator inside is none; empty where it costs no more than without."""
+def _worth(end: InsideEnd) -> tuple[bool, float]:
+    return end.step > TOLERABLE, end.cost
+
+
+def _rise(found: SearchEnd, end: InsideEnd, objective: Objective) -> tuple[float, float] | None:
+    """Cost of the response without the estimator, and by how much an end with it costs more.
+
+    None where it costs no more, or no more than chance.
+    """
     plain = curves_of(found.fitted, [each.omega_rad_s for each in objective.selected])
     residuals = objective.residuals(plain)
     before = float(residuals @ residuals)
     rise = 2.0 * (end.cost - found.groups[0][0].cost)
     chance = end.misfit <= CHANCE and objective.correction.data.errors is None
-    if rise <= (RISEN - 1.0) * before or chance:
+    return None if rise <= (RISEN - 1.0) * before or chance else (before, rise)
+
+
+def _why_worse(found: SearchEnd, ends: Sequence[InsideEnd], objective: Objective) -> str:
+    """Why the best end is no minimum to trust: it costs more, and no other start leads there."""
+    risen = _rise(found, ends[0], objective)
+    met = sum(abs(each.cost - ends[0].cost) <= SAME_LIKELIHOOD for each in ends)
+    if risen is None or met >= AGAIN:
         return ""
     return (
-        f"it would raise the cost of the response from {before:.3g} by {rise:.3g}: the model does "
-        "not hold what the records do, or the search met a wrong minimum"
+        f"it would raise the cost of the response from {risen[0]:.3g} by {risen[1]:.3g}, at a "
+        "minimum that no further start meets: there may be lower ones"
     )
 
 
