@@ -13,10 +13,12 @@ from scipy import signal
 
 import flightid as fid
 from flightid.control.tuning.size_findings import answers_by_size
+from flightid.control.tuning.structure_error import errors_of
 from flightid.conventions import Light
 from flightid.identification.frequency_domain import answer_by_size
 from flightid.identification.frequency_domain.answer_by_size import size_terms
 from tests.closeness import assert_close
+from tests.strangers.gains import structure_of
 
 STEP_S, INNER, RECORD_S = 0.02, 3, 60.0
 EFFECT, DAMPING, DRAG = 60.0, 2.0, 0.5
@@ -79,6 +81,47 @@ def test_samples_are_left_out_behind_a_low_pass_without_phase() -> None:
 
 def test_more_inputs_than_samples_tell_are_not_asked() -> None:
     assert term_of(1, DRAG, inputs=12) is None
+
+
+def swept(seed: int, drag: float, injected: bool = False) -> fid.Record:
+    u, y = flown(seed, drag)
+    return fid.Record.from_arrays(
+        np.arange(len(u)) * STEP_S,
+        inputs={"tau_phi": u},
+        outputs={"p": y},
+        excitations={"injected": u} if injected else None,
+        units={"p": "rad/s"},
+        hold="first",
+    ).declare(loop="closed" if injected else "open")
+
+
+@pytest.mark.parametrize("drag", [DRAG, 0.0])
+@pytest.mark.parametrize(
+    "method", ["output_error", pytest.param("filter_error", marks=pytest.mark.slow)]
+)
+def test_fits_of_records_in_time_are_asked_as_responses_are(method: str, drag: float) -> None:
+    """Gains of them carried nothing of it: the test was one of responses alone."""
+    fit = fid.identify(structure_of("published"), swept(3, drag), method=method)
+    bound = errors_of(fit)["p/tau_phi"]
+    found = [*answers_by_size(fit, ["p/tau_phi"], bound.band_rad_s)]
+    assert [each.light for each in found] == ([Light.AMBER] if drag else [])
+    own, omega = fit.model_errors["p/tau_phi"], bound.omega_rad_s
+    assert bool(np.all(bound.bound > own.bound)) is bool(drag)
+    if drag:
+        small = EFFECT / (1j * omega + DAMPING)
+        error = np.abs(small / fit.model.frequency_response(omega)[0, 0] - 1.0)
+        inside = (omega > 2.0) & (omega < 15.0)
+        assert np.all(bound.bound[inside] > error[inside])
+
+
+@pytest.mark.parametrize("drag", [DRAG, 0.0])
+def test_a_prewhitened_response_is_asked_by_what_was_injected(drag: float) -> None:
+    response = fid.estimate_response(
+        swept(3, drag, injected=True), band_rad_s=(1.2, 25.0), estimator="prewhitened"
+    )
+    fit = fid.identify(fid.load_model("rate_first_order", axis="roll"), response)
+    assert fit.left is not None
+    assert [*fit.left.by_size] == (["p/tau_phi"] if drag else [])
 
 
 @pytest.mark.parametrize("drag", [DRAG, 0.0])

@@ -194,12 +194,21 @@ def model_errors(
 def _with_left(bound: ModelErrorBound, name: str, left: LeftOver | None) -> ModelErrorBound:
     if left is None:
         return bound
-    reached = reaching(bound, left.narrow.get(name, ()))
-    sized = left.by_size.get(name)
+    return with_size(reaching(bound, left.narrow.get(name, ())), left.by_size.get(name))
+
+
+def with_size(bound: ModelErrorBound, sized: BySize | None) -> ModelErrorBound:
+    """The bound with what smaller motion may answer otherwise; as it was where nothing does.
+
+    Parameters
+    ----------
+    bound : ModelErrorBound
+    sized : BySize or None
+    """
     if sized is None:
-        return reached
+        return bound
     more = np.interp(bound.omega_rad_s, sized.omega_rad_s, sized.share)
-    return ModelErrorBound(bound.omega_rad_s, reached.bound + more)
+    return ModelErrorBound(bound.omega_rad_s, bound.bound + more)
 
 
 def reaching(bound: ModelErrorBound, narrow: Iterable[NarrowResidual]) -> ModelErrorBound:
@@ -237,8 +246,8 @@ def _of_records(
         return {}
     found: dict[str, ModelErrorBound] = {}
     try:
-        left = [_left_over(model, each, filtered) for each in records]
-        seen = _response(left, model)
+        left = left_of_records(model, records, filtered=filtered)
+        seen = response_of(left, model)
         known = linear_system(model).frequency_response(seen.omega_rad_s)
         narrow = [] if seen.linear is None else [*_by_window(seen.linear, seen.omega_rad_s)]
     except FlightidError:
@@ -260,6 +269,26 @@ def _by_window(left: LinearEstimate, omega_rad_s: Array) -> Iterator[WindowResid
     return residuals_by_window(left, omega_rad_s, left.output_records, band)
 
 
+def left_of_records(
+    model: Model, records: Sequence[FittedRecord], *, filtered: bool
+) -> list[Record]:
+    """Records that hold what a free run of a model leaves of each, in place of the outputs.
+
+    Parameters
+    ----------
+    model : Model
+    records : sequence of FittedRecord
+    filtered : bool
+        Whether their modelled outputs are no free run.
+
+    Raises
+    ------
+    FlightidError
+        The model cannot be followed over a record.
+    """
+    return [_left_over(model, each, filtered) for each in records]
+
+
 def _left_over(model: Model, item: FittedRecord, filtered: bool) -> Record:
     """Measured minus a free run of the model, and a trace of what was measured.
 
@@ -274,8 +303,21 @@ def _left_over(model: Model, item: FittedRecord, filtered: bool) -> Record:
     return item.measured.replace({n: (1.0 + TRACE) * y - run[n] for n, y in whole.items()})
 
 
-def _response(records: Sequence[Record], model: Model) -> FrequencyResponse:
-    """By way of the excitations where there are enough of them, else directly."""
+def response_of(records: Sequence[Record], model: Model) -> FrequencyResponse:
+    """Of a model's outputs in records to its inputs.
+
+    By way of the excitations where there are enough of them, else directly.
+
+    Parameters
+    ----------
+    records : sequence of Record
+    model : Model
+
+    Raises
+    ------
+    FlightidError
+        Nothing can be estimated of them.
+    """
     counts = [len(record.excitations) for record in records]
     estimator = "instrument" if min(counts) >= len(model.inputs) else "composite"
     return estimate_response(

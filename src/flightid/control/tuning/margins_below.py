@@ -11,7 +11,7 @@ from flightid.control.tuning.loop_problem import LoopAssessment, LoopProblem, Pl
 
 Band = tuple[float, float]
 BELOW_BAND = "at one below the identified band"
-FEWEST_PLANTS = 3
+FEWEST = 3
 """A spread needs more than the estimate and one other."""
 CROSSINGS = "crossover_rad_s", "delay_crossover_rad_s"
 """Where a loop passes one."""
@@ -52,7 +52,7 @@ def lows_left(
 
 def _error_at(plants: Plants, omega_rad_s: float) -> float:
     """Largest relative error of the estimate at a frequency; unknown where plants are few."""
-    if len(plants) < FEWEST_PLANTS:
+    if len(plants) < FEWEST:
         return np.inf
     at = min(int(np.searchsorted(plants.omega_rad_s, omega_rad_s)), len(plants.omega_rad_s) - 1)
     return float(np.abs(plants.rate[:, at] / plants.rate[0, at] - 1.0).max())

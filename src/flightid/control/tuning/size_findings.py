@@ -9,6 +9,8 @@ import numpy as np
 from flightid.control.tuning.structure_error import Band
 from flightid.conventions import Light
 from flightid.findings import Finding
+from flightid.identification.answers_of_records import by_size_of
+from flightid.identification.fit import Fit
 
 BY_SIZE = "answer-by-size"
 MATTERS = 0.05
@@ -18,7 +20,7 @@ MATTERS = 0.05
 def answers_by_size(source: object, pairs: Sequence[str], band: Band | None) -> Iterator[Finding]:
     """Amber where a response of the axes hangs on the size of the motion beyond chance.
 
-    Plants are moved by what small motion may differ by: `flightid.Fit.model_errors` holds it.
+    Plants are moved by what small motion may differ by (`errors_of`).
 
     Parameters
     ----------
@@ -28,10 +30,9 @@ def answers_by_size(source: object, pairs: Sequence[str], band: Band | None) -> 
     band : tuple of float or None
         Identified band, rad/s.
     """
-    left = getattr(source, "left", None)
-    if left is None or band is None:
+    if not isinstance(source, Fit) or band is None:
         return
-    for name, found in left.by_size.items():
+    for name, found in by_size_of(source).items():
         inside = (found.omega_rad_s >= band[0]) & (found.omega_rad_s <= band[1])
         if name not in pairs or not inside.any():
             continue

@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError
-from flightid.identification.model_error import MOST, SHOWN, ModelErrorBound
+from flightid.identification.answers_of_records import by_size_of
+from flightid.identification.fit import Fit
+from flightid.identification.model_error import MOST, SHOWN, ModelErrorBound, with_size
 
 Band = tuple[float, float]
 Array = NDArray[np.float64]
@@ -21,6 +23,11 @@ BESIDE = float(np.sqrt(2.0))
 
 def errors_of(source: object) -> dict[str, ModelErrorBound]:
     """Errors of a fit's structure by ``"output/input"``, from the fit or from its model's file."""
+    if isinstance(source, Fit):
+        # Responses hold it in theirs; of records it is asked where gains need it.
+        sized = by_size_of(source) if source.left is None else {}
+        known = source.model_errors.items()
+        return {name: with_size(bound, sized.get(name)) for name, bound in known}
     found = getattr(source, "model_errors", None)
     if found is not None:
         return dict(found)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from flightid.control.autopilots import AxisLoop
 from flightid.control.tuning.limits import ANGLE, Limit, limits, noise_limit
 from flightid.control.tuning.loop_problem import FULL, LoopAssessment, LoopProblem
-from flightid.control.tuning.margins_below import FEWEST_PLANTS
+from flightid.control.tuning.margins_below import FEWEST
 from flightid.control.tuning.modes_outside import Place, beside_modes, modes_outside
 from flightid.findings import SHOWN_DIGITS as DIGITS
 from flightid.findings import held
@@ -367,7 +367,7 @@ def _estimate(
         return Estimate(name, None, kind.unit, None, "no crossing in the band of the loop")
     if unknown:
         return Estimate(name, value, kind.unit, None, unknown)
-    if len(values) < FEWEST_PLANTS or not np.all(np.isfinite(values)):
+    if len(values) < FEWEST or not np.all(np.isfinite(values)):
         return Estimate(name, value, kind.unit)
     ends = DrawnEnds(values)
     worse = np.isfinite(bound) and _worst(np.append(values, bound), kind.more) == bound

@@ -40,6 +40,8 @@ OUTSIDE = (DataError, ModelError, OptionError, SingularError)
 OCTAVE = 2.0
 LEAK = 0.1
 """Of a term's integral, over the lowest frequency, at least: a mean would drift away."""
+WINDOWS_IN_RECORD = 5.0
+"""Least number of windows of a record (Tischler & Remple: at most a fifth of it each)."""
 MEMORY = 0.5
 """Of the longest window, within which a closed loop has answered."""
 TOGETHER = 64
@@ -188,20 +190,35 @@ class Correction:
         Raises as `apply`.
         """
         linear, loop = self._linear, self.data.loop
-        weights = linear.weights
-        if not isinstance(weights, WindowedWeights) or loop is None:
+        instruments = self._instruments
+        if instruments is None or loop is None:
             return []
         if not (loop.is_taken_care_of or loop.loop == "open"):
             return []
         found = size_terms(
-            weights.errors.windows.instruments,
+            instruments,
             linear.output_records,
             self._records.of(model),
             linear.sample_time_s,
-            max(self.data.window_s) * MEMORY,
+            self._longest_s * MEMORY,
             max(LEAK * low_rad_s, slowest_decay(model)),
         )
         return found or []
+
+    @property
+    def _longest_s(self) -> float:
+        """The longest window; of an estimate without any, what its records would take."""
+        rows = self._linear.output_records
+        whole = max(each.shape[1] for each in rows) * self._linear.sample_time_s
+        return max(self.data.window_s, default=whole / WINDOWS_IN_RECORD)
+
+    @property
+    def _instruments(self) -> Sequence[Array] | None:
+        """Of windows their own; of a noise model, which has none, what the records hold."""
+        weights, excited = self._linear.weights, self._linear.excited
+        if isinstance(weights, WindowedWeights):
+            return weights.errors.windows.instruments
+        return [each.matrix(each.excitations) for each in excited] or None
 
     def estimated(self, terms: Sequence[Sequence[Array]]) -> Complex:
         """The estimate of outputs, by output and record, as of those that were measured."""
