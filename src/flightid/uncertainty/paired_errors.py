@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from flightid.uncertainty.foretold import own_lags
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating]
 LAGS = 4
 """Of a record's length over the longest lag at which errors are taken to be alike."""
 KNOWN = 2
@@ -77,5 +77,5 @@ def _memory(one: Array, other: Array) -> float:
 
 def _own_correlations(row: Array, last: int) -> Array:
     """Correlations at lags 1 to `last`; zero where there is nothing."""
-    sums = own_lags(row, last)
+    sums = own_lags(np.asarray(row, np.float64), last)
     return np.asarray(sums[1:] / sums[0] if sums[0] > 0.0 else np.zeros(last))
