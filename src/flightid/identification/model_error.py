@@ -54,6 +54,10 @@ class BySize(Protocol):
     def share(self) -> Array:
         """Of the response."""
 
+    @property
+    def ratio(self) -> float:
+        """Of the term that makes it to its standard error."""
+
 
 class LeftOver(Protocol):
     """What a model leaves of the records behind its responses, by ``"output/input"``."""
