@@ -84,17 +84,17 @@ def test_states_last_until_the_next_one(monkeypatch: pytest.MonkeyPatch) -> None
 def test_the_landing_detector_of_either_autopilot(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(phases, "_held", lambda _, *states: states)
     copter = HandmadeLog("ardupilot").with_table("EV", [1.0, 2.0, 3.0], Id=np.array([28, 10, 18]))
-    stamps, up = phases._landing_detector(copter.log)  # type: ignore[misc]
+    stamps, up = phases.landing_detector(copter.log)  # type: ignore[misc]
     assert (stamps.tolist(), up.tolist()) == ([1.0, 3.0], [True, False])
     landed = HandmadeLog("ardupilot").with_table("EV", [1.0, 2.0], Id=np.array([18, 10]))
-    assert phases._landing_detector(landed.log) is None
-    assert phases._landing_detector(HandmadeLog("ardupilot").log) is None
+    assert phases.landing_detector(landed.log) is None
+    assert phases.landing_detector(HandmadeLog("ardupilot").log) is None
     stream = "vehicle_land_detected"
     px4 = HandmadeLog("px4").with_table(stream, [1.0, 2.0, 3.0], landed=np.array([1, 0, 1]))
-    stamps, up = phases._landing_detector(px4.log)  # type: ignore[misc]
+    stamps, up = phases.landing_detector(px4.log)  # type: ignore[misc]
     assert (stamps.tolist(), up.tolist()) == ([1.0, 2.0, 3.0], [False, True, False])
-    assert phases._landing_detector(HandmadeLog("px4").log) is None
-    assert phases._landing_detector(HandmadeLog("px4").with_table(stream, [1.0], x=[0]).log) is None
+    assert phases.landing_detector(HandmadeLog("px4").log) is None
+    assert phases.landing_detector(HandmadeLog("px4").with_table(stream, [1.0], x=[0]).log) is None
 
 
 def test_the_tilt_is_the_angle_of_the_z_axis(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -211,7 +211,7 @@ def test_a_landing_detector_tells_alone() -> None:
     up = np.where((TENTHS >= 3.0) & (TENTHS <= 7.0), True, False)
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(phases, "find", lambda *_: None)
-        patched.setattr(phases, "_landing_detector", lambda _: (TENTHS, up))
+        patched.setattr(phases, "landing_detector", lambda _: (TENTHS, up))
         found = phases.flight_phases(long_log(), None)
     assert (found.airborne, found.evidence) == (((3.0, 7.0),), "landing detector")
 

@@ -139,9 +139,9 @@ def test_large_problems_give_hopeless_starts_up_by_some_of_their_points(
     followed: list[tuple[int, int, int]] = []
     follow = search._Descent.follow
 
-    def told(self: search._Descent, begin: NDArray[np.float64], *steps: int) -> object:
+    def told(self: search._Descent, begin: NDArray[np.float64], *steps: int, **how: bool) -> object:
         followed.append((len(begin), steps[0], len(self.selected[0].places)))
-        return follow(self, begin, *steps)
+        return follow(self, begin, *steps, **how)
 
     monkeypatch.setattr(search._Descent, "follow", told)
     monkeypatch.setattr(search, "LEAVES", 0.0)

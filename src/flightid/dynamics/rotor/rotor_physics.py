@@ -18,7 +18,7 @@ from flightid.identification import Fit
 from flightid.identification.uncertain_of import source_findings
 from flightid.identification.uncertain_parameters import uncertain_parameters
 from flightid.models import StateSpaceModel
-from flightid.uncertainty.estimate import Estimate, Reading
+from flightid.uncertainty.estimate import UNHEARD, Estimate, Reading
 from flightid.uncertainty.uncertain import Uncertain
 
 NAMES: Mapping[str, str] = {
@@ -199,7 +199,7 @@ def _carried(
     found = uncertain.carried(value).number(
         0, item.name, item.unit, "the parameters give no such number"
     )
-    if found.interval95 is not None and found.interval95[0] == found.interval95[1]:
+    if found.interval95 is None and found.reason == UNHEARD:
         return Estimate(item.name, found.value, item.unit, None, "its parameters were not fitted")
     return found
 

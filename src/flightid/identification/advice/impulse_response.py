@@ -296,7 +296,6 @@ def loop_told(
     inputs : sequence of str
     output : str
     loop : {"open", "closed"} or None
-        The caller's word.
     """
     test = feedback_test(records, inputs=inputs, outputs=(output,), loop=loop)
     return unless_logged(test, [each.history for each in records])

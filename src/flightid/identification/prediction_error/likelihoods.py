@@ -9,6 +9,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from flightid.evidence.gather import CONVERGED
 from flightid.identification.innovation_tests import ROUNDING
 from flightid.identification.output_error.innovation_gain import ORDER
 from flightid.identification.output_error.sensor_noise import sensor_errors
@@ -57,7 +58,8 @@ def likeliest(
     """Minima of output error, the one first that chance does not refuse and that is likeliest.
 
     Slow noise holds few independent errors: between minima whose sums of squares differ no more
-    than chance makes them, the colour of what each leaves decides.
+    than chance makes them, the colour of what each leaves decides. An end that is no minimum, as a
+    search that stalls on the unit circle, comes after those that are.
 
     Parameters
     ----------
@@ -79,7 +81,12 @@ def likeliest(
     limit = scipy.special.chdtri(1, ALIKE)
     costs = [coloured_cost(structure, data, each[0][0], memory, skip)[0] for each in minima]
     ranks = [
-        (least > 0.0 and samples * math.log(each[0][1] / least) >= limit, cost, place)
+        (
+            least > 0.0 and samples * math.log(each[0][1] / least) >= limit,
+            each[0][-1] not in CONVERGED,
+            cost,
+            place,
+        )
         for place, (each, cost) in enumerate(zip(minima, costs, strict=True))
     ]
     order = [rank[-1] for rank in sorted(ranks)]
