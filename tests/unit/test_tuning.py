@@ -213,8 +213,12 @@ def test_a_model_that_its_data_contradict_promises_a_plain_loop_less(fit: fid.Fi
                 fid.tune_controller(doubted, **PLAIN)
             continue
         design = fid.tune_controller(doubted, **PLAIN)
-        margin = design.worst_case("loop", "phase margin")
-        gaps.append((margin.nominal or 0.0) - (margin.worst or 0.0))
+        # A mode above the band may take what is promised: the plants' own margins are asked.
+        paths = design.problem.paths
+        assert isinstance(paths, ControllerPaths)
+        judged = design.problem.judge(paths.gains_of(design.loop)[None])
+        margins = judged.metrics["loop"].phase_margin_deg[0]
+        gaps.append(margins[0] - margins.min())
     # An error of 0.3 turns the loop by up to arcsin 0.3 = 17.5 degrees, of 0.02 by 1.1.
     assert 12.0 < gaps[1] - gaps[0] < 20.0
 
