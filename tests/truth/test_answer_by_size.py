@@ -69,6 +69,27 @@ def test_a_linear_rate_has_none() -> None:
     assert 0.3 < np.std(ratios) < 2.0
 
 
+@pytest.mark.parametrize("fitted", [0.2, -0.3])
+def test_a_linear_answer_that_outlasts_the_memory_is_none(fitted: float) -> None:
+    """A structure without the lag leaves slow modes whole, and short records have short windows."""
+    ratios = []
+    for seed in range(3):
+        r = np.random.default_rng(seed)
+        u = 0.05 * np.repeat(r.choice([-1.0, 1.0], 94), 8)
+        time_s = np.arange(len(u)) * STEP_S
+        lagged = [EFFECT], np.polymul([1.0, 1.0], [0.09, 1.0])
+        y, made = (
+            signal.lsim(each, u, time_s, interp=False)[1]
+            for each in (lagged, ([EFFECT], [1.0, fitted]))
+        )
+        y = y + signal.lfilter([0.005], [1.0, -0.9], r.standard_normal(len(u)))
+        rows = [np.array([each - each.mean()]) for each in (u, y, y - made)]
+        found = size_terms([rows[0]], [rows[1]], [rows[2]], STEP_S, 1.0, 0.4)
+        assert found is not None
+        ratios.append(found[0].ratio)
+    assert max(ratios) < 3.0
+
+
 def test_samples_are_left_out_behind_a_low_pass_without_phase() -> None:
     """What is slow stays where it is; what would come back as slow is gone."""
     k = np.arange(1201)

@@ -23,8 +23,10 @@ MOST_LAGS, AHEAD = 200, 5
 NOISE_ORDER = 24
 """Of the autoregression that whitens what the model leaves."""
 SMALL = 1e-6
-"""Share of the largest power of the excitation's lags below which a direction holds none."""
-MOST_COLUMNS = 2 * (MOST_LAGS + AHEAD)
+"""Share of the largest power of the excitation's lags, each of one, below which one holds none."""
+TAILS = 0.5, 1.0, 2.0, 4.0
+"""Decays over the memory of what answers longer: a wrong structure leaves slow modes whole."""
+MOST_COLUMNS = 2 * (MOST_LAGS + AHEAD + len(TAILS))
 HALF_WIDTH = 10
 """Of the low-pass before samples are left out, in samples that stay."""
 STANDS_OUT = 3.29
@@ -83,6 +85,10 @@ class _LinearAnswers:
         filtered = np.append(1.0, -np.linalg.lstsq(past[:, ::-1], now, rcond=None)[0])
         delayed = [np.hstack([_lags(row, lags) for row in each]) for each in instruments]
         matrix = np.vstack([_through(filtered, each)[p:] for each in delayed])
+        # Whitened, what is slow is small beside what is fast: of like size, or it would be cut.
+        size = np.linalg.norm(matrix, axis=0)
+        size[size == 0.0] = 1.0
+        matrix, delayed = matrix / size, [each / size for each in delayed]
         power, turn = np.linalg.eigh(matrix.T @ matrix)
         kept = power > SMALL * power[-1]
         inverse = (turn[:, kept] / power[kept]) @ turn[:, kept].T
@@ -123,7 +129,7 @@ def size_terms(
         Measured, and less what a model makes of the measured inputs.
     sample_time_s : float
     memory_s : float
-        How long a linear answer lasts.
+        Within which a linear answer may have any shape; beyond it decays as a sum of exponentials.
     decay_rad_s : float
         By which the integral of a term forgets, as the vehicle's own damping makes it.
 
@@ -143,7 +149,7 @@ def size_terms(
     """
     every = max(1, int(memory_s / MOST_LAGS / sample_time_s))
     step, lags = every * sample_time_s, min(MOST_LAGS, int(memory_s / sample_time_s))
-    columns = len(instruments[0]) * (lags + AHEAD)
+    columns = len(instruments[0]) * (lags + AHEAD + len(TAILS))
     thin = [[_thinned(each, every) for each in part] for part in (instruments, outputs, residuals)]
     free = sum(each.shape[1] - NOISE_ORDER for each in thin[0]) - columns
     if columns > MOST_COLUMNS or free < columns:
@@ -189,6 +195,9 @@ def _through(weights: Array, row: Array) -> Array:
 
 
 def _lags(row: Array, count: int) -> Array:
-    """The row ahead and delayed, one column each; nothing beyond its ends."""
+    """The row ahead and delayed, one column each, and its tails; nothing beyond its ends."""
     padded = np.concatenate([np.zeros(count - 1), row, np.zeros(AHEAD)])
-    return np.lib.stride_tricks.sliding_window_view(padded, count + AHEAD)
+    delayed = np.lib.stride_tricks.sliding_window_view(padded, count + AHEAD)
+    kept = np.exp(-np.array(TAILS) / count)
+    tails = [filtered(np.array([1.0 - k]), np.array([1.0, -k]), delayed[:, 0]) for k in kept]
+    return np.column_stack([delayed, *tails])
