@@ -15,8 +15,10 @@ import flightid as fid
 from flightid.control.tuning.size_findings import answers_by_size
 from flightid.control.tuning.structure_error import errors_of
 from flightid.conventions import Light
+from flightid.identification.answers_of_records import by_size_of
 from flightid.identification.frequency_domain import answer_by_size
 from flightid.identification.frequency_domain.answer_by_size import size_terms
+from flightid.record.history import Step
 from tests.closeness import assert_close
 from tests.strangers.gains import structure_of
 
@@ -133,6 +135,23 @@ def test_fits_of_records_in_time_are_asked_as_responses_are(method: str, drag: f
         error = np.abs(small / fit.model.frequency_response(omega)[0, 0] - 1.0)
         inside = (omega > 2.0) & (omega < 15.0)
         assert np.all(bound.bound[inside] > error[inside])
+
+
+def test_records_of_an_autopilots_log_are_asked_by_what_was_injected_alone() -> None:
+    """It closes a loop, whether a test sees that or not: its inputs hold noise of the outputs."""
+    u, y = flown(3, DRAG)
+    bench = fid.Record.from_arrays(
+        np.arange(len(u)) * STEP_S,
+        inputs={"tau_phi": u},
+        outputs={"p": y},
+        units={"p": "rad/s"},
+        hold="first",
+    )
+    asked = [
+        [*by_size_of(fid.identify(structure_of("published"), each, method="output_error"))]
+        for each in (bench, bench.replace(step=Step("Log.record")))
+    ]
+    assert asked == [["p/tau_phi"], []]
 
 
 @pytest.mark.parametrize("drag", [DRAG, 0.0])

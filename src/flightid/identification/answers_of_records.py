@@ -24,6 +24,7 @@ from flightid.identification.model_error import BySize, left_of_records, respons
 from flightid.models import GreyBoxModel
 from flightid.models.model import linear_system
 from flightid.record import Record
+from flightid.uncertainty.feedback_result import unless_logged
 
 Array = NDArray[np.float64]
 KEPT = 2
@@ -95,7 +96,8 @@ def _instruments(
     if min(len(each.excitations) for each in left) >= len(model.inputs):
         return [each.matrix(each.excitations) for each in left]
     measured = tuple(each.measured for each in records)
-    loop = loop_seen(measured, tuple(model.inputs), tuple(model.outputs))
+    seen = loop_seen(measured, tuple(model.inputs), tuple(model.outputs))
+    loop = unless_logged(seen, [each.history for each in measured])
     return [each.matrix(model.inputs) for each in left] if loop.loop == "open" else None
 
 
