@@ -24,7 +24,7 @@ from flightid.control.margins.low_mode_slack import (
 from flightid.control.margins.margins import margins_of
 from flightid.control.margins.resonance_slack import TAKEN, ResonanceSlack
 from flightid.control.tuning.axis_tuning import held_by_hand
-from flightid.control.tuning.findings import below_band, verdict
+from flightid.control.tuning.findings import _taken, below_band, verdict
 from flightid.control.tuning.margins_below import lows_left
 from flightid.control.tuning.worst_cases import WorstCase
 from flightid.conventions import Light
@@ -264,7 +264,8 @@ def test_of_a_phase_that_is_read_below_the_band_nothing_is_promised(
     found = replace(held_by_hand(design.problem, _gains_of(design)), exists=True)
     light = verdict(found, np.ones(300, dtype=bool), 300, design.worst_cases, (low, 900.0))
     assert light.light is (Light.GREEN if promised else Light.AMBER)
-    assert f"requirement in the band shown, {low:g} to 900 rad/s: at least" in light.message
+    assert f"requirement in the band shown, {low:g} to 900 rad/s" in light.message
+    assert ("say nothing of a light mode below it" in light.message) is not promised
     if not promised:
         for name in ("gain margin", "sensitivity peak", "crossover", "delay margin"):
             case = design.worst_case("angle loop", name)
@@ -371,3 +372,15 @@ def test_what_was_asked_and_may_be_taken_is_a_check_that_was_not_made(
 
 def _gains_of(design: fid.PidDesign) -> np.ndarray:
     return np.asarray(design.problem.paths.gains_of(design.loop))  # type: ignore[attr-defined]
+
+
+def test_what_a_mode_below_takes_is_told_of_each_loop() -> None:
+    def lost(loop: str, name: str, reason: str = TAKEN_BELOW) -> WorstCase:
+        return WorstCase(loop, name, Estimate(name, 1.0, "1", None, reason), None, None, None)
+
+    rate = [lost("rate loop", "phase margin"), lost("rate loop", "gain margin")]
+    whole = [lost("whole loop", "sensitivity peak"), lost("whole loop", "phase margin", "")]
+    loops = ("rate loop", "whole loop")
+    assert _taken(rate, loops[:1]) == "phase margin, gain margin"
+    told = "of rate loop phase margin, gain margin; of whole loop sensitivity peak"
+    assert _taken([*rate, *whole], loops) == told

@@ -76,12 +76,14 @@ def verdict(
         said = f"gains found for the model alone; {_bound(found)}"
         return Finding("gains", Light.AMBER, said)
     good, share = int(met.sum()), least_share(int(met.sum()), drawn)
-    low, high = bool(_at_one_below(worst_cases)), _passes_above(worst_cases)
+    under, high = _asked_below(worst_cases), _passes_above(worst_cases)
+    low = bool(_at_one_below(worst_cases)) or under
     shown = ""
     if band_rad_s is not None:
         shown = f" in the band shown, {band_rad_s[0]:.3g} to {band_rad_s[1]:.3g} rad/s"
-    if high:
-        shown += ", and say nothing of a light mode above it, which may take margins and stability"
+    if sides := ["below"] * under + ["above"] * high:
+        shown += f", and say nothing of a light mode {' and '.join(sides)} it, which may take "
+        shown += "margins and stability"
     where = [_sweep(band_rad_s)] * low + [HIGHER] * high
     return Finding(
         "gains",
@@ -289,14 +291,14 @@ def below_band(result: AxisResult, band_rad_s: tuple[float, float] | None) -> It
         )
     lowered = _named(result.worst_cases, TAKEN_BELOW)
     if rest := [name for name in lowered if name not in found]:
-        asked = [e for e in result.worst_cases if e.estimate.reason == TAKEN_BELOW and e.required]
+        asked = _asked_below([e for e in result.worst_cases if e.loop in rest])
         yield Finding(
             "mode-below-band",
             # What was asked and is not known to hold is a check that was not made.
-            Light.AMBER if any(each.loop in rest for each in asked) else Light.GREEN,
+            Light.AMBER if asked else Light.GREEN,
             f"{' and '.join(rest)}: nothing is known below {band_rad_s[0]:.3g} rad/s: a light mode "
             f"there that lowers the response by up to {MOST_LOWERED_DB:g} dB may take "
-            f"{', '.join(_taken(result.worst_cases, rest))}, and none is promised",
+            f"{_taken(result.worst_cases, rest)}, and none is promised",
             _sweep(band_rad_s),
         )
 
@@ -304,6 +306,11 @@ def below_band(result: AxisResult, band_rad_s: tuple[float, float] | None) -> It
 def _at_one_below(cases: Sequence[WorstCase]) -> list[str]:
     """Loops that are at one below the band, or nearer to it than is asked."""
     return _named(cases, BELOW_BAND)
+
+
+def _asked_below(cases: Sequence[WorstCase]) -> bool:
+    """Whether a light mode below the band may take what was asked of a loop."""
+    return any(each.required and each.estimate.reason == TAKEN_BELOW for each in cases)
 
 
 def _passes_above(cases: Sequence[WorstCase]) -> bool:
@@ -315,9 +322,15 @@ def _named(cases: Sequence[WorstCase], reason: str) -> list[str]:
     return [*dict.fromkeys(each.loop for each in cases if each.estimate.reason == reason)]
 
 
-def _taken(cases: Sequence[WorstCase], loops: Sequence[str]) -> list[str]:
-    taken = (e.name for e in cases if e.loop in loops and e.estimate.reason == TAKEN_BELOW)
-    return [*dict.fromkeys(taken)]
+def _taken(cases: Sequence[WorstCase], loops: Sequence[str]) -> str:
+    """Numbers that a mode below the band may take, of which loop where loops lose unlike ones."""
+    alike: dict[tuple[str, ...], list[str]] = {}
+    for loop in loops:
+        lost = [e.name for e in cases if (e.loop, e.estimate.reason) == (loop, TAKEN_BELOW)]
+        alike.setdefault(tuple(lost), []).append(loop)
+    if len(alike) == 1:
+        return ", ".join(*alike)
+    return "; ".join(f"of {' and '.join(of)} {', '.join(lost)}" for lost, of in alike.items())
 
 
 def _sweep(band_rad_s: tuple[float, float] | None) -> str:
