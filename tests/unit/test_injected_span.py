@@ -40,6 +40,7 @@ def test_a_fit_ends_with_what_was_injected(estimator: str) -> None:
     assert response.injected_rad_s is not None
     ends = 2.0 * np.pi * np.array([LOW_HZ, TOP_HZ])
     assert response.injected_rad_s == pytest.approx(ends, rel=0.15)
+    assert response.injected_rad_s[1] == pytest.approx(ends[1], rel=0.1)
     fit = fid.identify(fid.load_model("rate_first_order", axis="roll"), response)
     assert fit.responses[0].omega_rad_s[-1] <= 1.1 * 2.0 * np.pi * TOP_HZ
     if estimator == "instrument":
