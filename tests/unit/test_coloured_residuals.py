@@ -10,9 +10,9 @@ from flightid.uncertainty.blocks import RecordBlock
 from flightid.uncertainty.coloured_residuals import (
     ResidualCovariance,
     _lifted,
-    colour_findings,
     residual_covariance,
 )
+from flightid.uncertainty.residual_colour import colour_findings
 from tests.closeness import assert_close
 
 Array = np.ndarray
@@ -117,7 +117,7 @@ def test_white_residuals_keep_the_inverse_information() -> None:
     )
     assert_close(found.white, np.linalg.inv(np.einsum("onp,onq->pq", slopes, slopes)), rtol=1e-9,
                  atol=1e-12, why="the same matrix")  # fmt: skip
-    assert_close(found.colour, (1.0, 1.0), rtol=0.05, why="8000 samples")
+    assert_close(found.colour, (1.0, 1.0, 1.0), rtol=0.05, why="8000 samples")
     assert "order 0, 0" in found.assumed
 
 

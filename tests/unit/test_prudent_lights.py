@@ -22,8 +22,8 @@ from flightid.inspection.thresholds import BAND_LEAST
 from flightid.study.proposal.of_records import study_of_records
 from flightid.study.proposal.stretches import RICHER
 from flightid.study.structures import RUNS_ALIKE
-from flightid.uncertainty.coloured_residuals import WELL_TOLD, colour_findings
 from flightid.uncertainty.foretold import MATERIAL_PERCENT, NEGLIGIBLE_PERCENT
+from flightid.uncertainty.residual_colour import WELL_TOLD, colour_findings
 from flightid.validation import residual_tests
 from flightid.validation.residuals.correlation_result import Kind, Verdict
 from flightid.validation.residuals.findings import residual_findings

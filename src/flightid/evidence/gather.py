@@ -90,6 +90,7 @@ BELONGS = {
     "predictor-at-circle": SETTLED,
     "input-not-excited": BAND,
     "residuals-coloured": RESIDUALS,
+    "residuals-unequal": RESIDUALS,
     "output-unexplained": RESIDUALS,
     PROCESS_NOISE: RESIDUALS,
     "errors-not-white": RESIDUALS,

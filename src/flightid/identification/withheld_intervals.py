@@ -15,6 +15,7 @@ from flightid.models import PolynomialModel
 
 _OF_INTERVALS = {
     "residuals-coloured",
+    "residuals-unequal",
     "intervals-by-output",
     "intervals-approximate",
     NOISE_KNOWN,

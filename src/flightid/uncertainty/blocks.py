@@ -162,7 +162,7 @@ def _of_output(part: Array, block: RecordBlock, output: int) -> Array:
     return part[output * n_samples : (output + 1) * n_samples]
 
 
-def _halves(block: RecordBlock, output: int) -> Array:
+def halves(block: RecordBlock, output: int) -> Array:
     """[basis, projected in the first half, projected in the second] of one output, (n, m + 2 n)."""
     own, shared = block.of_output(output)
     m, count, half = own.shape[1], shared.shape[1], block.middle
@@ -174,7 +174,7 @@ def _halves(block: RecordBlock, output: int) -> Array:
 
 
 def _squares_of_halves(block: RecordBlock, output: int) -> Array:
-    """Products of `_halves`, of which one is zero where the other is not."""
+    """Products of `halves`, of which one is zero where the other is not."""
     own, shared = block.of_output(output)
     m, count, half = own.shape[1], shared.shape[1], block.middle
     found = np.zeros((m + 2 * count, m + 2 * count))
@@ -222,7 +222,7 @@ def _information(slopes: Array) -> Array:
 
 
 def noise_heard(models: Sequence[Autoregression], blocks: Sequence[RecordBlock]) -> list[Array]:
-    """XᵀΩX of `_halves` by output of each record, for noise of these models and its own level."""
+    """XᵀΩX of `halves` by output of each record, for noise of these models and its own level."""
     return [
         level[:, None, None] * np.array([_heard(noise, each, o) for o, noise in enumerate(models)])
         for each, level in zip(blocks, levels(blocks), strict=True)
@@ -232,7 +232,7 @@ def noise_heard(models: Sequence[Autoregression], blocks: Sequence[RecordBlock])
 def _heard(noise: Autoregression, block: RecordBlock, output: int) -> Array:
     if noise.is_white:
         return np.asarray(noise.lags[0] * _squares_of_halves(block, output))
-    return noise.squared(_halves(block, output))
+    return noise.squared(halves(block, output))
 
 
 def directions_taken(blocks: Sequence[RecordBlock]) -> list[FittedDirections]:

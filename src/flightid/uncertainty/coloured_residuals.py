@@ -15,9 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.conventions import Light
 from flightid.errors import FitError
-from flightid.findings import Finding
 from flightid.frozen import dataclass
 from flightid.uncertainty.agreement import Agreement, AgreementTest, compare_parts
 from flightid.uncertainty.blocks import (
@@ -34,11 +32,13 @@ from flightid.uncertainty.fitted_correlation import FitResponse, FittedCorrelati
 from flightid.uncertainty.fitted_directions import FittedDirections
 from flightid.uncertainty.input_noise import InputNoise
 from flightid.uncertainty.periodograms import periodogram
+from flightid.uncertainty.residual_colour import Colour
 from flightid.uncertainty.residual_noise import (
     Autoregression,
     noise_models,
 )
 from flightid.uncertainty.triangle import triangle_of_rows
+from flightid.uncertainty.unequal_noise import unequal_outputs, widened_by, with_excess
 
 Array = NDArray[np.float64]
 ROUNDING = 1e-9
@@ -47,12 +47,6 @@ BLIND = 1e-12
 """Effect of a combination of parameters over the largest, below which its bar is rounding."""
 DRAWS = 32
 """Draws of random walks."""
-COLOURED = 1.5
-"""Ratio of coloured over white standard errors above which residuals count as coloured."""
-WELL_TOLD = 5.0
-"""Ratio up to which longer intervals hold: noise with a time constant of ten samples makes 4.4."""
-LARGEST_RATIO, SMALLEST_RATIO = 50.0, 0.02
-"""Ratios of coloured over white standard errors beyond which neither can be believed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +69,8 @@ class ResidualCovariance:
         Of records, and of halves of each.
     correlations : tuple of FittedCorrelation
         Of inputs with residuals, where inputs were given.
+    growth : ndarray, shape (n,), or None
+        Standard errors over those of noise of one power throughout, where it grows with the signal.
     """
 
     covariance: Array
@@ -85,70 +81,32 @@ class ResidualCovariance:
     orders: tuple[int, ...]
     agreement: Agreement
     correlations: tuple[FittedCorrelation, ...] = ()
+    growth: Array | None = None
 
     @property
     def ratios(self) -> Array:
-        """Standard errors over those for white residuals, shape (n,)."""
-        return np.asarray(self.agreement.by_noise / np.sqrt(np.diag(self.white)))
+        """Standard errors by colour over those for white residuals, shape (n,)."""
+        by_colour = self.agreement.by_noise / (1.0 if self.growth is None else self.growth)
+        return np.asarray(by_colour / np.sqrt(np.diag(self.white)))
 
     @property
-    def colour(self) -> tuple[float, float]:
-        """Smallest and largest of `ratios`; one without parameters."""
+    def colour(self) -> Colour:
+        """Smallest and largest of `ratios`, and the largest growth; one without parameters."""
         return self.colour_of(len(self.white))
 
-    def colour_of(self, count: int) -> tuple[float, float]:
+    def colour_of(self, count: int) -> Colour:
         """The same of the first parameters alone."""
-        ratios = self.ratios[:count] if count else np.ones(1)
-        return float(np.min(ratios)), float(np.max(ratios))
+        if not count:
+            return Colour()
+        ratios = self.ratios[:count]
+        growth = 1.0 if self.growth is None else float(np.max(self.growth[:count]))
+        return Colour(float(np.min(ratios)), float(np.max(ratios)), growth)
 
     @property
     def assumed(self) -> str:
         """What the covariance assumes, in words."""
         orders = ", ".join(map(str, self.orders))
         return f"autoregressive noise of each whitened output, order {orders}"
-
-
-def colour_findings(smallest: float, largest: float, *, has_bars: bool = True) -> list[Finding]:
-    """Verdict on the colour of residuals: red where it changes standard errors beyond belief.
-
-    A note where it widens them and the intervals allow for it, amber from `WELL_TOLD` times on.
-
-    Parameters
-    ----------
-    smallest, largest : float
-        Ratio of standard errors to those for white residuals, over all parameters.
-    has_bars : bool
-        Whether any estimate has an interval that allows for it.
-
-    Example
-    -------
-    >>> colour_findings(0.9, 1.2)
-    []
-    """
-    believed = smallest >= SMALLEST_RATIO and largest <= LARGEST_RATIO
-    if believed and largest <= COLOURED:
-        return []
-    if believed:
-        allowed = "are", ", and the intervals allow for it"
-        are, bars = allowed if has_bars else ("would be", "")
-        said = (
-            f"residuals are coloured: standard errors {are} up to {largest:.2g} times those of "
-            f"white residuals{bars}"
-        )
-        if largest <= WELL_TOLD:
-            return [Finding("residuals-coloured", Light.GREEN, said)]
-        action = "run residual_tests: where inputs still predict them, dynamics are missing"
-        return [Finding("residuals-coloured", Light.AMBER, said, action)]
-    ratio = largest if largest > LARGEST_RATIO else smallest
-    return [
-        Finding(
-            "colour-absurd",
-            Light.RED,
-            f"the colour of the residuals makes standard errors {ratio:.2g} times those of white "
-            "residuals: neither can be believed",
-            "take longer records; look for drifts, pure tones or constant outputs in the residuals",
-        )
-    ]
 
 
 def residual_covariance(
@@ -188,8 +146,9 @@ def residual_covariance(
 
     Assumes
     -------
-    Noise of each whitened output that is stationary within a record, of one colour in all records
-    though not of one level, and independent of the others'.
+    Noise of each whitened output that is of one colour in all records, though not of one level, and
+    independent of the others'. Where its power goes with what tells the parameters, scores are
+    summed with the power of each sample: see `flightid.uncertainty.unequal_noise`.
 
     Reference
     ---------
@@ -220,10 +179,14 @@ def residual_covariance(
     errors = [block.residual for block in blocks]
     models = noise_models(errors, taken, walks) if coloured else _white_models(errors)
     apart = noise_heard(models, whitened)
+    # Of random walks beside the noise, innovations have no one power to be held against.
+    unequal = unequal_outputs(models, whitened, half) if coloured and noise is None else {}
+    even = apart
+    if unequal:
+        apart = with_excess(apart, models, whitened, unequal)
     answers = [joined(each, block) for each, block in zip(apart, blocks, strict=True)]
     sizes = [block.basis.shape[1] for block in blocks]
-    heard = sum(each[:, m:, m:] for each, m in zip(answers, sizes, strict=True))
-    variances = half @ heard @ half.T
+    variances = half @ _of_shared(answers, sizes) @ half.T
     shared = np.asarray(variances.sum(axis=0))
     if slopes is not None:
         brought = slopes.slopes @ half.T
@@ -231,18 +194,12 @@ def residual_covariance(
     if noise is not None:
         brought = _of_walks(whitened[0], *noise) @ half.T
         shared = shared + brought.T @ brought
-    own, crossed = [], []
-    for block, each, m in zip(blocks, answers, sizes, strict=True):
-        # Own numbers answer the record's own noise and, through the parameters, everybody's.
-        heard_here = each.sum(axis=0)
-        back = np.linalg.inv(block.triangle)
-        through = back @ block.shared_on_own
-        gain = np.vstack([np.zeros((m, len(half))), half.T])
-        direct = np.vstack([back.T, -half.T @ through.T])
-        others = shared - gain.T @ heard_here @ gain
-        found = direct.T @ heard_here @ direct + through @ others @ through.T
-        own.append(_lifted(found, back @ back.T))
-        crossed.append(direct.T @ heard_here @ gain - through @ others)
+    growth = None
+    if unequal:
+        plainly = [joined(each, block) for each, block in zip(even, blocks, strict=True)]
+        less = variances - half @ _of_shared(plainly, sizes) @ half.T
+        shared, growth = widened_by(shared - less.sum(axis=0), shared)
+    own, crossed = _own_numbers(blocks, answers, half, shared)
     plain = half
     white = np.asarray(root @ root.T) if blocks[0].answering is None else plain @ plain.T
     freedom = freedom_of(
@@ -266,7 +223,32 @@ def residual_covariance(
         tuple(model.order for model in models),
         agreed.agreement,
         tested,
+        growth,
     )
+
+
+def _own_numbers(
+    blocks: Sequence[RecordBlock], answers: Sequence[Array], half: Array, shared: Array
+) -> tuple[list[Array], list[Array]]:
+    """Covariances of each record's own numbers, and between these and the parameters."""
+    own, crossed = [], []
+    for block, each in zip(blocks, answers, strict=True):
+        # Own numbers answer the record's own noise and, through the parameters, everybody's.
+        m, heard_here = block.basis.shape[1], each.sum(axis=0)
+        back = np.linalg.inv(block.triangle)
+        through = back @ block.shared_on_own
+        gain = np.vstack([np.zeros((m, len(half))), half.T])
+        direct = np.vstack([back.T, -half.T @ through.T])
+        others = shared - gain.T @ heard_here @ gain
+        found = direct.T @ heard_here @ direct + through @ others @ through.T
+        own.append(_lifted(found, back @ back.T))
+        crossed.append(direct.T @ heard_here @ gain - through @ others)
+    return own, crossed
+
+
+def _of_shared(answers: Sequence[Array], sizes: Sequence[int]) -> Array:
+    """By output, what the shared parameters hear of all records, shape (n_outputs, n, n)."""
+    return np.asarray(sum(each[:, m:, m:] for each, m in zip(answers, sizes, strict=True)))
 
 
 def _tested(

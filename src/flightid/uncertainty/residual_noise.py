@@ -119,7 +119,7 @@ class Autoregression:
         if not self.weights.size:
             fast = np.asarray(self.lags[0] * (columns.T @ columns))
         else:
-            fast = self._innovation * driven_products(
+            fast = self.innovation * driven_products(
                 columns, np.concatenate(([1.0], -self.weights))
             )
         if self.drift is None:
@@ -129,7 +129,7 @@ class Autoregression:
         return np.asarray(fast + drive * driven_products(columns, np.array([1.0, -pole])))
 
     @property
-    def _innovation(self) -> float:
+    def innovation(self) -> float:
         """Variance of what the recursion does not foretell."""
         return max(float(self.lags[0] - self.weights @ self.lags[1 : self.weights.size + 1]), 0.0)
 
@@ -182,7 +182,7 @@ class Autoregression:
 
     def _fast_spectrum(self) -> Array:
         order = self.weights.size
-        innovation = self._innovation
+        innovation = self.innovation
         if not order:
             return np.full(self.length // 2 + 1, innovation)
         gain = scipy.fft.rfft(np.concatenate(([1.0], -self.weights)), self.length)

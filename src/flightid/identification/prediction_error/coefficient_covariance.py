@@ -37,6 +37,7 @@ from flightid.uncertainty.coloured_residuals import (
 from flightid.uncertainty.estimate import Estimate
 from flightid.uncertainty.fitted_correlation import FittedCorrelation
 from flightid.uncertainty.foretold import chance_share, independent_samples, likelihood_gain
+from flightid.uncertainty.residual_colour import Colour
 
 Array = NDArray[np.float64]
 UNDETERMINED = "the data do not tell the coefficients apart"
@@ -71,7 +72,7 @@ class SearchResult:
     memory: list[list[float]]
     skip: int
     freedom: Array | None = None
-    colour: tuple[float, float] = (1.0, 1.0)
+    colour: Colour = Colour()
     agreement: Agreement | None = None
     reason: str = UNDETERMINED
     noise_reason: str = ""

@@ -55,8 +55,8 @@ from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.models.sampled.channels import SampledChannels, gather_channels, hold_diverged
 from flightid.record import Record
 from flightid.record.several import as_records
-from flightid.uncertainty.coloured_residuals import colour_findings
 from flightid.uncertainty.estimate import Estimate
+from flightid.uncertainty.residual_colour import colour_findings
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from flightid.conventions import Light
 from flightid.errors import DataError
 from flightid.findings import Finding
 from flightid.identification.records.setup import RecordSet
-from flightid.uncertainty.coloured_residuals import colour_findings
+from flightid.uncertainty.residual_colour import Colour, colour_findings
 
 ROUNDING_PERCENT = 1e-18
 """Share of an output's variance below which residuals are rounding."""
@@ -62,7 +62,7 @@ def judge_channels(prepared: RecordSet) -> list[Finding]:
 
 def judge_fit(
     costs: Mapping[str, float],
-    colour: tuple[float, float],
+    colour: Colour,
     noise: Callable[[], Mapping[str, float]] | None = None,
 ) -> list[Finding]:
     """Verdicts on what the model explains, the worst first, and on the colour of the residuals.
@@ -71,8 +71,8 @@ def judge_fit(
     ----------
     costs : mapping of str to float
         Percent of each output's variance in the residuals.
-    colour : tuple of float
-        Smallest and largest ratio of a standard error to that for white residuals.
+    colour : Colour
+        Ratios of standard errors to those for white residuals, and for noise of one power.
     noise : callable, optional
         Gives the percent that white noise of the measurements makes, which is no misfit; asked
         where more is left of an output than may be misfit.

@@ -28,6 +28,7 @@ from flightid.uncertainty.blocks import JointResiduals, RecordBlock
 from flightid.uncertainty.coloured_residuals import residual_covariance, triangle_of
 from flightid.uncertainty.estimate import Estimate
 from flightid.uncertainty.fitted_correlation import FittedCorrelation
+from flightid.uncertainty.residual_colour import Colour
 
 Array = NDArray[np.float64]
 Own = tuple[dict[str, Estimate], dict[str, Estimate], dict[str, Estimate]]
@@ -50,8 +51,8 @@ class RecordStatistics:
         The first corrected for coloured residuals, the second of the plain information.
     own : list of tuple
         Initial state, biases, reference shifts of each record.
-    colour : tuple of float
-        Smallest and largest ratio of a standard error to that for white residuals.
+    colour : Colour
+        Ratios of standard errors to those for white residuals, and for noise of one power.
     agreement : Agreement
         Of records and of their halves.
     bias : ndarray, shape (n,), or None
@@ -65,7 +66,7 @@ class RecordStatistics:
     covariance: Array
     correlation: Array
     own: list[Own]
-    colour: tuple[float, float]
+    colour: Colour
     agreement: Agreement
     bias: Array | None = None
     correlations: tuple[FittedCorrelation, ...] = ()

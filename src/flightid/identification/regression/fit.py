@@ -33,6 +33,7 @@ from flightid.uncertainty import correlation as correlation_of
 from flightid.uncertainty.agreement import Agreement
 from flightid.uncertainty.cramer_rao import inverse_hessian
 from flightid.uncertainty.fitted_correlation import FittedCorrelation
+from flightid.uncertainty.residual_colour import Colour
 from flightid.units import require_match
 from flightid.version import VERSION
 
@@ -86,7 +87,7 @@ class Knowledge:
     covariance: Array
     freedom: Array
     source: str
-    colour: tuple[float, float] = (1.0, 1.0)
+    colour: Colour = Colour()
     agreement: Agreement | None = None
     correlations: tuple[FittedCorrelation, ...] = ()
 

@@ -1,0 +1,232 @@
+"""Noise that grows with what a fit looks at: heteroscedastic residuals, coloured or not.
+
+A covariance by the mean power of the noise is too small where noise is large at the samples that
+tell the estimates. Residuals go through the whitening filter of their noise model, sensitivities
+backwards through its inverse: what is left at each sample is independent of the others, of a power
+of its own, and the sum of squares of scores is consistent whatever makes that power.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from flightid.frozen import dataclass
+from flightid.recursive_filter import filtered
+from flightid.uncertainty.blocks import RecordBlock, halves, levels
+from flightid.uncertainty.quantiles import normal_quantiles
+from flightid.uncertainty.residual_noise import Autoregression
+
+Array = NDArray[np.float64]
+FALSE_ALARM = 0.01
+"""Chance of a fit that noise of one power throughout is said to grow."""
+FREE = 0.1
+"""Share of a residual's variance below which the fit has taken it: it tells nothing of noise."""
+MOST = 20_000
+"""Samples of a record that are ranked: more tell no more."""
+LEAST = 40
+"""Samples of a record from which ranks are compared."""
+BESIDE_DRIFT = 40
+"""Order of the filter that whitens noise with a drift, which has no finite one."""
+
+
+@dataclass(frozen=True, eq=False)
+class Innovations:
+    """One output of one record, whitened.
+
+    Attributes
+    ----------
+    columns : ndarray, shape (n_samples, m + 2 n)
+        What own numbers and parameters, by halves, hear of each innovation.
+    errors : ndarray, shape (n_samples,)
+        Innovations over the root of the share that the fit left of them.
+    free : ndarray, shape (n_samples,)
+        That share.
+    signals : ndarray, shape (n + 1, n_samples)
+        Square of what each parameter, and all of them together, make of each innovation.
+    """
+
+    columns: Array
+    errors: Array
+    free: Array
+    signals: Array
+
+    @classmethod
+    def of(cls, noise: Autoregression, block: RecordBlock, output: int, half: Array) -> Innovations:
+        """Whitened by a model of the noise; `half` turns scores to changes of the estimates."""
+        columns = halves(block, output)
+        own, shared = block.of_output(output)
+        taken = np.sum(own**2, axis=1) + np.sum(shared**2, axis=1)
+        free = np.clip(1.0 - taken, FREE, 1.0)
+        errors = block.residual[output]
+        weights = _whitener(noise)
+        if weights.size:
+            denominator = np.concatenate(([1.0], -weights))
+            errors = filtered(denominator, [1.0], errors)
+            columns = filtered([1.0], denominator, columns[::-1], axis=0)[::-1]
+        m, n = own.shape[1], shared.shape[1]
+        told = columns[:, m : m + n] + columns[:, m + n :]
+        signals = np.vstack([((told @ half.T) ** 2).T, np.sum(told**2, axis=1)])
+        return cls(columns, errors / np.sqrt(free), free, signals)
+
+    def excess(self, level: float) -> Array:
+        """Products of scores beyond those of innovations of one power (HC3)."""
+        power = self.errors**2 / self.free - level
+        return np.asarray(self.columns.T @ (power[:, None] * self.columns))
+
+    def ranked(self) -> tuple[Array, Array] | None:
+        """Rank correlations of noise and signals by their errors, and the samples they count."""
+        kept = np.flatnonzero(self.free > FREE)
+        if kept.size > MOST:
+            first = (kept.size - MOST) // 2
+            kept = kept[first : first + MOST]
+        if kept.size < LEAST:
+            return None
+        noise = _ranks(np.abs(self.errors[kept]))
+        signals = np.array([_ranks(row[kept]) for row in self.signals])
+        together = signals @ noise / kept.size
+        # Bartlett: where both change slowly fewer samples are independent.
+        slow = _correlations(signals) @ _correlations(noise[None])[0]
+        counted = kept.size / np.maximum(1.0, 1.0 + 2.0 * slow)
+        return together * np.sqrt(counted), counted
+
+
+def _ranks(row: Array) -> Array:
+    """Ranks of unit variance about zero; ties share theirs."""
+    _, place, count = np.unique(row, return_inverse=True, return_counts=True)
+    ends = np.cumsum(count)
+    about = (ends - 0.5 * count)[place] - 0.5 * row.size
+    spread = float(np.sqrt(np.mean(about**2)))
+    return np.asarray(about / spread if spread > 0.0 else np.zeros_like(about))
+
+
+def _correlations(rows: Array) -> Array:
+    """Correlations of rows at lags from one on, up to an eighth of the samples, by a triangle."""
+    n = rows.shape[1]
+    power = np.abs(np.fft.rfft(rows, 2 * n)) ** 2
+    count = max(n // 8, 2)
+    lags = np.arange(1, count)
+    return np.asarray(np.fft.irfft(power)[:, 1:count] / n * (1.0 - lags / count))
+
+
+def _whitener(noise: Autoregression) -> Array:
+    """Weights of the past by which noise is foretold."""
+    if noise.drift is None:
+        return noise.weights
+    order = min(BESIDE_DRIFT, noise.n // 20)
+    lags = noise.autocovariance(order + 1)
+    return np.asarray(scipy.linalg.solve_toeplitz(lags[:-1], lags[1:]))
+
+
+def unequal_outputs(
+    models: Sequence[Autoregression], blocks: Sequence[RecordBlock], half: Array
+) -> dict[int, list[Innovations]]:
+    """Outputs whose noise grows with what tells the parameters: their innovations by record.
+
+    Parameters
+    ----------
+    models : sequence of Autoregression
+        By output.
+    blocks : sequence of RecordBlock
+        By record, along directions of unit information.
+    half : ndarray, shape (n, n)
+        From scores of the blocks to changes of the estimates.
+
+    Returns
+    -------
+    dict of int to list of Innovations
+        Empty where ranks of the noise's size, and of what each parameter or all of them make of
+        the noise, go together no more than chance makes of them: 1 % false alarms of a fit.
+
+    Reference
+    ---------
+    White (1980), A heteroskedasticity-consistent covariance matrix estimator and a direct test for
+    heteroskedasticity, Econometrica 48, 817-838; ranks: Spearman (1904); their error: Bartlett
+    (1935), J. Royal Statistical Society 98, 536-543.
+
+    Example
+    -------
+    >>> r = np.random.default_rng(0)
+    >>> signal, noise = np.sin(np.arange(400) / 9.0), r.standard_normal(400)
+    >>> rows = (signal / np.linalg.norm(signal))[None, :, None]
+    >>> white = [Autoregression(np.ones(1), np.empty(0), 400, 0)]
+    >>> def grows(error):
+    ...     block = RecordBlock.of(rows, np.zeros((1, 400, 0)), error[None])
+    ...     return list(unequal_outputs(white, [block], np.eye(1)))
+    >>> grows(noise), grows(noise * signal)
+    ([], [0])
+    """
+    found = {}
+    tests = max(len(models) * (len(half) + 1), 1)
+    limit = float(normal_quantiles([1.0 - FALSE_ALARM / tests])[0])
+    for output, noise in enumerate(models):
+        each = [Innovations.of(noise, block, output, half) for block in blocks]
+        known = [scores for part in each if (scores := part.ranked()) is not None]
+        if not known:
+            continue
+        total = sum(counted for _, counted in known)
+        score = sum(z * np.sqrt(counted) for z, counted in known) / np.sqrt(total)
+        if np.max(score) > limit:
+            found[output] = each
+    return found
+
+
+def with_excess(
+    apart: Sequence[Array],
+    models: Sequence[Autoregression],
+    blocks: Sequence[RecordBlock],
+    unequal: dict[int, list[Innovations]],
+) -> list[Array]:
+    """What `noise_heard` gives, with the power that the noise has where it is heard.
+
+    Parameters
+    ----------
+    apart : sequence of ndarray, shape (n_outputs, m + 2 n, m + 2 n)
+        By record.
+    models, blocks : sequence
+        As for `unequal_outputs`.
+    unequal : dict of int to list of Innovations
+        What that gave.
+
+    Reference
+    ---------
+    MacKinnon & White (1985), J. Econometrics 29, 305-325 (HC3); Andrews & Monahan (1992),
+    Econometrica 60, 953-966 (whitening before scores are summed).
+    """
+    made = [each.copy() for each in apart]
+    share = levels(blocks)
+    for output, parts in unequal.items():
+        for record, part in enumerate(parts):
+            level = share[record, output] * models[output].innovation
+            made[record][output] += part.excess(level)
+    return made
+
+
+def widened_by(before: Array, after: Array) -> tuple[Array, Array]:
+    """The first of two covariances, longer where the second is, never shorter, and by how much.
+
+    Returns
+    -------
+    ndarray, ndarray
+        The covariance, shape (n, n), and ratios of standard errors, shape (n,).
+
+    Example
+    -------
+    >>> wider, times = widened_by(np.eye(2), np.diag([4.0, 0.25]))
+    >>> np.diag(wider).round(6).tolist(), times.round(6).tolist()
+    ([4.0, 1.0], [2.0, 1.0])
+    """
+    size = np.sqrt(np.diag(before))
+    if not size.size or not np.all(size > 0.0):
+        return before, np.ones(size.size)
+    plain, other = before / np.outer(size, size), after / np.outer(size, size)
+    own, axes = np.linalg.eigh(plain)
+    root = axes * np.sqrt(np.maximum(own, np.finfo(float).eps * own[-1]))
+    back = np.linalg.inv(root)
+    gains, along = np.linalg.eigh(back @ (other - plain) @ back.T)
+    grown = root @ along * np.sqrt(np.maximum(gains, 0.0))
+    wider = before + size[:, None] * (grown @ grown.T) * size
+    return wider, np.sqrt(np.diag(wider)) / size

@@ -1,0 +1,111 @@
+"""Noise that grows with the signal: bars of the power where the estimate looks, coloured or not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import signal
+
+import flightid as fid
+from flightid.conventions import Light
+from flightid.uncertainty.blocks import RecordBlock
+from flightid.uncertainty.coloured_residuals import ResidualCovariance, residual_covariance
+from flightid.uncertainty.residual_colour import IN_DOUBT, UNEQUAL, WORTH_A_WORD, colour_findings
+from tests.closeness import assert_close
+from tests.strangers.output_error import STEP_S, TRUTH, model
+
+Array = np.ndarray
+SAMPLES = 8000
+
+
+def _gain() -> tuple[Array, Array]:
+    """A signal of 40 periods, and what least squares makes of an error for its gain."""
+    shape = np.sin(2.0 * np.pi * 40.0 * np.arange(SAMPLES) / SAMPLES)
+    return shape, shape / float(shape @ shape)
+
+
+def _known(shape: Array, error: Array) -> ResidualCovariance:
+    """The covariance of that gain."""
+    left = error - shape * float(shape @ error) / float(shape @ shape)
+    none = np.zeros((1, SAMPLES, 0))
+    return residual_covariance([RecordBlock.of(shape[None, :, None], none, left[None])])
+
+
+@pytest.mark.parametrize("pole", [0.0, 0.9])
+def test_the_variance_of_a_gain_is_that_of_its_scores(pole: float) -> None:
+    """A recursion driven by noise of power 0.1 + s²: the variance is the sum of power times the
+    square of what the estimate answers to each innovation."""
+    shape, answer = _gain()
+    power = 0.1 + shape**2
+    made = np.random.default_rng(5).standard_normal(SAMPLES) * np.sqrt(power)
+    error = signal.lfilter([1.0], [1.0, -pole], made)
+    heard = signal.lfilter([1.0], [1.0, -pole], answer[::-1])[::-1]
+    truth = float(heard**2 @ power)
+    even = float(heard**2 @ np.full(SAMPLES, power.mean()))
+    found = _known(shape, error)
+    assert_close(found.covariance[0, 0], truth, rtol=0.1, why="8000 samples")
+    assert found.growth is not None
+    assert_close(found.growth[0], np.sqrt(truth / even), rtol=0.05, why="8000 samples")
+    assert_close(found.colour.growth, found.growth[0], rtol=1e-12, why="one parameter")
+
+
+def test_noise_of_one_power_and_noise_that_falls_change_nothing() -> None:
+    shape, _ = _gain()
+    white = np.random.default_rng(6).standard_normal(SAMPLES)
+    assert _known(shape, white).growth is None
+    assert _known(shape, white * np.sqrt(1.1 - shape**2)).growth is None
+
+
+def test_white_noise_is_said_to_grow_in_one_of_a_hundred() -> None:
+    """Five of 200 at the most."""
+    random, said = np.random.default_rng(7), 0
+    shape = np.sin(np.arange(200) / 7.0)
+    for _ in range(200):
+        error = random.standard_normal(200)
+        left = error - shape * float(shape @ error) / float(shape @ shape)
+        block = RecordBlock.of(shape[None, :, None], np.zeros((1, 200, 0)), left[None])
+        said += residual_covariance([block]).growth is not None
+    assert said <= 5
+
+
+def test_a_note_up_to_twice_and_amber_from_there() -> None:
+    assert colour_findings(1.0, 1.0, 0.99 * WORTH_A_WORD) == []
+    for growth, light in ((0.99 * IN_DOUBT, Light.GREEN), (1.01 * IN_DOUBT, Light.AMBER)):
+        (said,) = colour_findings(1.0, 1.0, growth)
+        assert (said.code, said.light) == (UNEQUAL, light)
+        assert "the intervals allow for it" in said.message
+        (bare,) = colour_findings(1.0, 1.0, growth, has_bars=False)
+        assert "would be" in bare.message
+    codes = [each.code for each in colour_findings(1.0, 3.0, 1.5)]
+    assert codes == ["residuals-coloured", UNEQUAL]
+
+
+def _rolled(swell_rad_s: float) -> fid.Record:
+    """A roll axis, its rate measured to 1 % of its spread and 15 % of itself."""
+    time_s = np.arange(600) * STEP_S
+    moved = 0.05 * np.sin(2.0 * time_s + 0.1 * time_s**2)
+    moved *= np.sin(swell_rad_s * time_s) if swell_rad_s else 1.0
+    decay = np.exp(TRUTH["Lp"] * STEP_S)
+    gain = TRUTH["Lda"] * (decay - 1.0) / TRUTH["Lp"]
+    rate = signal.lfilter([0.0, gain], [1.0, -decay], moved)
+    noise = np.random.default_rng(8).standard_normal(rate.size)
+    return fid.Record.from_arrays(
+        time_s,
+        inputs={"da": moved},
+        outputs={"p": rate + (0.01 * rate.std() + 0.15 * np.abs(rate)) * noise},
+        units={"da": "rad", "p": "rad/s"},
+        hold="zero",
+    )
+
+
+@pytest.mark.parametrize("method", ["output_error", "filter_error", "equation_error"])
+def test_fits_say_it_in_their_residuals(method: str) -> None:
+    fit = fid.identify(model(), _rolled(0.3), method=method)
+    (told,) = [each for each in fit.findings if each.code == UNEQUAL]
+    assert "noise grows with the signal: standard errors are up to 1." in told.message
+
+
+def test_a_sine_tells_as_much_where_it_is_quiet_and_is_not_said() -> None:
+    """Damping is told at the zeros of what tells the control's effect: bars are as they were."""
+    fit = fid.identify(model(), _rolled(0.0), method="equation_error")
+    assert UNEQUAL not in [each.code for each in fit.findings]
