@@ -5,13 +5,12 @@
 Drawn by chance from all mutants of the packages that tell users what to believe
 (`mutations.EQUIVALENT` and its neighbours say what is left out). pytest collects the default suite
 once, each file of tests runs in a fork with coverage, and each mutant meets, in a fork of its own
-(`mutant_forks.py`): every test that reaches its statement, those of its module and short ones first
-(so many seconds of its processor's time; where that is not all, its end says so), then the other
-tests of the nearest files, which may take what a fixture or a cache made of that line for another.
-A mutant of
-what runs on import meets the contracts that read the source, the tests of files that import its
-module, and those that reach its file. One that no test notices is printed: mend the test, or delete
-what nothing needs.
+(`mutant_forks.py`): every test that reaches its statement, those of its module and of its room
+first, short before long (so many seconds of its processor's time; where that is not all, its end
+says so), then the other tests of the nearest files, which may take what a fixture or a cache made
+of that line for another. A mutant of what runs on import meets the contracts that read the source,
+the tests of files that import its module, and those that reach its file. One that no test notices
+is printed: mend the test, or delete what nothing needs.
 
 What tests reach is kept beside the file by the text of the test file; of a source that changed
 since, lines that stand elsewhere take their tests with them. Ends are kept for a tree that is the
@@ -209,12 +208,15 @@ def chosen(
             here = {k: names for k, of in enumerate(takers) for names in of.values()}
         at = set().union(*here.values()) - set(readers)
     breadth = Counter(each for names in here.values() for each in names)
-    most, stem = max(breadth.values(), default=0), Path(mutant.path).stem.rstrip("s")
+    most, place = max(breadth.values(), default=0), Path(mutant.path)
+    near = [place.stem.rstrip("s"), place.parent.name]
 
-    def rank(test: str) -> tuple[bool, bool, float, str]:
-        near = stem in test.partition("::")[0]
+    def rank(test: str) -> tuple[int, bool, float, str]:
+        """Of its module, of its room (many have a `reader.py`), of others; short ones first."""
+        file = test.partition("::")[0]
+        far = next((k for k, name in enumerate(near) if name in file), len(near))
         seconds = known.seconds.get(test, 0.0)
-        return not near, bool(readers) and breadth[test] < most / 2, seconds, test
+        return far, bool(readers) and breadth[test] < most / 2, seconds, test
 
     ranked = [*sorted(dict.fromkeys(readers), key=rank), *sorted(at, key=rank)]
     tests, left_out = _within(ranked, known, OFFERED * most_s)

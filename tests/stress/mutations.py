@@ -33,7 +33,13 @@ COSTS_ALONE = {
 }
 CACHES = ("lru_cache", "cache")
 """Their arguments are sizes of caches."""
-EQUIVALENT: dict[tuple[str, str, str], str] = {}
+EQUIVALENT: dict[tuple[str, str, str], str] = {
+    (
+        "src/flightid/control/tuning/tune.py",
+        "asked[0].requirements,",
+        "asked[ -1].requirements,",
+    ): "each axis is judged with its own requirements in their place",
+}
 """File, line before and line after: the reason why no result of any use differs."""
 FUNCTION = 0x1
 """Code of a function, not of a module or class: `inspect.CO_OPTIMIZED`."""

@@ -239,6 +239,27 @@ def test_a_layout_of_ones_own_is_written_and_read(tmp_path: Path) -> None:
     assert (table["x"].tolist(), table.unit("x")) == ([1.25, 2.5], "m")
 
 
+def test_layouts_of_one_name_are_read_apart_and_said(tmp_path: Path) -> None:
+    content = b""
+    for kind, formats in enumerate(("QE", "Qf", "QBB"), 200):
+        writer = DataflashWriter()
+        labels = ",".join(("TimeUS", "x", "y")[: len(formats)])
+        writer.define(
+            MessageLayout(
+                "OWN", kind, formats, labels, "s--"[: len(formats)], "F--"[: len(formats)]
+            )
+        )
+        writer.add("OWN", [1, 2, 3][: kind - 199], {"x": [kind - 199] * (kind - 199)})
+        content += writer.to_bytes()
+    (tmp_path / "three.bin").write_bytes(content)
+    log = fid.read_log(tmp_path / "three.bin")
+    counts = {name: info.count for name, info in log.messages.items() if name.startswith("OWN")}
+    assert counts == {"OWN": 1, "OWN~2": 2, "OWN~3": 3}
+    assert set(log.table("OWN~3").columns) == {"TimeUS", "x", "y"}
+    (said,) = (each for each in log.findings if each.code == "layout-changed")
+    assert said.message.endswith("inside the file: OWN~2, OWN~3")
+
+
 SMALL = _writer().to_bytes()
 
 

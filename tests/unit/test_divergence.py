@@ -53,6 +53,14 @@ def test_what_ends_again_what_jumps_and_what_was_asked_is_none() -> None:
         assert divergence(TIME_S, values + _noise(0.01), wanted) is None
 
 
+def test_what_was_asked_counts_in_the_last_third_of_the_growth() -> None:
+    grown = np.exp(TIME_S - 30.0) * np.sin(20.0 * TIME_S)
+    for first_s, last_s, is_found in ((13.0, 20.0, True), (20.0, 27.0, True), (29.0, 30.0, False)):
+        asked = np.where((first_s < TIME_S) & (last_s > TIME_S), 4.0 * np.sin(3.0 * TIME_S), 0.0)
+        found = divergence(TIME_S, asked + grown + _noise(0.01), asked)
+        assert (found is not None) == is_found, first_s
+
+
 def test_flight_and_inspect_say_that_a_loop_diverges(tmp_path: Path) -> None:
     path = tmp_path / "grows.bin"
     write_ordinary_log(path, axis=Axis(i=3.0, gust=1.0, noise=0.02), size=0.15, duration_s=5.8)

@@ -33,6 +33,12 @@ def test_a_damaged_last_stamp_is_not_believed() -> None:
     assert believable(stamps).tolist() == [True] * 1000 + [False]
 
 
+def test_of_stamps_that_never_increase_one_is_believed() -> None:
+    for stamps in ([3.0, 2.0, 1.0], [2.0, 2.0], [5.0, 5.0, 4.0]):
+        assert np.count_nonzero(believable(np.array(stamps))) == 1
+    assert believable(np.array([3.0, 1.0, 2.0])).tolist() == [False, True, True]
+
+
 def test_a_pause_where_blocks_meet_is_one() -> None:
     for last in (BLOCK - 1, BLOCK):
         stamps = np.arange(BLOCK + 3.0)

@@ -166,3 +166,23 @@ def test_the_highest_of_several_crossovers_is_found() -> None:
     assert_close(found[0], np.max(beyond.real), rtol=1e-5, why="chords of a fine grid")
     assert_close(found[1], 2.0, rtol=1e-9, why="a line in logarithms")
     assert np.isnan(found[2])
+
+
+def test_what_flew_is_told_of_the_estimate_and_at_worst_of_plants_that_all_hold() -> None:
+    problem = _problem()
+    judged = problem.judge(GAINS[:1])
+    noise = np.array([[0.5, 0.7, 0.6]])
+    table = {
+        (True, True, True): (0.5, 0.7), (True, False, True): (0.5, None),
+        (True, True, False): (0.5, None), (False, True, True): (None, None),
+    }  # fmt: skip
+    for stable, (flown, flown_worst) in table.items():
+        old = replace(judged, stable=np.array([stable]), noise=noise)
+        told = {(each.loop, each.name): each for each in worst_cases(problem, GAINS[0], old)[0]}
+        of_noise = told["output", "noise over gyro noise"]
+        assert (of_noise.flown, of_noise.flown_worst) == (flown, flown_worst)
+        (loop,) = old.metrics
+        of_phase = told[loop, "phase margin"]
+        values = old.metrics[loop].phase_margin_deg[0]
+        assert of_phase.flown == (None if flown is None else values[0])
+        assert of_phase.flown_worst == (None if flown_worst is None else values.min())

@@ -183,8 +183,8 @@ def noise_limit(setting: Setting, problem: LoopProblem, flown: Array) -> float |
         limits.append(allowed)
     if (allowed is not None or need.noise_growth is not None) and flown.any():
         judged = problem.judge(flown[None], [0])
-        if bool(judged.stable[0, 0]):
-            noise = float(judged.noise[0, 0])
+        if judged.stable.item():
+            noise = float(judged.noise.item())
             if allowed is not None:
                 limits[-1] = max(allowed, noise)
             elif need.noise_growth is not None:
@@ -250,11 +250,11 @@ def held_by_hand(
         of its own on fresh plants is no more.
     """
     judged = problem.judge(gains[None]) if judged is None else judged
-    least = dict(zip(judged.names, judged.slack[:, 0].min(axis=-1).tolist(), strict=True))
+    least = dict(zip(judged.names, judged.slack.squeeze(1).min(axis=-1).tolist(), strict=True))
     short = tuple(name for name, slack in least.items() if slack < 0.0)
     # Nothing moved these gains up to a requirement: one binds where they stand at it.
     tight = tuple(name for name, slack in least.items() if slack < EDGE)
-    met = judged.slack[:, 0].min(axis=0) >= 0.0
+    met = judged.slack.squeeze(1).min(axis=0) >= 0.0
     exists = bool(met[0]) and float(met.mean()) >= MOST
     missed = () if exists else shortfalls(problem, judged)
     return GainSearchResult(gains, exists, short or tight, least, by_hand=True, missed=missed)
@@ -270,7 +270,7 @@ def _result(
 ) -> AxisResult:
     gains = paths.gains_of(loop)
     made, met = worst_cases(fresh, gains, old, setting.evidence.band_rad_s)
-    held = None if old is None else old.stable[0]
+    held = None if old is None else old.stable.squeeze(0)
     beyond = margins_beyond(fresh, gains, setting.evidence.band_rad_s)
     return AxisResult(found, loop, made, met, held, fresh, beyond)
 

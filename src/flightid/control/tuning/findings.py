@@ -263,7 +263,7 @@ def _behind_rate_loop(result: AxisResult, omega: Array, coherence: Array) -> Arr
     angle loop is what the controller makes of it, and a sweep need not tell it.
     """
     problem = result.problem
-    rate = problem.loops(result.found.gains[None], problem.plants.take([0])).rate[0, 0]
+    rate = problem.loops(result.found.gains[None], problem.plants.take([0])).rate.squeeze((0, 1))
     left = np.interp(omega, problem.plants.omega_rad_s, np.abs(1.0 + rate) ** -2)
     tiny = np.finfo(float).tiny
     return np.asarray(coherence / (coherence + np.minimum(left, 1.0) * (1.0 - coherence) + tiny))

@@ -275,7 +275,7 @@ def _climb(problem: LoopProblem, space: _Space, start: Array, rows: list[int]) -
 
     low, high = space.bounds()
     point, reach = np.clip(space.to_point(start), low, high), FIRST_REACH
-    merit = float(_merit(*judged(point))[0])
+    merit = float(_merit(*judged(point)).item())
     linear: Linear | None = None
     for _ in range(ITERATIONS):
         linear = linear or _linearised(problem, space, point, rows)
@@ -284,11 +284,11 @@ def _climb(problem: LoopProblem, space: _Space, start: Array, rows: list[int]) -
         if step is None or np.abs(step).max() < SMALLEST_REACH:
             break
         met = judged(point + step)
-        trial = float(_merit(*met)[0])
+        trial = float(_merit(*met).item())
         if trial <= merit + SMALLEST_GAIN:
             step = _linear_step(_corrected(linear, step, *met), *box)
             if step is not None:
-                trial = float(_merit(*judged(point + step))[0])
+                trial = float(_merit(*judged(point + step)).item())
         if step is not None and trial > merit + SMALLEST_GAIN:
             full = np.abs(step).max() > 0.99 * reach
             point, merit, linear = point + step, trial, None
@@ -297,7 +297,7 @@ def _climb(problem: LoopProblem, space: _Space, start: Array, rows: list[int]) -
             reach *= SHRINK
             if reach < SMALLEST_REACH:
                 break
-    return np.asarray(space.to_gains(point[None])[0])
+    return np.asarray(space.to_gains(point[None]).squeeze(0))
 
 
 def _corrected(linear: Linear, step: Array, limits: Array, levels: Array) -> Linear:
@@ -306,7 +306,10 @@ def _corrected(linear: Linear, step: Array, limits: Array, levels: Array) -> Lin
     Without it steps along a curved limit leave it and are refused, however good they are.
     """
     _, _, limit_slopes, level_slopes = linear
-    near_limits, near_levels = limits[0] - limit_slopes @ step, levels[0] - level_slopes @ step
+    near_limits, near_levels = (
+        limits.squeeze(0) - limit_slopes @ step,
+        levels.squeeze(0) - level_slopes @ step,
+    )
     return near_limits, near_levels, limit_slopes, level_slopes
 
 
@@ -356,7 +359,7 @@ def _violating(judged: LoopAssessment, rows: list[int]) -> list[int]:
     """Plants outside `rows` that are worst in a requirement that fails, or in the objective."""
     new: list[int] = []
     known = set(rows)
-    slack, objective = judged.slack[:, 0], judged.objective[0]
+    slack, objective = judged.slack.squeeze(1), judged.objective.squeeze(0)
     inside = slack[:, rows].min(axis=1)
     for each, least in zip(slack, inside, strict=True):
         worst = int(np.argmin(each))
@@ -384,7 +387,7 @@ def _ends(problem: LoopProblem, gains: Array, *, exists: bool) -> Iterator[str]:
 
 def _report(problem: LoopProblem, gains: Array) -> GainSearchResult:
     judged = problem.judge(gains[None])
-    least = dict(zip(judged.names, judged.slack[:, 0].min(axis=1), strict=True))
+    least = dict(zip(judged.names, judged.slack.squeeze(1).min(axis=1), strict=True))
     exists = bool(min(least.values()) >= 0.0)
     edge = EDGE if exists else 0.0
     binding = tuple(name for name, slack in least.items() if slack < edge + 2 * HEADROOM)

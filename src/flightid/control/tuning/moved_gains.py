@@ -110,15 +110,15 @@ def move_gains(
         )
         for each in made
     )
-    slack = judged.slack[:, 0]
+    slack = judged.slack.squeeze(1)
     short = tuple(n for n, row in zip(judged.names, slack, strict=True) if row.min() < 0.0)
     worst = int(slack.min(axis=0).argmin())
     chosen = problem.plants.take([0, worst])
-    seen = problem.loops(gains[None], chosen).whole[0]
+    seen = problem.loops(gains[None], chosen).whole.squeeze(0)
     curves = {"estimate": seen[0], "worst plant": seen[1]}
     if design.flown.has_flown and not design.filters:
         old = paths.gains_of(design.flown)[None]
-        curves["flown"] = problem.loops(old, chosen).whole[0, 0]
+        curves["flown"] = problem.loops(old, chosen).whole.squeeze(0)[0]
     made_of = {name: loop.gains[name] for name in paths.names}
     return MovedGains(
         made_of,
@@ -127,7 +127,7 @@ def move_gains(
         met,
         short,
         int(np.count_nonzero(~judged.stable)),
-        holds := bool(judged.stable[0, 0]),
+        holds := bool(judged.stable.squeeze(0)[0]),
         _bands(design, loop) if responses and holds else (),
         problem.plants.omega_rad_s,
         curves,

@@ -28,17 +28,19 @@ def shortfalls(problem: LoopProblem, judged: LoopAssessment) -> tuple[str, ...]:
     tuple of str
         In the order of the requirements; stability, which is no number, is left out.
     """
-    slack = dict(zip(judged.names, judged.slack[:, 0], strict=True))
+    slack = dict(zip(judged.names, judged.slack.squeeze(1), strict=True))
     told = []
     for limit in limits(problem.requirements, judged.metrics, problem.crossover_limit_rad_s):
         least = slack[limit.name]
         if least.min() >= 0.0:
             continue
-        value = missed_most(limit, least, getattr(judged.metrics[limit.loop], limit.field)[0])
+        value = missed_most(
+            limit, least, getattr(judged.metrics[limit.loop], limit.field).squeeze(0)
+        )
         name, unit = f"{limit.loop}: {NAMES[limit.field]}", UNITS[limit.field]
         told.append(_short(name, value, unit, limit, least))
     if problem.noise_limit is not None and (least := slack["output noise"]).min() < 0.0:
-        noise, most = float(judged.noise[0].max()), noise_limit(problem.noise_limit)
+        noise, most = float(judged.noise.max()), noise_limit(problem.noise_limit)
         told.append(_short(most.name, noise, "", most, least))
     return tuple(told)
 

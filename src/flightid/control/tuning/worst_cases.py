@@ -226,11 +226,11 @@ def worst_cases(
             )
         )
     made.append(_noise(problem, new, old))
-    return tuple(made), np.asarray(new.slack[:, 0].min(axis=0) >= 0.0)
+    return tuple(made), np.asarray(new.slack.squeeze(1).min(axis=0) >= 0.0)
 
 
 def _values(judged: LoopAssessment, loop: str, kind: _Kind) -> Array:
-    values: Array = getattr(judged.metrics[loop], kind.field)[0]
+    values: Array = getattr(judged.metrics[loop], kind.field).squeeze(0)
     return values
 
 
@@ -242,7 +242,7 @@ def _flown(
     least_db: float,
 ) -> tuple[float | None, float | None]:
     """A number with the gains that flew: of the estimate, and at worst as far as it is promised."""
-    if old is None or not bool(old.stable[0, 0]):
+    if old is None or not bool(old.stable.squeeze(0)[0]):
         return None, None
     values = _values(old, loop, kind)
     unknown, bound = modes_outside(old, kind.at(loop), band_rad_s, least_db)
@@ -335,10 +335,10 @@ def _digits(limit: Limit, shown: tuple[float | None, float | None, float | None]
 
 def _noise(problem: LoopProblem, new: LoopAssessment, old: LoopAssessment | None) -> WorstCase:
     known = problem.noise_psd is not None
-    values = new.noise[0]
+    values = new.noise.squeeze(0)
     most = problem.noise_limit
     asked = [] if most is None else [noise_limit(most)]
-    before = None if old is None or not old.stable[0, 0] else old.noise[0]
+    before = None if old is None or not old.stable.squeeze(0)[0] else old.noise.squeeze(0)
     rate = problem.inner == AxisLoop.inner
     sensor, unit = "gyro" if rate else "measurement", "1/(rad/s)" if rate and not known else "1"
     name = "noise, rms" if known else f"noise over {sensor} noise"

@@ -57,7 +57,8 @@ def open_blackbox(path: Path) -> TableSource:
     data = data[max(data.find(PRODUCT), 0) :]
     flights = _native.blackbox_flights(data)
     sizes = [stop - start for start, stop in flights]
-    taken = int(np.argmax(sizes)) if sizes else 0
+    # Of a file without flights one that is not there: the refusal says how the file begins.
+    taken = int(np.argmax(sizes)) if sizes else len(sizes)
     with within_memory(path.name):
         native = _native.Blackbox(data, taken, memory_budget())
     header = dict(native.headers())
