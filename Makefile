@@ -82,10 +82,12 @@ docs: wheel  ## build the documentation site into build/site, warnings as errors
 bench: wheel  ## speed against peers, same data, one run
 	$(BIN)/python -m benchmarks
 
-same-wheel:  ## build the wheel twice and compare the bytes
-	rm -rf build/twice && SOURCE_DATE_EPOCH=315532800 $(BIN)/maturin build --release --quiet --out build/twice/a
-	touch crates/python/src/lib.rs
-	SOURCE_DATE_EPOCH=315532800 $(BIN)/maturin build --release --quiet --out build/twice/b
+same-wheel:  ## build the wheel in two folders and compare the bytes
+	rm -rf build/twice && mkdir -p build/twice/elsewhere
+	git ls-files -z | tar --null -T - -c | tar -x -C build/twice/elsewhere
+	! test -d src/flightid/app/page || cp -R src/flightid/app/page build/twice/elsewhere/src/flightid/app/
+	SOURCE_DATE_EPOCH=315532800 $(BIN)/maturin build --release --quiet --out build/twice/a
+	cd build/twice/elsewhere && SOURCE_DATE_EPOCH=315532800 $(abspath $(BIN))/maturin build --release --quiet --out ../b
 	for wheel in build/twice/a/*.whl; do cmp $$wheel build/twice/b/$$(basename $$wheel) || exit 1; done
 
 kills: develop  ## kill commands at 200 random moments and look for losses

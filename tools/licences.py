@@ -20,7 +20,8 @@ PAGE = ROOT / "THIRD_PARTY.md"
 HEAD = """# Software of others
 
 Made by `python tools/licences.py --write`. The crates are inside the wheel, whose
-`dist-info/sboms` lists them with versions and checksums; the packages are installed beside it.
+`dist-info/sboms` lists them with versions and checksums, and what the page and reports are made
+of (`tools/sbom.py`); the packages are installed beside it.
 Reports draw with plotly.js 4.1.1 (MIT, Copyright 2012-2026, Plotly, Inc.), which the wheel holds.
 The page of `flightid app` is made of Svelte 5.57.3 (MIT, Copyright 2016-2025, Svelte
 Contributors), uPlot 1.6.32 (MIT, Copyright 2022, Leon Sorokin) and three.js 0.187.0 (MIT, Copyright

@@ -281,6 +281,10 @@ def test_a_wheel_without_the_page_fails(tmp_path: Path) -> None:
     with zipfile.ZipFile(wheel, "w") as made:
         for name in names:
             made.writestr(f"flightid/app/page/{name}", "x")
+    with pytest.raises(SystemExit, match=r"lacks sboms/flightid\.cdx\.json"):
+        require_in(wheel)
+    with zipfile.ZipFile(wheel, "a") as made:
+        made.writestr("flightid-0.dist-info/sboms/flightid.cdx.json", "{}")
     require_in(wheel)
     page, sources = tmp_path / "page", tmp_path / "app"
     page.mkdir()
