@@ -14,18 +14,13 @@ import pytest
 import flightid as fid
 from flightid.control.margins import gain_limits
 from flightid.control.margins.loop_source import read_loop
-from flightid.control.margins.low_mode_slack import (
-    LEAST_DAMPING,
-    MOST_LOWERED_DB,
-    TAKEN_BELOW,
-    LowModeSlack,
-    most_lowered_db,
-)
 from flightid.control.margins.margins import margins_of
-from flightid.control.margins.resonance_slack import TAKEN, ResonanceSlack
+from flightid.control.margins.mode_slack import MOST_MOVED_DB, TAKEN, ModeSlack
 from flightid.control.tuning.axis_tuning import held_by_hand
-from flightid.control.tuning.findings import _taken, below_band, verdict
-from flightid.control.tuning.margins_below import lows_left
+from flightid.control.tuning.band_findings import asked_above, below_band, taken_words
+from flightid.control.tuning.findings import verdict
+from flightid.control.tuning.mode_slacks import slacks_of
+from flightid.control.tuning.wider_band import wider_band
 from flightid.control.tuning.worst_cases import WorstCase
 from flightid.conventions import Light
 from flightid.evidence.evidence import Check, Evidence
@@ -103,13 +98,19 @@ def test_where_a_resonance_may_leave_less_than_is_required_nothing_is_promised()
         "gain margin", "sensitivity peak", "disturbance peak", "phase margin", "delay margin",
     ):  # fmt: skip
         case = design.worst_case("loop", name)
-        assert (case.worst, case.estimate.reason) == (None, TAKEN)
+        assert (case.worst, case.estimate.reason) == (None, TAKEN["above"])
     assert design.worst_case("loop", "disturbance bandwidth").worst is not None
     found = replace(held_by_hand(design.problem, _gains_of(design)), exists=True)
-    light = verdict(found, np.ones(300, dtype=bool), 300, design.worst_cases, (0.1, 40.0))
+    wider = wider_band(design.problem, _gains_of(design), (0.1, 40.0))
+    light = verdict(found, np.ones(300, dtype=bool), 300, design.worst_cases, (0.1, 40.0), wider)
     assert light.light is Light.AMBER
     assert "say nothing of a light mode above it" in light.message
-    assert "20 dB below one" in light.action
+    assert light.action == wider[1]
+    up = float(re.search(r"higher frequencies, up to ([\d.]+) rad/s", wider[1]).group(1))  # type: ignore[union-attr]
+    assert up > 40.0
+    omega = design.problem.plants.omega_rad_s
+    loop = np.abs(design.problem.loops(_gains_of(design)[None], design.problem.plants).rate[0, 0])
+    assert loop[omega > up].max() <= 10.0 ** (-26.0 / 20.0), "20 dB of a mode, 6 of margin"
 
 
 def test_a_mode_under_20_db_above_the_band_takes_phase_and_delay() -> None:
@@ -126,17 +127,17 @@ def test_a_mode_under_20_db_above_the_band_takes_phase_and_delay() -> None:
     outer = 4.0 / s * rigid
     angle, above = outer / (1.0 + rigid), w > top
     for slack in (
-        ResonanceSlack.above(rigid[above]),
-        ResonanceSlack.above_around(angle[above], rigid[above]),
+        ModeSlack.above(rigid[above]),
+        ModeSlack.of("above", angle[above], rigid[above], MOST_MOVED_DB),
     ):
         assert all(slack.takes(field, 6.0) for field in ("phase_margin_deg", "delay_margin_s"))
         assert not slack.takes("disturbance_bandwidth_rad_s", 6.0)
     weak = outer / (4.0 + rigid)
-    low = ResonanceSlack.above_around(weak[above], rigid[above] / 4.0)
+    low = ModeSlack.of("above", weak[above], rigid[above] / 4.0, MOST_MOVED_DB)
     turned = outer * (1.0 + share * modes) / (4.0 + true)
     assert 0.0 < low.left_db <= -20.0 * np.log10(np.abs(turned[above]).max())
     assert not low.takes("phase_margin_deg", 6.0)
-    assert ResonanceSlack().left_db == np.inf
+    assert ModeSlack("above").left_db == np.inf
 
 
 def _phase_and_delay(w: np.ndarray, loop: np.ndarray) -> tuple[float, float]:
@@ -168,7 +169,7 @@ def test_margins_promise_no_more_than_a_frame_above_the_band_leaves(
     assert found.phase_margin.interval95 == known.phase_margin.interval95
     for number in (found.gain_margin, found.modulus_margin, found.sensitivity_peak, rejected.peak):
         assert (number.interval95 is not None) is reaching
-        assert (number.reason == TAKEN) is not reaching
+        assert (number.reason == TAKEN["above"]) is not reaching
     if not reaching:
         return
     w = np.geomspace(1.0, 300.0, 200_000)
@@ -271,7 +272,10 @@ def test_of_a_phase_that_is_read_below_the_band_nothing_is_promised(
         for name in ("gain margin", "sensitivity peak", "crossover", "delay margin"):
             case = design.worst_case("angle loop", name)
             assert (case.worst, case.estimate.interval95, case.flown_worst) == (None,) * 3
-        assert "sweep from 1.3 rad/s or lower" in said[0].action
+        told = re.search(r"sweep from ([\d.]+) to ([\d.]+) rad/s alone", said[0].action)
+        start, top = map(float, told.groups())  # type: ignore[union-attr]
+        assert 0.0 < start < 1.0
+        assert top > low, "below the angle's own crossover, up into the band"
 
 
 @pytest.mark.parametrize("shift", [0.9, 1.12])
@@ -282,77 +286,57 @@ def test_a_pendulum_below_the_band_takes_no_promised_number(shift: float) -> Non
     model = 120.0 / s * 60.0 / (s + 60.0)
     zero, pole = 4.55, 4.55 * shift
     mode = (s**2 + 0.06 * zero * s + zero**2) / (s**2 + 0.06 * pole * s + pole**2)
-    assert np.abs(mode).min() > 10.0 ** (-MOST_LOWERED_DB / 20.0)
+    assert np.abs(mode).min() > 10.0 ** (-MOST_MOVED_DB / 20.0)
     angle = [3.0 / s * r / (1.0 + r) for r in (model, model * mode)]
-    slack = LowModeSlack.below(model[low])
+    slack = ModeSlack.below(model[low])
     assert slack.left_db == pytest.approx(20.0 * np.log10(np.abs(model[low]).min()) - 20.0)
-    around = LowModeSlack.below_around(angle[0][low], model[low])
+    around = ModeSlack.of("below", angle[0][low], model[low], MOST_MOVED_DB)
     assert np.abs(model * mode)[low].min() >= 10.0 ** (slack.left_db / 20.0)
     assert np.abs(angle[1])[low].min() >= 10.0 ** (around.left_db / 20.0)
     peak = (1.0 / np.abs(1.0 + model * mode))[low].max()
     assert peak <= slack.edge("sensitivity_peak")  # type: ignore[operator]
     assert around.takes_all(6.0), "the angle loop is at one there"
     assert not slack.takes_all(6.0)
-    weak = LowModeSlack.below(model[low] / 15.0)
+    weak = ModeSlack.below(model[low] / 15.0)
     assert np.abs(model * mode / 15.0)[low].min() < 1.0
     assert weak.takes_all(6.0)
     assert weak.takes("gain_margin_db", 6.0)
-    assert LowModeSlack().edge("sensitivity_peak") is None
-
-
-def test_a_mode_that_the_band_hardly_shows_lowers_the_response_beside_it_little() -> None:
-    """Pole beside zero of any shape: the nearer to the band, the more of it stands in the band."""
-    draw = np.random.default_rng(11)
-    for _ in range(300):
-        zero = np.exp(draw.uniform(np.log(0.05), 0.0))
-        pole = zero * np.exp(draw.uniform(-0.6, 0.6) * draw.uniform() ** 2)
-        of_zero, of_pole = np.exp(draw.uniform(np.log(LEAST_DAMPING), np.log(0.7), 2))
-
-        def mode(w: np.ndarray) -> np.ndarray:
-            top = zero**2 - w**2 + 2j * of_zero * zero * w  # noqa: B023
-            return np.asarray(top / (pole**2 - w**2 + 2j * of_pole * pole * w))  # noqa: B023
-
-        below = np.append(np.geomspace(0.01, 0.999, 200), zero * np.linspace(0.97, 1.0, 21))
-        error = float(np.abs(mode(np.array([1.0])) - 1.0)[0])
-        lowered_db = -20.0 * np.log10(np.abs(mode(below)))
-        least = np.minimum(lowered_db, MOST_LOWERED_DB) - most_lowered_db(1.0 / below, error)
-        assert least.max() < 0.3, (zero, pole, of_zero, of_pole)
-    assert np.all(most_lowered_db([1.0, 1.1], np.inf) == MOST_LOWERED_DB)
+    assert ModeSlack("below").edge("sensitivity_peak") is None
 
 
 def test_a_loop_that_a_mode_brings_through_one_is_promised_no_phase_nor_delay() -> None:
     """There it passes one with any phase: both were promised beside a gain margin that was not."""
-    through, clear = LowModeSlack(-0.5, 19.5), LowModeSlack(0.5, 20.5)
+    through, clear = ModeSlack("below", -0.5, 19.5), ModeSlack("below", 0.5, 20.5)
     for field in ("phase_margin_deg", "delay_margin_s", "gain_margin_db"):
         assert through.takes(field, 6.0), field
         assert not clear.takes(field, 6.0), field
     assert clear.takes("gain_reduction_margin_db", 6.0)
-    assert not LowModeSlack().takes("phase_margin_deg", 6.0)
+    assert not ModeSlack("below").takes("phase_margin_deg", 6.0)
 
 
-def test_what_a_mode_below_may_lower_is_judged_by_what_the_band_shows_at_its_end() -> None:
+@pytest.mark.parametrize("side", ["below", "above"])
+def test_what_a_mode_may_move_is_judged_by_what_the_band_shows(side: str) -> None:
+    band = (4.0, 100.0)
     design = fid.tune_pid(
         fid.load_model("rate_integrator", axis="roll").with_values({"Ltphi": 140.0, "tau": 0.03}),
         gains=fid.axis_loop("arducopter", "roll", loop_rate_hz=400.0),
-        band_rad_s=(4.0, 100.0),
+        band_rad_s=band,
         nominal=True,
         by_hand={"ATC_ANG_RLL_P": 3.0},
     )
-    plants = design.problem.plants
-    omega, gains = plants.omega_rad_s, _gains_of(design)
-    below = omega < 4.0
-    alone = lows_left(design.problem, gains, (4.0, 100.0))["rate loop"]
-    assert alone.left_db == pytest.approx(alone.own_db - MOST_LOWERED_DB)
-    loop = design.problem.loops(gains[None], plants).rate[0, 0, below]
-    three = {name: np.repeat(getattr(plants, name), 3, axis=0) for name in ("angle", "rest")}
-    for error, less in ((0.0, True), (0.1, True), (0.9, False)):
-        spread = plants.rate * (1.0 + error * np.array([0.0, 1.0, -1.0j])[:, None])
-        many = replace(plants, rate=spread, unstable=np.repeat(plants.unstable, 3), **three)
-        found = lows_left(design.problem.with_plants(many), gains, (4.0, 100.0))["rate loop"]
-        assert found.own_db == pytest.approx(alone.own_db)
-        left_db = 20.0 * np.log10(np.abs(loop)) - most_lowered_db(4.0 / omega[below], error)
-        assert found.left_db == pytest.approx(left_db.min())
-        assert (found.left_db > alone.left_db + 1.0) is less
+    problem, gains = design.problem, _gains_of(design)
+    omega = problem.plants.omega_rad_s
+    outside = omega < band[0] if side == "below" else omega > band[1]
+    alone = slacks_of(problem, gains, band, side)["rate loop"]  # type: ignore[arg-type]
+    assert alone.left_db == pytest.approx(alone.own_db - MOST_MOVED_DB)
+    moved = np.linspace(1.0, 15.0, len(omega))
+    found = slacks_of(replace(problem, moved_db=moved), gains, band, side)["rate loop"]  # type: ignore[arg-type]
+    loop_db = 20.0 * np.log10(np.abs(problem.loops(gains[None], problem.plants).rate[0, 0]))
+    away = (loop_db if side == "below" else -loop_db)[outside]
+    assert found.own_db == pytest.approx(away.min())
+    assert found.left_db == pytest.approx((away - moved[outside]).min())
+    assert found.room_db - found.moved_db == pytest.approx(found.left_db)
+    assert slacks_of(problem, gains, None, side) == {}  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(("required", "light"), [("≥ 6", Light.AMBER), ("", Light.GREEN)])
@@ -360,15 +344,17 @@ def test_what_was_asked_and_may_be_taken_is_a_check_that_was_not_made(
     required: str, light: Light
 ) -> None:
     """Not green beside a requirement of which nothing is promised (docs/evidence.md)."""
-    reading = Estimate("rate loop: gain reduction margin", 15.0, "dB", reason=TAKEN_BELOW)
+    reading = Estimate("rate loop: gain reduction margin", 15.0, "dB", reason=TAKEN["below"])
     case = WorstCase("rate loop", "gain reduction margin", reading, None, None, None, required)
     whole = Estimate("rate loop: phase margin", 60.0, "deg")
     kept = WorstCase("rate loop", "phase margin", whole, 50.0, None, None, "≥ 45")
     result = SimpleNamespace(worst_cases=(kept, case))
-    (said,) = below_band(result, (4.0, 100.0))  # type: ignore[arg-type]
+    (said,) = below_band(result, (4.0, 100.0), "sweep lower")  # type: ignore[arg-type]
     assert (said.code, said.light) == ("mode-below-band", light)
     assert "may take gain reduction margin, and none is promised" in said.message
-    assert said.action == "sweep from 1.3 rad/s or lower, with more amplitude there"
+    assert said.action == "sweep lower"
+    above = replace(case, estimate=replace(reading, reason=TAKEN["above"]))
+    assert asked_above((kept, above)) is (light is Light.AMBER)
 
 
 def _gains_of(design: fid.PidDesign) -> np.ndarray:
@@ -376,12 +362,12 @@ def _gains_of(design: fid.PidDesign) -> np.ndarray:
 
 
 def test_what_a_mode_below_takes_is_told_of_each_loop() -> None:
-    def lost(loop: str, name: str, reason: str = TAKEN_BELOW) -> WorstCase:
+    def lost(loop: str, name: str, reason: str = TAKEN["below"]) -> WorstCase:
         return WorstCase(loop, name, Estimate(name, 1.0, "1", None, reason), None, None, None)
 
     rate = [lost("rate loop", "phase margin"), lost("rate loop", "gain margin")]
     whole = [lost("whole loop", "sensitivity peak"), lost("whole loop", "phase margin", "")]
     loops = ("rate loop", "whole loop")
-    assert _taken(rate, loops[:1]) == "phase margin, gain margin"
+    assert taken_words(rate, loops[:1]) == "phase margin, gain margin"
     told = "of rate loop phase margin, gain margin; of whole loop sensitivity peak"
-    assert _taken([*rate, *whole], loops) == told
+    assert taken_words([*rate, *whole], loops) == told

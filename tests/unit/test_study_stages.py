@@ -12,7 +12,7 @@ import pytest
 import flightid as fid
 from flightid.app.gain_work import _small_moves
 from flightid.control.autopilots import axis_loop
-from flightid.control.tuning.margins_below import BELOW_BAND
+from flightid.control.tuning.modes_outside import BELOW_BAND
 from flightid.control.tuning.worst_cases import WorstCase
 from flightid.conventions import Light, Role
 from flightid.errors import FlightidError

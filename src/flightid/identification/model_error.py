@@ -114,6 +114,15 @@ class ModelErrorBound:
         slow = np.maximum(band[0] / np.maximum(omega, TINY), 1.0)
         return np.asarray(np.where(omega < band[0], np.minimum(inside * slow, SHOWN), above))
 
+    def averaged(self, values: Complex) -> Complex:
+        """Means over half an octave at the bound's frequencies, as those of the error are taken.
+
+        Parameters
+        ----------
+        values : ndarray of complex, shape (…, n)
+        """
+        return _window_means(values, *_half_octaves(self.omega_rad_s))
+
     def to_dict(self) -> dict[str, object]:
         """Plain values, four digits."""
         return {
@@ -337,15 +346,23 @@ def _named(name: str, omega: Array, error: Complex, spread: Array) -> dict[str, 
     """Mean error about each frequency with its own doubt; nothing of fewer than two frequencies."""
     if len(omega) < FEWEST:
         return {}
-    logs = np.log(omega)
-    low = np.searchsorted(logs, logs - REACH)
-    high = np.searchsorted(logs, logs + REACH, side="right")
+    low, high = _half_octaves(omega)
     count = high - low
     means, powers = (_window_means(values, low, high) for values in (error, spread**2))
     doubt = np.sqrt(powers.real * np.minimum(ALIKE / count, 1.0))
     return {name: ModelErrorBound(omega, np.abs(means) + SIGMAS * doubt)}
 
 
-def _window_means(values: Array | Complex, low: Array, high: Array) -> Complex:
-    sums = np.concatenate([[0.0], np.cumsum(values.astype(np.complex128))])
-    return np.asarray((sums[high] - sums[low]) / (high - low))
+def _half_octaves(omega: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """First place about each frequency, and the one after the last."""
+    logs = np.log(omega)
+    low = np.searchsorted(logs, logs - REACH)
+    return low, np.searchsorted(logs, logs + REACH, side="right")
+
+
+def _window_means(
+    values: Array | Complex, low: NDArray[np.intp], high: NDArray[np.intp]
+) -> Complex:
+    start = np.zeros((*values.shape[:-1], 1))
+    sums = np.concatenate([start, np.cumsum(values.astype(np.complex128), axis=-1)], axis=-1)
+    return np.asarray((sums[..., high] - sums[..., low]) / (high - low))

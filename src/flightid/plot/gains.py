@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from flightid.control.margins.low_mode_slack import TAKEN_BELOW
+from flightid.control.margins.mode_slack import TAKEN
 from flightid.control.tuning.limits import ANGLE
-from flightid.control.tuning.margins_below import BELOW_BAND
+from flightid.control.tuning.modes_outside import BELOW_BAND
 from flightid.control.tuning.pid_design import PidDesign
 from flightid.control.tuning.responses import ResponseBand
 from flightid.control.tuning.unpromised import outside_words
@@ -179,7 +179,7 @@ def margins_caption(designs: Sequence[PidDesign]) -> str:
     ]
     shown = [each for each in cases if each.name in PANELS]
     unread = (e for e in shown if e.worst is None and e.estimate.value is not None)
-    above = any(each.estimate.reason not in (BELOW_BAND, TAKEN_BELOW) for each in unread)
+    above = any(each.estimate.reason not in (BELOW_BAND, TAKEN["below"]) for each in unread)
     if outside := outside_words(shown, above=above):
         parts.append(f"not promised: {outside}")
     bare = [name for name in named if not any(each.worst is not None for each in named[name])]

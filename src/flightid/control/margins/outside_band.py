@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +10,7 @@ from numpy.typing import NDArray
 from flightid.control.margins.gain_limits import everywhere, loop_numbers, measured_up
 from flightid.control.margins.loop_metrics import READ_AT
 from flightid.control.margins.loop_source import BrokenLoop
-from flightid.control.margins.resonance_slack import MOST_RAISED_DB, ResonanceSlack
+from flightid.control.margins.mode_slack import ModeSlack
 from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.frozen import dataclass
@@ -29,6 +28,8 @@ PLACES = READ_AT | {
     "disturbance_peak_db": "sensitivity_peak_rad_s",
 }
 """Numbers of a loop, and the fields that say at which frequency each is read."""
+ABOVE = ModeSlack("above")
+"""Nothing lies above."""
 SAID_BELOW = {
     "phase_margin_deg": "phase margin",
     "delay_margin_s": "delay margin",
@@ -47,34 +48,40 @@ class MarginBeyond:
     loop : str
     omega_rad_s : float
         Highest frequency at which one is read, rad/s: above the band, or inside it.
-    room_db : float
-        By how much a resonance above the band may raise the response before the loop passes one.
+    slack : ModeSlack
+        What a resonance above the band leaves of the loop.
     clear_rad_s : float
         Where the loop is so low that no resonance beyond it leaves less than is asked, rad/s.
     taken : str
         What a resonance that passes one takes, in words.
+    asked : bool
+        Whether a margin that may be taken is required: a check that was not made.
     """
 
     loop: str
     omega_rad_s: float
-    room_db: float
+    slack: ModeSlack
     clear_rad_s: float = 0.0
     taken: str = RESTING
+    asked: bool = False
 
     @property
     def is_near(self) -> bool:
-        """Whether a resonance of ordinary size would pass one."""
-        return self.room_db < MOST_RAISED_DB
+        """Whether a resonance that may be there would pass one."""
+        return self.slack.passes_one
 
     @property
     def words(self) -> str:
         """What may go wrong there."""
-        if self.room_db <= 0.0:
-            return f"there the loop passes one again, by {-self.room_db:.2g} dB in the model alone"
-        return (
-            f"a resonance there that raises the response by {self.room_db:.2g} dB may make it "
-            "unstable"
-        )
+        room, moved = self.slack.room_db, self.slack.moved_db
+        if room <= 0.0:
+            return f"there the loop passes one again, by {-room:.2g} dB in the model alone"
+        if not self.is_near:
+            return (
+                f"a resonance there that raises the response by {moved:.2g} dB may leave "
+                f"{self.slack.left_db:.2g} dB of gain margin"
+            )
+        return f"a resonance there that raises the response by {room:.2g} dB may make it unstable"
 
 
 def beyond_findings(
@@ -85,12 +92,12 @@ def beyond_findings(
     return [
         Finding(
             "margin-beyond-band",
-            Light.AMBER if each.is_near else Light.GREEN,
+            Light.AMBER if each.is_near or each.asked else Light.GREEN,
             f"{each.loop}: margins are read up to {each.omega_rad_s:.3g} rad/s, "
             f"{_limit(each, top)}",
             "sweep to higher frequencies, and identify up to "
             f"{max(TO_SEE_IT * max(each.omega_rad_s, top), each.clear_rad_s):.3g} rad/s or further"
-            + (f"; or {LOWER}" if each.is_near else ""),
+            + (f"; or {LOWER}" if each.is_near or each.asked else ""),
         )
         for each in found
     ]
@@ -101,7 +108,7 @@ def _limit(each: MarginBeyond, top_rad_s: float) -> str:
     taken = each.taken if each.is_near else "no gain margin or peak is promised"
     if each.omega_rad_s > top_rad_s:
         said = f"above {shown}: {each.words}, and nothing is promised of those margins"
-        return f"{said}: {taken}" if each.is_near else said
+        return f"{said}: {taken}" if each.is_near or each.asked else said
     return f"but nothing is known above {shown}: {each.words}, and {taken}"
 
 
@@ -115,7 +122,7 @@ class OutsideBand:
         By name of the number, as `LoopMetrics` and `loop_numbers` have it.
     highest_rad_s : float
         Highest frequency at which any is read.
-    room : ResonanceSlack
+    room : ModeSlack
         What a resonance above the band leaves of the others.
 
     Example
@@ -127,7 +134,7 @@ class OutsideBand:
     above: Mapping[str, float]
     below: Mapping[str, float]
     highest_rad_s: float = 0.0
-    room: ResonanceSlack = field(default_factory=ResonanceSlack)
+    room: ModeSlack = ABOVE
 
     @property
     def is_at_one_below(self) -> bool:
@@ -169,14 +176,14 @@ def outside_band(loop: BrokenLoop) -> OutsideBand:
     )
 
 
-def _room(loop: BrokenLoop, omega: NDArray[np.float64], top_rad_s: float) -> ResonanceSlack:
+def _room(loop: BrokenLoop, omega: NDArray[np.float64], top_rad_s: float) -> ModeSlack:
     """What lies above the band of a fit, over all frequencies of a model's loop."""
     whole = everywhere(loop, omega)
     omega = omega if whole is None else np.append(whole, omega)
     above = np.unique(omega[omega > top_rad_s])
     if not above.size:
-        return ResonanceSlack()
-    return ResonanceSlack.above(loop.of(loop.uncertain.value, above))
+        return ABOVE
+    return ModeSlack.above(loop.of(loop.uncertain.value, above))
 
 
 def outside_band_findings(
@@ -195,7 +202,7 @@ def outside_band_findings(
     if band is None:
         return
     if found.above or found.room.left_db < least_db:
-        beyond = MarginBeyond(loop.name, found.highest_rad_s, found.room.room_db)
+        beyond = MarginBeyond(loop.name, found.highest_rad_s, found.room)
         yield from beyond_findings([beyond], band)
     if named := [said for name, said in SAID_BELOW.items() if name in found.below]:
         lowest = min(found.below[name] for name in SAID_BELOW if name in found.below)

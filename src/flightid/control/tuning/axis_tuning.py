@@ -30,6 +30,7 @@ from flightid.control.tuning.sampled_plants import (
     plants_of_axis,
 )
 from flightid.control.tuning.shortfalls import shortfalls
+from flightid.control.tuning.unseen_modes import moved_of
 from flightid.control.tuning.whole_gains import whole_gains
 from flightid.control.tuning.worst_cases import WorstCase, worst_cases
 from flightid.frozen import dataclass
@@ -312,11 +313,15 @@ def _judged(
 ) -> tuple[LoopProblem, LoopAssessment | None]:
     """The axis on fresh plants, and its flown gains among the others' flown gains."""
     fresh = problem_of(setting, setting.judged.axis(place, loops, setting.gyro), paths, limit)
+    system, omega = setting.judged.sampled.systems[0], fresh.plants.omega_rad_s
+    names = system.outputs[place], system.inputs[place]
+    moved = moved_of(setting.evidence, *names, omega)
+    fresh = replace(fresh, moved_db=moved, measured=setting.coherence_of(place))
     if not flown[place].has_flown:
         return fresh, None
     own = ControllerPaths(flown[place], setting.gyro, setting.with_angle)
     plants = setting.judged.axis(place, flown, setting.gyro)
-    around = problem_of(setting, plants, own, limit)
+    around = replace(problem_of(setting, plants, own, limit), moved_db=fresh.moved_db)
     gains = own.gains_of(flown[place])
     old = around.judge(gains[None])
     return fresh, beside_modes(old, around, gains, setting.evidence.band_rad_s)

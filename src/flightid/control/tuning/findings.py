@@ -10,14 +10,12 @@ from numpy.typing import NDArray
 from flightid.control.autopilots import AxisLoop
 from flightid.control.gyro import Gyro
 from flightid.control.margins.findings import COHERENCE
-from flightid.control.margins.low_mode_slack import MOST_LOWERED_DB, TAKEN_BELOW
-from flightid.control.margins.resonance_slack import MOST_RAISED_DB, TAKEN
 from flightid.control.tuning.axis_tuning import AxisResult
+from flightid.control.tuning.band_findings import asked_above, asked_below, at_one_below
 from flightid.control.tuning.gain_search import INTEGRAL, LOW_END
 from flightid.control.tuning.gain_search_result import NO_GAINS, GainSearchResult
 from flightid.control.tuning.gain_steps import Stage, TunedGain
 from flightid.control.tuning.limits import ANGLE
-from flightid.control.tuning.margins_below import BELOW_BAND
 from flightid.control.tuning.order_statistics import ENOUGH, least_share
 from flightid.control.tuning.worst_cases import WorstCase
 from flightid.conventions import Light
@@ -28,9 +26,6 @@ NEAR = 2.0**0.5
 """Half an octave to either side."""
 ABOUT = 21
 """Frequencies about a crossover at which coherence is read."""
-SLOWER = 3.0
-"""Ratio of a band's low end to where a sweep begins that brings a crossover just below into it."""
-HIGHER = f"sweep to higher frequencies, until the loop is {MOST_RAISED_DB:g} dB below one"
 GAINS = ("gains", NO_GAINS)
 """Codes of `verdict`."""
 ADVICE = {
@@ -51,6 +46,7 @@ def verdict(
     drawn: int,
     worst_cases: Sequence[WorstCase] = (),
     band_rad_s: tuple[float, float] | None = None,
+    wider: tuple[str, str] = ("", ""),
 ) -> Finding:
     """Whether there are gains, and for how many plants: the one light of gains, wherever it shows.
 
@@ -66,6 +62,8 @@ def verdict(
         What is promised: plants speak of no frequency at which nothing was shown.
     band_rad_s : tuple of float or None
         Where the model was shown to hold, rad/s.
+    wider : tuple of str
+        What brings its low end, and its high end, so far that all that was asked is promised.
     """
     if not found.exists:
         return _no_gains(found)
@@ -76,15 +74,15 @@ def verdict(
         said = f"gains found for the model alone; {_bound(found)}"
         return Finding("gains", Light.AMBER, said)
     good, share = int(met.sum()), least_share(int(met.sum()), drawn)
-    under, high = _asked_below(worst_cases), _passes_above(worst_cases)
-    low = bool(_at_one_below(worst_cases)) or under
+    high = asked_above(worst_cases)
+    low = bool(at_one_below(worst_cases)) or asked_below(worst_cases)
     shown = ""
     if band_rad_s is not None:
         shown = f" in the band shown, {band_rad_s[0]:.3g} to {band_rad_s[1]:.3g} rad/s"
-    if sides := ["below"] * under + ["above"] * high:
+    if sides := ["below"] * low + ["above"] * high:
         shown += f", and say nothing of a light mode {' and '.join(sides)} it, which may take "
         shown += "margins and stability"
-    where = [_sweep(band_rad_s)] * low + [HIGHER] * high
+    where = [text for text, taken in zip(wider, (low, high), strict=True) if taken and text]
     return Finding(
         "gains",
         Light.GREEN if share >= ENOUGH and not (low or high) else Light.AMBER,
@@ -267,73 +265,3 @@ def _behind_rate_loop(result: AxisResult, omega: Array, coherence: Array) -> Arr
     left = np.interp(omega, problem.plants.omega_rad_s, np.abs(1.0 + rate) ** -2)
     tiny = np.finfo(float).tiny
     return np.asarray(coherence / (coherence + np.minimum(left, 1.0) * (1.0 - coherence) + tiny))
-
-
-def below_band(result: AxisResult, band_rad_s: tuple[float, float] | None) -> Iterator[Finding]:
-    """Amber where a loop is at one below the band, or a light mode there may take what was asked.
-
-    Parameters
-    ----------
-    result : AxisResult
-    band_rad_s : tuple of float or None
-        Where the model was shown to hold, rad/s; nothing is said where that is not known.
-    """
-    if band_rad_s is None:
-        return
-    if found := _at_one_below(result.worst_cases):
-        yield Finding(
-            "margin-below-band",
-            Light.AMBER,
-            f"{' and '.join(found)}: the gain is at one below the {band_rad_s[0]:.3g} rad/s from "
-            "which the model was shown to hold: a light mode there, such as a pendulum, may take "
-            "margins and stability, and no margin, peak or bandwidth is promised",
-            _sweep(band_rad_s),
-        )
-    lowered = _named(result.worst_cases, TAKEN_BELOW)
-    if rest := [name for name in lowered if name not in found]:
-        asked = _asked_below([e for e in result.worst_cases if e.loop in rest])
-        yield Finding(
-            "mode-below-band",
-            # What was asked and is not known to hold is a check that was not made.
-            Light.AMBER if asked else Light.GREEN,
-            f"{' and '.join(rest)}: nothing is known below {band_rad_s[0]:.3g} rad/s: a light mode "
-            f"there that lowers the response by up to {MOST_LOWERED_DB:g} dB may take "
-            f"{_taken(result.worst_cases, rest)}, and none is promised",
-            _sweep(band_rad_s),
-        )
-
-
-def _at_one_below(cases: Sequence[WorstCase]) -> list[str]:
-    """Loops that are at one below the band, or nearer to it than is asked."""
-    return _named(cases, BELOW_BAND)
-
-
-def _asked_below(cases: Sequence[WorstCase]) -> bool:
-    """Whether a light mode below the band may take what was asked of a loop."""
-    return any(each.required and each.estimate.reason == TAKEN_BELOW for each in cases)
-
-
-def _passes_above(cases: Sequence[WorstCase]) -> bool:
-    """Whether a loop passes one above the band where a light mode has raised it."""
-    return any(e.name == "phase margin" and e.estimate.reason == TAKEN for e in cases)
-
-
-def _named(cases: Sequence[WorstCase], reason: str) -> list[str]:
-    return [*dict.fromkeys(each.loop for each in cases if each.estimate.reason == reason)]
-
-
-def _taken(cases: Sequence[WorstCase], loops: Sequence[str]) -> str:
-    """Numbers that a mode below the band may take, of which loop where loops lose unlike ones."""
-    alike: dict[tuple[str, ...], list[str]] = {}
-    for loop in loops:
-        lost = [e.name for e in cases if (e.loop, e.estimate.reason) == (loop, TAKEN_BELOW)]
-        alike.setdefault(tuple(lost), []).append(loop)
-    if len(alike) == 1:
-        return ", ".join(*alike)
-    return "; ".join(f"of {' and '.join(of)} {', '.join(lost)}" for lost, of in alike.items())
-
-
-def _sweep(band_rad_s: tuple[float, float] | None) -> str:
-    """From where to sweep, so that loops are at one inside the band."""
-    start = "lower" if band_rad_s is None else f"{band_rad_s[0] / SLOWER:.2g} rad/s or lower"
-    return f"sweep from {start}, with more amplitude there"

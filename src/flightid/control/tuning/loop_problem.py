@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.control.margins.loop_metrics import LoopMetrics, loop_metrics
-from flightid.control.margins.low_mode_slack import LowModeSlack
-from flightid.control.margins.resonance_slack import ResonanceSlack
+from flightid.control.margins.mode_slack import ModeSlack
 from flightid.control.margins.stability_count import unstable_poles
 from flightid.control.tuning.limits import ANGLE, WHOLE, limits, noise_limit, present
 from flightid.control.tuning.requirements import TuningRequirements
@@ -140,9 +139,9 @@ class LoopAssessment:
     peaks : ndarray, shape (n_loops, n_candidates, n_plants, n_bands)
         Slack of the sensitivity peak by bands of frequency: where two peaks are equally high, the
         highest alone has an edge that a search would stick to.
-    lows : mapping of str to LowModeSlack
+    lows : mapping of str to ModeSlack
         What a light mode below the identified band leaves of each loop, where that was asked.
-    rooms : mapping of str to ResonanceSlack
+    rooms : mapping of str to ModeSlack
         What a resonance above it leaves.
     """
 
@@ -153,8 +152,8 @@ class LoopAssessment:
     stable: NDArray[np.bool_]
     noise: Array
     peaks: Array
-    lows: Mapping[str, LowModeSlack] = field(default_factory=dict)
-    rooms: Mapping[str, ResonanceSlack] = field(default_factory=dict)
+    lows: Mapping[str, ModeSlack] = field(default_factory=dict)
+    rooms: Mapping[str, ModeSlack] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,6 +182,10 @@ class LoopProblem:
         Of the loop's dynamics over those of a vehicle's rate loop.
     integral_ratio : float
         Largest I over P, 1/s.
+    moved_db : ndarray, shape (n_f,), or None
+        By how much a mode outside the identified band may move the vehicle, dB; None: not known.
+    measured : tuple of ndarray or None
+        Frequencies (rad/s) and coherence of the response that was fitted.
     """
 
     plants: Plants
@@ -197,13 +200,17 @@ class LoopProblem:
     inner: str = "rate loop"
     time_scale: float = 1.0
     integral_ratio: float = float("inf")
+    moved_db: Array | None = None
+    measured: tuple[Array, Array] | None = None
 
     def with_plants(self, plants: Plants) -> LoopProblem:
         """The same requirements on other plants, at their frequencies."""
         known = self.plants.omega_rad_s
-        psd = self.noise_psd
-        moved = None if psd is None else np.interp(plants.omega_rad_s, known, psd)
-        return replace(self, plants=plants, noise_psd=moved)
+        psd, moved = (
+            None if each is None else np.interp(plants.omega_rad_s, known, each)
+            for each in (self.noise_psd, self.moved_db)
+        )
+        return replace(self, plants=plants, noise_psd=psd, moved_db=moved)
 
     @property
     def has_angle(self) -> bool:

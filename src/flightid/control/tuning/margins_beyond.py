@@ -6,43 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.control.margins.outside_band import MarginBeyond
-from flightid.control.margins.resonance_slack import MOST_RAISED_DB, ResonanceSlack
 from flightid.control.tuning.limits import ANGLE
 from flightid.control.tuning.loop_problem import LoopProblem
+from flightid.control.tuning.mode_slacks import clear_from, slacks_of
 
 PLACES = "phase_crossover_rad_s", "sensitivity_peak_rad_s", "delay_crossover_rad_s"
 """Where gain margin, sensitivity peak and delay margin are read."""
 NONE_PROMISED = "no margin or peak is promised"
-
-
-def rooms_left(
-    problem: LoopProblem, gains: NDArray[np.float64], band_rad_s: tuple[float, float] | None
-) -> dict[str, ResonanceSlack]:
-    """What a resonance above the band leaves of the estimate's loops until they pass one.
-
-    Parameters
-    ----------
-    problem : LoopProblem
-    gains : ndarray, shape (n_gains,)
-    band_rad_s : tuple of float or None
-        Where the model was shown to hold, rad/s.
-
-    Returns
-    -------
-    dict of str to ResonanceSlack
-        By loop. Empty where no band is known, or the loop's frequencies end inside it.
-    """
-    above = problem.plants.omega_rad_s > (np.inf if band_rad_s is None else band_rad_s[1])
-    if not above.any():
-        return {}
-    loops = problem.loops(gains[None], problem.plants.take([0]))
-    rate = loops.rate[..., above]
-    return {
-        name: ResonanceSlack.above_around(loop[..., above], rate)
-        if name == ANGLE
-        else ResonanceSlack.above(loop[..., above])
-        for name, loop in loops.named()
-    }
 
 
 def margins_beyond(
@@ -59,19 +29,18 @@ def margins_beyond(
     band_rad_s : tuple of float or None
         Where the model was shown to hold, rad/s; nothing is said where that is not known.
     """
-    left = rooms_left(problem, gains, band_rad_s)
+    left = slacks_of(problem, gains, band_rad_s, "above")
     if band_rad_s is None or not left:
         return ()
     judged = problem.judge(gains[None])
     if not judged.stable.all():
         return ()
     found, least_db = [], problem.requirements.gain_margin_db
-    loops = dict(problem.loops(gains[None], problem.plants.take([0])).named())
+    clear = clear_from(problem, gains, band_rad_s, "above", least_db)
     for name, metrics in judged.metrics.items():
         highest = max(float(np.nanmax(getattr(metrics, at), initial=0.0)) for at in PLACES)
         if name != ANGLE and (left[name].left_db < least_db or highest > band_rad_s[1]):
-            asked = 10.0 ** (-(MOST_RAISED_DB + least_db) / 20.0)
-            reaching = problem.plants.omega_rad_s[np.abs(loops[name][0, 0]) > asked]
-            clear = float(reaching.max(initial=0.0))
-            found.append(MarginBeyond(name, highest, left[name].room_db, clear, NONE_PROMISED))
+            found.append(
+                MarginBeyond(name, highest, left[name], clear[name], NONE_PROMISED, asked=True)
+            )
     return tuple(found)

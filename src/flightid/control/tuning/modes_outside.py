@@ -7,15 +7,16 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.control.margins.low_mode_slack import TAKEN_BELOW, LowModeSlack
-from flightid.control.margins.resonance_slack import TAKEN, ResonanceSlack
+from flightid.control.margins.mode_slack import TAKEN, ModeSlack
 from flightid.control.tuning.loop_problem import LoopAssessment, LoopProblem
-from flightid.control.tuning.margins_below import BELOW_BAND, lows_left, passes_below
-from flightid.control.tuning.margins_beyond import rooms_left
+from flightid.control.tuning.mode_slacks import slacks_of
 from flightid.frozen import dataclass
 
 Band = tuple[float, float]
 ABOVE_BAND = "read above the identified band"
+BELOW_BAND = "at one below the identified band"
+CROSSINGS = "crossover_rad_s", "delay_crossover_rad_s"
+"""Where a loop passes one."""
 
 
 @dataclass(frozen=True)
@@ -55,8 +56,11 @@ def beside_modes(
     band_rad_s : tuple of float or None
         Where the model was shown to hold, rad/s.
     """
-    lows = lows_left(problem, gains, band_rad_s)
-    return replace(judged, lows=lows, rooms=rooms_left(problem, gains, band_rad_s))
+    return replace(
+        judged,
+        lows=slacks_of(problem, gains, band_rad_s, "below"),
+        rooms=slacks_of(problem, gains, band_rad_s, "above"),
+    )
 
 
 def modes_outside(
@@ -80,8 +84,8 @@ def modes_outside(
     float
         Infinite, on the side that sets no bound, where they touch nothing.
     """
-    low = judged.lows.get(place.loop, LowModeSlack())
-    room = judged.rooms.get(place.loop, ResonanceSlack())
+    low = judged.lows.get(place.loop, ModeSlack("below"))
+    room = judged.rooms.get(place.loop, ModeSlack("above"))
     there = np.isfinite(getattr(judged.metrics[place.loop], place.field)[0]).any()
     edges = (room.edge(place.field), low.edge(place.field) if there else None)
     known = [each for each in edges if each is not None]
@@ -94,17 +98,19 @@ def _unpromised(
     place: Place,
     band_rad_s: Band | None,
     least_db: float,
-    low: LowModeSlack,
-    room: ResonanceSlack,
+    low: ModeSlack,
+    room: ModeSlack,
 ) -> str:
-    """A plant reads it above the band, or a mode outside it may take it."""
+    """A plant reads it above the band, or a mode outside it may take it: one rule on both sides."""
     if band_rad_s is None:
         return ""
-    at = getattr(judged.metrics[place.loop], place.read_at)[0] if place.read_at else 0.0
-    if np.any(at > band_rad_s[1]):
+    metrics = judged.metrics[place.loop]
+    at = getattr(metrics, place.read_at)[0] if place.read_at else 0.0
+    crossings = np.array([getattr(metrics, each)[0] for each in CROSSINGS])
+    if np.any(at > band_rad_s[1]) or np.any(crossings > band_rad_s[1]):
         return ABOVE_BAND
-    if low.takes_all(least_db) or passes_below(judged, place.loop, band_rad_s):
+    if low.takes_all(least_db) or np.any(crossings < band_rad_s[0]):
         return BELOW_BAND
     if low.takes(place.field, least_db):
-        return TAKEN_BELOW
-    return TAKEN if room.takes(place.field, least_db) else ""
+        return TAKEN["below"]
+    return TAKEN["above"] if room.takes(place.field, least_db) else ""

@@ -15,6 +15,7 @@ from flightid.control.tuning.findings import GAINS, verdict
 from flightid.control.tuning.gain_search_result import GainSearchResult
 from flightid.control.tuning.pid_design import PidDesign
 from flightid.control.tuning.responses import ResponseBand, response_bands
+from flightid.control.tuning.wider_band import wider_band
 from flightid.control.tuning.worst_cases import WorstCase, worst_cases
 from flightid.findings import Finding
 from flightid.frozen import dataclass
@@ -147,7 +148,8 @@ def _verdict(
     known = bool(design.provenance.get("draws"))
     left = cast(int, design.provenance.get("left_out", 0))
     band = cast("tuple[float, float] | None", design.provenance.get("band_rad_s"))
-    return verdict(held, met, len(met) + left if known else 0, made, band)
+    wider = wider_band(design.problem, held.gains, band)
+    return verdict(held, met, len(met) + left if known else 0, made, band, wider)
 
 
 def _bands(design: PidDesign, loop: object) -> tuple[ResponseBand, ...]:

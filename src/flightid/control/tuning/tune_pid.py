@@ -22,10 +22,11 @@ from flightid.control.tuning.axis_tuning import (
     stages_of,
     tune_axis,
 )
+from flightid.control.tuning.band_findings import below_band
 from flightid.control.tuning.controller_paths import ControllerPaths, has_angle_loop
 from flightid.control.tuning.evidence import TuningEvidence, Verdicts, gather
 from flightid.control.tuning.filter_choice import FilterChoice
-from flightid.control.tuning.findings import below_band, low_coherence, remarks, verdict
+from flightid.control.tuning.findings import low_coherence, remarks, verdict
 from flightid.control.tuning.flown_gains import Gains, flown_loop, require_known
 from flightid.control.tuning.options import DRAWS
 from flightid.control.tuning.order_statistics import least_share
@@ -34,6 +35,7 @@ from flightid.control.tuning.requirements import TuningRequirements
 from flightid.control.tuning.responses import ClosedPlants, response_bands
 from flightid.control.tuning.sampled_plants import SampledPlants, sample_plants
 from flightid.control.tuning.structure_error import Band, perturbed
+from flightid.control.tuning.wider_band import wider_band
 from flightid.errors import ModelError, OptionError
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.progress import progress
@@ -294,6 +296,7 @@ def design_of(
     bands = response_bands(closed, new, steady) if exists else ()
     count = len(result.met)
     drawn, band = count + setting.evidence.left_out, setting.evidence.band_rad_s
+    wider = wider_band(result.problem, result.found.gains, band)
     return PidDesign(
         flown,
         result.loop if exists else flown,
@@ -309,11 +312,13 @@ def design_of(
         count,
         result.problem,
         (
-            verdict(result.found, result.met, drawn if known else 0, result.worst_cases, band),
+            verdict(
+                result.found, result.met, drawn if known else 0, result.worst_cases, band, wider
+            ),
             *remarks(result, flown, changes, stages, couplings, setting.gyro),
             *low_coherence(result, setting.coherence_of(place)),
             *beyond_findings(result.beyond, band),
-            *below_band(result, band),
+            *below_band(result, band, wider[0]),
             *setting.evidence.findings,
         ),
         {

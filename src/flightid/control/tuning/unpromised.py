@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from flightid.control.margins.low_mode_slack import TAKEN_BELOW
-from flightid.control.margins.resonance_slack import TAKEN
-from flightid.control.tuning.margins_below import BELOW_BAND
-from flightid.control.tuning.modes_outside import ABOVE_BAND
+from flightid.control.margins.mode_slack import TAKEN
+from flightid.control.tuning.modes_outside import ABOVE_BAND, BELOW_BAND
 from flightid.control.tuning.worst_cases import WorstCase
 
 BAND = "the band in which the model was shown to hold"
@@ -35,8 +33,8 @@ def outside_words(cases: Iterable[WorstCase], *, above: bool = False) -> str:
     'what lies below the band in which the model was shown to hold (phase margin of angle loop)'
     """
     without = [each for each in cases if each.worst is None]
-    below = [each for each in without if each.estimate.reason in (BELOW_BAND, TAKEN_BELOW)]
-    above = above or any(each.estimate.reason in (ABOVE_BAND, TAKEN) for each in without)
+    below = [each for each in without if each.estimate.reason in (BELOW_BAND, TAKEN["below"])]
+    above = above or any(each.estimate.reason in (ABOVE_BAND, TAKEN["above"]) for each in without)
     named = ", ".join(dict.fromkeys(f"{each.name} of {each.loop}" for each in below))
     if not below:
         return f"what lies above {BAND}" if above else ""

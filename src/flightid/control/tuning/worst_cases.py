@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from flightid.control.autopilots import AxisLoop
 from flightid.control.tuning.limits import ANGLE, Limit, limits, noise_limit
 from flightid.control.tuning.loop_problem import FULL, LoopAssessment, LoopProblem
-from flightid.control.tuning.margins_below import FEWEST
 from flightid.control.tuning.modes_outside import Place, beside_modes, modes_outside
 from flightid.findings import SHOWN_DIGITS as DIGITS
 from flightid.findings import held
@@ -20,6 +19,8 @@ from flightid.uncertainty.estimate import Estimate, Reading
 from flightid.uncertainty.uneven import DrawnEnds, Reaching
 
 Array = NDArray[np.float64]
+FEWEST = 3
+"""A spread needs more than the estimate and one other."""
 
 
 @dataclass(frozen=True)
