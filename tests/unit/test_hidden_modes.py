@@ -102,8 +102,8 @@ def test_what_lower_sweeps_need_is_told_or_that_none_brings_it() -> None:
     for steep, wide in ((2.0, 0.9), (4.0, 0.9)):
         coherence = 1.0 / (1.0 + (1.5 / omega) ** steep)
         told = times_louder(1.0, wide, omega, coherence)
-        # Twice what a coherence of 0.6 needs.
-        assert told == pytest.approx(np.sqrt(2.0 * 1.5 * 1.5**steep), rel=0.05)
+        # Five times what a coherence of 0.6 needs.
+        assert told == pytest.approx(np.sqrt(5.0 * 1.5 * 1.5**steep), rel=0.05)
     assert times_louder(1.0, 1.0, omega, np.zeros(60)) is None
     seen = omega, 1.0 / (1.0 + (0.9 / omega) ** 3)
     said = lower_sweep(0.9, 1.2, seen)

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 from scipy.optimize import brentq
 
 import flightid as fid
@@ -16,8 +17,9 @@ from flightid.planning.axis_guess import _typical
 from flightid.planning.flight_time import flight_time
 from flightid.planning.flown_axis import FlownAxis
 from flightid.planning.options import PlanOptions
-from flightid.planning.plan import _band, _loop, _sweep
+from flightid.planning.plan import _loop, _sweep
 from flightid.planning.procedures import PROCEDURES, procedure_of
+from flightid.planning.sweep_band import sweep_band
 from tests.closeness import assert_close
 
 BARE = FlownAxis(20.0, 0.5, 0.02, motor_lag_s=0.05, rate_feedback=0.3)
@@ -39,12 +41,27 @@ def test_the_band_is_an_eighth_of_the_crossover_to_two_and_a_half_times_the_turn
     turned = brentq(
         lambda w: np.arctan(0.5 * w) + np.arctan(0.05 * w) + 0.02 * w - math.pi, 5.0, 80.0
     )
-    low, high = _band(BARE, by_stick=False)
+    low, high = sweep_band(BARE, 400.0, by_stick=False)
     assert_close(high, 2.5 * turned, rtol=0.05, why="two digits of Hz, and a grid of 1 %")
     assert_close(low, crossover / 8.0, rtol=0.05, why="the same")
-    assert _band(BARE, by_stick=True)[1] <= 2.0 * math.tau
-    slow = replace(BARE, loop=fid.axis_loop("arducopter", "roll", loop_rate_hz=50.0))
-    assert_close(_band(slow, by_stick=False)[1], 2.0 * math.tau, rtol=1e-9, why="25 in a cycle")
+    assert sweep_band(BARE, 400.0, by_stick=True)[1] <= 2.0 * math.tau
+    slow = sweep_band(BARE, 48.0, by_stick=False)
+    assert_close(slow[1], 3.0 * math.tau, rtol=1e-9, why="16 in a cycle")
+
+
+@pytest.mark.parametrize(("gain", "capped"), [(60.0, False), (140.0, True)])
+def test_a_sweep_goes_up_until_no_light_mode_beyond_takes_a_margin(
+    gain: float, capped: bool
+) -> None:
+    """A loop of much gain turns long before it is low: 20 dB of a mode and 6 of margin."""
+    high = sweep_band(replace(BARE, gain=gain), 400.0, by_stick=False)[1]
+    left = gain / 20.0 * abs(_loop_gain(high))
+    if capped:
+        assert_close(high, 25.0 * math.tau, rtol=1e-9, why="as far as the log's rate allows")
+        assert left > 10.0 ** (-26.0 / 20.0)
+    else:
+        assert_close(20.0 * math.log10(left), -26.0, atol=0.8, why="two digits of Hz")
+        assert high > 94.3, "the 15 Hz that were the most"
 
 
 def test_an_amplitude_is_as_large_as_coherence_asks_for_between_half_and_all() -> None:

@@ -29,16 +29,11 @@ from flightid.planning.options import PlanOptions
 from flightid.planning.procedures import PROCEDURES, Procedure, procedure_of
 from flightid.planning.result import AxisSweep, SweepPlan
 from flightid.planning.settings import SID_AXES, log_family, settings_of, unsized_s
+from flightid.planning.sweep_band import sweep_band, why_so_high
 from flightid.planning.told_axes import told_axis
 from flightid.review.loops import loop_rate_hz as logged_loop_rate_hz
 
 USUAL_LOOP_HZ = 400.0
-SAMPLES_IN_CYCLE = 25.0
-LOWEST_HZ, HIGHEST_HZ, HIGHEST_BY_STICK_HZ = 0.1, 15.0, 2.0
-LOW_SHARE, HIGH_SHARE = 0.125, 2.5
-"""Ends of the band over the crossover, and over the frequency of -180 deg."""
-WIDEST_BAND = 80.0
-"""Highest over lowest frequency: a chirp has as many times less power at its end."""
 CYCLES, SHORTEST_S, LONGEST_S = 20.0, 60.0, 120.0
 ENOUGH_COHERENCE, SMALLEST_SHARE = 0.95, 0.5
 """An amplitude that reaches this coherence nearly everywhere will do; never less than this share of
@@ -165,6 +160,10 @@ def plan_flight(
         sweeps.append(AxisSweep(axis, guess, made, changes, is_flown_again=again))
     flown = [] if opened is None else list(swept.findings(opened, chosen))
     flown += flight_findings(opened, phases, sweeps, USUAL_LOOP_HZ if assumed and sweeps else 0.0)
+    own = [each for each in sweeps if not each.is_flown_again]
+    tops = {each.axis: each.plan.excitation.band_rad_s[1] for each in own if each.plan}
+    if procedure.how == "mode" and asked.band_rad_s is None and tops:
+        flown.append(why_so_high(tops))
     lengths = [
         each.plan.excitation.duration_s if each.plan else unsized_s(procedure, asked)
         for each in sweeps
@@ -241,7 +240,7 @@ def _sweep(
         )
         return replace(_sweep(procedure, axis, vehicle, as_flown), excitation=flown_so)
     by_stick = procedure.how == "stick"
-    band = asked.band_rad_s or _band(vehicle, by_stick)
+    band = asked.band_rad_s or sweep_band(vehicle, _rate_hz(vehicle), by_stick)
     cycles_s = CYCLES * math.tau / band[0]
     length_s = asked.duration_s or float(np.clip(math.ceil(cycles_s), SHORTEST_S, LONGEST_S))
     limits = Limits(
@@ -277,30 +276,6 @@ def _enough(largest: Plan) -> float:
     size = share * float(largest.excitation.peak[0])
     digits = 1 - math.floor(math.log10(size))
     return math.floor(size * 10.0**digits) / 10.0**digits
-
-
-def _band(vehicle: FlownAxis, by_stick: bool) -> tuple[float, float]:
-    """Around crossover and -180 deg of the broken rate loop, as far as the loop's rate allows."""
-    omega = np.geomspace(0.5, 200.0, 600)
-    opened = vehicle.response(omega) * vehicle.feedback_slope(omega) / (1j * omega)
-    above = np.flatnonzero(np.abs(opened) >= 1.0)
-    crossover = omega[above[-1]] if above.size else 1.0 / vehicle.time_constant_s
-    phase = np.unwrap(np.angle(opened))
-    beyond = np.flatnonzero((phase < -np.pi) & (omega > crossover))
-    turned = omega[beyond[0]] if beyond.size else 4.0 * crossover
-    highest_hz = min(HIGHEST_HZ, _rate_hz(vehicle) / SAMPLES_IN_CYCLE)
-    if by_stick:
-        highest_hz = HIGHEST_BY_STICK_HZ
-    high = min(HIGH_SHARE * float(turned), math.tau * highest_hz)
-    low = max(LOW_SHARE * float(crossover), math.tau * LOWEST_HZ)
-    low = float(np.clip(low, high / WIDEST_BAND, high / 10.0))
-    return _rounded(low), _rounded(high)
-
-
-def _rounded(omega_rad_s: float) -> float:
-    """A frequency whose hertz have two digits."""
-    hertz = omega_rad_s / math.tau
-    return math.tau * float(f"{hertz:.2g}")
 
 
 def _logging(procedure: Procedure, log: Log | None) -> str:

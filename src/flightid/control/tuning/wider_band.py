@@ -20,12 +20,13 @@ TOLD = 0.3, 0.97
 STEEPEST = 4.0
 """Of the injection's power over that of noise with frequency: a loop holds a vehicle against both,
 so the input that is left of an injection falls with 1/(1 + L)²."""
-SURE = 2.0
-"""Power over what a coherence of `COHERENT` needs: it is read with chance."""
+SURE = 5.0
+"""Power over what a coherence of `COHERENT` needs: it is read with chance, and falls faster below
+the band than at its end, where an integrator sets in; with 2 such sweeps fell short."""
 CLEAR, WITHIN = 0.95, 10.0
 """Coherence that bears records which hold nothing there, and how far above the band's low end it is
 looked for: every record adds noise where it sweeps nothing."""
-LOUDEST = 4.0
+LOUDEST = 6.0
 """Times an amplitude that has flown, beyond which none is advised: a vehicle turns as far."""
 
 
@@ -111,7 +112,7 @@ def times_louder(
     -------
     >>> omega = np.array([1.0, 2.0, 4.0])
     >>> round(times_louder(1.0, 2.0, omega, np.array([0.36, 0.6, 0.8])), 2)
-    2.31
+    3.65
     """
     near = (omega_rad_s <= 4.0 * low_rad_s) & (coherence > TOLD[0]) & (coherence < TOLD[1])
     if np.count_nonzero(near) < 2:
@@ -127,10 +128,10 @@ def times_louder(
 def _unclear(low_rad_s: float, measured: tuple[Array, Array] | None) -> float:
     """Up to where coherence about the band's low end is not clear, rad/s."""
     if measured is None:
-        return WITHIN**0.5 * low_rad_s
+        return float(np.sqrt(WITHIN)) * low_rad_s
     omega, coherence = measured
     weak = omega[(omega < WITHIN * low_rad_s) & (coherence < CLEAR)]
-    return max(float(weak.max(initial=0.0)), low_rad_s)
+    return float(np.max(weak, initial=low_rad_s))
 
 
 def _up(seconds: float) -> str:
