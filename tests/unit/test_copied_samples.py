@@ -1,9 +1,15 @@
-"""One flight given twice counts once: every method says so, and shows no bars."""
+"""One flight given twice counts once: every method says so, and shows no bars.
+
+Whole or in part, rounded, thinned, moved, in another unit or taken between its samples.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import flightid as fid
 from flightid.evidence.copied_samples import COPIED, judge_copies
@@ -84,3 +90,118 @@ def test_records_behind_a_response_lose_their_line_and_are_known() -> None:
     whole = fid.estimate_response(record, band_rad_s=(1.0, 12.0), loop="open")
     (said,) = judge_copies([whole, record.segment(2.0, 8.0)], ["p"])
     assert "records 1 and 2 hold the same 3" in said.message
+
+
+Array = np.ndarray
+STEP_S = 0.02
+
+
+def _record(inputs: Array, outputs: Array, step_s: float = STEP_S) -> fid.Record:
+    return fid.Record.from_arrays(
+        np.arange(outputs.size) * step_s,
+        inputs={"da": inputs},
+        outputs={"p": outputs},
+        units={"da": "rad", "p": "rad/s"},
+        hold="zero",
+    )
+
+
+def _between(ratio: float, begin: float, step_s: float) -> Callable[[Array, Array], fid.Record]:
+    """By straight lines on another grid."""
+
+    def made(u: Array, p: Array) -> fid.Record:
+        grid, places = np.arange(p.size), np.arange(begin, p.size - 1, ratio)
+        return _record(np.interp(places, grid, u), np.interp(places, grid, p), step_s)
+
+    return made
+
+
+COPIES = {
+    "float32": lambda u, p: _record(u, p.astype(np.float32).astype(float)),
+    "four digits": lambda u, p: _record(u, np.round(p, 4)),
+    "degrees": lambda u, p: _record(u, np.degrees(p)),
+    "levelled": lambda u, p: _record(u, np.round(p - p.mean(), 4)),
+    "later": lambda u, p: _record(u[7:], np.round(p[7:], 4)),
+    "a part": lambda u, p: _record(u[100:240], np.round(p[100:240], 4)),
+    "thinned": lambda u, p: _record(u[1::2], np.round(p[1::2], 4), 2.0 * STEP_S),
+    "upsampled": _between(0.5, 0.0, 0.5 * STEP_S),
+    "resampled": _between(1.25, 0.0, 1.25 * STEP_S),
+    "between samples": _between(1.0, 0.5, STEP_S),
+}
+
+
+@pytest.mark.parametrize("kind", COPIES)
+def test_copies_that_were_changed_share_their_noise(kind: str) -> None:
+    for seed in (1, 2, 3):
+        record = _flown(seed)
+        copy = COPIES[kind](record.matrix(["da"])[0], record.matrix(["p"])[0])
+        (said,) = judge_copies([_flown(seed + 10), record, copy], ["da", "p"])
+        assert (said.code, said.light.value) == (COPIED, "red")
+        assert said.message.startswith("records 2 and 3 ")
+        # Of float32 some stretches stay the same to six digits of their second differences.
+        assert kind == "float32" or "share their noise in p (r = " in said.message
+
+
+def test_the_shift_is_told() -> None:
+    record = _flown()
+    u, p = record.matrix(["da", "p"])
+    (said,) = judge_copies([_record(u[7:], np.round(p[7:], 4)), record], ["da", "p"])
+    assert "at a shift of -7 samples, over 493 samples)" in said.message
+
+
+@pytest.mark.parametrize("method", ["output_error", "fourier_regression"])
+def test_fits_of_rounded_copies_show_no_bars(method: str) -> None:
+    record = _flown()
+    u, p = record.matrix(["da", "p"])
+    _said(fid.identify(model(), [record, _record(u, np.round(p, 4))], method=method))
+
+
+def test_nor_do_fits_of_responses_and_black_boxes() -> None:
+    record = _flown()
+    u, p = record.matrix(["da", "p"])
+    both = [record, _record(u, p.astype(np.float32).astype(float))]
+    response = fid.estimate_response(both, band_rad_s=(1.0, 12.0), loop="open")
+    _said(fid.identify(model(), response))
+    _said(fid.identify(fid.PolynomialModel.arx("da", "p", na=1, nb=1), both, loop="open"))
+
+
+def _noise(random: np.random.Generator, kind: str, n: int) -> Array:
+    white = random.standard_normal(n)
+    return 0.3 * lfilter([1.0], [1.0, -0.95], white) if kind == "slow" else white
+
+
+@pytest.mark.parametrize("kind", ["white", "slow", "quantised", "lacking", "quiet"])
+def test_flights_of_one_sweep_are_no_copies(kind: str) -> None:
+    """The same stick, and what a model lacks of the vehicle, eight times as large as the noise."""
+    time_s = np.arange(400) * STEP_S
+    stick = np.sin(2.0 * time_s + 0.6 * time_s**2)
+    clean = lfilter([0.0, 0.06], [1.0, -0.94], stick)
+    level = {"quiet": 0.001, "lacking": 0.01}.get(kind, 0.08) * clean.std()
+    if kind == "lacking":
+        clean = clean + 0.2 * np.abs(clean) * clean / clean.std()
+    random = np.random.default_rng(3)
+    for _ in range(12):
+        flights = []
+        for _ in range(2):
+            start = random.standard_normal() * 0.94 ** np.arange(400.0)
+            p = clean + level * (_noise(random, kind, 400) + start + random.standard_normal())
+            flights.append(_record(stick, np.round(p, 1) if kind == "quantised" else p))
+        assert not judge_copies(flights, ["da", "p"])
+
+
+def test_runs_of_a_model_without_noise_are_no_copies() -> None:
+    """Twice the input is twice the output: there is no noise that both could share."""
+    time_s = np.arange(400) * STEP_S
+    stick = np.sin(2.0 * time_s + 0.6 * time_s**2)
+    clean = np.tanh(lfilter([0.0, 0.06], [1.0, -0.94], np.interp(time_s - 0.013, time_s, stick)))
+    assert not judge_copies([_record(stick, clean), _record(2.0 * stick, 2.0 * clean)], ["da", "p"])
+
+
+def test_wind_that_two_vehicles_share_in_part_is_no_copy() -> None:
+    random = np.random.default_rng(4)
+    wind = random.standard_normal(400)
+    flights = [
+        _record(random.standard_normal(400), lfilter([1.0], [1.0, -0.9], wind + own))
+        for own in 0.5 * random.standard_normal((2, 400))
+    ]
+    assert not judge_copies(flights, ["da", "p"])

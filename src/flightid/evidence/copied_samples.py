@@ -1,19 +1,22 @@
-"""Records that hold the same samples: what was measured once counts twice.
+"""Records that hold the same samples, or the same noise: what was measured once counts twice.
 
 Asked of second differences, which keep nothing of what an estimate takes out of a record (its mean,
-its line), by stretches that move: a vehicle at rest gives the same samples again.
+its line), by stretches that move: a vehicle at rest gives the same samples again. Copies that were
+rounded, thinned or moved hold no sample twice; noise tells them (`shared_noise.py`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.conventions import Light, Role
+from flightid.evidence.feedback import KEPT
+from flightid.evidence.shared_noise import RecordSeries, SharedNoise, shared_noise
 from flightid.findings import Finding
-from flightid.frozen import dataclass
 from flightid.record import Record
 from flightid.responses import FrequencyResponse
 
@@ -29,20 +32,6 @@ _MIX, _BASE = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xD1342543DE82EF95)
 """Odd numbers without pattern, that make words of samples and of stretches (Knuth, 3, 6.4)."""
 
 
-@dataclass(frozen=True, eq=False)
-class OutputSeries:
-    """Outputs of one record.
-
-    Attributes
-    ----------
-    names : tuple of str
-    samples : ndarray, shape (n_outputs, n_samples)
-    """
-
-    names: tuple[str, ...]
-    samples: Array
-
-
 def judge_copies(
     data: Sequence[Record | FrequencyResponse], channels: Collection[str]
 ) -> list[Finding]:
@@ -52,7 +41,7 @@ def judge_copies(
     ----------
     data : sequence of Record and FrequencyResponse
     channels : collection of str
-        Of which outputs are compared, all together.
+        Of which outputs are compared, all together, beside its inputs.
 
     Example
     -------
@@ -62,34 +51,69 @@ def judge_copies(
     >>> said.message
     'records 1 and 2 hold the same 100 samples of p: they were measured once and count twice'
     """
+    return list(_judged(tuple(data), frozenset(channels)))
+
+
+@lru_cache(maxsize=KEPT)
+def _judged(
+    data: tuple[Record | FrequencyResponse, ...], channels: frozenset[str]
+) -> tuple[Finding, ...]:
     series = [part for each in data for part in _series(each, channels)]
     if len(series) < 2:
-        return []
+        return ()
     common = [name for name in series[0].names if all(name in each.names for each in series[1:])]
     if not common:
-        return []
-    rows = [each.samples[[each.names.index(name) for name in common]] for each in series]
-    met = _first_met(rows)
-    if met is None:
-        return []
-    (first, second), count = met
-    what = (
-        f"records {first + 1} and {second + 1} hold the same {count} samples of "
-        f"{', '.join(common)}: they were measured once and count twice"
+        return ()
+    series = [each.of(common) for each in series]
+    met = _first_met([each.outputs for each in series])
+    if met is not None:
+        (first, second), count = met
+        return (
+            _copied(
+                f"records {first + 1} and {second + 1} hold the same {count} samples of "
+                f"{', '.join(common)}: they were measured once and count twice"
+            ),
+        )
+    shared = shared_noise(series)
+    return () if shared is None else (_copied(_in_words(shared, common)),)
+
+
+def _copied(what: str) -> Finding:
+    return Finding(COPIED, Light.RED, what, "give each flight once, and cuts that do not overlap")
+
+
+def _in_words(shared: SharedNoise, names: Sequence[str]) -> str:
+    by = f"a shift of {shared.shift} samples"
+    if shared.step_s is not None:
+        by += f" of {shared.step_s:.4g} s"
+    return (
+        f"records {shared.first + 1} and {shared.second + 1} share their noise in "
+        f"{', '.join(names)} (r = {shared.correlation:.3f} at {by}, over {shared.count} samples), "
+        "as copies of one flight do: they count twice"
     )
-    return [Finding(COPIED, Light.RED, what, "give each flight once, and cuts that do not overlap")]
 
 
-def _series(each: Record | FrequencyResponse, channels: Collection[str]) -> list[OutputSeries]:
+def _series(each: Record | FrequencyResponse, channels: Collection[str]) -> list[RecordSeries]:
     if isinstance(each, Record):
         known = each.channels
-        names = tuple(n for n in each.outputs if n in channels and known[n].role is Role.OUTPUT)
-        return [OutputSeries(names, each.matrix(names))] if names else []
-    if each.linear is None:
+        names, inputs = (
+            tuple(n for n in rows if n in channels and known[n].role is role)
+            for rows, role in ((each.outputs, Role.OUTPUT), (each.inputs, Role.INPUT))
+        )
+        if not names:
+            return []
+        none = np.zeros((0, each.n_samples))
+        driven = each.matrix(inputs) if inputs else none
+        return [RecordSeries(names, each.matrix(names), driven, each.sample_time_s)]
+    linear = each.linear
+    if linear is None:
         return []
     kept = [place for place, name in enumerate(each.outputs) if name in channels]
     names = tuple(each.outputs[place] for place in kept)
-    return [OutputSeries(names, rows[kept]) for rows in each.linear.output_records]
+    return [
+        RecordSeries(names, rows[kept], driven, linear.sample_time_s)
+        for rows, driven in zip(linear.output_records, linear.input_records, strict=True)
+    ]
 
 
 def _first_met(rows: Sequence[Array]) -> tuple[tuple[int, int], int] | None:

@@ -118,6 +118,7 @@ def residual_covariance(
     coloured: bool = True,
     overwrite: bool = False,
     triangle: Array | None = None,
+    asked: int | None = None,
 ) -> ResidualCovariance:
     """Covariance of estimates by the colour of their residuals.
 
@@ -138,6 +139,8 @@ def residual_covariance(
         Whether the sensitivities of the blocks may be lost, which saves as much memory again.
     triangle : ndarray, shape (n, n), optional
         `triangle_of` these blocks and what is beside them, where it is known.
+    asked : int, optional
+        First parameters that the noise may grow with: variances of a filter move what they measure.
 
     Returns
     -------
@@ -180,7 +183,7 @@ def residual_covariance(
     models = noise_models(errors, taken, walks) if coloured else _white_models(errors)
     apart = noise_heard(models, whitened)
     # Of random walks beside the noise, innovations have no one power to be held against.
-    unequal = unequal_outputs(models, whitened, half) if coloured and noise is None else {}
+    unequal = unequal_outputs(models, whitened, half[:asked]) if coloured and noise is None else {}
     even = apart
     if unequal:
         apart = with_excess(apart, models, whitened, unequal)

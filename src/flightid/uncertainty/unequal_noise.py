@@ -45,7 +45,7 @@ class Innovations:
         Innovations over the root of the share that the fit left of them.
     free : ndarray, shape (n_samples,)
         That share.
-    signals : ndarray, shape (n + 1, n_samples)
+    signals : ndarray, shape (n_asked + 1, n_samples)
         Square of what each parameter, and all of them together, make of each innovation.
     """
 
@@ -56,7 +56,7 @@ class Innovations:
 
     @classmethod
     def of(cls, noise: Autoregression, block: RecordBlock, output: int, half: Array) -> Innovations:
-        """Whitened by a model of the noise; `half` turns scores to changes of the estimates."""
+        """Whitened by a model of the noise; `half` turns scores to changes of some estimates."""
         columns = halves(block, output)
         own, shared = block.of_output(output)
         taken = np.sum(own**2, axis=1) + np.sum(shared**2, axis=1)
@@ -69,7 +69,9 @@ class Innovations:
             columns = filtered([1.0], denominator, columns[::-1], axis=0)[::-1]
         m, n = own.shape[1], shared.shape[1]
         told = columns[:, m : m + n] + columns[:, m + n :]
-        signals = np.vstack([((told @ half.T) ** 2).T, np.sum(told**2, axis=1)])
+        each = ((told @ half.T) ** 2).T
+        size = np.maximum(np.mean(each, axis=1, keepdims=True), np.finfo(float).tiny)
+        signals = np.vstack([each, np.sum(each / size, axis=0)])
         return cls(columns, errors / np.sqrt(free), free, signals)
 
     def excess(self, level: float) -> Array:
@@ -132,8 +134,8 @@ def unequal_outputs(
         By output.
     blocks : sequence of RecordBlock
         By record, along directions of unit information.
-    half : ndarray, shape (n, n)
-        From scores of the blocks to changes of the estimates.
+    half : ndarray, shape (n_asked, n)
+        From scores of the blocks to changes of the estimates that are asked.
 
     Returns
     -------

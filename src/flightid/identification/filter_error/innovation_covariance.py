@@ -102,7 +102,8 @@ def innovation_covariance(
             )
         )
     still = jacobian[first:]
-    return residual_covariance(blocks, JointResiduals(still, still, measured=False))
+    curvature = JointResiduals(still, still, measured=False)
+    return residual_covariance(blocks, curvature, asked=len(names))
 
 
 def _own_outputs(innovation: Array) -> Array:
