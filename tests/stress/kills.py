@@ -1,21 +1,29 @@
 """Kill commands at random moments, look for losses: `python -m tests.stress.kills --kills 200`.
 
 A file is whole or the one before, a folder of a study too; one into which a verb writes file by
-file (`plan`) has each whole. What a kill leaves aside, the next run clears.
+file (`plan`) has each whole. What a kill leaves aside, the next run clears. Every second moment is
+one at which files are being written or renamed.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import os
 import random
 import subprocess
 import sys
 import tempfile
 import time
+import tomllib
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from io import BytesIO
+from math import inf
 from pathlib import Path
+
+import h5py
 
 from flightid.vehicles import fly
 from flightid.vehicles.ardupilot_log import write_ardupilot_log
@@ -25,6 +33,8 @@ from tests.strangers.ordinary_flights import Axis
 
 PROGRAM = (sys.executable, "-m", "flightid")
 STUDY = Path(__file__).parents[2] / "examples" / "quadrotor_rig" / "study.toml"
+LOOK_S, AFTER_S = 0.0005, 0.005
+"""Between looks at files that are being written, and at most from a change to a kill, s."""
 MODEL = ("rate_motor_lag", "--axis", "roll")
 
 
@@ -58,8 +68,23 @@ def contents(path: Path) -> dict[str, bytes]:
     return {each.name: each.read_bytes() for each in files}
 
 
-def loss(path: Path, before: dict[str, bytes]) -> str:
-    """What is wrong after a kill; empty where the old or a whole new result stands."""
+def _opened(content: bytes) -> None:
+    h5py.File(BytesIO(content)).close()
+
+
+READERS: Mapping[str, Callable[[bytes], object]] = {
+    ".json": json.loads,
+    ".toml": lambda content: tomllib.loads(content.decode("utf-8")),
+    ".nc": _opened,
+}
+"""What fails on half a file, by the end of its name."""
+
+
+def loss(path: Path, before: Mapping[str, bytes], fixed: Mapping[str, bytes]) -> str:
+    """What is wrong after a kill; empty where the old or a whole new result stands.
+
+    `fixed` are files that hold the same bytes whenever their command ends.
+    """
     aside = list(path.parent.glob(f".{path.name}.*.old"))
     if not path.exists():
         return "" if aside else "gone"
@@ -67,13 +92,63 @@ def loss(path: Path, before: dict[str, bytes]) -> str:
     if missing := set(before) - set(after):
         return f"without {sorted(missing)[:3]}"
     for name, content in after.items():
+        if content != fixed.get(name, content):
+            return f"other bytes in {name}"
         if name.endswith(".html") and not content.rstrip().endswith(b"</html>"):
             return f"half of {name}"
         try:
-            json.loads(content) if name.endswith(".json") else None
-        except ValueError as error:
+            READERS.get(Path(name).suffix, bytes)(content)
+        except (OSError, ValueError) as error:
             return f"half of {name}: {error}"
     return "" if all(after.values()) else "empty files"
+
+
+def changes(made: subprocess.Popen[bytes], path: Path, most: float) -> int:
+    """Wait for so many changes beside a result or of it, or for the command's end; those seen."""
+
+    def state() -> set[tuple[str, int]]:
+        found = set()
+        for each in os.scandir(path.parent):
+            if path.name in each.name:
+                try:
+                    found.add((each.name, each.stat().st_mtime_ns))
+                except OSError:  # renamed meanwhile
+                    continue
+        return found
+
+    seen, before = 0, state()
+    while made.poll() is None and seen < most:
+        time.sleep(LOOK_S)
+        if (now := state()) != before:
+            seen, before = seen + 1, now
+    return seen
+
+
+@dataclass(frozen=True)
+class Whole:
+    """What a command that nobody kills takes, and leaves.
+
+    Seconds, and changes seen on the way; files, and those of the same bytes twice.
+    """
+
+    span_s: float
+    changes: int
+    files: dict[str, bytes]
+    fixed: dict[str, bytes]
+
+
+def unharmed(words: Sequence[str], path: Path) -> Whole:
+    """Run it twice: once to have what a second run replaces."""
+    subprocess.run([*PROGRAM, *words], check=True, stdout=-3, stderr=-3)
+    first, begun = contents(path), time.monotonic()
+    made = subprocess.Popen([*PROGRAM, *words], stdout=-3, stderr=-3)
+    seen = changes(made, path, inf)
+    assert made.wait() == 0, words
+    span_s, files = time.monotonic() - begun, contents(path)
+    assert files, f"{words[0]} wrote nothing that a kill could lose"
+    assert seen, f"{words[0]} was not seen writing"
+    fixed = {name: content for name, content in files.items() if first.get(name) == content}
+    return Whole(span_s, seen, files, fixed)
 
 
 def tell(
@@ -98,23 +173,21 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as name:
         known = commands(Path(name))
         verbs = asked.verbs or list(known)
-        spans, before = {}, {}
-        for verb in verbs:
-            words, path = known[verb]
-            begun = time.monotonic()
-            subprocess.run([*PROGRAM, *words], check=True, stdout=-3, stderr=-3)
-            spans[verb], before[verb] = time.monotonic() - begun, contents(path)
-            assert before[verb], f"{verb} wrote nothing that a kill could lose"
+        whole = {verb: unharmed(*known[verb]) for verb in verbs}
         try:
             for kill in range(asked.kills):
                 verb = verbs[kill % len(verbs)]
                 words, path = known[verb]
                 made = subprocess.Popen([*PROGRAM, *words], stdout=-3, stderr=-3)
-                time.sleep(chance.uniform(0.3, 1.1) * spans[verb])
+                if kill // len(verbs) % 2:
+                    time.sleep(chance.uniform(0.3, 1.1) * whole[verb].span_s)
+                else:
+                    changes(made, path, chance.randint(1, whole[verb].changes))
+                    time.sleep(chance.uniform(0.0, AFTER_S))
                 made.kill()
                 kills[verb] += 1
                 within[verb] += made.wait() < 0
-                if told := loss(path, before[verb]):
+                if told := loss(path, whole[verb].files, whole[verb].fixed):
                     losses[verb] += 1
                     print(kill, verb, told, flush=True)
                 # A count that is cut off (it takes half an hour) still says how far it came.
