@@ -48,6 +48,18 @@ def _on_by_default(module: ast.Module) -> Iterator[str]:
                 yield f"{node.name}: {name}"  # type: ignore[attr-defined]
 
 
+def test_arguments_may_be_named_and_those_behind_a_star_must_be() -> None:
+    """A slash in place of a star would ask for the other of both."""
+    found = {
+        f"{path.stem}.{node.name}"
+        for path in python_files()
+        for node in nodes(tree(path))
+        if isinstance(node, ast.FunctionDef) and node.args.posonlyargs
+    }
+    # As `dataclass` has it, and a protocol in which that argument may have any name.
+    assert found == {"frozen._dataclass", "sampling_rate.frequency_response"}
+
+
 def test_what_is_dangerous_is_asked_for() -> None:
     found = [
         f"{path.relative_to(PACKAGE)}: {each}"

@@ -13,12 +13,13 @@ from scipy import signal
 
 import flightid as fid
 from flightid.conventions import Light
-from flightid.errors import OptionError
+from flightid.errors import DataError, OptionError
 from flightid.evidence.data_checks import _band, _windows, loop_check, loop_of_responses
+from flightid.evidence.feedback import feedback_test
 from flightid.responses.store import read_response, write_response
 from flightid.responses.windows.defaults import CYCLES_AT_LOWEST, HIGHEST_FRACTION
-from flightid.uncertainty.feedback import find_feedback
-from flightid.uncertainty.feedback_result import LEVEL, FeedbackTest
+from flightid.uncertainty.feedback import _shares, find_feedback
+from flightid.uncertainty.feedback_result import LEVEL, FeedbackTest, _percent
 from tests.closeness import assert_close
 from tests.feedback_flights import DT, flight, reference
 
@@ -278,3 +279,26 @@ def test_an_input_that_moves_at_its_end_is_tested() -> None:
     u, e = np.zeros(400), random.standard_normal(400)
     u[-3:] = random.standard_normal((2, 3))[0]
     assert find_feedback([u[None] - u.mean()], [e[None]], ["u"]).loop == "open"
+
+
+def test_past_noise_and_none_of_the_same_sample_explains_an_input() -> None:
+    random = np.random.default_rng(0)
+    noise = random.standard_normal((1, 2000))
+    own = 0.3 * random.standard_normal((1, 2000))
+    for late, share, sure in ((0, 0.0, False), (1, 1.0 / 1.09, True), (3, 1.0 / 1.09, True)):
+        pair = np.roll(noise, late, axis=1) + own, noise
+        ((found, chance),) = _shares([pair], [noise[:, 6:]], 6)
+        assert found == pytest.approx(share, abs=0.02)
+        assert (chance < LEVEL) is sure
+
+
+def test_shares_are_cut_and_only_all_is_all() -> None:
+    table = {None: "0", 0.0: "0", 0.00019: "0.01", 0.1239: "12.39", 0.99995: "99.99", 1.0: "100"}
+    assert {share: _percent(share) for share in table} == table
+
+
+def test_feedback_without_inputs_is_refused() -> None:
+    record = fid.Record.from_arrays(np.arange(50) / 10.0, outputs={"y": np.zeros(50)})
+    for inputs in (None, ()):
+        with pytest.raises(DataError, match=r"needs an input and an output.*found y"):
+            feedback_test(record, inputs=inputs)

@@ -352,6 +352,7 @@ def test_what_was_asked_and_may_be_taken_is_a_check_that_was_not_made(
     (said,) = below_band(result, (4.0, 100.0), "sweep lower")  # type: ignore[arg-type]
     assert (said.code, said.light) == ("mode-below-band", light)
     assert "may take gain reduction margin, and none is promised" in said.message
+    assert "nothing is known below 4 rad/s" in said.message
     assert said.action == "sweep lower"
     above = replace(case, estimate=replace(reading, reason=TAKEN["above"]))
     assert asked_above((kept, above)) is (light is Light.AMBER)

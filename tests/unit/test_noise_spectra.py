@@ -285,3 +285,13 @@ def test_orders_are_those_that_samples_allow_and_negative_power_is_cut() -> None
     sound = residual_noise._fitted(np.where(power < 0.0, -40.0, power), 400, 800)
     assert sound.lags == pytest.approx(periodograms.first_lags(cut, 800, 20), rel=1e-12)
     assert np.all(found.spectrum() > 0.0)
+
+
+def test_noise_is_white_without_weights_and_without_slow_power() -> None:
+    n, length = 1000, 2048
+    flat, high = np.ones(60), np.full(60, 9.0)
+    white, red = np.array([1.0, *[0.0] * 20]), 0.7 ** np.arange(21)
+    table = ((white, flat, True), (white, high, False), (red, flat, False), (red, high, False))
+    for lags, slow, is_white in table:
+        found = residual_noise._white(lags, slow, n, length)
+        assert (found is not None) is is_white
