@@ -20,6 +20,7 @@ from flightid.control.tuning.axis_tuning import held_by_hand
 from flightid.control.tuning.band_findings import asked_above, below_band, taken_words
 from flightid.control.tuning.findings import verdict
 from flightid.control.tuning.mode_slacks import slacks_of
+from flightid.control.tuning.modes_outside import BELOW_BAND
 from flightid.control.tuning.wider_band import wider_band
 from flightid.control.tuning.worst_cases import WorstCase
 from flightid.conventions import Light
@@ -356,6 +357,17 @@ def test_what_was_asked_and_may_be_taken_is_a_check_that_was_not_made(
     assert said.action == "sweep lower"
     above = replace(case, estimate=replace(reading, reason=TAKEN["above"]))
     assert asked_above((kept, above)) is (light is Light.AMBER)
+
+
+def test_a_loop_at_one_below_the_band_names_where_the_band_begins() -> None:
+    reading = Estimate("rate loop: phase margin", 60.0, "deg", reason=BELOW_BAND)
+    case = WorstCase("rate loop", "phase margin", reading, None, None, None, "≥ 45")
+    result = SimpleNamespace(worst_cases=(case,))
+    (said,) = below_band(result, (4.0, 100.0), "sweep lower")  # type: ignore[arg-type]
+    assert (said.code, said.light) == ("margin-below-band", Light.AMBER)
+    assert said.message.startswith("rate loop: the gain is at one below the 4 rad/s from which")
+    assert said.action == "sweep lower"
+    assert not [*below_band(result, None, "sweep lower")]  # type: ignore[arg-type]
 
 
 def _gains_of(design: fid.PidDesign) -> np.ndarray:
