@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import flightid as fid
+from flightid.identification.frequency_domain.error_model import KNOWN, ErrorModel, Run
 from flightid.responses.errors.covariance import WindowedErrors
 from flightid.responses.errors.noise import NoiseSpectrum
 from flightid.responses.errors.random_error import Points
@@ -86,6 +87,19 @@ def test_noise_without_levels_is_held_for_known(response: fid.FrequencyResponse)
     errors, points, gain = _errors(response)
     given = NoiseSpectrum(errors.noise.omega_rad_s, errors.noise.density)
     assert replace(errors, known_noise=given).by_level([points], [gain]) == [None]
+
+
+def test_no_kernel_is_made_to_ask_whether_levels_are_known(
+    response: fid.FrequencyResponse, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    errors, points, _ = _errors(response)
+    model = ErrorModel(KNOWN, (Run(0, 1, points, np.arange(20)),), errors)
+
+    def refused(*_: object) -> object:
+        raise AssertionError("kernels are most of what a fit's errors take")
+
+    monkeypatch.setattr(WindowedErrors, "_kernels", refused)
+    assert not model.noise_taken_for_known
 
 
 @pytest.mark.parametrize("cost", ["likelihood", "coherence"])

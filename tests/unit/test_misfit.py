@@ -7,7 +7,12 @@ import pytest
 from scipy.signal import cont2discrete
 
 import flightid as fid
-from flightid.identification.frequency_domain.misfit import MisfitForm, why_missed
+from flightid.identification.frequency_domain.error_model import ErrorModel
+from flightid.identification.frequency_domain.misfit import (
+    MisfitForm,
+    misfit_forms,
+    why_missed,
+)
 
 STEP_S = 0.04
 N_R, N_PED = -2.2, 6.0
@@ -75,6 +80,45 @@ def test_a_model_that_misses_nothing_keeps_its_bars(estimator: str) -> None:
     fit = fid.identify(model("tau"), data)
     assert not fit.missed
     assert fit.covariance is not None
+
+
+def test_all_outputs_are_tested_by_one_pass_over_their_errors(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    record, noise = swept(0, 0.004), 0.02 * np.random.default_rng(9).standard_normal(750)
+    beside = fid.Record.from_arrays(
+        np.arange(750) * STEP_S,
+        inputs={"ped": record["ped"]},
+        outputs={"r": record["r"], "turn": record["r"] + noise},
+        units={"ped": "1", "r": "rad/s", "turn": "rad/s"},
+        hold="first",
+        loop="open",
+    )
+    table = model("tau").to_dict()
+    table.pop("responses", None)
+    table["outputs"] = {"r": "r", "turn": "r"}
+    both = fid.StateSpaceModel.from_dict(table)
+    asked: list[tuple[np.ndarray, np.ndarray]] = []
+    untouched = ErrorModel.propagated
+
+    def forms(
+        end: object, points: object, bias: object, errors: ErrorModel, *further: object
+    ) -> object:
+        def propagated(self: ErrorModel, gain: np.ndarray, told: int = 0) -> object:
+            covariance, freedom = untouched(self, gain, told)
+            alone = [untouched(self, row[None], 1)[1][0] for row in gain]
+            asked.append((freedom, np.array(alone)))
+            return covariance, freedom
+
+        with monkeypatch.context() as spied:
+            spied.setattr(ErrorModel, "propagated", propagated)
+            return misfit_forms(end, points, bias, errors, *further)
+
+    monkeypatch.setattr("flightid.identification.frequency_domain.fit.misfit_forms", forms)
+    fid.identify(both, fid.estimate_response(beside, band_rad_s=(0.7, 12.0)))
+    ((freedom, alone),) = asked
+    assert len(freedom) == 2
+    assert freedom == pytest.approx(alone, rel=1e-9)
 
 
 def test_the_worst_of_what_is_certain_is_named() -> None:

@@ -96,7 +96,7 @@ class ErrorModel:
             return False
         points = self.runs[0].points
         size = 2 * len(points.inputs) * len(points.frequencies)
-        return by_level(self.known, [points], [np.zeros((1, size))])[0] is None
+        return by_level(self.known, [points], [np.zeros((0, size))])[0] is None
 
     @cached_property
     def covariances(self) -> tuple[Array, ...]:

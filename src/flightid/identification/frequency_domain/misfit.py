@@ -95,7 +95,7 @@ def misfit_forms(
     size = np.linalg.norm(followed, axis=0)
     basis = np.linalg.qr(followed[:, size > 0.0] / size[size > 0.0])[0]
     common = sum(basis[s].T @ part @ basis[s] for s, part in zip(spans, parts, strict=True))
-    found = []
+    tested, worst = [], []
     for run, span, part, answer in zip(errors.runs, spans, parts, seen, strict=True):
         own = basis[span]
         taken = own @ (own.T @ part)
@@ -107,10 +107,16 @@ def misfit_forms(
         kept = values > SMALLEST * values[-1]
         along = axes[:, kept].T @ (residuals[span] / scale)
         ratio = float(np.mean(along**2 / values[kept]))
-        freedom = errors.propagated((axes[:, -1] / scale)[None] @ answer, 1)[1][0]
-        name = selected[run.first].measured.output
-        found.append(MisfitForm(name, ratio, _chance(ratio, int(kept.sum()), float(freedom))))
-    return found
+        tested.append((selected[run.first].measured.output, ratio, int(kept.sum())))
+        worst.append((axes[:, -1] / scale) @ answer)
+    if not worst:
+        return []
+    # All outputs at once: the kernels of the errors are most of the work, and the same for each.
+    freedom = errors.propagated(np.stack(worst), len(worst))[1]
+    return [
+        MisfitForm(name, ratio, _chance(ratio, size, float(each)))
+        for (name, ratio, size), each in zip(tested, freedom, strict=True)
+    ]
 
 
 def why_missed(forms: Sequence[MisfitForm]) -> str:

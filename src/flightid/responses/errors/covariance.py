@@ -120,7 +120,9 @@ class WindowedErrors(JointErrors):
             np.zeros((0 if each is None else len(each.freedom), gain.shape[1], len(gain)))
             for each, gain in zip(levels, gains, strict=True)
         ]
-        for noise, kernels, near in self._kernels(inputs, frequencies):
+        # Gains without rows ask whether levels are known: no kernel is needed for that.
+        asked = any(map(len, gains))
+        for noise, kernels, near in self._kernels(inputs, frequencies) if asked else ():
             for part, gain, each, products in zip(parts, gains, levels, found, strict=True):
                 if each is None:
                     continue
@@ -185,12 +187,7 @@ class WindowedErrors(JointErrors):
         near = np.flatnonzero(omega + self._reach() >= angle[0])
         shares, detrend = self.windows.shares, self.windows.detrend
         bases = [
-            tuple(
-                _kept_transform(
-                    share.plan.length, omega[near].tobytes(), (sign * angle).tobytes(), detrend
-                )
-                for sign in (1.0, -1.0)
-            )
+            _kept_transforms(share.plan.length, omega[near].tobytes(), angle.tobytes(), detrend)
             for share in shares
         ]
         turns = [
@@ -198,12 +195,12 @@ class WindowedErrors(JointErrors):
             for share, weight in zip(shares, records[0], strict=True)
         ]
         for weights in records:
-            kernels = []
-            for weight, turn, (above, below) in zip(weights, turns, bases, strict=True):
-                ahead = (weight[:, near] @ turn) * above
-                mirrored = ((weight[:, near] @ turn.conj()) * below).conj()
-                kernels += [(ahead + mirrored) / 2.0, (ahead - mirrored) / 2.0j]
-            yield noise, np.stack(kernels, axis=2), near
+            kernels = np.empty(
+                (len(weights[0]), len(near), 2 * len(shares), len(angle)), dtype=np.complex128
+            )
+            for place, (weight, turn, both) in enumerate(zip(weights, turns, bases, strict=True)):
+                _mirrored(weight[:, near], turn, both, kernels[:, :, 2 * place : 2 * place + 2])
+            yield noise, kernels, near
 
     def _noise_at(self, columns: Places, length: int) -> _BinNoise:
         omega: Real = np.asarray(2.0 * np.pi * columns / (length * self.sample_time_s))
@@ -274,7 +271,10 @@ class _Part:
         """Add the Gram matrix of the weighted kernels of all points to `total`."""
         rows, places = self.weighted(kernels, near, level)
         flat = rows.view(np.float64)
-        total[places[:, None], places] += flat @ flat.T
+        if len(places) == len(total):  # most bins of noise reach all points
+            total += flat @ flat.T
+        else:
+            total[places[:, None], places] += flat @ flat.T
 
     def weighted(self, kernels: Complex, near: Places, level: Real) -> tuple[Complex, Places]:
         """Kernels of all points at the noise's level, (n, n_bins), and the places of these rows."""
@@ -314,10 +314,39 @@ def _kept_turns(middle: int, hop: int, count: int, angle: bytes) -> Complex:
 
 
 @lru_cache(KEPT)
-def _kept_transform(length: int, omega: bytes, angle: bytes, detrend: str) -> Complex:
-    found = basis_transform(length, np.frombuffer(omega), np.frombuffer(angle), detrend)
-    found.setflags(write=False)
+def _kept_transforms(
+    length: int, omega: bytes, angle: bytes, detrend: str
+) -> tuple[Complex, Complex]:
+    """Half the sum of a window's transform and its mirror image; j times half the difference."""
+    at, angles = np.frombuffer(omega), np.frombuffer(angle)
+    above = basis_transform(length, at, angles, detrend)
+    below = basis_transform(length, at, -angles, detrend).conj()
+    found = (above + below) / 2.0, 0.5j * (above - below)
+    for each in found:
+        each.setflags(write=False)
     return found
+
+
+def _mirrored(
+    weights: Complex, turns: Complex, both: tuple[Complex, Complex], into: Complex
+) -> None:
+    """Kernels of real and of imaginary parts, from real products: half those of complex ones.
+
+    Parameters
+    ----------
+    weights : ndarray, shape (n_in, n_near, n_windows)
+    turns : ndarray, shape (n_windows, n_bins)
+    both : tuple of ndarray, each shape (n_near, n_bins)
+        See `_kept_transforms`.
+    into : ndarray, shape (n_in, n_near, 2, n_bins)
+    """
+    parts = np.concatenate([weights.real, weights.imag]) @ turns.view(np.float64)
+    real, imaginary = parts.view(np.complex128).reshape(2, *into.shape[:2], -1)
+    same, apart = both
+    np.multiply(real, same, out=into[:, :, 0])
+    into[:, :, 0] += imaginary * apart
+    np.multiply(imaginary, same, out=into[:, :, 1])
+    into[:, :, 1] -= real * apart
 
 
 def basis_transform(length: int, omega: Real, angle: Real, detrend: str) -> Complex:
