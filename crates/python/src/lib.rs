@@ -34,6 +34,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     vehicles::autopilot_controllers::register(module)?;
     vehicles::ardupilot_chirp::register(module)?;
     vehicles::kinematics::register(module)?;
+    simulation::closed_response::register(module)?;
     simulation::drift_errors::register(module)?;
     simulation::extended_kalman::register(module)?;
     simulation::linear_recursion::register(module)?;

@@ -1,6 +1,7 @@
 //! Linear systems in time: exact hold discretisation, simulation and recursions.
 
 pub(crate) mod block_recursion;
+pub mod closed_response;
 pub(crate) mod column_products;
 pub mod discretisation;
 pub mod drift_errors;

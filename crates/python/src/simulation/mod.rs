@@ -1,5 +1,6 @@
 //! Systems, equations and loops run in time.
 
+pub mod closed_response;
 pub mod drift_errors;
 pub mod extended_kalman;
 pub mod linear_recursion;

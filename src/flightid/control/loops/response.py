@@ -67,7 +67,7 @@ class ConnectionBlocks:
         omega = np.atleast_1d(np.asarray(omega_rad_s, dtype=np.float64))
         try:
             found = self._closed(self.core.places(outputs), omega)
-        except (np.linalg.LinAlgError, SingularError):
+        except SingularError:
             found = np.full(1, np.nan, dtype=np.complex128)
         if not np.all(np.isfinite(found)):
             raise DataError(
@@ -75,66 +75,42 @@ class ConnectionBlocks:
                 found=f"{omega.min():g} to {omega.max():g} rad/s",
                 needed="frequencies that are not poles of the blocks or of the closed loops",
             )
-        return np.asarray(np.moveaxis(found, 0, -1))
+        return found
 
     def _closed(self, places: list[int], omega: Array) -> Complex:
-        """Rows driven from outside, by delays and by ports, shape (n_f, n_outputs, n_inputs)."""
+        """Rows driven from outside, by delays and by ports, shape (n_outputs, n_inputs, n_f)."""
         core, rows = self.core, self.core.rows
         given = [name for block in self.ports for name in block.outputs]
         inside = core.delayed_inside([*self.inputs, *given])
         reads = [name for block in self.ports for name in block.inputs]
         # What goes around: late signals, then outputs of ports; each may drive several rows.
-        around = [*(rows[k].carrier for k in inside), *reads]
-        watched = sorted({*places, *core.places(around)})
-        by_row = self._driven(watched, omega)
-        late = np.exp(-1j * omega[:, None] * [row.delay_s for row in rows])
-        by_row = by_row * late[:, None, :]
+        around = core.places([*(rows[k].carrier for k in inside), *reads])
+        watched = sorted({*places, *around})
         place = {signal: k for k, signal in enumerate(watched)}
-        outside = np.zeros((len(rows), len(self.inputs)))
-        looped = np.zeros((len(rows), len(inside) + len(given)))
-        for k, row in enumerate(rows):
-            if row.carrier in self.inputs:
-                outside[k, self.inputs.index(row.carrier)] = 1.0
-            elif row.carrier in given:
-                looped[k, len(inside) + given.index(row.carrier)] = 1.0
-            else:
-                looped[k, inside.index(k)] = 1.0
-        seen = [place[core.signals.index(name)] for name in around]
-        direct, back = _gathered(by_row, outside), _gathered(by_row, looped)
-        loop, given_from = back[:, seen], direct[:, seen]
-        if self.ports:  # else all that goes around is late signals, one for one
-            shares = self._port_responses(len(inside), len(given), len(reads), omega)
-            loop, given_from = shares @ loop, shares @ given_from
-        driven = np.linalg.solve(np.eye(loop.shape[1]) - loop, given_from)
-        wanted = [place[each] for each in places]
-        return np.asarray(direct[:, wanted] + back[:, wanted] @ driven)
+        drives = {name: k for k, name in enumerate(self.inputs)}
+        late = {row: len(drives) + k for k, row in enumerate(inside)}
+        last = len(drives) + len(late)
+        drives |= {name: last + k for k, name in enumerate(given)}
+        return _native.closed_responses(
+            (core.a, core.b, core.c[watched], core.d[watched]),
+            np.array([row.delay_s for row in rows]),
+            [late[k] if k in late else drives[row.carrier] for k, row in enumerate(rows)],
+            len(self.inputs),
+            [place[each] for each in around],
+            self._port_responses(len(given), len(reads), omega),
+            [place[each] for each in places],
+            np.asarray(1j * omega, dtype=np.complex128),
+        )
 
-    def _driven(self, watched: list[int], omega: Array) -> Complex:
-        """Signals by row, delays left out, shape (n_f, n_watched, n_rows)."""
-        core = self.core
-        points = np.asarray(1j * omega, dtype=np.complex128)
-        c, d = core.c[watched], core.d[watched]
-        return np.moveaxis(_native.linear_response(core.a, core.b, c, d, points), -1, 0)
-
-    def _port_responses(self, n_late: int, n_given: int, n_reads: int, omega: Array) -> Complex:
-        """From what goes around to what it drives: ones for late signals, then the ports."""
-        shares = np.zeros((len(omega), n_late + n_given, n_late + n_reads), dtype=np.complex128)
-        shares[:, :n_late, :n_late] = np.eye(n_late)
-        row, column = n_late, n_late
+    def _port_responses(self, n_given: int, n_reads: int, omega: Array) -> Complex:
+        """From what ports read to what they give, shape (n_given, n_reads, n_f)."""
+        shares = np.zeros((n_given, n_reads, len(omega)), dtype=np.complex128)
+        row, column = 0, 0
         for block in self.ports:
             p, m = len(block.outputs), len(block.inputs)
-            found = np.moveaxis(_port_response(block, omega), -1, 0)
-            shares[:, row : row + p, column : column + m] = found
+            shares[row : row + p, column : column + m] = _port_response(block, omega)
             row, column = row + p, column + m
         return shares
-
-
-def _gathered(by_row: Complex, chosen: Array) -> Complex:
-    """Columns of rows that belong together added up; one alone is taken as it is."""
-    places = [np.flatnonzero(column) for column in chosen.T]
-    if all(len(each) == 1 for each in places):
-        return by_row[:, :, np.concatenate(places)] if places else by_row[:, :, :0]
-    return np.asarray(by_row @ chosen)
 
 
 def _port_response(block: Block, omega: Array) -> Complex:
