@@ -12,9 +12,9 @@ from scipy import linalg, signal
 
 from flightid import FrequencyResponse, Record, estimate_response
 from flightid.errors import DataError
-from flightid.responses.errors.covariance import basis_transform
 from flightid.responses.errors.local_errors import LocalErrors
 from flightid.responses.errors.noise import NoiseSpectrum
+from flightid.responses.errors.noise_kernels import basis_transform
 from flightid.responses.windows.transform import WindowPlan, frames
 from tests.closeness import assert_close
 
