@@ -1,9 +1,11 @@
 """Least squares of pilots: transients eliminated record by record change nothing."""
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
-from flightid.responses.errors.pilot import fit_pilots
+from flightid.responses.errors.pilot import Pilot, Pilots, fit_pilots
 from flightid.responses.errors.pilot_errors import acting, taken_by
 from flightid.responses.errors.pilot_search import (
     SPARE,
@@ -131,3 +133,32 @@ def test_an_order_goes_on_from_where_it_was() -> None:
     anew = settled(data, weights, started(data, 3, weights))
     assert further.cost < under_these.cost
     assert_close(further.cost, anew.cost, rtol=1e-4, why="steps end at shares of 1e-5")
+
+
+def test_what_was_injected_is_fitted_once_to_each_input(monkeypatch: pytest.MonkeyPatch) -> None:
+    random, asked = np.random.default_rng(5), []
+    given = [random.standard_normal((2, 400)) for _ in range(2)]
+    inputs = [lfilter([0.1, 0.05], [1.0, -0.8], each, axis=1) for each in given]
+    outputs = [lfilter([0.2], [1.0, -0.9], each[:1], axis=1) for each in inputs]
+    untouched = fit_pilots
+
+    def spied(
+        u: list[np.ndarray], y: list[np.ndarray], *limits: float, **excited: object
+    ) -> object:
+        asked.append((len(y[0]), bool(excited)))
+        return untouched(u, y, *limits, **excited)
+
+    monkeypatch.setattr("flightid.responses.errors.pilot.fit_pilots", spied)
+
+    def found(order: list[int]) -> Pilot:
+        own = tuple(each[order] for each in inputs)
+        (pilot,) = Pilots(own, tuple(outputs), 0.05, 20.0, tuple(given)).found
+        assert pilot is not None
+        return pilot
+
+    first, second = found([0, 1]), found([1, 0])
+    assert asked == [(2, False), (1, True), (1, True)]
+    assert_close(first.outputs[0], second.outputs[0], rtol=1e-6, why="order of the columns")
+    given[0] = given[0] + 1e-9
+    found([0, 1])
+    assert asked[3:] == [(2, False), (1, True)]
