@@ -26,6 +26,8 @@ from flightid.errors import DataError, ModelError, OptionError, UnknownNameError
 from flightid.evidence import Check, Evidence
 from flightid.evidence.spans import Span, judge_span
 from flightid.findings import Finding
+from flightid.identification.fit_findings import NoiseCost, why_misfit
+from flightid.identification.frequency_domain.misfit import MisfitForm, why_missed
 from flightid.vehicles import fly, write_ardupilot_log
 from tests.closeness import assert_close
 
@@ -191,6 +193,11 @@ def test_what_took_the_errors_says_how_to_have_them() -> None:
     source = SimpleNamespace(findings=(Finding("seen", Light.GREEN, "16 starts"), took))
     assert _towards_errors(source, "a root of C") == "lower the order"
     assert _towards_errors(source, "given alone").startswith("fit a measured response")
+    for why in (
+        why_misfit(50.0, {"p/a": NoiseCost(0.2, 0.04)}),
+        why_missed([MisfitForm("p", 26.0, 1e-30)]),
+    ):
+        assert _towards_errors(source, why).startswith("add the dynamics that the model lacks")
 
 
 PLAIN = {"controller": fid.ControllerOptions(controller="p", loop_rate_hz=400.0), "draws": 5}

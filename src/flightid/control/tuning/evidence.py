@@ -42,6 +42,12 @@ BY_INSTRUMENT = "instrument-fit"
 """Code of gains for a fit by way of the excitation in place of one that a loop biases."""
 TAKING = (*WITHHOLDING, CANCELLATION)
 """Codes of findings that took a covariance, and say what gives it back."""
+MISSES = "the model misses"
+"""How a reason begins that a fit of a response has no errors for what its structure lacks."""
+LACKING = (
+    "add the dynamics that the model lacks (motor lag, delay, a mode), or fit the band alone in "
+    "which it follows the response"
+)
 Array = NDArray[np.float64]
 
 
@@ -280,6 +286,8 @@ def _towards_errors(source: object, reason: str) -> str:
         took = finding.code in TAKING or finding.message.startswith(reason)
         if took and finding.action:
             return str(finding.action)
+    if reason.startswith(MISSES):
+        return LACKING
     return "fit a measured response or records; or take nominal=True and keep margins"
 
 
