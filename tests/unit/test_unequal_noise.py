@@ -5,12 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy import signal
+from scipy.stats import norm, rankdata
 
 import flightid as fid
 from flightid.conventions import Light
 from flightid.uncertainty.blocks import RecordBlock
 from flightid.uncertainty.coloured_residuals import ResidualCovariance, residual_covariance
 from flightid.uncertainty.residual_colour import IN_DOUBT, UNEQUAL, WORTH_A_WORD, colour_findings
+from flightid.uncertainty.residual_noise import Autoregression
+from flightid.uncertainty.unequal_noise import Innovations, unequal_outputs
 from tests.closeness import assert_close
 from tests.strangers.output_error import STEP_S, TRUTH, model
 
@@ -109,3 +112,49 @@ def test_a_sine_tells_as_much_where_it_is_quiet_and_is_not_said() -> None:
     """Damping is told at the zeros of what tells the control's effect: bars are as they were."""
     fit = fid.identify(model(), _rolled(0.0), method="equation_error")
     assert UNEQUAL not in [each.code for each in fit.findings]
+
+
+def _block(seed: int, growth: float, *, ties: bool = False) -> RecordBlock:
+    random = np.random.default_rng(seed)
+    slow = np.cumsum(random.standard_normal((400, 2)), axis=0)
+    slow /= np.linalg.norm(slow, axis=0)
+    noise = random.standard_normal(400) * (1.0 + growth * 20.0 * np.abs(slow[:, 1]))
+    noise = np.round(noise, 1) if ties else noise
+    return RecordBlock.of(slow[None], np.zeros((1, 400, 0)), noise[None])
+
+
+WHITE = [Autoregression(np.ones(1), np.empty(0), 400, 0)]
+
+
+def test_noise_of_one_power_needs_no_correlations_of_long_rows(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def refused(_: np.ndarray) -> np.ndarray:
+        raise AssertionError("a bound has told it")
+
+    monkeypatch.setattr("flightid.uncertainty.unequal_noise._correlations", refused)
+    assert not unequal_outputs(WHITE, [_block(4, 0.0), _block(5, 0.0)], np.eye(2))
+
+
+@pytest.mark.parametrize("ties", [False, True])
+@pytest.mark.parametrize("growth", [0.0, 0.15, 0.3, 1.0])
+def test_a_bound_changes_no_answer(growth: float, *, ties: bool) -> None:
+    """Scores written out, by SciPy's ranks."""
+    for seed in range(0, 12, 2):
+        blocks = [_block(seed, growth, ties=ties), _block(seed + 1, growth, ties=ties)]
+        known = []
+        for block in blocks:
+            part = Innovations.of(WHITE[0], block, 0, np.eye(2))
+            rows = [np.abs(part.errors), *part.signals]
+            ranks = np.array([rankdata(row) for row in rows])
+            ranks -= ranks.mean(axis=1, keepdims=True)
+            ranks /= ranks.std(axis=1, keepdims=True)
+            lags = np.arange(1, 50)
+            met = [[row[:-k] @ row[k:] / 400.0 for k in lags] for row in ranks]
+            slow = np.array(met) * (1.0 - lags / 50.0)
+            counted = 400.0 / np.maximum(1.0, 1.0 + 2.0 * slow[1:] @ slow[0])
+            known.append((ranks[1:] @ ranks[0] / 400.0, counted))
+        total = sum(counted for _, counted in known)
+        score = sum(together * counted for together, counted in known) / np.sqrt(total)
+        limit = norm.ppf(1.0 - 0.01 / 3.0)
+        assert bool(unequal_outputs(WHITE, blocks, np.eye(2))) == bool(np.max(score) > limit)

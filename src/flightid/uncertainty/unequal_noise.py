@@ -9,6 +9,7 @@ of its own, and the sum of squares of scores is consistent whatever makes that p
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 import scipy
@@ -79,8 +80,8 @@ class Innovations:
         power = self.errors**2 / self.free - level
         return np.asarray(self.columns.T @ (power[:, None] * self.columns))
 
-    def ranked(self) -> tuple[Array, Array] | None:
-        """Rank correlations of noise and signals by their errors, and the samples they count."""
+    def ranked(self) -> Ranks | None:
+        """Ranks of the noise's size and of signals; None where samples are few."""
         kept = np.flatnonzero(self.free > FREE)
         if kept.size > MOST:
             first = (kept.size - MOST) // 2
@@ -88,25 +89,72 @@ class Innovations:
         if kept.size < LEAST:
             return None
         noise = _ranks(np.abs(self.errors[kept]))
-        signals = np.array([_ranks(row[kept]) for row in self.signals])
-        together = signals @ noise / kept.size
-        # Bartlett: where both change slowly fewer samples are independent.
-        slow = _correlations(signals) @ _correlations(noise[None])[0]
-        counted = kept.size / np.maximum(1.0, 1.0 + 2.0 * slow)
-        return together * np.sqrt(counted), counted
+        return Ranks(noise, np.array([_ranks(row[kept]) for row in self.signals]))
+
+
+@dataclass(frozen=True, eq=False)
+class Ranks:
+    """Ranks of one output of one record, of unit variance about zero.
+
+    Attributes
+    ----------
+    noise : ndarray, shape (n_samples,)
+        Of its size.
+    signals : ndarray, shape (n + 1, n_samples)
+    """
+
+    noise: Array
+    signals: Array
+
+    @cached_property
+    def together(self) -> Array:
+        """Rank correlations, shape (n + 1,)."""
+        return np.asarray(self.signals @ self.noise / self.noise.size)
+
+    def counted(self, some: NDArray[np.intp]) -> Array:
+        """Samples that count of some signals: where both change slowly fewer are independent."""
+        slow = _correlations(self.signals[some]) @ _correlations(self.noise[None])[0]
+        return np.asarray(self.noise.size / np.maximum(1.0, 1.0 + 2.0 * slow))
+
+
+def _score(known: Sequence[Ranks], limit: float) -> float:
+    """Largest score of all signals, or what none of them passes where that is below a limit.
+
+    No more samples count than there are: by the inequality of Cauchy and Schwarz this bounds most
+    scores of noise of one power, without the correlations of long rows.
+    """
+    most = [np.maximum(each.together, 0.0) ** 2 * each.noise.size for each in known]
+    bound = np.sqrt(np.sum(most, axis=0))
+    some = np.flatnonzero(bound > limit)
+    if not some.size:
+        return float(np.max(bound))
+    counted = [each.counted(some) for each in known]
+    moved = [each.together[some] * count for each, count in zip(known, counted, strict=True)]
+    return float(np.max(np.sum(moved, axis=0) / np.sqrt(np.sum(counted, axis=0))))
 
 
 def _ranks(row: Array) -> Array:
     """Ranks of unit variance about zero; ties share theirs."""
-    _, place, count = np.unique(row, return_inverse=True, return_counts=True)
-    ends = np.cumsum(count)
-    about = (ends - 0.5 * count)[place] - 0.5 * row.size
+    order = np.argsort(row)
+    sorted_row = row[order]
+    about = np.arange(row.size) - 0.5 * (row.size - 1)
+    new = np.flatnonzero(sorted_row[1:] != sorted_row[:-1]) + 1
+    if new.size < row.size - 1:
+        ends = np.append(new, row.size)
+        begins = np.append(0, new)
+        about = np.repeat(0.5 * (begins + ends - row.size), ends - begins)
     spread = float(np.sqrt(np.mean(about**2)))
-    return np.asarray(about / spread if spread > 0.0 else np.zeros_like(about))
+    found = np.zeros(row.size)
+    if spread > 0.0:
+        found[order] = about / spread
+    return found
 
 
 def _correlations(rows: Array) -> Array:
-    """Correlations of rows at lags from one on, up to an eighth of the samples, by a triangle."""
+    """Correlations of rows at lags from one on, up to an eighth of the samples, by a triangle.
+
+    Bartlett (1935): the error of a correlation of two rows that both change slowly.
+    """
     n = rows.shape[1]
     power = np.abs(np.fft.rfft(rows, 2 * n)) ** 2
     count = max(n // 8, 2)
@@ -166,12 +214,8 @@ def unequal_outputs(
     limit = float(normal_quantiles([1.0 - FALSE_ALARM / tests])[0])
     for output, noise in enumerate(models):
         each = [Innovations.of(noise, block, output, half) for block in blocks]
-        known = [scores for part in each if (scores := part.ranked()) is not None]
-        if not known:
-            continue
-        total = sum(counted for _, counted in known)
-        score = sum(z * np.sqrt(counted) for z, counted in known) / np.sqrt(total)
-        if np.max(score) > limit:
+        known = [ranks for part in each if (ranks := part.ranked()) is not None]
+        if known and _score(known, limit) > limit:
             found[output] = each
     return found
 
