@@ -321,7 +321,9 @@ def freedom_of(
         if model.drift is not None:
             # Of unit noise: what an estimate's variance says of the level where it looks.
             parts = [b.projected.reshape(*b.residual.shape, -1)[output] @ half.T for b in blocks]
-            levels = variance / np.sum([np.sum(part**2, axis=0) for part in parts], axis=0)
+            square = np.sum([np.sum(part**2, axis=0) for part in parts], axis=0)
+            # An output that tells nothing of an estimate brings no doubt of it either.
+            levels = variance / np.where(square > 0.0, square, 1.0)
         doubt = doubt + variance**2 / model.freedom(levels)
     # Errors that are known leave no doubt, nor does a residual that vanishes.
     doubtful = doubt > 0.0

@@ -29,14 +29,14 @@ from flightid.uncertainty.blocks import (
     rest_of,
 )
 from flightid.uncertainty.fitted_correlation import FitResponse, FittedCorrelation
-from flightid.uncertainty.fitted_directions import FittedDirections
 from flightid.uncertainty.input_noise import InputNoise
-from flightid.uncertainty.periodograms import periodogram
+from flightid.uncertainty.input_walks import gradients_of_walks, left_of_walks
 from flightid.uncertainty.residual_colour import Colour
 from flightid.uncertainty.residual_noise import (
     Autoregression,
     noise_models,
 )
+from flightid.uncertainty.restricted_drift import with_drifts
 from flightid.uncertainty.triangle import triangle_of_rows
 from flightid.uncertainty.unequal_noise import unequal_outputs, widened_by, with_excess
 
@@ -45,8 +45,6 @@ ROUNDING = 1e-9
 """Share of the variance for white residuals below which there is rounding alone."""
 BLIND = 1e-12
 """Effect of a combination of parameters over the largest, below which its bar is rounding."""
-DRAWS = 32
-"""Draws of random walks."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,6 +114,7 @@ def residual_covariance(
     inputs: Sequence[Array] | None = None,
     *,
     coloured: bool = True,
+    drifts: bool = True,
     overwrite: bool = False,
     triangle: Array | None = None,
     asked: int | None = None,
@@ -135,6 +134,8 @@ def residual_covariance(
         By record: tested for what they foretell of the residuals.
     coloured : bool
         False takes residuals for white, of the power that they have.
+    drifts : bool
+        Whether drift may be in the residuals that the fit has bent out of sight.
     overwrite : bool
         Whether the sensitivities of the blocks may be lost, which saves as much memory again.
     triangle : ndarray, shape (n, n), optional
@@ -178,15 +179,19 @@ def residual_covariance(
     half = root @ inner
     turned = half @ root.T
     taken = directions_taken(whitened)
-    walks = None if noise is None else _walks(taken[0], *noise)
+    walks = None if noise is None else left_of_walks(taken[0], *noise)
     errors = [block.residual for block in blocks]
-    models = noise_models(errors, taken, walks) if coloured else _white_models(errors)
+    seen = noise_models(errors, taken, walks) if coloured else _white_models(errors)
+    models = with_drifts(seen, errors, taken) if coloured and drifts and noise is None else seen
     apart = noise_heard(models, whitened)
+    # Drift that a fit has bent out of sight is in estimates, not in residuals: these are asked as
+    # they show.
+    shown = apart if seen is models else noise_heard(seen, whitened)
     # Of random walks beside the noise, innovations have no one power to be held against.
-    unequal = unequal_outputs(models, whitened, half[:asked]) if coloured and noise is None else {}
+    unequal = unequal_outputs(seen, whitened, half[:asked]) if coloured and noise is None else {}
     even = apart
     if unequal:
-        apart = with_excess(apart, models, whitened, unequal)
+        apart, shown = (with_excess(each, seen, whitened, unequal) for each in (apart, shown))
     answers = [joined(each, block) for each, block in zip(apart, blocks, strict=True)]
     sizes = [block.basis.shape[1] for block in blocks]
     variances = half @ _of_shared(answers, sizes) @ half.T
@@ -195,7 +200,7 @@ def residual_covariance(
         brought = slopes.slopes @ half.T
         shared = shared + brought.T @ brought
     if noise is not None:
-        brought = _of_walks(whitened[0], *noise) @ half.T
+        brought = gradients_of_walks(whitened[0], *noise) @ half.T
         shared = shared + brought.T @ brought
     growth = None
     if unequal:
@@ -203,8 +208,7 @@ def residual_covariance(
         less = variances - half @ _of_shared(plainly, sizes) @ half.T
         shared, growth = widened_by(shared - less.sum(axis=0), shared)
     own, crossed = _own_numbers(blocks, answers, half, shared)
-    plain = half
-    white = np.asarray(root @ root.T) if blocks[0].answering is None else plain @ plain.T
+    white = np.asarray(root @ root.T) if blocks[0].answering is None else half @ half.T
     freedom = freedom_of(
         shared, variances, models, whitened, half, None if slopes is None else slopes.levels
     )
@@ -215,7 +219,7 @@ def residual_covariance(
     if noise is None:
         compared = [flight.along(triangle) for flight in flights_of(apart, whitened)]
     rest = rest_of(compared, beside)
-    tested = () if inputs is None else _tested(whitened, models, answers, inner, slopes, inputs)
+    tested = () if inputs is None else _tested(whitened, seen, shown, inner, slopes, inputs)
     agreed = compare_parts(compared, turned, _lifted(shared, white), freedom, rest)
     return ResidualCovariance(
         agreed.covariance,
@@ -257,13 +261,13 @@ def _of_shared(answers: Sequence[Array], sizes: Sequence[int]) -> Array:
 def _tested(
     blocks: Sequence[RecordBlock],
     models: Sequence[Autoregression],
-    answers: Sequence[Array],
+    shown: Sequence[Array],
     gain: Array,
     beside: JointResiduals | None,
     inputs: Sequence[Array],
 ) -> tuple[FittedCorrelation, ...]:
     brought = np.zeros_like(gain) if beside is None else beside.slopes.T @ beside.slopes
-    whole = [each.sum(axis=0) for each in answers]
+    whole = [joined(each, block).sum(axis=0) for each, block in zip(shown, blocks, strict=True)]
     return FitResponse(blocks, models, whole, gain, brought).correlations(inputs)
 
 
@@ -345,26 +349,6 @@ def _gain(beside: JointResiduals | None, blocks: Sequence[RecordBlock]) -> Array
         return np.eye(count)
     follows = beside.slopes.T @ (beside.slopes - beside.total)
     return np.asarray(np.linalg.inv(np.eye(count) - follows), dtype=np.float64)
-
-
-def _walks(taken: FittedDirections, noise: InputNoise, whitener: Array) -> Array:
-    """Mean periodogram of what a fit leaves of each output's random walk.
-
-    Draws come from a fixed seed: the same record gives the same intervals.
-    """
-    directions = taken.shared
-    n = directions.shape[1]
-    draws = np.random.default_rng(0).standard_normal((n - 1, noise.steps.shape[2], DRAWS))
-    walks = noise.outputs_of(draws) * whitener[:, None, None]
-    along = np.einsum("onp,ond->pd", directions, walks, optimize=True)
-    return np.array([periodogram(walk) for walk in walks - directions @ along])
-
-
-def _of_walks(block: RecordBlock, noise: InputNoise, whitener: Array) -> Array:
-    """Gradients that unit noise of each input and step makes, shape (n_noises, n)."""
-    sensitivities = block.projected.reshape(*block.residual.shape, -1)
-    paths = noise.transposed(sensitivities * whitener[:, None, None])
-    return np.asarray(paths.reshape(-1, paths.shape[2]))
 
 
 def _lifted(covariance: Array, plain: Array) -> Array:

@@ -31,6 +31,7 @@ from flightid.uncertainty.periodograms import (
     transform_length,
 )
 from flightid.uncertainty.slow_drift import (
+    LEAST_FREEDOM,
     SETTLED,
     Drift,
     apart,
@@ -56,8 +57,6 @@ CUT = 1e-6
 """Of the mean power, to which a power that is negative is cut: below it rounding decides."""
 VALLEY = 0.02
 """Share of the mean power below which a spectrum is not believed."""
-LEAST_FREEDOM = 1.0
-"""Below it Student's distribution has no mean, and its interval no meaning."""
 
 
 @dataclass(frozen=True, eq=False)

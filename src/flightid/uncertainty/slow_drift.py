@@ -18,6 +18,8 @@ from flightid.frozen import dataclass
 Array = NDArray[np.float64]
 SLOWEST = 1.5
 """Corner over the inverse of the number of samples, rad: below it a record knows no corner."""
+LEAST_FREEDOM = 1.0
+"""Below it Student's distribution has no mean, and its interval no meaning."""
 RANK = 1e-12
 """Share of the largest information below which a direction of a drift is not known at all."""
 FASTEST = 0.05
@@ -50,10 +52,14 @@ class Drift:
         Square of the residual's unit.
     corner : float
         One less the pole, rad per sample.
+    freedom : float or None
+        Degrees of freedom of the variance, at a corner that is given; None where the spectrum tells
+        both (`doubt`).
     """
 
     variance: float
     corner: float
+    freedom: float | None = None
 
     def autocovariance(self, n_lags: int) -> Array:
         """Autocovariance at lags 0 to ``n_lags - 1``."""
@@ -72,6 +78,9 @@ class Drift:
         """
         power, under = self._parts(length)
         own = self.variance * power / under
+        if self.freedom is not None:
+            level = 2.0 / max(self.freedom, LEAST_FREEDOM)
+            return np.asarray(level * (own / (fast + own)) ** 2)
         # By the corner: a number times `own`, which is there, and one times this.
         slopes = np.array([fast, own, own * self.corner**2 / under]) / (fast + own)
         information = 0.5 * n * (slopes @ slopes.T) / len(fast)

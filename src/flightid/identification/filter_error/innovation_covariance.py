@@ -102,8 +102,9 @@ def innovation_covariance(
             )
         )
     still = jacobian[first:]
-    curvature = JointResiduals(still, still, measured=False)
-    return residual_covariance(blocks, curvature, asked=len(names))
+    # A filter's own process noise follows what drifts, and `noise_doubt` asks what is unseen of it.
+    rest = JointResiduals(still, still, measured=False)
+    return residual_covariance(blocks, rest, drifts=False, asked=len(names))
 
 
 def _own_outputs(innovation: Array) -> Array:
