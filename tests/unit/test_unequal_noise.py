@@ -144,8 +144,10 @@ def test_a_bound_changes_no_answer(growth: float, *, ties: bool) -> None:
         blocks = [_block(seed, growth, ties=ties), _block(seed + 1, growth, ties=ties)]
         known = []
         for block in blocks:
-            part = Innovations.of(WHITE[0], block, 0, np.eye(2))
-            rows = [np.abs(part.errors), *part.signals]
+            told = block.of_output(0)[1].T ** 2
+            together = np.sum(told / told.mean(axis=1, keepdims=True), axis=0)
+            errors = Innovations.of(WHITE[0], block, 0).errors
+            rows = [np.abs(errors), *told, together]
             ranks = np.array([rankdata(row) for row in rows])
             ranks -= ranks.mean(axis=1, keepdims=True)
             ranks /= ranks.std(axis=1, keepdims=True)

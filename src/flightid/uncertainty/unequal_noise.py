@@ -46,50 +46,22 @@ class Innovations:
         Innovations over the root of the share that the fit left of them.
     free : ndarray, shape (n_samples,)
         That share.
-    signals : ndarray, shape (n_asked + 1, n_samples)
-        Square of what each parameter, and all of them together, make of each innovation.
     """
 
     columns: Array
     errors: Array
     free: Array
-    signals: Array
 
     @classmethod
-    def of(cls, noise: Autoregression, block: RecordBlock, output: int, half: Array) -> Innovations:
-        """Whitened by a model of the noise; `half` turns scores to changes of some estimates."""
-        columns = halves(block, output)
-        own, shared = block.of_output(output)
-        taken = np.sum(own**2, axis=1) + np.sum(shared**2, axis=1)
-        free = np.clip(1.0 - taken, FREE, 1.0)
-        errors = block.residual[output]
-        weights = _whitener(noise)
-        if weights.size:
-            denominator = np.concatenate(([1.0], -weights))
-            errors = filtered(denominator, [1.0], errors)
-            columns = filtered([1.0], denominator, columns[::-1], axis=0)[::-1]
-        m, n = own.shape[1], shared.shape[1]
-        told = columns[:, m : m + n] + columns[:, m + n :]
-        each = ((told @ half.T) ** 2).T
-        size = np.maximum(np.mean(each, axis=1, keepdims=True), np.finfo(float).tiny)
-        signals = np.vstack([each, np.sum(each / size, axis=0)])
-        return cls(columns, errors / np.sqrt(free), free, signals)
+    def of(cls, noise: Autoregression, block: RecordBlock, output: int) -> Innovations:
+        """Whitened by a model of the noise."""
+        errors, free = _errors(noise, block, output)
+        return cls(_heard(noise, halves(block, output)), errors, free)
 
     def excess(self, level: float) -> Array:
         """Products of scores beyond those of innovations of one power (HC3)."""
         power = self.errors**2 / self.free - level
         return np.asarray(self.columns.T @ (power[:, None] * self.columns))
-
-    def ranked(self) -> Ranks | None:
-        """Ranks of the noise's size and of signals; None where samples are few."""
-        kept = np.flatnonzero(self.free > FREE)
-        if kept.size > MOST:
-            first = (kept.size - MOST) // 2
-            kept = kept[first : first + MOST]
-        if kept.size < LEAST:
-            return None
-        noise = _ranks(np.abs(self.errors[kept]))
-        return Ranks(noise, np.array([_ranks(row[kept]) for row in self.signals]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,11 +72,36 @@ class Ranks:
     ----------
     noise : ndarray, shape (n_samples,)
         Of its size.
-    signals : ndarray, shape (n + 1, n_samples)
+    signals : ndarray, shape (n_asked + 1, n_samples)
+        Of the square of what each parameter, and all of them together, make of each innovation.
     """
 
     noise: Array
     signals: Array
+
+    @classmethod
+    def of(
+        cls, noise: Autoregression, block: RecordBlock, output: int, half: Array
+    ) -> Ranks | None:
+        """Whitened by a model of the noise; `half` turns scores to changes of some estimates.
+
+        None where samples are few.
+        """
+        errors, free = _errors(noise, block, output)
+        kept = np.flatnonzero(free > FREE)
+        if kept.size > MOST:
+            first = (kept.size - MOST) // 2
+            kept = kept[first : first + MOST]
+        if kept.size < LEAST:
+            return None
+        signals = np.empty((len(half) + 1, len(errors)))
+        each = signals[:-1]
+        np.matmul(half, _heard(noise, block.of_output(output)[1]).T, out=each)
+        np.square(each, out=each)
+        size = np.maximum(np.mean(each, axis=1), np.finfo(float).tiny)
+        np.matmul(1.0 / size, each, out=signals[-1])
+        ranked = np.array([_ranks(row[kept]) for row in signals])
+        return cls(_ranks(np.abs(errors[kept])), ranked)
 
     @cached_property
     def together(self) -> Array:
@@ -171,6 +168,25 @@ def _whitener(noise: Autoregression) -> Array:
     return np.asarray(scipy.linalg.solve_toeplitz(lags[:-1], lags[1:]))
 
 
+def _errors(noise: Autoregression, block: RecordBlock, output: int) -> tuple[Array, Array]:
+    """Innovations over the root of the share that the fit left of each, and that share."""
+    own, shared = block.of_output(output)
+    taken = np.einsum("ij,ij->i", own, own) + np.einsum("ij,ij->i", shared, shared)
+    free = np.clip(1.0 - taken, FREE, 1.0)
+    errors, weights = block.residual[output], _whitener(noise)
+    if weights.size:
+        errors = filtered(np.concatenate(([1.0], -weights)), [1.0], errors)
+    return errors / np.sqrt(free), free
+
+
+def _heard(noise: Autoregression, columns: Array) -> Array:
+    """What columns of samples hear of each innovation: whitening, backwards in time."""
+    weights = _whitener(noise)
+    if not weights.size:
+        return columns
+    return filtered([1.0], np.concatenate(([1.0], -weights)), columns[::-1], axis=0)[::-1]
+
+
 def unequal_outputs(
     models: Sequence[Autoregression], blocks: Sequence[RecordBlock], half: Array
 ) -> dict[int, list[Innovations]]:
@@ -213,10 +229,11 @@ def unequal_outputs(
     tests = max(len(models) * (len(half) + 1), 1)
     limit = float(normal_quantiles([1.0 - FALSE_ALARM / tests])[0])
     for output, noise in enumerate(models):
-        each = [Innovations.of(noise, block, output, half) for block in blocks]
-        known = [ranks for part in each if (ranks := part.ranked()) is not None]
+        # Most noise is of one power: innovations are made where they are summed, not before.
+        asked = (Ranks.of(noise, block, output, half) for block in blocks)
+        known = [ranks for ranks in asked if ranks is not None]
         if known and _score(known, limit) > limit:
-            found[output] = each
+            found[output] = [Innovations.of(noise, block, output) for block in blocks]
     return found
 
 
