@@ -18,7 +18,7 @@ from flightid.evidence.data_checks import _band, _windows, loop_check, loop_of_r
 from flightid.evidence.feedback import feedback_test
 from flightid.responses.store import read_response, write_response
 from flightid.responses.windows.defaults import CYCLES_AT_LOWEST, HIGHEST_FRACTION
-from flightid.uncertainty.feedback import _shares, find_feedback
+from flightid.uncertainty.feedback import _Pasts, _shares, _shares_at_once, find_feedback
 from flightid.uncertainty.feedback_result import LEVEL, FeedbackTest, _percent
 from tests.closeness import assert_close
 from tests.feedback_flights import DT, flight, reference
@@ -302,3 +302,12 @@ def test_feedback_without_inputs_is_refused() -> None:
     for inputs in (None, ()):
         with pytest.raises(DataError, match=r"needs an input and an output.*found y"):
             feedback_test(record, inputs=inputs)
+
+
+def test_outputs_of_the_same_sample_explain_the_input_that_they_move() -> None:
+    random = np.random.default_rng(1)
+    free, own, *outputs = random.standard_normal((4, 2000))
+    records = [np.array([free, 0.9 * outputs[1] + 0.3 * own, *outputs])]
+    (of_free, chance), (of_moved, sure) = _shares_at_once(_Pasts(records, 3, 2))
+    assert (of_free, of_moved) == pytest.approx((0.0, 0.9), abs=0.02)
+    assert chance > LEVEL > sure

@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import flightid as fid
 from flightid.cli.program import run
 from flightid.identification.frequency_domain.longer_windows import judge_windows
+from flightid.uncertainty.response_errors import _squared_hann
 from tests.strangers.response_bands import oscillator_record
 from tests.strangers.responses import oscillator
 
@@ -86,3 +88,11 @@ def test_where_nobody_chose_windows_a_second_pass_takes_longer_ones(
     assert item.fit is not None
     low, high = item.fit.parameters["w2"].interval95 or (0.0, 0.0)
     assert low < 4.09 < high < low + 0.3
+
+
+def test_frequencies_share_what_the_squared_window_lets_through() -> None:
+    bins = np.linspace(-3.0, 3.0, 25)
+    time = (np.arange(4000) + 0.5) / 4000 - 0.5
+    power = np.cos(np.pi * time) ** 4
+    transform = np.cos(2.0 * np.pi * np.outer(bins, time)) @ power / power.sum()
+    assert _squared_hann(bins) == pytest.approx(transform, abs=1e-6)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -57,6 +58,17 @@ def test_ranges_stay_with_what_flew_while_gains_move() -> None:
     low, high = ControllerPaths(moved, "filtered", True, SLOW).ranges()
     assert low.tolist() == [0.01, 0.002, 0.0, 1.0]
     assert high.tolist() == [0.5, 2.0, 0.05, 12.0]
+    # No logarithm starts from zero: a thousandth of the upper end; D may be none.
+    roles = ("p", "i", "d", "angle_p")
+    zero = {name: replace(each, low=0.0) for name, each in moved.ranges.items()}
+    from_zero = SimpleNamespace(
+        roles=roles,
+        names=tuple(moved.names[role] for role in roles),
+        loop=SimpleNamespace(ranges=zero, unit_of=moved.unit_of),
+        flown=SimpleNamespace(has_flown=False),
+    )
+    least, most = ControllerPaths.ranges(from_zero)  # type: ignore[arg-type]
+    assert least.tolist() == pytest.approx([1e-3 * most[0], 1e-3 * most[1], 0.0, 1e-3 * most[3]])
     fast = SLOW.with_gains({ANGLE: 14.0})
     assert ControllerPaths(fast, "filtered", True).ranges()[1][-1] == 14.0
 

@@ -230,7 +230,7 @@ def _findings(data: bytes, lost: int, runs: int) -> Iterator[Finding]:
             f"the autopilot starts anew in this log, {runs} runs in all: the longest is read",
             "save each run to its own file to read the others",
         )
-    if _ends_inside(data, lost):
+    if lost and _ends_inside(data, lost):
         yield log_cut(f"{INSIDE} a frame")
     elif lost:
         yield Finding(
@@ -247,7 +247,7 @@ def _ends_inside(data: bytes, lost: int) -> bool:
     Frames are walked by their lengths: inside of one that is cut others may seem to begin.
     """
     at, end = 0, len(data)
-    while lost and at < end:
+    while at < end:
         rest = data[at + STAMP : at + STAMP + 3]
         size = _frame_size(rest)
         if len(rest) > 2 and not size:
