@@ -105,7 +105,7 @@ def _rolled(swell_rad_s: float) -> fid.Record:
 def test_fits_say_it_in_their_residuals(method: str) -> None:
     fit = fid.identify(model(), _rolled(0.3), method=method)
     (told,) = [each for each in fit.findings if each.code == UNEQUAL]
-    assert "noise grows with the signal: standard errors are up to 1." in told.message
+    assert "residuals grow with the signal: standard errors are up to 1." in told.message
 
 
 def test_a_sine_tells_as_much_where_it_is_quiet_and_is_not_said() -> None:

@@ -161,11 +161,21 @@ def _differ(chance: float | None) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class AgreementTest:
-    """Covariance and degrees of freedom that stand after parts were compared."""
+    """Covariance and degrees of freedom that stand after parts were compared.
+
+    `growth` is how many times as long standard errors are as by noise of one power throughout,
+    where errors were found to grow with the signal.
+    """
 
     covariance: Array
     freedom: Array
     agreement: Agreement
+    growth: Array | None = None
+
+    @property
+    def most_growth(self) -> float:
+        """The largest growth; one where there is none."""
+        return 1.0 if self.growth is None else float(np.max(self.growth, initial=1.0))
 
 
 def compare_parts(

@@ -11,6 +11,7 @@ that all records share meet in one small matrix.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,7 +39,12 @@ from flightid.uncertainty.residual_noise import (
 )
 from flightid.uncertainty.restricted_drift import with_drifts
 from flightid.uncertainty.triangle import triangle_of_rows
-from flightid.uncertainty.unequal_noise import unequal_outputs, widened_by, with_excess
+from flightid.uncertainty.unequal_noise import (
+    Innovations,
+    unequal_outputs,
+    widened_by,
+    with_excess,
+)
 
 Array = NDArray[np.float64]
 ROUNDING = 1e-9
@@ -272,7 +278,7 @@ def _tested(
 
 
 def white_covariance(
-    blocks: Sequence[RecordBlock], covariance: Array, freedom: float
+    blocks: Sequence[RecordBlock], covariance: Array, freedom: float, *, grown: bool = False
 ) -> AgreementTest:
     """Covariance of estimates whose errors their own noise model whitens, parts compared.
 
@@ -284,17 +290,32 @@ def white_covariance(
         By white errors.
     freedom : float
         Degrees of freedom of their variance.
+    grown : bool
+        Whether errors that grow with the signal make it longer.
 
     Reference
     ---------
-    See `flightid.uncertainty.agreement.compare_parts`.
+    See `flightid.uncertainty.agreement.compare_parts` and `flightid.uncertainty.unequal_noise`.
     """
-    root = _inverse_root(triangle_of(blocks))
+    triangle = triangle_of(blocks)
+    root = _inverse_root(triangle)
     degrees = np.full(len(covariance), freedom)
-    flights = flights_of(
-        noise_heard(_white_models([each.residual for each in blocks]), blocks), blocks
-    )
-    return compare_parts(flights, root @ root.T, covariance, degrees)
+    models = _white_models([each.residual for each in blocks])
+    unequal: dict[int, list[Innovations]] = {}
+    if grown:
+        whitened = [block.along(root) for block in blocks]
+        unequal = unequal_outputs(models, whitened, root)
+    if not unequal:
+        flights = flights_of(noise_heard(models, blocks), blocks)
+        return compare_parts(flights, root @ root.T, covariance, degrees)
+    even = noise_heard(models, whitened)
+    apart = with_excess(even, models, whitened, unequal)
+    sizes = [block.basis.shape[1] for block in blocks]
+    more = [joined(a - e, b) for a, e, b in zip(apart, even, whitened, strict=True)]
+    beyond = root @ _of_shared(more, sizes).sum(axis=0) @ root.T
+    wider, growth = widened_by(covariance, covariance + beyond)
+    flights = [flight.along(triangle) for flight in flights_of(apart, whitened)]
+    return replace(compare_parts(flights, root @ root.T, wider, degrees), growth=growth)
 
 
 def _white_models(errors: Sequence[Array]) -> list[Autoregression]:

@@ -93,7 +93,7 @@ def _growth_findings(ratio: float, *, has_bars: bool = True) -> list[Finding]:
         return []
     are, bars = ("are", ", and the intervals allow for it") if has_bars else ("would be", "")
     said = (
-        f"noise grows with the signal: standard errors {are} up to {ratio:.2g} times those of "
+        f"residuals grow with the signal: standard errors {are} up to {ratio:.2g} times those of "
         f"noise of one power throughout{bars}"
     )
     if ratio < IN_DOUBT:

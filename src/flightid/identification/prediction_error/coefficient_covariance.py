@@ -152,10 +152,14 @@ def compared(
     elif found.agreement is None:
         at = partial(errors_at, structure, data, found.memory)
         blocks = part_blocks(at, data, found.theta, found.skip)
-        agreed = white_covariance(blocks, plain, found.degrees)
+        agreed = white_covariance(blocks, plain, found.degrees, grown=True)
         freedom = agreed.freedom if agreed.agreement.by_scatter is not None else None
         found = replace(
-            found, covariance=agreed.covariance, freedom=freedom, agreement=agreed.agreement
+            found,
+            covariance=agreed.covariance,
+            freedom=freedom,
+            agreement=agreed.agreement,
+            colour=Colour(growth=agreed.most_growth),
         )
         if not shares_poles(structure) and structure.method != "iv4":
             found = _by_colour(structure, data, found, errors, None if tests.is_white else blocks)

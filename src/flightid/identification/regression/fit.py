@@ -187,6 +187,7 @@ def known_by_spectra(
         agreed.covariance,
         agreed.freedom,
         "spectra of residuals",
+        Colour(growth=agreed.most_growth),
         agreement=agreed.agreement,
         correlations=foretold_harmonics(kept, weights, driven),
     )

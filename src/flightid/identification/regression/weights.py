@@ -84,7 +84,7 @@ def compared_covariance(
         slopes = _in_time(_complex(np.moveaxis(each.slopes, 2, 1) * weight[:, None]))
         sensitivity = -np.moveaxis(slopes, 1, 2)
         blocks.append(RecordBlock.of(sensitivity, np.zeros((residual.size, 0)), residual))
-    return white_covariance(blocks, covariance, freedom)
+    return white_covariance(blocks, covariance, freedom, grown=True)
 
 
 def _in_time(harmonics: Complex) -> Array:
