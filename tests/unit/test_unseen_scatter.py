@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy import stats
+from scipy.signal import lfilter
 
+import flightid as fid
 from flightid.conventions import Light
 from flightid.evidence.part_checks import agreement_check
 from flightid.models.polynomial.gain_and_speed import gain_and_speed
@@ -175,6 +177,23 @@ def test_a_black_box_goes_with_gain_and_speed_of_its_vehicle() -> None:
     assert moves[:, 0].tolist() == [0.0, 0.0, 0.5, 0.2, 0.0]
     assert moves[:, 1].tolist() == [0.0, 0.0, 0.0, 0.0, 3.0]
     assert_close(moves[:2, 2], (faster - a) / 1e-4, rtol=1e-3, why="a difference of 1e-4")
+
+
+def test_a_pair_is_compared_in_the_terms_of_the_vehicle_alone() -> None:
+    """A model of the noise has terms of its own: its evidence broke off where they had no bars."""
+
+    def record(seed: int) -> fid.Record:
+        random = np.random.default_rng(seed)
+        u, e = np.sign(random.standard_normal(400)), 0.1 * random.standard_normal(400)
+        y = lfilter([0.0, 0.5], [1.0, -0.9], u) + lfilter([1.0], [1.0, -1.5, 0.9], e)
+        t = np.arange(400) * 0.1
+        return fid.Record.from_arrays(t, inputs={"u": u}, outputs={"y": y}, hold="zero")
+
+    structure = fid.PolynomialModel.bj("u", "y", nb=1, nc=1, nd=1, nf=1)
+    fit = fid.identify(structure, [record(1), record(2)], loop="open")
+    assert tuple(fit.names) == ("b1", "f1")
+    check = next(c for c in fit.evidence.checks if c.name == "agreement of parts")
+    assert check.what.startswith("2 records agree")
 
 
 def test_a_pair_of_short_regressions_says_what_it_cannot_show() -> None:

@@ -123,7 +123,7 @@ def _at_once(model: object) -> tuple[str, ...]:
 def _compared(fit: Fit) -> NDArray[np.float64] | None:
     """Estimates whose parts were compared; None where it is not known which those are."""
     compared = _estimates(fit)
-    return None if compared is None else np.array([each.value for each in compared])
+    return None if compared is None else np.array([each.value for each in compared.values()])
 
 
 def _unseen(fit: Fit) -> UnseenScatter | None:
@@ -131,10 +131,13 @@ def _unseen(fit: Fit) -> UnseenScatter | None:
     compared = _estimates(fit)
     if compared is None or fit.agreement is None or fit.agreement.compared is None:
         return None
-    values = np.array([each.value for each in compared])
-    stderr = np.array([each.stderr or 0.0 for each in compared])
+    values = np.array([each.value for each in compared.values()])
+    stderr = np.array([each.stderr or 0.0 for each in compared.values()])
     if isinstance(fit.model, PolynomialModel):
-        moves = gain_and_speed(fit.model.structure.names, values)
+        # Speed moves whole polynomials, of which a fit may compare the plant's terms alone.
+        every = fit.model.structure.names
+        moves = gain_and_speed(every, np.array([fit.parameters[name].value for name in every]))
+        moves = moves[[every.index(name) for name in compared]]
     elif isinstance(getattr(fit.structure, "parameters", None), Parameters):
         moves = np.diag(values)
     else:
@@ -142,13 +145,15 @@ def _unseen(fit: Fit) -> UnseenScatter | None:
     return fit.agreement.compared.unseen(moves, stderr)
 
 
-def _estimates(fit: Fit) -> list[Estimate] | None:
+def _estimates(fit: Fit) -> dict[str, Estimate] | None:
     if fit.agreement is None:
         return None
     free = tuple(name for name, each in fit.parameters.items() if each.status == "free")
-    for names in (fit.names, free):
+    # Of a polynomial with noise of its own, parts are compared in the vehicle's terms alone.
+    vehicle = tuple(name for name in fit.parameters if name[0] in "bf")
+    for names in (fit.names, free, *([vehicle] if isinstance(fit.model, PolynomialModel) else [])):
         if len(names) == fit.agreement.by_noise.size:
-            return [fit.parameters[name] for name in names]
+            return {name: fit.parameters[name] for name in names}
     return None
 
 
