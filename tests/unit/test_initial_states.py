@@ -174,6 +174,25 @@ def test_constants_of_linear_equations_act_in_every_verb() -> None:
     assert_close(made.predicted["q"], wanted, atol=1e-12, why="the same constants")
 
 
+def test_a_constant_that_large_biases_undo_is_named() -> None:
+    """A slow lag all but stands still: start and biases undo its constant with ten times its share,
+    beside which it had been left out of the words, and the fit ended in an index beyond none."""
+    time_s = np.arange(100) * 0.02
+    rates = [fid.Parameter("a", -0.02, "1/s"), fid.Parameter("b", 1.0, "1/s")]
+    slow = fid.StateSpaceModel(
+        states={"x": "1"},
+        input_units={"u": "1"},
+        measurements={f"y{k}": fid.Output("x", "1") for k in range(5)},
+        equations={"x'": "a*x + b + c*u"},
+        parameters=fid.Parameters([*rates, fid.Parameter("c", 1.0, "1/s", free=False)]),
+    )
+    outputs = {f"y{k}": time_s + k for k in range(5)}
+    step = np.where(time_s > 1.0, 1.0, 0.0)
+    record = fid.Record.from_arrays(time_s, inputs={"u": step}, outputs=outputs)
+    with pytest.raises(FitError, match="found b, output bias of y0"):
+        fid.identify(slow, record)
+
+
 def test_a_bias_that_is_a_constant_is_found_before_the_search() -> None:
     time_s = np.arange(300) * 0.02
     driven = fid.Record.from_arrays(time_s, inputs={"de": np.sin(time_s**1.4)}, units={"de": "rad"})

@@ -85,6 +85,14 @@ def test_noise_of_halves_joins_to_that_of_the_whole() -> None:
             assert heard == pytest.approx(wide.T @ among @ wide)
 
 
+@pytest.mark.parametrize("size", [0.0, np.inf])
+def test_parts_that_tell_nothing_finite_are_not_compared(size: float) -> None:
+    """Nothing of two is seen: it had been an index beyond none."""
+    with np.errstate(invalid="ignore"):
+        flat = RecordParts(np.ones((1, 2)), np.full((1, 2, 2), size), np.ones((1, 2, 1, 2)))
+        assert chance_where_seen([flat, flat], np.inf) is None
+
+
 def test_chances_do_not_depend_on_units() -> None:
     rng = np.random.default_rng(3)
     roots = rng.standard_normal((4, 3, 3))

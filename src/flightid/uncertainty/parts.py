@@ -145,7 +145,8 @@ def seen_by_all(parts: Sequence[RecordParts]) -> list[tuple[Array, Array, Array]
     -------
     list
         By part: scores, their slopes by directions of unit information, and by the part's own
-        parameters; None of noise that has no finite size. Empty without parameters.
+        parameters; None of noise that has no finite size. Empty without parameters, or without
+        finite information of any.
     """
     total = np.sum([each.information[0] for each in parts], axis=0)
     if not len(total):
@@ -153,6 +154,8 @@ def seen_by_all(parts: Sequence[RecordParts]) -> list[tuple[Array, Array, Array]
     size = np.sqrt(np.maximum(np.diag(total), np.finfo(float).tiny))
     sizes, turned = np.linalg.eigh(_scaled(total))
     kept = sizes > LEAST_INFORMATION * sizes[-1]
+    if not kept.any():
+        return []
     root = turned[:, kept] / np.sqrt(sizes[kept]) / size[:, None]
     shares = [root.T @ each.information[0] @ root for each in parts]
     seen: list[tuple[Array, Array, Array] | None] = []

@@ -192,8 +192,9 @@ def _error(
     model: GreyBoxModel, prepared: RecordSet, shares: Array, parts: Sequence[Array]
 ) -> FitError:
     top = max(float(shares.max()), *(float(part.max(initial=0.0)) for part in parts))
-    free = [p.name for p, share in zip(model.parameters.free, shares, strict=True)
-            if share > SHARE * top]  # fmt: skip
+    # It is a parameter that the others undo, however many of them and how small it is beside them.
+    most = SHARE * float(shares.max())
+    free = [p.name for p, share in zip(model.parameters.free, shares, strict=True) if share > most]
     biased, others = set[str](), set[str]()
     for numbers, part in zip(prepared.own, parts, strict=True):
         for place, share in enumerate(part):
