@@ -108,7 +108,7 @@ OWN = {
     "control.tuning": (
         "requirements of a design and its evidence",
         "accept_red angle_loop by_hand filters gyro_noise name nominal other_loops requirements "
-        "sign signs verification verifications",
+        "rigid sign signs verification verifications",
     ),
     "dynamics": (
         "words of the standards: response types, classes, categories, derivatives",

@@ -21,6 +21,7 @@ from flightid.control.tuning.band_findings import asked_above, below_band, taken
 from flightid.control.tuning.findings import verdict
 from flightid.control.tuning.mode_slacks import slacks_of
 from flightid.control.tuning.modes_outside import BELOW_BAND
+from flightid.control.tuning.rigid_vehicle import RIGID
 from flightid.control.tuning.wider_band import wider_band
 from flightid.control.tuning.worst_cases import WorstCase
 from flightid.conventions import Light
@@ -106,7 +107,7 @@ def test_where_a_resonance_may_leave_less_than_is_required_nothing_is_promised()
     light = verdict(found, np.ones(300, dtype=bool), 300, design.worst_cases, (0.1, 40.0), wider)
     assert light.light is Light.AMBER
     assert "say nothing of a light mode above it" in light.message
-    assert light.action == wider[1]
+    assert light.action == f"{wider[1]}; {RIGID}"
     up = float(re.search(r"higher frequencies, up to ([\d.]+) rad/s", wider[1]).group(1))  # type: ignore[union-attr]
     assert up > 40.0
     omega = design.problem.plants.omega_rad_s
@@ -349,12 +350,12 @@ def test_what_was_asked_and_may_be_taken_is_a_check_that_was_not_made(
     case = WorstCase("rate loop", "gain reduction margin", reading, None, None, None, required)
     whole = Estimate("rate loop: phase margin", 60.0, "deg")
     kept = WorstCase("rate loop", "phase margin", whole, 50.0, None, None, "≥ 45")
-    result = SimpleNamespace(worst_cases=(kept, case))
+    result = SimpleNamespace(worst_cases=(kept, case), problem=SimpleNamespace(rigid=False))
     (said,) = below_band(result, (4.0, 100.0), "sweep lower")  # type: ignore[arg-type]
     assert (said.code, said.light) == ("mode-below-band", light)
     assert "may take gain reduction margin, and none is promised" in said.message
     assert "nothing is known below 4 rad/s" in said.message
-    assert said.action == "sweep lower"
+    assert said.action == f"sweep lower; {RIGID}"
     above = replace(case, estimate=replace(reading, reason=TAKEN["above"]))
     assert asked_above((kept, above)) is (light is Light.AMBER)
 
@@ -362,7 +363,7 @@ def test_what_was_asked_and_may_be_taken_is_a_check_that_was_not_made(
 def test_a_loop_at_one_below_the_band_names_where_the_band_begins() -> None:
     reading = Estimate("rate loop: phase margin", 60.0, "deg", reason=BELOW_BAND)
     case = WorstCase("rate loop", "phase margin", reading, None, None, None, "≥ 45")
-    result = SimpleNamespace(worst_cases=(case,))
+    result = SimpleNamespace(worst_cases=(case,), problem=SimpleNamespace(rigid=False))
     (said,) = below_band(result, (4.0, 100.0), "sweep lower")  # type: ignore[arg-type]
     assert (said.code, said.light) == ("margin-below-band", Light.AMBER)
     assert said.message.startswith("rate loop: the gain is at one below the 4 rad/s from which")

@@ -13,6 +13,7 @@ from flightid.control.autopilots.parameter_files import parameter_suffix
 from flightid.control.autopilots.pid_loop import PidLoop
 from flightid.control.tuning.limits import ANGLE
 from flightid.control.tuning.result import untouched_finding
+from flightid.control.tuning.rigid_vehicle import DECLARED
 from flightid.control.tuning.unpromised import outside_words
 from flightid.conventions import Light
 from flightid.findings import MOST_DIGITS, Finding, at_least, counted, worst
@@ -79,6 +80,8 @@ def gains_finding(
     what = "rig" if plain else "vehicle"
     light = worst(findings) if findings else Light.GREEN
     message = f"gains of {axes}{promise} at the worst {what} that the data allow"
+    if any(each.code == DECLARED for each in findings):
+        message += ", declared rigid"
     asked = designs[0].requirements.phase_margin_deg
     if least and min(least) < asked:
         share = min(design.share_met for design in designs)

@@ -32,6 +32,11 @@ TAKEN = {
     "above": "a resonance above the identified band may leave less",
     "below": "a light mode below the identified band may leave less",
 }
+NEAR_ONE = {
+    "above": "near one above the identified band",
+    "below": "near one below the identified band",
+}
+"""Why a number is not promised of a loop that no mode moves."""
 Side = Literal["above", "below"]
 
 
@@ -59,7 +64,7 @@ class ModeSlack:
     room_db : float
         By how much the loop itself may be moved where least is left.
     moved_db : float
-        By how much a mode may move it there.
+        By how much a mode may move it there; 0 where the vehicle was declared rigid.
 
     Example
     -------
@@ -109,6 +114,16 @@ class ModeSlack:
         """Whether a mode may make the loop pass one, where it takes stability, too."""
         return self.left_db < 0.0
 
+    @property
+    def has_mode(self) -> bool:
+        """Whether a mode is allowed for, and it is not the loop itself that is near one."""
+        return self.moved_db > 0.0
+
+    @property
+    def reason(self) -> str:
+        """Why a number that is taken is not promised."""
+        return TAKEN[self.side] if self.has_mode else NEAR_ONE[self.side]
+
     def edge(self, field: str) -> float | None:
         """What a mode may make of a number of `LoopMetrics`; None where it does not touch it.
 
@@ -140,7 +155,7 @@ class ModeSlack:
         if field in AT_ONE and field != OWN_MARGIN[self.side]:
             return self.passes_one
         if field == "disturbance_bandwidth_rad_s":
-            return self.side == "below" and self.left_db < AT_BANDWIDTH_DB
+            return self.side == "below" and self.has_mode and self.left_db < AT_BANDWIDTH_DB
         return field in MORE_IS_BETTER and self.left_db < least_db
 
     def takes_all(self, least_db: float) -> bool:
@@ -164,7 +179,7 @@ class ModeSlack:
         if number.value is None or edge is None or number.interval95 is None:
             return number
         if self.takes(field, least_db):
-            return Estimate(number.name, number.value, number.unit, None, TAKEN[self.side])
+            return Estimate(number.name, number.value, number.unit, None, self.reason)
         low, high = number.interval95
         if edge >= low if MORE_IS_BETTER[field] else edge <= high:
             return number

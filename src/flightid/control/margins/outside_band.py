@@ -20,7 +20,8 @@ TO_SEE_IT = 1.3
 """Band beyond the frequency of a margin from which the model is known about it."""
 BEYOND = "read above the band to which the model was shown to hold"
 RESTING = "no gain margin or peak is promised, and phase and delay margin rest on no such mode"
-LOWER = "put a notch on what spectra of the gyro show there, or lower the loop by filters or gains"
+LESS = "lower the loop by filters or gains"
+LOWER = f"put a notch on what spectra of the gyro show there, or {LESS}"
 PLACES = READ_AT | {
     "phase_crossover_rad_s": "phase_crossover_rad_s",
     "gain_reduction_rad_s": "gain_reduction_rad_s",
@@ -56,6 +57,8 @@ class MarginBeyond:
         What a resonance that passes one takes, in words.
     asked : bool
         Whether a margin that may be taken is required: a check that was not made.
+    instead : str
+        What else to do than sweep, where there is something.
     """
 
     loop: str
@@ -64,6 +67,7 @@ class MarginBeyond:
     clear_rad_s: float = 0.0
     taken: str = RESTING
     asked: bool = False
+    instead: str = ""
 
     @property
     def is_near(self) -> bool:
@@ -76,6 +80,8 @@ class MarginBeyond:
         room, moved = self.slack.room_db, self.slack.moved_db
         if room <= 0.0:
             return f"there the loop passes one again, by {-room:.2g} dB in the model alone"
+        if not self.slack.has_mode:
+            return f"there the loop comes as near to one as {room:.2g} dB in the model alone"
         if not self.is_near:
             return (
                 f"a resonance there that raises the response by {moved:.2g} dB may leave "
@@ -97,7 +103,8 @@ def beyond_findings(
             f"{_limit(each, top)}",
             "sweep to higher frequencies, and identify up to "
             f"{max(TO_SEE_IT * max(each.omega_rad_s, top), each.clear_rad_s):.3g} rad/s or further"
-            + (f"; or {LOWER}" if each.is_near or each.asked else ""),
+            + (f"; or {LOWER}" if each.is_near or (each.asked and each.slack.has_mode) else "")
+            + (f"; {each.instead}" if each.instead else ""),
         )
         for each in found
     ]
@@ -108,7 +115,7 @@ def _limit(each: MarginBeyond, top_rad_s: float) -> str:
     taken = each.taken if each.is_near else "no gain margin or peak is promised"
     if each.omega_rad_s > top_rad_s:
         said = f"above {shown}: {each.words}, and nothing is promised of those margins"
-        return f"{said}: {taken}" if each.is_near or each.asked else said
+        return f"{said}: {taken}" if each.is_near or (each.asked and each.slack.has_mode) else said
     return f"but nothing is known above {shown}: {each.words}, and {taken}"
 
 

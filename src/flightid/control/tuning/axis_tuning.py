@@ -171,6 +171,7 @@ def problem_of(
         paths.loop.inner,
         paths.loop.time_scale,
         paths.integral_ratio(need.integral_factor),
+        rigid=setting.evidence.rigid,
     )
 
 

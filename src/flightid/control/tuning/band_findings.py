@@ -1,17 +1,37 @@
-"""Verdicts on loops that light modes outside the band may reach, with how far to sweep."""
+"""Verdicts on loops that light modes outside the band may reach, with what to do about it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
 from flightid.control.margins.mode_slack import MOST_MOVED_DB, TAKEN
+from flightid.control.margins.outside_band import beyond_findings
 from flightid.control.tuning.axis_tuning import AxisResult
-from flightid.control.tuning.modes_outside import ABOVE_BAND, BELOW_BAND
+from flightid.control.tuning.modes_outside import BELOW_BAND, OF_ABOVE
+from flightid.control.tuning.rigid_vehicle import RIGID, rigid_declared
 from flightid.control.tuning.worst_cases import WorstCase
 from flightid.conventions import Light
 from flightid.findings import Finding
 
 Band = tuple[float, float]
+
+
+def band_findings(
+    result: AxisResult, band_rad_s: Band | None, wider: tuple[str, str]
+) -> Iterator[Finding]:
+    """All that is to be said of what lies outside the band.
+
+    Parameters
+    ----------
+    result : AxisResult
+    band_rad_s : tuple of float or None
+        Where the model was shown to hold, rad/s.
+    wider : tuple of str
+        What brings its low end, and its high end, so far that all is promised.
+    """
+    yield from rigid_declared(result.problem.rigid, band_rad_s)
+    yield from beyond_findings(result.beyond, band_rad_s)
+    yield from below_band(result, band_rad_s, wider[0])
 
 
 def below_band(result: AxisResult, band_rad_s: Band | None, sweep: str) -> Iterator[Finding]:
@@ -28,13 +48,15 @@ def below_band(result: AxisResult, band_rad_s: Band | None, sweep: str) -> Itera
     if band_rad_s is None:
         return
     if found := at_one_below(result.worst_cases):
+        taken = "a light mode there, such as a pendulum, may take margins and stability, and "
+        if result.problem.rigid:
+            taken = "what stands there is the model's word alone, and "
         yield Finding(
             "margin-below-band",
             Light.AMBER,
             f"{' and '.join(found)}: the gain is at one below the {band_rad_s[0]:.3g} rad/s from "
-            "which the model was shown to hold, or nearer to it there than is asked: a light mode "
-            "there, such as a pendulum, may take margins and stability, and no margin, peak or "
-            "bandwidth is promised",
+            f"which the model was shown to hold, or nearer to it there than is asked: {taken}"
+            "no margin, peak or bandwidth is promised",
             sweep,
         )
     lowered = _named(result.worst_cases, TAKEN["below"])
@@ -47,7 +69,7 @@ def below_band(result: AxisResult, band_rad_s: Band | None, sweep: str) -> Itera
             f"{' and '.join(rest)}: nothing is known below {band_rad_s[0]:.3g} rad/s: a light mode "
             f"there that lowers the response by up to {MOST_MOVED_DB:g} dB may take "
             f"{taken_words(result.worst_cases, rest)}, and none is promised",
-            sweep,
+            f"{sweep}; {RIGID}",
         )
 
 
@@ -63,7 +85,13 @@ def asked_below(cases: Sequence[WorstCase]) -> bool:
 
 def asked_above(cases: Sequence[WorstCase]) -> bool:
     """Whether what lies above the band may take what was asked of a loop."""
-    return any(e.required and e.estimate.reason in (ABOVE_BAND, TAKEN["above"]) for e in cases)
+    return any(e.required and e.estimate.reason in OF_ABOVE for e in cases)
+
+
+def by_modes_alone(cases: Sequence[WorstCase]) -> bool:
+    """Whether all that was asked and is not promised is what light modes may take."""
+    asked = [each.estimate.reason for each in cases if each.required]
+    return not {BELOW_BAND, *OF_ABOVE}.difference(TAKEN.values()).intersection(asked)
 
 
 def _named(cases: Sequence[WorstCase], reason: str) -> list[str]:

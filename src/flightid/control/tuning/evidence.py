@@ -82,6 +82,8 @@ class TuningEvidence:
         By ``"output/input"``: how far the model itself was from its data.
     left_out : int
         Fresh plants drawn that no gains could hold beside the others.
+    rigid : bool
+        Whether the vehicle was declared to have no light mode outside the band.
     """
 
     estimate: LinearSystem
@@ -94,6 +96,7 @@ class TuningEvidence:
     coherences: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
     errors: Mapping[str, ModelErrorBound] = field(default_factory=dict)
     left_out: int = 0
+    rigid: bool = False
 
     @property
     def sources(self) -> tuple[LinearSystem, ...]:
@@ -114,6 +117,7 @@ def gather(
     nominal: bool,
     accept_red: bool,
     needs_band: bool,
+    rigid: bool = False,
 ) -> TuningEvidence:
     """Collect plants, or refuse where the data cannot carry gains.
 
@@ -137,6 +141,8 @@ def gather(
         Go on where the data refuse gains; every refusal is then a red finding.
     needs_band : bool
         Whether the crossover is bounded by the band.
+    rigid : bool
+        Declare that nothing on the vehicle swings or bends outside the band.
 
     Raises
     ------
@@ -178,6 +184,7 @@ def gather(
             if hasattr(each, "measured")
         },
         errors,
+        rigid=rigid,
     )
 
 

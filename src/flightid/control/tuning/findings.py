@@ -11,12 +11,18 @@ from flightid.control.autopilots import AxisLoop
 from flightid.control.gyro import Gyro
 from flightid.control.margins.findings import COHERENCE
 from flightid.control.tuning.axis_tuning import AxisResult
-from flightid.control.tuning.band_findings import asked_above, asked_below, at_one_below
+from flightid.control.tuning.band_findings import (
+    asked_above,
+    asked_below,
+    at_one_below,
+    by_modes_alone,
+)
 from flightid.control.tuning.gain_search import INTEGRAL, LOW_END
 from flightid.control.tuning.gain_search_result import NO_GAINS, GainSearchResult
 from flightid.control.tuning.gain_steps import Stage, TunedGain
 from flightid.control.tuning.limits import ANGLE
 from flightid.control.tuning.order_statistics import ENOUGH, least_share
+from flightid.control.tuning.rigid_vehicle import RIGID
 from flightid.control.tuning.worst_cases import WorstCase
 from flightid.conventions import Light
 from flightid.findings import Finding, at_least
@@ -47,6 +53,7 @@ def verdict(
     worst_cases: Sequence[WorstCase] = (),
     band_rad_s: tuple[float, float] | None = None,
     wider: tuple[str, str] = ("", ""),
+    rigid: bool = False,
 ) -> Finding:
     """Whether there are gains, and for how many plants: the one light of gains, wherever it shows.
 
@@ -64,6 +71,8 @@ def verdict(
         Where the model was shown to hold, rad/s.
     wider : tuple of str
         What brings its low end, and its high end, so far that all that was asked is promised.
+    rigid : bool
+        Whether the vehicle was declared to have no light mode outside it.
     """
     if not found.exists:
         return _no_gains(found)
@@ -79,10 +88,12 @@ def verdict(
     shown = ""
     if band_rad_s is not None:
         shown = f" in the band shown, {band_rad_s[0]:.3g} to {band_rad_s[1]:.3g} rad/s"
-    if sides := ["below"] * low + ["above"] * high:
-        shown += f", and say nothing of a light mode {' and '.join(sides)} it, which may take "
-        shown += "margins and stability"
+    shown += ", declared rigid" if rigid else ""
+    if sides := " and ".join(["below"] * low + ["above"] * high):
+        mode = f"a light mode {sides} it, which may take margins and stability"
+        shown += f", and say nothing of {f'what lies {sides} it' if rigid else mode}"
     where = [text for text, taken in zip(wider, (low, high), strict=True) if taken and text]
+    where += [RIGID] if where and not rigid and by_modes_alone(worst_cases) else []
     return Finding(
         "gains",
         Light.GREEN if share >= ENOUGH and not (low or high) else Light.AMBER,

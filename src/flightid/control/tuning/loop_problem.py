@@ -184,6 +184,8 @@ class LoopProblem:
         Largest I over P, 1/s.
     moved_db : ndarray, shape (n_f,), or None
         By how much a mode outside the identified band may move the vehicle, dB; None: not known.
+    rigid : bool
+        Whether the vehicle was declared to carry none: no mode is allowed for.
     measured : tuple of ndarray or None
         Frequencies (rad/s) and coherence of the response that was fitted.
     """
@@ -201,6 +203,7 @@ class LoopProblem:
     time_scale: float = 1.0
     integral_ratio: float = float("inf")
     moved_db: Array | None = None
+    rigid: bool = False
     measured: tuple[Array, Array] | None = None
 
     def with_plants(self, plants: Plants) -> LoopProblem:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.control.margins.outside_band import MarginBeyond
+from flightid.control.margins.outside_band import LESS, MarginBeyond
 from flightid.control.tuning.limits import ANGLE
 from flightid.control.tuning.loop_problem import LoopProblem
 from flightid.control.tuning.mode_slacks import clear_from, slacks_of
+from flightid.control.tuning.rigid_vehicle import RIGID
 
 PLACES = "phase_crossover_rad_s", "sensitivity_peak_rad_s", "delay_crossover_rad_s"
 """Where gain margin, sensitivity peak and delay margin are read."""
@@ -40,7 +41,10 @@ def margins_beyond(
     for name, metrics in judged.metrics.items():
         highest = max(float(np.nanmax(getattr(metrics, at), initial=0.0)) for at in PLACES)
         if name != ANGLE and (left[name].left_db < least_db or highest > band_rad_s[1]):
-            found.append(
-                MarginBeyond(name, highest, left[name], clear[name], NONE_PROMISED, asked=True)
-            )
+            near = left[name].own_db < least_db
+            instead = f"or {LESS}" if near and problem.rigid else ""
+            if not near and highest <= band_rad_s[1]:
+                instead = RIGID
+            told = {"taken": NONE_PROMISED, "instead": instead}
+            found.append(MarginBeyond(name, highest, left[name], clear[name], asked=True, **told))
     return tuple(found)

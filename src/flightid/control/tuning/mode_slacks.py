@@ -43,12 +43,14 @@ def slacks_of(
     if not outside.any():
         return {}
     moved = np.full(omega.shape, MOST_MOVED_DB) if problem.moved_db is None else problem.moved_db
+    if problem.rigid:
+        moved = np.zeros(omega.shape)
     loops = problem.loops(gains[None], problem.plants.take([0]))
     return {
         name: ModeSlack.of(
             side,
             loop[0, 0, outside],
-            loops.rate[0, 0, outside] if name == ANGLE else None,
+            loops.rate[0, 0, outside] if name == ANGLE and not problem.rigid else None,
             moved[outside],
         )
         for name, loop in loops.named()
@@ -67,7 +69,7 @@ def clear_from(
     band_rad_s : tuple of float
     side : {"above", "below"}
     least_db : float
-        What is to be left of a mode of ordinary size.
+        What is to be left of a mode of ordinary size, or of the loop itself of a rigid vehicle.
 
     Returns
     -------
@@ -77,10 +79,10 @@ def clear_from(
     omega = problem.plants.omega_rad_s
     outside = omega >= band_rad_s[1] if side == "above" else omega <= band_rad_s[0]
     loops = problem.loops(gains[None], problem.plants.take([0]))
-    found = {}
+    found, moved_db = {}, 0.0 if problem.rigid else MOST_MOVED_DB
     for name, loop in loops.named():
-        inner = loops.rate[0, 0] if name == ANGLE else None
-        left = left_by_frequency(side, loop[0, 0], inner, MOST_MOVED_DB)
+        inner = loops.rate[0, 0] if name == ANGLE and not problem.rigid else None
+        left = left_by_frequency(side, loop[0, 0], inner, moved_db)
         short = omega[outside & (left < least_db)]
         if side == "above":
             last = float(short.max(initial=0.0))

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.control.margins.mode_slack import TAKEN, ModeSlack
+from flightid.control.margins.mode_slack import NEAR_ONE, TAKEN, ModeSlack
 from flightid.control.tuning.loop_problem import LoopAssessment, LoopProblem
 from flightid.control.tuning.mode_slacks import slacks_of
 from flightid.frozen import dataclass
@@ -15,6 +15,8 @@ from flightid.frozen import dataclass
 Band = tuple[float, float]
 ABOVE_BAND = "read above the identified band"
 BELOW_BAND = "at one below the identified band"
+OF_ABOVE = ABOVE_BAND, NEAR_ONE["above"], TAKEN["above"]
+"""Why a number is not promised for what lies above the band."""
 CROSSINGS = "crossover_rad_s", "delay_crossover_rad_s"
 """Where a loop passes one."""
 
@@ -112,5 +114,5 @@ def _unpromised(
     if low.takes_all(least_db) or np.any(crossings < band_rad_s[0]):
         return BELOW_BAND
     if low.takes(place.field, least_db):
-        return TAKEN["below"]
-    return TAKEN["above"] if room.takes(place.field, least_db) else ""
+        return low.reason
+    return room.reason if room.takes(place.field, least_db) else ""

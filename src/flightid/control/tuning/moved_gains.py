@@ -149,7 +149,9 @@ def _verdict(
     left = cast(int, design.provenance.get("left_out", 0))
     band = cast("tuple[float, float] | None", design.provenance.get("band_rad_s"))
     wider = wider_band(design.problem, held.gains, band)
-    return verdict(held, met, len(met) + left if known else 0, made, band, wider)
+    return verdict(
+        held, met, len(met) + left if known else 0, made, band, wider, design.problem.rigid
+    )
 
 
 def _bands(design: PidDesign, loop: object) -> tuple[ResponseBand, ...]:

@@ -61,6 +61,12 @@ class TuneOptions(Options):
         "as they stand, gains that are not named as flown. Of a PID of its own Kp, Ki, Kd, with "
         "several loops output/Kp; what is not named is zero.",
     )
+    rigid: bool = option(
+        False,
+        doc="Declares that the vehicle carries nothing that swings or bends outside the band of "
+        "its model: no sling load, fuel slosh, soft mounts or arms. Light modes there are then "
+        "not allowed for; nothing shows it, and every promise says so.",
+    )
     accept_red: bool = option(
         False,
         doc="Make gains where the data refuse them, and write them: every refusal stands in the "

@@ -16,6 +16,7 @@ from flightid.control.tuning.loop_problem import LoopProblem
 from flightid.control.tuning.pid_file import write_settings
 from flightid.control.tuning.requirements import TuningRequirements
 from flightid.control.tuning.responses import ClosedPlants, ResponseBand
+from flightid.control.tuning.rigid_vehicle import DECLARED
 from flightid.control.tuning.worst_cases import WorstCase
 from flightid.conventions import Light
 from flightid.errors import DataError, UnknownNameError
@@ -382,7 +383,8 @@ def require_gains(
             action=f"{first.action or 'mend that'}; accept_red writes them all the same, with "
             "every red finding at the top of the file",
         )
-    return [f"RED, accepted by the user: {message}" for message in red]
+    declared = {finding.message: None for finding in said if finding.code == DECLARED}
+    return [*declared, *(f"RED, accepted by the user: {message}" for message in red)]
 
 
 def _step_changes(design: PidDesign, step: int) -> list[GainChange]:

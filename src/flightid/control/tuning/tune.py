@@ -73,6 +73,7 @@ def tune(
     other_loops: OtherLoops = "closed",
     filters: FilterChoice | None = None,
     by_hand: Mapping[str, float] | None = None,
+    rigid: bool = False,
 ) -> Tuning:
     """Gains of several axes; axes of one model are tuned with each other's loops closed.
 
@@ -91,7 +92,7 @@ def tune(
     autopilot : str
         Of parameters given by name; a log tells its autopilot.
     requirements : TuningRequirements, or a mapping of them by axis, optional
-    gyro, angle_loop, band_rad_s, draws, seed, nominal, accept_red : optional
+    gyro, angle_loop, band_rad_s, draws, seed, nominal, accept_red, rigid : optional
         As for `flightid.tune_pid`.
     signs : mapping of str to int, optional
         −1 for an axis whose rate answers the command the other way round.
@@ -141,7 +142,7 @@ def tune(
     shared: dict[str, Any] = {
         "band_rad_s": band_rad_s, "draws": draws, "seed": seed,
         "nominal": nominal, "accept_red": accept_red, "filters": filters,
-        "by_hand": by_hand or {},
+        "by_hand": by_hand or {}, "rigid": rigid,
     }  # fmt: skip
     if by_hand:
         require_known(by_hand, loops_of(gains, autopilot, fits))

@@ -71,6 +71,7 @@ def tune_controller(
     nominal: bool = False,
     by_hand: Mapping[str, float] | None = None,
     accept_red: bool = False,
+    rigid: bool = False,
 ) -> PidDesign:
     """Gains of a PID controller that keep their margins for every plant that the data allow.
 
@@ -91,7 +92,7 @@ def tune_controller(
     by_hand : mapping of str to float, optional
         Gains by name (Kp, Ki, Kd) that are judged as they stand in place of a search; those that
         are not named are zero.
-    band_rad_s, verification, draws, seed, nominal, accept_red : optional
+    band_rad_s, verification, draws, seed, nominal, accept_red, rigid : optional
         As for `flightid.tune_pid`.
 
     Returns
@@ -136,7 +137,7 @@ def tune_controller(
     need = (requirements or TuningRequirements()).of_own_controller()
     common = {"draws": draws, "fresh": draws, "seed": seed, "band_rad_s": band_rad_s,
               "verification": verification, "nominal": nominal, "accept_red": accept_red,
-              "needs_band": need.band_factor is not None}  # fmt: skip
+              "needs_band": need.band_factor is not None, "rigid": rigid}  # fmt: skip
     # A continuous model is drawn alike for any step; a sampled one knows its own rate.
     evidence = gather(fit, 1.0 / (rate_hz or 1.0), ["/".join(channels)], **common)  # type: ignore[arg-type]
     direct, evidence = _of_one_sign(evidence, *channels)

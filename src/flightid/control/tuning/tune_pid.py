@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 
 from flightid.control.autopilots import AxisLoop
 from flightid.control.gyro import Gyro
-from flightid.control.margins.outside_band import beyond_findings
 from flightid.control.tuning.axis_tuning import (
     JUDGED_POINTS,
     SEARCH_POINTS,
@@ -22,7 +21,7 @@ from flightid.control.tuning.axis_tuning import (
     stages_of,
     tune_axis,
 )
-from flightid.control.tuning.band_findings import below_band
+from flightid.control.tuning.band_findings import band_findings
 from flightid.control.tuning.controller_paths import ControllerPaths, has_angle_loop
 from flightid.control.tuning.evidence import TuningEvidence, Verdicts, gather
 from flightid.control.tuning.filter_choice import FilterChoice
@@ -74,6 +73,7 @@ def tune_pid(
     nominal: bool = False,
     accept_red: bool = False,
     by_hand: Mapping[str, float] | None = None,
+    rigid: bool = False,
 ) -> PidDesign:
     """Gains of one axis that keep their margins for every plant that the data allow.
 
@@ -122,6 +122,9 @@ def tune_pid(
     by_hand : mapping of str to float, optional
         Gains by the autopilot's names that are judged as they stand in place of a search; those
         that are not named stay as flown.
+    rigid : bool
+        Declare that nothing on the vehicle (sling load, fuel slosh, soft mounts or arms) swings or
+        bends outside the model's band: no light mode is allowed for there, as promises then say.
 
     Returns
     -------
@@ -180,6 +183,7 @@ def tune_pid(
         nominal=nominal,
         accept_red=accept_red,
         needs_band=need.band_factor is not None,
+        rigid=rigid,
     )
     setting = make_setting(
         evidence,
@@ -313,12 +317,12 @@ def design_of(
         result.problem,
         (
             verdict(
-                result.found, result.met, drawn if known else 0, result.worst_cases, band, wider
+                *(result.found, result.met, drawn if known else 0, result.worst_cases),
+                *(band, wider, result.problem.rigid),
             ),
             *remarks(result, flown, changes, stages, couplings, setting.gyro),
             *low_coherence(result, setting.coherence_of(place)),
-            *beyond_findings(result.beyond, band),
-            *below_band(result, band, wider[0]),
+            *band_findings(result, band, wider),
             *setting.evidence.findings,
         ),
         {
@@ -328,6 +332,7 @@ def design_of(
             "fresh_draws": len(setting.evidence.fresh),
             "seed": seed,
             "band_rad_s": band,
+            "rigid": result.problem.rigid,
             "rate": setting.gyro,
             "hold_in_model": setting.evidence.hold_in_model,
             "left_out": setting.evidence.left_out,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from flightid.control.margins.mode_slack import TAKEN
-from flightid.control.tuning.modes_outside import ABOVE_BAND, BELOW_BAND
+from flightid.control.tuning.modes_outside import BELOW_BAND, OF_ABOVE
 from flightid.control.tuning.worst_cases import WorstCase
 
 BAND = "the band in which the model was shown to hold"
@@ -34,7 +34,7 @@ def outside_words(cases: Iterable[WorstCase], *, above: bool = False) -> str:
     """
     without = [each for each in cases if each.worst is None]
     below = [each for each in without if each.estimate.reason in (BELOW_BAND, TAKEN["below"])]
-    above = above or any(each.estimate.reason in (ABOVE_BAND, TAKEN["above"]) for each in without)
+    above = above or any(each.estimate.reason in OF_ABOVE for each in without)
     named = ", ".join(dict.fromkeys(f"{each.name} of {each.loop}" for each in below))
     if not below:
         return f"what lies above {BAND}" if above else ""

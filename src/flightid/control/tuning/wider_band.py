@@ -46,13 +46,20 @@ def wider_band(problem: LoopProblem, gains: Array, band_rad_s: Band | None) -> t
     least_db = problem.requirements.gain_margin_db
     low = min(clear_from(problem, gains, band_rad_s, "below", least_db).values())
     high = max(clear_from(problem, gains, band_rad_s, "above", least_db).values())
-    return lower_sweep(low, band_rad_s[0], problem.measured), higher_sweep(high)
+    # Of a rigid vehicle the loop is low enough before its margins are read: those lines say where.
+    further = 0.0 if problem.rigid and np.isfinite(high) else high
+    return (
+        lower_sweep(low, band_rad_s[0], problem.measured),
+        higher_sweep(further, band_rad_s[1]),
+    )
 
 
-def higher_sweep(needed_rad_s: float) -> str:
+def higher_sweep(needed_rad_s: float, top_rad_s: float) -> str:
     """How far up to sweep for a band to a frequency, rad/s; infinite: there is none."""
     if np.isinf(needed_rad_s):
         return "lower the loop by filters or less D: it stays near one up to half the loop rate"
+    if needed_rad_s <= top_rad_s:
+        return "sweep to higher frequencies, until margins are read inside the band"
     return f"sweep to higher frequencies, up to {FURTHER * needed_rad_s:.3g} rad/s"
 
 
