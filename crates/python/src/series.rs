@@ -1,10 +1,11 @@
 //! Face of what is done to sampled series.
 //! (Python side: uncertainty/residual_noise.py, uncertainty/slow_drift.py,
-//! responses/windows/transform.py)
+//! uncertainty/unequal_noise.py, responses/windows/transform.py)
 
 use flightid_core::frequency_domain::composite::{CompositeRule, composite as core_composite};
 use flightid_core::numerics::folded_frames::{Frames, folded_frames as folded};
 use flightid_core::numerics::levinson::weights as levinson;
+use flightid_core::numerics::ranks::ranks as ranked;
 use flightid_core::numerics::slow_drift::{Parts, Rounds, Spectrum};
 use numpy::{IntoPyArray, PyArray1, PyUntypedArrayMethods};
 use pyo3::prelude::*;
@@ -118,6 +119,15 @@ fn folded_frames<'py>(
     Ok(found.map(|each| each.into_pyarray(py)))
 }
 
+/// ranks(row: NDArray[np.float64]) -> NDArray[np.float64]
+///
+/// Ranks about zero and of unit variance, ties sharing theirs; zeros where all numbers are the same.
+#[pyfunction]
+fn ranks<'py>(py: Python<'py>, row: RowMajor1<'_, f64>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let row = row.as_slice()?;
+    Ok(py.detach(|| ranked(row)).into_pyarray(py))
+}
+
 /// Add this file's names to the module.
 ///
 /// # Errors
@@ -127,5 +137,6 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(drift_beside, module)?)?;
     module.add_function(wrap_pyfunction!(drift_likelihood, module)?)?;
     module.add_function(wrap_pyfunction!(folded_frames, module)?)?;
+    module.add_function(wrap_pyfunction!(ranks, module)?)?;
     module.add_function(wrap_pyfunction!(autoregression_weights, module)?)
 }

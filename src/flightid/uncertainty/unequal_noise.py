@@ -15,6 +15,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from flightid._native import ranks
 from flightid.frozen import dataclass
 from flightid.recursive_filter import filtered
 from flightid.uncertainty.blocks import RecordBlock, halves, levels
@@ -100,8 +101,8 @@ class Ranks:
         np.square(each, out=each)
         size = np.maximum(np.mean(each, axis=1), np.finfo(float).tiny)
         np.matmul(1.0 / size, each, out=signals[-1])
-        ranked = np.array([_ranks(row[kept]) for row in signals])
-        return cls(_ranks(np.abs(errors[kept])), ranked)
+        ranked = np.array([ranks(row[kept]) for row in signals])
+        return cls(ranks(np.abs(errors[kept])), ranked)
 
     @cached_property
     def together(self) -> Array:
@@ -128,23 +129,6 @@ def _score(known: Sequence[Ranks], limit: float) -> float:
     counted = [each.counted(some) for each in known]
     moved = [each.together[some] * count for each, count in zip(known, counted, strict=True)]
     return float(np.max(np.sum(moved, axis=0) / np.sqrt(np.sum(counted, axis=0))))
-
-
-def _ranks(row: Array) -> Array:
-    """Ranks of unit variance about zero; ties share theirs."""
-    order = np.argsort(row)
-    sorted_row = row[order]
-    about = np.arange(row.size) - 0.5 * (row.size - 1)
-    new = np.flatnonzero(sorted_row[1:] != sorted_row[:-1]) + 1
-    if new.size < row.size - 1:
-        ends = np.append(new, row.size)
-        begins = np.append(0, new)
-        about = np.repeat(0.5 * (begins + ends - row.size), ends - begins)
-    spread = float(np.sqrt(np.mean(about**2)))
-    found = np.zeros(row.size)
-    if spread > 0.0:
-        found[order] = about / spread
-    return found
 
 
 def _correlations(rows: Array) -> Array:
@@ -231,7 +215,7 @@ def unequal_outputs(
     for output, noise in enumerate(models):
         # Most noise is of one power: innovations are made where they are summed, not before.
         asked = (Ranks.of(noise, block, output, half) for block in blocks)
-        known = [ranks for ranks in asked if ranks is not None]
+        known = [each for each in asked if each is not None]
         if known and _score(known, limit) > limit:
             found[output] = [Innovations.of(noise, block, output) for block in blocks]
     return found

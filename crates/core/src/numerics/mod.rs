@@ -12,6 +12,7 @@ pub mod levinson;
 pub mod matrix_exponential;
 pub mod polynomial_roots;
 pub mod random;
+pub mod ranks;
 pub mod recursive_filter;
 pub mod running_median;
 pub mod slow_drift;
