@@ -101,8 +101,11 @@ class Ranks:
         np.square(each, out=each)
         size = np.maximum(np.mean(each, axis=1), np.finfo(float).tiny)
         np.matmul(1.0 / size, each, out=signals[-1])
-        ranked = np.array([ranks(row[kept]) for row in signals])
-        return cls(ranks(np.abs(errors[kept])), ranked)
+        if kept.size < len(errors):
+            errors, signals = errors[kept], np.take(signals, kept, axis=1)
+        for row in signals:
+            row[:] = ranks(row)
+        return cls(ranks(np.abs(errors)), signals)
 
     @cached_property
     def together(self) -> Array:
