@@ -22,7 +22,13 @@ from flightid.report.content import Document
 from flightid.report.text import to_text
 from flightid.study.answer import _models, models_in_short, short_document
 from flightid.study.faults import CODE, FAILED, TUNING
-from flightid.study.gain_answer import gain_table, gains_finding, margin_table, small_angles
+from flightid.study.gain_answer import (
+    gain_table,
+    gain_tables,
+    gains_finding,
+    margin_table,
+    small_angles,
+)
 from flightid.study.identified import LEFT_OUT, ModelResults
 from flightid.study.settings import Segment
 from flightid.study.stage_runner import digest
@@ -441,6 +447,24 @@ def test_margins_below_what_is_asked_and_columns_left_out_are_told() -> None:
     assert page.message == small, "the page says what the command says"
     free = flown.with_gains(ATC_ACCEL_R_MAX=0.0)
     assert not [*small_angles([SimpleNamespace(axis="roll", flown=free, loop=free)])]  # type: ignore[list-item]
+
+
+def test_a_title_of_margins_stands_above_a_table_of_margins() -> None:
+    """Of a log that was cut no margin was promised: a title and two notes stood above nothing."""
+    asked = SimpleNamespace(phase_margin_deg=45.0, gain_margin_db=6.0, angle_phase_margin_deg=60.0)
+    flown = axis_loop("px4_multicopter", "roll", loop_rate_hz=400.0)
+    change = SimpleNamespace(name="P", flown=0.1, new=0.4, ratio=4.0)
+    for worst, titles in ((None, 1), (50.0, 2)):
+        reading = Estimate("m", 60.0, "deg", reason="" if worst else BELOW_BAND)
+        case = WorstCase("rate loop", "phase margin", reading, worst, None, None, "≥ 45")
+        roll = SimpleNamespace(
+            axis="roll", filters=(), changes=(change,), stages=[None], loop=flown, flown=flown,
+            worst_cases=(case,), requirements=asked, findings=(),
+        )  # fmt: skip
+        tables = gain_tables((roll,), None)  # type: ignore[arg-type]
+        assert [bool(each.rows) for each in tables] == [True] * titles
+        words = "phase margin and gain margin: not promised, for what lies below the band"
+        assert any(words in note for note in tables[0].notes) is (worst is None)
 
 
 def test_gains_to_fly_next_stand_beside_those_that_flew() -> None:

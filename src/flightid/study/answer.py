@@ -18,7 +18,7 @@ from flightid.report.content import Document, Lights, Section, TableBlock
 from flightid.study.elsewhere import red_elsewhere
 from flightid.study.estimate_tables import short_modes_table, structure_words
 from flightid.study.faults import CODE, other_faults, tuning_fault
-from flightid.study.gain_answer import flown_again, gain_table, gains_finding, margin_table
+from flightid.study.gain_answer import flown_again, gain_tables, gains_finding
 from flightid.table import Table
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ def answer_of(
     if study.gain_flight is not None:
         findings.append(flown_again(study.gain_flight))
     made = tuning.sound or tuple(design for design in tuning.designs if design.exists)
-    tables = (gain_table(made, tuning.filters), margin_table(made)) if made else ()
+    tables = gain_tables(made, tuning.filters) if made else ()
     return StudyAnswer(tuple(findings), tables)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING
@@ -156,6 +157,14 @@ def flown_again(flight: GainFlight) -> Finding:
     return Finding("flown-again", worst(flight.findings), told, first.action if first else "")
 
 
+def gain_tables(designs: tuple[PidDesign, ...], filters: TunedFilters | None) -> tuple[Table, ...]:
+    """Gains and margins; where no margin is promised, the gains say so, without a table of none."""
+    gains, margins = gain_table(designs, filters), margin_table(designs)
+    if margins.rows:
+        return gains, margins
+    return (replace(gains, notes=(*gains.notes, *margins.notes)),)
+
+
 def gain_table(designs: tuple[PidDesign, ...], filters: TunedFilters | None) -> Table:
     """Each gain and filter as flown, of the first step, and new.
 
@@ -230,7 +239,7 @@ def margin_table(designs: tuple[PidDesign, ...]) -> Table:
     cases = (e for design in designs for e in design.worst_cases if e.name in MARGINS)
     if outside := outside_words(cases, above=beyond):
         shown = [[row[2 + 2 * place] for row in rows] for place in range(len(MARGINS))]
-        gone = [name for name, cells in zip(MARGINS, shown, strict=True) if {*cells} == {None}]
+        gone = [name for name, cells in zip(MARGINS, shown, strict=True) if {*cells} <= {None}]
         dashed = any(None in cells and {*cells} != {None} for cells in shown)
         what = " and ".join(["–"] * (dashed or not gone) + gone)
         notes.append(f"{what}: not promised, for {outside}.")
