@@ -10,6 +10,7 @@ import flightid as fid
 from flightid.conventions import Light
 from flightid.errors import DataError, FitError, OptionError
 from flightid.evidence import FeedbackTest
+from flightid.identification.advice.advice import _delays
 from flightid.identification.advice.delays import delays_to_scan
 from flightid.identification.prediction_error.linear_regression import (
     LinearRegression,
@@ -161,6 +162,10 @@ def test_no_delay_or_rate_is_told_of_a_controller_turned_round(kind: str) -> Non
     assert "answer-untold" in codes
     assert not codes & {"delay", "delay-unsure", "sampling-rate", "sampled-slowly"}
     assert Light.GREEN not in {each.light for each in advice.findings}
+    (untold,) = (each for each in advice.findings if each.code == "answer-untold")
+    assert "name what was injected where the file holds it (excitations)" in untold.action
+    (untold,) = _delays("y", advice.acts_after, 0.01, advice.feedback, ["sweep"])
+    assert untold.action.startswith("fit by way of sweep (excitations), comparing nk from 1 on")
     found = fid.impulse_response(record)
     assert found.delays == {"u": None}
     assert str(found.feedback) in found.summary().to_text()

@@ -257,6 +257,12 @@ def test_a_moved_band_asks_the_same_samples_once(monkeypatch: pytest.MonkeyPatch
     assert len(asked) == 3
 
 
+def test_no_chance_is_none() -> None:
+    """The sentence beside a table of advice said "(p = 0)"."""
+    assert "(p < 1e-300)" in str(FeedbackTest("closed", "test", 0.0, "u", 0.4))
+    assert "(p = 0.002)" in str(FeedbackTest("closed", "test", 0.002, "u", 0.4))
+
+
 def test_responses_say_the_worst_of_their_loops_where_all_know() -> None:
     opened, closed = FeedbackTest("open", "declared"), FeedbackTest("closed", "declared")
     some = [cast("fid.FrequencyResponse", SimpleNamespace(loop=t)) for t in (opened, closed, None)]

@@ -12,6 +12,7 @@ from flightid.errors import OptionError
 from flightid.frozen import dataclass
 from flightid.record.history import Step, is_of_log, spread_channels
 from flightid.record.hold import LOOPS
+from flightid.surface import spoken
 
 LEVEL = 0.01
 """Share of open loops that are called closed."""
@@ -128,7 +129,7 @@ class FeedbackTest:
         }
         if self.source in words:
             return words[self.source]
-        seen, chance = "past noise of the outputs explains", f"(p = {self.p_value:.2g})"
+        seen, chance = "past noise of the outputs explains", spoken(f"(p = {self.p_value:.2g})")
         if self.loop == "closed":
             share = f"{_percent(self.share)} % of what is new in input {self.input}"
             return f"loop closed: {seen} {share} {chance}"

@@ -176,7 +176,7 @@ def advise(
         *_excitation(orders, feedback),
         *_related(names, data),
         *_pulse(reason),
-        *_delays(name, acts, data.sample_time_s, feedback),
+        *_delays(name, acts, data.sample_time_s, feedback, listed[0].excitations),
         *_feedback(feedback),
         # Without an answer, or along a loop, poles are those of noise, or of the controller.
         *(
@@ -249,17 +249,21 @@ def _pulse(reason: str) -> list[Finding]:
 
 
 def _delays(
-    output: str, acts: Mapping[str, InputDelay], sample_time_s: float, test: FeedbackTest
+    output: str,
+    acts: Mapping[str, InputDelay],
+    sample_time_s: float,
+    test: FeedbackTest,
+    injected: Sequence[str],
 ) -> list[Finding]:
     if test.may_turn_round:
         message = (
             f"how late {output!r} answers {', '.join(map(repr, acts))}, and by which poles, cannot "
             "be told: in a loop what is seen may be the controller turned round"
         )
-        action = (
-            "log what is injected, and fit by way of it (excitations), comparing nk from 1 on; or "
-            "record with the loop open"
-        )
+        way = "name what was injected where the file holds it (excitations), else log it; fit by it"
+        if injected:
+            way = f"fit by way of {', '.join(injected)} (excitations)"
+        action = f"{way}, comparing nk from 1 on; or record with the loop open"
         return [Finding("answer-untold", Light.AMBER, message, action)]
     found = []
     if_open = "" if test.is_known else "if the loop was open: "

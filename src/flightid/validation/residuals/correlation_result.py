@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.frozen import dataclass
+from flightid.surface import spoken
 from flightid.uncertainty.residual_correlation import LEVEL
 
 
@@ -194,7 +195,7 @@ class CorrelationTest:
 
     def __repr__(self) -> str:
         """Channels, verdict and p-value on one line."""
-        worth = "" if self.p_value is None else f", p = {self.p_value:.3g}"
+        worth = "" if self.p_value is None else spoken(f", p = {self.p_value:.3g}")
         return f"CorrelationTest({self.name}: {self.verdict}{worth})"
 
 
