@@ -102,8 +102,8 @@ OWN = {
     ),
     "control.margins": (
         "what a measured loop is, and guides",
-        "bandwidth_guide_rad_s gain_guide_db given peak_guide_db phase_guide_deg skew "
-        "unstable_poles",
+        "bandwidth_guide_rad_s gain_guide_db given peak_guide_db phase_guide_deg rigid "
+        "skew unstable_poles",
     ),
     "control.tuning": (
         "requirements of a design and its evidence",

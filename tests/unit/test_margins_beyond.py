@@ -16,12 +16,12 @@ from flightid.control.margins import gain_limits
 from flightid.control.margins.loop_source import read_loop
 from flightid.control.margins.margins import margins_of
 from flightid.control.margins.mode_slack import MOST_MOVED_DB, TAKEN, ModeSlack
+from flightid.control.margins.rigid_vehicle import RIGID
 from flightid.control.tuning.axis_tuning import held_by_hand
 from flightid.control.tuning.band_findings import asked_above, below_band, taken_words
 from flightid.control.tuning.findings import verdict
 from flightid.control.tuning.mode_slacks import slacks_of
 from flightid.control.tuning.modes_outside import BELOW_BAND
-from flightid.control.tuning.rigid_vehicle import RIGID
 from flightid.control.tuning.wider_band import wider_band
 from flightid.control.tuning.worst_cases import WorstCase
 from flightid.conventions import Light
@@ -169,6 +169,12 @@ def test_margins_promise_no_more_than_a_frame_above_the_band_leaves(
         near = "rest on no such mode" in each.message
         assert near is (each.light is Light.AMBER)
     assert found.phase_margin.interval95 == known.phase_margin.interval95
+    rigid, kept = (verb(source, rigid=True) for verb in (fid.margins, fid.disturbance_rejection))
+    assert rigid.gain_margin.interval95 == known.gain_margin.interval95
+    assert rigid.modulus_margin.interval95 == known.modulus_margin.interval95
+    for each in (rigid, kept):
+        codes = [finding.code for finding in each.findings]
+        assert (codes.count("rigid-declared"), codes.count("margin-beyond-band")) == (1, 0)
     for number in (found.gain_margin, found.modulus_margin, found.sensitivity_peak, rejected.peak):
         assert (number.interval95 is not None) is reaching
         assert (number.reason == TAKEN["above"]) is not reaching

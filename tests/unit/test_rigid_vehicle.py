@@ -12,11 +12,11 @@ import pytest
 
 import flightid as fid
 from flightid.control.margins.mode_slack import NEAR_ONE, TAKEN, ModeSlack
+from flightid.control.margins.rigid_vehicle import DECLARED, RIGID
 from flightid.control.tuning.band_findings import by_modes_alone
 from flightid.control.tuning.mode_slacks import clear_from, slacks_of
 from flightid.control.tuning.modes_outside import ABOVE_BAND, BELOW_BAND
 from flightid.control.tuning.moved_gains import move_gains
-from flightid.control.tuning.rigid_vehicle import DECLARED, RIGID
 from flightid.control.tuning.wider_band import wider_band
 from flightid.control.tuning.worst_cases import WorstCase
 from flightid.conventions import Light

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 from flightid.control.autopilots.angle_law import angle_law
 from flightid.control.autopilots.parameter_files import parameter_suffix
 from flightid.control.autopilots.pid_loop import PidLoop
+from flightid.control.margins.rigid_vehicle import DECLARED
 from flightid.control.tuning.limits import ANGLE
 from flightid.control.tuning.result import untouched_finding
-from flightid.control.tuning.rigid_vehicle import DECLARED
 from flightid.control.tuning.unpromised import outside_words
 from flightid.conventions import Light
 from flightid.findings import MOST_DIGITS, Finding, at_least, counted, worst

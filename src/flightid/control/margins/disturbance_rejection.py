@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import field
+from dataclasses import field, replace
 from typing import Any
 
 import numpy as np
@@ -108,6 +108,7 @@ def disturbance_rejection(
     unstable_poles: int | None = None,
     bandwidth_guide_rad_s: float | None = None,
     peak_guide_db: float = PEAK_GUIDE_DB,
+    rigid: bool = False,
 ) -> DisturbanceRejection:
     """Bandwidth and peak of a loop's response to disturbances of its output, with 95 % intervals.
 
@@ -134,6 +135,8 @@ def disturbance_rejection(
         Least bandwidth asked for, rad/s; it depends on axis and task, so that there is no default.
     peak_guide_db : float
         Greatest peak asked for, dB.
+    rigid : bool
+        Declare that nothing swings or bends above the band of the model; see `flightid.tune_pid`.
 
     Raises
     ------
@@ -179,6 +182,7 @@ def disturbance_rejection(
         band_rad_s=band_rad_s,
         unstable_poles=unstable_poles,
     )
+    loop = replace(loop, rigid=rigid)
     omega, metrics = measured_up(loop)
     drawn = drawn_points(loop, omega)
     places = np.searchsorted(omega, drawn)

@@ -65,6 +65,8 @@ class BrokenLoop:
         All frequencies of a model's loop that the band cuts off, so that no limit is missed.
     unread : str
         What of a measurement is not read, for want of coherence; empty where all is.
+    rigid : bool
+        Whether the vehicle was declared to have no light mode outside the band of its model.
     """
 
     name: str
@@ -77,6 +79,7 @@ class BrokenLoop:
     closed_unstable_poles: int | None = None
     whole_rad_s: Array | None = None
     unread: str = ""
+    rigid: bool = False
 
     @property
     def measured(self) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import field
+from dataclasses import field, replace
 from typing import Any
 
 import numpy as np
@@ -208,6 +208,7 @@ def margins(
     unstable_poles: int | None = None,
     phase_guide_deg: float = PHASE_GUIDE_DEG,
     gain_guide_db: float = GAIN_GUIDE_DB,
+    rigid: bool = False,
 ) -> Margins:
     """Margins of a loop, broken at one point, with 95 % intervals.
 
@@ -234,6 +235,8 @@ def margins(
         Unstable poles of the open loop. Left out: counted in a model; none in a measurement.
     phase_guide_deg, gain_guide_db : float
         What the findings ask for, at the worse end of the interval.
+    rigid : bool
+        Declare that nothing swings or bends above the band of the model; see `flightid.tune_pid`.
 
     Raises
     ------
@@ -284,6 +287,7 @@ def margins(
         band_rad_s=band_rad_s,
         unstable_poles=unstable_poles,
     )
+    loop = replace(loop, rigid=rigid)
     return margins_of(loop, phase_guide_deg=phase_guide_deg, gain_guide_db=gain_guide_db)
 
 

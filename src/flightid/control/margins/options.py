@@ -8,6 +8,12 @@ from flightid.control.margins.matrix_loop import PLACES, At
 from flightid.frozen import dataclass
 from flightid.options import Options, option
 
+RIGID = (
+    "Declares that nothing on the vehicle swings or bends above the band of its model: no "
+    "resonance there is allowed for; nothing shows it, and what is promised says so."
+)
+"""What the declaration means, of every verb on margins."""
+
 
 @dataclass(frozen=True)
 class LoopOptions(Options):
@@ -36,6 +42,7 @@ class MarginOptions(LoopOptions):
 
     phase_guide_deg: float = option(45.0, unit="deg", minimum=0.0, doc="Least phase margin.")
     gain_guide_db: float = option(6.0, unit="dB", minimum=0.0, doc="Least gain margin.")
+    rigid: bool = option(False, doc=RIGID)
 
 
 @dataclass(frozen=True)
@@ -74,3 +81,4 @@ class DisturbanceOptions(LoopOptions):
         None, unit="rad/s", above=0.0, doc="Least bandwidth; default: none, it depends on the task."
     )
     peak_guide_db: float = option(PEAK_GUIDE_DB, unit="dB", doc="Greatest peak.")
+    rigid: bool = option(False, doc=RIGID)

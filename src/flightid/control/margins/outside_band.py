@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from flightid.control.margins.gain_limits import everywhere, loop_numbers, measured_up
 from flightid.control.margins.loop_metrics import READ_AT
 from flightid.control.margins.loop_source import BrokenLoop
-from flightid.control.margins.mode_slack import ModeSlack
+from flightid.control.margins.mode_slack import MOST_MOVED_DB, ModeSlack
+from flightid.control.margins.rigid_vehicle import rigid_declared
 from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.frozen import dataclass
@@ -190,7 +191,8 @@ def _room(loop: BrokenLoop, omega: NDArray[np.float64], top_rad_s: float) -> Mod
     above = np.unique(omega[omega > top_rad_s])
     if not above.size:
         return ABOVE
-    return ModeSlack.above(loop.of(loop.uncertain.value, above))
+    moved_db = 0.0 if loop.rigid else MOST_MOVED_DB
+    return ModeSlack.above(loop.of(loop.uncertain.value, above), moved_db)
 
 
 def outside_band_findings(
@@ -206,6 +208,7 @@ def outside_band_findings(
         Gain margin that is asked for.
     """
     band = loop.uncertain.valid_rad_s
+    yield from rigid_declared(loop.rigid, band)
     if band is None:
         return
     if found.above or found.room.left_db < least_db:
@@ -213,10 +216,9 @@ def outside_band_findings(
         yield from beyond_findings([beyond], band)
     if named := [said for name, said in SAID_BELOW.items() if name in found.below]:
         lowest = min(found.below[name] for name in SAID_BELOW if name in found.below)
-        taken = (
-            ": intervals of this loop rest on its form there, and a light mode, such as a "
-            "pendulum, may take margins and stability"
-        )
+        taken = ": intervals of this loop rest on its form there"
+        if not loop.rigid:
+            taken += ", and a light mode, such as a pendulum, may take margins and stability"
         yield Finding(
             "margin-below-band",
             Light.AMBER if found.is_at_one_below else Light.UNKNOWN,

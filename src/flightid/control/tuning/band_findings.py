@@ -6,9 +6,9 @@ from collections.abc import Iterator, Sequence
 
 from flightid.control.margins.mode_slack import MOST_MOVED_DB, TAKEN
 from flightid.control.margins.outside_band import beyond_findings
+from flightid.control.margins.rigid_vehicle import RIGID, rigid_declared
 from flightid.control.tuning.axis_tuning import AxisResult
 from flightid.control.tuning.modes_outside import BELOW_BAND, OF_ABOVE
-from flightid.control.tuning.rigid_vehicle import RIGID, rigid_declared
 from flightid.control.tuning.worst_cases import WorstCase
 from flightid.conventions import Light
 from flightid.findings import Finding

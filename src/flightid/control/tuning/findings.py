@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from flightid.control.autopilots import AxisLoop
 from flightid.control.gyro import Gyro
 from flightid.control.margins.findings import COHERENCE
+from flightid.control.margins.rigid_vehicle import RIGID
 from flightid.control.tuning.axis_tuning import AxisResult
 from flightid.control.tuning.band_findings import (
     asked_above,
@@ -22,7 +23,6 @@ from flightid.control.tuning.gain_search_result import NO_GAINS, GainSearchResul
 from flightid.control.tuning.gain_steps import Stage, TunedGain
 from flightid.control.tuning.limits import ANGLE
 from flightid.control.tuning.order_statistics import ENOUGH, least_share
-from flightid.control.tuning.rigid_vehicle import RIGID
 from flightid.control.tuning.worst_cases import WorstCase
 from flightid.conventions import Light
 from flightid.findings import Finding, at_least

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.control.margins.outside_band import LESS, MarginBeyond
+from flightid.control.margins.rigid_vehicle import RIGID
 from flightid.control.tuning.limits import ANGLE
 from flightid.control.tuning.loop_problem import LoopProblem
 from flightid.control.tuning.mode_slacks import clear_from, slacks_of
-from flightid.control.tuning.rigid_vehicle import RIGID
 
 PLACES = "phase_crossover_rad_s", "sensitivity_peak_rad_s", "delay_crossover_rad_s"
 """Where gain margin, sensitivity peak and delay margin are read."""

@@ -10,13 +10,13 @@ from pathlib import Path
 
 from flightid.control.autopilots import AxisLoop, GainChange, write_parameters
 from flightid.control.autopilots.pid_loop import PidLoop
+from flightid.control.margins.rigid_vehicle import DECLARED
 from flightid.control.tuning.gain_search_result import without_gains
 from flightid.control.tuning.gain_steps import Stage, TunedGain
 from flightid.control.tuning.loop_problem import LoopProblem
 from flightid.control.tuning.pid_file import write_settings
 from flightid.control.tuning.requirements import TuningRequirements
 from flightid.control.tuning.responses import ClosedPlants, ResponseBand
-from flightid.control.tuning.rigid_vehicle import DECLARED
 from flightid.control.tuning.worst_cases import WorstCase
 from flightid.conventions import Light
 from flightid.errors import DataError, UnknownNameError
