@@ -2,17 +2,19 @@
 
 Run: python -m tests.strangers.gains --runs 500 [--first-seed 0] [--family rig] [--keep FILE]
 
-`rig` is `tests.strangers.rig_gains`. A promise is broken where the vehicle with the tuned gains is
-unstable or saturates hands off, or where its own worst margin lies below the lowest that the table
-prints for that loop.
+`rig` is `tests.strangers.rig_gains`; `bare` draws hovers without a bending frame; `--rigid` does so
+too, and declares them rigid. A promise is broken where the vehicle with the tuned gains is unstable
+or saturates hands off, or where its own worst margin lies below the lowest that the table prints
+for that loop.
 """
 
 from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +32,8 @@ TRUTHS = (
     "first order", "motor lag", "motor lag, no damping", "flapping", "motor lag and flapping",
     "motor lag, flexible frame", "motor lag, stiffer frame",
 )  # fmt: skip
+BARE = tuple(name for name in TRUTHS if "frame" not in name)
+"""Of vehicles that hold no light mode: flapping is damped by 0.4 or more."""
 FRAMES_HZ = {"flexible": (7.0, 14.0), "stiffer": (15.0, 35.0)}
 STRUCTURES = (
     "rate_first_order", "rate_gain_lag", "rate_integrator", "rate_integrator_motor_lag",
@@ -86,10 +90,10 @@ class Flight:
         return self.structure in HOLDS.get(self.craft.name, ())
 
 
-def drawn(seed: int) -> Flight:
+def drawn(seed: int, truths: Sequence[str] = TRUTHS) -> Flight:
     """Vehicle, flown gains, structure, method and noise."""
     r = np.random.default_rng(seed)
-    name = TRUTHS[r.integers(len(TRUTHS))]
+    name = truths[r.integers(len(truths))]
     lagged = "motor" in name
     craft = vehicle(
         name,
@@ -218,7 +222,12 @@ def tried(seed: int, *, draws: int = 120) -> Outcome:
     return outcome_of(drawn(seed), seed, draws=draws)
 
 
-def outcome_of(flight: Flight, seed: int, *, draws: int = 120) -> Outcome:
+def tried_bare(seed: int, *, draws: int = 120, rigid: bool = False) -> Outcome:
+    """The same of vehicles that hold no light mode, declared rigid or not."""
+    return outcome_of(drawn(seed, BARE), seed, draws=draws, rigid=rigid)
+
+
+def outcome_of(flight: Flight, seed: int, *, draws: int = 120, rigid: bool = False) -> Outcome:
     """Fly, fit, tune and fly what was tuned."""
     begun = time.process_time()
 
@@ -234,7 +243,7 @@ def outcome_of(flight: Flight, seed: int, *, draws: int = 120) -> Outcome:
         return outcome("refused", str(error))
     except np.linalg.LinAlgError as error:
         return outcome("fault", str(error))
-    options = {"gains": loop_of(flight.flown, flight), "draws": draws, "seed": seed}
+    options = {"gains": loop_of(flight.flown, flight), "draws": draws, "seed": seed, "rigid": rigid}
     try:
         design = fid.tune_pid(fit, **options)
     except fid.FlightidError as error:
@@ -306,17 +315,21 @@ def count(families: Mapping[str, Callable[[int], Outcome]], description: str | N
     parser.add_argument("--first-seed", type=int, default=0)
     parser.add_argument("--family", choices=(*families,), default=next(iter(families)))
     parser.add_argument("--keep", type=Path, help="file that outcomes are added to, and read from")
+    parser.add_argument("--rigid", action="store_true", help="bare hovers, declared rigid")
     parser.add_argument("--each", action="store_true", help="one line for every tuning")
     asked = parser.parse_args()
     tune_pid.response_bands = lambda *_: ()  # pictures, which no gain depends on
+    made = partial(tried_bare, rigid=True) if asked.rigid else families[asked.family]
+    if asked.rigid and asked.family not in ("hover", "bare"):
+        parser.error(f"--rigid is of hovers, not of --family {asked.family}")
     seeds = range(asked.first_seed, asked.first_seed + asked.runs)
 
     def show(found: Outcome) -> None:
         if asked.each or (found.broken and found.is_made):
             print(found.row(), flush=True)
 
-    print(table(collected(seeds, families[asked.family], asked.keep, show)))
+    print(table(collected(seeds, made, asked.keep, show)))
 
 
 if __name__ == "__main__":
-    count({"hover": tried, "rig": rig_gains.tried}, __doc__)
+    count({"hover": tried, "bare": tried_bare, "rig": rig_gains.tried}, __doc__)
