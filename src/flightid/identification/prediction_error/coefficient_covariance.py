@@ -19,6 +19,7 @@ from flightid.identification.prediction_error.coloured_errors import (
     noise_bias,
     output_error_covariance,
 )
+from flightid.identification.prediction_error.curved_ends import FARTHEST, reaches
 from flightid.identification.prediction_error.excited_inputs import noise_free_inputs
 from flightid.identification.prediction_error.findings import ELSEWHERE, NOISE_AT_CIRCLE
 from flightid.identification.prediction_error.likelihoods import ALIKE
@@ -37,6 +38,7 @@ from flightid.uncertainty.coloured_residuals import (
 from flightid.uncertainty.estimate import Estimate
 from flightid.uncertainty.fitted_correlation import FittedCorrelation
 from flightid.uncertainty.foretold import chance_share, independent_samples, likelihood_gain
+from flightid.uncertainty.quantiles import LEVEL, half_width
 from flightid.uncertainty.residual_colour import Colour
 
 Array = NDArray[np.float64]
@@ -61,7 +63,8 @@ FAR = 5.0
 class SearchResult:
     """Coefficients with what the search left; `skip` first errors of each record do not count.
 
-    `behind` tells how far minima lie below the first in likelihood, where colour was taken out.
+    `behind` tells how far minima lie below the first in likelihood, where colour was taken out;
+    `reach` how far ends lie over those to first order, (n, 2), where the cost is no parabola.
     """
 
     theta: Array
@@ -78,6 +81,7 @@ class SearchResult:
     noise_reason: str = ""
     correlations: tuple[FittedCorrelation, ...] = ()
     behind: tuple[float, ...] = ()
+    reach: Array | None = None
 
 
 def shares_poles(structure: PolynomialStructure) -> bool:
@@ -136,6 +140,19 @@ def compared(
     By the colour of residuals where no noise model answers for it; none where estimates are biased,
     and none where residuals are rounding: its sums of squares tell no error of the estimates.
     """
+    alone = not has_noise_model(structure) and structure.kernel is None
+    by_slopes = alone and found.agreement is None
+    made = _compared(structure, data, found, errors, tests)
+    return _curved(structure, data, made) if by_slopes else made
+
+
+def _compared(
+    structure: PolynomialStructure,
+    data: SampledChannels,
+    found: SearchResult,
+    errors: Array,
+    tests: InnovationTests,
+) -> SearchResult:
     plain = found.covariance
     if plain is None or _ratio(data, errors) <= ROUNDING:
         return found if plain is None else replace(found, covariance=None, reason=EXACT)
@@ -183,6 +200,23 @@ def compared(
     if _fits_elsewhere(found):
         return replace(found, covariance=None, reason=ELSEWHERE)
     return found if times == 1.0 else widened(found, times)
+
+
+def _curved(
+    structure: PolynomialStructure, data: SampledChannels, found: SearchResult
+) -> SearchResult:
+    """Ends by the cost itself; the covariance, for what is computed, longer by their mean."""
+    if found.covariance is None or not any(structure.nf):
+        return found
+    count = found.theta.size
+    freedom = [found.degrees] * count if found.freedom is None else found.freedom.tolist()
+    quantiles = np.array([half_width(LEVEL, each) for each in freedom])
+    bars = quantiles * np.sqrt(np.diag(found.covariance))
+    reach = reaches(structure, data, found.theta, found.memory, found.skip, bars)
+    if reach is None:
+        return found
+    reach = np.minimum(reach, FARTHEST)
+    return replace(widened(found, float(np.mean(reach))), reach=reach)
 
 
 def _reach(

@@ -28,6 +28,7 @@ from flightid.identification.prediction_error.coefficient_covariance import (
     spent,
     tests_of,
 )
+from flightid.identification.prediction_error.curved_ends import CurvedEnds, curve_findings
 from flightid.identification.prediction_error.details import FitScore, PolynomialDetails
 from flightid.identification.prediction_error.excited_inputs import with_excitations
 from flightid.identification.prediction_error.findings import (
@@ -136,8 +137,7 @@ def _assemble(
             *judge_polynomial(structure, model, parameters, pairs, minima, n_counted, found.reason),
             *colour_findings(*found.colour, has_bars=found.covariance is not None),
             *tests.findings(biased=biased, times=tests.widening(biased=biased)),
-            *nothing_told(found.reason),
-            *exact_fit(found.reason),
+            *_of_bars(found),
             *sampling_findings(model, roots, max(each.duration_s for each in records)),
         ),
         provenance=provenance_of(
@@ -154,6 +154,13 @@ def _assemble(
             undetermined=_undetermined(found, parameters),
         ),
     )
+
+
+def _of_bars(found: SearchResult) -> tuple[Finding, ...]:
+    """Why there are no bars, or how the cost bends them."""
+    reason = found.reason
+    bent = curve_findings(found.reach)
+    return (*bent, *nothing_told(reason), *exact_fit(reason))
 
 
 def _parameters(
@@ -175,7 +182,11 @@ def _parameters(
             continue
         stderr = float(np.sqrt(found.covariance[place, place]))
         degrees = found.degrees if found.freedom is None else float(found.freedom[place])
-        made[name] = Estimate(name, value, unit, stderr, freedom=degrees, status="free")
+        even = Estimate(name, value, unit, stderr, freedom=degrees, status="free")
+        made[name] = even
+        if found.reach is not None:
+            below, above = found.reach[place] / np.mean(found.reach)
+            made[name] = replace(even, ends=CurvedEnds(even, float(below), float(above)))
     return made
 
 
