@@ -139,7 +139,23 @@ def test_copies_that_were_changed_share_their_noise(kind: str) -> None:
         assert (said.code, said.light.value) == (COPIED, "red")
         assert said.message.startswith("records 2 and 3 ")
         # Of float32 some stretches stay the same to six digits of their second differences.
-        assert kind == "float32" or "share their noise in p (r = " in said.message
+        scaled = ", scaled by 57.3" if kind == "degrees" else ""
+        assert kind == "float32" or f"share their noise in p{scaled} (r = " in said.message
+
+
+@pytest.mark.parametrize(
+    ("of_inputs", "of_outputs"),
+    [(1.0, 1.005), (1.0, 0.995), (1.0, 1.001), (-1.0, -1.0), (1.2, 1.2), (1000.0, 1000.0)],
+)
+def test_copies_in_another_scale_are_told_with_it(of_inputs: float, of_outputs: float) -> None:
+    for seed in (1, 2, 3):
+        record = _flown(seed)
+        u, p = record.matrix(["da", "p"])
+        copy = _record(of_inputs * u, of_outputs * p)
+        (said,) = judge_copies([_flown(seed + 10), record, copy], ["da", "p"])
+        assert (said.code, said.light.value) == (COPIED, "red")
+        words = f"records 2 and 3 share their noise in p, scaled by {of_outputs:.4g} (r = 1.000"
+        assert said.message.startswith(words)
 
 
 def test_the_shift_is_told() -> None:
@@ -197,6 +213,29 @@ def test_runs_of_a_model_without_noise_are_no_copies() -> None:
     assert not judge_copies([_record(stick, clean), _record(2.0 * stick, 2.0 * clean)], ["da", "p"])
 
 
+@pytest.mark.parametrize("factor", [1.0, -1.0, 1.2, 2.0])
+def test_flights_and_runs_of_a_scaled_stick_are_no_copies(factor: float) -> None:
+    """With noise of their own, and as runs of a linear model, which leave digits or nothing."""
+    time_s = np.arange(400) * STEP_S
+    stick = np.sin(2.0 * time_s + 0.6 * time_s**2)
+    clean = lfilter([0.0, 0.06], [1.0, -0.94], stick)
+    random = np.random.default_rng(5)
+    runs = [_record(stick, clean), _record(factor * stick, factor * clean)]
+    said = judge_copies(runs, ["da", "p"])
+    assert bool(said) == (factor == 1.0)
+    assert all("hold the same 400 samples" in each.message for each in said)
+    for level in (0.001, 0.05):
+        one, other = clean + level * random.standard_normal((2, 400))
+        flown = [_record(stick, one), _record(factor * stick, factor * other)]
+        assert not judge_copies(flown, ["da", "p"])
+
+
+@pytest.mark.parametrize("level", [0.0, 2.0])
+def test_records_that_hold_nothing_but_a_level_are_judged(level: float) -> None:
+    still = np.full(400, level)
+    assert not judge_copies([_record(still, still), _record(still, 2.0 * still)], ["da", "p"])
+
+
 def test_wind_that_two_vehicles_share_in_part_is_no_copy() -> None:
     random = np.random.default_rng(4)
     wind = random.standard_normal(400)
@@ -205,3 +244,12 @@ def test_wind_that_two_vehicles_share_in_part_is_no_copy() -> None:
         for own in 0.5 * random.standard_normal((2, 400))
     ]
     assert not judge_copies(flights, ["da", "p"])
+
+
+@pytest.mark.parametrize("factor", [1.0, -1.0])
+def test_fits_of_runs_without_noise_end(factor: float) -> None:
+    u, p = flight(1, lambda random, n: np.zeros(n), duration_s=5.0).matrix(["da", "p"])
+    runs = [_record(u, p), _record(factor * u, factor * p)]
+    fit = fid.identify(model(), runs, method="equation_error")
+    told = any("count twice" in each.what for each in fit.evidence.checks)
+    assert told == (factor == 1.0)

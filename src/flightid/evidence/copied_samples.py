@@ -86,9 +86,12 @@ def _in_words(shared: SharedNoise, names: Sequence[str]) -> str:
     by = f"a shift of {shared.shift} samples"
     if shared.step_s is not None:
         by += f" of {shared.step_s:.4g} s"
+    factors = list(dict.fromkeys(f"{each:.4g}" for each in shared.factors))
+    scaled = "" if set(factors) <= {"1"} else f", scaled by {' and '.join(factors)}"
     return (
         f"records {shared.first + 1} and {shared.second + 1} share their noise in "
-        f"{', '.join(names)} (r = {shared.correlation:.3f} at {by}, over {shared.count} samples), "
+        f"{', '.join(names)}{scaled} "
+        f"(r = {shared.correlation:.3f} at {by}, over {shared.count} samples), "
         "as copies of one flight do: they count twice"
     )
 

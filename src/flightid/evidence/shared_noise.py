@@ -41,6 +41,16 @@ AROUND = 6
 """Samples to either side that tell how much is left around one."""
 AS_MUCH = 1e-3
 """Relative difference below which two factors are one."""
+DIGITS = 1e-6
+"""Of the outputs (rms): what a recursion leaves below it are digits of a run without noise."""
+NOISE = 1e-3
+"""Of the outputs (rms), from which what is left is taken for noise, wherever it lies."""
+EVEN = 0.6
+"""Least part of its rms that noise keeps in the tenth where least is left; white keeps 0.66."""
+DEVIATIONS = 5.0
+"""By which two factors differ that are not one."""
+LITTLE = 0.1
+"""Of its noise (rms), by which a record differs from another that was scaled, rounding included."""
 PHASES = 12
 """Samples of a finer record at which a coarser one may begin."""
 
@@ -108,6 +118,8 @@ class SharedNoise:
         Samples that both hold, on that grid.
     step_s : float or None
         Of the grid, where the records have different ones.
+    factors : tuple of float
+        Of the second's outputs to the first's, where those are scaled and little else.
     """
 
     first: int
@@ -116,6 +128,7 @@ class SharedNoise:
     shift: int
     count: int
     step_s: float | None = None
+    factors: tuple[float, ...] = ()
 
 
 def shared_noise(series: Sequence[RecordSeries]) -> SharedNoise | None:
@@ -169,9 +182,12 @@ def shared_noise(series: Sequence[RecordSeries]) -> SharedNoise | None:
                 if met is None or (best is not None and met[1] <= best.correlation):
                     continue
                 shift, count = met[0], met[2]
-                value = _looked_at(grid.cut(max(shift, 0), count), its.cut(max(-shift, 0), count))
+                one, two = grid.cut(max(shift, 0), count), its.cut(max(-shift, 0), count)
+                value = _looked_at(one, two)
                 if value is not None and (best is None or value > best.correlation):
-                    best = SharedNoise(p, q, value, shift, count, None if len(steps) == 1 else step)
+                    told_step = None if len(steps) == 1 else step
+                    factors = _told_factors(one, two)
+                    best = SharedNoise(p, q, value, shift, count, told_step, factors)
     return best
 
 
@@ -202,12 +218,17 @@ def _recursion(series: RecordSeries) -> list[Array]:
     return found
 
 
+def _errors(series: RecordSeries, weights: Sequence[Array]) -> list[Array]:
+    """What recursions leave of each output, without its mean."""
+    told = [_columns(series, output) @ each for output, each in enumerate(weights)]
+    left = [row[ORDER:] - each for row, each in zip(series.outputs, told, strict=True)]
+    return [each - each.mean() for each in left]
+
+
 def _left(series: RecordSeries, weights: Sequence[Array]) -> Array:
     """What recursions leave of the outputs, by its own deviation, large errors cut."""
     rows = []
-    for output, (row, each) in enumerate(zip(series.outputs, weights, strict=True)):
-        left = row[ORDER:] - _columns(series, output) @ each
-        left -= left.mean()
+    for left in _errors(series, weights):
         size = 1.4826 * float(np.median(np.abs(left))) or float(np.sqrt(np.mean(left**2)))
         rows.append(np.clip(left / (size or 1.0), -CLIPPED, CLIPPED))
     return np.array(rows)
@@ -252,26 +273,26 @@ def _looked_at(one: RecordSeries, other: RecordSeries) -> float | None:
     """Correlation of two errors by one recursion, where it is in bands and in quiet parts too.
 
     A copy may be in another unit, or lie between samples: the first record is taken as it and its
-    neighbours foretell the second. Where inputs have the same factor, a model ran without noise.
+    neighbours foretell the second. Runs of a model without noise have no noise to share: twice the
+    input is twice the output, and what is left of it.
     """
     moves = np.ptp(one.outputs, axis=1) > 0.0
     moves &= np.ptp(other.outputs, axis=1) > 0.0
     if not moves.any():
         return None
     inner = slice(1, one.n_samples - 1)
-    rows, factors = [], []
+    rows = []
     for row, its in zip(one.outputs[moves], other.outputs[moves], strict=True):
         near = np.array([row[:-2], row[1:-1], row[2:]]).T
         near -= near.mean(axis=0)
         taps = np.linalg.lstsq(near, its[inner] - its[inner].mean(), rcond=1e-9)[0]
         rows.append(near @ taps)
-        factors.append(float(taps.sum()))
-    if _scaled_throughout(one, other, float(np.mean(factors))):
-        return None
     plain = replace(one, outputs=one.outputs[moves]).cut(1, one.n_samples - 2)
     first = replace(plain, outputs=np.array(rows))
     second = replace(other, outputs=other.outputs[moves]).cut(1, first.n_samples)
     rests = _rests(plain) | _rests(second)
+    if _scaled_throughout(plain, second) and not (_noisy(plain) and _noisy(second)):
+        return None
     weights = _recursion(first)
     tried = [
         (_left(first, weights), _left(replace(second, inputs=first.inputs), weights)),
@@ -282,12 +303,51 @@ def _looked_at(one: RecordSeries, other: RecordSeries) -> float | None:
     return max(known, default=None)
 
 
-def _scaled_throughout(one: RecordSeries, other: RecordSeries, factor: float) -> bool:
-    """Whether inputs differ by the factor of the outputs, which is not one."""
-    if abs(factor - 1.0) < AS_MUCH or one.inputs.shape != other.inputs.shape:
+def _factor(rows: Array, its: Array) -> tuple[float, float]:
+    """Of the second to the first by least squares, and its standard error."""
+    power = max(float(np.sum(rows**2)), np.finfo(float).tiny)
+    factor = float(np.sum(rows * its)) / power
+    left = float(np.sum((its - factor * rows) ** 2)) / max(rows.size - 1, 1)
+    # No factor is known better than the digits of what it is taken of.
+    return factor, max(float(np.sqrt(left / power)), abs(factor) * 4.0 * np.finfo(float).eps)
+
+
+def _levelled(rows: Array) -> Array:
+    return np.asarray(rows - rows.mean(axis=1, keepdims=True))
+
+
+def _scaled_throughout(one: RecordSeries, other: RecordSeries) -> bool:
+    """Whether all inputs differ by the factor of the outputs, which is not one."""
+    if one.inputs.shape != other.inputs.shape or not np.any(one.inputs):
         return False
-    power = float(np.sum(one.inputs**2))
-    return power > 0.0 and abs(float(np.sum(one.inputs * other.inputs)) / power / factor - 1) < 0.01
+    told, deviation = _factor(_levelled(one.outputs), _levelled(other.outputs))
+    asked, its = _factor(one.inputs, other.inputs)
+    alike = abs(told - asked) <= DEVIATIONS * float(np.hypot(deviation, its))
+    return alike and abs(told - 1.0) >= AS_MUCH
+
+
+def _noisy(series: RecordSeries) -> bool:
+    """Whether what a recursion leaves of an output is noise: more than digits, and everywhere."""
+    around = np.ones(2 * AROUND + 1) / (2 * AROUND + 1)
+    for row, left in zip(series.outputs, _errors(series, _recursion(series)), strict=True):
+        size, whole = float(np.std(left)), float(np.std(row))
+        if size > NOISE * whole:
+            return True
+        near = np.sqrt(np.sort(np.convolve(left**2, around, mode="same"))[left.size // 10])
+        if size > DIGITS * whole and near >= EVEN * size:
+            return True
+    return False
+
+
+def _told_factors(one: RecordSeries, other: RecordSeries) -> tuple[float, ...]:
+    """Of outputs that are scaled and little else: a filter or another grid has no factor."""
+    noise = _errors(one, _recursion(one))
+    found = []
+    for row, its, left in zip(_levelled(one.outputs), _levelled(other.outputs), noise, strict=True):
+        factor, deviation = _factor(row, its)
+        if np.std(its - factor * row) < LITTLE * abs(factor) * np.std(left):
+            found.append(1.0 if abs(factor - 1.0) <= DEVIATIONS * deviation else factor)
+    return tuple(found)
 
 
 def _rests(series: RecordSeries) -> NDArray[np.bool_]:
