@@ -6,7 +6,10 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from flightid.record import InputShape, Interpolation, Record, Step, to_uniform
+from flightid.record.checks import checked_history
+from flightid.record.chosen_hold import shape_of
 from flightid.record.interpolation import is_coarser, usual_method
+from flightid.record.slow_channels import said_of_slow, slow_channels
 
 STILL = (("zero", {"previous"}), ("first", {"linear"}))
 """Ways to a finer base that keep what inputs do between samples."""
@@ -33,8 +36,10 @@ def resample(
     Returns
     -------
     Record
-        Copy; starts at the same instant. Its hold is "band_limited" where inputs were low-passed
-        to a coarser base, and unknown where steps or lines were broken up.
+        Copy; starts at the same instant, or the first at which outputs that repeat their values
+        have a new one: on a coarser base these are taken at such instants alone. Its hold is
+        "band_limited" where inputs were low-passed to a coarser base, as the steps or lines that
+        they are known to be, and unknown where steps or lines were broken up.
 
     Raises
     ------
@@ -57,13 +62,19 @@ def resample(
     Record('record', 100 samples, 100 Hz, 1 s, inputs [], outputs [p])
     """
     methods = _methods(record, sample_time_s, interpolation)
+    hold = shape_of(record).hold
+    rows = {name: (record.time_s, record[name]) for name in record.channels}
+    slow = slow_channels(rows, record.outputs, sample_time_s)
     base = to_uniform(
-        {name: (record.time_s, record[name]) for name in record.channels},
+        {**rows, **slow},
         sample_time_s=sample_time_s,
         interpolation=methods,
+        hold={} if hold is None else dict.fromkeys(record.inputs, hold),
     )
-    step = Step("conditioning.resample", base.options)
+    step = Step("conditioning.resample", said_of_slow(base.options, slow, sample_time_s))
     time_s = base.only.time_s
+    for found in checked_history(record)[len(record.history) :] if slow else ():
+        record = record.replace(step=found)
     return record.replace(
         base.only.samples,
         time_s=time_s,
@@ -98,7 +109,7 @@ def _shape_after(
     """
     used = {str(methods[name]) for name in record.inputs}
     known = record.input_shape
-    if is_coarser(sample_time_s, record.sample_time_s) and "previous" not in used:
+    if is_coarser(sample_time_s, record.sample_time_s) and not used & {"previous", "point"}:
         return replace(known, hold="band_limited") if used else known
     ratio = record.sample_time_s / sample_time_s
     nested = abs(ratio - round(ratio)) < 1e-9 * ratio and round(ratio) >= 1

@@ -15,7 +15,7 @@ from flightid.record.angle_units import angle_unit_faults
 from flightid.record.channel import Channel
 from flightid.record.commanded_edges import Surroundings
 from flightid.record.history import NEW_BASES, SPREADS, Step
-from flightid.record.interpolation import HALF_LENGTH
+from flightid.record.interpolation import HALF_LENGTH, NEW_VALUES
 from flightid.record.record import Record
 from flightid.record.sample_faults import Array, SampleFault, sample_faults
 from flightid.table import Cell
@@ -155,7 +155,9 @@ def data_findings(
     for step in history:
         options, mended = step.options, MENDED.get(step.operation)
         found = {
-            key: one for key, one in found.items() if key[0] != mended or key[1] not in options
+            key: one
+            for key, one in found.items()
+            if not (key[0] == mended and key[1] in options) and not _is_thinned(step, *key[:2])
         }
         if step.operation != CHECK or (wanted is not None and options["channel"] not in wanted):
             continue
@@ -163,6 +165,12 @@ def data_findings(
         light = Light(str(options["light"]))
         found[code, channel, said] = Finding(code, light, said, str(options["action"] or ""))
     return tuple(found.values())
+
+
+def _is_thinned(step: Step, code: str, channel: str) -> bool:
+    """Whether a step left the new values of a channel that repeats them, and no others."""
+    said = str(step.options.get(channel, ""))
+    return code == "samples-repeated" and step.operation in NEW_BASES and said.endswith(NEW_VALUES)
 
 
 def record_findings(record: Record, channels: Iterable[str] | None = None) -> tuple[Finding, ...]:

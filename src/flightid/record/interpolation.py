@@ -26,6 +26,15 @@ SAME_RATE = 0.05
 mean of jittered stamps lies on either side of their nominal spacing."""
 FEWEST_ON_LINE = 3
 """Samples in a step of the grid that tell a line."""
+NEW_VALUES, BETWEEN_NEW = ", rows of new values", ", between rows of new values"
+"""Ends of what is said of a channel that repeats its values: on a grid as slow, on a finer one."""
+FILLED = {
+    "zero": ((0.5, 8 / 18), (0.5 - 0.15**0.5, 5 / 18), (0.5 + 0.15**0.5, 5 / 18)),
+    "first": ((0.0, 7 / 12), (-(0.4**0.5), 5 / 24), (0.4**0.5, 5 / 24)),
+}
+"""What a sample stands for between the samples, as Gauss points (in samples after it) and weights:
+a step of one sample's length, whose middle is half a sample late, or a triangle of two. A low-pass
+that leaves them out makes a lag behind a held input too long by half a sample."""
 CLOCK_JITTER = 0.15
 """Largest jitter, as a fraction of a sample, of stamps that belong to a clock."""
 
@@ -56,7 +65,11 @@ class Interpolation(StrEnum):
 
 
 def sample_at(
-    source: StampedSamples, time_s: NDArray[np.float64], sample_time_s: float, method: Interpolation
+    source: StampedSamples,
+    time_s: NDArray[np.float64],
+    sample_time_s: float,
+    method: Interpolation,
+    hold: str | None = None,
 ) -> tuple[NDArray[np.float64], str]:
     """Values of a channel on a uniform grid, low-passed first where the grid is coarser by 5 %.
 
@@ -70,6 +83,9 @@ def sample_at(
         Spacing of the grid, s.
     method : Interpolation
         Choice where the grid is not coarser than the source.
+    hold : str or None
+        What is known of the channel between its samples: "zero" and "first" are low-passed as the
+        steps and straight lines that they are.
 
     Returns
     -------
@@ -105,13 +121,32 @@ def sample_at(
         return np.interp(time_s, source.time_s, source.values), "linear"
     if not coarser and method is Interpolation.CUBIC:
         return spline(source, time_s), "cubic spline"
+    return _filtered(source, time_s, sample_time_s if coarser else None, hold)
+
+
+def _filtered(
+    source: StampedSamples,
+    time_s: NDArray[np.float64],
+    coarser_s: float | None,
+    hold: str | None,
+) -> tuple[NDArray[np.float64], str]:
+    """Values by the kernel: low-passed on a grid that is coarser, else band-limited."""
     start, step, values = uniform_samples(source)
-    rate = 1 / sample_time_s if coarser else 1 / step
-    # Decimation stops at the new Nyquist frequency; interpolation turns exactly at the old one,
-    # where the sinc passes through every given sample.
-    cutoff_hz = rate * ((1 - TRANSITION) / 2 if coarser else 0.5)
-    done = f"low-pass {cutoff_hz:.6g} Hz, zero phase" if coarser else "band-limited"
-    return windowed_sinc(values, (time_s - start) / step, cutoff_hz * step, rate * step), done
+    if coarser_s is None:
+        # Exactly at the old Nyquist frequency the sinc passes through every given sample.
+        return windowed_sinc(values, (time_s - start) / step, 0.5, 1.0), "band-limited"
+    # Decimation stops at the new Nyquist frequency.
+    rate = 1 / coarser_s
+    cutoff_hz = rate * (1 - TRANSITION) / 2
+    done = f"low-pass {cutoff_hz:.6g} Hz, zero phase"
+    if hold in FILLED:
+        done += f", of {'steps' if hold == 'zero' else 'straight lines'}"
+    parts = (
+        weight
+        * windowed_sinc(values, (time_s - start) / step - after, cutoff_hz * step, rate * step)
+        for after, weight in FILLED.get(hold or "", ((0.0, 1.0),))
+    )
+    return np.asarray(sum(parts)), done
 
 
 def usual_method(hold: str | None, source_s: float, sample_time_s: float) -> Interpolation:

@@ -90,6 +90,30 @@ def found_staircase(samples: Array) -> Staircase | None:
     return Staircase(1, int(jumps.size)) if large and still else None
 
 
+def measured_rows(samples: Array) -> slice | None:
+    """Rows at which a measured channel got a new value, where it repeats them on a coarser grid.
+
+    Parameters
+    ----------
+    samples : ndarray, shape (n_samples,)
+
+    Returns
+    -------
+    slice or None
+        None where values do not repeat so, or the channel is a switch.
+
+    Example
+    -------
+    >>> measured_rows(np.repeat(np.arange(20.0) ** 2, 3)[1:])
+    slice(2, None, 3)
+    """
+    found = found_staircase(samples)
+    if found is None or found.samples < 2 or is_switched(samples):
+        return None
+    first = int(np.flatnonzero(np.diff(samples))[0]) + 1
+    return slice(first % found.samples, None, found.samples)
+
+
 def stands_still(samples: Array) -> bool:
     """Whether samples stand still for the most and jump far within one, be it seldom.
 

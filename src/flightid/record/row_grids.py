@@ -20,6 +20,7 @@ from flightid.record.interpolation import SAME_RATE, Interpolation, is_coarser, 
 from flightid.record.outlying import bridge_outliers
 from flightid.record.repeats import is_switched
 from flightid.record.rows import require_sensible_base
+from flightid.record.slow_channels import said_of_slow, slow_channels
 from flightid.record.stamps import mean_spacing_s
 from flightid.record.step_instants import clock_step_s, moves_on, span_of_steps
 from flightid.record.timebase import to_uniform
@@ -101,8 +102,9 @@ class RowGrid:
         if isinstance(given, str):
             return {item.channel.name: given for item in self.wanted}
         found: dict[str, Interpolation | str] = {}
+        holds = self.holds(rows)
         for name in self.driving:
-            hold = self.hold or ("zero" if is_switched(rows[name][1]) else None)
+            hold = holds.get(name)
             if hold == "zero" and moves_on(rows[name], step_s):
                 found[name] = Interpolation.PREVIOUS
             else:
@@ -115,6 +117,12 @@ class RowGrid:
                 found[name] = Interpolation.POINT
         return {**dict.fromkeys(rows, Interpolation.BAND_LIMITED), **found, **(given or {})}
 
+    def holds(self, rows: Rows) -> dict[str, InputHold]:
+        """What is known of inputs between their stamps: it was declared, or two levels show it."""
+        if self.hold is not None:
+            return dict.fromkeys(self.driving, self.hold)
+        return {name: "zero" for name in self.driving if is_switched(rows[name][1])}
+
     def _low_passed(self, rows: Rows, step_s: float, ways: Mapping[str, str]) -> bool:
         """Whether an input is low-passed on its way to the grid."""
         return any(
@@ -125,7 +133,7 @@ class RowGrid:
     def hold_after(self, rows: Rows) -> InputHold | None:
         """What is still true of the inputs: what was low-passed is smooth."""
         step_s = self.step_s(rows)
-        if step_s is None or self.hold is None:
+        if step_s is None or set(self.holds(rows)) != set(self.driving):
             return self.hold
         ways = self.methods(rows, step_s)
         filtered = self._low_passed(rows, step_s, ways)
@@ -168,6 +176,9 @@ class RowGrid:
             and (fault := folded_power(name, *rows[name], step_s)) is not None
         )
         held = [name for name in self.driving if ways[name] == "previous"]
+        outputs = [c.channel.name for c in self.wanted if c.channel.role is Role.OUTPUT]
+        slow = slow_channels(rows, outputs, step_s, self.max_gap_s)
+        rows = {**rows, **slow}
         made = to_uniform(
             rows,
             sample_time_s=step_s,
@@ -175,8 +186,10 @@ class RowGrid:
             gaps="split",
             max_gap_s=self.max_gap_s,
             interpolation=ways,
+            hold=self.holds(rows),
         )
-        steps = (*steps, Step("conditioning.to_uniform", made.options, VERSION))
+        said = said_of_slow(made.options, slow, step_s)
+        steps = (*steps, Step("conditioning.to_uniform", said, VERSION))
         return [(span.time_s, span.samples, steps) for span in made.spans]
 
     def _without_outliers(self, rows: Rows, asked: Mapping[str, Any]) -> tuple[Rows, Step]:

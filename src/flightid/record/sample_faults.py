@@ -17,7 +17,7 @@ from flightid.findings import Finding, counted
 from flightid.frozen import dataclass
 from flightid.record.commanded_edges import Surroundings, answered, answers
 from flightid.record.outlying import distances, none_stands_out, spread_of
-from flightid.record.repeats import found_staircase, is_switched, rests_within_a_count, stands_still
+from flightid.record.repeats import measured_rows, rests_within_a_count, stands_still
 from flightid.units import DIMENSIONLESS, is_convertible, si_base
 
 Array = NDArray[np.float64]
@@ -348,19 +348,18 @@ def _held(channel: _ExaminedChannel) -> SampleFault | None:
     if not channel.rests:
         return None
     name, values = channel.name, channel.values
-    found = found_staircase(values)
-    if found is None or found.samples < 2:
-        return None
+    rows = measured_rows(values)
     # Of a channel without a role nobody knows whether it commands: one that steps far does.
     unknown = channel.role is Role.OTHER
-    if is_switched(values) or (unknown and stands_still(values)):
+    if rows is None or (unknown and stands_still(values)):
         return None
-    slow = f"measured {found.samples} times slower than it is stored, and lags by half of that"
-    said = f"{name} repeats its samples: it changes every {found.samples} rows, so that it was "
+    slow = f"measured {rows.step} times slower than it is stored, and lags by half of that"
+    said = f"{name} repeats its samples: it changes every {rows.step} rows, so that it was "
     said += f"held as a command is, or {slow}" if unknown else slow
     places = {2: "second", 3: "third"}
-    place = places.get(found.samples, f"{found.samples}th")
-    action = f"resample the record to every {place} row (resample_to_s)"
+    place = places.get(rows.step, f"{rows.step}th")
+    action = f"resample the record to every {place} row (resample_to_s): of outputs it "
+    action += "takes the new values alone, each at its instant"
     if unknown:
         action = f"a command: nothing; what was measured: {action}"
     ends = np.array([0]), np.array([values.size - 1])

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from flightid.errors import DataError, OptionError, UnknownNameError
 from flightid.reading import VARIABLE, memory_budget
+from flightid.record.hold import InputHold
 from flightid.record.interpolation import Interpolation, sample_at
 from flightid.record.stamps import GAP_FACTOR, StampedSamples, StampPolicy, stamped
 from flightid.record.uniform_base import ChannelResampling, UniformBase, UniformSpan, doubts
@@ -48,6 +49,7 @@ def to_uniform(
     max_gap_s: float | None = None,
     stamps: StampPolicy | str = StampPolicy.ERROR,
     interpolation: Interpolation | str | Mapping[str, Interpolation | str] = "band-limited",
+    hold: Mapping[str, InputHold] | None = None,
 ) -> UniformBase:
     """Bring stamped channels to one uniform time base.
 
@@ -76,6 +78,9 @@ def to_uniform(
         What to do with repeated and backward stamps.
     interpolation : Interpolation or mapping of str to Interpolation
         How samples arise between stamps, for all channels or by name (others: band-limited).
+    hold : mapping of str to {"zero", "first", "band_limited"}, optional
+        What is known of channels between their stamps: the low-pass is then that of the steps or
+        the straight lines, without which a held channel comes half of its own sample too early.
 
     Raises
     ------
@@ -124,7 +129,9 @@ def to_uniform(
         samples = {}
         for key, channel in checked.items():
             part = _stretch(channel, first, last, gap_policy, max_gap_s)
-            samples[key], done[key] = sample_at(part, grid, step, methods[key])
+            samples[key], done[key] = sample_at(
+                part, grid, step, methods[key], (hold or {}).get(key)
+            )
         spans.append(UniformSpan(grid, samples))
     if not spans:
         raise DataError(
