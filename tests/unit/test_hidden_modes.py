@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,8 @@ from flightid.control.margins.hidden_modes import LEAST_DAMPING, most_moved_db
 from flightid.control.margins.mode_slack import MOST_MOVED_DB
 from flightid.control.tuning.wider_band import lower_sweep, times_louder
 from flightid.identification.model_error import SHOWN, ModelErrorBound
+from flightid.responses.injected_power import InjectedPower
+from flightid.responses.pair import PairResponse
 
 BAND = 1.0, 60.0
 POINTS = np.geomspace(*BAND, 60)
@@ -99,19 +103,25 @@ def test_coarser_windows_and_freer_parameters_hide_more() -> None:
 
 def test_what_lower_sweeps_need_is_told_or_that_none_brings_it() -> None:
     omega = np.geomspace(0.5, 50.0, 60)
-    for steep, wide in ((2.0, 0.9), (4.0, 0.9)):
-        coherence = 1.0 / (1.0 + (1.5 / omega) ** steep)
-        told = times_louder(1.0, wide, omega, coherence)
-        # Five times what a coherence of 0.6 needs.
-        assert told == pytest.approx(np.sqrt(5.0 * 1.5 * 1.5**steep), rel=0.05)
-    assert times_louder(1.0, 1.0, omega, np.zeros(60)) is None
-    seen = omega, 1.0 / (1.0 + (0.9 / omega) ** 3)
-    said = lower_sweep(0.9, 1.2, seen)
+    flown = InjectedPower(omega, 2.0 * np.pi / (omega * np.log(100.0)), 100.0)
+    ones = np.ones(60)
+
+    def seen(at: float) -> PairResponse:
+        """Coherence that falls with the cube of frequency, in a logarithmic sweep."""
+        coherence = 1.0 / (1.0 + (at / omega) ** 3)
+        return PairResponse("p", "u", "1", omega, 1j * ones, coherence, 0.0 * ones, flown)
+
+    told = times_louder(1.2, seen(0.9), 0.7, 0.5, 3.0)
+    # Five times what a coherence of 0.6 needs; the new sweep has fewer octaves, of longer records.
+    share = 20.0 * np.pi / 0.7
+    denser = share / (share + 100.0) * np.log(100.0) / np.log(6.0)
+    assert told == pytest.approx(np.sqrt(5.0 * 1.5 * (0.9 / 0.7) ** 3 / denser), rel=0.05)
+    assert times_louder(1.0, replace(seen(0.9), coherence=0.0 * ones), 0.7, 0.5, 3.0) is None
+    said = lower_sweep(0.9, 1.2, seen(0.9))
     start, each, together = 0.9 / 1.3**2, 8.0 * np.pi * 1.3 / 0.9, 20.0 * np.pi * 1.3 / 0.9
     assert f"from {start:.2g} to" in said
     assert f"of {5 * np.ceil(each / 5):.0f} s or more each" in said
     assert f"and {5 * np.ceil(together / 5):.0f} s or more together" in said
-    assert "times the amplitude that flew, if the vehicle may turn as far" in said
-    assert "no sweep of ordinary size" in lower_sweep(0.1, 1.2, seen)
-    assert "no sweep brings it" in lower_sweep(0.0, 1.2, seen)
-    assert "the amplitude that flew" in lower_sweep(5.0, 5.5, seen)
+    assert "times the largest amplitude that flew, if it may turn as far" in said
+    assert "no sweep brings it" in lower_sweep(0.0, 1.2, seen(0.9))
+    assert "with the largest amplitude that flew" in lower_sweep(5.0, 5.5, seen(0.9))

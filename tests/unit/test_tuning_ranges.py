@@ -89,8 +89,9 @@ def test_a_rate_loop_makes_up_for_what_an_angle_loop_was_not_shown() -> None:
         problem = SimpleNamespace(plants=plants, loops=lambda *_: SimpleNamespace(rate=rate))
         case = SimpleNamespace(name="crossover", nominal=crossover, loop=loop)
         found = SimpleNamespace(exists=True, gains=np.ones(2))
+        measured = SimpleNamespace(omega_rad_s=omega, coherence=0.3 + 0.0 * omega)
         result = SimpleNamespace(found=found, worst_cases=[case], problem=problem)
-        return [each.message for each in low_coherence(result, (omega, 0.3 + 0.0 * omega))]
+        return [each.message for each in low_coherence(result, measured)]
 
     assert said(2.0, "angle loop") == []
     assert said(6.0, "angle loop") == [

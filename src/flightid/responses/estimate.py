@@ -28,6 +28,7 @@ from flightid.responses.estimators.windowed import (
 )
 from flightid.responses.excited_band import end_findings
 from flightid.responses.feedback import feedback_findings, feedback_of
+from flightid.responses.injected_power import injected_power
 from flightid.responses.injected_span import injected_span
 from flightid.responses.options import ResponseOptions
 from flightid.responses.response import FrequencyResponse
@@ -239,7 +240,8 @@ def _with_inputs(
         test = FeedbackTest("unknown", "noise model")
     else:
         test = feedback_of(samples, float(response.omega_rad_s[-1]), records, loop)
-    known = replace(response, loop=test, injected_rad_s=injected_span(records))
+    span, power = injected_span(records), injected_power(records, response.inputs)
+    known = replace(response, loop=test, injected_rad_s=span, injected=power)
     return replace(
         known,
         findings=(*response.findings, *feedback_findings(test), *end_findings(known)),

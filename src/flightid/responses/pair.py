@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from flightid.frozen import dataclass
 from flightid.responses.bands import usable_band
+from flightid.responses.injected_power import InjectedPower
 from flightid.units import DIMENSIONLESS
 
 
@@ -20,6 +21,8 @@ class PairResponse:
     omega_rad_s : ndarray, shape (n_f,)
     response : ndarray of complex, shape (n_f,)
     coherence, random_error : ndarray, shape (n_f,)
+    injected : InjectedPower, optional
+        How strongly each frequency was injected by way of the input; None where nobody knows.
 
     Example
     -------
@@ -37,6 +40,7 @@ class PairResponse:
     response: NDArray[np.complex128]
     coherence: NDArray[np.float64]
     random_error: NDArray[np.float64]
+    injected: InjectedPower | None = None
 
     @property
     def magnitude_db(self) -> NDArray[np.float64]:

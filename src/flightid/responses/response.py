@@ -20,6 +20,7 @@ from flightid.responses.bands import choose_frequencies, nearest
 from flightid.responses.errors.linear_estimate import LinearEstimate
 from flightid.responses.errors.random_error import CovarianceSource, ErrorSelection
 from flightid.responses.excited_band import excited_band, median_percent, summary_notes
+from flightid.responses.injected_power import InjectedPower
 from flightid.responses.pair import PairResponse, quotient_unit
 from flightid.responses.shown import shown_values
 from flightid.result import Result
@@ -35,7 +36,7 @@ SMALL_COVARIANCE = 1 << 25
 class FrequencyResponse(
     Result,
     schema="flightid.frequency_response/1",
-    untold={"errors": "what computes the covariance of a fit", "linear": "what arithmetic needs"},
+    untold={"errors": "for fits", "linear": "for arithmetic", "injected": "for the next sweep"},
 ):
     """Frequency responses of all outputs to all inputs with coherence, error and spectra.
 
@@ -83,6 +84,8 @@ class FrequencyResponse(
         Of the records that it was estimated from.
     injected_rad_s : (float, float), optional
         Lowest and highest frequency of what was injected, where records hold that.
+    injected : mapping of str to InjectedPower
+        By input: how strongly each frequency was injected, where records hold that.
     linear : LinearEstimate, optional
         The estimate as weights on the measured outputs, from which a fit computes its bias; None
         after arithmetic, from a file, and where it was given.
@@ -119,6 +122,7 @@ class FrequencyResponse(
     input_shape: InputShape = field(default_factory=InputShape)
     digests: Sequence[RecordDigest] = ()
     injected_rad_s: tuple[float, float] | None = None
+    injected: Mapping[str, InjectedPower] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         sizes = {"o": len(self.outputs), "i": len(self.inputs), "f": len(self.omega_rad_s)}
@@ -273,15 +277,10 @@ class FrequencyResponse(
             There is no such channel.
         """
         row, column = self._index("output", output), self._index("input", input)
-        return PairResponse(
-            output,
-            input,
-            quotient_unit(self.units.get(output, "1"), self.units.get(input, "1")),
-            self.omega_rad_s,
-            self.response[row, column],
-            self.coherence[row, column],
-            self.random_error[row, column],
-        )
+        unit = quotient_unit(self.units.get(output, "1"), self.units.get(input, "1"))
+        response, coherence = self.response[row, column], self.coherence[row, column]
+        about = response, coherence, self.random_error[row, column], self.injected.get(input)
+        return PairResponse(output, input, unit, self.omega_rad_s, *about)
 
     def select(
         self,

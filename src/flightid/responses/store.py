@@ -25,6 +25,7 @@ from flightid.record.formats.hdf5 import plain_datasets, read_dataset
 from flightid.record.history import Step
 from flightid.record.hold import InputShape
 from flightid.responses.errors.random_error import StoredCovariance
+from flightid.responses.injected_power import InjectedPower
 from flightid.responses.response import AXES, FrequencyResponse
 from flightid.uncertainty.feedback_result import FeedbackTest
 
@@ -71,6 +72,7 @@ def write_response(response: FrequencyResponse, path: str | Path) -> Path:
         "input_shape": response.input_shape.to_dict(),
         "digests": [each.to_dict() for each in response.digests],
         "injected_rad_s": response.injected_rad_s,
+        "injected": {name: each.to_dict() for name, each in response.injected.items()},
         "findings": [finding.to_dict() for finding in response.findings],
         "history": [
             {"operation": s.operation, "options": dict(s.options), "version": s.version}
@@ -162,6 +164,9 @@ def _response(
         input_shape=InputShape(**about.get("input_shape", {})),
         digests=tuple(map(RecordDigest.from_dict, about.get("digests", ()))),
         injected_rad_s=_span(about.get("injected_rad_s")),
+        injected={
+            name: InjectedPower.from_dict(each) for name, each in about.get("injected", {}).items()
+        },
         history=tuple(
             Step(one["operation"], one["options"], one["version"]) for one in about["history"]
         ),

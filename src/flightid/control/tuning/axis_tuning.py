@@ -34,6 +34,7 @@ from flightid.control.tuning.unseen_modes import moved_of
 from flightid.control.tuning.whole_gains import whole_gains
 from flightid.control.tuning.worst_cases import WorstCase, worst_cases
 from flightid.frozen import dataclass
+from flightid.responses.pair import PairResponse
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -114,10 +115,10 @@ class Setting:
     noise_allowed: float | None = None
     by_hand: Mapping[str, float] = field(default_factory=dict)
 
-    def coherence_of(self, place: int) -> tuple[Array, Array] | None:
-        """Frequencies and coherence of an axis' measured response, where the fit rests on one."""
+    def measured_of(self, place: int) -> PairResponse | None:
+        """The measured response of an axis, where the fit rests on one."""
         system = self.searched.sampled.systems[0]
-        return self.evidence.coherences.get(f"{system.outputs[place]}/{system.inputs[place]}")
+        return self.evidence.measured.get(f"{system.outputs[place]}/{system.inputs[place]}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -317,7 +318,7 @@ def _judged(
     system, omega = setting.judged.sampled.systems[0], fresh.plants.omega_rad_s
     names = system.outputs[place], system.inputs[place]
     moved = moved_of(setting.evidence, *names, omega)
-    fresh = replace(fresh, moved_db=moved, measured=setting.coherence_of(place))
+    fresh = replace(fresh, moved_db=moved, measured=setting.measured_of(place))
     if not flown[place].has_flown:
         return fresh, None
     own = ControllerPaths(flown[place], setting.gyro, setting.with_angle)

@@ -28,6 +28,7 @@ from flightid.inspection.usable_band import NARROW
 from flightid.models import InnovationsModel, NarxModel, PolynomialModel
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.models.model import linear_system, model_of
+from flightid.responses.pair import PairResponse
 from flightid.uncertainty.uncertain import Uncertain
 
 CORNER = 2.0
@@ -76,8 +77,8 @@ class TuningEvidence:
     hold_in_model : bool
         Whether the model's delay holds the output hold's half sample.
     findings : tuple of Finding
-    coherences : mapping of str to tuple of ndarray
-        By ``"output/input"`` of the fitted responses: frequencies (rad/s) and coherence.
+    measured : mapping of str to PairResponse
+        The fitted responses by ``"output/input"``.
     errors : mapping of str to ModelErrorBound
         By ``"output/input"``: how far the model itself was from its data.
     left_out : int
@@ -93,7 +94,7 @@ class TuningEvidence:
     band_rad_s: Band | None
     hold_in_model: bool
     findings: tuple[Finding, ...]
-    coherences: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
+    measured: Mapping[str, PairResponse] = field(default_factory=dict)
     errors: Mapping[str, ModelErrorBound] = field(default_factory=dict)
     left_out: int = 0
     rigid: bool = False
@@ -179,7 +180,7 @@ def gather(
         hold_in_model(source),
         tuple(findings),
         {
-            each.name: (each.measured.omega_rad_s, each.measured.coherence)
+            each.name: each.measured
             for each in getattr(source, "responses", ())
             if hasattr(each, "measured")
         },

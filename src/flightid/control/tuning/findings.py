@@ -26,6 +26,7 @@ from flightid.control.tuning.order_statistics import ENOUGH, least_share
 from flightid.control.tuning.worst_cases import WorstCase
 from flightid.conventions import Light
 from flightid.findings import Finding, at_least
+from flightid.responses.pair import PairResponse
 
 Array = NDArray[np.float64]
 NEAR = 2.0**0.5
@@ -233,18 +234,18 @@ def remarks(
         yield Finding("unmodelled", Light.AMBER, text)
 
 
-def low_coherence(result: AxisResult, measured: tuple[Array, Array] | None) -> Iterator[Finding]:
+def low_coherence(result: AxisResult, measured: PairResponse | None) -> Iterator[Finding]:
     """Say where a loop would cross over at frequencies that the flight hardly excited.
 
     Parameters
     ----------
     result : AxisResult
-    measured : tuple of ndarray or None
-        Frequencies (rad/s) and coherence of the response that was fitted.
+    measured : PairResponse or None
+        The response that was fitted.
     """
     if measured is None or not result.found.exists:
         return
-    omega, coherence = measured
+    omega, coherence = measured.omega_rad_s, measured.coherence
     for each in result.worst_cases:
         if each.name != "crossover" or each.nominal is None:
             continue

@@ -16,6 +16,7 @@ from flightid.control.margins.stability_count import unstable_poles
 from flightid.control.tuning.limits import ANGLE, WHOLE, limits, noise_limit, present
 from flightid.control.tuning.requirements import TuningRequirements
 from flightid.frozen import dataclass
+from flightid.responses.pair import PairResponse
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -186,8 +187,8 @@ class LoopProblem:
         By how much a mode outside the identified band may move the vehicle, dB; None: not known.
     rigid : bool
         Whether the vehicle was declared to carry none: no mode is allowed for.
-    measured : tuple of ndarray or None
-        Frequencies (rad/s) and coherence of the response that was fitted.
+    measured : PairResponse or None
+        The response that was fitted.
     """
 
     plants: Plants
@@ -204,7 +205,7 @@ class LoopProblem:
     integral_ratio: float = float("inf")
     moved_db: Array | None = None
     rigid: bool = False
-    measured: tuple[Array, Array] | None = None
+    measured: PairResponse | None = None
 
     def with_plants(self, plants: Plants) -> LoopProblem:
         """The same requirements on other plants, at their frequencies."""

@@ -321,7 +321,7 @@ def design_of(
                 *(band, wider, result.problem.rigid),
             ),
             *remarks(result, flown, changes, stages, couplings, setting.gyro),
-            *low_coherence(result, setting.coherence_of(place)),
+            *low_coherence(result, setting.measured_of(place)),
             *band_findings(result, band, wider),
             *setting.evidence.findings,
         ),

@@ -40,6 +40,6 @@ def moved_of(evidence: TuningEvidence, output: str, input: str, omega_rad_s: Arr
         )
         return np.array([each / known - 1.0 for each in others])
 
-    measured = evidence.coherences.get(name)
-    coarsest = None if measured is None else COARSEST * float(measured[0][0])
+    measured = evidence.measured.get(name)
+    coarsest = None if measured is None else COARSEST * float(measured.omega_rad_s[0])
     return most_moved_db(omega_rad_s, evidence.band_rad_s, bound, slopes, coarsest)

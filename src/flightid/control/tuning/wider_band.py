@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from flightid.control.tuning.loop_problem import LoopProblem
 from flightid.control.tuning.mode_slacks import clear_from
 from flightid.responses.bands import COHERENT
+from flightid.responses.pair import PairResponse
 from flightid.responses.windows.defaults import CYCLES_AT_LOWEST, WINDOWS_IN_RECORDS
 
 Array = NDArray[np.float64]
@@ -18,8 +19,12 @@ gains found anew cross over elsewhere."""
 TOLD = 0.3, 0.97
 """Coherence that tells how it falls: less is chance, more is that of windows."""
 STEEPEST = 4.0
-"""Of the injection's power over that of noise with frequency: a loop holds a vehicle against both,
-so the input that is left of an injection falls with 1/(1 + L)²."""
+"""Of what a loop leaves of an injection's power over that of noise, with frequency: it holds a
+vehicle against both, and the input that is left of an injection falls with 1/(1 + L)²."""
+NEAR, BESIDE, FEWEST, SPREAD = 4.0, 1.3, 4, 1.3
+"""How far above the band's low end coherence tells how it falls, and how far above the start of a
+sweep, which few windows hold; how many frequencies are to tell it, and the ratio of the highest to
+the lowest: of fewer the slope is chance."""
 SURE = 5.0
 """Power over what a coherence of `COHERENT` needs: it is read with chance, and falls faster below
 the band than at its end, where an integrator sets in; with 2 such sweeps fell short."""
@@ -63,8 +68,8 @@ def higher_sweep(needed_rad_s: float, top_rad_s: float) -> str:
     return f"sweep to higher frequencies, up to {FURTHER * needed_rad_s:.3g} rad/s"
 
 
-def lower_sweep(needed_rad_s: float, low_rad_s: float, measured: tuple[Array, Array] | None) -> str:
-    """How to sweep for a band from a frequency on, or that no sweep of ordinary size brings it.
+def lower_sweep(needed_rad_s: float, low_rad_s: float, measured: PairResponse | None) -> str:
+    """How to sweep for a band from a frequency on, or that none brings it.
 
     Parameters
     ----------
@@ -72,8 +77,8 @@ def lower_sweep(needed_rad_s: float, low_rad_s: float, measured: tuple[Array, Ar
         From where on the model has to be shown, rad/s; zero: there is no such frequency.
     low_rad_s : float
         From where on it was, rad/s.
-    measured : tuple of ndarray or None
-        Frequencies (rad/s) and coherence of the response that was fitted.
+    measured : PairResponse or None
+        The response that was fitted.
 
     Example
     -------
@@ -91,52 +96,72 @@ def lower_sweep(needed_rad_s: float, low_rad_s: float, measured: tuple[Array, Ar
         f"add records that sweep from {start:.2g} to {top:.2g} rad/s alone, of {_up(each)} s or "
         f"more each and {_up(together)} s or more together"
     )
-    louder = None if measured is None else times_louder(target, low_rad_s, *measured)
+    louder = None if measured is None else times_louder(low_rad_s, measured, target, start, top)
     if louder is None:
-        return f"{how}, with more amplitude than before"
+        return f"{how}, with the amplitude that flew, then see: what flew does not tell how much"
     if louder > LOUDEST:
         return (
-            f"no sweep of ordinary size brings it: from {target:.2g} rad/s on the model would have "
-            f"to be shown, where the loop leaves so little of what is injected that it takes "
-            f"{louder:.0f} times the amplitude; sweep with softer I and angle gains, which leave "
-            f"more of it, or {instead}"
+            f"{how}, with as much amplitude as the vehicle may turn with: by how its coherence "
+            f"falls about {louder:.0f} times the largest that flew, which may not fly; softer I "
+            f"and angle gains may leave more of a sweep, or {instead}"
         )
     if louder <= 1.0:
-        return f"{how}, with the amplitude that flew"
+        return f"{how}, with the largest amplitude that flew"
     times = np.ceil(10.0 * louder) / 10.0
-    return f"{how}, with {times:g} times the amplitude that flew, if the vehicle may turn as far"
+    return f"{how}, with {times:g} times the largest amplitude that flew, if it may turn as far"
 
 
 def times_louder(
-    target_rad_s: float, low_rad_s: float, omega_rad_s: Array, coherence: Array
+    low_rad_s: float,
+    measured: PairResponse,
+    target_rad_s: float,
+    start_rad_s: float,
+    top_rad_s: float,
 ) -> float | None:
-    """By how much an amplitude has to rise for coherence at a frequency; None where nobody knows.
+    """By how much an amplitude has to rise for coherence at a frequency of a new sweep.
 
-    Noise and injection stay as they are, so γ²/(1 − γ²) rises with the square of the amplitude. It
-    falls below the band as it does about the band's low end.
+    Noise stays as it is, so γ²/(1 − γ²) is the power injected times what the loop leaves of it over
+    noise, which falls below the band as it does about the band's low end. Power of a logarithmic
+    sweep at a frequency goes with its length and the inverse of ω ln(ω₂/ω₁).
 
-    Example
+    Parameters
+    ----------
+    low_rad_s : float
+        Low end of the band, rad/s.
+    measured : PairResponse
+        The response that was fitted, with what was injected.
+    target_rad_s : float
+        Where coherence is needed, rad/s.
+    start_rad_s, top_rad_s : float
+        Ends of the new sweep, rad/s.
+
+    Returns
     -------
-    >>> omega = np.array([1.0, 2.0, 4.0])
-    >>> round(times_louder(1.0, 2.0, omega, np.array([0.36, 0.6, 0.8])), 2)
-    3.65
+    float or None
+        Over the largest amplitude that flew; None where what flew does not tell.
     """
-    near = (omega_rad_s <= 4.0 * low_rad_s) & (coherence > TOLD[0]) & (coherence < TOLD[1])
-    if np.count_nonzero(near) < 2:
+    omega, coherence, power = measured.omega_rad_s, measured.coherence, measured.injected
+    if power is None:
         return None
-    ratio = coherence[near] / (1.0 - coherence[near])
-    slope, _ = np.polyfit(np.log(omega_rad_s[near]), np.log(ratio), 1)
-    slope = float(np.clip(slope, 0.0, STEEPEST))
-    level = float(np.mean(np.log(ratio) - slope * np.log(omega_rad_s[near])))
-    there = np.exp(level + slope * np.log(target_rad_s))
-    return float(np.sqrt(SURE * COHERENT / (1.0 - COHERENT) / there))
+    near = (omega <= NEAR * low_rad_s) & (coherence > TOLD[0]) & (coherence < TOLD[1])
+    near &= power.is_swept(omega) & power.is_swept(omega / BESIDE)
+    if np.count_nonzero(near) < FEWEST or np.ptp(np.log(omega[near])) < np.log(SPREAD):
+        return None
+    logs = np.log(omega[near])
+    left = np.log(coherence[near] / (1.0 - coherence[near]) / power.at(omega[near]))
+    slope = float(np.clip(np.polyfit(logs, left, 1)[0], 0.0, STEEPEST))
+    there = np.exp(np.mean(left - slope * logs) + slope * np.log(target_rad_s))
+    lasting = WINDOWS_IN_RECORDS * CYCLES_AT_LOWEST * 2.0 * np.pi / target_rad_s
+    share = lasting / (lasting + power.seconds)
+    density = share * 2.0 * np.pi / (target_rad_s * np.log(top_rad_s / start_rad_s))
+    return float(np.sqrt(SURE * COHERENT / (1.0 - COHERENT) / (there * density)))
 
 
-def _unclear(low_rad_s: float, measured: tuple[Array, Array] | None) -> float:
+def _unclear(low_rad_s: float, measured: PairResponse | None) -> float:
     """Up to where coherence about the band's low end is not clear, rad/s."""
     if measured is None:
         return float(np.sqrt(WITHIN)) * low_rad_s
-    omega, coherence = measured
+    omega, coherence = measured.omega_rad_s, measured.coherence
     weak = omega[(omega < WITHIN * low_rad_s) & (coherence < CLEAR)]
     return float(np.max(weak, initial=low_rad_s))
 
