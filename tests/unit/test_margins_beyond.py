@@ -16,13 +16,14 @@ from flightid.control.margins import gain_limits
 from flightid.control.margins.loop_source import read_loop
 from flightid.control.margins.margins import margins_of
 from flightid.control.margins.mode_slack import MOST_MOVED_DB, TAKEN, ModeSlack
+from flightid.control.margins.outside_band import MarginBeyond, beyond_findings
 from flightid.control.margins.rigid_vehicle import RIGID
 from flightid.control.tuning.axis_tuning import held_by_hand
 from flightid.control.tuning.band_findings import asked_above, below_band, taken_words
 from flightid.control.tuning.findings import verdict
 from flightid.control.tuning.mode_slacks import slacks_of
 from flightid.control.tuning.modes_outside import BELOW_BAND
-from flightid.control.tuning.wider_band import wider_band
+from flightid.control.tuning.wider_band import higher_sweep, wider_band
 from flightid.control.tuning.worst_cases import WorstCase
 from flightid.conventions import Light
 from flightid.evidence.evidence import Check, Evidence
@@ -110,9 +111,31 @@ def test_where_a_resonance_may_leave_less_than_is_required_nothing_is_promised()
     assert light.action == f"{wider[1]}; {RIGID}"
     up = float(re.search(r"higher frequencies, up to ([\d.]+) rad/s", wider[1]).group(1))  # type: ignore[union-attr]
     assert up > 40.0
+    assert "and log at the loop's 200 Hz" in wider[1]
+    assert re.search(r"identify up to [\d.]+ rad/s \(a log of \d+ rows a second", said.action)
     omega = design.problem.plants.omega_rad_s
     loop = np.abs(design.problem.loops(_gains_of(design)[None], design.problem.plants).rate[0, 0])
     assert loop[omega > up].max() <= 10.0 ** (-26.0 / 20.0), "20 dB of a mode, 6 of margin"
+
+
+def test_a_band_that_no_log_of_the_loop_holds_is_not_asked_for() -> None:
+    """One of 400 Hz has 2 rows in a period of 1150 rad/s."""
+    half = 400.0 * np.pi
+    assert higher_sweep(100.0, 50.0, half).endswith(
+        "up to 130 rad/s (a log of 340 rows a second or more holds it)"
+    )
+    said = higher_sweep(1150.0 / 1.3, 50.0, half)
+    assert said.startswith("put a notch on")
+    assert "1150 rad/s (a log of 2930 rows a second or more holds it) would show it" in said
+    assert said.endswith("the loop runs at 400 Hz")
+
+
+def test_a_first_crossing_of_one_is_not_said_to_be_another() -> None:
+    omega = np.array([60.0, 90.0])
+    above = MarginBeyond("loop", 90.0, ModeSlack.above(omega / 30.0 + 0j))
+    (told,) = beyond_findings([above], (1.0, 50.0))
+    assert "there the loop lies above one, by" in told.message
+    assert "again" not in told.message
 
 
 def test_a_mode_under_20_db_above_the_band_takes_phase_and_delay() -> None:

@@ -19,7 +19,8 @@ from flightid.planning.flown_axis import FlownAxis
 from flightid.planning.options import PlanOptions
 from flightid.planning.plan import _loop, _sweep
 from flightid.planning.procedures import PROCEDURES, procedure_of
-from flightid.planning.sweep_band import sweep_band
+from flightid.planning.sweep_band import crossover_rad_s, ends_too_low, sweep_band
+from flightid.report.flight_card import card_html
 from tests.closeness import assert_close
 
 BARE = FlownAxis(20.0, 0.5, 0.02, motor_lag_s=0.05, rate_feedback=0.3)
@@ -47,6 +48,23 @@ def test_the_band_is_an_eighth_of_the_crossover_to_two_and_a_half_times_the_turn
     assert sweep_band(BARE, 400.0, by_stick=True)[1] <= 2.0 * math.tau
     slow = sweep_band(BARE, 48.0, by_stick=False)
     assert_close(slow[1], 3.0 * math.tau, rtol=1e-9, why="16 in a cycle")
+
+
+def test_a_sweep_below_what_the_loop_needs_is_said_on_the_card() -> None:
+    """A pilot's 2 Hz, and gains that cross over below a third of what was swept."""
+    crossover = brentq(lambda w: abs(_loop_gain(w)) - 1.0, 1.0, 30.0)
+    found = {"roll": crossover_rad_s(BARE), "yaw": None}
+    assert_close(found["roll"], crossover, rtol=0.01, why="a grid of 1 %")
+    assert ends_too_low({"roll": 3.1 * crossover, "yaw": 1.0}, found) is None
+    told = ends_too_low({"roll": 2.9 * crossover, "yaw": 1.0}, found)
+    assert told is not None
+    assert (str(told.light), told.message.split(":")[0]) == ("amber", "roll")
+    assert f"up to {3.0 * found['roll'] / math.tau:.2g} Hz" in told.action
+    made = fid.plan_flight(vehicle="quad", autopilot="px4", axes=("roll",))
+    assert "sweep-below-loop" in [each.code for each in made.findings]
+    assert "expect a model of it, not gains" in card_html(made)
+    made = fid.plan_flight(vehicle="quad", axes=("roll",))
+    assert "sweep-below-loop" not in [each.code for each in made.findings]
 
 
 @pytest.mark.parametrize(("gain", "capped"), [(60.0, False), (140.0, True)])

@@ -29,7 +29,7 @@ from flightid.planning.options import PlanOptions
 from flightid.planning.procedures import PROCEDURES, Procedure, procedure_of
 from flightid.planning.result import AxisSweep, SweepPlan
 from flightid.planning.settings import SID_AXES, log_family, settings_of, unsized_s
-from flightid.planning.sweep_band import sweep_band, why_so_high
+from flightid.planning.sweep_band import crossover_rad_s, ends_too_low, sweep_band, why_so_high
 from flightid.planning.told_axes import told_axis
 from flightid.review.loops import loop_rate_hz as logged_loop_rate_hz
 
@@ -164,6 +164,9 @@ def plan_flight(
     tops = {each.axis: each.plan.excitation.band_rad_s[1] for each in own if each.plan}
     if procedure.how == "mode" and asked.band_rad_s is None and tops:
         flown.append(why_so_high(tops))
+    crossovers = {e.axis: crossover_rad_s(e.guess.vehicle) for e in own if e.plan and e.guess}
+    if low := ends_too_low({axis: tops[axis] for axis in crossovers}, crossovers):
+        flown.append(low)
     lengths = [
         each.plan.excitation.duration_s if each.plan else unsized_s(procedure, asked)
         for each in sweeps

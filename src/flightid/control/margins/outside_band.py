@@ -19,6 +19,8 @@ from flightid.uncertainty.estimate import Estimate, Reading
 
 TO_SEE_IT = 1.3
 """Band beyond the frequency of a margin from which the model is known about it."""
+SAMPLES_IN_CYCLE = 16.0
+"""Rows of a log in a period of the highest frequency that is swept."""
 BEYOND = "read above the band to which the model was shown to hold"
 RESTING = "no gain margin or peak is promised, and phase and delay margin rest on no such mode"
 LESS = "lower the loop by filters or gains"
@@ -80,7 +82,7 @@ class MarginBeyond:
         """What may go wrong there."""
         room, moved = self.slack.room_db, self.slack.moved_db
         if room <= 0.0:
-            return f"there the loop passes one again, by {-room:.2g} dB in the model alone"
+            return f"there the loop lies above one, by {-room:.2g} dB in the model alone"
         if not self.slack.has_mode:
             return f"there the loop comes as near to one as {room:.2g} dB in the model alone"
         if not self.is_near:
@@ -102,13 +104,29 @@ def beyond_findings(
             Light.AMBER if each.is_near or each.asked else Light.GREEN,
             f"{each.loop}: margins are read up to {each.omega_rad_s:.3g} rad/s, "
             f"{_limit(each, top)}",
-            "sweep to higher frequencies, and identify up to "
-            f"{max(TO_SEE_IT * max(each.omega_rad_s, top), each.clear_rad_s):.3g} rad/s or further"
+            f"sweep to higher frequencies, and identify up to {_up_to(each, top)} or further"
             + (f"; or {LOWER}" if each.is_near or (each.asked and each.slack.has_mode) else "")
             + (f"; {each.instead}" if each.instead else ""),
         )
         for each in found
     ]
+
+
+def held_by(omega_rad_s: float) -> str:
+    """A frequency, rad/s, and which log holds it.
+
+    Example
+    -------
+    >>> held_by(1150.0)
+    '1150 rad/s (a log of 2930 rows a second or more holds it)'
+    """
+    rows = 10.0 * np.ceil(SAMPLES_IN_CYCLE * omega_rad_s / (20.0 * np.pi))
+    shown = float(f"{omega_rad_s:.3g}")
+    return f"{shown:g} rad/s (a log of {rows:.0f} rows a second or more holds it)"
+
+
+def _up_to(each: MarginBeyond, top_rad_s: float) -> str:
+    return held_by(max(TO_SEE_IT * max(each.omega_rad_s, top_rad_s), each.clear_rad_s))
 
 
 def _limit(each: MarginBeyond, top_rad_s: float) -> str:

@@ -5,11 +5,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.control.margins.outside_band import LOWER, SAMPLES_IN_CYCLE, held_by
 from flightid.control.tuning.loop_problem import LoopProblem
 from flightid.control.tuning.mode_slacks import clear_from
 from flightid.responses.bands import COHERENT
 from flightid.responses.pair import PairResponse
-from flightid.responses.windows.defaults import CYCLES_AT_LOWEST, WINDOWS_IN_RECORDS
+from flightid.responses.windows.defaults import (
+    CYCLES_AT_LOWEST,
+    HIGHEST_FRACTION,
+    WINDOWS_IN_RECORDS,
+)
 
 Array = NDArray[np.float64]
 Band = tuple[float, float]
@@ -55,17 +60,41 @@ def wider_band(problem: LoopProblem, gains: Array, band_rad_s: Band | None) -> t
     further = 0.0 if problem.rigid and np.isfinite(high) else high
     return (
         lower_sweep(low, band_rad_s[0], problem.measured),
-        higher_sweep(further, band_rad_s[1]),
+        higher_sweep(further, band_rad_s[1], float(problem.plants.omega_rad_s[-1])),
     )
 
 
-def higher_sweep(needed_rad_s: float, top_rad_s: float) -> str:
-    """How far up to sweep for a band to a frequency, rad/s; infinite: there is none."""
+def higher_sweep(needed_rad_s: float, top_rad_s: float, half_rate_rad_s: float) -> str:
+    """How far up to sweep for a band to a frequency, and with which log, or that none reaches it.
+
+    Parameters
+    ----------
+    needed_rad_s : float
+        Up to where the model has to be shown, rad/s; infinite: there is no such frequency.
+    top_rad_s : float
+        Up to where it was, rad/s.
+    half_rate_rad_s : float
+        Half the loop's rate, rad/s: responses are trusted up to two fifths of it at most.
+
+    Example
+    -------
+    >>> higher_sweep(100.0, 50.0, 1257.0)
+    'sweep to higher frequencies, up to 130 rad/s (a log of 340 rows a second or more holds it)'
+    """
     if np.isinf(needed_rad_s):
         return "lower the loop by filters or less D: it stays near one up to half the loop rate"
     if needed_rad_s <= top_rad_s:
         return "sweep to higher frequencies, until margins are read inside the band"
-    return f"sweep to higher frequencies, up to {FURTHER * needed_rad_s:.3g} rad/s"
+    reach, rate_hz = FURTHER * needed_rad_s, half_rate_rad_s / np.pi
+    if reach > HIGHEST_FRACTION * 2.0 * half_rate_rad_s:
+        return (
+            f"{LOWER}: only a band up to {held_by(reach)} would show it, and the loop runs at "
+            f"{rate_hz:.0f} Hz"
+        )
+    if SAMPLES_IN_CYCLE * reach > 2.0 * half_rate_rad_s:
+        said = f"{float(f'{reach:.3g}'):g} rad/s, and log at the loop's {rate_hz:.0f} Hz"
+        return f"sweep to higher frequencies, up to {said}"
+    return f"sweep to higher frequencies, up to {held_by(reach)}"
 
 
 def lower_sweep(needed_rad_s: float, low_rad_s: float, measured: PairResponse | None) -> str:
