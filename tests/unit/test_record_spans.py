@@ -87,3 +87,22 @@ def test_a_record_has_the_rate_that_is_asked(tmp_path: Path) -> None:
     assert_close(
         part["tau_phi"], 0.1 * np.cos(2.0 * (2.0 + 0.0025 * np.arange(401))), atol=1e-6, why="float"
     )
+
+
+def test_steps_of_a_log_are_low_passed_as_steps(tmp_path: Path) -> None:
+    """As `resample` does; as a smooth signal through its rows an input is half a row early."""
+    writer = DataflashWriter()
+    writer.message(0, "ArduCopter V4.7.0 (test)")
+    stamps = 1_000_000 + 10_000 * np.arange(600)
+    steps = np.repeat(np.random.default_rng(0).choice([-1.0, 1.0], 40), 15)
+    writer.add("RATE", stamps, {"R": np.cumsum(steps) * 0.01, "ROut": 0.1 * steps})
+    log = fid.read_log(writer.write(tmp_path / "log.bin"))
+    names = ["tau_phi", "p"]
+    made = log.record(names=names, sample_rate_hz=25.0, hold="zero")
+    of_rows = fid.conditioning.resample(log.record(names=names, hold="zero"), 0.04)
+    assert made.hold == of_rows.hold == "band_limited"
+    assert_close(made.time_s, of_rows.time_s, atol=1e-9, why="one grid")
+    assert_close(made["tau_phi"], of_rows["tau_phi"], atol=1e-12, why="one low-pass")
+    early = log.record(names=names, sample_rate_hz=25.0)
+    assert np.max(np.abs(made["tau_phi"] - early["tau_phi"])) > 0.01
+    assert early.hold is None

@@ -88,8 +88,9 @@ class Log(LogContents):
         name : str, optional
             Name of the record; default: the file's.
         hold : {"zero", "first", "band_limited"}, optional
-            What inputs do between the samples of the record; default: what the map says, where the
-            inputs are on their own stamps, else unknown.
+            What inputs do between their samples in the log; a record on a coarser base holds them
+            low-passed, band-limited. Default: what the map says, where the inputs are on their own
+            stamps, else unknown.
         period_s : float, optional
             Time after which the inputs repeat, s.
         loop : {"open", "closed"}, optional

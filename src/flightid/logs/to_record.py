@@ -27,12 +27,16 @@ from flightid.logs.scale_check import check_scales
 from flightid.logs.self_check import InjectionCheck, check_injection, chirp_clock, paired_rows
 from flightid.record import Channel, InputShape, Record, Step
 from flightid.record.checks import entry_steps, fault_steps
+from flightid.record.hold import InputHold
+from flightid.record.interpolation import is_coarser
 from flightid.record.sample_faults import SampleFault
 from flightid.record.timebase import GapPolicy, to_uniform
 from flightid.table import Cell
 from flightid.units import convert
 
 EXCITATION = "excitation"
+STEADY = "zero", "first"
+"""Holds that a low-pass to a coarser base takes away."""
 EDGE_STEPS = 3.0
 """Steps of its own by which a channel may begin late or end early and still cover a span."""
 OWN_STAMPS = 1e-3
@@ -72,6 +76,7 @@ def make_record(
         span_s=_snapped(found, reference, span_s),
         gaps=gaps,
         max_gap_s=max_gap_s,
+        hold=_filled(declared, found),
     )
     span = base.only
     record = Record.from_arrays(
@@ -112,6 +117,14 @@ def make_record(
     return made
 
 
+def _filled(declared: InputShape, found: list[ChannelSamples]) -> dict[str, InputHold]:
+    """What inputs do between their own samples, for a low-pass to a coarser base."""
+    if declared.hold is None:
+        return {}
+    names = (item.channel.name for item in found if item.channel.role == Role.INPUT)
+    return dict.fromkeys(names, declared.hold)
+
+
 def _input_shape(
     log: LogContents,
     declared: InputShape,
@@ -119,16 +132,20 @@ def _input_shape(
     found: list[ChannelSamples],
     step_s: float,
 ) -> InputShape:
-    """What is declared; else what the map knows, for inputs that are not resampled.
+    """What is declared, after a low-pass; else what the map knows, where nothing is resampled.
 
     Of a controller whose loops were not all logged nothing is known between the rows.
     """
+    inputs = [item for item in found if item.channel.role == Role.INPUT]
+    if declared.hold in STEADY and any(is_coarser(step_s, item.interval_s) for item in inputs):
+        # Steps and lines that a low-pass went over are none any more; beside others, neither.
+        every = all(is_coarser(step_s, item.interval_s) for item in inputs)
+        return replace(declared, hold="band_limited" if every else None)
     if declared.hold is not None or chosen.hold is None:
         return declared
     loop_s = loop_step_s(log.parameters)
     if loop_s is not None and abs(step_s / loop_s - 1.0) > EVERY_LOOP:
         return declared
-    inputs = [item for item in found if item.channel.role == Role.INPUT]
     own = all(abs(item.interval_s / step_s - 1.0) < OWN_STAMPS for item in inputs)
     return replace(declared, hold=chosen.hold) if own else declared
 
