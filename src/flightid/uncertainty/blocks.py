@@ -327,6 +327,6 @@ def freedom_of(
         doubt = doubt + variance**2 / model.freedom(levels)
     # Errors that are known leave no doubt, nor does a residual that vanishes.
     doubtful = doubt > 0.0
-    return np.asarray(
-        np.where(doubtful, np.diag(shared) ** 2 / np.where(doubtful, doubt, 1.0), np.inf)
-    )
+    found = np.where(doubtful, np.diag(shared) ** 2 / np.where(doubtful, doubt, 1.0), np.inf)
+    # A level that has one comes out one to rounding, and Student's law has no less.
+    return np.asarray(np.maximum(found, 1.0))

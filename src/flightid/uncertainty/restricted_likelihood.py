@@ -22,6 +22,11 @@ RIDGE = 1e-9
 """Information that every direction has, over that of unit noise: records may be blind to one."""
 
 
+FAINTEST = 1e-9
+"""Fast power left over that expected, below which a fit has taken an output whole: rounding alone
+may come out below zero."""
+
+
 class LikelihoodPoint(NamedTuple):
     """Restricted likelihood, and sums for its derivatives, by output."""
 
@@ -108,7 +113,9 @@ def weighed(
             part, levels, (np.linalg.inv(lower), through), (spread, estimate), shapes, factor
         )
     slope, information, seen, expected = sums
-    return LikelihoodPoint(0.5 * value, 0.5 * slope, 0.5 * information, seen / expected)
+    known = expected > 0.0
+    level = np.where(known, seen, 1.0) / np.where(known, expected, 1.0)
+    return LikelihoodPoint(0.5 * value, 0.5 * slope, 0.5 * information, np.fmax(level, FAINTEST))
 
 
 def _derivatives(
