@@ -7,13 +7,16 @@ The truth is computed here: a lag under an input that is held, or straight, betw
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 import flightid as fid
+from flightid.identification.told_hold import _judged
 from flightid.record.checks import record_findings
+from flightid.record.chosen_hold import ChosenHold
 from tests.closeness import assert_close
 
 Array = NDArray[np.float64]
@@ -150,3 +153,22 @@ def test_an_advised_file_is_no_longer_amber_for_what_was_mended(tmp_path: Path) 
         assert [f.code for f in record_findings(read)] == ["samples-repeated"] * left
         gap = fid.read_records(path, resample_to_s=step_s or 0.02, max_gap_s=0.025, **told)[0]
         assert [f.code for f in record_findings(gap)] == ["samples-repeated"]
+
+
+def test_no_other_hold_is_advised_of_what_was_low_passed() -> None:
+    """Of right words 1 of 7 is doubted there, and each declaration that followed was false."""
+    better = SimpleNamespace(
+        hold="zero", gain=3.1, parameter="tau", moved=38.0, by=", 0.039 s smaller", doubts=True
+    )
+    inputs = SimpleNamespace(model=SimpleNamespace(inputs=("ped",)))
+    said = []
+    for record in (made := flown("zero", 0.01), fid.conditioning.resample(made, 0.02)):
+        rivals = SimpleNamespace(fit=inputs, records=[record])
+        held = ChosenHold("band_limited", "record")
+        finding, reached = _judged([better], held, rivals)  # type: ignore[arg-type, list-item]
+        assert finding is not None
+        assert (finding.code, reached) == ("hold-contradicted", [better])
+        said.append((finding.message, finding.action))
+    assert "declare hold='zero'" in said[0][1]
+    assert said[1][0].startswith("inputs were low-passed to a coarser base, yet outputs fit better")
+    assert "declare no other hold" in said[1][1]

@@ -103,6 +103,8 @@ def _judged(
     doubts = [each for each in matter if each.doubts]
     if doubts:
         best = max(doubts, key=lambda each: each.gain or 0.0)
+        if held.hold == "band_limited" and _low_passed(rivals):
+            return low_passed_otherwise(best), [best]
         return contradicted(best, held.hold, whose), [best]
     # Samples that stand still and jump are a witness of their own: less than odds of 400 to 1
     # against steps does not outweigh them.
@@ -252,6 +254,27 @@ def contradicted(best: OtherHold, taken: InputHold, whose: str) -> Finding:
         f"declare hold={best.hold!r} for the record, or the hold that is true; a delay of half a "
         "sample that the model lacks looks alike",
     )
+
+
+def low_passed_otherwise(best: OtherHold) -> Finding:
+    """The same of inputs that a low-pass made smooth: no other word is true of them."""
+    return Finding(
+        "hold-contradicted",
+        Light.AMBER,
+        "inputs were low-passed to a coarser base, yet outputs fit better as if they were "
+        f"{BETWEEN[best.hold]} between samples: log-likelihood {best.gain:.3g} higher, "
+        f"{best.parameter} {best.moved:.2g} standard errors away{best.by}",
+        "fit the samples as they were stored, with the hold that was true of them; declare no "
+        "other hold for these; a delay of half a sample that the model lacks looks alike",
+    )
+
+
+def _low_passed(rivals: Rivals) -> bool:
+    """Whether a coarser base was made of an input of any record."""
+    names = rivals.fit.model.inputs
+    done = [step.options.get(name) for each in rivals.records for step in each.history
+            for name in names]  # fmt: skip
+    return any(isinstance(each, str) and each.startswith("low-pass") for each in done)
 
 
 def widened(fit: Fit, others: Sequence[OtherHold]) -> Fit:
