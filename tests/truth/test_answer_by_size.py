@@ -106,8 +106,7 @@ def test_more_inputs_than_samples_tell_are_not_asked() -> None:
     assert term_of(1, DRAG, inputs=12) is None
 
 
-def swept(seed: int, drag: float, injected: bool = False) -> fid.Record:
-    u, y = flown(seed, drag)
+def recorded(u: np.ndarray, y: np.ndarray, *, injected: bool = False) -> fid.Record:
     return fid.Record.from_arrays(
         np.arange(len(u)) * STEP_S,
         inputs={"tau_phi": u},
@@ -115,7 +114,12 @@ def swept(seed: int, drag: float, injected: bool = False) -> fid.Record:
         excitations={"injected": u} if injected else None,
         units={"p": "rad/s"},
         hold="first",
-    ).declare(loop="closed" if injected else "open")
+    )
+
+
+def swept(seed: int, drag: float, injected: bool = False) -> fid.Record:
+    record = recorded(*flown(seed, drag), injected=injected)
+    return record.declare(loop="closed" if injected else "open")
 
 
 @pytest.mark.parametrize("drag", [DRAG, 0.0])
@@ -139,14 +143,7 @@ def test_fits_of_records_in_time_are_asked_as_responses_are(method: str, drag: f
 
 def test_records_of_an_autopilots_log_are_asked_by_what_was_injected_alone() -> None:
     """It closes a loop, whether a test sees that or not: its inputs hold noise of the outputs."""
-    u, y = flown(3, DRAG)
-    bench = fid.Record.from_arrays(
-        np.arange(len(u)) * STEP_S,
-        inputs={"tau_phi": u},
-        outputs={"p": y},
-        units={"p": "rad/s"},
-        hold="first",
-    )
+    bench = recorded(*flown(3, DRAG))
     asked = [
         [*by_size_of(fid.identify(structure_of("published"), each, method="output_error"))]
         for each in (bench, bench.replace(step=Step("Log.record")))
@@ -166,14 +163,7 @@ def test_a_prewhitened_response_is_asked_by_what_was_injected(drag: float) -> No
 
 @pytest.mark.parametrize("drag", [DRAG, 0.0])
 def test_bounds_reach_small_motion_and_gains_are_told(drag: float) -> None:
-    u, y = flown(3, drag)
-    record = fid.Record.from_arrays(
-        np.arange(len(u)) * STEP_S,
-        inputs={"tau_phi": u},
-        outputs={"p": y},
-        units={"p": "rad/s"},
-        hold="first",
-    ).declare(loop="open")
+    record = swept(3, drag)
     model = fid.load_model("rate_first_order", axis="roll")
     fit = fid.identify(model, fid.estimate_response(record, band_rad_s=(1.2, 25.0)))
     bound = fit.model_errors["p/tau_phi"]
