@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.signal import chirp, lfilter
 
 import flightid as fid
 from flightid.uncertainty.blocks import RecordBlock
@@ -68,6 +69,46 @@ def test_a_true_model_keeps_its_bars_in_every_colour(colour: str) -> None:
     assert str(test.verdict) == "pass"
     assert test.p_value == fit.input_correlations[0].p_value
     assert test.lags[0] == 0
+
+
+def test_a_delayed_input_that_begins_with_a_jump_is_named_beside_missing_dynamics() -> None:
+    """At rest before the record, as a simulation begins: nothing is missing but what was before."""
+    n, late_by, step_s = 4000, 6, 0.01
+    u = 0.3 * chirp(np.arange(n) * step_s, 0.1, 40.0, 8.0, "logarithmic")
+    u += 0.1 * np.sign(np.sin(0.44 * np.arange(n) * step_s + 1.0))
+    keep = np.exp(-1.4 * step_s)
+    y = lfilter([0.0, 5.2 / 1.4 * (1.0 - keep)], [1.0, -keep], np.r_[np.zeros(late_by), u])[:n]
+    y = y + 0.014 * np.random.default_rng(1).standard_normal(n)
+    made = fid.StateSpaceModel.from_dict(
+        {
+            "name": "yaw",
+            "states": {"r": "rad/s"},
+            "inputs": {"ped": "1"},
+            "outputs": {"r": "r"},
+            "parameters": {
+                "Nr": {"value": -1.0, "unit": "1/s"},
+                "Nped": {"value": 4.0, "unit": "1/s^2"},
+                "tau": {"value": 0.05, "min": 0.0, "max": 0.4, "unit": "s"},
+            },
+            "equations": {"r'": "Nr*r + Nped*ped"},
+            "delays": {"ped": "tau"},
+        }
+    )
+    fits = []
+    for first in (0, 10):
+        record = fid.Record.from_arrays(
+            np.arange(n - first) * step_s,
+            inputs={"ped": u[first:]},
+            outputs={"r": y[first:]},
+            units={"ped": "1", "r": "rad/s"},
+            hold="zero",
+        )
+        fits.append(fid.identify(made, record, loop="open"))
+    (said,) = [each for each in fits[0].findings if each.code == "inputs-in-errors"]
+    assert "or a delayed input was another before its record began" in said.message
+    assert "cut off as much as its delay" in said.action
+    low, high = fits[1].parameters["tau"].interval95 or (0.0, 0.0)
+    assert low <= late_by * step_s <= high, "what is advised gives bars that hold"
 
 
 def test_a_missing_lag_has_no_bars_and_says_why() -> None:

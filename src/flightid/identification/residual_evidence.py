@@ -27,6 +27,9 @@ DOUBTED = (CONTRADICTED, "hold-unknown")
 OUTPUT_ERROR = "output_error"
 NOTHING = "what inputs explain of the outputs is within chance: nothing of the vehicle is told"
 
+BEGUN = "dynamics are missing, or a delayed input was another before its record began"
+"""Cause of models with delays, which hold the first sample of an input for all that was before."""
+LATER = "; where an input is not at rest at the beginning, cut off as much as its delay"
 EXACT = "residuals are at rounding, so no noise is there that bars could tell"
 
 
@@ -65,7 +68,10 @@ def with_residuals_judged(fit: Fit) -> Fit:
     tests = tests.beside(fit.agreement)
     if tests.is_independent:
         return fit
-    (said,) = tests.findings(biased=False, action=MISSING)
+    is_late = bool(getattr(fit.model, "delays", None))
+    if is_late:
+        tests = replace(tests, cause=BEGUN)
+    (said,) = tests.findings(biased=False, action=MISSING + (LATER if is_late else ""))
     return _withheld(fit, said.message, said)
 
 
