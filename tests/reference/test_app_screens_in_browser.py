@@ -17,10 +17,12 @@ import pytest
 from flightid.control.autopilots.parameter_files import read_parameters
 from flightid.vehicles import Autopilot, PilotDoublet, SidActivation, fly
 from flightid.vehicles.ardupilot_log import write_ardupilot_log
-from tests.reference.test_app_in_browser import WAIT_MS, Desk, Window, _findings, desk
+from tests.reference.test_app_in_browser import WAIT_MS, Desk, Window, _findings, desk, held_work
 
 __all__ = ["desk"]
-SLOW_MS = 2 * WAIT_MS  # below the limit of `make test` for one test: a wait that never ends has a name
+SLOW_MS = (
+    2 * WAIT_MS
+)  # below the limit of `make test` for one test: a wait that never ends has a name
 MOST_TABS = 500
 WALKS = 4  # a slow machine draws what was asked for while Tab goes round
 PHONE = {"width": 390, "height": 844}
@@ -166,11 +168,11 @@ def test_from_a_dropped_log_to_gains_and_the_flight_with_them(desk: Desk, tmp_pa
     page.get_by_role("button", name="Download step 1").wait_for()
     assert _saved(page, "Download step 1 of 2", tmp_path).read_bytes() == step.read_bytes()
     # Another preset is tuned, which says how far it is and can be ended; one that was is there.
-    page.get_by_role("button", name="firm", exact=True).press("Enter")
-    page.get_by_role("group", name="Tuning again").get_by_role("button", name="Cancel").press(
-        "Enter"
-    )
-    page.get_by_role("status").filter(has_text="Tuning again: cancelled.").wait_for()
+    with held_work():
+        page.get_by_role("button", name="firm", exact=True).press("Enter")
+        again = page.get_by_role("group", name="Tuning again")
+        again.get_by_role("button", name="Cancel").press("Enter")
+        page.get_by_role("status").filter(has_text="Tuning again: cancelled.").wait_for()
     page.get_by_text("still those of balanced; firm has none yet").wait_for()
     page.get_by_role("button", name="balanced", exact=True).press("Enter")
     page.get_by_role("status").filter(has_text="cancelled").wait_for(state="detached")

@@ -8,7 +8,6 @@ nothing is wider than the window or its field, and what a stranger has named lik
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,7 @@ import pytest
 pytest.importorskip("duckdb", reason="the extra fleet is not installed")
 
 from tests.app_stage import LONG, MANY, PLANTED, Stage, furnish
-from tests.reference.test_app_in_browser import AXE, SERIOUS, Desk, coloured, desk
+from tests.reference.test_app_in_browser import AXE, SERIOUS, Desk, coloured, desk, held_work
 from tests.reference.test_app_screens_in_browser import CLIPPED, CROWDED
 
 __all__ = ["desk"]
@@ -200,8 +199,6 @@ def _printed(page: Any) -> list[object]:
 
 
 def _of_gains(stage: Stage) -> Iterator[str]:
-    from playwright.sync_api import TimeoutError as TimedOut  # noqa: PLC0415 - an extra
-
     page = stage.page
     stage.open(f"gains/{stage.logs['first']}")
     stage.button("Download step 1 of 2").wait_for()
@@ -212,16 +209,13 @@ def _of_gains(stage: Stage) -> Iterator[str]:
     yield "gains that are refused"
     stage.button("As found").press("Enter")
     stage.button("Download step 1 of 2").wait_for()
-    stage.button("firm").press("Enter")
-    page.get_by_role("group", name="Tuning again").wait_for()
-    yield "tuned again"
-    # With its plants at hand a tuning may end while the state is looked at: then none is cancelled.
-    with suppress(TimedOut):
-        page.get_by_role("group", name="Tuning again").get_by_role("button", name="Cancel").press(
-            "Enter", timeout=5000
-        )
-        ended = page.get_by_role("status").filter(has_text="Tuning again: cancelled.")
-        ended.wait_for(timeout=5000)
+    with held_work():
+        stage.button("firm").press("Enter")
+        again = page.get_by_role("group", name="Tuning again")
+        again.wait_for()
+        yield "tuned again"
+        again.get_by_role("button", name="Cancel").press("Enter")
+        page.get_by_role("status").filter(has_text="Tuning again: cancelled.").wait_for()
         yield "cancelled"
     stage.button("balanced").press("Enter")
     stage.button("Download step 1 of 2").wait_for()

@@ -10,6 +10,7 @@ export class Gains {
   of = $state("");
   job: Job | null = $state(null);
   error = $state("");
+  #asked = 0;
 
   constructor(readonly log: string) {}
 
@@ -23,9 +24,12 @@ export class Gains {
     return this.job?.state === "waiting" || this.stale || !this.part ? this.job : null;
   }
 
+  /** Of several answers the one to the last question counts: an older one speaks of another study. */
   async ask(again = false) {
+    const mine = ++this.#asked;
     try {
       const told = await api.gains(this.log, again);
+      if (mine !== this.#asked) return;
       this.etag = told.etag;
       this.job = told.jobs[0] ?? null;
       this.error = this.job?.state === "failed" ? this.job.reason : "";
@@ -34,7 +38,7 @@ export class Gains {
         this.of = told.etag;
       }
     } catch (problem) {
-      this.error = (problem as Error).message;
+      if (mine === this.#asked) this.error = (problem as Error).message;
     }
   }
 
