@@ -1,35 +1,32 @@
 """Kill commands at random moments, look for losses: `python -m tests.stress.kills --kills 200`.
 
 A file is whole or the one before, a folder of a study too; one into which a verb writes file by
-file (`plan`) has each whole. What a kill leaves aside, the next run clears. Every second moment is
-one at which files are being written or renamed.
+file (`plan`) has each whole. What commands read, and all else in their folders, has the same bytes.
+After each kill the command is run again: it ends well, its result is whole, and what the kill left
+aside is gone. Every second moment is one at which files are being written or renamed.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import random
 import subprocess
 import sys
 import tempfile
 import time
-import tomllib
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from io import BytesIO
 from math import inf
 from pathlib import Path
-
-import h5py
 
 from flightid.vehicles import fly
 from flightid.vehicles.ardupilot_log import write_ardupilot_log
 from tests.autotune_log import write_ardupilot
 from tests.ordinary_log import write_ordinary_log
 from tests.strangers.ordinary_flights import Axis
+from tests.stress.losses import contents, harm, loss, next_run, others
 
 PROGRAM = (sys.executable, "-m", "flightid")
 STUDY = Path(__file__).parents[2] / "examples" / "quadrotor_rig" / "study.toml"
@@ -60,47 +57,6 @@ def commands(folder: Path) -> dict[str, tuple[list[str], Path]]:
         verb: ([*map(str, start), str(folder / name)], folder / name)
         for verb, (start, name) in words.items()
     }
-
-
-def contents(path: Path) -> dict[str, bytes]:
-    """Files of a result, or one file."""
-    files = [path] if path.is_file() else [each for each in path.rglob("*") if each.is_file()]
-    return {each.name: each.read_bytes() for each in files}
-
-
-def _opened(content: bytes) -> None:
-    h5py.File(BytesIO(content)).close()
-
-
-READERS: Mapping[str, Callable[[bytes], object]] = {
-    ".json": json.loads,
-    ".toml": lambda content: tomllib.loads(content.decode("utf-8")),
-    ".nc": _opened,
-}
-"""What fails on half a file, by the end of its name."""
-
-
-def loss(path: Path, before: Mapping[str, bytes], fixed: Mapping[str, bytes]) -> str:
-    """What is wrong after a kill; empty where the old or a whole new result stands.
-
-    `fixed` are files that hold the same bytes whenever their command ends.
-    """
-    aside = list(path.parent.glob(f".{path.name}.*.old"))
-    if not path.exists():
-        return "" if aside else "gone"
-    after = contents(path)
-    if missing := set(before) - set(after):
-        return f"without {sorted(missing)[:3]}"
-    for name, content in after.items():
-        if content != fixed.get(name, content):
-            return f"other bytes in {name}"
-        if name.endswith(".html") and not content.rstrip().endswith(b"</html>"):
-            return f"half of {name}"
-        try:
-            READERS.get(Path(name).suffix, bytes)(content)
-        except (OSError, ValueError) as error:
-            return f"half of {name}: {error}"
-    return "" if all(after.values()) else "empty files"
 
 
 def changes(made: subprocess.Popen[bytes], path: Path, most: float) -> int:
@@ -173,7 +129,9 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as name:
         known = commands(Path(name))
         verbs = asked.verbs or list(known)
+        folders, results = (Path(name), STUDY.parent), [path for _, path in known.values()]
         whole = {verb: unharmed(*known[verb]) for verb in verbs}
+        apart = others(folders, results)  # With the study that `tune` writes beside the log.
         try:
             for kill in range(asked.kills):
                 verb = verbs[kill % len(verbs)]
@@ -187,7 +145,13 @@ def main() -> int:
                 made.kill()
                 kills[verb] += 1
                 within[verb] += made.wait() < 0
-                if told := loss(path, whole[verb].files, whole[verb].fixed):
+                own = (whole[verb].files, whole[verb].fixed)
+                if told := (
+                    loss(path, *own)
+                    or harm(apart, others(folders, results))
+                    or next_run([*PROGRAM, *words], path, *own)
+                    or harm(apart, others(folders, results))
+                ):
                     losses[verb] += 1
                     print(kill, verb, told, flush=True)
                 # A count that is cut off (it takes half an hour) still says how far it came.
