@@ -33,6 +33,8 @@ COSTS_ALONE = {
 }
 CACHES = ("lru_cache", "cache")
 """Their arguments are sizes of caches."""
+LEFT_OPEN = "reshape"
+"""A size of -1 is one that NumPy finds itself, as any other negative one is."""
 EQUIVALENT: dict[tuple[str, str, str], str] = {
     (
         "src/flightid/control/tuning/tune.py",
@@ -127,6 +129,8 @@ def _left_out(module: ast.Module) -> Iterator[tuple[tuple[int, int], tuple[int, 
                 and not (each.arg == "strict" and ast.unparse(each.value) == "False")
             ]
             parts += node.args if getattr(node.func, "id", "") in CACHES else []
+            if getattr(node.func, "attr", "") == LEFT_OPEN:
+                parts += [each for each in node.args if ast.unparse(each) == "-1"]
         for told in parts:
             if isinstance(told, ast.expr) and told.end_lineno and told.end_col_offset:
                 yield (told.lineno, told.col_offset), (told.end_lineno, told.end_col_offset)

@@ -13,6 +13,7 @@ from scipy.signal import lfilter
 
 import flightid as fid
 from flightid.evidence.copied_samples import COPIED, judge_copies
+from flightid.evidence.shared_noise import RecordSeries, _met, _scaled_throughout, _transforms
 from tests.strangers import noises
 from tests.strangers.output_error import flight, model
 
@@ -130,6 +131,29 @@ COPIES = {
 }
 
 
+def test_where_two_errors_meet_is_where_they_go_together_most() -> None:
+    """Every shift written out: samples in common of both, from the first to the last."""
+    random = np.random.default_rng(3)
+    noise = random.standard_normal(200)
+    spike = np.r_[4.0, noise[1:-1], 4.0]
+    for first, last, second in ((0, 140, 0), (0, 140, 60), (60, 200, 0), (0, 200, 70)):
+        for rows in (noise, spike):
+            one = rows[None, first:last] + 0.3 * random.standard_normal(last - first)
+            other = rows[None, second : second + 130] + 0.3 * random.standard_normal(130)
+            n, m = one.size, other.size
+            met = _met(one, other, *_transforms([one, other]), 1.0)
+            best = (0.0, 0, 0.0, 0)
+            for shift in range(-(m - 48), n - 48 + 1):
+                start, stop = max(shift, 0), min(n, m + shift)
+                a, b = one[0, start:stop], other[0, start - shift : stop - shift]
+                alike = abs(float(a @ b)) / float(np.sqrt((a @ a) * (b @ b)))
+                score = alike * float(np.sqrt(stop - start))
+                best = max(best, (score, shift, alike, stop - start + 6))
+            assert met is not None
+            assert (met[0], met[2]) == (best[1], best[3])
+            assert met[1] == pytest.approx(best[2], rel=1e-9)
+
+
 @pytest.mark.parametrize("kind", COPIES)
 def test_copies_that_were_changed_share_their_noise(kind: str) -> None:
     for seed in (1, 2, 3):
@@ -234,6 +258,19 @@ def test_flights_and_runs_of_a_scaled_stick_are_no_copies(factor: float) -> None
 def test_records_that_hold_nothing_but_a_level_are_judged(level: float) -> None:
     still = np.full(400, level)
     assert not judge_copies([_record(still, still), _record(still, 2.0 * still)], ["da", "p"])
+    # No input, or inputs of other channels, tell nothing of a factor.
+    rows, others = np.random.default_rng(2).standard_normal((2, 1, 400))
+    moved, rest = np.full((1, 400), 2.0), np.zeros((1, 400))
+    for inputs, outputs, its, are_scaled in (
+        (moved, 2.0 * rows, 2.0 * moved, True),
+        (moved, 2.0 * rows, moved, False),
+        (moved, 2.0 * rows, np.concatenate([2.0 * moved, rest]), False),
+        (rest, others, rest, False),
+    ):
+        one, other = (
+            RecordSeries(("p",), *pair, STEP_S) for pair in ((rows, inputs), (outputs, its))
+        )
+        assert _scaled_throughout(one, other) == are_scaled
 
 
 def test_wind_that_two_vehicles_share_in_part_is_no_copy() -> None:

@@ -28,6 +28,9 @@ def test_growth_is_found_with_its_time_constant(tau_s: float, hertz: float) -> N
     assert found is not None
     assert found.time_constant_s == pytest.approx(tau_s, rel=0.2)
     assert found.at_limit_s <= found.time_constant_s
+    # It grew from its first window to its last, by its time constant.
+    risen_s = found.time_constant_s * np.log(found.last / found.first)
+    assert found.stop_s - found.start_s == pytest.approx(risen_s, rel=0.25)
     if hertz:
         assert found.frequency_hz == pytest.approx(hertz, rel=0.15)
     else:
@@ -40,6 +43,15 @@ def test_growth_into_a_limit_is_found() -> None:
     assert found is not None
     assert found.stop_s == pytest.approx(10.0 + 0.8 * np.log(50.0), abs=0.7)
     assert found.at_limit_s == pytest.approx(30.0 - found.stop_s, abs=0.1)
+
+
+def test_eight_windows_of_a_tenth_of_a_second_tell_growth() -> None:
+    """Of the shortest window two more than have to grow; in less time nothing is told."""
+    for span_s, is_found in ((0.82, True), (0.78, False)):
+        time_s = np.arange(0.0, span_s, 0.001)
+        grown = np.exp((time_s - span_s) / 0.25) * np.sin(200.0 * time_s)
+        found = divergence(time_s, grown, np.zeros_like(time_s))
+        assert (found is not None) == is_found, span_s
 
 
 def test_what_ends_again_what_jumps_and_what_was_asked_is_none() -> None:

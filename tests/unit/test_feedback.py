@@ -18,6 +18,7 @@ from flightid.evidence.data_checks import _band, _windows, loop_check, loop_of_r
 from flightid.evidence.feedback import feedback_test
 from flightid.responses.store import read_response, write_response
 from flightid.responses.windows.defaults import CYCLES_AT_LOWEST, HIGHEST_FRACTION
+from flightid.uncertainty import feedback
 from flightid.uncertainty.feedback import _Pasts, _shares, _shares_at_once, find_feedback
 from flightid.uncertainty.feedback_result import LEVEL, FeedbackTest, _percent
 from tests.closeness import assert_close
@@ -287,7 +288,9 @@ def test_an_input_that_moves_at_its_end_is_tested() -> None:
     assert find_feedback([u[None] - u.mean()], [e[None]], ["u"]).loop == "open"
 
 
-def test_past_noise_and_none_of_the_same_sample_explains_an_input() -> None:
+def test_past_noise_and_none_of_the_same_sample_explains_an_input(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     random = np.random.default_rng(0)
     noise = random.standard_normal((1, 2000))
     own = 0.3 * random.standard_normal((1, 2000))
@@ -296,6 +299,10 @@ def test_past_noise_and_none_of_the_same_sample_explains_an_input() -> None:
         ((found, chance),) = _shares([pair], [noise[:, 6:]], 6)
         assert found == pytest.approx(share, abs=0.02)
         assert (chance < LEVEL) is sure
+    # Rounding explains less than nothing, or more than all: it is neither news nor an error.
+    for explains, told in ((-1e-15, (0.0, 1.0)), (-1.0, (0.0, 1.0)), (1e9, (1.0, 0.0))):
+        monkeypatch.setattr(feedback, "explained", lambda *_, size=explains: np.array([size]))
+        assert _shares([pair], [noise[:, 6:]], 6) == [told]
 
 
 def test_shares_are_cut_and_only_all_is_all() -> None:

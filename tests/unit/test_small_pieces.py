@@ -135,6 +135,7 @@ def test_what_misses_a_requirement_is_told_by_plant_and_size() -> None:
     assert _short("phase margin", 36.04, " deg", margin, slack[1:2]) == (
         "phase margin 36 deg, 9 deg short of ≥ 45 (the model)"
     )
+    assert _short("phase margin", 36.04, " deg", margin, slack[:2]).endswith("(1 of 2 plants)")
     assert _short("peak", 2.471, "", peak, slack) == "peak 2.48, 0.48 above ≤ 2 (2 of 3 plants)"
 
 

@@ -467,6 +467,14 @@ def test_an_integral_flown_without_p_asks_for_no_more_than_usual() -> None:
         loop = FLOWN.with_gains({names[role]: value for role, value in flown.items()})
         ratios.append(ControllerPaths(loop, "filtered", False).integral_ratio(2.0))
     assert ratios == [2.0 * usual[1] / usual[0], 2.0 * usual[1] / usual[0], 9.0]
+    # Without a default of both there is no usual ratio.
+    for lacking in "pi":
+        known = {k: each for k, each in FLOWN.ranges.items() if k != names[lacking]}
+        bare = SimpleNamespace(
+            ranges=known, names=names, values=FLOWN.values, unit_of=FLOWN.unit_of
+        )
+        paths = ControllerPaths(cast("Any", bare), "filtered", False)
+        assert paths.integral_ratio(2.0) == np.inf
 
 
 def test_the_largest_sensitivity_is_the_smaller_of_both_that_are_asked() -> None:

@@ -13,6 +13,7 @@ from flightid.control.tuning.shortfalls import NAMES
 from flightid.findings import held
 
 RATE = "rate loop"
+LOOPS = (RATE, WHOLE, ANGLE)
 ASKED = TuningRequirements(
     phase_margin_deg=41.0,
     gain_margin_db=7.0,
@@ -26,7 +27,7 @@ ASKED = TuningRequirements(
 
 
 def test_the_limit_in_words_is_the_limit_in_figures() -> None:
-    made = limits(ASKED, (RATE, WHOLE, ANGLE), 19.0)
+    made = limits(ASKED, LOOPS, 19.0)
     for limit in made:
         sign, number = re.fullmatch(r"([≥≤]) ([\d.]+)", limit.text).groups()
         inside = 1.001 if sign == "≥" else 0.999
@@ -51,8 +52,19 @@ def test_a_number_is_shown_on_the_side_of_its_limit_that_it_is_on(value: float) 
 
 
 def test_every_requirement_on_a_loop_is_a_limit() -> None:
-    texts = {limit.text[2:] for limit in limits(ASKED, (RATE, WHOLE, ANGLE), 19.0)}
+    texts = {limit.text[2:] for limit in limits(ASKED, LOOPS, 19.0)}
     assert texts == {"41", "7", "1.7", "0.013", "11", "5", "57", "3", "19"}
+    found = {(limit.loop, limit.field): limit.bound for limit in limits(ASKED, LOOPS, None)}
+    margins = {"gain_margin_db": 7.0, "gain_reduction_margin_db": 7.0, "sensitivity_peak": 1.7}
+    inner = margins | {"phase_margin_deg": 41.0, "delay_margin_s": 0.013}
+    targets = {"crossover_rad_s": 11.0, "disturbance_bandwidth_rad_s": 5.0}
+    wanted = {
+        RATE: inner | targets,
+        WHOLE: inner,
+        # What delays the whole loop is asked of it there.
+        ANGLE: margins | {"phase_margin_deg": 57.0, "crossover_rad_s": 3.0},
+    }
+    assert found == {(loop, k): v for loop, of in wanted.items() for k, v in of.items()}
 
 
 def test_loops_that_are_not_there_have_no_limits() -> None:

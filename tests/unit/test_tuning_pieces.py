@@ -16,7 +16,7 @@ from flightid.control.tuning.gain_steps import TunedGain, reached
 from flightid.control.tuning.requirements import TuningRequirements
 from flightid.control.tuning.sampled_plants import SampledPlants, loop_grid
 from flightid.control.tuning.standing_error import judge_standing, slow_gain, standing_errors
-from flightid.control.tuning.tune_controller import _gains_given, _loop, _scaled, _turn
+from flightid.control.tuning.tune_controller import _gains_given, _loop, _scaled, _sign, _turn
 from flightid.control.tuning.tune_pid import _require_right_way, noise_density
 from flightid.control.tuning.tuned_filters import TunedFilters
 from flightid.errors import ModelError, OptionError
@@ -182,6 +182,11 @@ def test_what_a_loop_without_an_integrator_leaves_of_a_step() -> None:
         found = slow_gain(system, "y", "u")
         assert_close(found[0], gain, rtol=1e-4, why="a millionth above rest")
         assert found[1:] == (integrators, unstable)
+        # Feedback has to answer each real pole on the right by turning round.
+        assert _sign(system, "y", "u") == math.copysign(1.0, gain) * (-1) ** unstable
+    away = _system([[1.0, 0.0], [1.0, 2.0]], [1.0, 0.0], [0.0, 1.0])
+    assert slow_gain(away, "y", "u")[1:] == (0, 2)
+    assert _sign(away, "y", "u") == 1.0
     loop: Any = SimpleNamespace(values={"p": 2.0, "b": 0.8}, direct=False)
     errors = standing_errors(loop, [lag, twice, motor], "y", "u")
     assert_close(errors, [1.0 - 0.8 * 0.75, 1.0 - 0.8 * 6.0 / 7.0, 0.2], rtol=1e-5, why="formula")

@@ -13,7 +13,8 @@ from flightid.uncertainty.blocks import RecordBlock
 from flightid.uncertainty.coloured_residuals import ResidualCovariance, residual_covariance
 from flightid.uncertainty.residual_colour import IN_DOUBT, UNEQUAL, WORTH_A_WORD, colour_findings
 from flightid.uncertainty.residual_noise import Autoregression
-from flightid.uncertainty.unequal_noise import Innovations, unequal_outputs
+from flightid.uncertainty.slow_drift import Drift
+from flightid.uncertainty.unequal_noise import Innovations, _whitener, unequal_outputs
 from tests.closeness import assert_close
 from tests.strangers.output_error import STEP_S, TRUTH, model
 
@@ -134,6 +135,18 @@ def test_noise_of_one_power_needs_no_correlations_of_long_rows(
 
     monkeypatch.setattr("flightid.uncertainty.unequal_noise._correlations", refused)
     assert not unequal_outputs(WHITE, [_block(4, 0.0), _block(5, 0.0)], np.eye(2))
+
+
+def test_noise_with_a_drift_is_foretold_by_its_last_forty_samples_at_most() -> None:
+    """The normal equations written out; fewer where a record is short."""
+    drift = Drift(0.5, 0.01)
+    for n, order in ((4000, 40), (800, 40), (799, 39), (60, 3)):
+        noise = Autoregression(np.array([1.0, 0.6]), np.array([0.6]), n, 2 * n, drift)
+        weights, lags = _whitener(noise), noise.autocovariance(order + 1)
+        assert weights.shape == (order,)
+        among = lags[np.abs(np.subtract.outer(np.arange(order), np.arange(order)))]
+        assert_close(among @ weights, lags[1:], rtol=1e-9, why="rounding")
+    assert _whitener(Autoregression(np.ones(2), np.array([0.6]), 60, 128)).tolist() == [0.6]
 
 
 @pytest.mark.parametrize("ties", [False, True])

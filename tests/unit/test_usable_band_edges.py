@@ -122,6 +122,40 @@ def test_windows_of_one_length_and_of_half_of_it(monkeypatch: pytest.MonkeyPatch
     assert usable_band._of_windows((), names, 4.0, 0.1, "") == "no window"
 
 
+def test_of_windows_the_longest_with_enough_are_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Enough at all frequencies, else at some, else the shortest of all that were tried."""
+
+    class Flown(list[Any]):
+        are_long = False
+
+    class Moved(dict[str, Any]):
+        sample_time_s, duration_s = 0.1, 40.0
+
+    flown = Moved(u=np.arange(2.0))
+    monkeypatch.setattr(usable_band, "FlightStretches", lambda *_: Flown([flown]))
+    monkeypatch.setattr(usable_band, "_cut", lambda *_: "")
+    axis: Any = SimpleNamespace(command="u", rate="p")
+    for counts, taken in (
+        ([(1, 9), (9, 9), (1, 1)], 1),
+        ([(1, 1), (1, 9), (9, 1), (1, 1)], 1),
+        ([(1, 1), (1, 9)], 1),
+        ([(1, 1), (1, 1), (2, 2)], 2),
+        ([(1, 9), "short"], 0),
+        ([(1, 1), "short"], 1),
+    ):
+        tried = [
+            each if isinstance(each, str) else SimpleNamespace(
+                composite=SimpleNamespace(n_independent=np.array(each, dtype=float))
+            )
+            for each in counts
+        ]  # fmt: skip
+        left = iter(tried)
+        last = tried[-1]
+        monkeypatch.setattr(usable_band, "_of_windows", lambda *_, k=left, e=last: next(k, e))
+        found = usable_band._explained((), [axis], ((0.0, 40.0),))
+        assert found is tried[taken], counts
+
+
 def band_of(coherence: list[float], **told: Any) -> Any:
     """Of these coherences at 1, 2, ... rad/s."""
     omega = np.arange(1.0, 1.0 + len(coherence))

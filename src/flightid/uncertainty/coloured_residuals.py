@@ -365,7 +365,7 @@ def _gain(beside: JointResiduals | None, blocks: Sequence[RecordBlock]) -> Array
     if answering:
         pairs = zip(blocks, answering, strict=True)
         return np.linalg.inv(np.sum([each.projected.T @ slopes for each, slopes in pairs], axis=0))
-    count = blocks[0].projected.shape[1]
+    (count,) = {block.projected.shape[1] for block in blocks}
     if beside is None:
         return np.eye(count)
     follows = beside.slopes.T @ (beside.slopes - beside.total)

@@ -98,11 +98,9 @@ class ControllerPaths:
         if factor is None or not {"p", "i"} <= names.keys() & self.loop.values.keys():
             return float(np.inf)
         one = {role: self.loop.unit_of(role) for role in "pi"}
-        usual = [
-            known[names[role]].default * one[role] if names[role] in known else 0.0 for role in "pi"
-        ]
+        usual = [known[names[role]].default * one[role] for role in "pi" if names[role] in known]
         flown = [self.loop.values[role] * one[role] for role in "pi"]
-        if min(usual) <= 0.0:
+        if len(usual) < 2 or min(usual) <= 0.0:
             return float(np.inf)
         return max(factor * usual[1] / usual[0], flown[1] / flown[0] if flown[0] > 0.0 else 0.0)
 
