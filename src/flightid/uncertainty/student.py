@@ -13,11 +13,13 @@ MANY = 1e4
 LARGE = 200.0
 """Degrees of freedom from which the ratio of gamma functions is a series."""
 SETTLED = 4e-16
-"""Relative step, or factor of a fraction less one, below which iterations end."""
+"""Factor of a continued fraction less one, below which it ends."""
 STEPS = 5
 """Of Halley's from the bound, which make any share's quantile exact to rounding."""
 MOST_STEPS = 60
 """Of a search for a quantile."""
+LAST_STEP = 1e-8
+"""Relative step after which a quantile is exact to rounding: Newton's error is about its square."""
 MOST_TERMS = 2000
 """Of a continued fraction."""
 TINY = 1e-300
@@ -39,6 +41,7 @@ def normal_quantile(share: float) -> float:
     return math.copysign(_above(min(share, 1.0 - share)), share - 0.5)
 
 
+@lru_cache(64)
 def _above(share: float) -> float:
     """Quantile with this share, at most one half, above it."""
     z = math.sqrt(-2.0 * math.log(2.0 * share))
@@ -100,13 +103,14 @@ def _student_above(share: float, freedom: float) -> float:
     z = _above(share)
     if freedom > MANY:
         return z + _beyond_normal(z, freedom)
-    place, wanted = math.log(max(z, TINY)), math.log(share)
+    near = max(z, z + _beyond_normal(z, freedom), TINY)
+    place, wanted = math.log(near), math.log(share)
     for _ in range(MOST_STEPS):
         t = math.exp(place)
         tail, density = _tail(t, freedom)
         step = tail / (t * density) * (math.log(tail) - wanted)
         place += step
-        if abs(step) < SETTLED:
+        if abs(step) < LAST_STEP:
             break
     return math.exp(place)
 
@@ -145,19 +149,19 @@ def _gamma_ratio(half: float) -> float:
 
 def _fraction(a: float, b: float, x: float) -> float:
     """Continued fraction of the incomplete beta function, by Lentz's way."""
-    c, d = 1.0, 1.0 / _not_zero(1.0 - (a + b) * x / (a + 1.0))
+    c, d = 1.0, 1.0 / (1.0 - (a + b) * x / (a + 1.0) or TINY)
     found = d
     for m in range(1, MOST_TERMS):
-        even = m * (b - m) * x / ((a + 2 * m - 1.0) * (a + 2 * m))
-        odd = -(a + m) * (a + b + m) * x / ((a + 2 * m) * (a + 2 * m + 1.0))
-        for part in (even, odd):
-            d = 1.0 / _not_zero(1.0 + part * d)
-            c = _not_zero(1.0 + part / c)
-            found *= c * d
-        if abs(c * d - 1.0) < SETTLED:
+        above = a + 2 * m
+        even = m * (b - m) * x / ((above - 1.0) * above)
+        d = 1.0 / (1.0 + even * d or TINY)
+        c = 1.0 + even / c or TINY
+        odd = -(a + m) * (a + b + m) * x / (above * (above + 1.0))
+        first = c * d
+        d = 1.0 / (1.0 + odd * d or TINY)
+        c = 1.0 + odd / c or TINY
+        factor = c * d
+        found *= first * factor
+        if abs(factor - 1.0) < SETTLED:
             break
     return found
-
-
-def _not_zero(value: float) -> float:
-    return value if abs(value) > TINY else TINY
