@@ -72,6 +72,10 @@ def test_a_root_among_the_seeds_leaves_the_others_together(
     monkeypatch.setattr(np.linalg, "solve", counted)
     assert newton_roots(*parts, np.array([-1.0 + 0.0j, *others])) == [-1.0 + 0.0j, *alone]
     assert solved[:2] == [31, 30]
+    solved.clear()  # below the real axis steps mirror those above
+    found = newton_roots(*parts, np.array([*np.conj(others), *others]))
+    assert found == [*(each and each.conjugate() for each in alone), *alone]
+    assert solved[0] == 30
 
 
 def test_roots_with_a_direct_part_solve_their_equation() -> None:

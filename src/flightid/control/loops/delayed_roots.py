@@ -68,7 +68,8 @@ def newton_roots(
     """
     s = np.array(seeds, dtype=np.complex128)
     found: list[complex | None] = [None] * len(s)
-    going = np.arange(len(s))
+    twins = _twins(s)
+    going = np.array([place for place in range(len(s)) if place not in twins], dtype=np.intp)
     for _ in range(STEPS):
         if not len(going):
             break
@@ -85,7 +86,17 @@ def newton_roots(
         for place in going[settled]:
             found[place] = _off_the_axis(complex(s[place]))
         going = going[~settled]
+    for place, other in twins.items():
+        root = found[other]
+        found[place] = root if root is None or root.imag == 0.0 else root.conjugate()
     return found
+
+
+def _twins(seeds: Complex) -> dict[int, int]:
+    """Places of seeds below the real axis, and of their conjugates, whose steps mirror theirs."""
+    above = {complex(seed): place for place, seed in enumerate(seeds) if seed.imag > 0.0}
+    below = ((place, complex(seed).conjugate()) for place, seed in enumerate(seeds))
+    return {place: above[seed] for place, seed in below if seed in above}
 
 
 def _off_the_axis(s: complex) -> complex:
@@ -122,18 +133,19 @@ def _pencils(
     a: Array, b: Array, c: Array, d: Array, delays: Array, s: Complex
 ) -> tuple[Complex, Complex]:
     """F and F' at some places, shapes (n_s, n, n)."""
-    one, inner = np.eye(len(a)), np.eye(len(delays))
+    one = np.eye(len(a))
     apart = np.multiply.outer(s.real, delays)
     late = np.exp(np.clip(-apart, -200.0, 200.0) - 1j * np.multiply.outer(s.imag, delays))
     if d.any():
+        inner = np.eye(len(delays))
         left = np.linalg.inv(inner - late[:, :, None] * d)
         right = np.linalg.inv(inner - d * late[:, None, :])
-        gain = left * late[:, None, :]
-        slope = (left * (-delays * late)[:, None, :]) @ right
+        onward = b @ (left * late[:, None, :])
+        slope = b @ ((left * (-delays * late)[:, None, :]) @ right)
     else:  # what goes around inside has no direct part: both inverses are one
-        gain, slope = late[:, :, None] * inner, (-delays * late)[:, :, None] * inner
-    f = s[:, None, None] * one - a - b @ gain @ c
-    return np.asarray(f), np.asarray(one - b @ slope @ c, dtype=np.complex128)
+        onward, slope = b * late[:, None, :], b * (-delays * late)[:, None, :]
+    f = s[:, None, None] * one - a - onward @ c
+    return np.asarray(f), np.asarray(one - slope @ c, dtype=np.complex128)
 
 
 def line_right_of_axis(a: Array, delays_s: Array) -> float:
