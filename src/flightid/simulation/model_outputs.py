@@ -215,10 +215,13 @@ def driven_outputs(
     -------
     ndarray, shape (..., p, n_samples)
     """
-    if hold != "band_limited":
-        return np.asarray(sum(_driven(each, between, sample_time_s, hold) for each in modes))
-    step = sample_time_s / FINER
-    return np.asarray(sum(_driven(each, between, step, "first", FINER) for each in modes))
+    how = (
+        (sample_time_s, hold) if hold != "band_limited" else (sample_time_s / FINER, "first", FINER)
+    )
+    found = _driven(modes[0], between, *how)
+    for each in modes[1:]:
+        found += _driven(each, between, *how)
+    return found
 
 
 def free_outputs(modes: list[ModeSubset], n_samples: int, sample_time_s: float) -> Array:
@@ -229,12 +232,14 @@ def free_outputs(modes: list[ModeSubset], n_samples: int, sample_time_s: float) 
     ndarray, shape (n_states + m, p, n_samples)
         States at the first sample, or at the last for modes that are followed backwards.
     """
-    states, steady = [], np.zeros((len(modes[0].delays_s), len(modes[0].matrices[2]), n_samples))
-    for each in modes:
-        found = _free(each, n_samples, sample_time_s)
-        states.append(found[: len(each.matrices[0])])
-        steady += found[len(each.matrices[0]) :]
-    return np.concatenate([*states, steady])
+    parts = [_free(each, n_samples, sample_time_s) for each in modes]
+    if len(parts) == 1:
+        return parts[0]
+    sizes = [len(each.matrices[0]) for each in modes]
+    steady = parts[0][sizes[0] :]
+    for part, size in zip(parts[1:], sizes[1:], strict=True):
+        steady += part[size:]
+    return np.concatenate([*(part[:size] for part, size in zip(parts, sizes, strict=True)), steady])
 
 
 def _free(modes: ModeSubset, n_samples: int, sample_time_s: float) -> Array:
@@ -249,13 +254,16 @@ def _free(modes: ModeSubset, n_samples: int, sample_time_s: float) -> Array:
     system[:n] = np.hstack([a, b])
     ahead = -sample_time_s if modes.backwards else sample_time_s
     power = scipy.linalg.expm(ahead * system)
-    rows, needed = np.hstack([c, d]), n_samples * len(c)
+    known, needed = len(c), n_samples * len(c)
+    rows = np.empty((needed, n + m))
+    rows[:known] = np.hstack([c, d])
     with np.errstate(over="ignore", invalid="ignore"):  # who asks tells a run that explodes
-        while len(rows) < needed:
-            more = rows[: needed - len(rows)] @ power
-            rows, power = np.concatenate([rows, more]), power @ power
+        while known < needed:
+            more = min(known, needed - known)
+            np.matmul(rows[:more], power, out=rows[known : known + more])
+            known, power = known + more, power @ power
     found = rows.reshape(n_samples, len(c), n + m).transpose(2, 1, 0)
-    return found[:, :, ::-1] if modes.backwards else found
+    return np.ascontiguousarray(found[:, :, ::-1] if modes.backwards else found)
 
 
 def _driven(

@@ -153,10 +153,11 @@ class ModelResiduals:
             sides = [_Side.of(runs, kept, motion) for runs in groups]
             for place, (other, step) in enumerate(moved):
                 systems, beyond = self._motion(other, kept, n, motion.systems)
-                turned = (beyond - motion.free) / step
+                beyond -= motion.free
+                beyond /= step
                 for whole, side in zip(wholes, sides, strict=True):
                     driven = self._driven(systems, kept, side.runs.places)
-                    whole[:, place, kept] = side.moved(driven, step, turned)
+                    whole[:, place, kept] = side.moved(driven, step, beyond)
             for whole, side in zip(wholes, sides, strict=True):
                 turns = np.stack(side.turns, axis=1)
                 _take_motion_out(whole, kept, side.runs.fitter, motion.basis, turns)
@@ -221,13 +222,15 @@ class ModelResiduals:
         """What the inputs of records of one length drive, shape (n_records, n_fitted, n)."""
         between = self._between[places]
         n = self.linear.output_records[places[0]].shape[1]
-        found = np.zeros((len(places), len(kept), n))
+        found = None if len(systems) == 1 else np.zeros((len(places), len(kept), n))
         for each in systems:
             is_all = each.inputs == list(range(between.shape[1]))
             inputs = between if is_all else between[:, each.inputs]
             outputs = driven_outputs(each.modes, inputs, self.linear.sample_time_s, self.hold)
+            if found is None:  # all fitted outputs are its own
+                return _taken(outputs, each.places)
             found[:, np.searchsorted(kept, each.rows)] += outputs[:, each.places]
-        return found
+        return np.asarray(found)
 
     @cached_property
     def _between(self) -> dict[tuple[int, ...], Array]:
@@ -256,11 +259,13 @@ class ModelResiduals:
             rows = [k for k in kept if self.outputs[k] in each.outputs]
             places = [each.outputs.index(self.outputs[k]) for k in rows]
             motions.append(_SystemRun(modes, inputs, rows, places))
-            moving = free_outputs(modes, n, step)
-            wide = np.zeros((len(moving), len(kept), n))
-            wide[:, np.searchsorted(kept, rows)] = moving[:, places]
-            free.append(wide)
-        together = np.concatenate(free)
+            moving = _taken(free_outputs(modes, n, step), places)
+            if len(rows) < len(kept):
+                wide = np.zeros((len(moving), len(kept), n))
+                wide[:, np.searchsorted(kept, rows)] = moving
+                moving = wide
+            free.append(moving)
+        together = free[0] if len(free) == 1 else np.concatenate(free)
         if not np.all(np.isfinite(together)):
             raise self._diverges(kept, "a simulation without bounds")
         return motions, together
@@ -302,6 +307,11 @@ class ModelResiduals:
         )
 
 
+def _taken(outputs: Array, places: list[int]) -> Array:
+    """Some outputs of a system, which are most often all of them; a copy costs as much as a sum."""
+    return outputs if places == list(range(outputs.shape[1])) else outputs.take(places, axis=1)
+
+
 @dataclass(frozen=True)
 class _Side:
     """Records of one length, and what each moved model is compared with.
@@ -330,17 +340,23 @@ class _Side:
         return cls(runs, motion.basis, weighed, runs.pulls(kept, motion.basis), [])
 
     def moved(self, driven: Array, step: float, turned: Array) -> Array:
-        """Derivatives by one parameter, means removed, shape (n_records, n_fitted, n)."""
+        """Derivatives by one parameter, means removed, shape (n_records, n_fitted, n).
+
+        In place of `driven`, what a moved model drives.
+        """
         runs, lengths = self.runs, self.unknown.lengths
-        pushed = (driven - runs.driven) / step
+        driven -= runs.driven
+        driven /= step
+        pushed = driven
         flat = turned.reshape(len(turned), -1)
         # What is left of the outputs turns with the space that was taken out of them.
         turning = self.weighed @ flat.T / lengths
         alone = runs.fitter.left_alone.transpose(1, 0, 2)
         answered = (alone @ turned.transpose(1, 2, 0)).transpose(1, 0, 2)
         self.turns.append(turning + runs.reweighing(self.pulls, pushed, answered, lengths))
-        change = pushed + (runs.start @ flat).reshape(pushed.shape)
-        return np.asarray(change - change.mean(axis=2, keepdims=True))
+        pushed += (runs.start @ flat).reshape(pushed.shape)
+        pushed -= pushed.mean(axis=2, keepdims=True)
+        return pushed
 
 
 def _take_motion_out(
