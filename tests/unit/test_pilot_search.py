@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from flightid.responses.errors.pilot import Pilot, Pilots, fit_pilots
-from flightid.responses.errors.pilot_errors import acting, taken_by
+from flightid.responses.errors.pilot_errors import acting, basis_of, spent_in
 from flightid.responses.errors.pilot_search import (
     SPARE,
     PilotBins,
@@ -48,7 +48,8 @@ def test_what_a_fit_takes_of_noise_is_that_of_all_columns() -> None:
     columns = written_out(data, order, target)
     places = [acting(6, order + 1 + SPARE, 2, order, record) for record in range(2)]
     parts = [part[at] for part, at in zip(data.by_record(columns), places, strict=True)]
-    spent, covariance = taken_by(parts, slice(6, 6 + order + 1 + SPARE), weights)
+    basis = basis_of(parts, slice(6, 6 + order + 1 + SPARE), weights)
+    spent, covariance = spent_in(basis), basis.covariance()
     both = np.concatenate([(columns * weights).real, (columns * weights).imag], axis=1)
     inverse = np.linalg.inv(both @ both.T)
     share = 0.5 * np.einsum("ib,ij,jb->b", both, inverse, both).reshape(2, -1).sum(axis=0)
@@ -64,7 +65,7 @@ def test_coefficients_that_all_but_cancel_take_what_their_columns_span() -> None
     for part in beside:
         part[8] = part[0] + 5e-8 * part[8]
     weights = np.ones(140)
-    spent, _ = taken_by(beside, slice(4, 7), weights)
+    spent = spent_in(basis_of(beside, slice(4, 7), weights))
     columns = np.zeros((12, 140), dtype=complex)
     for record, span in enumerate((slice(0, 60), slice(60, 140))):
         columns[[0, 1, 2, 3, 10, 11], span] = beside[record][[0, 1, 2, 3, 7, 8]]

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from flightid.responses.errors.pilot_basis import PilotBasis, weighed_parts
 from flightid.responses.errors.pilot_errors import (
+    basis_of,
     ending_of,
     noise_weights,
     slopes_of,
-    taken_by,
+    spent_in,
 )
 from flightid.responses.errors.pilot_orders import PilotFit
 from flightid.responses.errors.pilot_search import (
@@ -60,16 +61,17 @@ def instrumented(measured: PilotBins, fit: PilotFit) -> PilotFit:
     excited, ending = fit.data, ending_of(fit.state)
     own, others = (data.given.columns(fit.state.order) for data in (measured, excited))
     found, slopes = _with(measured, own, fit.state, fit.weights), fit.slopes
-    taken, omega = taken_by(slopes, ending, fit.weights), np.concatenate(measured.omega)
-    weights = fit.weights
+    basis, weights = basis_of(slopes, ending, fit.weights), fit.weights
+    spent, omega = spent_in(basis), np.concatenate(measured.omega)
     for _ in range(PASSES):
         left = measured.target - found.modelled
-        weights = noise_weights(omega, left, measured.target, taken[0])
-        instruments = PilotBasis.of(weighed_parts(slopes, weights), ending)
+        weights = noise_weights(omega, left, measured.target, spent)
+        instruments = basis_of(slopes, ending, weights)
         found = _settled(measured, own, instruments, _with(measured, own, found, weights), weights)
         slopes = slopes_of(others, _with(excited, others, found, weights))
-        taken = taken_by(slopes, ending, weights)
-    return PilotFit(measured, found, slopes, taken, weights)
+        basis = basis_of(slopes, ending, weights)
+        spent = spent_in(basis)
+    return PilotFit(measured, found, slopes, basis, spent, weights)
 
 
 def _settled(

@@ -210,7 +210,7 @@ def fit_pilots(
 
 
 def _pilot(data: PilotBins, fit: PilotFit) -> Pilot:
-    state, (spent, covariance) = fit.state, fit.taken
+    state, covariance = fit.state, fit.basis.covariance()
     variance = state.cost * data.size / max(2.0 * data.size - len(covariance), 1.0)
     return Pilot(
         data.given.scale_rad_s,
@@ -219,5 +219,5 @@ def _pilot(data: PilotBins, fit: PilotFit) -> Pilot:
         data.samples(data.by_record(state.modelled)),
         data.samples(fit.slopes),
         variance * covariance,
-        tuple(data.by_record(spent)),
+        tuple(data.by_record(fit.spent)),
     )

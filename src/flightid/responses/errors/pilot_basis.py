@@ -126,12 +126,12 @@ class PilotBasis:
         """
         left, right = self.components(values)
         whole: Real = np.zeros((len(right), len(self.shared)))
-        borders = []
-        for place, (rows, part) in enumerate(zip(moved, left, strict=True)):
-            products = self.rows[place] @ rows.T
-            own = self.own[place].T @ products[self.ending]
-            shared = self.shared.T @ _others(products, self.ending) - self.crossed[place].T @ own
-            inverse = np.linalg.pinv(own[:, self.ending], rcond=LEAST)
+        borders, products = [], [mine @ rows.T for mine, rows in zip(self.rows, moved, strict=True)]
+        owns = [mine.T @ each[self.ending] for mine, each in zip(self.own, products, strict=True)]
+        inverses = _inverses([each[:, self.ending] for each in owns])
+        for place, (own, inverse, part) in enumerate(zip(owns, inverses, left, strict=True)):
+            mine = self.shared.T @ _others(products[place], self.ending)
+            shared = mine - self.crossed[place].T @ own
             beside, alone = inverse @ _others(own.T, self.ending).T, inverse @ part
             whole += _others(shared.T, self.ending).T - shared[:, self.ending] @ beside
             right = right - shared[:, self.ending] @ alone
@@ -145,6 +145,13 @@ def weighed_parts(values: Sequence[Complex], weights: Real) -> list[Real]:
     ends = np.cumsum([each.shape[-1] for each in values])[:-1]
     parts = zip(values, np.split(weights, ends), strict=True)
     return [(each * weight).view(np.float64) for each, weight in parts]
+
+
+def _inverses(parts: Sequence[Real]) -> list[Real]:
+    """Pseudo-inverses, at once where all have one shape."""
+    if len({each.shape for each in parts}) == 1:
+        return list(np.asarray(np.linalg.pinv(np.stack(parts), rcond=LEAST)))
+    return [np.asarray(np.linalg.pinv(each, rcond=LEAST)) for each in parts]
 
 
 def _triangle(columns: Real) -> Real:

@@ -56,15 +56,19 @@ def ending_of(state: PilotState) -> slice:
     return slice(first, first + len(state.denominator) + SPARE)
 
 
-def taken_by(slopes: Sequence[Complex], ending: slice, weights: Real) -> tuple[Real, Real]:
-    """Share of each bin's noise that the coefficients took, and their covariance in unit noise.
+def basis_of(slopes: Sequence[Complex], ending: slice, weights: Real) -> PilotBasis:
+    """What coefficients move of the weighed bins, made orthonormal.
 
     A transient acts in the bins of its own record: records are tens, and products of all with all
     would be zeros for the most part.
     """
-    basis = PilotBasis.of(weighed_parts(slopes, weights), ending)
+    return PilotBasis.of(weighed_parts(slopes, weights), ending)
+
+
+def spent_in(basis: PilotBasis) -> Real:
+    """Share of each bin's noise that the coefficients took."""
     taken = [0.5 * each.reshape(-1, 2).sum(axis=1) for each in basis.taken()]
-    return np.minimum(np.concatenate(taken), MOST_SPENT), basis.covariance()
+    return np.asarray(np.minimum(np.concatenate(taken), MOST_SPENT))
 
 
 def noise_weights(omega_rad_s: Real, residual: Complex, target: Complex, spent: Real) -> Real:

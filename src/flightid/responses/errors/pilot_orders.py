@@ -8,12 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.frozen import dataclass
+from flightid.responses.errors.pilot_basis import PilotBasis
 from flightid.responses.errors.pilot_errors import (
     LEAST,
+    basis_of,
     ending_of,
     noise_weights,
     slopes_of,
-    taken_by,
+    spent_in,
 )
 from flightid.responses.errors.pilot_search import (
     ORDERS,
@@ -44,8 +46,10 @@ class PilotFit:
     state : PilotState
     slopes : list of ndarray, each shape (n_acting, n_f)
         Derivatives of each record's modelled bins.
-    taken : (ndarray, ndarray)
-        See `taken_by`.
+    basis : PilotBasis
+        Of the slopes, weighed.
+    spent : ndarray, shape (n_bins,)
+        See `spent_in`.
     weights : ndarray, shape (n_bins,)
         One over the root of the noise's spectrum.
     """
@@ -53,17 +57,19 @@ class PilotFit:
     data: PilotBins
     state: PilotState
     slopes: list[Complex]
-    taken: tuple[Real, Real]
+    basis: PilotBasis
+    spent: Real
     weights: Real
 
     @classmethod
     def of(cls, data: PilotBins, state: PilotState, weights: Real) -> PilotFit:
         """Of a state that was found with weights."""
         slopes = slopes_of(data.given.columns(state.order), state)
-        taken = taken_by(slopes, ending_of(state), weights)
+        basis = basis_of(slopes, ending_of(state), weights)
+        spent = spent_in(basis)
         left = data.target - state.modelled
-        weights = noise_weights(np.concatenate(data.omega), left, data.target, taken[0])
-        return cls(data, state, slopes, taken, weights)
+        weights = noise_weights(np.concatenate(data.omega), left, data.target, spent)
+        return cls(data, state, slopes, basis, spent, weights)
 
 
 def fitted(data: PilotBins, *, beyond: bool = False) -> PilotFit | None:

@@ -46,6 +46,8 @@ def has_unseen_peak(
     poles = _roots(denominator, scale_rad_s)
     inside = (poles.imag > lowest) & (poles.imag < highest)
     hidden = poles[inside & (np.abs(poles.real) < NARROW * spacing)]
+    if not hidden.size:
+        return False
     zeros = [_roots(each, scale_rad_s) for each in numerators]
     return any(
         all(bool(np.min(np.abs(each - pole), initial=np.inf) < spacing) for each in zeros)
