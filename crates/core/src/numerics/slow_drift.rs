@@ -68,13 +68,21 @@ impl Spectrum<'_> {
             );
         }
         let rows = self.cosines.chunks_exact(self.power.len()).take(count);
-        let lag = |row| {
-            widest(
-                #[inline(always)]
-                || product(row, power),
-            )
+        let Some(folded) = Folded::of(power, self.length) else {
+            return rows.map(|row| self.along(row, power)).collect();
         };
-        rows.map(lag).collect()
+        let lag = |(k, row): (usize, &[f64])| {
+            let part = folded.of_lag(k);
+            self.along(&row[..part.len()], part)
+        };
+        rows.enumerate().map(lag).collect()
+    }
+
+    fn along(&self, row: &[f64], power: &[f64]) -> f64 {
+        widest(
+            #[inline(always)]
+            || product(row, power),
+        )
     }
 
     /// The same without a table: cos kω = 2 cos ω cos (k − 1)ω − cos (k − 2)ω.
@@ -188,30 +196,91 @@ impl Spectrum<'_> {
     /// What each part is expected to hold: the autoregression's power, and the drift's variance.
     #[inline(always)]
     fn share(&self, level: &Level<'_>, shape: &[f64], variance: f64, rest: &mut [f64]) -> f64 {
-        let n_bins = rest.len();
         let mut total = [0.0; LANES];
-        for begin in (0..n_bins).step_by(LANES) {
-            let count = LANES.min(n_bins - begin);
-            // Beyond the last bin weights of zero add nothing.
-            let [mut power, mut weight, mut turn, mut own, mut left] = [[0.0; LANES]; 5];
-            for (to, from) in [(&mut power, self.power), (&mut turn, self.turns), (&mut own, shape)]
-            {
-                to[..count].copy_from_slice(&from[begin..begin + count]);
-            }
-            (0..count).for_each(|k| weight[k] = self.weight(begin + k));
-            let other = level.at(&turn);
-            for k in 0..LANES {
-                let own = variance * own[k];
-                let share = own / (other[k] + own).max(f64::MIN_POSITIVE);
-                let mixed = share * other[k];
-                total[k] += weight[k] * (share * share * power[k] + mixed);
-                let beside = 1.0 - share;
-                left[k] = beside * beside * power[k] + mixed;
-            }
-            rest[begin..begin + count].copy_from_slice(&left[..count]);
+        let (powers, power) = self.power.as_chunks::<LANES>();
+        let (turns, turn) = self.turns.as_chunks::<LANES>();
+        let (shapes, shape) = shape.as_chunks::<LANES>();
+        let (wholes, rest) = rest.as_chunks_mut::<LANES>();
+        let mut begin = 0;
+        for (((power, turn), shape), left) in powers.iter().zip(turns).zip(shapes).zip(wholes) {
+            let own = shape.map(|each| variance * each);
+            self.share_of(begin, level, (power, turn, &own), (left, &mut total));
+            begin += LANES;
         }
+        // Bins beyond the last one have no power and no drift.
+        let filled = |part: &[f64]| std::array::from_fn(|k| part.get(k).copied().unwrap_or(0.0));
+        let (power, turn, shape): ([f64; LANES], _, [f64; LANES]) =
+            (filled(power), filled(turn), filled(shape));
+        let (own, mut left) = (shape.map(|each| variance * each), [0.0; LANES]);
+        self.share_of(begin, level, (&power, &turn, &own), (&mut left, &mut total));
+        rest.copy_from_slice(&left[..rest.len()]);
         total.iter().sum()
     }
+
+    /// The same of some bins side by side: power, one less the cosine, the drift's own.
+    #[inline(always)]
+    fn share_of(
+        &self,
+        begin: usize,
+        level: &Level<'_>,
+        (power, turn, own): (&[f64; LANES], &[f64; LANES], &[f64; LANES]),
+        (left, total): (&mut [f64; LANES], &mut [f64; LANES]),
+    ) {
+        let other = level.at(turn);
+        for k in 0..LANES {
+            let share = own[k] / (other[k] + own[k]).max(f64::MIN_POSITIVE);
+            let mixed = share * other[k];
+            total[k] += self.weight(begin + k) * (share * share * power[k] + mixed);
+            let beside = 1.0 - share;
+            left[k] = beside * beside * power[k] + mixed;
+        }
+    }
+}
+
+/// A power whose bins meet those with the same cosine, but for its sign: cos k(π − ω) = ±cos kω.
+struct Folded {
+    /// Of lags that are multiples of four, of other even lags, and of odd ones.
+    parts: [Vec<f64>; 3],
+}
+
+impl Folded {
+    /// None where no bin stands at π.
+    fn of(power: &[f64], length: usize) -> Option<Self> {
+        let last = power.len() - 1;
+        if length % 2 == 1 || last == 0 {
+            return None;
+        }
+        let (mut sums, differences) = met(power);
+        if last % 2 == 1 {
+            return Some(Self { parts: [sums.clone(), sums, differences] });
+        }
+        // The middle bin had nothing to meet: the weights of lags count it twice, the first once.
+        *sums.last_mut()? *= 2.0;
+        let (fourth, other) = met(&sums);
+        Some(Self { parts: [fourth, other, differences] })
+    }
+
+    /// What meets the first numbers of a lag's row.
+    fn of_lag(&self, lag: usize) -> &[f64] {
+        &self.parts[match lag % 4 {
+            0 => 0,
+            2 => 1,
+            _ => 2,
+        }]
+    }
+}
+
+/// Sums and differences of the first bins with the last ones, backwards; the middle one stays.
+fn met(power: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    let (middle, pairs) = (power.len() / 2, power.iter().zip(power.iter().rev()));
+    let pairs = pairs.take(middle);
+    let mut sums: Vec<f64> = pairs.clone().map(|(a, b)| a + b).collect();
+    let mut differences: Vec<f64> = pairs.map(|(a, b)| a - b).collect();
+    if power.len() % 2 == 1 {
+        sums.push(power[middle]);
+        differences.push(0.0);
+    }
+    (sums, differences)
 }
 
 /// The spectrum of an autoregression: what its recursion does not foretell over |1 − Σ w zᵏ|².
