@@ -190,6 +190,10 @@ def _of_starts(
 
 def _whitened(whitener: Array, slopes: Array) -> Array:
     """Slopes (n_outputs, n_samples, k) whitened across outputs, in place."""
+    own = np.diag(whitener)
+    if np.array_equal(whitener, np.diag(own)):
+        slopes *= own[:, None, None]
+        return slopes
     for begin in range(0, slopes.shape[1], AT_ONCE):
         here = slopes[:, begin : begin + AT_ONCE]
         here[:] = np.tensordot(whitener, here, axes=1)
