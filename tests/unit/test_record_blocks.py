@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from flightid.uncertainty import blocks
 from flightid.uncertainty.blocks import RecordBlock, flights_of
+from flightid.uncertainty.coloured_residuals import residual_covariance
 from flightid.uncertainty.parts import RecordParts, chance_alike, chance_where_seen, larger
 from flightid.uncertainty.residual_noise import Autoregression
 
@@ -43,6 +47,58 @@ def test_own_numbers_are_projected_out_and_rows_are_those_of_outputs() -> None:
     turned = made.along(np.eye(3)[:, ::-1])
     assert turned.projected.tolist() == made.projected[:, ::-1].tolist()
     assert (turned.half, turned.middle) == (made.middle,) * 2
+
+
+def test_own_numbers_that_move_some_outputs_count_as_all_of_them_mixed() -> None:
+    """A basis with zeros beside the same space in mixed directions, in noise of every kind."""
+    rng = np.random.default_rng(5)
+    n = 400
+    time = np.linspace(0.0, 1.0, n)
+    shared, own = rng.standard_normal((4, n, 2)), np.zeros((4, n, 6))
+    shared[:, :, 1] = np.exp(-2.0 * time)
+    own[:2, :, 0] = np.exp(-3.0 * time)
+    own[range(4), :, range(1, 5)] = 1.0
+    own[0, -1, 5] = 1.0  # between all samples that are looked at first
+    noise = rng.standard_normal((4, n))
+    noise[1] = lfilter([1.0], [1.0, -0.8], noise[1])
+    noise[2] *= 0.05 + np.abs(shared[2, :, 0])
+    noise[3] += 0.3 * np.cumsum(rng.standard_normal(n))
+    made = RecordBlock.of(shared, own, noise)
+    assert made.basis @ made.triangle == pytest.approx(own.reshape(-1, 6), abs=1e-12)
+    assert [each.tolist() for each in made.own.places] == [[0, 1, 5], [2, 5], [3], [4]]
+    assert [each.shape[1] for each in made.own.columns] == [3, 2, 1, 1]
+    turn = np.linalg.qr(rng.standard_normal((6, 6)))[0]
+    mixed = replace(
+        made,
+        basis=made.basis @ turn,
+        triangle=turn.T @ made.triangle,
+        shared_on_own=turn.T @ made.shared_on_own,
+    )
+    assert all(each.size == 6 for each in mixed.own.places)
+    inputs = [rng.standard_normal((1, n))]
+    known, other = (residual_covariance([each], inputs=inputs) for each in (made, mixed))
+    assert known.growth is not None
+    assert known.orders == other.orders
+    assert sum(known.orders) > 1
+    white = [Autoregression(np.ones(1), np.empty(0), n, 2 * n)] * 4
+    parts = [flights_of(blocks.noise_heard(white, [each]), [each])[0] for each in (made, mixed)]
+    for mine, theirs in (
+        (parts[0].noise, parts[1].noise),
+        (known.covariance, other.covariance),
+        (known.freedom, other.freedom),
+        (known.own[0], other.own[0]),
+        (known.crossed[0], other.crossed[0]),
+        *(
+            (a.values, b.values)
+            for a, b in zip(known.correlations, other.correlations, strict=True)
+        ),
+        *(
+            (a.errors, b.errors)
+            for a, b in zip(known.correlations, other.correlations, strict=True)
+        ),
+        ([a.p_value for a in known.correlations], [b.p_value for b in other.correlations]),
+    ):
+        assert mine == pytest.approx(theirs, rel=1e-9, abs=1e-12)
 
 
 def test_second_halves_begin_where_half_is_told() -> None:

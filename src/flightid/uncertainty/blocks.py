@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from flightid.frozen import dataclass
 from flightid.uncertainty.estimated_levels import EstimatedLevels
 from flightid.uncertainty.fitted_directions import FittedDirections
+from flightid.uncertainty.own_directions import OwnDirections, reaching_few_first, spread
 from flightid.uncertainty.parts import LEAST_INFORMATION, RecordParts
 from flightid.uncertainty.residual_noise import Autoregression
 from flightid.uncertainty.triangle import orthonormal
@@ -32,7 +33,8 @@ class RecordBlock:
     shared_on_own : ndarray, shape (n_own, n)
         What was taken out.
     basis, triangle : ndarray, shapes (n_rows, n_own) and (n_own, n_own)
-        Orthonormal basis and triangle of the own numbers' sensitivities.
+        Orthonormal basis of the own numbers' sensitivities and, times it, what gives these: a
+        triangle whose columns may stand in another order.
     residual : ndarray, shape (n_outputs, n_samples)
     answering : ndarray, shape (n_rows, n), optional
         How residuals go down with the parameters, where `projected` are instruments instead.
@@ -59,9 +61,14 @@ class RecordBlock:
         shares = _information(self.projected).reshape(self.residual.shape)
         return middle_of(shares.sum(axis=0))
 
+    @cached_property
+    def own(self) -> OwnDirections:
+        """`basis` by output."""
+        return OwnDirections(self.basis.reshape(*self.residual.shape, -1))
+
     def of_output(self, output: int) -> tuple[Array, Array]:
-        """Rows of one output: `basis` and `projected`, (n_samples, k) each."""
-        return _of_output(self.basis, self, output), _of_output(self.projected, self, output)
+        """Rows of one output, (n_samples, k) each: of `basis` what reaches it, and `projected`."""
+        return self.own.columns[output], _of_output(self.projected, self, output)
 
     @classmethod
     def of(
@@ -72,9 +79,10 @@ class RecordBlock:
         With `overwrite` what is left of the shared ones takes their memory.
         """
         rows = residual.size
+        order = reaching_few_first(own.reshape(*residual.shape, -1))
         # Columns of longer rows stay where they are.
         shared, own = shared.reshape(rows, -1), own.reshape(rows, -1)
-        basis, triangle = orthonormal(own)
+        basis, triangle = orthonormal(own, order)
         on_own = basis.T @ shared
         projected = shared
         if own.size:
@@ -163,7 +171,10 @@ def _of_output(part: Array, block: RecordBlock, output: int) -> Array:
 
 
 def halves(block: RecordBlock, output: int) -> Array:
-    """[basis, projected in the first half, projected in the second] of one output, (n, m + 2 n)."""
+    """[basis, projected in the first half, projected in the second] of one output.
+
+    Of the basis what reaches the output: shape (n_samples, k + 2 n).
+    """
     own, shared = block.of_output(output)
     m, count, half = own.shape[1], shared.shape[1], block.middle
     wide = np.zeros((len(shared), m + 2 * count))
@@ -230,9 +241,18 @@ def noise_heard(models: Sequence[Autoregression], blocks: Sequence[RecordBlock])
 
 
 def _heard(noise: Autoregression, block: RecordBlock, output: int) -> Array:
-    if noise.is_white:
-        return np.asarray(noise.lags[0] * _squares_of_halves(block, output))
-    return noise.squared(halves(block, output))
+    heard = (
+        np.asarray(noise.lags[0] * _squares_of_halves(block, output))
+        if noise.is_white
+        else noise.squared(halves(block, output))
+    )
+    return of_all_halves(heard, block, output)
+
+
+def of_all_halves(found: Array, block: RecordBlock, output: int) -> Array:
+    """Products of `halves` of one output, those of all of the basis, (m + 2 n, m + 2 n)."""
+    count = 2 * block.projected.shape[1]
+    return spread(found, block.own.within(output, count), block.own.count + count)
 
 
 def directions_taken(blocks: Sequence[RecordBlock]) -> list[FittedDirections]:
@@ -244,7 +264,7 @@ def directions_taken(blocks: Sequence[RecordBlock]) -> list[FittedDirections]:
         ends = np.cumsum([len(each) for each in apart])[:-1]
         shared = np.split(np.linalg.qr(np.vstack(apart))[0], ends)
     return [
-        FittedDirections(*(part.reshape(*block.residual.shape, -1) for part in (block.basis, each)))
+        FittedDirections(block.own.whole, each.reshape(*block.residual.shape, -1), block.own)
         for block, each in zip(blocks, shared, strict=True)
     ]
 
@@ -270,7 +290,7 @@ def _flight(answers: Array, block: RecordBlock) -> RecordParts:
             # A half meets what answers there alone.
             scores[place] += residual[rows] @ shared[rows]
             square[place] += shared[rows].T @ answer[rows]
-            on_own[:, place] += own[rows].T @ shared[rows]
+            on_own[block.own.places[output], place] += own[rows].T @ shared[rows]
     turn = np.vstack([-on_own.reshape(len(on_own), 2 * count), np.eye(2 * count)])
     return RecordParts(scores, square, (turn.T @ answers @ turn).reshape(2, count, 2, count))
 

@@ -123,7 +123,10 @@ class FitResponse:
         met_everywhere = [_met(*pair) for pair in zip(lagged, everywhere, strict=True)]
         for output, noise in enumerate(self.models):
             heard = [each[output] for each in everywhere]
-            met = [each[output] for each in met_everywhere]
+            met = [
+                _of_all(each[output], block, output)
+                for block, each in zip(self.blocks, met_everywhere, strict=True)
+            ]
             scale = np.diag(plain)
             if noise.is_white:
                 raw, covariance = score = self._of_output(output, met, squares)
@@ -132,8 +135,8 @@ class FitResponse:
                 raw, covariance = self._of_output(output, met, squares, columns)
                 sharp = [noise.unshaped(u) for u in columns]
                 met = [
-                    np.concatenate([x.T @ u for x in parts])
-                    for parts, u in zip(heard, sharp, strict=True)
+                    _of_all(np.concatenate([x.T @ u for x in parts]), block, output)
+                    for block, parts, u in zip(self.blocks, heard, sharp, strict=True)
                 ]
                 own = [u.T @ u for u in sharp]
                 score = self._of_output(output, met, own, sharp)
@@ -177,7 +180,8 @@ class FitResponse:
                 u, parts = columns[place], self.blocks[place].of_output(output)
                 whole = noise.squared(np.concatenate([u.T, *(x.T for x in parts)]).T)
                 k = u.shape[1]
-                heard, cross = whole[:k, :k], whole[:k, k:] @ taken
+                reaching = self.blocks[place].own.within(output, n)
+                heard, cross = whole[:k, :k], whole[:k, k:] @ taken[reaching]
             else:
                 heard, cross = noise.lags[0] * square, noise.lags[0] * (own[:-1].T @ taken)
             around = level[place] * (heard - cross - cross.T)
@@ -236,8 +240,16 @@ def judged_correlation(
 
 
 def _heard(block: RecordBlock, output: int) -> list[Array]:
-    """Columns of one output: own numbers' basis, sensitivities, residual."""
+    """Columns of one output: own numbers that reach it, sensitivities, residual."""
     return [x for x in (*block.of_output(output), block.residual[output][:, None]) if x.size]
+
+
+def _of_all(met: Array, block: RecordBlock, output: int) -> Array:
+    """[X, e]ᵀU with rows of zeros for own numbers that do not reach the output."""
+    places = block.own.within(output, block.projected.shape[1], 1)
+    whole = np.zeros((block.own.count + block.projected.shape[1] + 1, met.shape[1]))
+    whole[places] = met
+    return whole
 
 
 def _met(inputs: LaggedInputs, everywhere: Sequence[Sequence[Array]]) -> list[Array]:

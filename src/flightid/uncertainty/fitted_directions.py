@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid import _native
 from flightid.frozen import dataclass
+from flightid.uncertainty.own_directions import OwnDirections
 
 Array = NDArray[np.float64]
 TURN, TERMS = 0.5, 12
@@ -27,10 +28,22 @@ class FittedDirections:
         Of numbers that belong to this record.
     shared : ndarray, shape (n_outputs, n, n_shared)
         Of parameters; orthonormal over all records together.
+    known : OwnDirections, optional
+        What is known of `own` already.
     """
 
     own: Array
     shared: Array
+    known: OwnDirections | None = None
+
+    @cached_property
+    def reaching(self) -> OwnDirections:
+        """Of each output, the own directions that reach it."""
+        return OwnDirections(self.own) if self.known is None else self.known
+
+    def places(self, output: int) -> NDArray[np.intp]:
+        """Which of all directions, the own ones first, reach an output."""
+        return self.reaching.within(output, self.shared.shape[2])
 
 
 def lags_of_form(columns: Array, form: Array, n_lags: int) -> Array:

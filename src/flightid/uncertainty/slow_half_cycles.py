@@ -15,6 +15,7 @@ import scipy
 from numpy.typing import NDArray
 
 from flightid.uncertainty.fitted_directions import FittedDirections
+from flightid.uncertainty.own_directions import spread
 from flightid.uncertainty.residual_noise import Autoregression
 
 Array = NDArray[np.float64]
@@ -86,11 +87,17 @@ def slowest(residual: Array, taken: FittedDirections, size: Array, n_bins: int) 
     starts = np.arange(0, n, span)
     turns = _cosines(n_bins, (n, span, len(starts)))
     found = []
-    for own, shared, row, level in zip(taken.own, taken.shared, residual, size, strict=True):
+    count = taken.own.shape[2] + taken.shared.shape[2] + 1
+    parts = zip(taken.reaching.columns, taken.shared, residual, size, strict=True)
+    for output, (own, shared, row, level) in enumerate(parts):
         columns = [own, shared, row[:, None]]
         if span > 1:
             columns = [np.add.reduceat(each, starts, axis=0) for each in columns]
-        found.append(turns @ np.hstack(columns) / level)
+        whole = np.zeros((n_bins, count))
+        whole[:, taken.reaching.within(output, shared.shape[1], 1)] = (
+            turns @ np.hstack(columns) / level
+        )
+        found.append(whole)
     return np.array(found)
 
 
@@ -106,10 +113,11 @@ def half_cycles(
     n = residual.shape[1]
     high, levels = np.zeros((n_outputs, width, width)), np.zeros((n_outputs, n_bins))
     for o, model in enumerate(fast):
-        columns = np.hstack([taken.own[o], taken.shared[o], residual[o][:, None]])
+        columns = np.hstack([taken.reaching.columns[o], taken.shared[o], residual[o][:, None]])
+        places = taken.reaching.within(o, taken.shared.shape[2], 1)
         if model.is_white:
             levels[o] = model.lags[0]
-            whole = columns.T @ columns / size[o] ** 2
+            whole = spread(columns.T @ columns / size[o] ** 2, places, width)
             high[o] = (whole - low[o].T @ low[o]) / model.lags[0]
             continue
         turned = scipy.fft.dct(columns, axis=0, norm="ortho", overwrite_x=True) / size[o]
@@ -117,5 +125,5 @@ def half_cycles(
         level = np.interp(np.arange(n), np.linspace(0.0, n, len(spectrum)), spectrum)
         levels[o] = level[:n_bins]
         turned[n_bins:] /= np.sqrt(level[n_bins:, None])
-        high[o] = turned[n_bins:].T @ turned[n_bins:]
+        high[o] = spread(turned[n_bins:].T @ turned[n_bins:], places, width)
     return HalfCycleSums(high, low, levels, taken.own.shape[2], n - n_bins)

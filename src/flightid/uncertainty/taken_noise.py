@@ -16,6 +16,7 @@ import scipy
 from numpy.typing import NDArray
 
 from flightid.uncertainty.fitted_directions import FittedDirections, lags_of_form, slow_transforms
+from flightid.uncertainty.own_directions import spread
 from flightid.uncertainty.periodograms import twice
 from flightid.uncertainty.transformed_columns import of_both, powers_of, squares_of, transforms
 
@@ -66,10 +67,14 @@ class TakenNoise:
 
     def forms(self, models: Sequence[ModelledNoise]) -> list[Array]:
         """Qᵀ Ω Q by record: of its own numbers and, of all records together, the shared ones."""
-        found = [
-            np.sum([self._answer(k, o, model) for o, model in enumerate(models)], axis=0)
-            for k in range(len(self._taken))
-        ]
+        found = []
+        for k, each in enumerate(self._taken):
+            count = each.own.shape[2] + each.shared.shape[2]
+            answers = [
+                spread(self._answer(k, o, model), each.places(o), count)
+                for o, model in enumerate(models)
+            ]
+            found.append(np.sum(answers, axis=0))
         n_own = [each.own.shape[2] for each in self._taken]
         shared = sum(each[m:, m:] for each, m in zip(found, n_own, strict=True))
         for each, m in zip(found, n_own, strict=True):
@@ -94,6 +99,7 @@ class TakenNoise:
         lags, power = np.zeros(self._n_lags), np.zeros(self._n_bins)
         for k, each in enumerate(forms):
             form = 2.0 * level * np.eye(len(each)) - each
+            form = self._reaching(form, k, output)
             slow = _kept(self._slow, (k, output), self._slowest)
             lags += self._lags(k, output, form)
             power += np.sum((slow @ form) * slow.conj(), axis=1).real
@@ -105,15 +111,21 @@ class TakenNoise:
         lost = np.zeros(len(spectrum))
         for k, each in enumerate(forms):
             part, n = self._transformed(k, output), self._taken[k].shared.shape[1]
+            form = self._reaching(each, k, output)
             if model.is_white:
-                lost += powers_of(2.0 * spectrum[0] * np.eye(len(part)) - each, part)
+                lost += powers_of(2.0 * spectrum[0] * np.eye(len(part)) - form, part)
                 continue
             shaped = part * of_both(spectrum)  # which ends with the record
             ended = scipy.fft.irfft(shaped.view(np.complex128), self._length)[:, :n]
             turned = scipy.fft.rfft(ended, self._length).view(np.float64)
             met = np.einsum("kb,kb->b", turned, part)
-            lost += 2.0 * (met[::2] + met[1::2]) - powers_of(each, part)
+            lost += 2.0 * (met[::2] + met[1::2]) - powers_of(form, part)
         return lost
+
+    def _reaching(self, form: Array, record: int, output: int) -> Array:
+        """Of a form in all directions, the part of those that reach an output."""
+        places = self._taken[record].places(output)
+        return form if len(places) == len(form) else form[np.ix_(places, places)]
 
     def _answer(self, record: int, output: int, model: ModelledNoise) -> Array:
         if model.is_white:
@@ -153,12 +165,12 @@ class TakenNoise:
         return np.block([[own.T @ own, beside], [beside.T, shared.T @ shared]])
 
     def _apart(self, record: int, output: int) -> tuple[Array, Array]:
-        """Own and shared directions of an output, (n, n_own) and (n, n_shared)."""
+        """Own and shared directions that reach an output, (n, n_own) and (n, n_shared)."""
         taken = self._taken[record]
-        return taken.own[output], taken.shared[output]
+        return taken.reaching.columns[output], taken.shared[output]
 
     def _together(self, record: int, output: int, samples: slice = slice(None)) -> Array:
-        """Own and shared directions of an output side by side, (n, n_own + n_shared)."""
+        """Own and shared directions that reach an output side by side."""
         own, shared = self._apart(record, output)
         if not own.shape[1]:
             return shared[samples]

@@ -187,8 +187,10 @@ def triangle_of_parts(
     return found
 
 
-def orthonormal(columns: Array) -> tuple[Array, Array]:
+def orthonormal(columns: Array, order: NDArray[np.intp] | None = None) -> tuple[Array, Array]:
     """Q and R of columns = QR; the signs of R's rows are as they come.
+
+    In another `order` of the columns R is a triangle once its columns stand in it.
 
     By products of columns, once more of what the first round leaves, where these keep enough
     digits; else by reflections, which cost four times as much.
@@ -196,6 +198,8 @@ def orthonormal(columns: Array) -> tuple[Array, Array]:
     Parameters
     ----------
     columns : ndarray, shape (n, k)
+    order : ndarray of int, shape (k,), optional
+        In which they are taken in.
 
     Returns
     -------
@@ -212,15 +216,38 @@ def orthonormal(columns: Array) -> tuple[Array, Array]:
     >>> np.abs(basis).ravel(), np.abs(triangle).ravel()
     (array([0.6, 0.8]), array([5.]))
     """
-    first = _of_products(lambda: [columns]) if len(columns) >= ROWS else None
+    if order is not None:
+        found = _orthonormal(columns, order)
+        return found[0], found[1][:, np.argsort(order)]
+    return _orthonormal(columns, np.arange(columns.shape[1]))
+
+
+def _orthonormal(columns: Array, order: NDArray[np.intp]) -> tuple[Array, Array]:
+    first = None
+    if len(columns) >= ROWS:
+        with np.errstate(over="ignore", invalid="ignore"):
+            products = (columns.T @ columns)[np.ix_(order, order)]
+        first = _of_products(
+            lambda: [_in_order(columns, order)],
+            products,
+            lambda places: [columns[:, order[places]]],
+        )
     if first is None or np.any(np.diag(first) == 0.0):
-        return np.linalg.qr(columns)
-    basis = columns @ np.triu(np.linalg.inv(first))
+        return np.linalg.qr(_in_order(columns, order))
+    # Columns stay where they are: rows of the inverse stand in their order instead.
+    turn = np.empty_like(first)
+    turn[order] = np.triu(np.linalg.inv(first))
+    basis = columns @ turn
     products = basis.T @ basis
     if not np.max(np.abs(products - np.eye(len(products))), initial=0.0) < NEAR_UNIT:
-        return np.linalg.qr(columns)
+        return np.linalg.qr(_in_order(columns, order))
     second = np.linalg.cholesky(products).T
     inverse = np.triu(np.linalg.inv(second))
     for begin in range(0, len(basis), CACHED):
         basis[begin : begin + CACHED] = basis[begin : begin + CACHED] @ inverse
     return basis, np.asarray(second @ first)
+
+
+def _in_order(columns: Array, order: NDArray[np.intp]) -> Array:
+    """Without a copy where they stand so: long records are large."""
+    return columns if np.all(np.diff(order) > 0) else columns[:, order]

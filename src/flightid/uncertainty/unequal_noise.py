@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from flightid._native import ranks
 from flightid.frozen import dataclass
 from flightid.recursive_filter import filtered
-from flightid.uncertainty.blocks import RecordBlock, halves, levels
+from flightid.uncertainty.blocks import RecordBlock, halves, levels, of_all_halves
 from flightid.uncertainty.quantiles import normal_quantiles
 from flightid.uncertainty.residual_noise import Autoregression
 
@@ -41,8 +41,8 @@ class Innovations:
 
     Attributes
     ----------
-    columns : ndarray, shape (n_samples, m + 2 n)
-        What own numbers and parameters, by halves, hear of each innovation.
+    columns : ndarray, shape (n_samples, k + 2 n)
+        What own numbers that reach the output and parameters, by halves, hear of each innovation.
     errors : ndarray, shape (n_samples,)
         Innovations over the root of the share that the fit left of them.
     free : ndarray, shape (n_samples,)
@@ -251,7 +251,7 @@ def with_excess(
     for output, parts in unequal.items():
         for record, part in enumerate(parts):
             level = share[record, output] * models[output].innovation
-            made[record][output] += part.excess(level)
+            made[record][output] += of_all_halves(part.excess(level), blocks[record], output)
     return made
 
 
