@@ -58,6 +58,8 @@ pub struct OutputError<'a, T: Trajectories> {
     /// Calls of `cost` since then.
     tried: usize,
     moments: Option<Moments>,
+    /// Under the present weights, at `theta`; where one pass serves.
+    weighed: Option<Moments>,
 }
 
 impl<'a, T: Trajectories> OutputError<'a, T> {
@@ -84,8 +86,18 @@ impl<'a, T: Trajectories> OutputError<'a, T> {
         // Residuals at numbers of a record that are not at their best yet would count as noise.
         let alone = data.iter().all(|each| each.n_free() == 0);
         let gathers = settles && alone && !noise.full && noise.limit.is_infinite();
-        let (tried, moments) = (0, None);
-        Ok(Self { trajectories, data, weights, passes, settles, gathers, theta, tried, moments })
+        Ok(Self {
+            trajectories,
+            data,
+            weights,
+            passes,
+            settles,
+            gathers,
+            theta,
+            tried: 0,
+            moments: None,
+            weighed: None,
+        })
     }
 
     /// Run a task on every record, in parallel, the answers in the order of the records.
@@ -137,6 +149,8 @@ impl<'a, T: Trajectories> OutputError<'a, T> {
     fn parts(&mut self, x: &[f64]) -> Result<Vec<Part>, CoreError> {
         let weights = self.weights.clone();
         if self.gathers {
+            let moments = self.passes.iter().map(|pass| pass.gathered(&weights)).collect();
+            self.weighed = Some(Moments::total(moments));
             let found = self.weigh().into_iter().zip(&mut self.passes);
             return Ok(found.map(|(each, pass)| pass.keep_gathered(each, &weights)).collect());
         }
@@ -163,9 +177,15 @@ impl<'a, T: Trajectories> OutputError<'a, T> {
             self.follow(&vec![0.0; theta.len()], 1.0);
             self.passes.iter_mut().for_each(RecordPass::accept);
         }
-        let moments = self.take_moments(&theta)?;
-        self.weights.update(&moments)?;
-        let moments = self.take_moments(&theta)?;
+        let moments = match self.weighed.take() {
+            // The last linearisation was here: it took R from these residuals, and weighed them.
+            Some(moments) if theta == self.theta => moments,
+            _ => {
+                let moments = self.take_moments(&theta)?;
+                self.weights.update(&moments)?;
+                self.take_moments(&theta)?
+            }
+        };
         Ok(Estimate {
             theta,
             objective: self.weights.objective(&moments),

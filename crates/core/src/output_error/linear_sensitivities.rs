@@ -42,7 +42,8 @@ impl Workspace {
     }
 }
 
-/// Coefficients of the recursion, the columns in chunks of `LANES`.
+/// Coefficients of the recursion, the derivatives' columns in chunks of `LANES`: in a row the outputs
+/// stand before them.
 #[derive(Debug, Clone)]
 pub struct Recursion {
     n: usize,
@@ -56,7 +57,9 @@ pub struct Recursion {
     n_sources: usize,
     /// Φ then C, (n + p) × n.
     matrix: Vec<f64>,
-    /// By chunk, row and source; the first column is the state itself.
+    /// What drives the state itself, by row and source.
+    drive: Vec<f64>,
+    /// What drives the derivatives, by chunk, row and source.
     forcing: Vec<[f64; LANES]>,
     /// What acts on the state and, with the state itself, on the outputs, by row.
     plain: Vec<Acting<1>>,
@@ -98,28 +101,33 @@ impl Recursion {
         // The last source is the constant that drives the shifts' columns.
         let n_sources = n + taps.len() + 1;
         let rows = n + p;
+        let n_chunks = (wanted.columns(n_theta) - 1).div_ceil(LANES);
         let mut layout = Self {
             n,
             p,
             n_theta,
             stride,
-            n_chunks: if wanted.columns(n_theta) > 1 { stride / LANES } else { 0 },
+            n_chunks,
             n_sources,
             matrix: [discrete.transition.as_slice(), &continuous.c].concat(),
-            forcing: vec![[0.0; LANES]; stride / LANES * rows * n_sources],
+            drive: vec![0.0; rows * n_sources],
+            forcing: vec![[0.0; LANES]; n_chunks * rows * n_sources],
             plain: Vec::new(),
             seen: Vec::new(),
             acting: Vec::new(),
             taps,
         };
         for (place, &t) in used.iter().enumerate() {
-            layout.add_tap(discrete, t, n + place, 0);
+            let tap = &discrete.taps[t];
+            for (row, &weight) in tap.state.iter().chain(&tap.output).enumerate() {
+                layout.drive[row * n_sources + n + place] += weight;
+            }
             for (j, slope) in slopes[..n_theta].iter().enumerate() {
-                layout.add_tap(slope, t, n + place, 1 + j);
+                layout.add_tap(slope, t, n + place, j);
             }
             if let (Some(input), _) = layout.taps[place] {
                 for (s, _) in wanted.shift.iter().enumerate().filter(|&(_, &each)| each == input) {
-                    let column = 1 + n_theta + wanted.initial.len() + s;
+                    let column = n_theta + wanted.initial.len() + s;
                     layout.add_tap(discrete, t, n_sources - 1, column);
                 }
             }
@@ -129,7 +137,7 @@ impl Recursion {
             let outputs = continuous.slopes[j].c.chunks_exact(n.max(1));
             for (row, weights) in rates.chain(outputs).enumerate() {
                 for (source, &weight) in weights.iter().enumerate() {
-                    layout.add(row, source, 1 + j, weight);
+                    layout.add(row, source, j, weight);
                 }
             }
         }
@@ -144,16 +152,13 @@ impl Recursion {
         let entries = |row: usize| line(row).iter().copied().enumerate();
         self.seen =
             (n..rows).map(|row| entries(row).filter(|&(_, each)| each != 0.0).collect()).collect();
-        let first = self.forcing.chunks_exact(self.n_sources).take(rows);
-        let plain = first.enumerate().map(|(row, weights)| {
+        let plain = self.drive.chunks_exact(self.n_sources).enumerate().map(|(row, weights)| {
             let states = entries(row).filter(|_| row >= n).map(|(at, each)| (at, [each]));
-            let sources = weights.iter().enumerate().map(|(at, each)| (at, [each[0]]));
+            let sources = weights.iter().enumerate().map(|(at, &each)| (at, [each]));
             Acting::of(states.chain(sources))
         });
         self.plain = plain.collect();
-        // The state has had its own pass.
-        self.forcing.iter_mut().take(rows * self.n_sources).for_each(|weights| weights[0] = 0.0);
-        let each = self.forcing.chunks_exact(self.n_sources).take(self.n_chunks * rows);
+        let each = self.forcing.chunks_exact(self.n_sources);
         self.acting = each.map(|weights| Acting::of(weights.iter().copied().enumerate())).collect();
     }
 
@@ -184,7 +189,7 @@ impl Recursion {
     pub fn workspace(&self, initial: &[f64], wanted: &Wanted<'_>) -> Workspace {
         let mut slopes = vec![[0.0; LANES]; self.n_chunks * self.n];
         for (offset, &l) in wanted.initial.iter().enumerate() {
-            let column = 1 + self.n_theta + offset;
+            let column = self.n_theta + offset;
             slopes[column / LANES * self.n + l][column % LANES] = 1.0;
         }
         Workspace {
@@ -246,12 +251,17 @@ impl Recursion {
         let lines = &moved[chunk * self.n..(chunk + 1) * self.n];
         let acting = &self.acting[chunk * (self.n + self.p) + self.n..];
         for (o, (seen, acting)) in self.seen.iter().zip(acting).enumerate() {
-            let at = o * self.stride + chunk * LANES;
+            let at = o * self.stride + 1 + chunk * LANES;
             let place = |line: &Columns, factor: f64, rows: &mut [f64]| {
                 let places = rows.chunks_exact_mut(self.row_length());
                 for (row, values) in places.zip(line) {
-                    if let Some(into) = row[at..].first_chunk_mut::<LANES>() {
-                        *into = values.map(|value| factor * value);
+                    let values = values.map(|value| factor * value);
+                    let into = &mut row[at..];
+                    // Zeros of the last chunk may reach the next output's place, which is written
+                    // later, or beyond the row.
+                    match into.first_chunk_mut::<LANES>() {
+                        Some(into) => *into = values,
+                        None => into.copy_from_slice(&values[..into.len()]),
                     }
                 }
             };

@@ -210,7 +210,12 @@ impl RecordPass {
         let (trajectories, scratch) = (task.trajectories, &mut self.scratch);
         let (shared, record) = (task.shared, task.record);
         trajectories.run(shared, record, &initial, &shift, &wanted, scratch, &mut sink)?;
-        Ok(self.sums.moments(task.weights))
+        Ok(self.gathered(task.weights))
+    }
+
+    /// Moments of what `gather` kept under some weights.
+    pub fn gathered(&self, weights: &Weights) -> Moments {
+        self.sums.moments(weights)
     }
 
     /// Normal equations from what `gather` kept, of a record without numbers of its own.
@@ -223,7 +228,7 @@ impl RecordPass {
 
     /// Keep what `weigh` found.
     pub fn keep_gathered(&mut self, found: Elimination, weights: &Weights) -> Part {
-        let cost = self.sums.moments(weights).cost;
+        let cost = self.gathered(weights).cost;
         let part = Part { rest: found.rest.clone(), beside: 0.0, cost };
         self.elimination = found;
         part
